@@ -408,9 +408,9 @@ def onset(
 
     from stiction.methods import methods
     from stiction.methods import onset as find
-    from stiction.results import ONSET_VARIABLES
     from stiction.study.export import table_of
     from stiction.study.study import read_setup
+    from stiction.variables import ONSET_VARIABLES
 
     setup = read_setup(study)
     problem, own = setup.problem, setup.method

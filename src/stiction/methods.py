@@ -18,13 +18,13 @@ from stiction.model import Progress, checked, to_plain
 from stiction.problem import Problem, Sample, refusals
 from stiction.profiles.placing import with_gaps
 from stiction.progress import Meter
-from stiction.results import (
+from stiction.results import to_dataset
+from stiction.variables import (
     DIRECTION,
     FRICTION_COEFFICIENT,
     ONSET_VARIABLES,
     SAMPLE,
     Variable,
-    to_dataset,
 )
 
 if TYPE_CHECKING:

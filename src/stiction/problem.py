@@ -19,8 +19,8 @@ from stiction.load import Load, LoadShape
 from stiction.model import Mode, describe, is_unplaced, model, real_array
 from stiction.profiles.placing import Gaps, describe_gaps, turned
 from stiction.profiles.reading import at_nodes
-from stiction.results import PROFILES
 from stiction.solid import Solid
+from stiction.variables import PROFILES
 
 FEWEST_NODES = 4
 LARGEST = 1e100

@@ -21,9 +21,9 @@ from stiction.errors import InputError
 from stiction.files import write_whole
 from stiction.plot.axes import scaled, shown_quantity
 from stiction.plot.style import PAGE, new_figure, panel, paper_style
-from stiction.results import DIRECTION
 from stiction.statistics.estimates import mean, quantiles, standard_deviation
 from stiction.study.run import StoredRun
+from stiction.variables import DIRECTION
 
 MOST_ROWS = 200
 MOST_FIGURES = 12

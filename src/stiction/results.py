@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
@@ -13,66 +13,10 @@ from numpy.typing import NDArray
 
 from stiction import __version__
 from stiction.interface import Interface
+from stiction.variables import DIRECTION, ONSET_VARIABLES, Variable
 
 if TYPE_CHECKING:
     import xarray as xr
-
-
-@dataclass(frozen=True)
-class Variable:
-    """Unit, meaning and dimensions of a variable of a result.
-
-    Attributes
-    ----------
-    units : str
-        SI; "1" for a pure number.
-    long_name : str
-    dims : tuple of str
-        The first is 'sample' for all variables of a method.
-    """
-
-    units: str
-    long_name: str
-    dims: tuple[str, ...] = ("sample",)
-
-    @property
-    def wide(self) -> bool:
-        """Whether a sample has one value a node, and not one or one a direction."""
-        return not set(self.dims[1:]) <= {DIRECTION}
-
-
-PROFILES: dict[str, Variable] = {
-    "strength": Variable("Pa", "peak strength"),
-    "residual_strength": Variable("Pa", "residual strength"),
-    "initial_stress": Variable("Pa", "initial stress"),
-    "weakening_rate": Variable("Pa m-1", "weakening rate"),
-    "critical_slip": Variable("m", "critical slip"),
-    "fracture_energy": Variable("J m-2", "fracture energy"),
-    "normal_pressure": Variable("Pa", "normal pressure"),
-}
-"""What may be given or sampled along an interface, with its unit; the order is that of the streams
-of random draws and never changes."""
-FRICTION_COEFFICIENT = Variable("1", "static friction coefficient")
-QUANTITIES = PROFILES | {
-    "residual_ratio": Variable("1", "residual ratio"),
-    "load_profile": Variable("1", "load profile"),
-    "slip": Variable("m", "slip"),
-    "friction_coefficient": FRICTION_COEFFICIENT,
-    "height": Variable("m", "height"),
-}
-"""What may be read as a profile."""
-
-DIRECTION = "direction"
-"""Dimension of the components along x and y."""
-
-ONSET_VARIABLES: dict[str, Variable] = {
-    "critical_load": Variable("Pa", "load factor at which the interface slides as a whole"),
-    "critical_stress": Variable("Pa", "mean interface stress at the critical load"),
-    "first_instability": Variable(
-        "Pa", "mean interface stress when the first patch is unstable"
-    ),
-    "critical_position": Variable("m", "position of the critical patch"),
-}
 
 
 def along(interface: Interface, variable: Variable) -> Variable:
@@ -132,6 +76,3 @@ def to_dataset(
         coords={name: labelled(*given) for name, given in coordinates.items()},
         attrs=attrs,
     )
-
-
-SAMPLE = Variable("1", "sample number", ("sample",))

@@ -9,14 +9,16 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.results import Variable, onset_variables
+from stiction.results import onset_variables
+from stiction.variables import Variable
 
 METHOD = '''\
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from stiction.results import Variable, onset_variables
+from stiction.results import onset_variables
+from stiction.variables import Variable
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ from stiction.criterion.windows import Window, windows_of
 from stiction.errors import InputError, warn_accuracy
 from stiction.model import checked, model
 from stiction.problem import Problem, Sample, refusals
-from stiction.results import Variable, onset_variables, position
+from stiction.results import onset_variables, position
+from stiction.variables import Variable
 
 SLIP = {1: 0.6614, 2: 1.3788}
 """W times the slip at the centre of a critical patch over the curvature of its strength, in one and

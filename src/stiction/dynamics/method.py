@@ -28,7 +28,8 @@ from stiction.friction.laws import FrictionLaw
 from stiction.friction.parameters import SMALLEST_EIGENVALUE
 from stiction.model import Count, Flag, Positive, Real, model
 from stiction.problem import Problem, Sample, steepest_rate
-from stiction.results import Variable, onset_variables
+from stiction.results import onset_variables
+from stiction.variables import Variable
 
 Fraction = Annotated[Real, Field(gt=0, le=1)]
 

@@ -20,7 +20,8 @@ from stiction.errors import InputError, StoreError, unknown_name
 from stiction.files import UNREADABLE, read_arrays, write_arrays, write_whole
 from stiction.interface import Interface
 from stiction.model import Count, FilePath, Names, Real, Text, checked, model
-from stiction.results import Variable, along, coordinate, to_dataset
+from stiction.results import along, coordinate, to_dataset
+from stiction.variables import Variable
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -24,7 +24,8 @@ from stiction.model import Progress, checked, to_plain
 from stiction.problem import Problem, refusals
 from stiction.profiles.placing import with_gaps
 from stiction.progress import Meter
-from stiction.results import Variable, along, to_dataset
+from stiction.results import along, to_dataset
+from stiction.variables import Variable
 
 if TYPE_CHECKING:
     import xarray as xr

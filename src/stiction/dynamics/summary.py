@@ -12,7 +12,8 @@ from stiction.dynamics.integrator import Run
 from stiction.dynamics.state import Floats, State
 from stiction.interface import Interface
 from stiction.problem import Problem
-from stiction.results import Variable, position
+from stiction.results import position
+from stiction.variables import Variable
 
 _SCALARS: dict[str, Variable] = {
     "applied_load": Variable("Pa", "load factor applied at the largest mean stress"),

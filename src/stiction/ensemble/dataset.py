@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from stiction.ensemble.batches import NUMBER, POINT, Failure, Table
 from stiction.ensemble.experiment import Experiment
 from stiction.model import check_memory
-from stiction.results import SAMPLE, Variable, coordinate, to_dataset
+from stiction.results import coordinate, to_dataset
+from stiction.variables import SAMPLE, Variable
 
 if TYPE_CHECKING:
     import xarray as xr

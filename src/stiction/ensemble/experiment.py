@@ -25,7 +25,8 @@ from stiction.random.stresses import (
     mean_in_stress,
     profiles_in_stress,
 )
-from stiction.results import PROFILES, Variable, along
+from stiction.results import along
+from stiction.variables import PROFILES, Variable
 
 AnyRandom: TypeAlias = RandomInterface | RandomField
 

@@ -12,7 +12,8 @@ from stiction.equilibrium.solver import Solver, event_variables
 from stiction.model import Flag, Real, _count, model
 from stiction.problem import Problem
 from stiction.problem import Sample as Samples
-from stiction.results import Variable, along, onset_variables, position
+from stiction.results import along, onset_variables, position
+from stiction.variables import Variable
 
 Number = Annotated[int, BeforeValidator(_count), Field(ge=0)]
 Gap: TypeAlias = Annotated[Real, Field(ge=1e-10, le=1e-2)]

@@ -17,7 +17,8 @@ from stiction.equilibrium.solver import (
 from stiction.errors import InputError, warn_accuracy
 from stiction.model import check, check_memory, real_array, to_plain
 from stiction.problem import Problem
-from stiction.results import Variable, along, to_dataset
+from stiction.results import along, to_dataset
+from stiction.variables import Variable
 
 LOAD = Variable("Pa", "load factor tau_0", ("load",))
 VARIABLES = {

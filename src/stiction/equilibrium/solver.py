@@ -29,7 +29,8 @@ from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
 from stiction.problem import Problem
 from stiction.problem import Sample as Samples
-from stiction.results import Variable, position
+from stiction.results import position
+from stiction.variables import Variable
 
 FINE = 8.0
 """Nodes in the nucleation length below which there is a warning."""

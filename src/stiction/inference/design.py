@@ -19,7 +19,8 @@ from stiction.problem import Problem
 from stiction.progress import Meter
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
-from stiction.results import Variable, to_dataset
+from stiction.results import to_dataset
+from stiction.variables import Variable
 
 POINTS = 8_000
 """Of the grid of each posterior."""

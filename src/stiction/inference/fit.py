@@ -27,7 +27,7 @@ from stiction.inference.window import Window
 from stiction.interface import Interface
 from stiction.model import Count, Flag, Number, Progress, Real, at_least, checked, is_finite
 from stiction.random.random_field import RandomField
-from stiction.results import QUANTITIES
+from stiction.variables import QUANTITIES
 
 MARGINALS = ("lognormal", "weibull", "gamma", "beta")
 ENOUGH_LENGTHS = 10.0

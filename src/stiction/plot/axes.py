@@ -15,7 +15,7 @@ from stiction.interface import Interface
 from stiction.model import check
 from stiction.plot.style import COLUMN, paper_style
 from stiction.problem import Problem
-from stiction.results import FRICTION_COEFFICIENT
+from stiction.variables import FRICTION_COEFFICIENT
 
 _MULTIPLES: dict[str, tuple[float, dict[str, float]]] = {
     "m": (1.0, {"km": 1e-3, "m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}),

@@ -26,7 +26,7 @@ from stiction.plot.style import (
     panel,
     paper_style,
 )
-from stiction.results import QUANTITIES
+from stiction.variables import QUANTITIES
 
 Array = NDArray[np.float64]
 

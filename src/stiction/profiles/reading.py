@@ -21,7 +21,7 @@ from stiction.model import FilePath, Flag, check, checked, describe, real_array
 from stiction.profiles.placing import MEASURED, OF_A_PLANE, Gaps, close_gaps, place
 from stiction.profiles.tables import load
 from stiction.profiles.units import factor_to, is_in, parse
-from stiction.results import QUANTITIES
+from stiction.variables import QUANTITIES
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -21,7 +21,7 @@ from stiction.random.mapping import from_normal
 from stiction.random.marginals import AnyMarginal
 from stiction.random.random_field import RandomField
 from stiction.random.synthesis import BLOCK, Stream, block_of
-from stiction.results import PROFILES
+from stiction.variables import PROFILES
 
 NAMES = tuple(PROFILES)
 COEFFICIENTS = ("strength", "residual_strength", "initial_stress")  # or stresses

@@ -28,7 +28,8 @@ from stiction.reliability.answer import (
 from stiction.reliability.failure import FREQUENT
 from stiction.reliability.tail import sample_tail
 from stiction.reliability.uncertainty import lognormal_interval
-from stiction.results import Variable, to_dataset
+from stiction.results import to_dataset
+from stiction.variables import Variable
 
 COMMONEST = 0.5
 

@@ -29,7 +29,8 @@ from stiction.reliability.answer import (
 from stiction.reliability.counting import count_failures
 from stiction.reliability.tail import Tail, sample_tail
 from stiction.reliability.uncertainty import generator, lognormal_interval
-from stiction.results import ONSET_VARIABLES, PROFILES, along
+from stiction.results import along
+from stiction.variables import ONSET_VARIABLES, PROFILES
 
 PILOT = 1_000
 """Plain samples by which the algorithm is chosen."""

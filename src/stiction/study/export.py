@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from stiction.errors import InputError, warn_accuracy
 from stiction.files import cannot, write_whole
-from stiction.results import DIRECTION
+from stiction.variables import DIRECTION
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -22,7 +22,7 @@ from stiction.model import (
     to_plain,
 )
 from stiction.profiles.reading import profile_in_file, quantity_of
-from stiction.results import PROFILES, QUANTITIES, Variable
+from stiction.variables import PROFILES, QUANTITIES, Variable
 
 MOST_POINTS = 100_000
 _FIXED = (
