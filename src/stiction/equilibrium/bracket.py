@@ -5,7 +5,7 @@ For A = K - W, strength less initial stress s and load profile p, the onset is
     max {tau_0 : d >= 0, A d + s - tau_0 p >= 0} = min {<s, y>/<p, y> : y >= 0, A y <= 0}.
 
 Any d >= 0 bounds it from below and any y from above, whatever they were computed with: A need not
-be a Z-matrix. Bisection is the plain algorithm, robust and linear in the digits asked for: it
+be a Z-matrix. Bisection is robust, and its steps are proportional to the number of digits: it
 starts `turning_point`, which closes the bracket, and takes over where that fails.
 """
 
@@ -89,10 +89,10 @@ def _upper_bound(
 
 @dataclass
 class Bracket:
-    """Programme of one sample on a grid, and what is known of its solution.
+    """Programme of one sample on a grid, with the bounds of its solution found so far.
 
-    Strength less initial stress (Pa) and load profile, flat; rigorous bounds of the onset load
-    (Pa) with the slip (m) and multiplier, <p, y> = 1, that prove them.
+    It holds the strength less initial stress (Pa) and load profile, flat, and rigorous bounds
+    of the onset load (Pa) with the slip (m) and the multiplier, <p, y> = 1, that prove them.
     """
 
     operator: Operator
@@ -123,7 +123,7 @@ class Bracket:
 
     @property
     def magnitude(self) -> float:
-        """Load that relative gaps are measured by: the onset, unless that is next to nothing."""
+        """Load to which relative gaps refer: the onset, unless it is close to zero."""
         return max(
             abs(self.upper), 1e-2 * float(np.abs(self.excess).mean() / self.profile.mean())
         )
@@ -134,7 +134,7 @@ class Bracket:
 
     @property
     def scale(self) -> float:
-        """Stress that errors are measured by, Pa."""
+        """Stress to which errors refer, Pa."""
         return self.magnitude * float(self.profile.mean())
 
     def raise_slip(self, slip: Array) -> None:
@@ -145,7 +145,7 @@ class Bracket:
             self.lower, self.slip = load, trial
 
     def raise_multiplier(self, y: Array) -> float:
-        """Take a multiplier if it proves a lower upper bound; returns its bound."""
+        """Take a multiplier if it proves a lower upper bound, and return its bound."""
         trial = y.copy()
         load = _upper_bound(
             self.operator, self.excess, self.profile, trial, *self.lifting, self.residual
@@ -156,13 +156,13 @@ class Bracket:
 
 
 def make_bracket(symbol: Array, rate: Array | float, excess: Array, profile: Array) -> Bracket:
-    """Return the trivial bracket of fields (*shape): nothing slips, or the whole slides at once."""
+    """Return the trivial bracket of fields (*shape): no node slips, or all slide at once."""
     operator = make_operator(symbol, rate, excess.shape)
     return Bracket(operator, excess.flatten(), profile.flatten())
 
 
 def bisect(bracket: Bracket, gap: float, accuracy: float, steps: int = 60) -> Array:
-    """Narrow a bracket to a relative gap; returns the last unstable direction, unit norm.
+    """Narrow a bracket to a relative gap; return the last unstable direction, of unit norm.
 
     The accuracy is the largest residual stress as a share of the mean strength.
     """

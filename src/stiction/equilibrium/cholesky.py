@@ -26,7 +26,7 @@ MOST_MEMBERS = 8192
 
 @jit
 def row_start(row: int) -> int:
-    """Where a row begins in the flat array."""
+    """Return the index at which a row begins in the flat array."""
     block = row >> 3
     return 32 * block * (block + 1) + 8 * (row & 7) * (block + 1)
 
@@ -117,7 +117,7 @@ def raise_diagonal(
 ) -> None:
     """Add a positive amount to one diagonal entry of the factored matrix, by plane rotations.
 
-    Their cosines and sines are kept in `turns`, work space.
+    The cosines and sines of the rotations are kept in `turns`, a workspace.
     """
     for r in range(position, size):
         start = row_start(r)
@@ -172,7 +172,7 @@ def back_substitute(factor: Array, size: int, values: Array) -> None:
 
 
 class Workspace(NamedTuple):
-    """The factor of A on the slipping nodes of one sample, and work space for it.
+    """The factor of A on the slipping nodes of one sample, with the arrays that extend it.
 
     `members[:size]` are the slipping nodes in the order of the rows of `factor`, `inside` marks
     them, `diagonal` is that of A; `forward` holds the forward substitutions of the load profile
@@ -211,7 +211,7 @@ def make_workspace(stiffness: Stiffness) -> Workspace:
 def append(workspace: Workspace, size: int, count: int) -> int:
     """Append order[:count] to the factor of A on members[:size], until done or a pivot fails.
 
-    Returns the members now: if they are less than size + count, the node after the last one
+    Returns the number of members: if it is below size + count, the node after the last member
     failed, and its row, without the pivot, follows the last one in the factor.
     """
     factor, members, nodes = workspace.factor, workspace.members, workspace.order
@@ -265,7 +265,7 @@ def substitute_members(
 
 @jit_inside
 def multiply_members(workspace: Workspace, size: int, values: Array, result: Array) -> None:
-    """K times a field given on the members, at all nodes."""
+    """Multiply K by a field given on the members; the result is at all nodes."""
     apply_stiffness(
         workspace.stiffness, workspace.members, size, values, workspace.halves, result
     )

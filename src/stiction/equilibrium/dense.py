@@ -1,4 +1,4 @@
-"""The programme of lines, with one dense factor.
+"""The linear programme of a line, with one dense factor.
 
 Where very many nodes slip the factor is slower than the transforms of planes, which take over.
 """
@@ -54,11 +54,11 @@ from stiction.problem import Sample as Samples
 LONGEST_RUN = 2048
 """Nodes up to which the quick test for arrest follows a run."""
 MANY_NODES = 1500
-"""Nodes weaker than the upper bound of the load from which on transforms are faster."""
+"""Number of nodes weaker than the upper bound of the load above which transforms are faster."""
 GAP_OF_MANY = 3e-10
 """Relative distance of the bounds by transforms."""
 MARGIN = 1.5
-"""Safety on the length at which a rupture counts as unstoppable."""
+"""Safety factor on the length beyond which a rupture counts as unstoppable."""
 
 
 class LineProgram(Program):
@@ -77,7 +77,7 @@ class LineProgram(Program):
     """
 
     widest_gap = 1e-9
-    """Certificate gap, as a share of the load, from which on there is a warning."""
+    """Certificate gap, as a share of the load, above which there is a warning."""
 
     def __init__(self, problem: Problem, every: int = 1) -> None:
         if reasons := refused(problem.friction):
@@ -114,8 +114,8 @@ class LineProgram(Program):
     ) -> State | None:
         """Return the critical load of one sample (below `cap`) with its proofs, None if it stalls.
 
-        Only the first piece of its law counts: `excess` and `rate`. The state is an equilibrium at
-        a lower load, if one is known.
+        Only the first piece of the friction law counts: `excess` and `rate`. The state is an
+        equilibrium at a lower load, if one was found.
         """
         windows = windows or self._windows(sample.rate)
         multiplier, slip, stiff = np.zeros((3, self.nodes))
@@ -144,7 +144,7 @@ class LineProgram(Program):
         )  # fmt: skip
         if not found.closed:
             return None
-        # The multiplier was lifted everywhere to be feasible; nodes at rest have none.
+        # The multiplier was lifted everywhere to be feasible; that of nodes at rest is zero.
         multiplier = found.multiplier - found.multiplier.min()
         multiplier[multiplier < 1e-9 * multiplier.max()] = 0.0
         multiplier /= multiplier @ sample.profile
@@ -153,10 +153,10 @@ class LineProgram(Program):
         return State(found.lower, found.slip, stiff, multiplier)
 
     def first(self, rows: Samples, fields: bool) -> tuple[First, dict[int, State | None]]:
-        """Return the first instability of each row by the programme, with `fields` slip and all.
+        """Return the first instability of each row, with `fields` also its slip and multiplier.
 
-        Also the rows to be followed from there, or, None, from the start, as a corner of the law
-        is reached before; all others run away.
+        Also returns the rows to be followed from there or, with None, from rest, as a corner of
+        the law is reached before; all other rows run away.
         """
         first = empty_first(rows.samples, 5, self.nodes)
         samples = sample_of(rows, self.pieces)
@@ -197,8 +197,8 @@ class LineProgram(Program):
     def next(self, sample: Sample, state: State, target: float = np.inf) -> State:
         """Return the next instability, or the state at a load before it.
 
-        It is the programme of the present pieces if no node reaches another corner before it; that
-        is not tried from rest, where it has been, nor after it once failed: most others would.
+        The programme of the present pieces gives it if no node reaches a further corner before.
+        That is tried neither from rest, where `first` did so, nor after it once failed.
         """
         stuck = state.stuck
         if target == np.inf and state.slip.any() and not stuck:

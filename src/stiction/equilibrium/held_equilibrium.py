@@ -4,7 +4,7 @@ Find d >= 0 with A d + s - tau_0 p - mu phi >= 0, equal to zero where d > 0, and
 mu = spring (alpha - <phi, d>). Nodes join where they carry more than their strength and leave where
 they would slip backwards, until neither happens. Without a spring and for a Z-matrix A nodes only
 join, and the result is the least equilibrium at this load. With the spring, equilibria are found on
-both sides of the turning point, and mu tells which load they belong to.
+both sides of the turning point, and mu gives the load to which each belongs.
 """
 
 from stiction.arrays import Array
@@ -25,12 +25,12 @@ from stiction.jit import jit, jit_inside
 LOOSE = 0.05
 """Factor by which a residual is reduced before the set of slipping nodes is revised."""
 ITERATIONS = 3000
-"""Of conjugate gradients, for one equilibrium."""
+"""Largest number of iterations of conjugate gradients for one equilibrium."""
 
 
 @jit_inside
 def _revise(inside: Mask, slip: Array, residual: Array, tolerance: float) -> tuple[int, int]:
-    """Let overloaded nodes join and those with negative slip leave; returns how many of each."""
+    """Let overloaded nodes join and those with negative slip leave; return how many of each."""
     joined, left = 0, 0
     for i in range(slip.size):
         if inside[i]:
@@ -57,7 +57,7 @@ def equilibrate(
 ) -> tuple[int, int]:
     """Slip under the drive `right` = tau_0 p - s + spring alpha phi; status and iterations.
 
-    The nodes `inside` that slip, and their slip, are a guess, then the answer. The residual
+    The nodes `inside` that slip, and their slip, are a guess, then the solution. The residual
     right - A d - spring phi <phi, d> is nowhere above `tolerance` (Pa) if it is solved.
     """
     restrict(slip, inside)

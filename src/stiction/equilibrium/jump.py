@@ -1,4 +1,4 @@
-"""Beyond an instability: does the patch come to rest in another equilibrium at the same load?
+"""Jump beyond an instability, to another equilibrium at the same load or to global sliding.
 
 Slip beyond the instability can only grow, and strength only falls with slip. So every field from
 which all slipping nodes are still driven forward lies below the next equilibrium, and two kinds of
@@ -34,14 +34,14 @@ ALL = -1
 CROWDED = -2
 
 STEPS = 4000
-"""Elastic steps at most."""
+"""Largest number of elastic steps."""
 PATIENCE = 16
-"""Elastic steps after which the true states are tried even if more nodes keep joining."""
+"""Number of elastic steps after which the true states are tried although nodes keep joining."""
 
 
 @jit_inside
 def _residual_runs(sample: Sample, slip: Array) -> tuple[int, int]:
-    """Longest run of residual nodes on the circle, and how many corners are passed in all."""
+    """Longest run of residual nodes on the circle, and the number of corners passed in all."""
     n = slip.shape[0]
     longest = 0
     run = 0
@@ -64,7 +64,7 @@ def _join(
 ) -> int:
     """Append the overstressed nodes to the elastic factor.
 
-    Returns the members now, ALL if nothing remains at rest, CROWDED if there is no space for them.
+    Returns the number of members, ALL if no node remains at rest, CROWDED if they do not fit.
     """
     count = overstressed(sample, load, stiff, workspace, tolerance)
     if count == 0:
@@ -89,9 +89,9 @@ def _relax(
     size: int,
     tolerance: float,
 ) -> int:
-    """One elastic step with frozen strengths, then the nodes it overstresses join.
+    """Take one elastic step with frozen strengths; the nodes that it overstresses then join.
 
-    Returns as `_join` does.
+    Returns what `_join` returns.
     """
     solution = workspace.vectors[1]
     drive = workspace.vectors[3]
@@ -118,7 +118,7 @@ def _settle(
     other: Workspace,
     size: int,
 ) -> int:
-    """One step with the true states: along the unstable direction, or towards equilibrium.
+    """Take one step with the true states: along the unstable direction or towards equilibrium.
 
     Returns ARRESTED if the step ends in the equilibrium of the members, SLIDING if nothing bounds
     it, else UNDECIDED.
@@ -166,11 +166,11 @@ def jump(
     workspace: Workspace,
     other: Workspace,
 ) -> int:
-    """Follow an instability at a fixed load to the next least equilibrium, or to none.
+    """Follow an instability at a fixed load to the next least equilibrium, or to sliding.
 
     Slip d and K d are those of the state that became unstable, moved along the unstable direction
-    as far as `step_to_corner` goes; afterwards a lower bound of the next equilibrium, or it. So
-    many residual nodes in a row as Griffith's length count as global sliding.
+    as far as `step_to_corner` goes; on return, of the next equilibrium or a lower bound of it.
+    A run of residual nodes as long as Griffith's length counts as global sliding.
     """
     tolerance = stress_tolerance(sample, load)
     count = ZERO
@@ -198,7 +198,7 @@ def jump(
         if run >= griffith:
             return SLIDING
         waited += 1
-        # Worth a factor of its own once elastic steps change nothing but the slip, or creep on.
+        # A factor of their own pays once elastic steps change only the slip, or creep on.
         if waited < PATIENCE and (size > before or corners > passed):
             passed = corners
             continue

@@ -2,7 +2,7 @@
 
 At a load the nodes that must slip are added until none is overstressed, the most overstressed
 first. If A on the slipping nodes ceases to be positive definite as node j joins, the load is too
-high, and y = (-A_SS^-1 A_Sj, 1) says by how much: A y <= 0, so <s, y>/<p, y> is a lower upper
+high, and y = (-A_SS^-1 A_Sj, 1) shows by how much: A y <= 0, so <s, y>/<p, y> is a lower upper
 bound (a cut). The same slipping nodes, less the few that do not slip at the lower load, go on from
 there. A load that is an upper bound and has an equilibrium is the critical one.
 """
@@ -30,7 +30,7 @@ OVERFULL = 2
 OVERSTRESS = 1e-12
 """Share of the mean strength below which an overstress is round-off."""
 CLOSE = 0.02
-"""Share of the bound by which a load with an equilibrium may lie below it to try the bound next."""
+"""Relative distance of a stable load below the bound at which the bound itself is tried."""
 PASSES = 10_000
 
 
@@ -69,7 +69,7 @@ def overstressed(
 
 @jit_inside
 def stress_tolerance(sample: Sample, load: float) -> float:
-    """Overstress, Pa, that is round-off."""
+    """Overstress, Pa, that counts as round-off."""
     scale = 0.0
     n = sample.excess.shape[0]
     for i in range(n):
@@ -103,7 +103,7 @@ def _back_off(
 
 @jit_inside
 def _without_reversed(workspace: Workspace, size: int, load: float) -> int:
-    """Remove the members that would slip backwards at a load; returns how many stay."""
+    """Remove the members that would slip backwards at a load; return the number that stay."""
     solution = workspace.vectors[1]
     while size > 0:
         kept = 0
@@ -131,12 +131,12 @@ def solve_program(
 ) -> tuple[float, int]:
     """Critical load with slip d, K d and multiplier, from an upper bound and its multiplier.
 
-    The load is first `start`, then each time three quarters nearer to the bound until that is
-    close: at too high a load far too many nodes join. Where `start` is -inf it is so much nearer
-    than the first slip. Nodes that slip already, at `slip`, join first. If `cap` is below the
-    critical load, the result is the least equilibrium there. The workspace has the diagonal of A in
-    it. The status is SOLVED, STALLED after too many passes, or OVERFULL: more members than the
-    workspace holds.
+    The load is first `start`, then each time three quarters nearer to the bound until close to
+    it: at too high a load far too many nodes join. If `start` is -inf, the first load lies that
+    much nearer to the bound than the load of first slip. Nodes that already slip (`slip`) join
+    first. If `cap` is below the critical load, the result is the least equilibrium there. The
+    workspace holds the diagonal of A. The status is SOLVED, STALLED after too many passes, or
+    OVERFULL: more members than the workspace can hold.
     """
     top = min(bound, cap)
     if start == -np.inf:

@@ -1,4 +1,4 @@
-"""Patches on a periodic line or plane: how many slip, and where and how wide one of them is.
+"""Patches on a periodic line or plane: their number, and the position and width of one of them.
 
 Nodes of a plane are connected where their cells share an edge (four neighbours), also across the
 borders.
@@ -18,7 +18,7 @@ from stiction.jit import jit
 Mask = NDArray[np.bool_]
 
 CORE = 0.1
-"""Share of the largest weight from which on a node of a plane belongs to the critical patch."""
+"""Share of the largest weight above which a node of a plane belongs to the critical patch."""
 
 
 class Patch(NamedTuple):
@@ -72,7 +72,7 @@ def main_patch(field: Array) -> tuple[int, int, float]:
 
 
 def labelled_patches(mask: Mask) -> tuple[NDArray[np.int64], int]:
-    """Return the number of the patch, from 1 on, of each node (0: none), and how many there are."""
+    """Return the label of each node's patch, from 1 (0: none), and the number of patches."""
     pieces, count = label(mask)
     if count == 0:
         return pieces.astype(np.int64), 0
@@ -88,8 +88,8 @@ def labelled_patches(mask: Mask) -> tuple[NDArray[np.int64], int]:
 
 
 def _span(occupied: Mask, peak: int) -> tuple[int, int]:
-    """First place and length of the shortest arc that holds all places; all around from the peak's
-    far side if none is empty."""
+    """First place and length of the shortest arc that holds all places; if none is empty, of
+    the whole circle from the far side of the peak."""
     n = occupied.size
     places = np.flatnonzero(occupied)
     if places.size == n:
@@ -139,8 +139,8 @@ def critical_patch(multiplier: Array, spacings: tuple[float, ...]) -> tuple[Mask
     """Return the patch that becomes unstable, from its multiplier y >= 0, not all zero.
 
     On a line it is the run with the largest y. On a plane it is where y is above a tenth of its
-    largest value, around that value. Not all slipping nodes that are connected with it: in a rough
-    strength these reach across the plane, with a y that is next to nothing.
+    largest value, around that value. It is not all slipping nodes connected with it: on rough
+    strengths these reach across the plane, with a y close to zero.
     """
     return largest_patch(multiplier, spacings, 0.0 if multiplier.ndim == 1 else CORE)
 

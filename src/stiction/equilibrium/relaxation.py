@@ -42,7 +42,7 @@ SETTLED = 0.02
 DRAG = 1e-3
 """Stiffness added to elastic steps, as a share of the largest W."""
 ROUGH = 2e-3
-"""Largest residual stress as a share of the mean strength while slip grows faster than that."""
+"""Largest residual stress, as a share of the mean strength, while growth exceeds `SETTLED`."""
 
 
 def _solve(
@@ -63,7 +63,7 @@ def _weakening_step(
 ) -> Array:
     """Slip moved with the true states until the first node reaches a corner.
 
-    Only the nodes that slip or are overloaded move; it goes towards their equilibrium, or, if they
+    Only the nodes that slip or are overloaded move: towards their equilibrium or, if they
     have none, along y >= 0 with A y = lambda y, lambda < 0. Both keep every node that moves driven
     forward or balanced, so the next equilibrium is not passed.
     """
@@ -92,7 +92,7 @@ def _weakening_step(
 
 
 class Relaxed(NamedTuple):
-    """BALANCED, SLIDING or UNDECIDED; the slip."""
+    """Status (BALANCED, SLIDING or UNDECIDED) and slip."""
 
     status: int
     slip: Array
@@ -110,16 +110,16 @@ def least_equilibrium(
 
     The slip is zero, or an equilibrium at a lower load, or beyond it along an unstable direction;
     the accuracy is the largest residual stress as a share of the mean strength. With `only_stable`
-    it gives up, as UNDECIDED, where the path to the equilibrium looks unstable.
+    the result is UNDECIDED where the path to the equilibrium looks unstable.
 
-    It slides as soon as the load exceeds the strength that is left on average: stiffness adds
+    The interface slides once the load exceeds the average strength that is left: stiffness adds
     nothing to the mean. If K has no positive entry off its diagonal, the result is exact up to
-    `accuracy`; that of planes has small ones.
+    `accuracy`. On planes K has small positive entries there.
     """
     tolerance = accuracy * float(
         np.abs(sample.excess).mean() + abs(load) * sample.profile.mean()
     )
-    # K alone is singular where everything slips; a drag on the growth keeps it a lower bound.
+    # K alone is singular where everything slips; a drag on growth keeps the slip a lower bound.
     drag = DRAG * float(sample.rate.max())
     frozen = np.full_like(sample.rate, -drag)
     slip = np.maximum(slip, 0.0)

@@ -1,4 +1,4 @@
-"""A quick test: does the unstable patch run away along the interface, all others held fixed?
+"""A quick test for an unstable patch that runs along the interface, all others held fixed.
 
 A lower bound of what happens: if the patch alone, growing as one run of nodes, reaches a length at
 which no fracture energy can stop it, the whole interface slides. Each step solves the elastic
@@ -55,7 +55,7 @@ def block_factor(column: Array, width: int) -> Array:
 
 
 class Runs(NamedTuple):
-    """What the test needs of a line.
+    """Properties of a line that the test needs.
 
     The first column of K three times over (Pa/m), the factor for runs of up to `longest` nodes,
     the distance of the nodes (m), and G* (Pa).

@@ -20,16 +20,16 @@ from stiction.problem import Sample as Samples
 TOGETHER = 1e-9
 """Share of the slip at a corner within which nodes reach their corners at once."""
 FLAT = 1e-11
-"""Share of the mean strength by which it must fall to count as weakening. Less cannot be told from
-the round-off of K d; an instability of such nodes would be one of nothing, and never end."""
+"""Share of the mean strength by which a node must weaken to count as weakening. A smaller fall
+is within the round-off of K d; an instability of such nodes adds no slip and never ends."""
 
 
 class Pieces(NamedTuple):
-    """A falling polygon f of u = slip/d_c, in what does not depend on the node.
+    """A falling piecewise linear function f of u = slip/d_c, the same at every node.
 
-    `ends` are the u at the end of each piece, the last 1. Of each piece and of the residual
-    strength, `starts` are f continued back to zero slip (1, ..., 0) and `slopes` how steeply it
-    falls in units of the first (1, ..., 0); `first` is -f' there, `area` the integral of f. From
+    `ends` are the u at the end of each piece, the last 1. For each piece and the residual
+    strength, `starts` are f continued back to zero slip (1, ..., 0) and `slopes` are -f' over
+    the first (1, ..., 0); `first` is -f' on the first piece, `area` the integral of f. From
     the share `at_corner` of the slip at a corner on a node counts as beyond it.
     """
 
@@ -50,7 +50,7 @@ LINEAR = Pieces(np.array([1.0]), np.array([1.0, 0.0]), np.array([1.0, 0.0]))
 
 
 def refused(law: FrictionLaw) -> list[str]:
-    """Return why a law cannot be followed piece by piece; nothing if it can."""
+    """Return the reasons why a law cannot be followed piece by piece; none if it can."""
     name, kind = type(law).__name__, type(law.parameters)
     if kind in (Linear, Polygon):
         return []
@@ -61,7 +61,7 @@ def refused(law: FrictionLaw) -> list[str]:
 
 
 def pieces_of(law: FrictionLaw) -> Pieces:
-    """Return the pieces of a law that `refused` has nothing against."""
+    """Return the pieces of a law for which `refused` returns no reason."""
     parameters = law.parameters
     if not isinstance(parameters, Polygon):
         return LINEAR
@@ -129,8 +129,8 @@ LOAD, GAP, PATCHES, POSITION, LENGTH = range(5)
 class First(NamedTuple):
     """First instabilities of many samples.
 
-    What `Equilibrium` returns, (samples, columns), of planes more columns; if asked for, slip d (m)
-    and multiplier, (samples, nodes).
+    The variables that `Equilibrium` returns, (samples, columns), more columns on planes; on
+    request, slip d (m) and multiplier, (samples, nodes).
     """
 
     table: Array
@@ -144,7 +144,7 @@ def empty_first(samples: int, columns: int, nodes: int) -> First:
 
 
 class Present(NamedTuple):
-    """The piece on which each node is, what it has at zero slip (Pa), and its slope (Pa/m)."""
+    """The piece on which each node is, its value at zero slip (Pa), and its slope (Pa/m)."""
 
     piece: NDArray[np.int64]
     strength: Array
@@ -157,9 +157,9 @@ class State:
 
     Load tau_0 (Pa), slip d (m), K d (Pa; of lines only), and the direction in which it is unstable;
     `upper`, a load without equilibrium (Pa) where one is known, and whether that is proved.
-    `unstable` and `known` say whether the path is unstable there and could be followed so far,
-    `stuck` whether the programme failed to find the next instability before; `ahead` is what is
-    known already of the equilibrium to which it leads.
+    `unstable` is true if the path is unstable there, `known` if it could be followed so far,
+    `stuck` if the programme failed to find the next instability before; `ahead` is what was
+    found so far of the equilibrium to which the instability leads.
     """
 
     load: float
@@ -175,7 +175,7 @@ class State:
 
 
 class Program:
-    """What finds the equilibria of a problem, on lines and on planes; safe for several threads."""
+    """Base of the programmes of lines and planes, which find equilibria; thread-safe."""
 
     pieces: Pieces
 
@@ -190,7 +190,7 @@ class Program:
 
 
 class Jump(NamedTuple):
-    """Where an instability ends: whether it is arrested, and counts; the state; if it is known.
+    """End of an instability: whether it is arrested and counts, the state, if that is known.
 
     `counts` is false for a jump so small that it is a long step of the stable path.
     """
@@ -237,7 +237,7 @@ def steep_corners(sample: Sample, slip: Array) -> NDArray[np.int64]:
     return found
 
 
-# Optimised on their own: LLVM puts these small functions into loops only if they are.
+# Optimised on their own, as LLVM puts these small functions into loops only then.
 
 
 @jit
@@ -253,7 +253,7 @@ def piece_at(pieces: Pieces, critical: float, slip: float) -> int:
 
 @jit
 def start_of(sample: Sample, i: int, piece: int) -> float:
-    """What a piece of node i has at zero slip, Pa: tau_p on the first, tau_r on the last."""
+    """Value of a piece of node i at zero slip, Pa: tau_p on the first, tau_r on the last."""
     share = sample.pieces.starts[piece]
     return share * sample.excess[i] + (1.0 - share) * sample.residual[i]
 

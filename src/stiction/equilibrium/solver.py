@@ -40,15 +40,15 @@ ROUGHLY = {
     2: "single onsets are off by 0.15 % at 9 nodes along x and 6 along y, by 0.5 % at 6 and 4",
 }
 SHARE = 0.5
-"""Estimated error, in per cent of the onset, from which on there is a warning."""
+"""Estimated error, in per cent of the onset, above which there is a warning."""
 EVENT_CORE = 1e-3
-"""Share of the largest added slip from which on a node belongs to the patch of an event."""
+"""Share of the largest added slip above which a node belongs to the patch of an event."""
 
 Program: TypeAlias = LineProgram | PlaneProgram
 
 
 def event_variables(interface: Interface) -> dict[str, Variable]:
-    """Return what is known of each arrested event on a line or a plane."""
+    """Return the variables of each arrested event on a line or a plane."""
 
     def variable(units: str, text: str) -> Variable:
         return Variable(units, text, ("event",))
@@ -100,7 +100,7 @@ def event_table(
 
 @dataclass
 class Path:
-    """What happens to one sample until it slides.
+    """Course of one sample until it slides.
 
     `first` is the first instability, `last` the last equilibrium, `known` is false where a jump
     or a path did not come to its end: `last` is then a lower bound.
@@ -144,7 +144,7 @@ def listed(numbers: NDArray[np.int64], most: int = 5) -> str:
 
 
 def make_program(problem: Problem, gap: float = 1e-6, every: int = 1) -> Program:
-    """Return what finds the equilibria of a problem on its nodes, or on every second one."""
+    """Return the programme that finds equilibria on all nodes of a problem, or every second."""
     if problem.interface.is_plane:
         return PlaneProgram(problem, gap, every)
     return LineProgram(problem, every)
@@ -153,7 +153,7 @@ def make_program(problem: Problem, gap: float = 1e-6, every: int = 1) -> Program
 class Solver:
     """Solves samples of a problem; safe to call from several threads.
 
-    Options as of `Equilibrium`.
+    Its options are those of `Equilibrium`.
     """
 
     def __init__(
@@ -255,7 +255,7 @@ class Solver:
         return critical_patch(direction.reshape(interface.shape), interface.spacings)[1]
 
     def _describe(self, first: First, row: int, sample: Sample, state: State) -> None:
-        """Write what is known of a first instability that was found by following the path."""
+        """Write the variables of a first instability that was found by following the path."""
         y = state.direction / max(inner(state.direction, sample.profile), 1e-300)
         patch = self._patch(y)
         gap = self.program.gap(sample, state, y)
@@ -268,11 +268,11 @@ class Solver:
             first.multiplier[row] = _sensitivity(self.program, sample, state, y)
 
     def _discretization_error(self, rows: Samples, onset: Array) -> Array:
-        """Size of the error of each onset that is due to the distance of the nodes, Pa.
+        """Estimate the size of the error of each onset that is due to the node spacing, Pa.
 
         The same profiles are solved on every second node. The onset converges with the square of
         the spacing, so that the error is a third of the difference to a grid twice as coarse. Its
-        sign is that of chance on random profiles: the root mean square of all is taken.
+        sign is random on random profiles: the root mean square of all is taken.
         """
         assert self.coarse is not None
         others = []
@@ -295,7 +295,7 @@ class Solver:
     def _warn(
         self, gap: Array, load: Array, unproved: NDArray[np.bool_], lost: NDArray[np.bool_]
     ) -> None:
-        """Warn where the bounds are wide, or none, or where a path did not come to an end."""
+        """Warn where bounds are wide or absent, or where a path was not followed to its end."""
         share = gap / np.maximum(np.abs(load), 1e-300)
         wide = np.flatnonzero(~unproved & ~(share <= self.program.widest_gap))
         if wide.size:
@@ -335,7 +335,7 @@ def first_instabilities(program: Program, rows: Samples) -> Array:
 
 
 def _check_multiple_of_four(problem: Problem) -> None:
-    """Raise `InputError` if every second node is not an even number of nodes."""
+    """Raise `InputError` if taking every second node leaves an odd number of nodes."""
     shape = problem.interface.shape
     if any(nodes % 4 for nodes in shape):
         given, enough = (" x ".join(map(str, n)) for n in (shape, [n + -n % 4 for n in shape]))
@@ -348,7 +348,7 @@ def _check_multiple_of_four(problem: Problem) -> None:
 def _sensitivity(program: Program, sample: Sample, state: State, y: Array) -> Array:
     """Derivative of the load of an instability by the peak strengths, from its multiplier.
 
-    NaN where nodes begin to weaken more steeply as it comes, several at once or on a plane.
+    NaN where nodes begin to weaken more steeply at that load, several at once or on a plane.
     """
     piece = present_pieces(sample, state.slip).piece
     if isinstance(program, PlaneProgram):
@@ -356,7 +356,7 @@ def _sensitivity(program: Program, sample: Sample, state: State, y: Array) -> Ar
             return np.full(y.size, np.nan)
     elif (corners := steep_corners(sample, state.slip)).size:
         return program.corner_sensitivity(sample, state.slip, piece, corners)
-    # Of a piece that starts from share tau_p + (1 - share) tau_r; the share of the last is 0.
+    # A piece starts from share tau_p + (1 - share) tau_r; the share of the last piece is 0.
     return y * np.where(sample.critical > 0.0, sample.pieces.starts[piece], 1.0)
 
 

@@ -1,8 +1,8 @@
 """The path of equilibria, event by event: the load rises until a node slips or reaches a corner.
 
-Between events slip is linear in the load, d(load) = A_SS^-1 (load p - q) with q what the piece of
-the law on which a node is has at zero slip, less the initial stress, and W the slope of the piece.
-An event is a node at rest that reaches its strength (a row of the factor more), a slipping node
+Between events slip is linear in the load: d(load) = A_SS^-1 (load p - q). Here q is the value
+at zero slip of the piece on which a node is, less the initial stress, and W the slope of it.
+An event is a node at rest that reaches its strength (a new row of the factor), a slipping node
 that reaches the next corner (a diagonal entry that rises as the strength falls less steeply), or a
 node whose slipping, or weakening more steeply, makes A singular: there the path ends.
 """
@@ -32,9 +32,9 @@ UNSTABLE = 1
 CROWDED = 2
 
 ONE: Any = np.int64(1)
-"""As `ZERO`: no literal."""
+"""An index that is no literal, as `ZERO`."""
 REFRESH = 16
-"""Events after which slip is solved for anew, lest round-off adds up."""
+"""Events after which slip is solved for anew, so that round-off does not accumulate."""
 
 
 @jit_inside

@@ -1,6 +1,6 @@
 """The programme of planes, with transforms: a coarse grid first, then the turning point.
 
-Its onset serves long lines too.
+`plane_onset` also serves long lines.
 
 Between jumps the next instability is a linear programme with the present pieces of the friction
 law, as long as no node reaches a corner before it. Where one does, the path is followed in steps of
@@ -48,13 +48,13 @@ MOVED = 0.02
 """Slip, as a share of d_c, below which a jump is a long step of the stable path and no event."""
 DIRECTION_ITERATIONS = 300
 AT_CORNER = 1.0 - 1e-9
-"""Share of the slip at a corner from which on a node counts as beyond it."""
+"""Share of the slip at a corner above which a node counts as beyond it."""
 ACCURACY = 1e-7
-"""Of the slip at a given load: largest residual stress as a share of the mean strength."""
+"""Largest residual stress of the slip at a given load, as a share of the mean strength."""
 
 
 class Plane(NamedTuple):
-    """Periods (m), G (Pa) and nu of a plane between two half-spaces; of a line G* and 0."""
+    """Periods (m), G (Pa) and nu of a plane between two half-spaces; for a line, G* and 0."""
 
     lengths: tuple[float, ...]
     shear_modulus: float
@@ -93,7 +93,7 @@ class PlaneOnset(NamedTuple):
     """Onset of one sample.
 
     Rigorous bounds of the load (Pa) with the slip (m) and the multiplier, (*shape), that prove
-    them; whether they are as close as was asked for.
+    them; whether they are as close as required.
     """
 
     lower: float
@@ -104,7 +104,7 @@ class PlaneOnset(NamedTuple):
 
 
 def _narrow(bracket: Bracket, gap: float) -> float:
-    """Close a bracket from nothing: bisection until Newton's method succeeds.
+    """Close a bracket from its trivial bounds: bisection until Newton's method succeeds.
 
     Returns the curvature found. The bounds of a stiffness that is no Z-matrix may not meet.
     """
@@ -285,7 +285,7 @@ class PlaneProgram(Program):
 
 
 def _direction(operator: Operator, sample: Sample, slip: Array, after: Array) -> Array:
-    """How the patch at the end of a stable path gives way: the y of its nearly zero eigenvalue."""
+    """Direction of instability at the end of a stable path: y of the nearly zero eigenvalue."""
     growth = np.maximum(after - slip, 0.0)
     inside = slip > 0.0
     vector = np.where(inside, growth, 0.0)

@@ -27,10 +27,10 @@ from stiction.equilibrium.bracket import Bracket
 from stiction.equilibrium.held_equilibrium import ITERATIONS, equilibrate
 
 SWITCHES = 4
-"""Patches to hold one after the other, at most."""
+"""Largest number of patches that are held one after the other."""
 PATIENCE = 8
 PROGRESS = 0.95
-"""States that may leave more than this share of the gap, one after the other."""
+"""Share of the gap that a state should not leave; too many in a row that do end the search."""
 RETREAT = 2e-3
 """Share by which the load is lowered when another patch is held, twice as much each time."""
 
@@ -52,9 +52,9 @@ def _guess(load: float, amplitude: float, slip: Array, slope: Array) -> Held:
 
 
 def _hold(bracket: Bracket, held: Array, guess: Held, accuracy: float) -> Held | None:
-    """Equilibrium with a patch phi held; None if something else is unstable.
+    """Equilibrium with a patch phi held; None if another patch is unstable.
 
-    The guess says at which amplitude the spring is without force; the accuracy is the largest
+    The guess gives the amplitude at which the spring has no force; the accuracy is the largest
     residual stress as a share of the mean strength.
     """
     operator, excess, profile = bracket.operator, bracket.excess, bracket.profile
@@ -108,7 +108,7 @@ def _other_patch(bracket: Bracket) -> Array | None:
 
 
 def _load_at(state: Held, amplitude: float, curvature: float = 0.0) -> float:
-    """Load without force of the spring at an amplitude, extrapolated from a state, Pa."""
+    """Load at which the spring has no force at an amplitude, extrapolated from a state, Pa."""
     step = amplitude - state.amplitude
     force = state.force + (state.slope_of_force + 0.5 * curvature * step) * step
     return state.load - force / state.relief

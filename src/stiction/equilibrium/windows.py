@@ -28,7 +28,7 @@ DENSE = 300
 WIDEST = 4096
 """Widest window tried."""
 STRIDES = 16
-"""Places of a window, to each of its widths, that are looked at first."""
+"""Number of places in the width of a window at which it is tried first."""
 
 
 @functools.lru_cache(maxsize=512)
@@ -104,7 +104,7 @@ class Windows(NamedTuple):
     Attributes
     ----------
     thresholds : (count,) array
-        Weakening rate from which on each is unstable, Pa/m, falling.
+        Weakening rate above which each is unstable, Pa/m, falling.
     widths : (count,) int array
     modes : (count or 1, largest width) array
         Eigenvectors of unit sum, zero beyond their width.
@@ -153,7 +153,7 @@ def _window_sum(values: Array, mode: Array, width: int, start: int) -> float:
 
 @jit_inside
 def _count_fast(rate: Array, threshold: float, length: Array) -> None:
-    """How many nodes in a row, from each on, weaken at least as fast as a threshold."""
+    """Count the nodes in a row, from each on, that weaken at least as fast as a threshold."""
     n = rate.shape[0]
     run = 0.0
     for q in range(2 * n - 1, -1, -1):
@@ -167,8 +167,8 @@ def window_bound(sample: Sample, windows: Windows, allowed: Array, multiplier: A
     """Lowest bound over the windows and the uniform field, Pa, and its multiplier.
 
     A weighted mean over a window hardly changes as the window moves by a sixteenth of its width:
-    only every such place is looked at, and then the nodes about the best one. Whichever window is
-    found, what it says is a bound. `allowed` is work space.
+    only every such place is tried, and then the nodes about the best one. Every window found
+    gives a bound. `allowed` is a workspace.
     """
     rate = sample.rate
     n = rate.shape[0]
