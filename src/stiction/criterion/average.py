@@ -89,7 +89,7 @@ def _between_nodes(average: Array) -> Array:
 
 @jit
 def _filter(field: Array, multiplier: Array, axis: Array, spectrum: Array, out: Array) -> None:
-    """`out` = a line with its Fourier modes multiplied."""
+    """Write a line with its Fourier modes multiplied to `out`."""
     r2c(field, spectrum, axis, True, 1.0, 1)
     for i in range(spectrum.size):
         spectrum[i] *= multiplier[i]
@@ -98,7 +98,7 @@ def _filter(field: Array, multiplier: Array, axis: Array, spectrum: Array, out: 
 
 @jit
 def _estimates(values: Array, i: int) -> tuple[float, float]:
-    """Minimum near a node by a parabola, and by how much it may be lower; infinite if none is near.
+    """Minimum near a node by a parabola, and how much lower it may be; infinite without one.
 
     A cubic through four nodes differs from the parabola by at most 0.065 third differences.
     """
@@ -183,7 +183,7 @@ def _minimum_of_rows(
     excess: Array, profile: Array, scale: Array, multiplier: Array, reach: int,
     axis: Array, spectrum: Array, minimum: Array, place: Array,
 ) -> None:  # fmt: skip
-    """Minimum over a line of <s, y>/<p, y> for every row, and where, in units of nodes.
+    """Minimum over a line of <s, y>/<p, y> for every row, and its place in units of nodes.
 
     `scale` is <p, y>. A parabola through each local minimum of the nodes estimates how low the
     function falls there; polynomials through ten nodes take the lowest, and any other that might be

@@ -13,7 +13,7 @@ from scipy.special import jv
 from stiction.arrays import Array
 
 TERMS = 40
-"""Terms of the eigenfunction."""
+"""Number of terms of the eigenfunction."""
 EDGE = 16
 """Nodes at either end of a patch whose weights are fitted; samples of g are exact further in."""
 SMOOTH = 2.0

@@ -12,9 +12,9 @@ from stiction.problem import Problem
 POINTS = 512
 """Fewest Gauss-Chebyshev points along a crack; smooth drops are exact to round-off."""
 SHORT = np.geomspace(1e-6, 1.0, 40, endpoint=False)
-"""Lengths below the distance of two nodes at which a crossing is looked for, over it."""
+"""Lengths below one node spacing at which a crossing is sought, in units of it."""
 BATCH = 1 << 20
-"""Points that are evaluated at once."""
+"""Number of points evaluated at once."""
 HALVINGS = 30
 
 

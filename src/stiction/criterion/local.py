@@ -1,4 +1,4 @@
-"""The local criterion: the weakest patch, each by itself."""
+"""The local criterion: the weakest patch, each patch by itself."""
 
 from collections.abc import Callable, Iterator, Mapping
 from itertools import islice
@@ -17,9 +17,9 @@ from stiction.results import onset_variables, position
 from stiction.variables import Variable
 
 SLIP = {1: 0.6614, 2: 1.3788}
-"""W times the slip at the centre of a critical patch over the curvature of its strength, in one and
-two dimensions: the slip of (K - W) slip = tau_0 - curvature r^2 on the unit ball, K scalar, without
-a singularity at the rim."""
+"""W times the slip at the centre of a critical patch over the curvature of its strength, on
+lines and planes: the slip of (K - W) slip = tau_0 - curvature r^2 on the unit ball, K scalar,
+without a singularity at the rim."""
 ENOUGH = 1000
 """Number of samples for the estimate of how many reach their residual strength."""
 INSTEAD = "; use st.Equilibrium() or st.Rupture()"

@@ -1,4 +1,4 @@
-"""Critical windows: where a patch becomes unstable by itself, and the weight of each of its nodes.
+"""Critical windows: patches that are just unstable by themselves, and weights of their nodes.
 
 On a line the window is the nucleation length with the eigenfunction of Uenishi and Rice (2003) as
 its weight. On a plane it is an ellipse: for each of five aspects the smallest on whose nodes the
@@ -30,7 +30,7 @@ TOLERANCE = 1e-9
 """Residual of an eigenvector, as a share of W."""
 ITERATIONS = 500
 SMALLEST_BOX = 32
-"""Nodes along each side of the part of a plane that is looked at first."""
+"""Nodes along each side of the part of a plane that is searched first."""
 
 
 class Window(NamedTuple):
@@ -134,7 +134,7 @@ def ellipse_window(
 
     K(k) and W are in Pa/m, the periods in m; the aspect is that of the semi-axes along x and y.
 
-    What happens on the nodes of an ellipse is the same on a box of the plane that is twice as
+    The problem on the nodes of an ellipse is the same on a box of the plane that is twice as
     long, made periodic with the stiffness between its own nodes: a block of a Toeplitz matrix is
     one of a circulant. So the cost follows the ellipse and not the plane.
     """

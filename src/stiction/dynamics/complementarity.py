@@ -1,7 +1,7 @@
 """One implicit step: slip increments u >= 0 with the stress nowhere above the strength.
 
 (M - W) u = g - strength on the slipping set, u = 0 and stress below strength elsewhere; M is a
-circulant with positive symbol, W how fast the strength of each node falls. A semismooth Newton
+circulant with positive symbol, W the rate at which each node weakens. A semismooth Newton
 iteration finds the slipping set and the straight line that the strength of each node follows;
 conjugate gradients, preconditioned with the inverse circulant, solve each linear problem.
 """
@@ -74,9 +74,9 @@ def solve_increment(
 ) -> Any:
     """Find the slip increments of one implicit step; return whether they were found.
 
-    `tables.increment` and `tables.slipping` hold the first guess, and then what is found. The
+    `tables.increment` and `tables.slipping` hold the first guess, and then the solution. The
     stress is met to `accuracy` (Pa); the strength may be as far as `near` (Pa) from the straight
-    line that it is taken for.
+    line that stands for it.
     """
     law, nodes = setting.law, setting.nodes
     strength, floor, weakening = nodes.strength, nodes.residual, nodes.weakening

@@ -1,4 +1,4 @@
-"""What both kinds of step do once the new slip is known: peaks, events, arrival, the record."""
+"""Updates after a step of either kind: peaks, events, arrival, the record."""
 
 from typing import Any, NamedTuple
 
@@ -13,7 +13,7 @@ REACH = 3.0  # a node counts with at most so many times the stress drop that the
 # In units of the stress scale:
 EVENT_DROP = 1e-4  # fall of the mean stress that begins an event
 STEADY_STRESS = 1e-2  # Z V of creep whose waves implicit steps may smear
-_PEAK_WIDTH = 1e-5  # so close below its maximum the mean stress still is at it
+_PEAK_WIDTH = 1e-5  # distance below its maximum at which the mean stress counts as at it
 _COLUMNS = len(RECORD)
 
 
@@ -47,7 +47,7 @@ def stress_scale(nodes: Nodes) -> History:
     stops = np.isfinite(end)
     loads, at = np.unique(np.concatenate([begin, end[stops]]), return_inverse=True)
     bends = np.bincount(at, np.concatenate([slope, -slope[stops]]))
-    # The last slope goes on beyond the last load, so one more load shows it.
+    # The last slope goes on beyond the last load; one more load makes it visible.
     loads = np.append(loads, loads[-1] + max(1.0, abs(loads[-1])))
     scales = np.concatenate([[0.0], np.cumsum(np.cumsum(bends) * np.diff(loads))])
     return loads, scales

@@ -1,4 +1,4 @@
-"""Energies of a rupture: spent on breaking, stored in the solids, carried away by waves."""
+"""Energies of a rupture: dissipated by fracture, stored in the solids, radiated by waves."""
 
 import numpy as np
 

@@ -28,7 +28,7 @@ from stiction.friction.kernels import strength_at
 from stiction.jit import ZERO, jit, jit_inside
 
 LARGEST_STEP = 1e20  # s
-_ROUND_OFF = 1e-14  # of the largest stress: what a few transforms leave, ten times over
+_ROUND_OFF = 1e-14  # share of the largest stress: ten times the error of a few transforms
 # In units of the stress scale:
 _SOLVED = 1e-9  # stress at which a step counts as solved
 _SMALL_DROP = 0.1  # weakening below that is not resolved
@@ -115,7 +115,7 @@ def _assemble(
         level = max(level, abs(trial[i]))
         tables.increment[i] = state.past[i] * size
         tables.slipping[i] = 1 if state.rate[i] > 0.0 else 0
-    # Round-off of the transforms bounds what can be asked for.
+    # Round-off of the transforms limits the accuracy.
     return max(_SOLVED * state.diagnostics[0].scale, _ROUND_OFF * level)
 
 
@@ -146,8 +146,8 @@ def _effect(
 def _accelerates(
     now: Any, thresholds: Thresholds, attempt: _Attempt, largest: float, radiated: float
 ) -> Any:
-    """Whether the interface accelerates too much for the load at onset to be accurate."""
-    # A step that raises the load by next to nothing cannot put the onset wrong.
+    """Return whether the interface accelerates too much for an accurate load at onset."""
+    # A step that hardly raises the load cannot put the onset wrong.
     matters = abs(attempt.load - now.load) > _NEGLIGIBLE * now.scale
     noticed = _NOTICED * now.scale
     growing = radiated > noticed and radiated > _GROWTH * max(now.radiated, noticed)
@@ -212,7 +212,7 @@ def _accept(
 
 @jit_inside
 def _next_size(asked: float, size: float, largest: float, growing: bool) -> Any:
-    """Sizes change by powers of sqrt 2, so that tables are reused while the size stays."""
+    """Return the next size: it changes by powers of sqrt 2, so that tables are reused."""
     root = np.sqrt(2.0)
     if largest > asked:
         return size / root
@@ -237,8 +237,8 @@ def implicit_steps(
 
     Parameters as in `explicit_steps`; `state.memory` holds psi itself, `step` is the first size to
     try. Second order, as in the two-step backward differences: the slip rate at the end of a step
-    follows from the mean rates of this step and of the one before (`past`), and the memory sees it
-    change linearly. A step is repeated at half the size if no slip increments are found (negative
+    follows from the mean rates of this step and of the one before (`past`), and changes linearly
+    in the memory. A step is repeated at half size if no slip increments are found (negative
     rise: the patches are unstable at this size), a node weakens too much, or the interface
     accelerates too much. Creep at the residual strength does not count.
     """

@@ -33,9 +33,9 @@ from stiction.elasticity.line import griffith_length
 from stiction.friction.kernels import strengths
 from stiction.friction.laws import FrictionLaw
 
-_OVERSTRESSED = 1e-6  # stress scales above the strength from which on slip begins with waves
+_OVERSTRESSED = 1e-6  # stress scales above the strength beyond which slip begins with waves
 _NO_SLIP = 1e-9  # Z V below which nothing slips, in units of the stress scale
-_MARGIN = 1.5  # on the length from which on nothing stops a rupture: the same as equilibrium's
+_MARGIN = 1.5  # factor on the length beyond which nothing stops a rupture, as in equilibrium
 _RUNAWAY_STEPS, _STEPS = 32, 1000  # between two looks at whether a run has ended
 
 _ENDINGS: dict[int, str] = {
@@ -58,7 +58,7 @@ class Run:
     # Load below which nothing runs away: the mean strength of the weakest nodes that make up half a
     # nucleation length, Pa; a few nodes of next to no strength do not make it low.
     least_load: float
-    # Of the kind of step that was taken last: they are large, and one kind at a time is enough.
+    # Tables of the last kind of step only: they are large, and one kind at a time is enough.
     tables: ExplicitTables | ImplicitTables | None = None
 
     @property
@@ -81,7 +81,7 @@ class Run:
         return found
 
     def scale_at(self, load: float) -> float:
-        """Return the stress scale of a load, at least of the least that may run away, Pa."""
+        """Return the stress scale of a load, at least that of the least that may run away, Pa."""
         setting = self.setting
         return float(load_at(setting.scale_loads, setting.scales, max(load, self.least_load)))
 
@@ -157,7 +157,7 @@ class Run:
         return bool(left <= 1e-6 * self.medium.step)
 
     def ending(self, state: State, reason: int) -> str | None:
-        """Return why a run ends here, in a word; None if it goes on."""
+        """Return the reason why a run ends here, in a word; None if it goes on."""
         if reason in _ENDINGS:
             return _ENDINGS[reason]
         if self.stop == "runaway" and self._runs_away(state):
@@ -175,7 +175,7 @@ class Run:
 
     @functools.cached_property
     def _largest_fracture_energy(self) -> float:
-        """J/m²; infinite if there are barriers that never break."""
+        """Largest fracture energy, J/m²; infinite if there are barriers that never break."""
         nodes = self.setting.nodes
         if not np.all(np.isfinite(nodes.strength)):
             return np.inf
@@ -201,7 +201,7 @@ class Run:
     def follow(self, state: State, most: int) -> tuple[str | None, int]:
         """Go on to the end of the run, or to `most` steps in all; return why it ended and the code.
 
-        The word is None if it has not ended: the code is then NOT_FINITE, or DONE after the steps.
+        The reason is None if it has not ended; the code is then NOT_FINITE or DONE (all steps).
         """
         portion = _RUNAWAY_STEPS if self.stop == "runaway" else _STEPS
         word, reason = None, int(Reason.DONE)
@@ -241,7 +241,7 @@ class Run:
     def _implicit(self, state: State, count: int, record: Floats) -> tuple[int, int]:
         size, grid = float(state.phase[1]), self.medium.grid
         if not isinstance(self.tables, ImplicitTables):
-            self.tables = None  # let go of the others before these are made
+            self.tables = None  # release the others before these are made
             self.tables = implicit_tables(grid)
         taken, state.phase[1], reason = implicit_steps(
             count, size, state, grid, self.setting, self.tables, record

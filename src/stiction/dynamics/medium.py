@@ -1,4 +1,4 @@
-"""Shared by all runs of one problem: stiffness, memory kernel, explicit time step."""
+"""Data shared by all runs of one problem: stiffness, memory kernel, explicit time step."""
 
 import dataclasses
 import functools
@@ -15,10 +15,10 @@ from stiction.interface import Interface
 from stiction.model import check_memory
 from stiction.problem import Problem
 
-LARGEST_RATIO = 7.15  # of c_d to c_s: nu = 0.49 in plane strain
+LARGEST_RATIO = 7.15  # c_d over c_s: nu = 0.49 in plane strain
 SMALLEST_RATIO = 1.002  # nu = -0.99 in plane stress
 STEADY_TOLERANCE = 1e-4  # sums this good were stable for every Poisson's ratio
-_GROWTH = 1e-5  # of a wave in a step; a rupture takes thousands
+_GROWTH = 1e-5  # growth of a wave in a step; a rupture takes thousands
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""The memory of past slip rates: how its variables lie in memory, and what steps do with them.
+"""The memory of past slip rates: the layout of its variables, and how steps advance them.
 
 Variables lie in blocks of 64 modes, so that one pass stays in registers. Tables have an entry for
 each wave vector that differs in what waves do: on a line k > 0, on a plane kx >= 0 and ky >= 0,
@@ -59,7 +59,7 @@ def blocks(entries: int) -> int:
 def zeros(size: int, kind: type = float) -> NDArray[Any]:
     """Zeros from the start of a cache line on, so that no vector of a pass lies across two.
 
-    (What allocates memory begins 16 bytes later: every second load would touch two lines, which
+    (Allocated memory begins 16 bytes later: every second load would touch two lines, which
     costs a third of the pass.)
     """
     whole = np.zeros(size * np.dtype(kind).itemsize + LINE, dtype=np.uint8)
@@ -127,7 +127,7 @@ def advance_memory(
     """y <- E y + V and memory_sum = Re sum w E B y, for all modes and pairs: the one pass."""
     size = pairs * 256
     for own in range(table.size // size):
-        # Views that begin at zero: the compiler then knows that no index is negative. One of each
+        # Views that begin at zero: the compiler can then exclude negative indices. One of each
         # a block and none a pair: making a view costs as much as a few modes.
         e = table[own * size :][:size]
         for copy in range(multiplicity):
@@ -198,7 +198,7 @@ def _ramp(z: Any) -> Any:
 
 
 def implicit_tables(grid: Grid) -> ImplicitTables:
-    """Tables that are for no step yet."""
+    """Tables that are not yet valid for any step."""
     count, pairs, entries = blocks(grid.frequency.size), grid.poles.size, grid.frequency.size
     modes, nodes = grid.entry.size, int(np.prod(grid.transform.shape))
     table, ramp = (zeros(count * pairs * rows * LANES) for rows in (4, 2))
@@ -267,7 +267,7 @@ def fading_memory(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
         for j in range(128):
             sums[0, j] = sums[1, j] = 0.0
         for p in range(pairs):
-            # Views that begin at zero: the compiler then knows that no index is negative.
+            # Views that begin at zero: the compiler can then exclude negative indices.
             y = memory[(block * pairs + p) * 256 :][:256]
             e = tables.table[(block // multiplicity * pairs + p) * 256 :][:256]
             out = sums[0 if p < split else 1]

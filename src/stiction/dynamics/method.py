@@ -154,7 +154,7 @@ class Rupture:
     stop: Stop = "sliding"
     max_steps: Count = 5_000_000
     type: Literal["rupture"] = "rupture"
-    # What else `Problem.sample` may let through.
+    # Combinations that `Problem.sample` may let through.
     accepts: ClassVar[tuple[str, ...]] = ("barriers", "overstress")
     chunk_size: ClassVar[int] = 8
     label: ClassVar[str] = "rupture"

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 UNITS = {"slip": "m", "slip_rate": "m/s", "shear_stress": "Pa"}
-"""What can be compared."""
+"""Quantities that can be compared."""
 FEWEST = 5
-"""Times of a record that are too few for a misfit are fewer than these."""
+"""Fewest times of a record from which a misfit is computed."""
 
 
 class Misfit(NamedTuple):

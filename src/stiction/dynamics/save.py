@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FRAMES = 64
-"""Frames in a file of a folder."""
+"""Number of frames in a file of a folder."""
 _MOST_STEPS = 50_000  # recorded between frames that lie far apart, before they are written
 _CHECKPOINT, _SUMMARY, _CHUNKS = "checkpoint.npz", "summary.nc", "frames-*.nc"
 
@@ -238,7 +238,7 @@ class Recorder:
 
     @property
     def _others(self) -> str:
-        """What a folder depends on besides the run."""
+        """Everything besides the run on which a folder depends."""
         return repr([self.save.fields, self.save.stations])
 
     def flush(self, state: State, *, force: bool = False) -> None:
@@ -270,7 +270,7 @@ def _write(path: Path, dataset: xr.Dataset) -> None:
 
 
 def _digest(run: Run, others: str) -> str:
-    """SHA-256 of all that a run depends on besides its state, but when to stop."""
+    """SHA-256 of all that a run depends on besides its state, except when to stop."""
     medium, setting = run.medium, run.setting
     grid = medium.grid
     thresholds = setting.thresholds._replace(
@@ -294,7 +294,7 @@ def write_checkpoint(path: Path, run: Run, state: State, others: str = "") -> No
 
 
 def read_checkpoint(path: Path, run: Run, state: State, others: str = "") -> State:
-    """Fill a state of this very run with what a checkpoint holds, and return it."""
+    """Fill a state of this very run with the content of a checkpoint, and return it."""
     try:
         arrays = read_arrays(path)
         digest = arrays["digest"].tobytes().decode()

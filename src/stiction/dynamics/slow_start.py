@@ -1,14 +1,14 @@
-"""Where a run may begin: on the quasi-static path, close to the first instability.
+"""The start of a run on the quasi-static path, close to the first instability.
 
 While the load rises slowly, slip follows the equilibria d(tau_0) at the rate V = R dd/dtau_0, R the
 loading rate. Slip that grows as exp(a t) leaves in each memory variable, psi' = z psi + V with
-z = s_p |k| c_s, what it leaves for ever: psi = V/(a - z). Near the onset, a fold, the distance of
+z = s_p |k| c_s, a permanent part: psi = V/(a - z). Near the onset, a fold, the distance of
 slip from its limit falls as (tau_c - tau_0)^(1/2), so that a = R / (2 (tau_c - tau_0)).
 
 Stress that follows such a rate without delay needs no force; what is left over is inertia (the
-kernel is even in a but for the radiation of the mean, to which the load is raised). So the stress
-by which such a state misses the strength where it slips is an estimate of the error: it is at once
-what is wrong with the state and, as a stress, by how much the onset can be misplaced.
+kernel is even in a except for the radiation of the mean, to which the load is raised). So the
+stress by which such a state misses the strength where it slips estimates the error: it is both
+the error of the state and, as a stress, the amount by which the onset can be misplaced.
 """
 
 import numpy as np
@@ -22,9 +22,9 @@ from stiction.equilibrium.sample import Sample as StaticSample
 from stiction.equilibrium.sample import exceeds, refused
 from stiction.problem import Problem, Sample
 
-_TOLERANCE = 2e-5  # of the stress scale: a fifth of the fall that counts as an event
-_CROSSINGS = 10.0  # of h_n by shear waves: how long before the onset the first trial begins
-_BACK = 0.25  # of the distance to the onset, over which the rate is measured
+_TOLERANCE = 2e-5  # in units of the stress scale: a fifth of the fall that counts as an event
+_CROSSINGS = 10.0  # times shear waves cross h_n between the first trial and the onset
+_BACK = 0.25  # share of the distance to the onset over which the rate is measured
 _TRIALS = 5
 
 
@@ -72,7 +72,7 @@ def _at(
     distance: float,
     rate: float,
 ) -> State | None:
-    """The state at a distance (Pa) below the onset; None where it is not known well enough.
+    """State at a distance (Pa) below the onset; None where it is not determined well enough.
 
     That is where a node is beyond the first piece of its law, so that the programme does not hold,
     or has lost half of its strength at a time that would be unknown.

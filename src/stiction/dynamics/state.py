@@ -1,4 +1,4 @@
-"""What a rupture consists of: what stays, what changes, and what is watched at every step.
+"""The state of a rupture: constants of a run, variables, and diagnostics of every step.
 
 Fields of the interface and their transforms are flat, whatever its shape; `Grid.transform` knows
 the shape. Modes q = 0, 1, ... are those of the real transform in its order, q = 0 the mean.
@@ -17,12 +17,12 @@ Ints = NDArray[np.int64]
 Spectrum = NDArray[np.complex128]
 Floats = NDArray[np.float64]
 History = tuple[Floats, Floats]
-"""Times (s) and values of what is straight in between."""
+"""Times (s) and values of a piecewise linear function."""
 
 Reason = IntEnum(
     "Reason", "DONE ALL_SLID TO_EXPLICIT TO_IMPLICIT NOT_FINITE DROPPED AT_REST", start=0
 )
-"""Why a compiled loop of steps returned."""
+"""Reasons why a compiled loop of steps returned."""
 
 RECORD = ("time", "load", "mean_stress", "mean_slip", "top_slip_rate", "size", "work")
 """Columns of the record of every step; each station adds slip, slip rate and stress."""
@@ -60,11 +60,11 @@ DIAGNOSTICS = np.dtype(
         ("start_error", "f8"),
     ]
 )
-"""What is watched at every step: one record, which compiled steps and checkpoints share."""
+"""Diagnostics of every step: one record, which compiled steps and checkpoints share."""
 
 
 class Thresholds(NamedTuple):
-    """When steps change or end: what depends on the method and the problem."""
+    """Thresholds at which steps change or end, from the method and the problem."""
 
     slid_stop: float  # nodes at the residual strength at which to return
     event_stop: bool  # return at an event
@@ -87,20 +87,20 @@ class Grid(NamedTuple):
 
     transform: Transform
     impedance: float  # Z = G/(2 c_s), Pa s/m
-    cell: float  # what a node stands for: dx (m), on a plane dx dy (m²)
+    cell: float  # size of a node's cell: dx (m), on a plane dx dy (m²)
     stiffness: Array  # (2, modes): static stiffness K(k) and G|k|/2, Pa/m; zero for the mean
     entry: Ints  # (modes,): which entry of the tables a mode uses
     offset: Ints  # (modes,): where its real part is in packed arrays, see `memory`
     multiplicity: int  # modes that share an entry of the tables: 2 on a plane, kx and -kx
     frequency: Array  # |k| c_s of each entry, rad/s
-    mode_two: Array  # how much of it is mode II, (kx/k)²; 1 on a line, whatever its mode
+    mode_two: Array  # share of mode II, (kx/k)²; 1 on a line, whatever its mode
     poles: Spectrum  # of the sums of exponentials: first those that weigh with `mode_two`,
     weights: Spectrum  # then, on a plane, those of mode III, which weigh with 1 - mode_two
     split: int  # how many of the pairs weigh with `mode_two`
 
 
 class Nodes(NamedTuple):
-    """What differs between nodes and does not change in a run, each (nodes,)."""
+    """Properties of the nodes that do not change in a run, each (nodes,)."""
 
     strength: Array  # tau_p, Pa; infinite where nothing breaks
     residual: Array  # tau_r, Pa
@@ -111,7 +111,7 @@ class Nodes(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """What drives and holds an interface, and how it is stepped. Does not change in a run."""
+    """Load and friction of an interface, and its stepping. Does not change in a run."""
 
     law: Any  # ``friction.parameters``
     nodes: Nodes
@@ -127,7 +127,7 @@ class Setting(NamedTuple):
 
 
 class State(NamedTuple):
-    """What changes in a run; two runs from equal states are the same run, bit by bit."""
+    """Variables of a run; two runs from equal states are the same run, bit by bit."""
 
     slip: Floats  # (nodes,), m; flat, also on a plane
     rate: Floats  # m/s
@@ -157,7 +157,7 @@ class State(NamedTuple):
 
 
 class ExplicitTables(NamedTuple):
-    """Of one fixed explicit step h, with arrays to work in."""
+    """Tables of one fixed explicit step h, with arrays to work in."""
 
     step: float  # h, s
     table: Array  # [block][pair][4][64]: E = exp(s |k| c_s h) and w E B, B = h phi(s |k| c_s h)
@@ -170,7 +170,7 @@ class ExplicitTables(NamedTuple):
 
 
 class ImplicitTables(NamedTuple):
-    """Of an implicit step of some size, with arrays to work in; belongs to one run."""
+    """Tables of an implicit step of some size, with arrays to work in; belong to one run."""
 
     valid_for: Array  # size (s) and ratio of the last step that they are for; -1 if none
     table: Array  # this one to `ramp_response`: see `memory.tabulate`

@@ -38,7 +38,7 @@ _SCALARS: dict[str, Variable] = {
 
 
 def per_area(interface: Interface, variable: Variable) -> Variable:
-    """The same quantity on a plane, where what is per length on a line is whole."""
+    """Return a variable for a plane, where a quantity per length of a line is a total."""
     if not interface.is_plane:
         return variable
     units = {"N": "N m", "J/m": "J"}.get(variable.units, variable.units)
@@ -82,7 +82,7 @@ def _axis_speeds(
     lengths: float,
     statistic: Callable[[Floats], Any],
 ) -> list[float]:
-    """A statistic of the front's speed along each axis, on the lines through where it began."""
+    """A statistic of the front's speed along each axis, on the lines through its origin."""
     interface, arrival = problem.interface, _arrival(run, state)
     began = np.unravel_index(int(state.now["peak_node"]), interface.shape)
     windows = _windows(problem, run, lengths)

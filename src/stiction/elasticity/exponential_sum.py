@@ -34,7 +34,7 @@ MAX_PAIRS = 60
 ROUNDS = 14
 _DAMPING = 0.3
 _FLOOR = _DAMPING / T_MAX  # every pole decays at least as fast
-# Decay over T_MAX that balanced truncation is told of, in the order tried: seen to be good starts
+# Decay over T_MAX for balanced truncation, in the order tried: found to be good starts
 # for polishing at loose and at tight tolerances.
 _LOOSE, _TIGHT = (10.0, 1.0), (1.0, 0.3)
 _FORMAT = 2  # raise when the fit or the file layout changes, so that old files are left alone
@@ -203,7 +203,7 @@ def fit_exponentials(mode: str, eta: float, tolerance: float) -> ExponentialSum:
     fit = _Polish(fit_times, exponential_sum(fit_times, *arcs))
     check_times = _sample_times(150, 12, seed=1)
     check = exponential_sum(check_times, *arcs)
-    # Where the search begins: seen to be just below what is needed, for every Poisson's ratio.
+    # First number of pairs tried: found to be just below the need, for every Poisson's ratio.
     digits = -np.log10(tolerance)
     pairs = max(3, round(1.7 * digits - 2.0 if mode == "III" else 5.3 * digits - 9.7))
     starts = _LOOSE if tolerance > 1e-7 else _TIGHT

@@ -27,7 +27,7 @@ def stiffness_column(nodes: int, length: float, modulus: float) -> Array:
 
 
 class Stiffness(NamedTuple):
-    """K of a line: its first column (n,), and the odd entries of it three times over, Pa/m."""
+    """K of a line: its first column (n,), and its odd entries three times in a row, Pa/m."""
 
     column: Array
     strip: Array
@@ -42,7 +42,7 @@ def make_stiffness(column: Array) -> Stiffness:
 def _add_four(
     target: Array, strip: Array, places: tuple[int, int, int, int], values: tuple[float, ...]
 ) -> None:
-    """Add to one half of a product what four nodes contribute."""
+    """Add the contribution of four nodes to one half of a product."""
     half = target.shape[0]
     p0, p1, p2, p3 = places
     z0, z1, z2, z3 = values
@@ -63,7 +63,7 @@ def apply_stiffness(
 ) -> None:
     """`result` (n,) = K times a field that has `values` at the first `size` of the `members`.
 
-    Elsewhere the field is zero; `halves` (2, n/2) is work space.
+    Elsewhere the field is zero; `halves` (2, n/2) is a workspace.
     """
     strip = stiffness.strip
     half = halves.shape[1]

@@ -25,7 +25,7 @@ Mask = NDArray[np.bool_]
 
 @jit
 def dot(first: Array, second: Array, count: int) -> float:
-    """Sum of products; numpy's own takes threads for long arrays, and then depends on how many."""
+    """Sum of products in one thread; numpy's own depends on the number of its threads."""
     a = zeros()
     b = zeros()
     c = zeros()

@@ -43,9 +43,9 @@ class Transform(NamedTuple):
     Attributes
     ----------
     shape : (int, int)
-        Of a profile; (1, nodes) on a line, so that one compiled kernel serves both.
+        Shape of a profile; (1, nodes) on a line, so that one compiled kernel serves both.
     half : (int, int)
-        Of its real transform.
+        Shape of its real transform.
     every, first, last : int arrays
         All axes that are transformed, all but the last of them, the last; of a line counted
         on flat arrays.
@@ -90,7 +90,7 @@ def backward(transform: Transform, spectrum: Array, field: Array) -> None:
 def convolve(
     transform: Transform, multiplier: Array, field: Array, spectrum: Array, out: Array
 ) -> None:
-    """`out` = a field with its Fourier modes multiplied; all flat, the spectrum is work space."""
+    """`out` = a field with its Fourier modes multiplied; all flat; spectrum is a workspace."""
     forward(transform, field, spectrum)
     for i in range(spectrum.size):
         spectrum[i] *= multiplier[i]

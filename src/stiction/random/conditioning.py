@@ -1,4 +1,4 @@
-"""A field that is known in part: measured values with errors, and what follows for the rest.
+"""A field that was measured in places: values with errors, and the field elsewhere.
 
 A Gaussian field is a linear function of its draws, z(x) = phi(x)^T a with a standard normal.
 So measured z_k = phi(x_k)^T a + e_k are a linear regression, whose posterior is
@@ -46,7 +46,7 @@ TINY = 1e-12  # least variance
 
 
 def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
-    """Places (rows x, and y on a plane) and values (last row) of what was measured."""
+    """Places (rows x, and y on a plane) and values (last row) of a measurement."""
     if isinstance(value, np.ndarray) and value.ndim == 2 and len(value) in (2, 3):  # as kept
         return value
     context = info.context or {}
@@ -144,7 +144,7 @@ class Conditions:
 
 
 class Measured(NamedTuple):
-    """What was measured of one property: z at its places is phi @ draws, (points, dimension).
+    """Measured values of one property: z at its places is phi @ draws, (points, dimension).
 
     `factor` is the marginal of the factor between specimens, by whose draw it is multiplied.
     """
@@ -252,7 +252,7 @@ class Conditioning:
         mean, deviation = self.moments(self.phi)
         least = 1.0 / (self.phi**2).sum(axis=1)
         rest = np.maximum(deviation**-2 - precision, least)
-        # Over so small an error the map is straight, and the difference would be round-off.
+        # Over so small an error the map is linear, and the difference would be round-off.
         sharp = deviation < SHARP
         found = (mean / deviation**2 - precision * z) / rest
         return np.where(sharp, 0.0, found), np.where(sharp, 1.0, 1.0 / rest)

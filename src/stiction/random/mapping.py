@@ -1,4 +1,4 @@
-"""The map z -> F^-1(Phi(z)) from the Gaussian field to the marginal F, and what it does to
+"""The map z -> F^-1(Phi(z)) from the Gaussian field to the marginal F, and its effect on
 correlation.
 
 The map is tabulated, which is a thousand times faster than scipy's quantile: cubic Hermite
@@ -108,7 +108,7 @@ def hermite_coefficients(marginal: Any) -> Array:
     """
     distribution, half = marginal.distribution, round(REACH / STEP)
     z = np.arange(-half, half + 1) * STEP
-    # Without the mean: it would cost a narrow marginal its digits.
+    # Without the mean, which would cost a narrow marginal its digits.
     mean, variance = float(distribution.mean()), float(distribution.var())
     if not variance > 0.0:
         raise InputError("marginal: its standard deviation is zero in double precision")

@@ -104,7 +104,7 @@ class _ByMoments(Marginal):
 
     @property
     def _ratio(self) -> float:
-        """Standard deviation over the mean above the lower bound."""
+        """Standard deviation over the distance of the mean from the lower bound."""
         return self.cv * self.mean / (self.mean - self.low)
 
     def _shape(self, ratio: float) -> tuple[float, float]:
@@ -254,7 +254,7 @@ class ScipyMarginal(Marginal):
         return self.frozen or getattr(scipy.stats, self.type)(**dict(self.parameters))
 
     def plain(self) -> dict[str, Any]:
-        """Return what a study file holds."""
+        """Return the table of this marginal in a study file."""
         if self.frozen is not None:
             raise ValueError(
                 f"marginal is the Python distribution {self.type!r}, not a named one"
@@ -281,11 +281,11 @@ def affine_parameters(marginal: Any) -> tuple[tuple[str, ...], float, float]:
 MARGINALS: dict[str, Any] = {
     kind.type: kind for kind in (Beta, Lognormal, Weibull, Gamma, TruncatedNormal)
 }
-"""By their names in study files. 'beta' and 'gamma' are scipy's where its parameters are given."""
+"""Families by their names in study files; 'beta' and 'gamma' also take scipy's parameters."""
 
 
 def marginal_of(value: Any) -> Marginal:
-    """Return the marginal of one, of a table {type, ...}, or of a frozen scipy.stats distribution.
+    """Return the marginal given by itself, by a table {type, ...} or by a frozen distribution.
 
     An `InputError` if it is none of them, or its mean or standard deviation is not finite.
     """
@@ -311,7 +311,7 @@ def marginal_of(value: Any) -> Marginal:
 
 
 def _of_scipy(name: str, given: Mapping[str, Any], first: tuple[Any, ...] = ()) -> Marginal:
-    """The marginal of scipy's name for a family and its parameters, the `first` in order."""
+    """Return the marginal of scipy's name of a family and parameters, the `first` in order."""
     family = getattr(scipy.stats, name, None)
     if not isinstance(family, scipy.stats.rv_continuous):
         valid = [*MARGINALS, "lognorm", "weibull_min", "truncnorm", "uniform", "norm", "..."]
@@ -330,4 +330,4 @@ def _of_scipy(name: str, given: Mapping[str, Any], first: tuple[Any, ...] = ()) 
 _OF_SCIPY = {"type": "string", "description": "name of a continuous scipy.stats distribution"}
 _ALSO = {"type": "object", "properties": {"type": _OF_SCIPY}, "required": ["type"]}
 AnyMarginal: TypeAlias = Annotated[Any, OneOf(MARGINALS, marginal_of, [_ALSO])]
-"""`Beta`, `Lognormal` and the like, or any frozen continuous `scipy.stats` distribution."""
+"""A `Beta`, `Lognormal`, ..., or any frozen continuous `scipy.stats` distribution."""

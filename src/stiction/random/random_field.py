@@ -24,7 +24,7 @@ from stiction.random.spectra import CustomSpectrum, Share, Spectrum, lag_of_corr
 from stiction.random.synthesis import Stream, block_of
 
 FEWEST_LENGTHS = 8.0 * math.pi  # e-folding lengths that make a mean mode superfluous
-# What is worth a warning: a share of the variance, a negative correlation, an error of one.
+# Limits of warnings: a share of the variance, a negative correlation, an error of one.
 LOST, FALLEN, UNCERTAIN = 1e-4, 0.02, 0.01
 
 Of: TypeAlias = Literal["strength", "z"]

@@ -26,7 +26,7 @@ from stiction.variables import PROFILES
 NAMES = tuple(PROFILES)
 COEFFICIENTS = ("strength", "residual_strength", "initial_stress")  # or stresses
 BETWEEN = 1000  # number of the stream of draws of the first property's factor
-DEFINITE = 1e-12  # what is round-off in eigenvalues of a correlation matrix
+DEFINITE = 1e-12  # round-off of eigenvalues of a correlation matrix
 
 
 def _pairs(value: Any) -> Any:
@@ -122,7 +122,7 @@ class RandomInterface:
     @field_validator(*NAMES, mode="before")
     @classmethod
     def _name_quantity(cls, field: Any, info: ValidationInfo) -> Any:
-        """Tell the reader of a study file which quantity a measured profile holds."""
+        """Pass the quantity of a measured profile to the reader of a study file."""
         if info.context is not None and isinstance(field, dict):
             coefficient = field.get("of") is not None
             info.context["quantity"] = (
@@ -272,7 +272,7 @@ def _layout(random: RandomInterface, interface: Interface) -> list[Stream]:
 def _conditioned(
     random: RandomInterface, interface: Interface
 ) -> list[tuple[NDArray[np.int64], Conditioning]]:
-    """What was measured, for each group of correlated properties, with the columns of its draws.
+    """Measured values of each group of correlated properties, with the columns of its draws.
 
     The last column is that of the factor between specimens on which it depends, if any.
     """
@@ -303,7 +303,7 @@ def _conditioned(
 
 
 def as_random_interface(given: Any) -> RandomInterface:
-    """Return a `RandomInterface`; of a bare `RandomField` that of the strength alone."""
+    """Return a `RandomInterface`; a bare `RandomField` becomes the strength of one."""
     if isinstance(given, RandomField):
         return RandomInterface(strength=given)
     if not isinstance(given, RandomInterface):

@@ -3,8 +3,8 @@
 On a plane the field is isotropic, and a line cut through it has the correlation of the
 field on a line. That fixes the density in D dimensions as a function of the length of the
 wave vector (it is the inverse Abel transform of the line's): to the power of 1 + k^2 is
-added (D - 1)/2, and a Gaussian stays what it is. What is sampled is the truncated
-spectrum, so correlations and lengths are of that. To add a spectrum, derive from
+added (D - 1)/2, and a Gaussian keeps its form. Samples have the truncated
+spectrum, and so correlations and lengths are those of it. To add a spectrum, derive from
 `ScaledSpectrum` and add it to `SPECTRA`.
 """
 
@@ -30,7 +30,7 @@ from stiction.kinds import OneOf, from_table
 from stiction.model import Positive, Real, describe, model
 
 Share: TypeAlias = Annotated[Real, Field(gt=0, lt=1)]
-ACCURACY, LARGEST_ERROR = 1e-12, 1e-6  # of integrals: aimed at, and accepted
+ACCURACY, LARGEST_ERROR = 1e-12, 1e-6  # errors of integrals: aimed at, and accepted
 
 
 class SpectralDensity(ABC):
@@ -159,7 +159,7 @@ class ScaledSpectrum(SpectralDensity):
 
     @property
     def efolding_length(self) -> float:
-        # Searched for once a shape: a sweep may hold a hundred thousand lengths.
+        # Searched for once per shape: a sweep may hold a hundred thousand lengths.
         unit = dataclasses.replace(self, correlation_length=1.0)
         return self.correlation_length * lag_of_correlation(unit, math.exp(-1.0))
 
@@ -329,11 +329,11 @@ SPECTRA: dict[str, Any] = {
     kind.type: kind
     for kind in (PowerLawSpectrum, SquaredExponentialSpectrum, ExponentialSpectrum)
 }
-"""By their names in study files."""
+"""Spectra by their names in study files."""
 
 
 def spectrum_of(value: Any) -> SpectralDensity:
-    """Return the spectrum of one, or of a table {type, ...}."""
+    """Return the spectrum given by itself, or by a table {type, ...}."""
     if isinstance(value, SpectralDensity):
         return value
     if isinstance(value, dict):

@@ -11,9 +11,9 @@ from stiction.problem import Problem
 from stiction.random.random_interface import RandomInterface
 
 WORTH_SAYING, MOST = 1e-6, 0.5
-"""Shares of the strength at or below the residual strength that are warned of, and refused."""
+"""Shares of the strength at or below the residual strength that give a warning, or an error."""
 QUANTILES, PRESSURES = 2000, 64
-"""Equally likely values that stand for a random residual strength and a normal pressure."""
+"""Number of equally likely values of a random residual strength, and of a normal pressure."""
 
 
 def coefficients_of(random: RandomInterface) -> list[str]:

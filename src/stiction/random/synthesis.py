@@ -25,7 +25,7 @@ def block_of(dimensions: int) -> int:
 class Stream(NamedTuple):
     """The draws of one property, or of a factor between specimens, among all draws of a sample."""
 
-    number: int  # of the stream; never changes
+    number: int  # number of the stream; never changes
     block: int  # samples that share a generator
     ranks: NDArray[np.int64]  # modes drawn, rising
     mean_mode: bool  # whether the mean mode is drawn

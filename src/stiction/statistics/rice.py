@@ -1,8 +1,8 @@
 """Distribution of the critical stress from crossing rates: the minimum of a stationary process.
 
 On a plane dips take the place of crossings: the expected Euler characteristic of what lies
-below a level is the expected number of its parts less that of their holes, which low down
-there are none of (Adler, 1981). Low dips come as a Poisson process.
+below a level is the expected number of its parts less that of their holes, of which there
+are none at low levels (Adler, 1981). Low dips come as a Poisson process.
 """
 
 import math
@@ -30,7 +30,7 @@ FEWEST_CROSSINGS = 10
 MOST_BELOW = 0.04
 MOST_DIPS = 1.1
 MOST_NODES = 1 << 22
-"""Nodes of all planes that are sampled at once."""
+"""Number of nodes of all planes that are sampled at once."""
 ENOUGH_POINTS = 32
 """Points in h_n at which crossings are counted; at 8, one in six of the rare ones is missed."""
 
@@ -187,7 +187,7 @@ def _count_dips(
     below: NDArray[np.int64],
     reached: NDArray[np.int64],
 ) -> None:
-    """Steps whose cumulative sums count what of some planes is at or below each level.
+    """Steps whose cumulative sums count dips and nodes of some planes at or below each level.
 
     `level` is the number of the first level at or above the value of each node. `dips` is
     the Euler characteristic, nodes less edges plus faces of the periodic grid; `below` and
