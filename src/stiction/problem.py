@@ -219,7 +219,10 @@ class Problem:
             doubts.append(
                 ("strength", strength, "normal pressure", np.mean(pressure), FRICTION)
             )
-            hint = "; coefficients need of='friction_coefficient', and are no percentages"
+            hint = (
+                "; normal_pressure is in Pa; coefficients are fractions, not percentages,"
+                " and need of='friction_coefficient'"
+            )
         if residual:
             doubts.append(("residual_strength", residual, "shear modulus", modulus, RIGIDITY))
         for name, mean, what, of, (least, most) in doubts:

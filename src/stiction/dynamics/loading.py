@@ -70,6 +70,6 @@ def first_reach(history: History, target: float) -> float:
     if slope <= 0.0:
         raise InputError(
             f"load: stays at or below {values.max():.6g} Pa, but the first slip needs tau_0 = "
-            f"{target:.6g} Pa"
+            f"{target:.6g} Pa; raise the load, or Load.initial_stress where slip should begin"
         )
     return float(times[low] + (target - values[low]) / slope)

@@ -38,6 +38,7 @@ ADVICE = {
     "marginal": "the values are far from its family; compare families",
     "spectrum": "the periodogram is far from its family; take another spectrum or a higher detrend",
 }
+FIXED = {"exponent": ", as in spectrum={'type': 'power_law', 'exponent': 4}"}
 STRESSES = ("mean", "standard_deviation", "noise", "low", "high", "loc", "scale")
 """Parameters in the unit of the field."""
 
@@ -403,7 +404,7 @@ def _doubts(found: Estimate, p_values: Mapping[str, float], done: int, asked: in
         )
     doubts += [
         f"{name} {value:.3g} lies at the end of the searched range, {end:.3g}: the data do not"
-        " determine it; fix its value"
+        f" determine it; fix its value{FIXED.get(name, '')}"
         for name, value, end in found.setting.spectrum.ends_met(found.model)
     ]
     doubts += [

@@ -108,7 +108,8 @@ def _spacing(x: Array, name: str) -> float:
         raise InputError(
             f"{name} is not equally spaced: the point at {x[off.argmax()]:.6g} m is off by"
             f" {off.max():.2g} of the mean spacing, {spacing:.6g} m; first put the profile on the"
-            " nodes of an interface: st.read_profile(..., interface=..., interpolate=True)"
+            " nodes of an interface: st.read_profile(..., interface=..., interpolate=True,"
+            " gaps='skip')"
         )
     return spacing
 

@@ -17,7 +17,6 @@ from stiction.plot.axes import need, problem_of, unit_for
 from stiction.plot.ruptures import (
     COLORS,
     DECADES,
-    KEEP,
     finite_strength,
     masked,
     rate_scale,
@@ -26,6 +25,7 @@ from stiction.plot.ruptures import (
 from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, new_figure, paper_style
 from stiction.progress import Meter, Show
 
+KEEP = "; keep them with simulate_rupture(save=st.Save(['slip_rate', 'shear_stress']))"
 Moving = list[tuple[Any, str, Any]]
 """What moves in a figure: an artist, the name of its data, and these for each frame of the run."""
 

@@ -22,7 +22,7 @@ DECADES = 7.0
 """Of slip rate below the largest that are drawn."""
 BEFORE = 0.11
 """Time before the onset that is drawn, in units of L/c_s."""
-KEEP = "; keep it with simulate_rupture(save=st.Save(...))"
+KEEP = "; keep it with simulate_rupture(save=st.Save(['slip_rate']))"
 
 
 def rupture(run: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None = None) -> Axes:
