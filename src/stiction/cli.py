@@ -130,6 +130,8 @@ def run(
     Exit code 0: complete; 1: samples failed or the run could not continue; 2: errors in the study
     or the command; 3: the time limit was reached; 130: interrupted.
     """
+    import pandas as pd
+
     from stiction.study.study import Study, open_run
 
     loaded = Study.from_toml(study)
@@ -153,9 +155,11 @@ def run(
     for name in ("critical_stress", "friction_coefficient"):
         if name in result:
             scale, unit = (1e-6, ", MPa") if result[name].attrs["units"] == "Pa" else (1.0, "")
-            values = (result[name] * scale).to_dataframe()[name]
-            table = values.groupby(dims) if dims else values
-            echo(f"{name}{unit}\n{table.describe(percentiles=LEVELS).to_string(max_rows=48)}")
+            values = (result[name] * scale).transpose(*dims, "sample")
+            labels = values.isel(sample=0, drop=True).to_series().index if dims else [name]
+            rows = pd.DataFrame(values.values.reshape(len(labels), -1), index=labels)
+            table = rows.T.describe(percentiles=LEVELS).T
+            echo(f"{name}{unit}\n{table.to_string(max_rows=48)}")
     state = open_run(out).status()
     echo(f"part {part}: " * bool(part) + f"{state.done} of {state.samples} samples in {out}")
     if state.failures:

@@ -97,6 +97,13 @@ def test_run_grow_look_export_report(command, study):
         assert words in page
 
 
+def test_points_with_one_label_are_not_thrown_together(command, study):
+    axis = {"problem.interface.nodes": [256, 256], "random.strength.marginal.alpha": [1.5, 3.0]}
+    study.write_text(tomli_w.dumps(STUDY | {"sweep": [axis]}))
+    out = command("run", study, "--out", "run", "--no-pilot")[1]
+    assert out.count("100.0") == 4  # two points, of stress and coefficient
+
+
 def test_parts_and_the_time_limit(command):
     code, out, _ = command("run", "study.toml", "--out", "run", "--part", "1/2")
     assert code == 0

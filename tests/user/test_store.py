@@ -372,3 +372,15 @@ def test_time_between_chunks_is_about_a_second(tmp_path):
             out=tmp_path / "run", executor=executor, workers=2
         )
     assert st.open_run(tmp_path / "run").status().chunks >= 2
+
+
+def test_a_run_that_grows_from_few_samples_has_the_whole_pilot(tmp_path):
+    make_study(samples=3).run(out=tmp_path / "run")
+    assert make_study().run(out=tmp_path / "run").identical(make_study().run())
+
+
+def test_a_study_that_another_version_wrote_is_refused_as_such(tmp_path):
+    older = make_study().to_dict() | {"method": {"type": "local_criterion", "weights": "exact"}}
+    store.Store.open(tmp_path / "run", older)
+    with pytest.raises(StoreError, match="another version wrote: method: unknown 'weights'"):
+        st.open_run(tmp_path / "run")

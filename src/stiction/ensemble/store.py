@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stiction.ensemble.batches import Failure, Table, versions
+from stiction.ensemble.pilot import ON_A_LINE
 from stiction.errors import StoreError, warn_user
 from stiction.files import PART, UNREADABLE, cannot, write_whole
 from stiction.model import describe
@@ -87,6 +88,8 @@ class Store:
                     f"{STUDY} is damaged or missing; it is rebuilt from the given study"
                 )
         if before != study:
+            if before and before["ensemble"]["samples"] < ON_A_LINE:  # a pilot of fewer samples
+                (path / PILOT).unlink(missing_ok=True)
             _write_json(path / STUDY, study)
         return store
 

@@ -407,4 +407,10 @@ def open_run(path: Any) -> StoredRun:
         raise StoreError(f"{place}: holds no run") from None
     except Damaged as error:
         raise StoreError(f"{error}; run the study again into the folder to repair it") from None
-    return StoredRun(Store(place, study), Study.from_dict(study))
+    try:
+        return StoredRun(Store(place, study), Study.from_dict(study))
+    except InputError as error:
+        raise StoreError(
+            f"{place}: this version of stiction cannot read its study, which another version wrote:"
+            f" {'; '.join(error.problems)}"
+        ) from None
