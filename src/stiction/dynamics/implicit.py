@@ -237,7 +237,7 @@ def implicit_steps(
 
     Parameters as in `explicit_steps`; `state.memory` holds psi itself, `step` is the first size to
     try. Second order, as in the two-step backward differences: the slip rate at the end of a step
-    follows from the mean rates of this step and of the one before (`past`), and changes linearly
+    follows from the mean rates of this step and the one before (`past`), and changes linearly
     in the memory. A step is repeated at half size if no slip increments are found (negative
     rise: the patches are unstable at this size), a node weakens too much, or the interface
     accelerates too much. Creep at the residual strength does not count.

@@ -81,7 +81,7 @@ class Run:
         return found
 
     def scale_at(self, load: float) -> float:
-        """Return the stress scale of a load, at least that of the least that may run away, Pa."""
+        """Stress scale of a load, Pa, at least that of the least that can run away."""
         setting = self.setting
         return float(load_at(setting.scale_loads, setting.scales, max(load, self.least_load)))
 

@@ -1,1 +1,1 @@
-"""Ensembles: which samples there are, and how they are computed."""
+"""Ensembles: the samples of a study, and their computation."""

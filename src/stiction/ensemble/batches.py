@@ -1,4 +1,4 @@
-"""Samples computed in batches, by threads or any executor: the same numbers whoever computes."""
+"""Samples computed in batches, by threads or any executor: the same numbers from each."""
 
 import os
 import socket
@@ -26,11 +26,11 @@ from stiction.random.synthesis import BLOCK, block_of
 POINT, NUMBER = "_point", "_sample"
 """Names of the columns that hold the numbers of the point and of the sample."""
 SECONDS = 0.5
-"""Of a piece of work."""
+"""Duration of a piece of work."""
 MOST_BYTES = 16 * 2**20
-"""Of the values of a piece of work."""
+"""Largest size of the values of a piece of work."""
 TICK = 1.0
-"""Seconds after which an iteration goes on although nothing is done."""
+"""Seconds after which an iteration continues although no work is done."""
 
 
 def _executor(value: Any) -> Any:
@@ -101,7 +101,7 @@ def usable_cores() -> int:
 
 
 def in_threads(function: Callable[[Any], Any], jobs: Sequence[Any], workers: int) -> list[Any]:
-    """Return what a function makes of each job; its warnings come once, at the caller's line."""
+    """Return results of a function for all jobs; warnings come once, at the caller's line."""
     with collect_warnings() as caught, ThreadPoolExecutor(workers) as pool:
         contexts = [copy_context() for _ in jobs]
         found = list(pool.map(Context.run, contexts, repeat(function), jobs))
@@ -137,7 +137,7 @@ def solve_span(experiment: Experiment, span: Span, expected: str = "") -> Table:
             with one_blas_thread():
                 parts.append(_rows(span.point, first, experiment.results(first, count)))
         except Exception as error:
-            if count > 1:  # find out which sample it is
+            if count > 1:  # find the sample that failed
                 waiting.extendleft((first + i, 1) for i in reversed(range(count)))
                 continue
             known = isinstance(error, InputError)
@@ -167,7 +167,7 @@ def piece_size(
 
 
 def _workers_of(executor: Executor, workers: int) -> int:
-    """How many workers an executor has now: those of a Dask scheduler come and go."""
+    """Return the present number of workers of an executor: those of Dask come and go."""
     client = getattr(executor, "_client", None)
     if client is not None:
         return max(1, sum(client.nthreads().values()))

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 FAILED = "failed_samples"
 Coordinates = dict[str, tuple[NDArray[Any], Variable]]
-"""Values and meaning by name."""
+"""Values and variables of coordinates by name."""
 
 
 class GridAxis(NamedTuple):
@@ -48,8 +48,8 @@ def variables_in(points: Sequence[Experiment]) -> dict[str, Variable]:
 class Gathered:
     """The results of all samples of one or several experiments, in memory.
 
-    Of the variables, `only` those of these names are gathered. `done`, of shape (points, samples),
-    tells which samples are there.
+    `only` names the variables that are gathered. `done`, of shape (points, samples),
+    marks the samples that are there.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class Gathered:
         self.done = np.zeros((len(points), samples), dtype=np.bool_)
         self._failures: dict[tuple[int, int], Failure] = {}
         self._arrays: dict[str, NDArray[Any]] = {}
-        self._offered: dict[str, NDArray[np.bool_]] = {}  # at which points there is a variable
+        self._offered: dict[str, NDArray[np.bool_]] = {}  # points that have a variable
 
     def add(self, table: Table) -> None:
         """Put the rows of a table in their places; those of other samples are left out."""
@@ -95,7 +95,7 @@ class Gathered:
 
     @property
     def dealt_with(self) -> NDArray[np.bool_]:
-        """Which samples are there or have failed, (points, samples)."""
+        """Mask of the samples that are there or have failed, (points, samples)."""
         found = self.done.copy()
         for at in self._failures:
             found[at] = True

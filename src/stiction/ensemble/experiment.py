@@ -94,14 +94,14 @@ class Experiment:
 
     @property
     def variables(self) -> dict[str, Variable]:
-        """What `results` returns, by name."""
+        """Variables of `results`, by name."""
         interface, names = self.problem.interface, self.random.names
         kept = {name: along(interface, PROFILES[name]) for name in self.keep if name in names}
         return variables_of(self.problem, self.method, "normal_pressure" in names) | kept
 
     @property
     def sample_bytes(self) -> float:
-        """Bytes of what `results` returns for one sample."""
+        """Size of `results` for one sample, in bytes."""
         nodes = self.problem.interface.size
         return 8.0 * sum(nodes if one.wide else 1 for one in self.variables.values())
 
@@ -162,10 +162,10 @@ class Experiment:
 
     @property
     def batch(self) -> int:
-        """Samples to solve at once: as many as suit the method, and of planes the memory."""
+        """Number of samples to solve at once: suited to the method, on planes to the memory."""
         interface, size = self.problem.interface, int(self.method.chunk_size)
         most = max(1, MOST_NODES // interface.size)
-        # Draws of a line come in blocks: a part of one costs as much as the whole.
+        # Draws of a line come in blocks: a part of one is as expensive as the whole.
         return min(size, most) if interface.is_plane else size
 
     def batches(self, first: int, count: int, size: int = 0) -> Iterator[tuple[int, int]]:
@@ -189,7 +189,7 @@ def _solver(problem: Problem, method: Any) -> Solver:
 def _keeping(
     problem: Problem, method: Any, keep: tuple[str, ...], random: tuple[str, ...]
 ) -> tuple[Any, list[str]]:
-    """The method with the options switched on that `keep` names, and what cannot be kept."""
+    """Return the method with the options that `keep` names, and messages on unknown names."""
     names = [field.name for field in dataclasses.fields(method)]
     options = [name for name in names if isinstance(getattr(method, name), bool)]
     wider = {name: dataclasses.replace(method, **{name: True}) for name in options}

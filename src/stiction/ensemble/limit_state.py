@@ -24,7 +24,7 @@ from stiction.random.stresses import support_in_stress
 Event = Literal["critical_stress", "first_instability"]
 
 SHORTEST, LONGEST = 2e-3, 0.5
-"""Seconds of work that are worth a thread, and after which progress is shown."""
+"""Seconds of work that justify a thread, and after which progress is shown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +98,7 @@ class LimitState:
             found = self._stress(rows)
         else:
             found = np.concatenate(in_threads(self._stress, parts, self.workers))
-        found = np.maximum(found, lowest)  # rounding may leave a stress a hair below
+        found = np.maximum(found, lowest)  # rounding may leave a stress slightly below
         return found if given.ndim == 2 else found[0]
 
     def _stress(self, draws: Array) -> Array:
@@ -118,7 +118,7 @@ class LimitState:
         every node; and the mean stress of an interface whose slip sums to no net force is at most
         the mean of its strength. Both hold for every method and every sample.
         """
-        if self._random_pressure:  # the stress per pressure has no other bounds
+        if self._random_pressure:  # no other bounds apply to the stress per pressure
             return 0.0, math.inf
         problem, random = self.experiment.problem, self.experiment.random
         low, high = support_in_stress(problem, random, "strength")
@@ -150,7 +150,7 @@ class LimitState:
 
 
 def no_single_length(problem: Problem, random: RandomInterface) -> str | None:
-    """Return why the local criterion does not hold, or None if it does."""
+    """Return the reason why the local criterion does not hold, or None if it does."""
     rate = problem.uniform_rate
     if not problem.friction.linear:
         return "strength does not fall linearly with slip"

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FEW, SHOWN = 4, 3
-"""Warnings and failures that are reported one by one."""
+"""Number of warnings and failures that are reported one by one."""
 HOPELESS = 16
-"""Samples that fail, with none solved, before the whole ensemble is given up."""
+"""Failed samples, with none solved, after which the whole ensemble is given up."""
 
 
 def _check_fields(points: Sequence[Experiment]) -> None:
@@ -57,7 +57,7 @@ def gather(
     time_limit: float | None = None,
     pilot: bool = True,
 ) -> xr.Dataset:
-    """Compute an ensemble at every point of a sweep, or what is not stored of it.
+    """Compute an ensemble at every point of a sweep, or the part of it that is not stored.
 
     Samples go to the `store` as they are done. With `retry`, stored samples that failed are
     computed again. `others`, of shape (points, samples), are samples that another job computes. For

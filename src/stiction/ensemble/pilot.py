@@ -14,9 +14,9 @@ from stiction.errors import InputError, collect_warnings, warn_accuracy
 from stiction.progress import Meter
 
 ON_A_LINE, ON_A_PLANE = 32, 8
-"""Samples of a pilot."""
+"""Number of samples of a pilot."""
 MOST_POINTS = 8
-"""Points of a sweep that have a pilot."""
+"""Number of points of a sweep that have a pilot."""
 WORTH_A_WARNING = 0.01
 
 
@@ -68,7 +68,7 @@ def compare(experiment: Experiment, first: int = 0, most: int = ON_A_LINE) -> Pi
 
 
 def doubt(pilot: Pilot, where: str = "") -> str | None:
-    """Return what to warn of: a difference beyond 1 %."""
+    """Return the text of a warning if the difference is beyond 1 %."""
     if max(abs(pilot.bias), pilot.scatter) <= WORTH_A_WARNING:
         return None
     return (

@@ -49,9 +49,9 @@ class Chunk(NamedTuple):
 
 
 class Store:
-    """What the folder of a run holds: samples of a study, which is given in plain form.
+    """The folder of a run: samples of a study, which is given in plain form.
 
-    `damage` gives what is wrong with which chunk, by its name, as far as they were read.
+    `damage` gives the defects of damaged chunks, by name, as far as they were read.
     """
 
     def __init__(self, path: Path, study: dict[str, Any]) -> None:
@@ -96,9 +96,9 @@ class Store:
     # -- reading -------------------------------------------------------------------------------
 
     def chunks(self) -> Iterator[Chunk]:
-        """Yield the chunks that are what was written; what is wrong with others is in `damage`.
+        """Yield the undamaged chunks; the defects of the others are in `damage`.
 
-        What is there and cannot be read may be whole: a `StoreError`.
+        A file that exists and cannot be read may be whole: it raises a `StoreError`.
         """
         folder, self.damage = self.path / CHUNKS, {}
         try:
@@ -139,7 +139,7 @@ class Store:
 
     @property
     def pilot(self) -> dict[str, Any] | None:
-        """What the pilot has found; None if there was none."""
+        """Result of the pilot; None if there was none."""
         with suppress(FileNotFoundError, Damaged):
             return read_json(self.path / PILOT)
         return None
@@ -147,9 +147,9 @@ class Store:
     # -- writing -------------------------------------------------------------------------------
 
     def add(self, tables: list[Table]) -> None:
-        """Take tables, and store what was taken if it is time or it is large.
+        """Take tables, and store all that were taken if it is time or they are large.
 
-        If it cannot be written, a `StoreError`, what was stored before stays readable.
+        If they cannot be written (a `StoreError`), what was stored before stays readable.
         """
         self._taken += tables
         now = time.monotonic()
@@ -159,7 +159,7 @@ class Store:
             self.save()
 
     def save(self) -> None:
-        """Store what was taken, one chunk for each set of variables."""
+        """Store the tables that were taken, one chunk for each set of variables."""
         groups: dict[Any, list[Table]] = {}
         for table in self._taken:
             groups.setdefault(table.rows.dtype, []).append(table)
@@ -169,7 +169,7 @@ class Store:
         self._taken, self._saved = [], time.monotonic()
 
     def note_pilot(self, attributes: Mapping[str, Any]) -> None:
-        """Store what the pilot has found."""
+        """Store the result of the pilot."""
         _write_json(self.path / PILOT, attributes)
 
 
@@ -182,7 +182,7 @@ def digest(data: bytes) -> str:
 
 
 def _encode(tables: list[Table], study: str) -> bytes:
-    """Return tables as the bytes of an .npz archive, with a few words about them as JSON."""
+    """Return tables as the bytes of an .npz archive, with a short description as JSON."""
     seconds = round(sum(table.seconds for table in tables), 3)
     failures = [failure for table in tables for failure in table.failures]
     about = json.dumps([study, versions(), seconds, failures]).encode()
@@ -227,7 +227,7 @@ def read_json(file: Path) -> dict[str, Any]:
 
 
 def _read(file: Path) -> bytes:
-    """Return what a file holds; what is there and cannot be read may be whole: a StoreError."""
+    """Return the content of a file; one that exists but cannot be read is a `StoreError`."""
     try:
         return file.read_bytes()
     except FileNotFoundError:

@@ -20,7 +20,7 @@ LARGEST = 9.0
 
 
 def variances_within(field: RandomField, windows: Sequence[Window]) -> Array:
-    """Return the variances that logarithms of record means have from samples of the field alone."""
+    """Return the variances of the logarithms of record means in samples of the field alone."""
     known: dict[Window, float] = {}
     for window in dict.fromkeys(windows):
         shape: Any = tuple(2 * n for n in window.shape)

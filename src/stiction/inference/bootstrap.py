@@ -28,25 +28,25 @@ from stiction.random.mapping import from_normal
 from stiction.random.random_field import RandomField
 
 FEWEST = 20
-"""Repetitions that determine a tail of errors."""
+"""Number of repetitions that determine a tail of errors."""
 NEGLIGIBLE = 1e-4
 """Share of noise that does not change a marginal."""
 LAGS = np.concatenate(([0.0], np.geomspace(0.01, 4.0, 400)))
-"""In correlation lengths; every spectrum has its 1/e there."""
+"""Lags in correlation lengths; the correlation of every spectrum falls to 1/e within them."""
 NAMES = {name: f"spectrum.{name}" for name in ("correlation_length", "exponent")}
 NAMES["anisotropy"] = "anisotropy"
-"""What is estimated of a spectrum, as study files have it."""
+"""Estimated parameters of a spectrum, by their names in study files."""
 PLACES = ("mean", "marginal.mean", "marginal.loc")
-"""Parameters that state where something is."""
+"""Parameters of location."""
 SIDES = {"marginal.low": -1.0, "marginal.high": 1.0}
-"""On which side of the mean a bound lies."""
+"""Side of the mean on which a bound lies."""
 SAME = 1e-3
-"""As a share of an end of a range: the distance within which an interval is uninformative."""
+"""Distance within which an interval is uninformative, as a share of an end of a range."""
 
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """What is fitted to what: families, and a window for each record (equal ones are shared)."""
+    """Families to fit, and a window for each record (equal windows are shared)."""
 
     windows: tuple[Window, ...]
     marginal: Family
@@ -68,7 +68,7 @@ class Estimate:
 
     @cached_property
     def parameters(self) -> dict[str, float]:
-        """All that is estimated, and what follows from it, by name."""
+        """All estimated parameters, and what follows from them, by name."""
         spectrum = self.model.spectrum
         lags = spectrum.correlation_length * LAGS
         correlation = spectrum.untruncated_correlation(lags)
@@ -125,7 +125,7 @@ def estimate(
         likelihood = Whittle(family, hermite_shares(marginal), observed)
         vector = likelihood.fit(likelihood.coarse() if vector is None else vector)
         model = family.model(vector, likelihood.shares)
-        if model.noise_share < 0.0:  # the best there can be is none
+        if model.noise_share < 0.0:  # zero is the best possible
             without = likelihood._replace(family=replace(family, noise=0.0))
             model = without.family.model(without.fit(vector[:-1]), likelihood.shares)
         if abs(model.noise**2 - noise**2) < NEGLIGIBLE * model.variance:
@@ -215,16 +215,16 @@ def at_ends(around: Repetitions, confidence: float) -> list[Estimate]:
 
 
 class Scale(NamedTuple):
-    """Where the error of a parameter is about normal: a logarithm, unless it is `linear`.
+    """Scale on which the error of a parameter is about normal: a logarithm, unless `linear`.
 
-    Of bounds of a marginal it is the logarithm of the distance from the mean.
+    For bounds of a marginal it is the logarithm of the distance from the mean.
     """
 
     name: str
     linear: bool = False
 
     def _from(self, values: Mapping[str, float]) -> tuple[float, float]:
-        """Where the logarithm begins, and on which side of it the parameter lies."""
+        """Origin of the logarithm, and the side of it on which the parameter lies."""
         if self.name in SIDES:
             return values["mean"], SIDES[self.name]
         return origin(self.name), 1.0
@@ -240,7 +240,7 @@ class Scale(NamedTuple):
         return scaled if self.linear else start + side * math.exp(scaled)
 
     def of(self, one: Estimate) -> tuple[float, float]:
-        """Return an estimate on this scale, and what its error is proportional to."""
+        """Return an estimate on this scale, and a quantity that scales its error."""
         if self.name == "noise":  # its variance, which may be negative, and its own error
             return one.noise
         width = math.sqrt(one.parameters["efolding_length"])

@@ -1,4 +1,4 @@
-"""Density of the peak that a test shows: that of the onset, with the error of the load cell.
+"""Density of the measured peak: that of the onset, with the error of the load cell.
 
 No onset is below the least possible strength, and where the correlation length is long many
 are just above it. A kernel density of the onsets would leak below, and find any strength
@@ -22,11 +22,11 @@ from stiction.arrays import Array
 from stiction.jit import jit
 
 GROUPS = 256
-"""Most groups of neighbouring sorted samples that stand for the sample, by their means."""
+"""Largest number of groups of neighbouring sorted samples, whose means stand for the sample."""
 REACH = 10.0
 STEP = 0.05
 ERRORS, SPREADS = 4.0, 6.0
-"""Standard deviations of the load cell, and of v, over which is integrated."""
+"""Half range of the integration, in standard deviations of the load cell, and of v."""
 
 
 class Densities(NamedTuple):

@@ -23,7 +23,7 @@ from stiction.results import to_dataset
 from stiction.variables import Variable
 
 POINTS = 8_000
-"""Of the grid of each posterior."""
+"""Number of points of the grid of each posterior."""
 UNIFORM = 12.0**-0.5
 """Standard deviation of u before any test."""
 VARIABLES = {

@@ -1,4 +1,4 @@
-"""A random field from measured profiles, and how far it may be trusted."""
+"""A random field from measured profiles, and reasons not to trust it."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -33,7 +33,7 @@ MARGINALS = ("lognormal", "weibull", "gamma", "beta")
 ENOUGH_LENGTHS = 10.0
 """Correlation lengths below which a record constrains no parameter well."""
 FAR = 0.01
-"""p-value below which a family does not suit."""
+"""p-value below which a family does not fit."""
 ADVICE = {
     "marginal": "the values are far from its family; compare families",
     "spectrum": "the periodogram is far from its family; take another spectrum or a higher detrend",
@@ -44,7 +44,7 @@ STRESSES = ("mean", "standard_deviation", "noise", "low", "high", "loc", "scale"
 
 
 def _known(value: Any, info: ValidationInfo) -> float | None:
-    """A number, that of `False`, or None, which is estimated."""
+    """Return the given number, 1 or 0 for `False`, or None for `True`: it is estimated."""
     ratio = info.field_name == "anisotropy"
     if isinstance(value, bool):
         return None if value else float(ratio)
@@ -382,7 +382,7 @@ def _lengths_held(found: Estimate) -> float:
 
 
 def _p_value(name: str, truth: Estimate, fits: Sequence[Estimate]) -> float:
-    """Of data that are a record of their model (Barnard's test; Davison and Hinkley, 1997)."""
+    """P-value of data from their model (Barnard's test; Davison and Hinkley, 1997)."""
     own = getattr(truth, name)
     return (sum(getattr(one, name) >= own for one in fits) + 1) / (len(fits) + 1)
 

@@ -1,4 +1,4 @@
-"""The posterior on a grid that closes in on where it is, and draws from it."""
+"""The posterior on a grid that closes in on its mass, and draws from it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,11 +12,11 @@ Function = Callable[[Array], Array]
 """Logarithms at points (points, parameters)."""
 
 POINTS = 100_000
-"""Points of a grid in all, about."""
+"""Approximate number of points of a grid."""
 MOST_ALONG = 512
 ZOOMS = 6
 NEGLIGIBLE = 1e-6
-"""Mass outside that is given up on either side of a parameter when the grid closes in."""
+"""Mass left outside on either side of a parameter when the grid closes in."""
 BATCH = 5_000
 
 
@@ -81,7 +81,7 @@ def _evaluated(function: Function, low: Array, high: Array, along: int, meter: M
 
 
 def _closer(mass: Array, low: Array, high: Array) -> tuple[Array, Array]:
-    """Return the box without the cells on either side that hold next to nothing."""
+    """Return the box without the cells on either side that hold almost no mass."""
     new_low, new_high = low.copy(), high.copy()
     for axis in range(mass.ndim):
         along = _along(mass, axis)

@@ -37,9 +37,9 @@ WIDEN = 0.3
 NEAR, HELD = 0.05, 1e-3
 """Share of the box at either end, and mass of the posterior there above which the box grows."""
 EDGE, PILED = 0.02, 4.0
-"""Share of a prior at its ends, and how many times that of the posterior is piled up there."""
+"""Share of a prior at its ends, and its multiple at which the posterior piles up there."""
 RARE = 1e-3
-"""Probability of a gap between peaks below which they are of two kinds."""
+"""Probability of a gap between peaks below which they are probably of two kinds."""
 
 
 @checked
@@ -287,9 +287,9 @@ def _notes(likelihood: Likelihood, errors: Sequence[float], u: Array) -> tuple[s
 
 
 def _piled_up(prior: Prior, u: Array) -> list[str]:
-    """Return where draws (draws, parameters) of the posterior pile up at an end of the prior.
+    """Return the ends of the prior at which draws (draws, parameters) of the posterior pile up.
 
-    The box that was simulated needs no such look: it grew until it held the posterior.
+    The simulated box needs no such check: it grew until it held the posterior.
     """
     texts = [
         f"the {side} end of {name}, {end:g}, holds {np.mean(near):.0%} of the draws"
@@ -309,7 +309,7 @@ def _piled_up(prior: Prior, u: Array) -> list[str]:
 
 
 def _check_agreement(peaks: Peaks, predicted: Sequence[Array]) -> None:
-    """Warn of peaks with a gap among them that one population would hardly show.
+    """Warn of a gap between peaks that is unlikely for one population.
 
     The largest gap between neighbours, in terms of the predicted distribution; the chance of one
     so large among n uniform numbers is at most (n - 1) (1 - gap)^n.

@@ -24,21 +24,21 @@ from stiction.inference.scaling import Scaling, find_scaling
 from stiction.progress import SILENT, Meter
 
 BATCHES = 8
-"""Parts of the sample, each left out once, by which the Monte Carlo error is estimated."""
+"""Number of parts of the sample, each left out once to estimate the Monte Carlo error."""
 SAMPLES = {"local_criterion": 2000, "equilibrium": 500}
 FEW = 100
 ALIKE = 0.8
-"""Correlation of onsets by two methods from which on one helps the other."""
+"""Correlation of the onsets by two methods above which one helps the other."""
 SPECIMEN = 2**20
 """Samples of a specimen of another length begin at multiples of this."""
 BEYOND = 2.0
-"""Spreads beyond the extremes of all simulated peaks from which on a peak is out of reach."""
+"""Spreads beyond the extremes of all simulated peaks beyond which a peak is out of reach."""
 ERRORS = 5.0
-"""Standard deviations of the load cell beyond that."""
+"""Standard deviations of the load cell that are added to this distance."""
 
 
 class Specimen(NamedTuple):
-    """What is simulated of one kind of specimen, in the unit of the peaks."""
+    """Simulated results of one kind of specimen, in the unit of the peaks."""
 
     onsets: Array  # (nodes, samples): of the same samples at every node
     local: Array | None  # by the local criterion, of the same samples and of more, if they help
@@ -118,10 +118,10 @@ def make_model(
     low: Array | None = None,
     high: Array | None = None,
 ) -> Model:
-    """Simulate what the likelihood needs.
+    """Simulate the onsets that the likelihood needs.
 
-    `lengths` are those of the specimens, m, None for the problem's own; `variable` is what peaks
-    are among the results of the method, with the standard `error` of the load cell. `low` and
+    `lengths` are those of the specimens, m, None for the problem's own; `variable` is the name
+    of the peaks among the results, with the standard `error` of the load cell. `low` and
     `high` are corners, as u, of the part of the prior that matters; all of it if left out.
     """
     low = np.zeros(prior.dimension) if low is None else low
@@ -164,7 +164,7 @@ def least_peak(experiment: Experiment, variable: str) -> float:
 
 
 def moved(few: Array, many: Array) -> Array:
-    """Move many onsets by the local criterion, (points, many), to where a few by the method are.
+    """Move many onsets by the local criterion, (points, many), to those of a few by the method.
 
     The same samples by both methods differ little, and so do their quantiles: the difference of
     the quantiles of the few is added to the many.

@@ -24,14 +24,14 @@ from stiction.random.marginals import MARGINALS, Beta, ScipyMarginal, marginal_o
 
 BINS = 160
 REACH = 5.0
-"""Standard deviations of the noise that count."""
+"""Standard deviations of the noise to which its distribution is integrated."""
 LEAST = 1e-12
-"""Probability of a bin."""
+"""Least probability of a bin."""
 DIFFERENCE = 1e-5
 WIDEST = 10.0
-"""Ranges of the values that free bounds may lie away from them: beyond, they have no effect."""
+"""Largest distance of free bounds from the values, in their ranges: more has no effect."""
 INSIDE = 1e-2
-"""Of the range: how near to a bound noise leaves a value, for a first guess."""
+"""Least distance of noisy values from a bound for a first guess, as a share of their range."""
 NEGLIGIBLE = 1e-4
 """Share of noise that does not change a marginal."""
 MOST_NOISE = 0.95
@@ -90,7 +90,7 @@ KINDS = {
     ),
 }
 SCIPYS = {"normal": "norm"}
-"""Names of ours for families of scipy."""
+"""Our names of families of scipy."""
 
 
 @dataclass(frozen=True)
@@ -195,7 +195,7 @@ class Family:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """The support as far as it is known before anything is fitted."""
+        """Support of the family with its fixed parameters, before any fit."""
         return self.fixed.get("low", -math.inf), self.fixed.get("high", math.inf)
 
     def check(self, values: Array) -> None:
@@ -248,7 +248,7 @@ def family_of(given: Any) -> Family:
 def _beta(
     values: Array, quiet: Array, noise: float, fixed: dict[str, float], start: Any
 ) -> Search:
-    """Shapes, and the distances of free bounds from the mean, as logarithms."""
+    """Return the search of shapes and distances of free bounds from the mean, as logarithms."""
     mean, unit = float(values.mean()), float(values.std())
     sides = {name: side for name, side in (("low", -1.0), ("high", 1.0)) if name not in fixed}
     room = {"low": mean - float(values.min()), "high": float(values.max()) - mean}
@@ -278,7 +278,7 @@ def _beta(
 
 
 def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], Array]]:
-    """Counts of values in bins, where the distribution without noise is needed, and what it gives.
+    """Counts of values in bins, places of the distribution without noise, and a map to bins.
 
     Its convolution with that of the noise is a sum in steps of half a deviation or less.
     """
@@ -300,7 +300,7 @@ def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], 
 
 
 def mean_log_likelihood(marginal: Any, values: Array, noise: float) -> float:
-    """Return that of values in bins, marginal and noise together, without the width of a bin."""
+    """Return the mean log likelihood of values in bins with noise, without the bin width."""
     counts, at, probabilities = _bins(values, noise)
     expected = probabilities(marginal.distribution.cdf(at))
     return float(counts @ np.log(expected) / values.size)

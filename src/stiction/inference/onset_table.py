@@ -19,9 +19,9 @@ from stiction.progress import SILENT, Meter
 from stiction.random.synthesis import BLOCK
 
 NODES = {0: 1, 1: 25, 2: 11, 3: 7, 4: 5}
-"""Nodes along each parameter that is simulated, by how many there are."""
+"""Nodes along each simulated parameter, by the number of these parameters."""
 LOG = 3.0
-"""Parameters whose prior spans this ratio or more are interpolated in their logarithm."""
+"""Ratio of the ends of a prior from which a parameter is interpolated in its logarithm."""
 
 
 class Axis(NamedTuple):
@@ -82,7 +82,7 @@ def experiments_at(
 ) -> list[Experiment]:
     """Return the experiments at points (points, parameters), on specimens of a length, m.
 
-    The distance of nodes is that of the problem.
+    The node spacing is that of the problem.
     """
     found = []
     for theta in thetas:

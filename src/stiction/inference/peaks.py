@@ -13,7 +13,7 @@ from stiction.profiles.tables import read_table
 from stiction.profiles.units import factor_to, is_in
 
 FEWEST = 3
-"""Peaks in all; of two numbers, one may be a mistake."""
+"""Fewest peaks in all: of two numbers, one may be a mistake."""
 PEAK = ("peak", "tau", "stress", "strength", "force", "friction")
 LENGTH = ("length", "specimen")
 
@@ -37,7 +37,7 @@ class Peaks(NamedTuple):
 
     @property
     def variable(self) -> str:
-        """Name of what was measured among the results of a method."""
+        """Name of the measured quantity among the results of a method."""
         return "friction_coefficient" if self.coefficients else "critical_stress"
 
     def __str__(self) -> str:

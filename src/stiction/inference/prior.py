@@ -81,7 +81,7 @@ class Prior:
 
     @contextmanager
     def named(self, theta: Array) -> Iterator[None]:
-        """Let mistakes that are found meanwhile begin with the point (parameters,)."""
+        """Begin the messages of errors raised meanwhile with the point (parameters,)."""
         pairs = zip(self.names, theta, strict=True)
         with prefixed("prior: at " + ", ".join(f"{name} = {v:.4g}" for name, v in pairs)):
             yield
@@ -108,7 +108,7 @@ def _tails(distribution: Any) -> tuple[float, float]:
 
 
 def full_key(key: str) -> str:
-    """Return a key as in a sweep: those of the strength may be given without where they stand."""
+    """Return a key as in a sweep; keys of the strength may be given without their prefix."""
     first = key.split(".")[0]
     if first in ("problem", "random"):
         return key

@@ -14,11 +14,11 @@ from stiction.profiles.reading import is_labelled, labelled, simplified
 FEWEST = 64
 """Fewest measured points from which a spectrum can be estimated."""
 NARROWEST = 8
-"""Points in each direction."""
+"""Fewest points in each direction."""
 UNEVEN = 0.02
-"""Of a spacing: what rounding in a file may move a point."""
+"""Share of a spacing by which rounding in a file may move a point."""
 OUTLYING = 8.0
-"""Times the robust standard deviation: where a value is called an outlier."""
+"""Distance of an outlier from the median, in robust standard deviations."""
 
 
 class Record(NamedTuple):
@@ -93,7 +93,7 @@ def _of_array(values: Any, interface: Interface | None) -> list[Record]:
 
 
 def _spacing(x: Array, name: str) -> float:
-    """Distance (m) of points at equal distances, of which sorted ones are given; or an error."""
+    """Return the distance (m) of equidistant points, given in order, or raise an error."""
     if not np.all(np.isfinite(x)) or x.size < 2:
         raise InputError(f"{name}: must be finite and have more than one point")
     steps = np.diff(x)

@@ -49,7 +49,7 @@ class Scaling(NamedTuple):
 
 
 def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
-    """Find which parameters of a prior scale the onset; `variable` is what the peaks are."""
+    """Find the parameters of a prior that scale the onset; `variable` names the peaks."""
     middle = prior.middle
     problem, random = prior.at(middle)
     if reason := _no_scaling(prior, problem, random, method):
@@ -93,7 +93,7 @@ def _none(middle: Array, reason: str) -> Scaling:
 
 
 def _no_scaling(prior: Prior, problem: Any, random: Any, method: Any) -> str:
-    """Return why no parameter scales the onset, or nothing."""
+    """Return the reason why no parameter scales the onset, or an empty text."""
     friction, load = problem.friction, problem.load
     if method.type not in ("local_criterion", "equilibrium"):
         return f"the onset by {method.label} does not scale with the strength"

@@ -9,7 +9,7 @@ from stiction.arrays import Array
 
 STEPS = 40
 HIGHEST = 1e8
-"""Damping at which no step rises any more."""
+"""Damping at which no step raises the likelihood any more."""
 
 
 def climb(
@@ -31,7 +31,7 @@ def climb(
     damping = 1e-3
     for _ in range(STEPS):
         score, information = derivatives(at, state)
-        # What pushes against its limit is held there, or the others could not move.
+        # A parameter that pushes against its limit is held there, or the others could not move.
         held = ((at <= limits[:, 0]) & (score < 0.0)) | ((at >= limits[:, 1]) & (score > 0.0))
         free = np.flatnonzero(~held)
         information, score = information[np.ix_(free, free)], score[free]

@@ -6,7 +6,7 @@ of the measurement, which is added to values and not to z, adds its share at zer
 variance is free, so that what a short record does to it does not disturb the shape of the
 spectrum.
 
-A spectrum that is cut off, or falls fast, has next to nothing at high wavenumbers, where a
+A spectrum that is cut off, or falls fast, has almost no power at high wavenumbers, where a
 likelihood would weigh the logarithm of what is left: higher orders of the map, rounding of
 the data. A floor of a thousandth of the highest power is therefore added to periodogram and
 expectation alike. The score stays unbiased; what lies below the floor ceases to count.
@@ -38,26 +38,26 @@ RANGES = {
     # chance; were it cut at zero, the errors of small noises could not be estimated.
     "noise_share": (-0.5, 0.95),
 }
-"""Between which ends parameters are looked for; of noise, its share of the variance."""
+"""Ends of the searched range of each parameter; for noise, of its share of the variance."""
 TRIED = {
     "variance": [1.0],
     "exponent": [1.0, 2.0, 4.0],
     "anisotropy": [0.5, 1.0, 2.0],
     "noise_share": [0.0, 0.01, 0.1, 0.4],
 }
-"""Where a search may begin."""
+"""Values from which a search may begin."""
 FLOOR = 1e-3
-"""Of the highest power, averaged over records and neighbours."""
+"""Floor as a share of the highest power, averaged over records and neighbours."""
 NEIGHBOURS = 5
 ORDERS = 10
 REACH, POINTS = 6.0, 121
 AT_END = 1e-3
-"""As a share of a range: how near to an end of it an estimate is not determined."""
+"""Distance from an end of a range, as a share of it, within which an estimate is at it."""
 DIFFERENCE = 1e-4
 SETTLED = 1e-3
 """Gain of log likelihood below which scoring ends; a standard error is worth a half."""
 LONGEST = 1.5
-"""Step, on the scale on which parameters are searched for."""
+"""Longest step, on the scale on which parameters are searched for."""
 
 
 def hermite_shares(marginal: Any) -> Array:
@@ -105,7 +105,7 @@ def observe(rows: Sequence[Array], windows: Sequence[Window]) -> list[Observed]:
 
 
 class Model(NamedTuple):
-    """What a spectrum, the Hermite shares of a marginal and noise predict of records.
+    """Prediction of records from a spectrum, the Hermite shares of a marginal and noise.
 
     The truncation of a spectrum is a property of the field only if it was given (`end_seen`): at a
     multiple of 1/xi_0 it would, among the wavenumbers of a record, determine the correlation
@@ -142,7 +142,7 @@ class Model(NamedTuple):
 
 
 def origin(name: str) -> float:
-    """Return where the logarithm begins on which the error of a parameter is about normal."""
+    """Return the origin of the logarithm on which the error of a parameter is about normal."""
     return 0.5 if name.endswith("exponent") else 0.0
 
 
@@ -246,7 +246,7 @@ class Whittle(NamedTuple):
         return value
 
     def coarse(self) -> Array:
-        """Return the best of a grid of parameters, to begin with."""
+        """Return the best of a grid of parameters, as a start."""
         lengths = np.geomspace(*self.family.lengths, 17)[:-2].tolist()
         tried = TRIED | {"correlation_length": lengths}
         windows = [one.window for one in self.observed]

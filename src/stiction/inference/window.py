@@ -25,7 +25,7 @@ from stiction.arrays import Array
 TAPERED = 0.5
 """Share of a record over which the cosine taper rises and falls."""
 EXACT = {1: 16, 2: 2}
-"""Wave numbers up to which the trend is in the expectation; the taper hides it from higher ones."""
+"""Wave numbers up to which the expectation includes the trend; the taper hides it beyond."""
 ROOM = {1: 4, 2: 2}
 """Period of the grid on which a correlation is computed, in lengths of the record."""
 EDGE = 0.2
@@ -36,7 +36,7 @@ LEFT_OUT = 1e-4
 FOLDS = 6
 """Multiples of the sampling wavenumber that are folded back one by one."""
 NEAR, FEW = 1, 65
-"""Of those multiples on a line the ones that need all wavenumbers, and how many the others do."""
+"""Multiples on a line that need all wavenumbers, and number of wavenumbers of the others."""
 
 
 class Window:
@@ -119,7 +119,7 @@ class Window:
     def power(self, spectrum: Any, anisotropy: float = 1.0, *, end_seen: bool = True) -> Array:
         """Return the variance of z in each mode of a period of the grid; it sums to 1 over all.
 
-        What lies above the sampling wavenumber is folded back, and above `FOLDS` times that evenly.
+        Power above the sampling wavenumber is folded back, above `FOLDS` times that evenly.
         The spectrum fades out at its truncation, and has none if `end_seen` is false: what it
         leaves out of a rough spectrum would be taken for noise.
         """
@@ -207,7 +207,7 @@ def _folded_line(
 def _folded_plane(
     spectrum: Any, axes: list[Array], folds: list[int], sampling: list[float], end: float
 ) -> Array:
-    """The same on a plane."""
+    """The same for a plane."""
     found = np.zeros((axes[0].size, axes[1].size))
     for p in range(-folds[0], folds[0] + 1):
         for q in range(-folds[1], folds[1] + 1):

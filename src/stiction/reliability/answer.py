@@ -97,7 +97,7 @@ class Answer:
 
     @property
     def _place(self) -> str:
-        """The coefficient and the distance from the bound, in words where there are any."""
+        """Text of the coefficient and of the distance from the bound, where there are any."""
         coefficient = f" (friction coefficient {self.friction_coefficient:.4g})"
         text = coefficient if math.isfinite(self.normal_pressure) else ""
         if bounded(self.lower_bound):
@@ -169,7 +169,7 @@ def prepare(
 
 
 def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
-    """Return why chains of samples take too long by this method; None if not, or if allowed."""
+    """Return the reason why chains of samples take too long by this method; None if allowed."""
     seconds = CHAIN * experiment.method.seconds_per_sample(experiment.problem)
     kind = experiment.method.type
     if (seconds <= PATIENCE and kind != "rupture") or (max_evaluations or 0) >= CHAIN:
@@ -183,7 +183,7 @@ def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
 
 
 def bounded(lowest: float) -> bool:
-    """Return whether a least possible stress is a bound: zero or none is not."""
+    """Return whether a least possible stress is a bound: zero and infinity are not."""
     return bool(np.isfinite(lowest) and lowest > 0.0)
 
 

@@ -15,8 +15,8 @@ BATCH = 1024
 class Count(NamedTuple):
     """Failures among the first samples of an ensemble.
 
-    If counting ended at a failure, because it was the last one wanted, that one does not show how
-    frequent failures are, and neither does its sample.
+    If counting ended at a failure, because it was the last one wanted, that failure does not
+    count towards their frequency, and neither does its sample.
     """
 
     failures: int
@@ -39,7 +39,7 @@ class Count(NamedTuple):
         last = int(self.until_failure)
         if self.failures <= last:
             return math.inf
-        # Where none held, as if one more had been drawn that did: nothing is certain by counting.
+        # If no sample held, count as if one more had been drawn that did: no count is certain.
         held = max(1.0 - self.probability, 1.0 / (self.samples + 1.0))
         return math.sqrt(held / (self.failures - last))
 
@@ -63,7 +63,7 @@ def count_failures(
 ) -> tuple[Count, Array]:
     """Count until there are enough failures, among at least `least` samples from `start` on.
 
-    Stopping when the estimate looks precise enough would favour counts that saw many failures
+    Stopping when the estimate looks precise enough would favour counts with many failures
     early. So the number of failures is fixed beforehand, and what was computed beyond the last of
     them does not count; the stresses that are returned include it.
     """

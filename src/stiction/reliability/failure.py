@@ -33,17 +33,17 @@ from stiction.results import along
 from stiction.variables import ONSET_VARIABLES, PROFILES
 
 PILOT = 1_000
-"""Plain samples by which the algorithm is chosen."""
+"""Number of plain samples by which the algorithm is chosen."""
 FREQUENT = 0.01
-"""From here on plain sampling needs no more evaluations than subset simulation."""
+"""Probability above which plain sampling needs no more evaluations than subset simulation."""
 NEGLIGIBLE = 1e-15
-"""Probability that anything slips below which no sample is drawn."""
+"""Probability of any slip below which no sample is drawn."""
 DOUBTFUL = 0.02
 """Share of the mean strength below which a stress is probably in another unit."""
 SHOWN = 20
 """Failing profiles kept."""
 CHECKED = 32
-"""Failures among the samples that are solved by equilibrium too."""
+"""Number of failures among the samples that are also solved by equilibrium."""
 COVERED = 0.8
 """Share of the failures that the first stage must reach to avoid a warning."""
 
@@ -178,7 +178,7 @@ def _certain(state: LimitState, stress: float) -> dict[str, Any]:
 
 
 def _fewest(budget: int) -> int:
-    """Return how many plain samples are solved at least."""
+    """Return the least number of plain samples that are solved."""
     return min(PILOT, max(budget // 5, 50))
 
 
@@ -187,7 +187,7 @@ def _choice(
 ) -> tuple[str, str, tuple[Array, Array] | None]:
     """Return the algorithm, the reason, and the draws and stresses of the samples that it took.
 
-    They do not enter the estimate of a count, which is chosen where they hold many failures.
+    They do not enter the estimate by counting, which is chosen where they hold many failures.
     """
     if algorithm != "auto":
         return algorithm, "as requested", None
@@ -221,7 +221,7 @@ def _by_counting(
         max_evaluations=budget - start, start=start,
     )  # fmt: skip
     failed = np.flatnonzero(stresses < stress)
-    # The weakest samples, failures and others in the shares that they have.
+    # The weakest samples: failures and others in their true shares.
     some = failed[:CHECKED]
     seen = stresses[: some.max(initial=-1) + 1]
     near = np.argsort(seen, kind="stable")[: 2 * some.size]

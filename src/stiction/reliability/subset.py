@@ -19,13 +19,13 @@ from stiction.reliability.uncertainty import ancestral_variance
 Function = Callable[[Array], Array]
 
 LEVEL_PROBABILITY = 0.1
-"""Share of a level's samples that go on."""
+"""Share of a level's samples that continue to the next."""
 ACCEPTANCE = 0.37
-"""Share of steps to accept; from 0.25 to 0.44 the efficiency is the same within a tenth."""
+"""Target share of accepted steps; from 0.25 to 0.44 the efficiency is the same within 10 %."""
 FIRST_STEP = 0.7
 MOST_LEVELS = 40
 KEEP = 3
-"""How many of the last populations keep their draws."""
+"""Number of the last populations that keep their draws."""
 COPIES = KEEP + 2  # the states of the chains and their noise
 ADVICE = "take fewer nodes, truncate the spectrum earlier, or use algorithm='plain'"
 
@@ -42,7 +42,7 @@ class Population(NamedTuple):
     step: float = FIRST_STEP  # b at the end
 
     def light(self) -> Self:
-        """Return the same without draws, which take nearly all of the memory."""
+        """Return the same population without draws, which take nearly all of the memory."""
         return self._replace(draws=np.empty((0, self.draws.shape[1])))
 
 
@@ -66,7 +66,7 @@ class Descent(NamedTuple):
         return float(self.populations[-1].values.min()), float(self.populations[0].values.max())
 
     def light(self) -> Self:
-        """Return the same without draws."""
+        """Return the same repetition without draws."""
         return self._replace(populations=[one.light() for one in self.populations])
 
     def _holders(self, value: float) -> list[Population]:
@@ -92,8 +92,8 @@ class Descent(NamedTuple):
     def around(self, value: float) -> tuple[Array, Array]:
         """Return draws and values of samples on both sides of a value, in their true shares.
 
-        The lowest of a population, twice as many as lie below the value. A population of which
-        more than half does would show next to nothing of the other side.
+        They are the lowest of a population, twice as many as lie below the value. With more
+        than half of it below, almost none of the other side would be shown.
         """
         *wider, holder = self._holders(value)
         below = int(np.sum(holder.values < value))

@@ -16,17 +16,17 @@ from stiction.reliability.two_level import bridge
 from stiction.reliability.uncertainty import generator, log_width
 
 MARGIN = 1.1
-"""The variance known so far is itself an estimate; aim a little further."""
+"""Factor on the sample size, as the variance so far is itself an estimate."""
 SUBSET, BRIDGE = (1_000, 5_000), (200, 1_000)
-"""Samples a level, or exact samples, of the first repetition and of the largest."""
+"""Samples per level, or exact samples, of the first and of the largest repetition."""
 DEEPER = 0.3
 """Repetitions go on to this share of a probability, to estimate the lower end of the interval."""
 PILOT = 500
-"""Plain samples by which a less expensive method is judged as a guide."""
+"""Number of plain samples by which a less expensive method is judged as a guide."""
 ALIKE = 0.9
 """Share of the weakest of them that a guide must pick to lead to the rarest."""
 POOR = 0.02
-"""Of the samples that a guide leads to, those that fail: fewer, and it is no guide."""
+"""Least share of failures among the samples of a guide; below it the method is no guide."""
 
 
 class Tail(NamedTuple):

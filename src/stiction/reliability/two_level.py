@@ -5,10 +5,10 @@ With L the guide's stress and E the exact one, for any ceiling b,
     P(E < s) = P(L < b) P(E < s | L < b) / P(L < b | E < s),
 
 whatever L is. Where L follows E closely the last factor is near one and the middle one is not
-small, so that a few hundred exact evaluations do what thousands would.
+small, so that a few hundred exact evaluations replace thousands.
 
-The last factor is measured by walks that start from failures with L < b. Failures which L does not
-see, and to which no short walk leads, stay unseen: whether L ranks samples as E does has to be
+The last factor is measured by walks that start from failures with L < b. Failures that L misses
+and that no short walk reaches are never found: whether L ranks samples as E does has to be
 known from elsewhere (`stiction.reliability.tail`).
 """
 
@@ -23,14 +23,14 @@ from stiction.reliability.subset import Function, descend, grow
 from stiction.reliability.uncertainty import ancestral_variance
 
 GUIDING = 5
-"""Samples of the guide a level for each exact one of the middle factor."""
+"""Samples of the guide per level for each exact sample of the middle factor."""
 COVERED = 0.95
-"""Smallest last factor: below it the walk must first find what the guide's stress does not see."""
+"""Smallest last factor: below it the walk must first find failures that the guide misses."""
 STEPS = 10
 FORGOTTEN = 5
-"""Exact steps of each walk in the failure set, and how many of them are forgotten."""
+"""Exact steps of each walk in the failure set, and the number of them that are discarded."""
 MARGIN = 2.5
-"""The guide's level should be this many times likelier than the requested probability, or more."""
+"""Least ratio of the probability of the guide's level to the requested probability."""
 
 
 class Bridge(NamedTuple):
@@ -40,7 +40,7 @@ class Bridge(NamedTuple):
     zero: leaving it out of a mean would favour repetitions that found one.
     """
 
-    samples: int  # exact evaluations meant for the middle factor
+    samples: int  # exact evaluations for the middle factor
     rarest: float  # probability of the last level of the guide
     evaluations: int  # of the exact limit state
     first_stage_evaluations: int  # of the guide
@@ -48,7 +48,7 @@ class Bridge(NamedTuple):
     log_probability: float = -math.inf  # logarithm of P(L < b)
     values: Array = np.zeros(0)  # E of samples with L < b
     ancestors: NDArray[np.int64] = np.zeros(0, np.int64)  # in the first level of the guide
-    share: float = 0.0  # of them that fails
+    share: float = 0.0  # share of them that fail
     last: float = 1.0  # P(L < b | E < s)
     last_variance: float = 0.0  # squared coefficient of variation of its estimate
     draws: Array = np.zeros((0, 0))  # of failing samples
