@@ -117,6 +117,15 @@ def test_units_that_are_stated_are_converted(given):
     assert found(given) == pytest.approx(found(STRENGTH), rel=1e-13)
 
 
+def test_a_dataset_is_a_profile_as_its_variable_is():
+    dataset = labelled().to_dataset(name="tau_p").assign(tau_i=labelled(STRENGTH / 2))
+    assert found({"strength": dataset}) == found(STRENGTH)
+
+
+def test_a_profile_in_si_keeps_no_other_unit():
+    assert "unit" not in st.read_profile(labelled(STRENGTH / 1e6, unit="MPa")).attrs
+
+
 def test_everything_beside_the_strength_is_read_alike():
     residual = 1e5 + 1e6 * X
     given = labelled(residual[::-1] * 1e-3, X[::-1] * 1e3, "mm", units="kPa")
@@ -305,6 +314,14 @@ REFUSED_CALLS = {
     ),
     "gaps: must be 'refuse' or 'fill'": lambda: onset(STRENGTH, gaps="drop"),
     "clearly the strength ... 'z'": lambda: st.read_profile(labelled().to_dataset(name="z")),
+    "value: unknown '1' ... strength, tau_i": lambda: st.read_profile(
+        labelled().to_dataset(name="strength").assign(tau_i=labelled()), x=0, value=1
+    ),
+    "not clear from (time)": lambda: dataclasses.replace(
+        SYSTEM,
+        interface=st.Interface(length=(0.1, 0.1), nodes=(NODES, NODES)),
+        load=st.Load(normal_pressure=xr.DataArray(STRENGTH, dims="time")),
+    ),
     "value: 'q' is not the name of the only variable, 'tau'": lambda: st.read_profile(
         labelled().rename("tau"), value="q"
     ),

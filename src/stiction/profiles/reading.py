@@ -140,7 +140,8 @@ def read_profile(
     if MEASURED in array.coords:
         array[MEASURED].attrs["long_name"] = "measured, not filled in"
     attributes = {"units": QUANTITIES[quantity].units, "long_name": quantity.replace("_", " ")}
-    return array.rename(quantity).assign_attrs(attributes)
+    array.attrs = attributes
+    return array.rename(quantity)
 
 
 def _in_order(array: Any) -> Any:
@@ -302,7 +303,7 @@ def _choose(data: Any, names: list[Any], called: tuple[str, ...], si: str) -> An
 def _column(data: Any, names: list[Any], what: str, wanted: Column) -> Any:
     """Return the variable of this name, heading or number."""
     columns = list(data.data_vars)
-    if isinstance(wanted, int) and 0 <= wanted < len(columns):
+    if isinstance(wanted, int) and "row" in data.dims and 0 <= wanted < len(columns):
         return columns[wanted]
     for name in names:
         if wanted in (name, data[name].attrs.get("heading")):
@@ -339,6 +340,7 @@ def _directed(array: Any, dims: tuple[str, ...]) -> Any:
     along = [dim for dim in (*dims, "row") if dim in array.dims]
     samples = [dim for dim in array.dims if dim not in along]
     one_each = not along and len(samples) == 1
+    one_each = one_each and (len(dims) == 1 or _plain(samples[0]) in SAMPLES)
     clear = one_each or along in ([*dims], ["row"])
     if not clear or len(samples) > 1 or "y" in samples or len({*array.dims}) < array.ndim:
         raise InputError(
@@ -363,7 +365,7 @@ def at_nodes(
     """
     quantity, interpolate = quantity_of(name), False
     with prefixed(name):
-        if isinstance(value, Mapping):  # of `profile_in_file`
+        if isinstance(value, Mapping) and not is_labelled(value):  # of `profile_in_file`
             import xarray as xr
 
             try:
