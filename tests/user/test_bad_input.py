@@ -82,6 +82,11 @@ MISTAKES = {
     "low=2 ... high=1": lambda: st.Beta(alpha=1.0, beta=1.0, low=2.0, high=1.0),
     "alpha ... 0": lambda: st.Beta(alpha=0.0, beta=1.0, low=1.0, high=2.0),
     "mean and cv ... finite squares ... 1e+308": lambda: st.Lognormal(mean=1e308, cv=1e308),
+    "mean and cv ... finite squares ... 1e-300": lambda: st.Gamma(mean=1e6, cv=1e-300),
+    "mean and cv ... finite squares ... 4.94066e-324": lambda: st.Gamma(mean=5e-324, cv=0.2),
+    "slip ... got an array of shape ()": lambda: st.PiecewiseWeakening(
+        slip=np.array(0.5), strength=[0.5, 0.0], critical_slip=1e-6
+    ),
     "correlation_length ... 0.000000000000001": lambda: st.PowerLawSpectrum(
         correlation_length=5e-324
     ),
@@ -199,6 +204,7 @@ MISTAKES = {
         ONE, problem=weakening(weakening_rate=1e10)
     ),
     # More memory than there is
+    "samples: this takes ... GiB": lambda: make_strength().sample(LINE, samples=10**400),
     "samples: this takes ... GiB of memory": lambda: make_strength().sample(
         PLANE, samples=10**6
     ),

@@ -239,7 +239,9 @@ class ExponentialWeakening(FrictionLaw):
         return -math.log(fraction) if fraction > 0.0 else math.inf
 
 
-_listed = BeforeValidator(lambda value: list(value) if isinstance(value, np.ndarray) else value)
+_listed = BeforeValidator(
+    lambda value: [*value] if isinstance(value, np.ndarray) and value.ndim else value
+)
 Corners: TypeAlias = Annotated[tuple[Real, ...], _listed]
 Pieces: TypeAlias = at_least(2)  # type: ignore[valid-type]  # a call makes it
 

@@ -90,7 +90,8 @@ class _ByMoments(Marginal):
             raise InputError(
                 f"mean must be above low, got mean={self.mean:g}, low={self.low:g}"
             )
-        if not max(self.mean, self.mean * self.cv, self._ratio) < 1e150:
+        extremes = self.mean, self.mean * self.cv, self._ratio
+        if not 1e-150 < min(extremes) <= max(extremes) < 1e150:
             raise InputError(
                 f"mean and cv: must have finite squares, got mean={self.mean:g}, cv={self.cv:g}"
             )

@@ -108,7 +108,7 @@ class RandomField:
         are (samples, dimension): A_1, B_1, A_2, B_2, ..., with A_0 in front if `mean_mode`.
         """
         modes = self.modes(interface)
-        check_memory("samples", 8.0 * samples * (modes.dimension + interface.size))
+        check_memory("samples", 8.0 * min(samples, 2**62) * (modes.dimension + interface.size))
         block = block_of(len(interface.shape))
         return Stream(0, block, modes.ranks, self.mean_mode).draw(seed, first, samples)
 

@@ -208,7 +208,7 @@ class RandomInterface:
         (samples, dimension): each property in the order of `names`, then those of `between`.
         """
         each = self.dimension(interface) + len(self.names) * interface.size
-        check_memory("samples", 8.0 * samples * each)
+        check_memory("samples", 8.0 * min(samples, 2**62) * each)
         parts = [stream.draw(seed, first, samples) for stream in _layout(self, interface)]
         return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
