@@ -148,7 +148,9 @@ def _flag(value: Any) -> bool:
 def _show(value: Any) -> Any:
     if callable(value) and not isinstance(value, type):
         return value
-    return _flag(value)
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError("must be True, False or a function of (done, total)")
+    return bool(value)
 
 
 def _names(value: Any) -> tuple[str, ...]:

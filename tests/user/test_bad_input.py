@@ -131,6 +131,7 @@ MISTAKES = {
         spectrum={"type": "powerlaw", "correlation_length": 1.0}
     ),
     "unknown 'gab' ... did you mean 'gap'": lambda: st.Equilibrium(gab=1e-6),
+    "progress ... function of (done, total) ... 3": lambda: monte_carlo(progress=3),
     "keep ... 'initial_stress' ... valid: strength": lambda: monte_carlo(
         keep=("initial_stress",)
     ),

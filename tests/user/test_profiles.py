@@ -328,6 +328,15 @@ REFUSED_CALLS = {
 }
 
 
+def test_a_table_of_a_line_is_no_map(tmp_path):
+    (tmp_path / "line.csv").write_text("x,strength\n0,1e6\n0.05,2e6\n", encoding="utf-8")
+    plane = st.Interface(length=(0.1, 0.1), nodes=(8, 8))
+    refuses(
+        "no columns x and y: got 'x', 'strength' ... .npy",
+        lambda: st.read_profile(tmp_path / "line.csv", interface=plane),
+    )
+
+
 @pytest.mark.parametrize("words", [*REFUSED, *REFUSED_CALLS])
 def test_what_is_no_strength_here_is_refused(words):
     refuses(words, REFUSED_CALLS.get(words, lambda: found(REFUSED[words])))

@@ -261,7 +261,7 @@ def labelled(
         len(dims) == 2 or (value is None and len(names) > 2)
     )
     if chosen is None or (table and (unplaced or (rivals and x is None and len(dims) == 1))):
-        raise InputError(_unclear(data, names, quantity))
+        raise InputError(_unclear(data, names, quantity, dims))
     array = data[chosen]
     at = {dim: data[name].variable for dim, name in places.items()}
     at = {dim: one for dim, one in at.items() if {*one.dims} <= {*array.dims}}
@@ -311,10 +311,12 @@ def _column(data: Any, names: list[Any], what: str, wanted: Column) -> Any:
     raise InputError(unknown_name(what, str(wanted), map(str, names)))
 
 
-def _unclear(data: Any, names: list[Any], quantity: str) -> str:
+def _unclear(data: Any, names: list[Any], quantity: str, dims: tuple[str, ...]) -> str:
     units = {name: _unit_of(data[name]) for name in names if not str(name).isdecimal()}
     shown = [f"{name!r} in {unit}" if unit else repr(name) for name, unit in units.items()]
     listed = ", ".join(shown) or f"{len(names)} columns without names, as of a matrix"
+    if len(dims) == 2 and not {*dims} <= {_plain(name) for name in data.variables}:
+        return f"has no columns x and y: got {listed}{OF_A_PLANE}"
     return (
         f"holds no variable that is clearly the {quantity} ({QUANTITIES[quantity].units}): got"
         f" {listed}. Call it {quantity!r}, state its unit, or give x=..., value=... and unit=..."
