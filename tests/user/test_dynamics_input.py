@@ -306,3 +306,12 @@ def test_load_by_samples_and_by_rate_agree():
     ]
     # The same straight line in other pieces: only rounding differs, and it may tip a step size.
     assert loads[1] == pytest.approx(loads[0], rel=1e-5)
+
+
+def test_a_run_killed_after_its_last_frame_takes_no_further_step(tmp_path, monkeypatch):
+    save, whole = st.Save(to=tmp_path / "run"), simulate(st.Save(to=tmp_path / "whole"))
+    with monkeypatch.context() as patch:
+        patch.setattr("stiction.dynamics.save.Recorder.finish", lambda *_: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            simulate(save)
+    assert simulate(save).identical(whole)

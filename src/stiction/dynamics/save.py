@@ -242,7 +242,7 @@ class Recorder:
         return repr([self.save.fields, self.save.stations])
 
     def flush(self, state: State, *, force: bool = False) -> None:
-        """Write what was gathered, if there is enough or by force, and then the state."""
+        """Write what was gathered, if there is enough, and then the state; by force at the end."""
         folder = self.save.to
         steps = sum(record.size for record in self._steps) // len(RECORD)
         full = len(self._frames) >= FRAMES or steps >= _MOST_STEPS
@@ -251,7 +251,8 @@ class Recorder:
         path = folder / f"frames-{state.steps:012d}.nc"
         try:
             _write(path, self.take())
-            write_checkpoint(folder / _CHECKPOINT, self.run, state, self._others)
+            if not force:  # from a state at its end a run would take another step
+                write_checkpoint(folder / _CHECKPOINT, self.run, state, self._others)
         except StoreError as error:
             raise StoreError(
                 f"to: cannot write {path.name} to {str(folder)!r} ({error}); the files before it "
