@@ -126,10 +126,7 @@ class _Cache(caching.FunctionCache):
 
 
 class _Pause(event.Listener):
-    """Stops the search for garbage while kernels are compiled: it takes a tenth of that time.
-
-    Compilations are nested, and never run beside each other.
-    """
+    """Pauses garbage collection during compilations, which are nested: 7 % of their time."""
 
     def __init__(self) -> None:
         self.depth, self.resumes = 0, False
@@ -168,10 +165,7 @@ def _is_own(kind: Any) -> bool:
 
 
 class _Flags(Flags):
-    """Options of a compilation, compared by those that were set.
-
-    numba compares all of them for every operator that it types, in a fifth of its time.
-    """
+    """Options of a compilation, compared by those that were set: numba compares all of them."""
 
     def values(self) -> dict[str, Any]:
         given: dict[str, Any] = self._values
