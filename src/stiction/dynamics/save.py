@@ -241,17 +241,17 @@ class Recorder:
         """Everything besides the run on which a folder depends."""
         return repr([self.save.fields, self.save.stations])
 
-    def flush(self, state: State, *, force: bool = False) -> None:
-        """Write what was gathered, if there is enough, and then the state; by force at the end."""
+    def flush(self, state: State, stopped: str | None = None) -> None:
+        """Write what was gathered, if there is enough or the run has stopped, and the state."""
         folder = self.save.to
         steps = sum(record.size for record in self._steps) // len(RECORD)
         full = len(self._frames) >= FRAMES or steps >= _MOST_STEPS
-        if folder is None or not (full or (force and (self._frames or steps))):
+        if folder is None or not (full or (stopped and (self._frames or steps))):
             return
         path = folder / f"frames-{state.steps:012d}.nc"
         try:
             _write(path, self.take())
-            if not force:  # from a state at its end a run would take another step
+            if stopped in (None, "max_steps"):  # at its end a run would take another step
                 write_checkpoint(folder / _CHECKPOINT, self.run, state, self._others)
         except StoreError as error:
             raise StoreError(

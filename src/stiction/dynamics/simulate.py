@@ -117,7 +117,7 @@ def simulate_rupture(
         stopped = _follow(run, state, recorder, method.max_steps, meter)
     recorder.attributes["stopped"] = stopped
     warn_if_unresolved(problem, run, state)
-    recorder.flush(state, force=True)
+    recorder.flush(state, stopped)
     dataset = recorder.take() if save.to is None else open_rupture(save.to, fields=())
     dataset.attrs["stopped"] = stopped
     result = _complete(dataset, problem, method, run, state)
