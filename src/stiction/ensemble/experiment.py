@@ -45,9 +45,8 @@ class Experiment:
     problem: Problem
     random: Any  # a RandomInterface, or a RandomField that becomes one
     method: Any
-    keep: tuple[
-        str, ...
-    ] = ()  # along the interface; options of the method are switched on for it
+    # Variables along the interface; options of the method are switched on for them.
+    keep: tuple[str, ...] = ()
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -59,13 +58,7 @@ class Experiment:
             problems += error.problems
         for name, field in random.properties.items():
             try:
-                if not field.modes(self.problem.interface).ranks.size:
-                    warn_user(
-                        f"{name}: its correlation length is so long for this interface that each"
-                        " sample is uniform; check its unit, and give scatter between specimens"
-                        " as between= of st.RandomInterface",
-                        UnitWarning,
-                    )
+                field.modes(self.problem.interface)
             except InputError as error:
                 problems += [f"{name}: {text}" for text in error.problems]
         problems += refusals(self.problem, method)
@@ -119,6 +112,14 @@ class Experiment:
         Most of the strength below the residual strength is an `InputError`.
         """
         self.random.warn_if_inaccurate(self.problem.interface)
+        for name, field in self.random.properties.items():
+            if not field.modes(self.problem.interface).ranks.size:
+                warn_user(
+                    f"{name}: its correlation length is so long for this interface that each"
+                    " sample is uniform; check its unit, and give scatter between specimens"
+                    " as between= of st.RandomInterface",
+                    UnitWarning,
+                )
         self.problem.warn_of_units(mean_in_stress(self.problem, self.random, "strength"))
         check_residual(self.problem, self.random)
 

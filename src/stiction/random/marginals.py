@@ -110,7 +110,7 @@ class _ByMoments(Marginal):
 
     def _shape(self, ratio: float) -> tuple[float, float]:
         """Shape of the family, and mean above `low` over scale, that have this ratio."""
-        raise NotImplementedError
+        raise NotImplementedError  # a family without one has a `distribution` of its own
 
     @cached_property
     def distribution(self) -> Any:
