@@ -120,9 +120,9 @@ class LineProgram(Program):
         windows = windows or self._windows(sample.rate)
         multiplier, slip, stiff = np.zeros((3, self.nodes))
         bound = window_bound(sample, windows, stiff, multiplier)
-        weak = np.count_nonzero(sample.excess < bound * sample.profile)
-        if cap == np.inf and weak > MANY_NODES:
-            found = self._by_transforms(sample, state)
+        if cap == np.inf and self.nodes > MANY_NODES:
+            weak = np.count_nonzero(sample.excess < bound * sample.profile)
+            found = self._by_transforms(sample, state) if weak > MANY_NODES else None
             if found is not None:
                 return found
         workspace = workspace or make_workspace(self.stiffness)
