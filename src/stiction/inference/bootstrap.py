@@ -62,9 +62,8 @@ class Estimate:
     model: Model
     distance: float  # Kolmogorov's, between values and marginal
     roughness: float  # mean square of log(periodogram/expectation), both averaged over bands
-    noise: tuple[
-        float, float
-    ]  # variance, which may be negative, and its error; 0 if it is known
+    # Variance, which may be negative, and its error; 0 if it is known.
+    noise: tuple[float, float]
 
     @cached_property
     def parameters(self) -> dict[str, float]:

@@ -55,9 +55,8 @@ class Window:
         self._lags = np.ix_(
             *[np.r_[:n, m - n : m] for n, m in zip(self.shape, self._period, strict=True)]
         )
-        self.basis = _polynomials(
-            measured, degree
-        )  # of the trend, orthonormal, (points, terms)
+        # Orthonormal polynomials of the trend, (points, terms).
+        self.basis = _polynomials(measured, degree)
         tapers = np.ix_(*map(_taper, self.shape))
         self.taper = np.prod(np.broadcast_arrays(measured, *tapers), axis=0)
         self.taper /= np.sqrt(np.sum(self.taper**2))
