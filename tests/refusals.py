@@ -16,3 +16,14 @@ def refuses(words: str, call: Callable[[], Any]) -> None:
         call()
     for word in words.split(" ... "):
         assert word in str(caught.value), str(caught.value)
+
+
+def refusals(table: dict[str, Any], call: Callable[..., Any] | None = None) -> Any:
+    """Return a test of each row: words, and a call that is refused or the options of `call`."""
+
+    @pytest.mark.parametrize("words", table)
+    def test(words: str) -> None:
+        given = table[words]
+        refuses(words, given if call is None else lambda: call(**given))
+
+    return test
