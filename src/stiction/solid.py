@@ -73,7 +73,6 @@ class Solid:
         schema["properties"]["youngs_modulus"] = {
             "type": "number", "exclusiveMinimum": 0, "title": "Youngs Modulus",
         }  # fmt: skip
-        schema["required"] = [name for name in schema["required"] if name != "shear_modulus"]
         return schema
 
     @model_validator(mode="after")

@@ -206,9 +206,15 @@ def test_damaged_chunks_are_found_and_computed_again(run, reference, damage):
     assert {path: after[path] for path in kept} == {path: before[path] for path in kept}
 
 
-@pytest.mark.parametrize("damage", [Path.unlink, lambda path: path.write_text("{")])
+def displaced(path):
+    path.write_bytes(path.with_name("pilot.json").read_bytes())
+
+
+@pytest.mark.parametrize("damage", [Path.unlink, lambda path: path.write_text("{"), displaced])
 def test_a_damaged_study_is_made_of_the_one_given_and_the_chunks(run, reference, damage):
     damage(run / "study.json")
+    with pytest.raises(StoreError, match="damaged|holds no run"):
+        st.open_run(run)
     with pytest.raises(StoreError, match="belongs to another study"):
         make_study(ensemble={"samples": 120, "seed": 4}).run(out=run)
     assert again(run, ["study.json is damaged or missing"]).identical(reference)

@@ -5,6 +5,7 @@ import json
 import tomllib
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 import scipy.stats
@@ -13,6 +14,7 @@ from refusals import refuses
 from small_study import small_study
 
 import stiction as st
+from stiction.study.study import study_schema
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -144,5 +146,5 @@ def test_files_that_are_not_toml(tmp_path, text):
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.toml")), ids=lambda path: path.name)
 def test_every_example_is_valid(path):
     study = st.Study.from_toml(path)
-    tomllib.loads(path.read_text())
+    jsonschema.validate(tomllib.loads(path.read_text()), study_schema())
     assert st.Study.from_dict(study.to_dict()) == study

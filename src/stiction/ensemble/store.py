@@ -80,7 +80,7 @@ class Store:
             raise cannot("written", path, error) from error
         store, before = cls(path, study), None
         try:
-            before = read_json(path / STUDY)
+            before = read_study(path)
             _refuse_another(path, study, before)
         except (FileNotFoundError, Damaged):
             if list(store.chunks()) or STUDY in others:
@@ -224,6 +224,14 @@ def read_json(file: Path) -> dict[str, Any]:
     except (ValueError, KeyError, TypeError, AttributeError):
         raise Damaged(f"{file}: is damaged") from None
     raise StoreError(f"{file}: is of format {body['format']!r}; this version reads {FORMAT}")
+
+
+def read_study(folder: Path) -> dict[str, Any]:
+    """Return the study of a run; for errors see `read_json`."""
+    found = read_json(folder / STUDY)
+    if "ensemble" not in found:  # another file of a run in its place
+        raise Damaged(f"{folder / STUDY}: is damaged")
+    return found
 
 
 def _read(file: Path) -> bytes:

@@ -22,7 +22,7 @@ from stiction.ensemble.dataset import GridAxis, variables_in
 from stiction.ensemble.dotted_keys import with_values
 from stiction.ensemble.experiment import Ensemble, Experiment
 from stiction.ensemble.monte_carlo import gather
-from stiction.ensemble.store import STUDY, Damaged, Store, read_json
+from stiction.ensemble.store import Damaged, Store, read_study
 from stiction.errors import InputError, StoreError
 from stiction.methods import as_method, methods
 from stiction.model import (
@@ -332,8 +332,19 @@ def _place(points: Sequence[Point]) -> str:
 
 
 def study_schema() -> dict[str, Any]:
-    """JSON schema of a study file."""
-    return pydantic.TypeAdapter(Study).json_schema()
+    """Return the JSON schema of a study file.
+
+    It requires no key but `type`: a swept key needs no value, and `stiction onset` no method.
+    """
+
+    def relaxed(table: dict[str, Any]) -> dict[str, Any]:
+        if "required" in table:
+            table["required"] = [name for name in table["required"] if name == "type"]
+        return table
+
+    written = json.dumps(pydantic.TypeAdapter(Study).json_schema())
+    found: dict[str, Any] = json.loads(written, object_hook=relaxed)
+    return found
 
 
 @model(kw_only=True)
@@ -402,7 +413,7 @@ def open_run(path: Any) -> StoredRun:
     if not place.is_dir():
         raise StoreError(f"{place}: there is no run here; a run is a folder")
     try:
-        study = read_json(place / STUDY)
+        study = read_study(place)
     except FileNotFoundError:
         raise StoreError(f"{place}: holds no run") from None
     except Damaged as error:
