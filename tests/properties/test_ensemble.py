@@ -79,6 +79,14 @@ def test_batches_cover_all_samples_once(samples, size, first):
     assert all(0 < count <= size for _, count in pieces)
 
 
+def test_a_batch_of_rough_planes_stays_small():
+    problem = make_problem((48, 48), length=(0.02, 0.02))
+    field = st.RandomField(st.Lognormal(mean=1e6, cv=0.2), st.ExponentialSpectrum(1e-3))
+    experiment = Experiment(problem, field, st.LocalCriterion())
+    assert experiment.dimension > 100 * problem.interface.size
+    assert experiment.batch * experiment.dimension <= 2**20
+
+
 def test_an_ensemble_may_be_continued(arguments, reference):
     rest = st.monte_carlo(**arguments, samples=SAMPLES - 700, seed=5, first=700)
     np.testing.assert_array_equal(rest["sample"], np.arange(700, SAMPLES))

@@ -30,8 +30,8 @@ from stiction.variables import PROFILES, Variable
 
 AnyRandom: TypeAlias = RandomInterface | RandomField
 
-MOST_NODES = 1 << 20
-"""Nodes of all samples of planes that are solved at once: 8 MiB for each profile."""
+MOST_NUMBERS = 1 << 20
+"""Nodes, and draws, of all samples of planes that are solved at once: 8 MiB for each profile."""
 
 
 @dataclass(frozen=True)
@@ -165,9 +165,10 @@ class Experiment:
     def batch(self) -> int:
         """Number of samples to solve at once: suited to the method, on planes to the memory."""
         interface, size = self.problem.interface, int(self.method.chunk_size)
-        most = max(1, MOST_NODES // interface.size)
-        # Draws of a line come in blocks: a part of one is as expensive as the whole.
-        return min(size, most) if interface.is_plane else size
+        if not interface.is_plane:  # draws come in blocks: a part is as expensive as the whole
+            return size
+        # A rough field has hundreds of draws for each node.
+        return min(size, max(1, MOST_NUMBERS // max(interface.size, self.dimension)))
 
     def batches(self, first: int, count: int, size: int = 0) -> Iterator[tuple[int, int]]:
         """Cut samples first .. first + count - 1 into (first, count), at multiples of `size`.
