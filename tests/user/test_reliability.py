@@ -237,8 +237,32 @@ def test_a_stress_in_another_unit_is_answered_without_sampling(system, stress):
     doubted = [w for w in caught if "check the units" in str(w.message)]
     assert len(doubted) == (stress < 2e4)  # a fiftieth of the mean strength
     assert (found.probability, found.evaluations, found.algorithm) == (0.0, 0, "exact")
-    # 256 nodes, each as weak with the probability that the lognormal distribution has.
-    assert found.interval[1] == pytest.approx(256 * field.marginal.distribution.cdf(stress))
+    assert found.interval == (0.0, 1e-15)
+
+
+@pytest.mark.parametrize("stress", [48e3, 1e9])
+@pytest.mark.parametrize("pressed", [False, True], ids=["uniform", "random"])
+def test_a_force_as_a_stress_is_answered_at_once(system, stress, pressed):
+    """A shear force, and a normal force, on a joint: minutes of subset simulation before."""
+    spectrum = system[1].spectrum
+    coefficient = st.RandomField(
+        st.Lognormal(mean=0.2, cv=0.12), spectrum, of="friction_coefficient"
+    )
+    pressure = st.RandomField(st.Lognormal(mean=80e6, cv=0.1), spectrum)
+    random = st.RandomInterface(
+        strength=coefficient,
+        normal_pressure=pressure if pressed else None,
+        between={"strength": st.Lognormal(mean=1.0, cv=0.08)},
+    )
+    problem = dataclasses.replace(system[0], load=st.Load(normal_pressure=80e6))
+    with pytest.warns(st.UnitWarning, match="check the units"):
+        found = st.failure_probability(problem, random, stress, method=EXACT)
+    assert (found.probability, found.evaluations) == (float(stress > 1e8), 0)
+    with pytest.warns(st.UnitWarning, match="check the units"):
+        found = st.failure_probability(
+            problem, random, friction_coefficient=stress / 80e6, method=EXACT
+        )
+    assert (found.probability, found.evaluations) == (float(stress > 1e8), 0)
 
 
 @pytest.fixture(scope="module")

@@ -118,35 +118,33 @@ class LimitState:
         every node; and the mean stress of an interface whose slip sums to no net force is at most
         the mean of its strength. Both hold for every method and every sample.
         """
-        if self._random_pressure:  # no other bounds apply to the stress per pressure
-            return 0.0, math.inf
+        return self.likely_bounds(0.0)
+
+    def likely_bounds(self, negligible: float) -> tuple[float, float]:
+        """Return the same for all samples but a share that is negligible."""
         problem, random = self.experiment.problem, self.experiment.random
-        low, high = support_in_stress(problem, random, "strength")
+        if any(field.conditions is not None for field in random.properties.values()):
+            negligible = 0.0  # what was measured may be rarer
+        if self._random_pressure and not negligible:
+            return 0.0, math.inf
+        chance = negligible / (8 * problem.interface.size)  # eight random factors, at each node
+        low, high = support_in_stress(problem, random, "strength", chance)
         profile = np.asarray(problem.load_profile, dtype=np.float64)
         least: Any = np.asarray(problem.load.initial_stress, dtype=np.float64)
         most: Any = least
         if "initial_stress" in random.names:
-            least, most = support_in_stress(problem, random, "initial_stress")
+            least, most = support_in_stress(problem, random, "initial_stress", chance)
         lowest_load = float(np.min((low - most) / profile))
         shape = problem.interface.shape
         mean = float(np.mean(np.broadcast_to(profile, shape)))
         # The mean of the initial stress is itself random where it is a field: take its lowest.
         initial = float(np.mean(np.broadcast_to(least, shape)))
-        return initial + lowest_load * mean, high
-
-    def slip_chance(self, stress: float) -> float:
-        """Return an upper bound of the probability that anything slips at a stress, Pa.
-
-        The number of nodes times the probability that the strength of a node is lower, where the
-        load and the law of the strength are the same at all nodes; else one.
-        """
-        problem, random = self.experiment.problem, self.experiment.random
-        field, load = random.strength, problem.load
-        alike = np.ptp(problem.load_profile) == 0.0 and not np.any(load.initial_stress)
-        known = field.of is None and field.conditions is None and not random.between
-        if not (alike and known) or self.per_pressure or "initial_stress" in random.names:
-            return 1.0
-        return problem.interface.size * float(field.marginal.distribution.cdf(stress))
+        low = initial + lowest_load * mean
+        if self._random_pressure:
+            ends = support_in_stress(problem, random, "normal_pressure", chance)
+            ratios = [self.experiment.pressure / end for end in ends]
+            low, high = min(low * one for one in ratios), max(high * one for one in ratios)
+        return low, high
 
 
 def no_single_length(problem: Problem, random: RandomInterface) -> str | None:

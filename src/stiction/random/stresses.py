@@ -44,14 +44,22 @@ def profiles_in_stress(
 
 
 def support_in_stress(
-    problem: Problem, random: RandomInterface, name: str
+    problem: Problem, random: RandomInterface, name: str, chance: float = 0.0
 ) -> tuple[float, float]:
-    """Return the values between which a property lies, Pa, with its factor between specimens."""
+    """Return the values between which a property lies, Pa, with its factor between specimens.
+
+    With a `chance`, each of its random parts may lie outside with this probability on either side.
+    """
     field, between = random.properties[name], random.between or {}
-    low, high = field.marginal.distribution.support()
-    factors = [between[name].distribution.support()] if name in between else []
+
+    def extremes(marginal: Any) -> Any:
+        known = marginal.distribution
+        return (known.ppf(chance), known.isf(chance)) if chance else known.support()
+
+    low, high = extremes(field.marginal)
+    factors = [extremes(between[name])] if name in between else []
     if field.of is not None and "normal_pressure" in random.names:
-        factors.append(support_in_stress(problem, random, "normal_pressure"))
+        factors.append(support_in_stress(problem, random, "normal_pressure", chance))
     elif field.of is not None:
         pressure = problem.load.normal_pressure
         factors.append((np.min(pressure), np.max(pressure)))

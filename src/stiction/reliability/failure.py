@@ -37,7 +37,7 @@ PILOT = 1_000
 FREQUENT = 0.01
 """Probability above which plain sampling needs no more evaluations than subset simulation."""
 NEGLIGIBLE = 1e-15
-"""Probability of any slip below which no sample is drawn."""
+"""Probability of failing, or of holding, below which no sample is drawn."""
 DOUBTFUL = 0.02
 """Share of the mean strength below which a stress is probably in another unit."""
 SHOWN = 20
@@ -134,9 +134,9 @@ def failure_probability(
     )  # fmt: skip
     if stress is None:
         stress = float((friction_coefficient or 0.0) * experiment.pressure)
-    low, high = state.bounds
+    likely = state.likely_bounds(NEGLIGIBLE)
     mean = mean_in_stress(experiment.problem, experiment.random, "strength")
-    if max(low, 0.0) < stress < DOUBTFUL * mean or stress > mean / DOUBTFUL:
+    if max(state.bounds[0], 0.0) < stress < DOUBTFUL * mean or stress > mean / DOUBTFUL:
         name = "stress" if friction_coefficient is None else "friction_coefficient"
         warn_user(
             f"{name}: {stress:g} Pa is {stress / mean:.2g} times the mean strength, {mean:.3g} Pa;"
@@ -144,8 +144,8 @@ def failure_probability(
             UnitWarning,
         )
     with state.meter:
-        if not (low < stress < high and state.slip_chance(stress) > NEGLIGIBLE):
-            found = _certain(state, stress)
+        if not likely[0] < stress < likely[1]:
+            found = _certain(state, stress, likely)
         else:
             slow = too_slow(experiment, max_evaluations)
             chosen, reason, pilot = _choice(state, stress, algorithm, slow, budget)
@@ -162,18 +162,19 @@ def failure_probability(
     return FailureProbability.of(state, stress=stress, **found)
 
 
-def _certain(state: LimitState, stress: float) -> dict[str, Any]:
+def _certain(state: LimitState, stress: float, likely: tuple[float, float]) -> dict[str, Any]:
     """Return the attributes of an answer where no sample is needed."""
-    (low, high), chance, most = state.bounds, 0.0, 0.0
+    certain = not state.bounds[0] < stress < state.bounds[1]
+    low, high = state.bounds if certain else likely
+    doubt = 0.0 if certain else NEGLIGIBLE
     if stress >= high:
-        chance = most = 1.0
-        reason = f"no interface carries more than the greatest strength, {high:g} Pa"
-    elif stress <= low:
-        reason = f"no interface slides at or below {low:g} Pa"
+        chance, interval = 1.0, (1.0 - doubt, 1.0)
+        reason = f"no interface carries more than {high:.7g} Pa"
     else:
-        most = state.slip_chance(stress)
-        reason = f"a node is weaker than that with a probability below {most or 1e-300:.1g}"
-    found = {"probability": chance, "interval": (chance, most), "cv": 0.0, "evaluations": 0}
+        chance, interval = 0.0, (0.0, doubt)
+        reason = f"no interface slides at or below {low:.7g} Pa"
+    reason += "" if certain else f", but for a probability below {doubt:g}"
+    found = {"probability": chance, "interval": interval, "cv": 0.0, "evaluations": 0}
     return found | {"algorithm": "exact", "reason": reason}
 
 
