@@ -19,7 +19,7 @@ import scipy.stats
 
 import stiction as st
 from stiction.inference.grid import grid_of
-from stiction.inference.likelihood import Likelihood, make_model
+from stiction.inference.likelihood import make_likelihood
 from stiction.inference.onset_table import experiments_at, simulate
 from stiction.inference.prior import make_prior
 from stiction.progress import SILENT
@@ -97,7 +97,7 @@ def ranks(campaigns, tests=TESTS, seed=0, samples=None, points=POINTS, case=None
     """Ranks of the truth, and the truth and the posterior means as u, (campaigns, parameters)."""
     case = cases()["three parameters"] if case is None else case
     prior = make_prior(case.problem, case.random, case.prior)
-    model = make_model(
+    simulated = make_likelihood(
         prior, method=case.method, lengths=case.lengths, error=case.error, samples=samples,
         seed=0, variable=case.variable, meter=SILENT,
     )  # fmt: skip
@@ -113,8 +113,8 @@ def ranks(campaigns, tests=TESTS, seed=0, samples=None, points=POINTS, case=None
                 variable=case.variable, meter=SILENT,
             )  # fmt: skip
             peaks.append(onsets[0] + case.error * rng.standard_normal(tests))
-        likelihood = Likelihood(model, tuple(peaks)).__call__
-        grid = grid_of(likelihood, model.low, model.high, points=points)
+        likelihood = simulated.of(peaks)
+        grid = grid_of(likelihood, likelihood.low, likelihood.high, points=points)
         draws = grid.draws(DRAWS, i)
         found[i], means[i] = (draws < u).sum(axis=0), draws.mean(axis=0)
     return prior.names, found, truth, means

@@ -108,7 +108,7 @@ def test_posterior_of_one_parameter(name):
     assert own.mean() == pytest.approx(mean, abs=1.0 * deviation)
     assert own.std() == pytest.approx(deviation, rel=0.4)
     # The box that was simulated holds it.
-    model = found.likelihood.model
+    model = found.likelihood
     for end, side in (
         (model.low[0], found.u[:, 0]),
         (1.0 - model.high[0], 1.0 - found.u[:, 0]),

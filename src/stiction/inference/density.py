@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
+from scipy.special import logsumexp, ndtr, ndtri
 
 from stiction.arrays import Array
 from stiction.jit import jit
@@ -60,22 +60,6 @@ def grouped(ordered: Array) -> tuple[Array, Array]:
     return means, share
 
 
-@jit
-def _log_density(centres: Array, share: Array, width: float, z: Array, out: Array) -> None:
-    """Logarithm of a sum of Gaussians of one width around sorted centres, at points z."""
-    norm = math.log(width * math.sqrt(2.0 * math.pi))
-    for i in range(z.size):
-        nearest = np.inf
-        for centre in centres:
-            nearest = min(nearest, abs(z[i] - centre))
-        least = 0.5 * (nearest / width) ** 2
-        total = 0.0
-        for k in range(centres.size):
-            u = (z[i] - centres[k]) / width
-            total += share[k] * math.exp(least - 0.5 * u * u)
-        out[i] = math.log(total) - least - norm
-
-
 def to_v(peaks: Array, bound: Array) -> Array:
     """v of onsets (nodes, samples) above the bounds (nodes,)."""
     if not np.isfinite(bound).all():
@@ -94,12 +78,13 @@ def tabulate(peaks: Array, bound: Array) -> Densities:
     mean, spread = v.mean(axis=1), v.std(axis=1)
     spread = np.maximum(spread, 1e-12 * np.maximum(np.abs(mean), 1.0))
     z = np.linspace(-REACH, REACH, round(2.0 * REACH / STEP) + 1)
-    table = np.empty((nodes, z.size))
     width = 1.06 * samples**-0.2  # Silverman's
+    table = np.empty((nodes, z.size))
     for row, own in zip(table, (v - mean[:, None]) / spread[:, None], strict=True):
         centres, share = grouped(np.sort(own))
-        _log_density(centres * math.sqrt(1.0 - width**2), share, width, z, row)
-    return Densities(bound, mean, spread, table)
+        away = (z[:, None] - math.sqrt(1.0 - width**2) * centres) / width
+        row[:] = logsumexp(-0.5 * away**2, axis=1, b=share)
+    return Densities(bound, mean, spread, table - math.log(width * math.sqrt(2.0 * math.pi)))
 
 
 @jit

@@ -1,6 +1,7 @@
 """Designs of tests: the information expected from each before any test is made."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,7 @@ import xarray as xr
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.inference.grid import grid_of
-from stiction.inference.likelihood import Likelihood, Model, make_model
-from stiction.inference.posterior import predicted
+from stiction.inference.likelihood import Likelihood, make_likelihood
 from stiction.inference.prior import make_prior
 from stiction.load import NotNegative
 from stiction.methods import MethodObject
@@ -102,15 +102,19 @@ def design_of_tests(
     plans = _plans(designs, parameters.names)
     lengths = list(dict.fromkeys(length for tests, _ in plans for length in tests))
     with Meter("design of tests", show=progress) as meter:
-        simulated = make_model(
+        simulated = make_likelihood(
             parameters, method=method, lengths=lengths, error=load_cell_error, samples=samples,
             seed=seed, variable="critical_stress", meter=meter,
         )  # fmt: skip
         meter.stage("simulated campaigns", repetitions * len(plans))
         rows = []
         for tests, free in plans:
-            specimens = tuple(simulated.specimens[lengths.index(one)] for one in tests)
-            own = simulated._replace(specimens=specimens)
+            kinds = [lengths.index(length) for length in tests]
+            own = replace(
+                simulated,
+                onsets=tuple(simulated.onsets[kind] for kind in kinds),
+                densities=tuple(simulated.densities[kind] for kind in kinds),
+            )
             rows.append(_expected(own, list(tests.values()), free, repetitions, seed, meter))
     dims = ("design", "parameter")
     variables = {name: Variable("1", text, dims) for name, text in VARIABLES.items()}
@@ -151,18 +155,24 @@ def _plans(
 
 
 def _expected(
-    model: Model, tests: list[int], free: list[int], repetitions: int, seed: int, meter: Meter
+    simulated: Likelihood,
+    tests: list[int],
+    free: list[int],
+    repetitions: int,
+    seed: int,
+    meter: Meter,
 ) -> Array:
     """Return information, its standard error and the spread left, (3, parameters)."""
-    rng, dimension = np.random.default_rng([seed, 2]), model.prior.dimension
+    rng, dimension = np.random.default_rng([seed, 2]), simulated.prior.dimension
     gains, left = np.full((2, repetitions, dimension), np.nan)
     for row in range(repetitions):
         truth, start = rng.random(dimension), int(rng.integers(2**32))
-        peaks = tuple(
-            predicted(model, number, np.tile(truth, (count, 1)), start + number)
-            for number, count in enumerate(tests)
+        likelihood = simulated.of(
+            [
+                simulated.predicted(kind, np.tile(truth, (count, 1)), start + kind)
+                for kind, count in enumerate(tests)
+            ]
         )
-        likelihood = Likelihood(model, peaks)
 
         def given_what_is_known(
             v: Array, truth: Array = truth, likelihood: Likelihood = likelihood
@@ -171,7 +181,7 @@ def _expected(
             u[:, free] = v
             return likelihood(u)
 
-        box = model.low[free], model.high[free]
+        box = simulated.low[free], simulated.high[free]
         # A posterior may fall between the points of a coarse grid.
         grid = grid_of(given_what_is_known, *box, points=POINTS) or grid_of(
             given_what_is_known, *box, points=50 * POINTS

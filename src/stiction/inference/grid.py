@@ -28,7 +28,6 @@ class Grid:
     high: Array
     mass: Array  # (n_1, ..., n_parameters): of the cells; sums to 1
     log_evidence: float  # logarithm of the mean of the likelihood over the whole prior
-    gain: float  # Kullback-Leibler divergence of the posterior from the prior, nats
 
     def centres(self, axis: int) -> Array:
         """Return the centres of the cells along one parameter, as u."""
@@ -39,6 +38,11 @@ class Grid:
     def marginal(self, axis: int) -> Array:
         """Return the mass of the cells along one parameter."""
         return _along(self.mass, axis)
+
+    def held(self, axis: int, low: float, high: float) -> float:
+        """Return the mass between two values of one parameter, as u."""
+        centres = self.centres(axis)
+        return float(self.marginal(axis)[(centres > low) & (centres < high)].sum())
 
     def information(self, axis: int) -> float:
         """Return the divergence of the marginal of one parameter from its prior, nats."""
@@ -116,7 +120,4 @@ def grid_of(
         if zoom == ZOOMS - 1 or np.all(closer[1] - closer[0] > 0.9 * (high - low)):
             break
         low, high = closer
-    evidence = top + np.log(total * cell)
-    held = mass > 0.0
-    gain = float(np.sum(mass[held] * (values[held] - evidence)))
-    return Grid(low, high, mass, float(evidence), gain)
+    return Grid(low, high, mass, top + float(np.log(total * cell)))

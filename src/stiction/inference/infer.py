@@ -1,10 +1,10 @@
 """Parameters of a random interface from the peaks of repeated tests."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction.arrays import Array
 from stiction.criterion.local import LocalCriterion
@@ -12,16 +12,15 @@ from stiction.ensemble.limit_state import no_single_length
 from stiction.ensemble.pilot import compare, doubt
 from stiction.errors import InputError, warn_accuracy
 from stiction.inference.grid import Grid, grid_of
-from stiction.inference.likelihood import Likelihood, make_model
+from stiction.inference.likelihood import Likelihood, make_likelihood
 from stiction.inference.onset_table import experiments_at
-from stiction.inference.peaks import Peaks, make_peaks
-from stiction.inference.posterior import Posterior, monte_carlo_errors
+from stiction.inference.peaks import Peaks, factor_of, make_peaks
+from stiction.inference.posterior import Posterior
 from stiction.inference.prior import Prior, make_prior
 from stiction.load import NotNegative
 from stiction.methods import MethodObject
 from stiction.model import Progress, at_least, checked
 from stiction.problem import Problem
-from stiction.profiles.units import factor_to
 from stiction.progress import Meter
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface
@@ -30,16 +29,12 @@ from stiction.random.stresses import mean_in_stress
 DRAWS = 4000
 TOLERABLE = 0.25
 """Monte Carlo error over the posterior's standard deviation above which it is reported."""
-LOST = 1e-4
-"""Mass of the first stage that may be lost on either side of the second."""
-WIDEN = 0.3
+WIDEN = 0.1
 """Width of the first posterior that is added to the box of the second on either side."""
 NEAR, HELD = 0.05, 1e-3
 """Share of the box at either end, and mass of the posterior there above which the box grows."""
 EDGE, PILED = 0.02, 4.0
 """Share of a prior at its ends, and its multiple at which the posterior piles up there."""
-RARE = 1e-3
-"""Probability of a gap between peaks below which they are probably of two kinds."""
 
 
 @checked
@@ -106,8 +101,8 @@ def infer(
     Warns
     -----
     AccuracyWarning
-        If the posterior piles up at an end of the prior, the number of simulated samples
-        matters, or the peaks fall into groups that one population does not show.
+        If the posterior piles up at an end of the prior, the method is not accurate there, or
+        few samples are simulated for the number of peaks.
 
     Notes
     -----
@@ -135,162 +130,119 @@ def infer(
     measured = make_peaks(peaks, unit)
     parameters = make_prior(problem, random, prior)
     pressed = problem.load.normal_pressure is not None
-    pressed = pressed or "normal_pressure" in parameters.random.names
-    if measured.coefficients and not pressed:
+    if measured.coefficients and not (pressed or "normal_pressure" in parameters.random.names):
         raise InputError(
             "peaks: are coefficients of friction, which need a normal pressure: give"
             " Load(normal_pressure=...) in Pa, or peaks as stresses with their unit"
         )
-    si = "1" if measured.coefficients else "Pa"
-    error = load_cell_error * (1.0 if isinstance(peaks, Peaks) else factor_to(si, unit))
+    error = load_cell_error * (1.0 if isinstance(peaks, Peaks) else factor_of(unit))
     if error > np.concatenate(measured.values).max():
         raise InputError(
             f"load_cell_error: {load_cell_error:g} {unit} is more than the largest peak; it is a"
             " standard deviation in the unit of the peaks"
         )
-    options: dict[str, Any] = {"lengths": measured.lengths, "variable": measured.variable}
     with Meter("infer", show=progress) as meter:
-        options |= {"error": error, "seed": seed, "meter": meter}
         (own,) = experiments_at(parameters, parameters.middle[None], method)
         own.problem.warn_of_units(mean_in_stress(own.problem, own.random, "strength"))
-        likelihood, grid = _located(parameters, method, measured, samples, options)
-        return _posterior(likelihood, grid, measured, seed, meter)
+
+        def likelihood_of(method: Any, samples: int | None, *box: Array) -> Likelihood:
+            made = make_likelihood(
+                parameters, *box, method=method, lengths=measured.lengths, error=error,
+                samples=samples, seed=seed, variable=measured.variable, meter=meter,
+            )  # fmt: skip
+            meter.stage("posterior")
+            return made.of(measured.values)
+
+        box = np.zeros(parameters.dimension), np.ones(parameters.dimension)
+        if method.type != "local_criterion" and not no_single_length(own.problem, own.random):
+            box = _first_box(likelihood_of(LocalCriterion(), None, *box), meter)
+        likelihood, grid = _located(partial(likelihood_of, method, samples), *box, meter)
+    u = grid.draws(DRAWS, seed)
+    theta = parameters.theta(u)
+    error = np.sqrt(sum(map(np.size, measured.values)) / likelihood.samples)
+    return Posterior(
+        peaks=measured,
+        draws={name: theta[:, i] for i, name in enumerate(parameters.names)},
+        information={name: grid.information(i) for i, name in enumerate(parameters.names)},
+        log_evidence=grid.log_evidence,
+        monte_carlo_error=float(error),
+        notes=_notes(likelihood, float(error), u),
+        likelihood=likelihood,
+        u=u,
+        seed=seed,
+    )
 
 
-def _located(
-    prior: Prior, method: Any, peaks: Peaks, samples: int | None, options: Mapping[str, Any]
-) -> tuple[Likelihood, Grid]:
-    """Return the likelihood in a box of the prior that holds the posterior, and the posterior."""
-    zero, one = np.zeros(prior.dimension), np.ones(prior.dimension)
-    low, high = zero, one
-    if method.type != "local_criterion" and not no_single_length(*prior.at(prior.middle)):
-        low, high = _first_box(prior, peaks, options)
-    while True:
-        model = make_model(prior, method=method, samples=samples, low=low, high=high, **options)
-        likelihood = Likelihood(model, peaks.values)
-        whole = bool(np.all(low == 0.0) and np.all(high == 1.0))
-        if whole and (refused := _out_of_reach(likelihood)[1]):
-            raise InputError(refused)
-        options["meter"].stage("posterior")
-        grid = grid_of(likelihood.__call__, low, high, options["meter"])
-        if grid is None and whole:
-            raise InputError(
-                "peaks: no point of the prior can produce all of them; widen the prior, or give"
-                " the load-cell error if they are not exact"
-            )
-        if grid is None:
-            low, high = zero, one
-            continue
-        old, (low, high) = (low, high), grown(grid, low, high)
-        if np.array_equal(old, (low, high)):
-            return likelihood, grid
-
-
-def _first_box(prior: Prior, peaks: Peaks, options: Mapping[str, Any]) -> tuple[Array, Array]:
+def _first_box(likelihood: Likelihood, meter: Meter) -> tuple[Array, Array]:
     """Return corners, as u, between which the local criterion finds the posterior.
 
     All of the prior if it cannot produce the peaks: where nodes reach their residual strength
     before the onset, the other methods may.
     """
-    low, high = np.zeros(prior.dimension), np.ones(prior.dimension)
-    model = make_model(prior, method=LocalCriterion(), samples=None, **options)
-    likelihood = Likelihood(model, peaks.values)
-    outside, refused = _out_of_reach(likelihood)
-    if outside.all():  # their unit is wrong, say
-        raise InputError(refused)
-    grid = None if refused else grid_of(likelihood.__call__, low, high, options["meter"])
+    low, high = likelihood.low, likelihood.high
+    grid = None if likelihood.refusals() else grid_of(likelihood, low, high, meter)
     if grid is None:
         return low, high
-    for axis in range(prior.dimension):
-        mass, centres = np.cumsum(grid.marginal(axis)), grid.centres(axis)
-        ends = np.searchsorted(mass, [LOST, 1.0 - LOST])
-        first, last = centres[np.minimum(ends, centres.size - 1)]
-        room = max(WIDEN * (last - first), 1e-3)
-        low[axis], high[axis] = max(0.0, first - room), min(1.0, last + room)
-    return low, high
+    room = np.maximum(WIDEN * (grid.high - grid.low), 1e-3)
+    return np.maximum(grid.low - room, 0.0), np.minimum(grid.high + room, 1.0)
 
 
-def _out_of_reach(likelihood: Likelihood) -> tuple[NDArray[np.bool_], list[str]]:
-    """Return the peaks that no parameters in the prior can produce, with the error messages."""
-    masks, texts = [], []
-    for number, peaks in enumerate(likelihood.peaks):
-        low, high, places = likelihood.model.reach(number)
-        far = (peaks < low) | (peaks > high)
-        masks.append(far)
-        for value in peaks[far][:1]:
-            texts.append(
-                f"peaks: {far.sum()} of {far.size} are out of reach, such as {value:g}, which lies"
-                f" {'below' if value < low else 'above'} all that the prior can produce, {low:g} to"
-                f" {high:g} ({places}); widen the prior, check the unit, or leave out tests of"
-                " another kind of specimen"
+def _located(
+    likelihood_in: Callable[..., Likelihood], low: Array, high: Array, meter: Meter
+) -> tuple[Likelihood, Grid]:
+    """Return the likelihood in a box of the prior that holds the posterior, and the posterior."""
+    while True:
+        likelihood = likelihood_in(low, high)
+        whole = bool(np.all(low == 0.0) and np.all(high == 1.0))
+        if whole and (refused := likelihood.refusals()):
+            raise InputError(refused)
+        grid = grid_of(likelihood, low, high, meter)
+        if whole and grid is None:
+            raise InputError(
+                "peaks: no point of the prior can produce all of them; widen the prior, or give"
+                " the load-cell error if they are not exact"
             )
-    return np.concatenate(masks), texts
+        wider = grown(grid, low, high)
+        if grid is not None and np.array_equal(wider, (low, high)):
+            return likelihood, grid
+        low, high = wider
 
 
-def grown(grid: Grid, low: Array, high: Array) -> tuple[Array, Array]:
+def grown(grid: Grid | None, low: Array, high: Array) -> tuple[Array, Array]:
     """Return the box, wider by its width on each side where the posterior reaches its end."""
-    new_low, new_high = low.copy(), high.copy()
-    for axis, width in enumerate(high - low):
-        mass, centres = grid.marginal(axis), grid.centres(axis)
-        if mass[centres < low[axis] + NEAR * width].sum() > HELD:
-            new_low[axis] = max(0.0, low[axis] - width)
-        if mass[centres > high[axis] - NEAR * width].sum() > HELD:
-            new_high[axis] = min(1.0, high[axis] + width)
-    return new_low, new_high
+    width = high - low
+    touched = np.ones((2, low.size), dtype=np.bool_)
+    if grid is not None:
+        ends = low + NEAR * width, high - NEAR * width
+        for i in range(low.size):
+            touched[0, i] = grid.held(i, 0.0, ends[0][i]) > HELD
+            touched[1, i] = grid.held(i, ends[1][i], 1.0) > HELD
+    return np.maximum(low - width * touched[0], 0.0), np.minimum(high + width * touched[1], 1.0)
 
 
-def _posterior(
-    likelihood: Likelihood, grid: Grid, peaks: Peaks, seed: int, meter: Meter
-) -> Posterior:
-    prior = likelihood.model.prior
-    u = grid.draws(DRAWS, seed)
-    meter.stage("Monte Carlo error")
-    errors = monte_carlo_errors(likelihood, u[::2]).tolist()
-    theta = prior.theta(u)
-    posterior = Posterior(
-        peaks=peaks,
-        draws={name: theta[:, i] for i, name in enumerate(prior.names)},
-        information={name: grid.information(i) for i, name in enumerate(prior.names)},
-        total_information=grid.gain,
-        log_evidence=grid.log_evidence,
-        monte_carlo_error=dict(zip(prior.names, errors, strict=True)),
-        notes=_notes(likelihood, errors, u),
-        likelihood=likelihood,
-        u=u,
-        seed=seed,
-    )
-    _check_agreement(peaks, posterior.predicted)
-    return posterior
-
-
-def _notes(likelihood: Likelihood, errors: Sequence[float], u: Array) -> tuple[str, ...]:
+def _notes(likelihood: Likelihood, error: float, u: Array) -> tuple[str, ...]:
     """Return the limitations of the posterior; serious ones are also issued as warnings."""
-    model = likelihood.model
-    notes = _piled_up(model.prior, u)
-    middle = model.prior.theta(u.mean(axis=0, keepdims=True))
-    (experiment,) = experiments_at(model.prior, middle, model.method)
+    prior = likelihood.prior
+    notes = _piled_up(prior, u)
+    middle = prior.theta(u.mean(axis=0, keepdims=True))
+    (experiment,) = experiments_at(prior, middle, likelihood.method)
     pilot = compare(experiment)
     if pilot and (text := doubt(pilot)):
         notes.append(text)
-    if max(errors) > TOLERABLE:
-        worst = model.prior.names[np.argmax(errors)]
-        samples = model.specimens[0].onsets.shape[1]
+    if error > TOLERABLE:
         notes.append(
-            f"the mean of {worst} is uncertain by {max(errors):.0%} of its standard deviation"
-            f" because only {samples} samples were simulated at each point; give more samples"
+            f"the means are uncertain by about {error:.0%} of their standard deviations because"
+            " few samples were simulated at each point; give more samples"
         )
     for text in notes:
         warn_accuracy(text)
-    if model.scaling.reason:
-        notes.append(f"every parameter was simulated: {model.scaling.reason}")
+    if likelihood.scaling.reason:
+        notes.append(f"every parameter was simulated: {likelihood.scaling.reason}")
     return tuple(notes)
 
 
 def _piled_up(prior: Prior, u: Array) -> list[str]:
-    """Return the ends of the prior at which draws (draws, parameters) of the posterior pile up.
-
-    The simulated box needs no such check: it grew until it held the posterior.
-    """
+    """Return the ends of the prior at which draws (draws, parameters) of the posterior pile up."""
     texts = [
         f"the {side} end of {name}, {end:g}, holds {np.mean(near):.0%} of the draws"
         for name, own, ends in zip(prior.names, u.T, prior.ends.T, strict=True)
@@ -306,22 +258,3 @@ def _piled_up(prior: Prior, u: Array) -> list[str]:
         f"the posterior piles up at the ends of the prior: {'; '.join(texts)} within {EDGE:.0%} of"
         " the prior; check the unit of the peaks, and widen the prior where its end is a guess"
     ]
-
-
-def _check_agreement(peaks: Peaks, predicted: Sequence[Array]) -> None:
-    """Warn of a gap between peaks that is unlikely for one population.
-
-    The largest gap between neighbours, in terms of the predicted distribution; the chance of one
-    so large among n uniform numbers is at most (n - 1) (1 - gap)^n.
-    """
-    for values, own in zip(peaks.values, predicted, strict=True):
-        ordered = np.sort(values)
-        gaps = np.diff(np.searchsorted(np.sort(own), ordered) / own.size)
-        widest = float(gaps.max(initial=0.0))
-        chance = (ordered.size - 1) * (1.0 - widest) ** ordered.size
-        if gaps.size and chance < RARE:
-            first, second = ordered[gaps.argmax() :][:2]
-            warn_accuracy(
-                f"peaks: none lies between {first:g} and {second:g}, where {widest:.0%} are"
-                f" expected (probability {chance:.1g}): are two kinds of specimens mixed?"
-            )

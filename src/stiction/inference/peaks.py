@@ -1,6 +1,6 @@
 """Measured peaks: validated, in SI units, one array for each kind of specimen."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -49,44 +49,28 @@ class Peaks(NamedTuple):
 
 
 def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
-    """Validate an array, or a mapping of arrays by length; `Peaks` are returned as they are.
-
-    Raises
-    ------
-    InputError
-        Naming all that is wrong.
-    """
+    """Validate an array, or a mapping of arrays by length; `Peaks` are returned as they are."""
     if isinstance(peaks, Peaks):
         return peaks
-    factor = _factor(unit)
     groups: dict[Any, Any] = dict(peaks) if isinstance(peaks, Mapping) else {None: peaks}
     if not all(key is None or (is_finite(key) and key > 0.0) for key in groups):
         raise InputError(
             "peaks: for several specimens, map each length (m) to its peaks, such"
             f" as {{0.1: [...], 0.2: [...]}}, got the lengths {describe(list(groups))}"
         )
-    problems: list[str] = []
-    values = []
-    for length, given in groups.items():
-        name = "peaks" if length is None else f"peaks at {length:g} m"
-        try:
-            values.append(factor * _values(name, given, unit))
-        except InputError as error:
-            problems += error.problems
-    if problems:
-        raise InputError(problems)
+    lengths = tuple(None if length is None else float(length) for length in groups)
+    values = tuple(_values(given, unit) for given in groups.values())
     every = np.concatenate([np.zeros(0), *values])
-    if every.size < FEWEST or np.ptp(every) == 0.0:
+    if np.unique(every).size < FEWEST:
         raise InputError(
             f"peaks: at least {FEWEST} different values are needed, got"
             f" {np.unique(every).size} in {every.size} peaks; fewer than about ten"
             " constrain little: see st.design_of_tests"
         )
-    lengths = tuple(None if length is None else float(length) for length in groups)
-    return Peaks(lengths, tuple(values), is_in(unit, "1"))
+    return Peaks(lengths, values, is_in(unit, "1"))
 
 
-def _factor(unit: str) -> float:
+def factor_of(unit: str) -> float:
     """Return the factor from a unit of stress, or of a pure number, to SI."""
     try:
         return factor_to("1" if is_in(unit, "1") else "Pa", unit)
@@ -97,27 +81,24 @@ def _factor(unit: str) -> float:
         ) from None
 
 
-def _values(name: str, given: Any, unit: str) -> Array:
-    """Return the peaks of one kind of specimen, in `unit`."""
-    ragged = isinstance(given, list | tuple) and any(np.ndim(one) for one in given)
-    values = (
-        np.empty((0, 0)) if ragged else check(name, getattr(given, "values", given), Numbers)
-    )
+def _values(given: Any, unit: str) -> Array:
+    """Return the peaks of one kind of specimen, in SI."""
+    stated = str(getattr(given, "attrs", {}).get("units", unit))
+    if is_in(stated, "1") != is_in(unit, "1"):
+        raise InputError(f"peaks: are in {stated}, but unit = {unit!r}")
+    values: Array = check("peaks", getattr(given, "values", given), Numbers)
     if values.ndim != 1:
         raise InputError(
-            f"{name}: must be one list of numbers for one kind of specimen, got {describe(given)};"
+            f"peaks: must be one list of numbers for one kind of specimen, got {describe(given)};"
             " for several, map each length (m) to its peaks: {0.1: [...], 0.2: [...]}"
         )
     bad = np.flatnonzero(~(values > 0.0) | np.isinf(values))
     if bad.size:
         raise InputError(
-            f"{name}: must be positive numbers; number {bad[0]} is {values[bad[0]]:g}; leave out"
+            f"peaks: must be positive numbers; number {bad[0]} is {values[bad[0]]:g}; leave out"
             " tests that gave no peak"
         )
-    stated = str(getattr(given, "attrs", {}).get("units", unit))
-    if is_in(stated, "1") != is_in(unit, "1"):
-        raise InputError(f"{name}: are in {stated}, but unit = {unit!r}")
-    return values * (_factor(stated) / _factor(unit))
+    return values * factor_of(stated)
 
 
 def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
@@ -155,43 +136,36 @@ def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
     """
     path = check("path", path, FilePath)
     with prefixed(str(path)):
-        return _from_table(read_table(Path(path)), unit)
+        table = read_table(Path(path))
+        peak, length = _column(table, PEAK), _column(table, LENGTH)
+        if peak is None:
+            names = ", ".join(map(str, table.data_vars))
+            raise InputError(f"no column has a name like 'peak [MPa]'; found {names}")
+        stated = peak.attrs.get("units", unit)
+        if stated is None or stated != (unit or stated):
+            raise InputError(
+                f"the unit of the peaks is {'not stated' if stated is None else stated}, and"
+                f" unit = {unit!r}; write it into the heading, 'peak [MPa]', or give unit="
+            )
+        if length is None:
+            return make_peaks(peak.values, stated)
+        if "units" not in length.attrs:
+            raise InputError("the unit of the length is not stated; write 'length [mm]'")
+        lengths = length.values * factor_to("m", length.attrs["units"])
+        if np.isnan(lengths).any():
+            row = int(np.argmax(np.isnan(lengths)))
+            raise InputError(
+                f"length: missing in row {row}; specimens of unknown length are mixed in"
+            )
+        groups = {one: peak.values[lengths == one] for one in np.unique(lengths)}
+        return make_peaks(groups, stated)
 
 
-def _from_table(table: Any, unit: str | None) -> Peaks:
-    names = list(table.data_vars)
-    peak, length = _column(names, PEAK), _column(names, LENGTH)
-    if peak is None and len(names) == 1:
-        peak = names[0]
-    if peak is None:
-        raise InputError(f"no column has a name like 'peak [MPa]'; found {', '.join(names)}")
-    stated = table[peak].attrs.get("units", unit)
-    if stated is None:
-        raise InputError(
-            "the unit of the peaks is not stated; write it into the heading, 'peak [MPa]', or give"
-            " unit="
-        )
-    if unit is not None and unit != stated:
-        raise InputError(f"the heading gives the peaks in {stated}, but unit = {unit!r}")
-    values = table[peak].values
-    if length is None:
-        return make_peaks(values, stated)
-    if "units" not in table[length].attrs:
-        raise InputError("the unit of the length is not stated; write 'length [mm]'")
-    lengths = table[length].values * factor_to("m", table[length].attrs["units"])
-    if not np.isfinite(lengths).all():
-        line = int(np.argmin(np.isfinite(lengths)))
-        raise InputError(
-            f"length: missing in row {line}; specimens of unknown length are mixed in"
-        )
-    return make_peaks({one: values[lengths == one] for one in np.unique(lengths)}, stated)
-
-
-def _column(names: Sequence[str], kinds: tuple[str, ...]) -> str | None:
+def _column(table: Any, kinds: tuple[str, ...]) -> Any:
     """Return the one column whose name begins with one of some words."""
-    words = [(name, name.lower().split()) for name in names]
-    found = [name for name, word in words if word and word[0].strip("_:.") in kinds]
+    firsts = {name: name.lower().partition(" ")[0].strip("_:.") for name in table.data_vars}
+    found = [name for name, first in firsts.items() if first in kinds]
     if len(found) > 1:
         both = " and ".join(map(repr, found))
         raise InputError(f"{both} may both be the {kinds[0]}; rename one")
-    return found[0] if found else None
+    return table[found[0]] if found else None

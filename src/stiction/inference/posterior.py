@@ -9,14 +9,13 @@ import numpy as np
 
 from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.inference.density import to_v
-from stiction.inference.likelihood import BATCHES, Likelihood, Model
-from stiction.inference.onset_table import corners
+from stiction.inference.likelihood import Likelihood
 from stiction.inference.peaks import Peaks
 from stiction.inference.prior import Prior
-from stiction.model import Numbers, check, describe
+from stiction.model import Numbers, check, checked
 from stiction.problem import Problem
 from stiction.random.random_interface import RandomInterface
+from stiction.random.spectra import Share
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -32,13 +31,11 @@ class Posterior:
     information : dict of float
         Kullback-Leibler divergence of the posterior of each parameter alone from its prior,
         nats. Halving a uniform range gives ln 2 = 0.69.
-    total_information : float
-        The same for all parameters together.
     log_evidence : float
         Logarithm of the density of the peaks under the prior, for comparing models.
-    monte_carlo_error : dict of float
-        Standard error of the posterior mean that is due to the number of simulated samples, as a
-        share of the standard deviation of the posterior.
+    monte_carlo_error : float
+        Standard error of a posterior mean that is due to the number of simulated samples, as a
+        share of its standard deviation: about the root of measured over simulated peaks.
     method : str
         Method that found the onset.
     peaks : Peaks
@@ -50,9 +47,8 @@ class Posterior:
     peaks: Peaks
     draws: Mapping[str, Array]
     information: Mapping[str, float]
-    total_information: float
     log_evidence: float
-    monte_carlo_error: Mapping[str, float]
+    monte_carlo_error: float
     notes: tuple[str, ...]
     likelihood: Likelihood = field(repr=False)
     u: Array = field(repr=False)
@@ -66,18 +62,19 @@ class Posterior:
     @property
     def method(self) -> str:
         """Method that found the onset."""
-        return str(self.likelihood.model.method.label)
+        return str(self.likelihood.method.label)
 
     @property
     def prior(self) -> Prior:
         """The prior: `theta(u)` and `u(theta)` map the unit cube to the parameters and back."""
-        return self.likelihood.model.prior
+        return self.likelihood.prior
 
     def mean(self, name: str) -> float:
         """Return the posterior mean of a parameter."""
         return float(self.draws[name].mean())
 
-    def interval(self, name: str, confidence: float = 0.9) -> tuple[float, float]:
+    @checked
+    def interval(self, name: str, confidence: Share = 0.9) -> tuple[float, float]:
         """Return the central credible interval of a parameter.
 
         Parameters
@@ -86,10 +83,6 @@ class Posterior:
         confidence : float
             Between 0 and 1.
         """
-        if not 0.0 < confidence < 1.0:
-            raise InputError(
-                f"confidence: must lie between 0 and 1, got {describe(confidence)}"
-            )
         tail = 0.5 - 0.5 * confidence
         low, high = np.quantile(self.draws[name], [tail, 1.0 - tail])
         return float(low), float(high)
@@ -137,10 +130,8 @@ class Posterior:
     @cached_property
     def predicted(self) -> tuple[Array, ...]:
         """Peaks of further tests, one for each draw, for every kind of specimen."""
-        model = self.likelihood.model
-        return tuple(
-            predicted(model, i, self.u, self.seed) for i in range(len(model.specimens))
-        )
+        kinds = range(len(self.peaks.values))
+        return tuple(self.likelihood.predicted(i, self.u, self.seed) for i in kinds)
 
     def to_arviz(self) -> Any:
         """Return an `arviz.InferenceData`: posterior, prior, log-likelihood, prediction, data.
@@ -164,7 +155,7 @@ class Posterior:
         return arviz.from_dict(
             posterior={key: own[None] for key, own in self.draws.items()},
             prior={key: before[None, :, i] for i, key in enumerate(self.names)},
-            log_likelihood={name: np.concatenate(self.likelihood.parts(self.u), axis=1)[None]},
+            log_likelihood={name: self.likelihood.parts(self.u)[None]},
             posterior_predictive={name: predicted[None]},
             observed_data={name: measured},
             coords={"test": np.arange(measured.size)},
@@ -183,47 +174,3 @@ class Posterior:
             )
         lines += [f"  {note}" for note in self.notes]
         return "\n".join(lines)
-
-
-def predicted(model: Model, number: int, u: Array, seed: int) -> Array:
-    """Draw a peak of specimen `number` at each of some points u (points, parameters)."""
-    rng = np.random.default_rng([seed, 1])
-    theta = model.prior.theta(u)
-    shift, stretch = model.scaling.of(theta)
-    own, rows = model.specimens[number], np.arange(u.shape[0])
-    known = own.densities
-    index, weight = corners(model.axes, theta)
-    corner = (weight.cumsum(axis=1) < rng.random((u.shape[0], 1))).sum(axis=1)
-    node = index[rows, np.minimum(corner, index.shape[1] - 1)]
-    sample = rng.integers(own.peaks.shape[1], size=u.shape[0])
-    z = (to_v(own.peaks, known.bound)[node, sample] - known.mean[node]) / known.spread[node]
-
-    def between(values: Array) -> Array:
-        found: Array = np.einsum("pc,pc->p", weight, values[index])
-        return found
-
-    onset = between(known.mean) + between(known.spread) * z
-    if np.isfinite(known.bound).all():
-        onset = between(known.bound) + np.exp(onset)
-    found: Array = shift + stretch * onset + model.error * rng.standard_normal(u.shape[0])
-    return found
-
-
-def monte_carlo_errors(likelihood: Likelihood, u: Array) -> Array:
-    """Return standard errors of the posterior means over their standard deviations, (parameters,).
-
-    Jackknife over batches of the simulated samples: the posterior without each is the one at hand,
-    weighted.
-    """
-    whole = likelihood(u)
-    theta = likelihood.model.prior.theta(u)
-    means = []
-    for batch in range(BATCHES):
-        parts = likelihood.without(batch).parts(u)
-        change = sum(part.sum(axis=1) for part in parts) - whole
-        weight = np.exp(change - change.max())
-        means.append(weight @ theta / weight.sum())
-    spread = np.array(means) - np.mean(means, axis=0)
-    error = np.sqrt((BATCHES - 1) / BATCHES * np.sum(spread**2, axis=0))
-    result: Array = error / np.maximum(theta.std(axis=0), 1e-300)
-    return result

@@ -1,6 +1,6 @@
 """Peaks of tests as a function of parameters, for other inference codes."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -53,8 +53,8 @@ def simulator(
     Raises
     ------
     InputError
-        If an argument is invalid. The function raises it if a parameter does not exist, or
-        if the parameters do not make a valid problem.
+        If an argument is invalid or a parameter does not exist. The function raises it if the
+        values of the parameters do not make a valid problem.
 
     Examples
     --------
@@ -69,6 +69,7 @@ def simulator(
     (25,)
     """
     interface = as_random_interface(random)
+    _check_names(problem, interface, parameters)
 
     def simulated(theta: Any, *, first: int = 0) -> Array:
         """Peaks of samples first, first + 1, ... at these parameters, Pa, (samples,)."""
@@ -97,3 +98,15 @@ def simulator(
         return found
 
     return simulated
+
+
+def _check_names(problem: Problem, random: RandomInterface, parameters: Sequence[str]) -> None:
+    """Refuse parameters that do not exist; what else is wrong depends on their values."""
+    unknown: list[str] = []
+    for name in parameters:
+        try:
+            with_parameters(problem, random, (name,), np.ones(1))
+        except InputError as error:
+            unknown += [text for text in error.problems if "unknown" in text]
+    if unknown:
+        raise InputError(unknown)

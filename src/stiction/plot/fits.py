@@ -250,7 +250,7 @@ def _make_scale(axes: Axes, name: str, ends: Array) -> None:
 
 def _draw_peaks(figure: Any, found: Posterior) -> None:
     """Draw the distribution functions of the measured and predicted peaks."""
-    peaks, error = found.peaks, found.likelihood.model.error
+    peaks, error = found.peaks, found.likelihood.error
     panels = figure.subplots(len(peaks.values), 1, squeeze=False)[:, 0]
     levels = np.linspace(0.002, 0.998, 250)
     rows = zip(panels, peaks.lengths, peaks.values, found.predicted, strict=True)
