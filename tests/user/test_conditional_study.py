@@ -1,19 +1,20 @@
 """A field that was measured in part and factors between specimens, in study files and tails."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 import xarray as xr
-from refusals import refuses
+from refusals import refusals
 from small_study import small_study
 
 import stiction as st
 
 OWN = st.Study.from_dict(small_study())
 FIELD, LINE = OWN.random.strength, OWN.problem.interface
-SWEEP = [
-    {"random.strength.given.noise": [5e3, 20e3]},
-    {"random.between.strength.cv": [0.05, 0.2]},
-]
+SCANNED = FIELD.sample(LINE, seed=9)[0]
+KNOWN = xr.DataArray(SCANNED, {"x": LINE.x}, "x")[:40]
+BETWEEN = {"type": "lognormal", "mean": 1.0, "cv": 0.1}
 
 
 @pytest.fixture
@@ -21,36 +22,37 @@ def study(tmp_path, monkeypatch):
     """The plain form of a study whose strength was scanned over a third, and has a factor."""
     monkeypatch.chdir(tmp_path)
     plain = small_study()
-    scan = FIELD.sample(LINE, seed=9)[0, :40]
     header = "x (mm),strength (MPa)"
-    table = np.column_stack([LINE.x[:40] * 1e3, scan * 1e-6])
+    table = np.column_stack([LINE.x[:40] * 1e3, SCANNED[:40] * 1e-6])
     np.savetxt("scan.csv", table, delimiter=",", header=header, comments="")
     plain["random"]["strength"]["given"] = {"profile": "scan.csv", "noise": 20e3}
-    plain["random"]["between"] = {"strength": {"type": "lognormal", "mean": 1.0, "cv": 0.1}}
+    plain["random"]["between"] = {"strength": dict(BETWEEN)}
     return plain
 
 
 def test_a_study_file_is_the_same_as_the_calls(study):
     read = st.Study.from_dict(study, folder=".")
-    result = read.run(progress=False)
+    result = read.run()
     given = FIELD.given(st.read_profile("scan.csv"), noise=20e3)
-    random = st.RandomInterface(
-        strength=given, between={"strength": st.Lognormal(mean=1.0, cv=0.1)}
-    )
-    called = st.monte_carlo(
-        read.problem, random, method=read.method, samples=30, seed=3, progress=False
-    )
+    between = {"strength": st.Lognormal(mean=1.0, cv=0.1)}
+    random = st.RandomInterface(strength=given, between=between)
+    called = st.monte_carlo(read.problem, random, method=read.method, samples=30, seed=3)
     assert np.array_equal(result.critical_stress, called.critical_stress)
     assert st.Study.from_result(result) == read
-    read.run(out="RUN", progress=False)
+    read.run(out="RUN")
     assert st.open_run("RUN").study == read
+    sweep = [
+        {"random.strength.given.noise": [5e3, 20e3]}, {"random.between.strength.cv": [0.05, 0.2]}
+    ]  # fmt: skip
+    swept = study | {"sweep": sweep, "ensemble": {"samples": 3}}
+    found = st.Study.from_dict(swept, folder=".").run()
+    assert found.critical_stress.sizes == {"noise": 2, "cv": 2, "sample": 3}
 
 
 def test_measured_values_and_their_places_may_state_other_units():
-    x, values = np.array([0.01, 0.02, 0.03]), np.array([0.8e6, 0.9e6, 1.0e6])
-    plain = FIELD.given(xr.DataArray(values, {"x": x}, "x"), noise=20e3)
-    places = ("x", x * 1e3, {"units": "mm"})
-    stated = xr.DataArray(values * 1e-6, {"x": places}, "x", attrs={"units": "MPa"})
+    plain = FIELD.given(KNOWN, noise=20e3)
+    places = ("x", KNOWN.x.values * 1e3, {"units": "mm"})
+    stated = xr.DataArray(KNOWN.values * 1e-6, {"x": places}, "x", attrs={"units": "MPa"})
     found = FIELD.given(stated, noise=20e3).conditions.profile
     np.testing.assert_allclose(found, plain.conditions.profile, rtol=1e-15)
     with pytest.raises(st.InputError, match="state a known unit, not 'furlong'"):
@@ -58,14 +60,12 @@ def test_measured_values_and_their_places_may_state_other_units():
 
 
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
-def test_values_that_were_filled_in_were_not_measured(study):
-    profile = FIELD.sample(LINE, seed=9)[0]
-    profile[50:60] = np.nan
-    scan = xr.DataArray(profile, {"x": LINE.x}, "x")
-    filled = st.read_profile(scan, interface=LINE, gaps="fill")
-    assert not np.isnan(filled).any()
+def test_values_that_were_filled_in_were_not_measured():
+    holes = xr.DataArray(SCANNED, {"x": LINE.x}, "x").copy()
+    holes[50:60] = np.nan
+    filled = st.read_profile(holes, interface=LINE, gaps="fill")
     given = FIELD.given(filled, noise=20e3)
-    assert given.conditions.values.size == profile.size - 10
+    assert given.conditions.values.size == SCANNED.size - 10
 
 
 @pytest.mark.parametrize(
@@ -74,10 +74,9 @@ def test_values_that_were_filled_in_were_not_measured(study):
 )
 def test_a_file_holds_the_property_that_was_measured(study, name, heading, unit):
     """A coefficient where the field is of those; any other property by its own name."""
-    spectrum = study["random"]["strength"]["spectrum"]
     field = {
         "marginal": {"type": "lognormal", "mean": 0.5 * unit, "cv": 0.15},
-        "spectrum": spectrum,
+        "spectrum": study["random"]["strength"]["spectrum"],
         "given": {"profile": "measured.csv", "noise": 0.01 * unit},
     }
     if name == "strength":
@@ -91,48 +90,45 @@ def test_a_file_holds_the_property_that_was_measured(study, name, heading, unit)
     np.testing.assert_allclose(values, [0.45 * unit, 0.55 * unit], rtol=1e-12)
 
 
-def test_noise_and_scatter_can_be_swept(study):
-    found = st.Study.from_dict(study | {"sweep": SWEEP}, folder=".").run(progress=False)
-    assert found.critical_stress.sizes == {"noise": 2, "cv": 2, "sample": 30}
-
-
 @pytest.mark.parametrize(
-    ("change", "text"),
+    ("table", "change", "text"),
     [
-        (lambda r: r["strength"]["given"].update(noise=-1.0), "given.noise: must be greater than"),
-        (lambda r: r["strength"]["given"].pop("profile"), "random.strength.given.profile: missing"),
-        (lambda r: r["strength"]["given"].update(nois=1.0), "did you mean 'noise'"),
-        (lambda r: r["strength"]["given"].update(profile="scam.csv"), "scam.csv: cannot be read"),
-        (lambda r: r["between"].update(strenght={"type": "lognormal", "mean": 1.0, "cv": 0.1}),
-         "between: unknown 'strenght'; did you mean 'strength'"),
-        (lambda r: r["between"]["strength"].update(mean=1.2), "must be positive with mean 1"),
+        ("strength", {"noise": -1.0}, "given.noise: must be greater than"),
+        ("strength", {"profile": None}, "random.strength.given.profile: missing"),
+        ("strength", {"nois": 1.0}, "did you mean 'noise'"),
+        ("strength", {"profile": "scam.csv"}, "scam.csv: cannot be read"),
+        ("between", {"strenght": BETWEEN}, "unknown 'strenght'; did you mean 'strength'"),
+        ("between", {"strength": BETWEEN | {"mean": 1.2}}, "must be positive with mean 1"),
     ],
-)  # fmt: skip
-def test_a_mistake_is_named(study, change, text):
-    change(study["random"])
+)
+def test_a_mistake_is_named(study, table, change, text):
+    random = study["random"]
+    given = random["strength"]["given"] if table == "strength" else random["between"]
+    given.update(change)
+    if None in change.values():
+        del given["profile"]
     with pytest.raises(st.InputError, match=text):
         st.Study.from_dict(study, folder=".")
 
 
-def test_impossible_values_and_places_are_refused_and_unlikely_ones_warned_of(study):
-    known = st.read_profile("scan.csv")
-    far = known.assign_coords(x=known.x + 0.09)
-    given = FIELD.given(known, noise=20e3)
-    prior = {"marginal.low": (0.5e6, 0.65e6)}
-    for words, call in {
-        "lies outside the marginal": lambda: FIELD.given(3.0 * known, noise=1e3).sample(LINE),
-        "the interface is 0.1 m long": lambda: FIELD.given(far, noise=1e3).sample(LINE),
-        "the field already has one": lambda: given.given(known, noise=1e3),
-        "is conditioned on": lambda: st.theory.nucleation_statistics(OWN.problem, given),
-        "conditioned on measured values": lambda: st.theory.rice_distribution(
-            OWN.problem, given
-        ),
-        "strength is conditioned on one specimen": lambda: st.infer(
-            OWN.problem, given, [7e5, 7.1e5, 7.3e5], method=OWN.method, prior=prior
-        ),
-    }.items():
-        refuses(words, call)
-    rough = known.copy(data=known.values[np.random.default_rng(0).permutation(known.size)])
+GIVEN = FIELD.given(KNOWN, noise=20e3)
+test_impossible_values_and_places_are_refused = refusals({
+    "lies outside the marginal": lambda: FIELD.given(3.0 * KNOWN, noise=1e3).sample(LINE),
+    "the interface is 0.1 m long": lambda: FIELD.given(
+        KNOWN.assign_coords(x=KNOWN.x + 0.09), noise=1e3
+    ).sample(LINE),
+    "the field already has one": lambda: GIVEN.given(KNOWN, noise=1e3),
+    "is conditioned on": lambda: st.theory.nucleation_statistics(OWN.problem, GIVEN),
+    "conditioned on measured values": lambda: st.theory.rice_distribution(OWN.problem, GIVEN),
+    "strength is conditioned on one specimen": partial(
+        st.infer, OWN.problem, GIVEN, [7e5, 7.1e5, 7.3e5], method=OWN.method,
+        prior={"marginal.low": (0.5e6, 0.65e6)},
+    ),
+})  # fmt: skip
+
+
+def test_unlikely_values_are_warned_of():
+    rough = KNOWN.copy(data=KNOWN.values[np.random.default_rng(0).permutation(KNOWN.size)])
     with pytest.warns(st.AccuracyWarning, match="unlikely for this field"):
         FIELD.given(rough, noise=1e3).sample(LINE)
 
@@ -140,23 +136,19 @@ def test_impossible_values_and_places_are_refused_and_unlikely_ones_warned_of(st
 def test_the_tail_of_a_scanned_specimen_and_of_specimens_with_factors(study):
     """Failure probability against counting ten times as many samples."""
     read = st.Study.from_dict(study, folder=".")
-    counted = st.monte_carlo(
-        read.problem, read.random, method=read.method, samples=20_000, seed=8, pilot=False
-    ).critical_stress
+    given = {"problem": read.problem, "random": read.random, "method": read.method}
+    counted = st.monte_carlo(**given, samples=10_000, seed=8, pilot=False).critical_stress
     stress = float(counted.quantile(0.01))
-    found = st.failure_probability(
-        read.problem, read.random, stress, method=read.method, algorithm="subset", target_cv=0.1
-    )
-    error = np.hypot(0.07, found.cv)  # of 200 failures, and of the answer
+    found = st.failure_probability(**given, stress=stress, algorithm="subset", target_cv=0.15)
+    error = np.hypot(0.1, found.cv)  # of 100 failures, and of the answer
     assert abs(np.log(found.probability / 0.01)) < 3.5 * error
 
 
 def test_a_factor_may_carry_measured_values_beyond_the_marginal():
-    high = 1.5 * FIELD.sample(LINE, seed=9)[0]
+    high = 1.5 * xr.DataArray(SCANNED, {"x": LINE.x}, "x")
     assert high.max() > 1.66e6 + 4.0 * 20e3
-    known = xr.DataArray(high, {"x": LINE.x}, "x")
     random = st.RandomInterface(
-        strength=FIELD.given(known, noise=20e3),
+        strength=FIELD.given(high, noise=20e3),
         between={"strength": st.Lognormal(mean=1.0, cv=0.3)},
     )
     found = st.monte_carlo(OWN.problem, random, method=OWN.method, samples=50, seed=0)

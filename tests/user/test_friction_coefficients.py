@@ -1,113 +1,106 @@
 """Joints in engineers' terms: Young's modulus, friction coefficients, safety factors."""
 
+from functools import partial
+
 import numpy as np
 import pytest
-from refusals import refuses
+from refusals import refusals
+from setups import make_problem
 
 import stiction as st
 
+STEEL = {"youngs_modulus": 2.6e9, "poisson_ratio": 0.3, "density": 1200.0}
 SPECTRUM = st.PowerLawSpectrum(correlation_length=2e-3)
-COEFFICIENT = st.RandomField(
-    st.Lognormal(mean=0.5, cv=0.15), SPECTRUM, of="friction_coefficient"
-)
 PRESSURE = 2e6
 LOCAL = st.LocalCriterion()
 
 
-def joint(pressure):
-    return st.Problem(
-        solid=st.Solid(youngs_modulus=2.6e9, poisson_ratio=0.3, density=1200.0),
-        interface=st.Interface(length=0.1, nodes=256),
-        friction=st.LinearWeakening(weakening_rate=2e11, residual_ratio=0.3),
+def lognormal(mean, cv=0.15, **options):
+    return st.RandomField(st.Lognormal(mean=mean, cv=cv), SPECTRUM, **options)
+
+
+COEFFICIENT, STRENGTH = lognormal(0.5, of="friction_coefficient"), lognormal(0.5 * PRESSURE)
+
+
+def joint(pressure=None):
+    return make_problem(
+        solid=st.Solid(**STEEL), weakening_rate=2e11, residual_ratio=0.3,
         load=st.Load(normal_pressure=pressure),
-    )
+    )  # fmt: skip
+
+
+FREE, PRESSED = joint(), joint(PRESSURE)
+UNDER_RANDOM_PRESSURE = st.RandomInterface(
+    strength=COEFFICIENT, normal_pressure=lognormal(PRESSURE, cv=0.1)
+)
+counted = partial(st.failure_probability, method=LOCAL, algorithm="plain")
 
 
 def test_youngs_modulus_is_the_shear_modulus_in_other_words():
-    solid = st.Solid(youngs_modulus=2.6e9, poisson_ratio=0.3, density=1200.0)
+    solid = st.Solid(**STEEL)
     assert solid == st.Solid(1e9, 0.3, 1200.0)  # G = E/(2 (1 + nu))
-    study = {"solid": {"youngs_modulus": 2.6e9, "poisson_ratio": 0.3, "density": 1200.0}}
-    problem = st.Problem(**study, interface=joint(1.0).interface, friction=joint(1.0).friction)
-    assert problem.solid == solid
+    assert st.Problem(STEEL, FREE.interface, FREE.friction).solid == solid
 
 
-MODULI = {
+test_moduli = refusals({
     "give either": {"youngs_modulus": 1e9, "shear_modulus": 1e9, "poisson_ratio": 0.3},
     "youngs_modulus: must be greater than 0": {"youngs_modulus": -1e9, "poisson_ratio": 0.3},
     "poisson_ratio: missing": {"youngs_modulus": 1e9},
-}
-STRENGTH = st.RandomField(st.Lognormal(mean=1e6, cv=0.15), SPECTRUM)
-REFUSED = {
-    **{
-        words: lambda given=given: st.Solid(**given, density=1200.0)
-        for words, given in MODULI.items()
-    },
+}, partial(st.Solid, density=1200.0))  # fmt: skip
+test_what_is_contradicting_or_missing_is_refused = refusals({
     "need a normal pressure": lambda: st.monte_carlo(
-        joint(None), COEFFICIENT, method=LOCAL, samples=2
+        FREE, COEFFICIENT, method=LOCAL, samples=2
     ),
-    "friction_coefficient: needs a normal pressure": lambda: st.failure_probability(
-        joint(None), STRENGTH, friction_coefficient=0.3, method=LOCAL
+    "friction_coefficient: needs a normal pressure": lambda: counted(
+        FREE, STRENGTH, friction_coefficient=0.3
     ),
-    "either stress ... or friction_coefficient": lambda: st.failure_probability(
-        joint(PRESSURE), STRENGTH, method=LOCAL
-    ),
+    "either stress ... or friction_coefficient": lambda: counted(PRESSED, STRENGTH),
     "critical_slip: of = 'friction_coefficient'": lambda: st.RandomInterface(
         strength=STRENGTH, critical_slip=COEFFICIENT
     ),
-}
-
-
-@pytest.mark.parametrize("words", REFUSED)
-def test_what_is_contradicting_or_missing_is_refused(words):
-    refuses(words, REFUSED[words])
+})  # fmt: skip
 
 
 def test_coefficients_times_a_pressure_are_a_strength():
-    strength = st.RandomField(st.Lognormal(mean=0.5 * PRESSURE, cv=0.15), SPECTRUM)
-    options = {"method": LOCAL, "samples": 20, "seed": 1}
-    given = st.monte_carlo(joint(PRESSURE), COEFFICIENT, **options)
-    same = st.monte_carlo(joint(PRESSURE), strength, **options)
+    given, same, along = (
+        st.monte_carlo(problem, field, method=LOCAL, samples=20, seed=1)
+        for problem, field in (
+            (PRESSED, COEFFICIENT),
+            (PRESSED, STRENGTH),
+            (joint(np.full(256, PRESSURE)), COEFFICIENT),
+        )
+    )
     np.testing.assert_allclose(given.critical_stress, same.critical_stress, rtol=1e-12)
     np.testing.assert_allclose(given.friction_coefficient * PRESSURE, given.critical_stress)
-    along = st.monte_carlo(joint(np.full(256, PRESSURE)), COEFFICIENT, **options)
     np.testing.assert_allclose(along.critical_stress, same.critical_stress, rtol=1e-12)
 
 
-def test_a_random_pressure_carries_the_strength_with_it():
+def test_pressure_that_varies_or_is_random_carries_the_strength_with_it():
     """Where strength is mu p, a higher pressure alone changes no coefficient at onset."""
-    pressure = st.RandomField(st.Lognormal(mean=PRESSURE, cv=0.1), SPECTRUM)
-    random = st.RandomInterface(strength=COEFFICIENT, normal_pressure=pressure)
-    result = st.monte_carlo(
-        joint(None),
-        random,
-        method=LOCAL,
-        samples=4,
-        seed=1,
-        keep=["strength", "normal_pressure"],
-    )
-    mu = result["strength"] / result["normal_pressure"]
-    np.testing.assert_allclose(mu, COEFFICIENT.sample(joint(None).interface, samples=4, seed=1))
+    varied = 5e6 * (1.0 + 0.1 * np.cos(2.0 * np.pi * FREE.interface.x / 0.1))
+    drawn = COEFFICIENT.sample(FREE.interface, samples=4, seed=1)
+    options = {"method": LOCAL, "samples": 4, "seed": 1}
+    found = st.monte_carlo(joint(varied), COEFFICIENT, **options, keep="strength")
+    np.testing.assert_allclose(found["strength"] / varied, drawn)
+    keep = ["strength", "normal_pressure"]
+    found = st.monte_carlo(FREE, UNDER_RANDOM_PRESSURE, **options, keep=keep)
+    np.testing.assert_allclose(found["strength"] / found["normal_pressure"], drawn)
 
 
 def test_failure_by_coefficient_is_failure_by_stress():
-    options = {"method": LOCAL, "target_cv": 0.3, "seed": 4, "algorithm": "plain"}
-    by_coefficient = st.failure_probability(
-        joint(PRESSURE), COEFFICIENT, friction_coefficient=0.4, **options
-    )
-    by_stress = st.failure_probability(joint(PRESSURE), COEFFICIENT, 0.4 * PRESSURE, **options)
+    options = {"target_cv": 0.3, "seed": 4}
+    by_coefficient = counted(PRESSED, COEFFICIENT, friction_coefficient=0.4, **options)
+    by_stress = counted(PRESSED, COEFFICIENT, 0.4 * PRESSURE, **options)
     assert by_coefficient.probability == by_stress.probability > 0.0
     assert by_coefficient.friction_coefficient == pytest.approx(0.4)
     assert "friction coefficient 0.4" in str(by_coefficient)
 
 
 def test_failure_under_a_random_pressure_counts_each_samples_own():
-    pressure = st.RandomField(st.Lognormal(mean=PRESSURE, cv=0.1), SPECTRUM)
-    random = st.RandomInterface(strength=COEFFICIENT, normal_pressure=pressure)
-    result = st.monte_carlo(joint(None), random, method=LOCAL, samples=4000, seed=9)
+    result = st.monte_carlo(FREE, UNDER_RANDOM_PRESSURE, method=LOCAL, samples=4000, seed=9)
     least = float(result.friction_coefficient.quantile(0.05))
-    found = st.failure_probability(
-        joint(None), random, friction_coefficient=least, method=LOCAL, algorithm="plain",
-        target_cv=0.1, seed=1,
-    )  # fmt: skip
+    found = counted(
+        FREE, UNDER_RANDOM_PRESSURE, friction_coefficient=least, target_cv=0.1, seed=1
+    )
     # Both scatter: 0.05 by 7 % from 4,000 samples, the estimate by 10 %.
     assert found.probability == pytest.approx(0.05, rel=0.35)

@@ -1,6 +1,7 @@
-"""A study is the same in Python, in TOML and in the attributes of its result."""
+"""A study, swept or not, is the same in Python, in TOML and in the attributes of its result."""
 
 import copy
+import dataclasses
 import json
 import tomllib
 from pathlib import Path
@@ -10,137 +11,131 @@ import numpy as np
 import pytest
 import scipy.stats
 import xarray as xr
-from refusals import refuses
-from small_study import small_study
+from refusals import refusals, refuses
+from small_study import lengths, small_study
 
 import stiction as st
 from stiction.study.study import study_schema
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-
-STUDY = small_study(
-    weakening_rate=0.5e12,
-    correlation_length=1.7e-3,
-    ensemble={"samples": 40, "seed": 3},
-)
+STUDY = small_study()
+BASE = st.Study.from_dict(STUDY)
+LENGTH = "random.strength.spectrum.correlation_length"
+LOGNORMAL = {"type": "lognorm", "s": 0.2, "scale": 1e6}
 
 
-def changed(path, value):
-    """A copy of the study with one key replaced, or removed if the value is None."""
+def changed(**values):
+    """A copy of the study with keys, dots written as __, replaced, or removed if None."""
     study = copy.deepcopy(STUDY)
-    *folders, last = path.split(".")
-    table = study
-    for name in folders:
-        table = table[name]
-    if value is None:
-        del table[last]
-    else:
+    for path, value in values.items():
+        *folders, last = path.split("__")
+        table = study
+        for name in folders:
+            table = table[name]
         table[last] = value
+        if value is None:
+            del table[last]
     return study
 
 
-def test_python_and_toml_are_the_same_study(tmp_path):
+def loaded(folder=".", **values):
+    return st.Study.from_dict(changed(**values), folder=folder)
+
+
+def swept(*axes, **values):
+    return loaded(**{"sweep": list(axes)} | values)
+
+
+def in_python(**parts):
+    return dataclasses.replace(BASE, **parts)
+
+
+# -- one study in all its forms ------------------------------------------------------------------
+
+
+def test_python_and_toml_and_result_are_the_same_study(tmp_path):
     study = st.Study(
+        title="a study",
         problem=st.Problem(
             st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
             st.Interface(length=0.1, nodes=128),
-            st.LinearWeakening(weakening_rate=0.5e12),
+            st.LinearWeakening(weakening_rate=0.25e12),
         ),
         random=st.RandomField(
             st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
-            st.PowerLawSpectrum(correlation_length=1.7e-3),
+            st.PowerLawSpectrum(correlation_length=4e-3),
         ),
         method=st.LocalCriterion(),
-        ensemble=st.Ensemble(samples=40, seed=3),
+        ensemble=st.Ensemble(samples=30, seed=3),
     )
-    assert study == st.Study.from_dict(STUDY)
+    assert study == loaded(title="a study")
     study.to_toml(tmp_path / "study.toml")
     assert st.Study.from_toml(tmp_path / "study.toml") == study
     result = study.run()
-    assert st.Study.from_result(result) == study
-    again = st.Study.from_result(result).run()
-    np.testing.assert_array_equal(again["critical_load"], result["critical_load"])
-
-
-def test_attributes_say_all_it_takes(tmp_path):
-    result = st.Study.from_dict(STUDY | {"title": "a study"}).run()
+    again = st.Study.from_result(result)
+    assert again == study
+    np.testing.assert_array_equal(again.run()["critical_load"], result["critical_load"])
     result.to_netcdf(tmp_path / "result.nc")
     with xr.open_dataset(tmp_path / "result.nc") as read:
         assert read.attrs["stiction_version"] == st.__version__
         assert read.attrs["seed"] == 3
         assert read.attrs["title"] == "a study"
-        assert json.loads(read.attrs["study"])["ensemble"]["samples"] == 40
+        assert json.loads(read.attrs["study"])["ensemble"]["samples"] == 30
         for variable in read.variables.values():
             assert {"units", "long_name"} <= set(variable.attrs)
+
+
+def test_a_sweep_in_toml_python_and_the_result(tmp_path):
+    text = """
+    [[sweep]]
+    "random.strength.spectrum.correlation_length" = { start = 4e-3, stop = 8e-3, count = 3 }
+    [[sweep]]
+    problem.solid.density = [1000.0, 2000.0]
+    problem.solid.poisson_ratio = [0.2, 0.3]
+    """
+    path = tmp_path / "study.toml"
+    BASE.to_toml(path)
+    path.write_text(path.read_text() + text)
+    study = st.Study.from_toml(path)
+    solids = {"problem.solid.density": [1e3, 2e3], "problem.solid.poisson_ratio": [0.2, 0.3]}
+    assert study == in_python(sweep=[{LENGTH: np.linspace(4e-3, 8e-3, 3)}, solids])
+    assert st.Study.from_result(study.run()) == study
+    study.to_toml(path)
+    assert st.Study.from_toml(path) == study
 
 
 def test_distributions_of_scipy_and_profiles_in_files(tmp_path):
     np.save(tmp_path / "profile.npy", np.linspace(1.0, 1.2, 128))
     np.savetxt(tmp_path / "stress.csv", np.full(128, 1e4), delimiter=",")
-    study = copy.deepcopy(STUDY)
-    study["random"]["strength"]["marginal"] = {"type": "lognorm", "s": 0.2, "scale": 1e6}
-    study["problem"]["load"] = {"profile": "profile.npy", "initial_stress": "stress.csv"}
-    loaded = st.Study.from_dict(study, folder=tmp_path)
-    np.testing.assert_array_equal(loaded.problem.load.profile, np.linspace(1.0, 1.2, 128))
+    load = {"profile": "profile.npy", "initial_stress": "stress.csv"}
+    study = loaded(tmp_path, random__strength__marginal=LOGNORMAL, problem__load=load)
+    np.testing.assert_array_equal(study.problem.load.profile, np.linspace(1.0, 1.2, 128))
     expected = scipy.stats.lognorm(0.2, scale=1e6)
-    assert loaded.random.strength.mean == pytest.approx(expected.mean(), rel=1e-14)
-    loaded.to_toml(tmp_path / "written.toml")
-    assert st.Study.from_toml(tmp_path / "written.toml") == loaded
-
-
-@pytest.mark.parametrize(
-    ("path", "value", "words"),
-    [
-        ("problem", None, "problem: missing"),
-        ("problem.solid.density", None, "problem.solid.density: missing"),
-        ("problem.solid.density", -1.0, "problem.solid.density ... greater than 0 ... -1"),
-        ("problem.solid.densty", 1.0, "problem.solid ... 'densty' ... did you mean 'density'"),
-        ("problem.interface.nodes", "many", "problem.interface.nodes ... 'many'"),
-        ("problem.load", {"profile": "missing.npy"}, "problem.load.profile ... missing.npy"),
-        ("random.strength.marginal.type", "betta", "'betta' ... did you mean 'beta'"),
-        ("random.strength.marginal.low", 2e6, "strength.marginal ... low must be below high"),
-        ("random.strength.spectrum.correlation_length", 10.0, "strength ... no mode is left"),
-        ("method.type", "local", "method.type ... 'local' ... local_criterion"),
-        ("method.typ", "exact", "method ... 'typ' ... did you mean 'type'"),
-        ("ensemble.samples", 0, "ensemble.samples ... 0"),
-        ("ensemble.samples", 2.5, "ensemble.samples ... whole number ... 2.5"),
-        ("ensemble.keep", ["stregth"], "keep ... 'stregth' ... strength"),
-    ],
-)
-def test_mistakes_are_named(tmp_path, path, value, words):
-    refuses(words, lambda: st.Study.from_dict(changed(path, value), folder=tmp_path))
-
-
-def test_all_mistakes_come_at_once():
-    study = changed("problem.solid.density", -1.0)
-    study["ensemble"] = {"samples": -5, "sed": 1}
-    study["sweep"] = [{"method.typ": ["exact"]}]
-    del study["random"]["strength"]["spectrum"]
-    words = "solid.density ... ensemble.samples ... 'sed' ... strength.spectrum ... 'type'"
-    refuses(words, lambda: st.Study.from_dict(study))
+    assert study.random.strength.mean == pytest.approx(expected.mean(), rel=1e-14)
+    study.to_toml(tmp_path / "written.toml")
+    assert st.Study.from_toml(tmp_path / "written.toml") == study
 
 
 def test_a_function_cannot_be_written_down(tmp_path):
     def bell(k):
         return np.exp(-((k * 1e-3) ** 2))
 
-    study = st.Study.from_dict(STUDY)
-    own = st.Study(
-        problem=study.problem,
-        random=st.RandomField(study.random.strength.marginal, st.CustomSpectrum(bell, 8e3)),
-        method=study.method,
-        ensemble=study.ensemble,
-    )
-    with pytest.raises(st.InputError, match="bell"):
-        own.to_toml(tmp_path / "study.toml")
+    field = dataclasses.replace(BASE.random.strength, spectrum=st.CustomSpectrum(bell, 8e3))
+    own = in_python(random=field)
+    words = "cannot be written down: spectrum.function is the Python function 'bell'; use"
+    refuses(words, lambda: own.to_toml(tmp_path / "study.toml"))
     assert "bell" in own.run().attrs["study_incomplete"]
+    pair = in_python(
+        sweep=[{"random.strength.spectrum": [BASE.random.strength.spectrum, field.spectrum]}]
+    )
+    assert pair.run()["critical_stress"].shape == (2, 30)
+    refuses("bell", pair.to_dict)
 
 
 @pytest.mark.parametrize("text", ["a = [", "\xff"])
 def test_files_that_are_not_toml(tmp_path, text):
     (tmp_path / "study.toml").write_bytes(text.encode("latin-1"))
-    with pytest.raises(st.InputError, match=r"study\.toml"):
-        st.Study.from_toml(tmp_path / "study.toml")
+    refuses("study.toml", lambda: st.Study.from_toml(tmp_path / "study.toml"))
 
 
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.toml")), ids=lambda path: path.name)
@@ -148,3 +143,189 @@ def test_every_example_is_valid(path):
     study = st.Study.from_toml(path)
     jsonschema.validate(tomllib.loads(path.read_text()), study_schema())
     assert st.Study.from_dict(study.to_dict()) == study
+
+
+# -- points of a sweep ---------------------------------------------------------------------------
+
+
+def test_every_point_is_the_study_with_its_values():
+    study = swept({LENGTH: [4e-3, 6e-3]}, {"problem.solid.poisson_ratio": [0.2, 0.4]})
+    result = study.run()
+    assert result["critical_stress"].dims == ("correlation_length", "poisson_ratio", "sample")
+    assert result["critical_stress"].shape == (2, 2, 30)
+    assert result["correlation_length"].attrs == {"units": "m", "long_name": LENGTH}
+    for point in study.points:
+        values = {name.replace(".", "__"): value for name, value in point.values.items()}
+        alone = loaded(**values).run()
+        part = result.isel(correlation_length=point.number // 2, poisson_ratio=point.number % 2)
+        for name in alone.data_vars:
+            np.testing.assert_array_equal(part[name], alone[name])
+
+
+def test_keys_of_one_table_vary_together():
+    study = swept(
+        {"problem.interface.length": [0.1, 0.2], "problem.interface.nodes": [128, 256]},
+        {"ensemble.seed": [3, 4]},
+        ensemble__samples=2,
+    )
+    points = [tuple(point.values.values()) for point in study.points]
+    assert points == [(0.1, 128, 3), (0.1, 128, 4), (0.2, 256, 3), (0.2, 256, 4)]
+    result = study.run()
+    assert result["critical_stress"].dims == ("length", "seed", "sample")
+    assert result["nodes"].dims == ("length",)
+    spacings = [plan.problem.interface.spacing for plan in study.experiments]
+    assert spacings == [0.1 / 128] * 4
+
+
+@pytest.mark.parametrize(
+    ("key", "span", "values"),
+    [
+        (LENGTH, {"stop": 8e-3, "count": 3, "spacing": "log"}, [2e-3, 4e-3, 8e-3]),
+        (LENGTH, {"stop": 8e-3, "count": 4}, [2e-3, 4e-3, 6e-3, 8e-3]),
+        ("problem.interface.nodes", {"start": 128, "stop": 256, "count": 3}, [128, 192, 256]),
+    ],
+)
+def test_ranges(key, span, values):
+    points = swept({key: {"start": 2e-3} | span}).points
+    # Geometric and arithmetic means of the ends, up to round-off.
+    assert [point.values[key] for point in points] == pytest.approx(values, rel=1e-14)
+
+
+def test_whole_tables_are_values_too():
+    marginals = [STUDY["random"]["strength"]["marginal"], LOGNORMAL]
+    study = swept({"random.strength.marginal": marginals})
+    np.testing.assert_array_equal(study.run()["marginal"], ["beta", "lognorm"])
+    assert study.experiments[1].random.strength.mean == pytest.approx(
+        scipy.stats.lognorm(0.2, scale=1e6).mean()
+    )
+    scales = {"random.strength.marginal.scale": [1e6, 2e6]}
+    stress = swept(scales, random__strength__marginal=LOGNORMAL).run()["critical_stress"].values
+    # The onset is linear in the strength: twice the scale, twice the stress, to round-off.
+    np.testing.assert_allclose(stress[1], 2.0 * stress[0], rtol=1e-12)
+
+
+def test_a_swept_key_needs_no_value_of_its_own():
+    spectrum = {"type": "power_law"}
+    study = swept(*lengths(4e-3, 6e-3), random__strength__spectrum=spectrum)
+    assert study.random.strength.spectrum.correlation_length == 4e-3
+
+
+def test_profiles_in_files_can_be_swept(tmp_path):
+    for name, scale in (("a", 0.0), ("b", 0.1)):
+        wave = np.sin(np.arange(128) * 2 * np.pi / 128)
+        np.save(tmp_path / f"{name}.npy", 1.0 + scale * wave)
+    study = swept({"problem.load.profile": ["a.npy", "b.npy"]}, folder=tmp_path)
+    assert study.experiments[1].problem.load.profile.max() == pytest.approx(1.1)
+
+
+def test_a_correlation_coefficient_is_swept():
+    """The strength has the same draws at every coefficient; the coordinate is a pure number."""
+    residual = {
+        "marginal": {"type": "beta", "alpha": 2.0, "beta": 2.0, "low": 0.0, "high": 0.5e6},
+        "spectrum": STUDY["random"]["strength"]["spectrum"],
+    }
+    kept = {"samples": 8, "keep": ["strength", "residual_strength"]}
+    given = {"random__residual_strength": residual, "ensemble": kept}
+    key = "random.correlation.strength.residual_strength"
+    result = swept({key: [-1.0, 0.0, 1.0]}, **given).run()
+    rho = result["correlation_strength_residual_strength"]
+    assert rho.attrs == {"units": "1", "long_name": key}
+    strength = result["strength"].values
+    np.testing.assert_array_equal(strength[0], strength[2])
+    for i, one in enumerate(rho.values):
+        found = np.corrcoef(strength[i].ravel(), result["residual_strength"].values[i].ravel())
+        # The marginals bend the fields: |r| of +-1 becomes 0.98 (Grigoriu 1995), and 8 samples of
+        # 25 correlation lengths scatter by 0.07.
+        assert found[0, 1] == pytest.approx(one, abs=0.2)
+    misspelt = {"random.correlation.strength.residual_strenght": [0.1]}
+    refuses("did you mean 'residual_strength'", lambda: swept(misspelt, **given))
+
+
+def test_warnings_of_many_points_are_summed_up():
+    with pytest.warns(st.AccuracyWarning) as caught:
+        swept(*lengths(*np.linspace(20e-3, 30e-3, 9)), ensemble={"samples": 2}).run()
+    texts = [str(warning.message) for warning in caught]
+    assert sum("no mean mode" in text for text in texts) == 4
+    assert sum("5 more warnings like these" in text for text in texts) == 1
+
+
+# -- what is kept --------------------------------------------------------------------------------
+
+
+def test_kept_profiles():
+    keeping = {"samples": 2, "seed": 3, "keep": ["strength"]}
+    study = swept(*lengths(4e-3, 6e-3), ensemble=keeping)
+    result = study.run()
+    assert result["strength"].dims == ("correlation_length", "sample", "x")
+    field, interface = study.experiments[1].random.strength, study.problem.interface
+    direct = field.sample(interface, samples=2, seed=3)
+    np.testing.assert_array_equal(result["strength"].values[1], direct)
+    longer = swept({"problem.interface.length": [0.1, 0.2]}, ensemble=keeping).run()
+    np.testing.assert_allclose(longer["position"][1], 0.2 / 128 * np.arange(128), rtol=1e-15)
+    refuses("GiB of memory", loaded(ensemble=keeping | {"samples": 10**9}).run)
+
+
+def test_slip_and_sensitivity_on_request():
+    """What the method can add is switched on by asking for it."""
+    kept = {"samples": 6, "keep": ["slip", "sensitivity"]}
+    study = loaded(method={"type": "equilibrium"}, ensemble=kept)
+    result = study.run()
+    tau_p = study.random.strength.sample(study.problem.interface, samples=6, seed=0)
+    method = st.Equilibrium(slip=True, sensitivity=True)
+    direct = st.onset(study.problem, tau_p, method=method)
+    for name in ("critical_load", "slip", "sensitivity"):
+        assert result[name].dims == direct[name].dims
+        np.testing.assert_array_equal(result[name], direct[name])
+
+
+# -- mistakes ------------------------------------------------------------------------------------
+
+test_mistakes_are_named = refusals({
+    "problem: missing": {"problem": None},
+    "problem.solid.density: missing": {"problem__solid__density": None},
+    "problem.solid.density ... greater than 0 ... -1": {"problem__solid__density": -1.0},
+    "problem.solid ... 'densty' ... did you mean 'density'": {"problem__solid__densty": 1.0},
+    "problem.interface.nodes ... 'many'": {"problem__interface__nodes": "many"},
+    "problem.load.profile ... missing.npy": {"problem__load": {"profile": "missing.npy"}},
+    "'betta' ... did you mean 'beta'": {"random__strength__marginal__type": "betta"},
+    "strength.marginal ... low must be below high": {"random__strength__marginal__low": 2e6},
+    "strength ... no mode is left": {"random__strength__spectrum__correlation_length": 10.0},
+    "method.type ... 'local' ... local_criterion": {"method__type": "local"},
+    "method ... 'typ' ... did you mean 'type'": {"method__typ": "exact"},
+    "ensemble.samples ... whole number ... 2.5": {"ensemble__samples": 2.5},
+    "keep ... 'stregth' ... strength": {"ensemble__keep": ["stregth"]},
+    "solid.density ... ensemble.samples ... 'sed' ... strength.spectrum ... 'type'": {
+        "problem__solid__density": -1.0,
+        "ensemble": {"samples": -5, "sed": 1},
+        "sweep": [{"method.typ": ["exact"]}],
+        "random__strength__spectrum": None,
+    },
+}, loaded)  # fmt: skip
+
+SPAN = {"start": 1e-3, "stop": 2e-3}
+AXES = {
+    "mean 'correlation_length'": [{"random.strength.spectrum.corelation_length": [1]}],
+    "did you mean 'problem'": [{"problm.solid.density": [1.0]}],
+    "correlation_length ... greater than 0 ... point 1": [{LENGTH: [4e-3, -1.0]}],
+    f"{LENGTH} ... list of values or a range": [{LENGTH: 4e-3}],
+    f"{LENGTH} ... list": [{LENGTH: []}],
+    "count: missing": [{LENGTH: SPAN}],
+    "'num' ... count: missing": [{LENGTH: SPAN | {"num": 3}}],
+    "positive": [{LENGTH: SPAN | {"start": 0.0, "count": 3, "spacing": "log"}}],
+    "count ... >= 2": [{LENGTH: SPAN | {"count": 1}}],
+    "as many values each ... has 2 ... has 3": [{LENGTH: [1, 2], "ensemble.seed": [1, 2, 3]}],
+    "swept twice": [{LENGTH: [1e-3]}, {LENGTH: [2e-3]}],
+    "random.strength.spectrum": [{"random.strength.spectrum": []}, {LENGTH: [2e-3]}],
+    "ensemble.samples: cannot be swept": [{"ensemble.samples": [10, 20]}],
+    "problem.solid.density ... 'heavy'": [{"problem.solid.density": [1.0, "heavy"]}],
+    "1000000 points": [{"ensemble.seed": list(range(1000))}, {"x": [1] * 1000}],
+    "list of tables": {LENGTH: [1e-3], "ensemble.seed": [1]},
+}
+test_axes_are_refused = refusals({
+    words: {"sweep": axes} for words, axes in AXES.items()
+} | {
+    "number of nodes is swept": {
+        "sweep": [{"problem.interface.nodes": [128, 256]}],
+        "ensemble__keep": ["strength"],
+    }
+}, loaded)  # fmt: skip
