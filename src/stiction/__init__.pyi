@@ -42,8 +42,8 @@ from stiction.random.spectra import CustomSpectrum as CustomSpectrum
 from stiction.random.spectra import ExponentialSpectrum as ExponentialSpectrum
 from stiction.random.spectra import PowerLawSpectrum as PowerLawSpectrum
 from stiction.random.spectra import SquaredExponentialSpectrum as SquaredExponentialSpectrum
-from stiction.reliability.curve import design_stress as design_stress
-from stiction.reliability.curve import failure_curve as failure_curve
+from stiction.reliability.failure import design_stress as design_stress
+from stiction.reliability.failure import failure_curve as failure_curve
 from stiction.reliability.failure import failure_probability as failure_probability
 from stiction.solid import Solid as Solid
 from stiction.study.study import Study as Study

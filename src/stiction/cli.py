@@ -522,7 +522,7 @@ def reliability(
     failure means that the interface as a whole slides below it.
     """
     from stiction import plot
-    from stiction.reliability.curve import failure_curve
+    from stiction.reliability.failure import failure_curve
     from stiction.study.export import write_result
     from stiction.study.study import Study
 

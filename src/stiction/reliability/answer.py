@@ -1,4 +1,4 @@
-"""Common parts of the reliability functions: checks of options, answers, and warnings."""
+"""Answers on failure probability, and the checks that all of them share."""
 
 import math
 from collections.abc import Sequence
@@ -40,23 +40,19 @@ class Answer:
 
     Attributes
     ----------
-    stress : float
-        Pa.
-    probability : float
-        Probability of an onset below `stress`.
+    stress, probability : float
+        Pa, and the probability of an onset below it.
     interval : tuple of float
         95 % confidence interval of the result.
     cv : float
-        Coefficient of variation of the probability at `stress`: estimated standard error over the
-        estimate; infinite without a failure, zero if exact.
+        Coefficient of variation of the probability: estimated standard error over the estimate;
+        infinite without a failure, zero if exact.
     evaluations, first_stage_evaluations : int
         Samples solved by the method, and by its less expensive first stage only.
     lower_bound, stress_above_bound : float
         Pa; no sample slides below `lower_bound`.
-    algorithm : str
-        'plain', 'subset', 'two_level' or 'exact' (nothing had to be sampled).
-    reason : str
-        Reason for the choice of the algorithm.
+    algorithm, reason : str
+        'plain', 'subset', 'two_level' or 'exact' (nothing had to be sampled), and why.
     warnings : tuple of str
         Reasons not to trust the answer; empty if there are none.
     normal_pressure, friction_coefficient : float
@@ -95,14 +91,12 @@ class Answer:
         """`stress` less `lower_bound`, Pa."""
         return self.stress - self.lower_bound
 
-    @property
-    def _place(self) -> str:
-        """Text of the coefficient and of the distance from the bound, where there are any."""
-        coefficient = f" (friction coefficient {self.friction_coefficient:.4g})"
-        text = coefficient if math.isfinite(self.normal_pressure) else ""
+    def _described(self, result: str) -> str:
+        if math.isfinite(self.normal_pressure):
+            result += f" (friction coefficient {self.friction_coefficient:.4g})"
         if bounded(self.lower_bound):
-            text += f", {self.stress_above_bound / 1e3:.4g} kPa above the bound"
-        return text
+            result += f", {self.stress_above_bound / 1e3:.4g} kPa above the bound"
+        return f"{result}; {self.algorithm}, {self.evaluations} evaluations"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -120,10 +114,9 @@ class FailureProbability(Answer):
 
     def __str__(self) -> str:
         low, high = self.interval
-        return (
+        return self._described(
             f"P = {self.probability:.3g} (95 %: {low:.3g} to {high:.3g},"
-            f" c.o.v. {self.cv:.2g}) below {self.stress / 1e6:.6g} MPa{self._place};"
-            f" {self.algorithm}, {self.evaluations} evaluations"
+            f" c.o.v. {self.cv:.2g}) below {self.stress / 1e6:.6g} MPa"
         )
 
 
@@ -133,10 +126,9 @@ class DesignStress(Answer):
 
     def __str__(self) -> str:
         low, high = self.interval
-        return (
-            f"{self.stress / 1e6:.7g} MPa (95 %: {low / 1e6:.7g} to"
-            f" {high / 1e6:.7g}){self._place}, at P = {self.probability:g};"
-            f" {self.algorithm}, {self.evaluations} evaluations"
+        return self._described(
+            f"{self.stress / 1e6:.7g} MPa (95 %: {low / 1e6:.7g} to {high / 1e6:.7g})"
+            f" at P = {self.probability:g}"
         )
 
 
@@ -176,9 +168,8 @@ def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
         return None
     return (
         f"{CHAIN:,} evaluations of subset simulation by {kind!r} would take about"
-        f" {seconds / 3600.0:.1g} h on one core; allow them with max_evaluations, or use"
-        " plain Monte Carlo (failure_probability with algorithm='plain', or quantiles of"
-        " st.monte_carlo)"
+        f" {seconds / 3600.0:.1g} h on one core; allow them with max_evaluations, or use plain"
+        " Monte Carlo (algorithm='plain' of failure_probability, or st.monte_carlo)"
     )
 
 
@@ -211,11 +202,10 @@ def exact_doubts(
     `near` holds draws and stresses of samples on both sides of the stress, the lowest there are.
     """
     exact, (draws, values) = exact_counterpart(state.experiment), near
-    if exact is None or draws.shape[0] == 0:
+    if exact is None or not values.size:
         return []
     (few, most), cost = CHECKED, exact.method.seconds_per_sample(exact.problem)
-    count = int(min(max(few, 10.0 / cost), most))
-    chosen = distinct(values, count, np.random.default_rng(0))
+    chosen = distinct(values, int(min(max(few, 10.0 / cost), most)), np.random.default_rng(0))
     state.meter.note = "checking by equilibrium"
     with collect_warnings():
         below = replace(state, experiment=exact)(draws[chosen]) < stress
@@ -223,10 +213,10 @@ def exact_doubts(
     by_one, by_other, differing = (int(np.sum(own)) for own in (failed, below, below != failed))
     if abs(by_other - by_one) <= 2.0 * math.sqrt(max(differing, 1)):
         return []
-    there = probability * max(by_other, 1) / max(by_one, 1)
+    there = min(probability * max(by_other, 1) / max(by_one, 1), 1.0)
     return [
-        f"of {chosen.size} samples in the tail {by_one} fail by the local criterion and"
-        f" {by_other} by equilibrium: by equilibrium the probability of failure is"
-        f" {'about' if by_other else 'below'} {min(there, 1.0):.2g} instead of"
-        f" {probability:.2g}; use method=st.Equilibrium()"
+        f"of {chosen.size} samples in the tail {by_one} fail by the local criterion and {by_other}"
+        " by equilibrium: by equilibrium the probability of failure is"
+        f" {'about' if by_other else 'below'} {there:.2g} instead of {probability:.2g}; use"
+        " method=st.Equilibrium()"
     ]

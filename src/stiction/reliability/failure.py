@@ -1,14 +1,16 @@
-"""Failure probability: counting, subset simulation, or two levels."""
+"""Failure probability, design stress and the curve of both: counting, or the tail of the onset."""
 
-from typing import Any, Literal
+import math
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import xarray as xr
+from pydantic import Field
 
 from stiction.arrays import Array
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import Event, LimitState
-from stiction.errors import InputError, UnitWarning, warn_user
+from stiction.errors import InputError, UnitWarning, warn_accuracy, warn_user
 from stiction.methods import MethodObject, label, study_attributes
 from stiction.model import Count, Number, Positive, Progress, Real, checked
 from stiction.problem import Problem
@@ -18,7 +20,9 @@ from stiction.random.random_interface import RandomInterface
 from stiction.random.stresses import mean_in_stress
 from stiction.reliability.answer import (
     Budget,
+    DesignStress,
     FailureProbability,
+    Probability,
     TargetCv,
     distinct,
     exact_doubts,
@@ -29,13 +33,15 @@ from stiction.reliability.answer import (
 from stiction.reliability.counting import count_failures
 from stiction.reliability.tail import Tail, sample_tail
 from stiction.reliability.uncertainty import generator, lognormal_interval
-from stiction.results import along
-from stiction.variables import ONSET_VARIABLES, PROFILES
+from stiction.results import along, to_dataset
+from stiction.variables import ONSET_VARIABLES, PROFILES, Variable
 
 PILOT = 1_000
 """Number of plain samples by which the algorithm is chosen."""
 FREQUENT = 0.01
 """Probability above which plain sampling needs no more evaluations than subset simulation."""
+COMMONEST = 0.5
+"""Probability at which a curve begins."""
 NEGLIGIBLE = 1e-15
 """Probability of failing, or of holding, below which no sample is drawn."""
 DOUBTFUL = 0.02
@@ -46,6 +52,21 @@ CHECKED = 32
 """Number of failures among the samples that are also solved by equilibrium."""
 COVERED = 0.8
 """Share of the failures that the first stage must reach to avoid a warning."""
+
+CURVE = {
+    name: Variable(unit, text, ("point",))
+    for name, unit, text in (
+        ("stress", "Pa", "stress"),
+        ("stress_above_bound", "Pa", "stress above its lower bound"),
+        ("friction_coefficient", "1", "stress over the mean normal pressure"),
+        ("probability", "1", "probability of an onset below the stress"),
+        ("probability_low", "1", "lower end of the interval of the probability"),
+        ("probability_high", "1", "upper end of the 95 % interval of the probability"),
+        ("cv", "1", "coefficient of variation of the probability"),
+        ("stress_low", "Pa", "lower end of the interval of the stress"),
+        ("stress_high", "Pa", "upper end of the interval of the stress"),
+    )
+}
 
 
 @checked
@@ -66,8 +87,6 @@ def failure_probability(
 ) -> FailureProbability:
     """Estimate the probability that an interface of random strength slides below a stress.
 
-    The algorithms and their sources: page 'Failure probability' of the documentation.
-
     Parameters
     ----------
     problem, random, seed, workers, progress
@@ -75,17 +94,17 @@ def failure_probability(
     stress : float, optional
         Mean shear stress to carry, Pa. Failure is an onset strictly below it.
     method : LocalCriterion, Equilibrium or Rupture
-        The method. `Rupture`, and any method too slow for subset simulation, is used with
-        plain Monte Carlo unless `max_evaluations` is 20,000 or more.
+        `Rupture`, and any method too slow for subset simulation, is used with plain Monte Carlo
+        unless `max_evaluations` is 20,000 or more.
     friction_coefficient : float, optional
         Instead of `stress`: ratio of mean shear stress to mean normal pressure that it must
         carry. If the pressure is random, each sample's own pressure counts.
     algorithm : {"auto", "plain", "subset", "two_level"}
         Plain Monte Carlo, subset simulation, or subset simulation by the local criterion with
-        equilibrium as the last level. 'auto' solves a thousand plain samples; if 1 % of them
-        fail, it continues with plain Monte Carlo. Otherwise it takes two levels for equilibrium
-        if the local criterion picks the same weakest samples and wastes few evaluations, else
-        subset simulation. `reason` in the result gives the choice and its cause.
+        equilibrium as the last level; page 'Failure probability' of the documentation has their
+        sources. 'auto' counts if 1 % of a thousand plain samples fail. Otherwise it takes two
+        levels for equilibrium if the local criterion picks the same weakest samples, else subset
+        simulation. `reason` in the result gives the cause.
     target_cv : float
         Coefficient of variation to reach.
     max_evaluations : int, optional
@@ -128,9 +147,10 @@ def failure_probability(
     if (stress is None) == (friction_coefficient is None):
         raise InputError("stress: give either stress (Pa) or friction_coefficient")
     experiment = Experiment(problem, random, method, seed=seed)
+    meter = Meter("failure_probability", show=progress)
     state, budget = prepare(
-        experiment, event, workers, Meter("failure_probability", show=progress),
-        max_evaluations, algorithm=algorithm, per_pressure=stress is None,
+        experiment, event, workers, meter, max_evaluations,
+        algorithm=algorithm, per_pressure=stress is None,
     )  # fmt: skip
     if stress is None:
         stress = float((friction_coefficient or 0.0) * experiment.pressure)
@@ -143,22 +163,31 @@ def failure_probability(
             " check the units (stress in Pa, friction_coefficient without unit)",
             UnitWarning,
         )
-    with state.meter:
+    with meter:
         if not likely[0] < stress < likely[1]:
             found = _certain(state, stress, likely)
+            return FailureProbability.of(state, stress=stress, **found)
+        reason, pilot, least = "as requested", None, min(PILOT, max(budget // 5, 50))
+        if algorithm == "auto" and (slow := too_slow(experiment, max_evaluations)):
+            algorithm, reason = "plain", slow
+        elif algorithm == "auto":
+            draws = state.draws(seed, 0, least)
+            pilot = draws, state(draws)
+            failures = int(np.sum(pilot[1] < stress))
+            rare = failures < FREQUENT * least
+            algorithm = "auto" if rare else "plain"
+            reason = f"{failures} failure{'s' * (failures != 1)} of {least} plain samples: "
+            reason += "rare" if rare else "frequent enough to count"
+        if algorithm == "plain":
+            begun = 0 if pilot is None else least
+            found = _by_counting(state, stress, target_cv, budget, least, begun)
+            found["reason"] = reason
         else:
-            slow = too_slow(experiment, max_evaluations)
-            chosen, reason, pilot = _choice(state, stress, algorithm, slow, budget)
-            if chosen == "plain":
-                begun = 0 if pilot is None else pilot[1].size
-                found = _by_counting(state, stress, target_cv, budget, begun)
-                found["reason"] = reason
-            else:
-                tail = sample_tail(
-                    state, algorithm=chosen, target_cv=target_cv, budget=budget,
-                    stress=stress, reason=reason, pilot=pilot,
-                )  # fmt: skip
-                found = _by_tail(state, stress, tail, target_cv)
+            tail = sample_tail(
+                state, algorithm=algorithm, target_cv=target_cv, budget=budget,
+                stress=stress, reason=reason, pilot=pilot,
+            )  # fmt: skip
+            found = _by_tail(state, stress, tail, target_cv)
     return FailureProbability.of(state, stress=stress, **found)
 
 
@@ -178,39 +207,13 @@ def _certain(state: LimitState, stress: float, likely: tuple[float, float]) -> d
     return found | {"algorithm": "exact", "reason": reason}
 
 
-def _fewest(budget: int) -> int:
-    """Return the least number of plain samples that are solved."""
-    return min(PILOT, max(budget // 5, 50))
-
-
-def _choice(
-    state: LimitState, stress: float, algorithm: str, slow: str | None, budget: int
-) -> tuple[str, str, tuple[Array, Array] | None]:
-    """Return the algorithm, the reason, and the draws and stresses of the samples that it took.
-
-    They do not enter the estimate by counting, which is chosen where they hold many failures.
-    """
-    if algorithm != "auto":
-        return algorithm, "as requested", None
-    if slow is not None:
-        return "plain", slow, None
-    draws = state.draws(state.experiment.seed, 0, _fewest(budget))
-    stresses = state(draws)
-    count, failures = stresses.size, int(np.sum(stresses < stress))
-    reason = f"{failures} failure{'s' * (failures != 1)} of {count} plain samples: "
-    if failures >= FREQUENT * count:
-        return "plain", f"{reason}frequent enough to count", (draws, stresses)
-    return "auto", f"{reason}rare", (draws, stresses)
-
-
 def _by_counting(
-    state: LimitState,
-    stress: float,
-    target_cv: float,
-    budget: int,
-    start: int,
+    state: LimitState, stress: float, target_cv: float, budget: int, least: int, start: int
 ) -> dict[str, Any]:
-    """Return the attributes of an answer by plain Monte Carlo from sample `start` on."""
+    """Return the attributes of an answer by plain Monte Carlo from sample `start` on.
+
+    Samples of a pilot do not enter: counting is chosen where they hold many failures.
+    """
     seed = state.experiment.seed
 
     def drawn(numbers: Any) -> Array:
@@ -218,23 +221,21 @@ def _by_counting(
         return np.concatenate([np.empty((0, state.dimension)), *rows])
 
     count, stresses = count_failures(
-        state, seed, stress, target_cv=target_cv, least=_fewest(budget),
+        state, seed, stress, target_cv=target_cv, least=least,
         max_evaluations=budget - start, start=start,
     )  # fmt: skip
     failed = np.flatnonzero(stresses < stress)
     # The weakest samples: failures and others in their true shares.
     some = failed[:CHECKED]
-    seen = stresses[: some.max(initial=-1) + 1]
-    near = np.argsort(seen, kind="stable")[: 2 * some.size]
-    spent = start + stresses.size
-    doubts = imprecise(count.cv, target_cv, spent)
+    near = np.argsort(stresses[: some.max(initial=-1) + 1], kind="stable")[: 2 * some.size]
+    doubts = imprecise(count.cv, target_cv, start + stresses.size)
     doubts += exact_doubts(state, (drawn(near), stresses[near]), stress, count.probability)
     return {
         "algorithm": "plain",
         "probability": count.probability,
         "cv": count.cv,
         "interval": count.interval(),
-        "evaluations": spent,
+        "evaluations": start + stresses.size,
         "failing_profiles": _profiles(state, drawn(failed[:SHOWN])),
         "doubts": doubts,
     }
@@ -244,8 +245,6 @@ def _by_tail(state: LimitState, stress: float, tail: Tail, target_cv: float) -> 
     """Return the attributes of an answer by subset simulation, by one level or two."""
     probability, cv, last = tail.probability(stress), tail.cv(stress), tail.repetitions[-1]
     interval = lognormal_interval(probability, cv)
-    if count := tail.counted(stress):
-        cv, interval = count.cv, count.interval()
     doubts = imprecise(cv, target_cv, tail.spent)
     if tail.algorithm == "two_level" and probability == 0.0:
         interval = 0.0, last.rarest
@@ -278,12 +277,201 @@ def _by_tail(state: LimitState, stress: float, tail: Tail, target_cv: float) -> 
 
 def _profiles(state: LimitState, draws: Array) -> xr.Dataset:
     """Return profiles and onset of some draws, labelled."""
-    if draws.shape[0] == 0:
+    if not draws.shape[0]:
         return xr.Dataset()
     problem, method = state.experiment.problem, state.experiment.method
     profiles = state.profiles(draws)
     onset = state.experiment.onset(profiles)
-    values = dict(profiles) | {name: onset[name] for name in ONSET_VARIABLES}
+    values = profiles | {name: onset[name] for name in ONSET_VARIABLES}
     meaning = {name: along(problem.interface, PROFILES[name]) for name in profiles}
     attributes = study_attributes(problem=problem, method=method)
-    return label(problem, method, values, np.arange(draws.shape[0]), attributes, meaning)
+    return label(problem, method, values, np.arange(len(draws)), attributes, meaning)
+
+
+@checked
+def design_stress(
+    problem: Problem,
+    random: RandomInterface | RandomField,
+    *,
+    probability: Probability,
+    method: MethodObject,
+    target_cv: TargetCv = 0.1,
+    seed: Number = 0,
+    max_evaluations: Budget | None = None,
+    event: Event = "critical_stress",
+    workers: Count | None = None,
+    progress: Progress = True,
+) -> DesignStress:
+    """Estimate the stress below which the interface slides with a given probability.
+
+    This is a quantile of the onset stress, from one set of repetitions of subset simulation.
+
+    Parameters
+    ----------
+    probability : float
+        Between 0 and 1, such as 1e-6.
+    method : LocalCriterion or Equilibrium
+        `Rupture`, or a method that would take more than a quarter of an hour on one core,
+        is refused unless `max_evaluations` is 20,000 or more.
+    target_cv : float
+        Coefficient of variation to reach, of the failure probability at the stress.
+    problem, random, seed, workers, progress
+        As in `monte_carlo`.
+    max_evaluations, event
+        As in `failure_probability`.
+
+    Returns
+    -------
+    DesignStress
+        With `stress` and its 95 % `interval`, Pa.
+
+    Raises
+    ------
+    InputError
+        If any argument is invalid; the message lists every problem.
+
+    Warns
+    -----
+    AccuracyWarning
+        If the allowed evaluations do not suffice, onsets accumulate at the bound, or
+        equilibrium and the local criterion disagree on samples near the stress.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> strength = st.paper.strength(problem, correlation_ratio=2.0)
+    >>> method = st.LocalCriterion()
+    >>> found = st.design_stress(problem, strength, probability=1e-3, method=method, target_cv=0.3)
+    >>> bool(found.stress > found.lower_bound)
+    True
+    """
+    experiment = Experiment(problem, random, method, seed=seed)
+    meter = Meter("design_stress", show=progress)
+    state, budget = prepare(experiment, event, workers, meter, max_evaluations)
+    often, lowest, doubts = probability >= FREQUENT, state.bounds[0], []
+    with meter:
+        tail = sample_tail(
+            state, algorithm="subset" if often else "auto", target_cv=target_cv, budget=budget,
+            probability=probability, reason="frequent" if often else "rare",
+        )  # fmt: skip
+        if tail.complete:
+            stress, least = tail.quantile(probability), math.nextafter(lowest, math.inf)
+            cv, on_it = tail.cv(stress), tail.probability(least)
+            if on_it >= probability:
+                stress, cv = lowest, tail.cv(least)
+                doubts.append(
+                    f"{on_it:.2g} of all samples slide at the bound of {lowest:.7g} Pa,"
+                    " within the accuracy of the method: the stress at P ="
+                    f" {probability:g} is the bound itself"
+                )
+            interval = tail.stress_interval(probability, cv, lowest)
+            doubts += imprecise(cv, target_cv, tail.spent)
+            if tail.algorithm == "subset":
+                near = tail.repetitions[-1].around(stress)
+                doubts += exact_doubts(state, near, stress, probability)
+        else:  # the tail ends at its lowest sample
+            cv, stress = math.inf, tail.extent[0] if math.isfinite(tail.extent[0]) else math.nan
+            interval = (lowest, stress) if stress > lowest else state.bounds
+            doubts.append(tail.short_of(f"P = {probability:g}"))
+    return DesignStress.of(
+        state, stress=stress, probability=probability, cv=cv, interval=interval,
+        doubts=doubts, **tail.attributes,
+    )  # fmt: skip
+
+
+@checked
+def failure_curve(
+    problem: Problem,
+    random: RandomInterface | RandomField,
+    *,
+    method: MethodObject,
+    smallest: Probability = 1e-9,
+    points_per_decade: Annotated[Count, Field(le=1000)] = 3,
+    target_cv: TargetCv = 0.3,
+    seed: Number = 0,
+    max_evaluations: Budget | None = None,
+    event: Event = "critical_stress",
+    workers: Count | None = None,
+    progress: Progress = True,
+) -> xr.Dataset:
+    """Estimate P(onset < s) from one half down to a smallest probability.
+
+    Parameters
+    ----------
+    smallest : float
+        Smallest probability of the curve.
+    points_per_decade : int
+        Number of stresses per decade of probability.
+    target_cv : float
+        Coefficient of variation to reach at the smallest probability; it is lower elsewhere.
+    problem, random, seed, workers, progress
+        As in `monte_carlo`.
+    method, max_evaluations, event
+        As in `design_stress`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over 'point': `stress`, `stress_above_bound` (Pa), `probability` with `probability_low`,
+        `probability_high` and `cv`, `stress_low`, `stress_high` (Pa), and with a normal pressure
+        `friction_coefficient`, the stress over its mean. `stress_above_bound` means little where
+        the attribute `lower_bound` is zero or less.
+
+    Raises
+    ------
+    InputError
+        If any argument is invalid; the message lists every problem.
+
+    Warns
+    -----
+    AccuracyWarning
+        If the allowed evaluations do not suffice, or equilibrium and the local criterion
+        disagree on samples at the end of the curve.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> strength = st.paper.strength(problem, correlation_ratio=2.0)
+    >>> curve = st.failure_curve(problem, strength, method=st.LocalCriterion(), smallest=1e-3)
+    >>> bool((curve.stress.diff("point") < 0.0).all())
+    True
+    """
+    experiment = Experiment(problem, random, method, seed=seed)
+    meter = Meter("failure_curve", show=progress)
+    state, budget = prepare(experiment, event, workers, meter, max_evaluations)
+    with meter:
+        tail = sample_tail(
+            state, algorithm="subset", target_cv=target_cv, budget=budget, probability=smallest
+        )
+        if tail.complete:
+            stress = tail.quantile(smallest)
+            near = tail.repetitions[-1].around(stress)
+            doubts = exact_doubts(state, near, stress, smallest)
+        else:
+            doubts = [f"{tail.short_of(f'P = {smallest:g}')}; the curve ends there"]
+            smallest = tail.probability(tail.reached)
+    for text in doubts:
+        warn_accuracy(text)
+    lowest, pressure = state.bounds[0], experiment.pressure
+    decades = max(np.log10(COMMONEST / smallest), 0.0)
+    count = int(np.ceil(decades * points_per_decade)) + 1
+    rows = []
+    for chance in (COMMONEST * 10.0 ** -np.linspace(0.0, decades, count)).tolist():
+        stress = tail.quantile(chance)
+        found, cv = tail.probability(stress), tail.cv(stress)
+        ends = lognormal_interval(found, cv)
+        sides = tail.stress_interval(chance, cv, lowest)
+        rows.append((stress, stress - lowest, stress / pressure, found, *ends, cv, *sides))
+    values: dict[str, Any] = dict(zip(CURVE, np.array(rows).T, strict=True))
+    if not np.isfinite(pressure):
+        del values["friction_coefficient"]
+    attributes = study_attributes(problem=problem, random=experiment.random, method=method) | {
+        "lower_bound": lowest,
+        "event": event,
+        "seed": seed,
+        "evaluations": tail.spent,
+        "method": method.type,
+    }
+    return to_dataset(values, CURVE, {}, attributes)

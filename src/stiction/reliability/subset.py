@@ -95,13 +95,13 @@ class Descent(NamedTuple):
         They are the lowest of a population, twice as many as lie below the value. With more
         than half of it below, almost none of the other side would be shown.
         """
-        *wider, holder = self._holders(value)
-        below = int(np.sum(holder.values < value))
-        while wider and wider[-1].draws.size and 2 * below > holder.values.size:
-            holder = wider.pop()
+        holders = self._holders(value)
+        while True:
+            holder = holders.pop()
             below = int(np.sum(holder.values < value))
-        count = min(2 * below, holder.draws.shape[0])
-        lowest = np.argsort(holder.values, kind="stable")[:count]
+            if 2 * below <= holder.values.size or not (holders and holders[-1].draws.size):
+                break
+        lowest = np.argsort(holder.values, kind="stable")[: min(2 * below, len(holder.draws))]
         return holder.draws[lowest], holder.values[lowest]
 
 

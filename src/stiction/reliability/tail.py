@@ -10,8 +10,7 @@ from stiction.arrays import Array
 from stiction.ensemble.limit_state import LimitState, no_single_length
 from stiction.methods import methods
 from stiction.progress import SILENT, Meter
-from stiction.reliability.counting import Count
-from stiction.reliability.subset import MOST_LEVELS, descend
+from stiction.reliability.subset import descend
 from stiction.reliability.two_level import bridge
 from stiction.reliability.uncertainty import generator, log_width
 
@@ -50,12 +49,10 @@ class Tail(NamedTuple):
     def short_of(self, goal: str) -> str:
         """Return a message that the tail does not reach the requested level."""
         text = f"{self.spent} evaluations do not reach {goal}"
-        if self.algorithm == "two_level":
-            return f"{text}: raise max_evaluations"
-        stopped = len(self.repetitions[0].populations) >= MOST_LEVELS
-        advice = f"it stops after {MOST_LEVELS} levels" if stopped else "raise max_evaluations"
-        chance = self.probability(self.reached)
-        return f"{text}: they come down to {self.reached:.7g} Pa (P = {chance:.2g}); {advice}"
+        if self.algorithm == "subset":
+            chance = self.probability(self.reached)
+            text += f": they come down to {self.reached:.7g} Pa (P = {chance:.2g})"
+        return f"{text}; raise max_evaluations"
 
     @property
     def extent(self) -> tuple[float, float]:
@@ -85,23 +82,11 @@ class Tail(NamedTuple):
     def cv(self, stress: float) -> float:
         """Return its coefficient of variation; infinite where no sample is so low."""
         parts = self._parts(stress)
+        if not any(parts):
+            return math.inf
         pairs = zip(parts, self.repetitions, strict=True)
-        variance = sum(
-            part * part * one.relative_variance(stress) for part, one in pairs if part
-        )
-        return math.sqrt(variance) / sum(parts) if any(parts) else math.inf
-
-    def counted(self, stress: float) -> Count | None:
-        """Return a count where failure is so likely that no repetition had a second level.
-
-        All samples are independent then.
-        """
-        if self.algorithm == "two_level" or not self.complete:
-            return None
-        if any(len(one.populations) > 1 for one in self.repetitions):
-            return None
-        values = np.concatenate([one.populations[0].values for one in self.repetitions])
-        return Count(int(np.sum(values < stress)), values.size)
+        variances = [part * part * one.relative_variance(stress) for part, one in pairs if part]
+        return math.sqrt(sum(variances)) / sum(parts)
 
     def quantile(self, probability: float) -> float:
         """Return the stress below which the onset lies with this probability."""
@@ -141,9 +126,8 @@ def repeat_until_precise(
     """Return repetitions whose pooled coefficient of variation is at most the target.
 
     All of them are complete, or it is a single incomplete one. `make` takes (samples, number of the
-    repetition, evaluations left), and `judge` returns the coefficient of variation of some of them,
-    or zero if no more are wanted. `first` and `largest` are sizes of a repetition: many of moderate
-    size bound the memory.
+    repetition, evaluations left), and `judge` returns the coefficient of variation, or zero if no
+    more are wanted. Many repetitions of moderate size, `first` to `largest`, bound the memory.
     """
     done: list[Any] = []
     spent, size = 0, first
@@ -154,9 +138,7 @@ def repeat_until_precise(
             return done or [one]
         done = [*(earlier.light() for earlier in done), one]
         cv = judge(done)
-        if cv > 0.0:  # zero is no estimate: no more repetitions are wanted
-            number = f"{len(done)} repetition{'s' if len(done) > 1 else ''}"
-            meter.note = f"{number}, c.o.v. {cv:.2g} (target {target_cv:g})"
+        meter.note = f"repetition {len(done)}, c.o.v. {cv:.2g} (target {target_cv:g})"
         if cv <= target_cv:
             break
         total = sum(each.samples for each in done)
@@ -195,10 +177,9 @@ def sample_tail(
 ) -> Tail:
     """Sample the lower tail down to a stress, or down to a probability.
 
-    Algorithm 'auto' takes two levels where a less expensive method is a guide to the weakest
-    samples: where it picks the same ones among some plain samples, and the first repetition finds
-    failures among the samples that it leads to. `budget` counts evaluations of the method, those of
-    the pilot included: (draws, stresses) of plain samples that are there already.
+    Algorithm 'auto' takes two levels where a less expensive method picks the same weakest ones
+    among plain samples, and the first repetition finds failures among the samples that it leads to.
+    `budget` includes the pilot: (draws, stresses) of plain samples that are there already.
     """
     guide, auto, seed = None, algorithm == "auto", state.experiment.seed
     if algorithm == "two_level" or (auto and two_levels_refused(state) is None):
@@ -219,14 +200,11 @@ def sample_tail(
             "max_evaluations": left,
             "threshold": stress,
             "floor": state.bounds[0],
+            "rng": generator(seed, 1 if guide is None else 3, number),
         }
         if guide is None:
-            deepest, rng = DEEPER * probability, generator(seed, 1, number)
-            return descend(state, state.dimension, rng=rng, probability=deepest, **options)
-        rng = generator(seed, 3, number)
-        return bridge(
-            guide, state, state.dimension, rng=rng, probability=probability, **options
-        )
+            return descend(state, state.dimension, probability=DEEPER * probability, **options)
+        return bridge(guide, state, state.dimension, probability=probability, **options)
 
     def is_poor(one: Any) -> bool:
         return auto and guide is not None and one.complete and one.share < POOR

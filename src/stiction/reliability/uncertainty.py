@@ -13,8 +13,8 @@ CONFIDENCE = 0.95
 def log_width(cv: float) -> float:
     """Half the width of the interval of the logarithm of an estimate.
 
-    The coefficient of variation is itself estimated, from about 1/cv^2 independent families,
-    so Student's distribution takes the place of the normal one.
+    By Student's distribution, as the coefficient of variation is itself estimated, from about
+    1/cv^2 independent families.
     """
     if cv == 0.0:
         return 0.0
@@ -42,17 +42,18 @@ def binomial_interval(failures: int, samples: int) -> tuple[float, float]:
 def ancestral_variance(ancestors: NDArray[np.int64], samples: int) -> float:
     """Squared coefficient of variation of a subset estimate, from the ancestry of its failures.
 
-    Families that descend from different first samples, `samples` in all, evolve independently, so
-    the spread of their shares among the failures measures the error of the whole estimate: the
-    sum of (share - 1/N)^2 over the N first samples. With k families of equal size that is 1/k,
-    where the variance of a mean of k calls for 1/(k - 1): hence a last division by one minus the
-    sum. The genealogy estimator of Chan and Lai (2013) and Lee and Whiteley (2018).
+    The genealogy estimator of Chan and Lai (2013) and Lee and Whiteley (2018): families that
+    descend from different first samples, `samples` in all, evolve independently, so the spread
+    of their shares among the failures measures the error, the sum of (share - 1/N)^2 over the N
+    first samples. With k families of equal size that is 1/k, where the variance of a mean of k
+    calls for 1/(k - 1): hence a last division by one minus the sum. If all samples fail, it is as
+    if two more had not: that bounds the error as their binomial distribution does.
     """
     if ancestors.size == 0:
         return math.inf
     _, sizes = np.unique(ancestors, return_counts=True)
     shares = sizes / ancestors.size
-    found = max(0.0, float(np.sum(shares * shares)) - 1.0 / samples)
+    found = max(float(np.sum(shares * shares)) - 1.0 / samples, (2.0 / samples) ** 2)
     return found / (1.0 - found) if found < 1.0 else math.inf
 
 
