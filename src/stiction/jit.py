@@ -121,6 +121,8 @@ class _Cache(caching.FunctionCache):
         return found
 
     def save_overload(self, signature: Any, data: Any) -> None:
+        for env in data._find_referenced_environments():  # its own, and those of drafts
+            data.library.codegen.set_env(env.env_name, env)
         if _is_own(signature):
             super().save_overload(signature, data)
 
@@ -181,10 +183,28 @@ class _Compiler(Compiler):
 
 
 class _Draft(JITCodeLibrary):
-    """Code that LLVM optimises only as a part of the kernels that call it."""
+    """Code that becomes machine code only as a part of the kernels that call it."""
 
     def _optimize_final_module(self) -> None:
         pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    @property
+    def codegen(self) -> Any:
+        """This draft, in place of the machine code in which numba looks for its environment."""
+        return self
+
+    def set_env(self, name: str, env: Any) -> None:
+        """Leave the environment to the kernels that call this code."""
+
+    def get_pointer_to_function(self, name: str) -> int:
+        return 0
+
+    def serialize_using_object_code(self) -> Any:
+        return self.serialize_using_bitcode()
 
 
 class _InsideCompiler(_Compiler):
@@ -199,6 +219,7 @@ class _InsideCompiler(_Compiler):
 
 _OPTIONS: dict[str, Any] = {
     "nogil": True,
+    "_nrt": False,
     "error_model": "numpy",
     "no_cfunc_wrapper": True,
     "pipeline_class": _Compiler,
@@ -221,6 +242,11 @@ def jit(function: Kernel) -> Kernel:
     numbers must come out whatever the batch.
     """
     return _compile(function, _OPTIONS)
+
+
+def jit_allocating(function: Kernel) -> Kernel:
+    """Compile a kernel that makes arrays. Others count no references, and so compile faster."""
+    return _compile(function, _OPTIONS | {"_nrt": True})
 
 
 def jit_inside(function: Kernel) -> Kernel:

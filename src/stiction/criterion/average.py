@@ -10,7 +10,7 @@ from rocket_fft import c2r, r2c
 from stiction.arrays import Array
 from stiction.criterion.windows import Window
 from stiction.interface import Interface
-from stiction.jit import ZERO, jit
+from stiction.jit import ZERO, jit, jit_allocating
 
 STENCIL = 10
 # Coefficients of the polynomial through ten nodes, in powers of the distance from their middle.
@@ -178,7 +178,7 @@ def _minimum_near(
     return lowest, place
 
 
-@jit
+@jit_allocating
 def _minimum_of_rows(
     excess: Array, profile: Array, scale: Array, multiplier: Array, reach: int,
     axis: Array, spectrum: Array, minimum: Array, place: Array,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from stiction.arrays import Array
 from stiction.elasticity.operator import Operator, filtered, product
-from stiction.jit import jit
+from stiction.jit import jit, jit_allocating
 from stiction.lanes import LANES, add, load, multiply_add, total, zeros
 
 SOLVED = 0
@@ -169,7 +169,7 @@ def _combine(basis: Array, weights: Array, count: int, out: Array) -> None:
         basis[0, i] = basis[0, i] * weights[0] + total
 
 
-@jit
+@jit_allocating
 def lowest_eigenvector(
     operator: Operator, inside: Mask, vector: Array, tolerance: float, iterations: int
 ) -> tuple[float, int]:

@@ -14,7 +14,7 @@ from numba.extending import overload
 
 from stiction.arrays import Array
 from stiction.friction.parameters import SHAPES, Linear
-from stiction.jit import jit
+from stiction.jit import jit, jit_allocating
 
 # numba compares the names of arguments with their annotations, so functions by type have none.
 # mypy: disable-error-code="no-untyped-def"
@@ -79,7 +79,7 @@ def strength_at(law: Any, peak: float, residual: float, rate: float, slip: float
     return _line(law, peak, residual, rate, slip, 0.0)[0]
 
 
-@jit
+@jit_allocating
 def strengths(law: Any, peak: Array, residual: Array, rate: Array, slip: Array) -> Array:
     """Return the strength tau_f at every node, Pa; all arrays (nodes,), see `line_at`."""
     result = np.empty(slip.size)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.arrays import Array
-from stiction.jit import jit
+from stiction.jit import jit_allocating
 
 BLOCK = 256
 
@@ -54,7 +54,7 @@ class Stream(NamedTuple):
         return draws
 
 
-@jit
+@jit_allocating
 def synthesise(
     draws: Array, sigma: Array, numbers: NDArray[np.int64], has_mean: bool, out: Array
 ) -> None:
@@ -94,7 +94,7 @@ def synthesise(
                     out[i, p, q] = field[p, q]
 
 
-@jit
+@jit_allocating
 def condition(
     right: Array, transposed: Array, offsets: Array, factors: Array, out: Array
 ) -> None:
