@@ -25,7 +25,7 @@ from stiction.equilibrium.cholesky import (
     substitute_members,
 )
 from stiction.equilibrium.sample import Sample, piece_at, start_of
-from stiction.jit import ZERO, jit, jit_allocating, jit_inside
+from stiction.jit import ZERO, jit_allocating, jit_inside
 
 REACHED = 0
 UNSTABLE = 1
