@@ -101,11 +101,11 @@ def studies(case: Case, most: int) -> dict[str, st.Study]:
         title=case.name,
     )
     # Sample i is the same in all of them.
-    some = st.Ensemble(samples=min(few, case.kept), seed=case.seed, keep="slip")
+    some = st.Ensemble(samples=min(few, case.kept), seed=case.seed)
     return {
         "exact": exact,
         "local": dataclasses.replace(exact, method=st.LocalCriterion()),
-        "kept": dataclasses.replace(exact, ensemble=some),
+        "kept": dataclasses.replace(exact, ensemble=some, method=st.Equilibrium(slip=True)),
     }
 
 

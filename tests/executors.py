@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 
 import pytest
 
 
-class Counting:
+class Counting(Executor):
     """Computes at once and keeps which samples, as spans, in `spans`."""
 
     def __init__(self):
@@ -21,7 +21,7 @@ class Counting:
         return future
 
 
-class Forbidding:
+class Forbidding(Executor):
     """Fails the test if anything is to be computed."""
 
     def submit(self, *arguments):

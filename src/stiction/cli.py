@@ -9,8 +9,7 @@ import re
 import signal
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -89,31 +88,10 @@ def _save_figure(axes: Any, path: Path) -> None:
 # -- studies and runs ----------------------------------------------------------------------------
 
 
-@contextmanager
-def _executor(scheduler: str | None) -> Iterator[Any]:
-    """The executor of a Dask scheduler; None without one."""
-    if scheduler is None:
-        yield None
-        return
-    try:
-        from distributed import Client
-
-        client = Client(scheduler)
-    except (ImportError, OSError, ValueError, TypeError) as error:
-        raise InputError(f"--scheduler: {scheduler} cannot be reached: {error}") from None
-    with client:
-        yield client.get_executor(pure=False)
-
-
 def run(
     study: StudyFile,
     out: Annotated[Path, Option(metavar="RUN", help="Folder in which samples are stored.")],
     workers: Workers = None,
-    scheduler: Annotated[
-        str | None,
-        Option(metavar="ADDRESS", help="Address of a Dask scheduler, such as tcp://host:8786."),
-    ] = None,
-    retry: Annotated[bool, Option("--retry", help="Compute failed samples again.")] = False,
     time_limit: Annotated[float | None, Option(help="Stop after this many seconds.")] = None,
     part: Annotated[
         str | None,
@@ -123,9 +101,8 @@ def run(
 ) -> None:
     """Run the study in a file, or the missing part of it.
 
-    Rerunning the command resumes an interrupted run, and computes only the new samples if
-    `samples` was raised in the study. The results do not depend on workers, machines or
-    interruptions.
+    Rerunning the command resumes an interrupted run, computes failed samples again, and new ones
+    if `samples` was raised. The results do not depend on workers, machines or interruptions.
 
     Exit code 0: complete; 1: samples failed or the run could not continue; 2: errors in the study
     or the command; 3: the time limit was reached; 130: interrupted.
@@ -138,20 +115,13 @@ def run(
     # A batch system's SIGTERM ends a run as Ctrl-C does: what is done is stored.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        with _executor(scheduler) as executor:
-            result = loaded.run(
-                out=out,
-                workers=workers,
-                executor=executor,
-                time_limit=time_limit,
-                retry=retry,
-                part=part,
-                pilot=pilot,
-            )
+        result = loaded.run(
+            out=out, workers=workers, time_limit=time_limit, part=part, pilot=pilot
+        )
     except KeyboardInterrupt:
         echo(f"interrupted: samples so far are in {out}; rerun the command to resume", err=True)
         raise typer.Exit(130) from None
-    dims = [axis.dim for axis in loaded.axes]
+    dims = list(loaded.axes)
     for name in ("critical_stress", "friction_coefficient"):
         if name in result:
             scale, unit = (1e-6, ", MPa") if result[name].attrs["units"] == "Pa" else (1.0, "")
@@ -163,7 +133,7 @@ def run(
     state = open_run(out).status()
     echo(f"part {part}: " * bool(part) + f"{state.done} of {state.samples} samples in {out}")
     if state.failures:
-        echo(f"{len(state.failures)} samples failed; --retry computes them again:", err=True)
+        echo(f"{len(state.failures)} samples failed; the same command retries:", err=True)
         _show_some(state.failures, "  ", err=True)
         raise typer.Exit(1)
     if "cut_short" in result.attrs and part is None:
@@ -174,7 +144,6 @@ def run(
 def status(run: RunPath) -> None:
     """Show the completed, failed and damaged parts of a run."""
     from stiction.study.study import open_run
-    from stiction.study.sweep import name_point
 
     stored = open_run(run)
     state, study = stored.status(), stored.study
@@ -182,10 +151,10 @@ def status(run: RunPath) -> None:
     echo(f"{run}: {' '.join(study.title.split())}".removesuffix(": "))
     share = 100.0 * state.done / state.samples
     echo(f"  samples   {state.done} of {state.samples} ({share:.1f} %)")
-    echo(f"  chunks    {state.chunks}, {state.bytes / 1e6:.3g} MB")
+    echo(f"  chunks    {state.chunks}")
     echo(f"  computed  {duration(state.seconds)} of one core")
     counts = zip(study.points, state.done_by_point, strict=True)
-    behind = [f"{name_point(one)}: {done} of {each}" for one, done in counts if done < each]
+    behind = [f"{one}: {done} of {each}" for one, done in counts if done < each]
     _show_some(behind if study.sweep else [], "  ")
     _show_some(state.damaged, "  damaged   ")
     if state.damaged:
@@ -193,9 +162,7 @@ def status(run: RunPath) -> None:
     else:
         echo("  verified  all stored chunks match their checksums")
     if state.failures:
-        echo(
-            f"  failed    {len(state.failures)}; `stiction run ... --retry` computes them again:"
-        )
+        echo(f"  failed    {len(state.failures)}; `stiction run` computes them again:")
         _show_some(state.failures, "    ")
 
 
@@ -236,14 +203,14 @@ def report(
 def check(study: StudyFile) -> None:
     """Validate a study file and estimate its time and size, or list all errors.
 
-    A few samples are solved to estimate the time and the error of the local criterion.
+    A few samples are solved to estimate the time.
     """
     from stiction.study.study import Study
 
     loaded = Study.from_toml(study)
     echo(f"{study}: valid" + (f", {loaded.title!r}" if loaded.title else ""))
     with Meter("timing a few samples"):
-        lines = description(loaded) | _cost(loaded) | _methods_that_apply(loaded.experiments[0])
+        lines = description(loaded) | _cost(loaded)
     for name, text in lines.items():
         echo(f"  {name:20s} {text}")
 
@@ -259,10 +226,10 @@ def description(study: Any) -> dict[str, str]:
     some = distinct(points, "problem", "random", "method")
     methods = ", ".join(dict.fromkeys(point.method.label for point in some))
     lines = {"method": methods, "samples": samples}
-    for number, axis in enumerate(study.axes, start=1):
-        keys = " with ".join(variable.long_name for _, variable in axis.coordinates.values())
-        values = axis.coordinates[axis.dim][0]
-        lines[f"axis {number}"] = f"{keys}: {axis.size} values, {values[0]} to {values[-1]}"
+    for number, (dim, coordinates) in enumerate(study.axes.items(), start=1):
+        keys = " with ".join(variable.long_name for _, variable in coordinates.values())
+        values = coordinates[dim][0]
+        lines[f"axis {number}"] = f"{keys}: {len(values)} values, {values[0]} to {values[-1]}"
     numbers = [_numbers(point) for point in some]
     for title, unit in dict.fromkeys(key for found in numbers for key in found):
         each = [found[title, unit] for found in numbers if (title, unit) in found]
@@ -289,28 +256,6 @@ def _numbers(point: Any) -> dict[tuple[str, str], float]:
     if hasattr(field.spectrum, "correlation_length"):
         found["xi_0 / h_n", ""] = field.spectrum.correlation_length / length
     return found
-
-
-def _methods_that_apply(experiment: Any) -> dict[str, str]:
-    """Return the methods that apply to the first point, and the error of the local criterion."""
-    from stiction.ensemble.pilot import compare
-    from stiction.methods import methods
-
-    local = methods()["local_criterion"]()
-    lines = {}
-    for method, text in (
-        (local, "applies"),
-        (methods()["equilibrium"](), "exact"),
-        (methods()["rupture"](loading_rate=LOADING_RATE), "with inertia"),
-    ):
-        refused = method.supports(experiment.problem)
-        if method is local and not refused and (found := compare(experiment.by(local))):
-            text = (
-                f"{100.0 * found.bias:+.2g} % of the exact onset on average, with a scatter of"
-                f" {100.0 * found.scatter:.2g} % (a pilot of {found.samples} samples)"
-            )
-        lines[method.label] = f"does not apply: {'; '.join(refused)}" if refused else text
-    return lines
 
 
 def _cost(study: Any) -> dict[str, str]:
@@ -354,10 +299,10 @@ def schema() -> None:
 # -- one interface -------------------------------------------------------------------------------
 
 
-def read_strength(
-    path: Path,
-    problem: Any,
-    *,
+def onset(
+    study: StudyFile,
+    strength: Annotated[Path, Option(metavar="PROFILE", help="File of the peak strength.")],
+    method: Annotated[list[str] | None, Option(help="Use only this one (repeatable).")] = None,
     unit: Annotated[
         str | None, Option(help="Unit of the values in PROFILE, such as MPa.")
     ] = None,
@@ -366,40 +311,6 @@ def read_strength(
     x: Annotated[str | None, Option(help="Column of x: name, or number from 0.")] = None,
     interpolate: Annotated[bool, Option("--interpolate", help="Interpolate to nodes.")] = False,
     gaps: Annotated[Literal["refuse", "fill"], Option(help="Missing values.")] = "refuse",
-) -> Any:
-    """Return the strength in a file, on the nodes of a problem."""
-    from stiction.profiles.reading import read_profile
-
-    def column(text: str | None) -> int | str | None:
-        return int(text) if text is not None and text.isdecimal() else text
-
-    return read_profile(
-        path,
-        interface=problem.interface,
-        unit=unit,
-        x_unit=x_unit,
-        value=column(value),
-        x=column(x),
-        interpolate=interpolate,
-        gaps=gaps,
-    )
-
-
-def _with_reading(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of `read_strength` in place of its `**reading`."""
-    own, read = (inspect.signature(f, eval_str=True) for f in (command, read_strength))
-    parameters = [p for p in own.parameters.values() if p.kind != p.VAR_KEYWORD]
-    parameters += [p for p in read.parameters.values() if p.kind == p.KEYWORD_ONLY]
-    command.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
-    return command
-
-
-@_with_reading
-def onset(
-    study: StudyFile,
-    strength: Annotated[Path, Option(metavar="PROFILE", help="File of the peak strength.")],
-    method: Annotated[list[str] | None, Option(help="Use only this one (repeatable).")] = None,
-    **reading: Any,
 ) -> None:
     """Compute the load and position at which one interface of given strength begins to slide.
 
@@ -412,6 +323,7 @@ def onset(
 
     from stiction.methods import methods
     from stiction.methods import onset as find
+    from stiction.profiles.reading import read_profile
     from stiction.study.export import table_of
     from stiction.study.study import read_setup
     from stiction.variables import ONSET_VARIABLES
@@ -420,7 +332,16 @@ def onset(
     problem, own = setup.problem, setup.method
     if unknown := [name for name in method or () if name not in methods()]:
         raise InputError([unknown_name("--method", name, methods()) for name in unknown])
-    profile = read_strength(strength, problem, **reading)
+    profile = read_profile(
+        strength,
+        interface=problem.interface,
+        unit=unit,
+        x_unit=x_unit,
+        interpolate=interpolate,
+        gaps=gaps,
+        value=_column(value),
+        x=_column(x),
+    )
     # Each method refuses, and warns, for itself.
     problem.sample(profile, accept=("barriers", "overstress", "constant"))
     printed = (*ONSET_VARIABLES, "friction_coefficient")
@@ -443,7 +364,10 @@ def onset(
         raise typer.Exit(1)
 
 
-@_with_reading
+def _column(text: str | None) -> int | str | None:
+    return int(text) if text is not None and text.isdecimal() else text
+
+
 def rupture(
     study: StudyFile,
     out: Annotated[Path, Option(help="Folder of result and figures.")] = Path(
@@ -455,18 +379,18 @@ def rupture(
         Option(metavar="PROFILE", help="Peak strength, instead of a sample."),
     ] = None,
     film: Annotated[bool, Option("--film", help="Also write rupture.gif.")] = False,
-    **reading: Any,
 ) -> None:
     """Simulate one interface from its first slip to global sliding, or as its study stops it.
 
     The strength is a sample of the study (of a sweep, at its first point) or a profile of your
-    own. The command writes `rupture.nc` (slip, slip rate and stress over time and x) and a figure
-    of the slip rate in space and time (PNG and PDF). The loading rate is that of the study's
-    method `rupture`, else 2e7 Pa/s.
+    own, with or without x. The command writes `rupture.nc` (slip, slip rate and stress over time
+    and x) and a figure of the slip rate in space and time (PNG and PDF). The loading rate is that
+    of the study's method `rupture`, else 2e7 Pa/s.
     """
     from stiction import plot
     from stiction.dynamics.method import Rupture
     from stiction.dynamics.simulate import simulate_rupture
+    from stiction.profiles.reading import read_profile
     from stiction.study.export import write_result
     from stiction.study.study import Study, read_setup
 
@@ -480,7 +404,7 @@ def rupture(
     else:
         setup = read_setup(study)
         problem, method, save = setup.problem, setup.method, setup.save
-        profiles = read_strength(strength, problem, **reading)
+        profiles = read_profile(strength, interface=problem.interface)
     if not isinstance(method, Rupture):
         method = Rupture(loading_rate=LOADING_RATE)
     result = simulate_rupture(problem, profiles, method=method, save=save)

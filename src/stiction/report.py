@@ -106,7 +106,8 @@ def write_report(run: StoredRun, path: Path) -> None:
         "critical_position",
     ]
     result = run.dataset(only=[*names, "arrested_events"])
-    dims = [axis.dim for axis in run.study.axes]
+    axes = run.study.axes
+    dims = list(axes)
     page = Page(run.study.title or "Onset of sliding: a Monte Carlo study")
     methods = " and ".join(dict.fromkeys(plan.method.label for plan in run.study.experiments))
     page.text(f"{state.done:,} of {state.samples:,} samples by {methods}.")
@@ -114,9 +115,7 @@ def write_report(run: StoredRun, path: Path) -> None:
         page.text("The run is not complete.", warning=True)
     with paper_style():
         add_figures(page, result, dims)
-    add_tables(
-        page, result, dims, [name for axis in run.study.axes for name in axis.coordinates]
-    )
+    add_tables(page, result, dims, [name for own in axes.values() for name in own])
     if state.failures:
         rows = [[str(failure)] for failure in state.failures[:MOST_ROWS]]
         page.table(f"Samples that failed ({len(state.failures):,})", ["sample"], rows)

@@ -58,7 +58,6 @@ type = "local_criterion"
 samples = 20
 seed = 11
 first = 0
-keep = ["strength"]
 [[sweep]]
 "random.strength.spectrum.correlation_length" = [0.02, 0.03]
 [[sweep]]

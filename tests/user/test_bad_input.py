@@ -78,8 +78,8 @@ test_numbers = refusals({
     "correlation_length ... 0.000000000000001": lambda: st.PowerLawSpectrum(5e-324),
     "exponent ... 0.6 ... 0.5": lambda: st.PowerLawSpectrum(1.0, exponent=0.5),
     "power_kept ... less than 1": lambda: st.ExponentialSpectrum(1.0, power_kept=1.0),
-    "slip ... True or False ... '1'": lambda: st.Equilibrium(slip="1"),
-    "arrest ... True or False ... 'no'": lambda: st.theory.griffith_length(
+    "slip ... valid boolean ... '1'": lambda: st.Equilibrium(slip="1"),
+    "arrest ... valid boolean ... 'no'": lambda: st.theory.griffith_length(
         PROBLEM, 1e6, 1.0, arrest="no"
     ),
     "seed ... -1 ... >= 0": lambda: make_strength().sample(LINE, seed=-1),
@@ -119,7 +119,7 @@ test_names_and_choices = refusals({
         spectrum={"type": "powerlaw", "correlation_length": 1.0}
     ),
     "did you mean 'edge'": lambda: st.Load(profile={"type": "egde", "excess": 1.0}),
-    "progress ... function of (done, total) ... 3": lambda: monte_carlo(progress=3),
+    "progress ... boolean or callable ... 3": lambda: monte_carlo(progress=3),
     "keep ... 'initial_stress' ... valid: strength": lambda: monte_carlo(
         keep=("initial_stress",)
     ),
@@ -150,7 +150,7 @@ test_objects_in_the_place_of_others = refusals({
     "profile ... must be a DataArray over x ... (64, 64)": lambda: make_strength().given(
         np.ones((64, 64)), noise=1e4
     ),
-    "sweep: slip cannot be kept ... number of nodes is swept": lambda: make_study(
+    "sweep: slip cannot be kept ... an interface that is swept": lambda: make_study(
         method=st.Equilibrium(slip=True), sweep=[{"problem.interface.nodes": [128, 256]}]
     ),
     "shear_modulus ... poisson_ratio ... density": lambda: st.Solid(

@@ -100,11 +100,10 @@ def test_coefficients_are_stresses_times_the_pressure():
 
 
 @pytest.mark.slow
-def test_a_dask_scheduler(tmp_path, command):
-    """By the executor of a client, and by the address on the command line."""
+def test_a_dask_scheduler():
+    """By the executor of a client."""
     distributed = pytest.importorskip("distributed")
     study = st.Study.from_dict(small_study(sweep=lengths(4e-3, 6e-3)))
-    study.to_toml(tmp_path / "study.toml")
     reference = study.run(workers=1)
     with (
         distributed.LocalCluster(
@@ -113,12 +112,6 @@ def test_a_dask_scheduler(tmp_path, command):
         distributed.Client(cluster) as client,
     ):
         assert study.run(executor=client.get_executor(pure=False)).identical(reference)
-        address = cluster.scheduler_address
-        code, _, errors = command(
-            "run", tmp_path / "study.toml", "--out", tmp_path / "run", "--scheduler", address
-        )
-    assert code == 0, errors
-    assert st.open_run(tmp_path / "run").dataset().identical(reference)
 
 
 MPI = """

@@ -8,7 +8,6 @@ import pytest
 import xarray as xr
 
 import stiction as st
-from stiction.study.export import SUFFIXES
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +59,7 @@ def test_netcdf_holds_everything(run, command, tmp_path):
 def test_other_suffixes_are_refused(run, command, tmp_path, name):
     code, _, err = command("export", run, tmp_path / name)
     assert code == 2
-    assert all(suffix in err for suffix in SUFFIXES)
+    assert all(suffix in err for suffix in (".nc", ".csv"))
     assert not (tmp_path / name).exists()
     with pytest.raises(st.InputError, match="suffix"):
         st.open_run(run).export(tmp_path / name)

@@ -210,14 +210,6 @@ def test_a_swept_key_needs_no_value_of_its_own():
     assert study.random.strength.spectrum.correlation_length == 4e-3
 
 
-def test_profiles_in_files_can_be_swept(tmp_path):
-    for name, scale in (("a", 0.0), ("b", 0.1)):
-        wave = np.sin(np.arange(128) * 2 * np.pi / 128)
-        np.save(tmp_path / f"{name}.npy", 1.0 + scale * wave)
-    study = swept({"problem.load.profile": ["a.npy", "b.npy"]}, folder=tmp_path)
-    assert study.experiments[1].problem.load.profile.max() == pytest.approx(1.1)
-
-
 def test_a_correlation_coefficient_is_swept():
     """The strength has the same draws at every coefficient; the coordinate is a pure number."""
     residual = {
@@ -260,22 +252,7 @@ def test_kept_profiles():
     field, interface = study.experiments[1].random.strength, study.problem.interface
     direct = field.sample(interface, samples=2, seed=3)
     np.testing.assert_array_equal(result["strength"].values[1], direct)
-    longer = swept({"problem.interface.length": [0.1, 0.2]}, ensemble=keeping).run()
-    np.testing.assert_allclose(longer["position"][1], 0.2 / 128 * np.arange(128), rtol=1e-15)
     refuses("GiB of memory", loaded(ensemble=keeping | {"samples": 10**9}).run)
-
-
-def test_slip_and_sensitivity_on_request():
-    """What the method can add is switched on by asking for it."""
-    kept = {"samples": 6, "keep": ["slip", "sensitivity"]}
-    study = loaded(method={"type": "equilibrium"}, ensemble=kept)
-    result = study.run()
-    tau_p = study.random.strength.sample(study.problem.interface, samples=6, seed=0)
-    method = st.Equilibrium(slip=True, sensitivity=True)
-    direct = st.onset(study.problem, tau_p, method=method)
-    for name in ("critical_load", "slip", "sensitivity"):
-        assert result[name].dims == direct[name].dims
-        np.testing.assert_array_equal(result[name], direct[name])
 
 
 # -- mistakes ------------------------------------------------------------------------------------
@@ -324,7 +301,7 @@ AXES = {
 test_axes_are_refused = refusals({
     words: {"sweep": axes} for words, axes in AXES.items()
 } | {
-    "number of nodes is swept": {
+    "an interface that is swept": {
         "sweep": [{"problem.interface.nodes": [128, 256]}],
         "ensemble__keep": ["strength"],
     }

@@ -11,11 +11,10 @@ from contextvars import Context, copy_context
 from functools import cache
 from importlib.metadata import version
 from itertools import repeat
-from typing import Annotated, Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator
 
 from stiction import __version__
 from stiction.arrays import one_blas_thread
@@ -31,16 +30,6 @@ MOST_BYTES = 16 * 2**20
 """Largest size of the values of a piece of work."""
 TICK = 1.0
 """Seconds after which an iteration continues although no work is done."""
-
-
-def _executor(value: Any) -> Any:
-    if not hasattr(value, "submit"):
-        raise ValueError("must be a concurrent.futures executor")
-    return value
-
-
-AnyExecutor: TypeAlias = Annotated[Any, BeforeValidator(_executor)]
-"""Anything that has `submit`: processes, a Dask client's executor, ..."""
 
 
 class Span(NamedTuple):
@@ -66,7 +55,7 @@ class Failure(NamedTuple):
 
 
 class Table(NamedTuple):
-    """Samples of any points of a sweep, the failures among them, and the computing time in s.
+    """Samples of any points of a sweep, and the failures among them.
 
     A sample that was solved is a row of a structured array: `POINT`, `NUMBER` and the variables of
     the method.
@@ -74,7 +63,8 @@ class Table(NamedTuple):
 
     rows: NDArray[Any]
     failures: tuple[Failure, ...]
-    seconds: float
+    seconds: float  # of one core
+    versions: str  # of the packages that computed them
 
     @property
     def size(self) -> int:
@@ -142,10 +132,10 @@ def solve_span(experiment: Experiment, span: Span, expected: str = "") -> Table:
                 continue
             known = isinstance(error, InputError)
             text = str(error) if known else f"{type(error).__name__}: {error}"
-            text = " / ".join(text.split("\n"))
+            text = text.replace("\n", " / ")
             failures.append(Failure(span.point, first, experiment.seed, text, known))
     rows = np.concatenate(parts or [_rows(span.point, 0, {})])
-    return Table(rows, tuple(failures), time.perf_counter() - begin)
+    return Table(rows, tuple(failures), time.perf_counter() - begin, versions())
 
 
 def piece_size(
@@ -244,11 +234,8 @@ def missing_spans(done: NDArray[np.bool_], first: int) -> list[Span]:
 
     The samples are numbered from `first`.
     """
-    samples = done.shape[1]
-    # A sample that is done before each point, and after the last one.
-    padded = np.append(np.pad(done, ((0, 0), (1, 0)), constant_values=True), True)
-    edges = np.flatnonzero(np.diff(padded)).reshape(-1, 2).tolist()
-    return [
-        Span(start // (samples + 1), first + start % (samples + 1), stop - start)
-        for start, stop in edges
-    ]
+    found = []
+    for point, row in enumerate(done):
+        edges = np.flatnonzero(np.diff(row, prepend=True, append=True)).reshape(-1, 2)
+        found += [Span(point, first + start, stop - start) for start, stop in edges.tolist()]
+    return found

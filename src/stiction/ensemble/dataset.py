@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,23 +13,17 @@ from numpy.typing import NDArray
 from stiction.ensemble.batches import NUMBER, POINT, Failure, Table
 from stiction.ensemble.experiment import Experiment
 from stiction.model import check_memory
-from stiction.results import coordinate, to_dataset
+from stiction.results import to_dataset
 from stiction.variables import SAMPLE, Variable
 
 if TYPE_CHECKING:
     import xarray as xr
 
 FAILED = "failed_samples"
-Coordinates = dict[str, tuple[NDArray[Any], Variable]]
+Coordinates: TypeAlias = dict[str, tuple[NDArray[Any], Variable]]
 """Values and variables of coordinates by name."""
-
-
-class GridAxis(NamedTuple):
-    """One axis of a sweep as a dimension of the result, and what is swept along it."""
-
-    dim: str
-    size: int
-    coordinates: Coordinates
+GridAxes: TypeAlias = Mapping[str, Coordinates]
+"""Axes of a sweep as dimensions of the result; the coordinates of each, that of its name first."""
 
 
 def distinct(points: Sequence[Experiment], *parts: str) -> list[Experiment]:
@@ -65,8 +60,8 @@ class Gathered:
         self.points, self.first, self._only = points, first, only
         self.done = np.zeros((len(points), samples), dtype=np.bool_)
         self._failures: dict[tuple[int, int], Failure] = {}
-        self._arrays: dict[str, NDArray[Any]] = {}
-        self._offered: dict[str, NDArray[np.bool_]] = {}  # points that have a variable
+        self._arrays: dict[str, NDArray[Any]] = {}  # floats, NaN where nothing is
+        self._types: dict[str, np.dtype[Any]] = {}
 
     def add(self, table: Table) -> None:
         """Put the rows of a table in their places; those of other samples are left out."""
@@ -82,68 +77,43 @@ class Gathered:
             if self._only is None or name in self._only:
                 values = table.rows[name][inside]
                 if name not in self._arrays:
-                    shape = self.done.shape + values.shape[1:]
-                    self._arrays[name] = np.zeros(shape, dtype=values.dtype)
-                    self._offered[name] = np.zeros(len(self.points), dtype=np.bool_)
+                    self._types[name] = values.dtype
+                    self._arrays[name] = np.full(self.done.shape + values.shape[1:], np.nan)
                 self._arrays[name][where] = values
-                self._offered[name][where[0]] = True
 
     @property
     def failed(self) -> list[Failure]:
         """Samples that failed and are not there, in the order of points and samples."""
         return [self._failures[at] for at in sorted(self._failures) if not self.done[at]]
 
-    @property
-    def dealt_with(self) -> NDArray[np.bool_]:
-        """Mask of the samples that are there or have failed, (points, samples)."""
-        found = self.done.copy()
-        for at in self._failures:
-            found[at] = True
-        return found
-
     def dataset(
-        self, attributes: Mapping[str, Any], axes: Sequence[GridAxis] = ()
+        self, attributes: Mapping[str, Any], axes: GridAxes = MappingProxyType({})
     ) -> xr.Dataset:
         """Return everything as a dataset over the axes of a sweep, the samples and the nodes.
 
         Samples that failed are NaN, and listed in the attribute 'failed_samples'. If others are
         missing too, the attribute 'cut_short' gives the number that are done.
         """
-        shape = tuple(axis.size for axis in axes)
-        dims = tuple(axis.dim for axis in axes)
+        dims = tuple(axes)
+        shape = tuple(len(axes[dim][dim][0]) for dim in dims)
         values, variables = {}, {}
         for name, variable in variables_in(self.points).items():
             if name in self._arrays:
-                array = self._arrays[name]
-                seen = self.done & self._offered[name][:, None]
-                if not seen.all():
-                    if array.dtype.kind != "f":
-                        array = array.astype(np.float64)
-                    array[~seen] = np.nan
+                array, kind = self._arrays[name], self._types[name]
+                if kind.kind == "f" or not np.isnan(array).any():
+                    array = array.astype(kind, copy=False)
                 values[name] = array.reshape(shape + array.shape[1:])
                 variables[name] = replace(variable, dims=dims + variable.dims)
         coordinates: Coordinates = {}
-        for axis in axes:
-            coordinates |= axis.coordinates
+        for own in axes.values():
+            coordinates |= own
         samples = self.first + np.arange(self.done.shape[1])
         coordinates["sample"] = (samples, SAMPLE)
-        used = {dim for variable in variables.values() for dim in variable.dims}
-        for dim in sorted(used & {"x", "y", "direction"}):
-            coordinates |= self._places(dim, dims, shape)
         attributes, failed = dict(attributes), self.failed
         made, total = int(self.done.sum()), self.done.size
         if failed:
             attributes[FAILED] = [list(failure) for failure in failed]
         if made + len(failed) < total:
             attributes["cut_short"] = f"{made} of {total} samples are done"
-        return to_dataset(values, variables, coordinates, attributes)
-
-    def _places(self, dim: str, dims: tuple[str, ...], shape: tuple[int, ...]) -> Coordinates:
-        """Positions along a dimension; if the length is swept, those of each point."""
-        values, meaning = coordinate(self.points[0].problem.interface, dim)
-        found = [coordinate(point.problem.interface, dim)[0] for point in self.points]
-        if all(np.array_equal(places, values) for places in found):
-            return {dim: (values, meaning)}
-        name = "position" if dim == "x" else f"position_{dim}"
-        own = replace(meaning, dims=(*dims, dim))
-        return {name: (np.reshape(found, (*shape, -1)), own)}
+        interface = self.points[0].problem.interface
+        return to_dataset(values, variables, coordinates, attributes, interface)

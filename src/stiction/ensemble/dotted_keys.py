@@ -15,41 +15,34 @@ MAPPINGS = ("correlation", "between")
 def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
     """Return a copy of a model object with dotted keys replaced, all of them at once.
 
-    Messages begin with `path`, the dotted key of the object itself.
-
-    Raises
-    ------
-    InputError
-        If a key does not exist (the nearest valid one is named) or a value does not fit.
+    Messages begin with `path`, the dotted key of the object itself. It is an `InputError` if a key
+    does not exist (the nearest valid one is named) or a value does not fit.
     """
-    whole = {key: value for key, value in values.items() if "." not in key}
+    changes: dict[str, Any] = {}
     inside: dict[str, dict[str, Any]] = {}
-    for key in (key for key in values if "." in key):
+    for key, value in values.items():
         name, _, rest = key.partition(".")
-        inside.setdefault(name, {})[rest] = values[key]
+        if rest:
+            inside.setdefault(name, {})[rest] = value
+        else:
+            changes[name] = value
     if isinstance(owner, ScipyMarginal):
-        return {"type": owner.type, **dict(owner.parameters), **whole}
-    begin = f"{path}." if path else ""
-    if isinstance(owner, Mapping):
-        parts = {
-            name: with_values(owner.get(name, {}), below, begin + name)
-            for name, below in inside.items()
-        }
-        return {**owner, **whole, **parts}
-    if not dataclasses.is_dataclass(owner) or isinstance(owner, type):
+        owner = {"type": owner.type, **dict(owner.parameters)}
+    table, begin = isinstance(owner, Mapping), f"{path}." if path else ""
+    if not table and not (dataclasses.is_dataclass(owner) and not isinstance(owner, type)):
         raise InputError(f"{path}: has no keys of its own, it is {describe(owner)}")
-    names = keys_of(type(owner))
-    used = dict.fromkeys(key.split(".")[0] for key in values)
-    unknown = [unknown_name(path or "sweep", name, names) for name in used if name not in names]
+    names = {} if table else keys_of(type(owner))
+    unknown = [name for name in {**changes, **inside} if not table and name not in names]
     if unknown:
-        raise InputError(unknown)
-    changes = {names[name]: value for name, value in whole.items()}
+        raise InputError([unknown_name(path or "sweep", name, names) for name in unknown])
     for name, below in inside.items():
-        part = getattr(owner, names[name])
+        part = owner.get(name, {}) if table else getattr(owner, names[name])
         part = {} if part is None and name in MAPPINGS else part
-        changes[names[name]] = with_values(part, below, begin + name)
+        changes[name] = with_values(part, below, begin + name)
+    if table:
+        return {**owner, **changes}
     try:
-        return dataclasses.replace(owner, **changes)
+        return dataclasses.replace(owner, **{names[key]: one for key, one in changes.items()})
     except InputError as error:
         kind = f"{type(owner).__name__}."
         texts = (text.removeprefix(kind) for text in error.problems)

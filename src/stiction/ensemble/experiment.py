@@ -45,12 +45,11 @@ class Experiment:
     problem: Problem
     random: Any  # a RandomInterface, or a RandomField that becomes one
     method: Any
-    # Variables along the interface; options of the method are switched on for them.
-    keep: tuple[str, ...] = ()
+    keep: tuple[str, ...] = ()  # names of random fields that `results` holds
     seed: int = 0
 
     def __post_init__(self) -> None:
-        random, method = as_random_interface(self.random), self.method
+        random = as_random_interface(self.random)
         problems: list[str] = []
         try:
             check_pressure(self.problem, random)
@@ -61,14 +60,12 @@ class Experiment:
                 field.modes(self.problem.interface)
             except InputError as error:
                 problems += [f"{name}: {text}" for text in error.problems]
-        problems += refusals(self.problem, method)
-        if self.keep:
-            method, mistakes = _keeping(self.problem, method, self.keep, random.names)
-            problems += mistakes
+        problems += refusals(self.problem, self.method)
+        unknown = [name for name in self.keep if name not in random.names]
+        problems += [unknown_name("keep", name, random.names) for name in unknown]
         if problems:
             raise InputError(problems)
         object.__setattr__(self, "random", random)
-        object.__setattr__(self, "method", method)
 
     def by(self, method: Any) -> Experiment:
         """Return the same experiment by another method."""
@@ -89,7 +86,7 @@ class Experiment:
     def variables(self) -> dict[str, Variable]:
         """Variables of `results`, by name."""
         interface, names = self.problem.interface, self.random.names
-        kept = {name: along(interface, PROFILES[name]) for name in self.keep if name in names}
+        kept = {name: along(interface, PROFILES[name]) for name in self.keep}
         return variables_of(self.problem, self.method, "normal_pressure" in names) | kept
 
     @property
@@ -158,8 +155,7 @@ class Experiment:
         A plain computation without threads, for any executor.
         """
         profiles = self.profiles(self.draws(first, count))
-        kept = {name: profiles[name] for name in self.keep if name in profiles}
-        return self.onset(profiles) | kept
+        return self.onset(profiles) | {name: profiles[name] for name in self.keep}
 
     @property
     def batch(self) -> int:
@@ -188,24 +184,9 @@ def _solver(problem: Problem, method: Any) -> Solver:
     return prepared(problem, method)
 
 
-def _keeping(
-    problem: Problem, method: Any, keep: tuple[str, ...], random: tuple[str, ...]
-) -> tuple[Any, list[str]]:
-    """Return the method with the options that `keep` names, and messages on unknown names."""
-    names = [field.name for field in dataclasses.fields(method)]
-    options = [name for name in names if isinstance(getattr(method, name), bool)]
-    wider = {name: dataclasses.replace(method, **{name: True}) for name in options}
-    adding = [name for name, one in wider.items() if name in one.variables(problem)]
-    offered = sorted({*random, *adding})
-    unknown = [n for n in keep if n not in offered and n not in method.variables(problem)]
-    if on := {name: True for name in keep if name in adding}:
-        method = dataclasses.replace(method, **on)
-    return method, [unknown_name("keep", name, offered) for name in unknown]
-
-
 @model(kw_only=True)
 class Ensemble:
-    """Number of samples, seed, and variables to keep.
+    """Number of samples, seed, and profiles to keep.
 
     Parameters
     ----------
@@ -216,8 +197,8 @@ class Ensemble:
     first : int
         Number of the first sample.
     keep : str or tuple of str
-        Variables kept along the interface: random fields, such as ``"strength"``, and
-        optional ones of the method, such as ``"slip"`` or ``"sensitivity"`` of `Equilibrium`.
+        Random fields, such as ``"strength"``, whose profiles are kept. Options of the method add
+        others, such as ``slip=True`` of `Equilibrium`.
 
     Examples
     --------

@@ -41,9 +41,6 @@ class LimitState:
     workers: int = 1  # threads; the numbers do not depend on this
     meter: Meter = SILENT  # counts the samples
 
-    def __repr__(self) -> str:
-        return f"<LimitState: {self.dimension} standard normal draws to {self.event}, Pa>"
-
     @property
     def dimension(self) -> int:
         """Number of draws of a sample."""

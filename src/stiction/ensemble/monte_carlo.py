@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack, closing
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from stiction.ensemble.batches import AnyExecutor, missing_spans, solve_spans, usable_cores
-from stiction.ensemble.dataset import FAILED, Gathered, GridAxis, distinct
+from stiction.ensemble.batches import missing_spans, solve_spans, usable_cores
+from stiction.ensemble.dataset import FAILED, Gathered, GridAxes, distinct
 from stiction.ensemble.experiment import AnyRandom, Ensemble, Experiment
 from stiction.ensemble.pilot import pilot_attributes
 from stiction.ensemble.store import Store
-from stiction.errors import InputError, collect_warnings, warn_accuracy, warn_user
+from stiction.errors import InputError, RunError, collect_warnings, warn_accuracy, warn_user
 from stiction.methods import MethodObject, study_attributes
 from stiction.model import Count, Flag, Names, Number, Positive, Progress, checked
 from stiction.problem import Problem
@@ -46,10 +47,9 @@ def gather(
     points: Sequence[Experiment],
     ensemble: Ensemble,
     attributes: Mapping[str, Any],
-    axes: Sequence[GridAxis] = (),
+    axes: GridAxes = MappingProxyType({}),
     *,
     store: Store | None = None,
-    retry: bool = False,
     others: NDArray[Any] | bool = False,
     workers: int | None = None,
     executor: Executor | None = None,
@@ -59,14 +59,13 @@ def gather(
 ) -> xr.Dataset:
     """Compute an ensemble at every point of a sweep, or the part of it that is not stored.
 
-    Samples go to the `store` as they are done. With `retry`, stored samples that failed are
-    computed again. `others`, of shape (points, samples), are samples that another job computes. For
-    the rest see `monte_carlo`.
+    Samples go to the `store` as they are done. `others`, of shape (points, samples), are samples
+    that another job computes. For the rest see `monte_carlo`.
     """
     rows = Gathered(points, ensemble.samples, ensemble.first)
     for table in store.load() if store else ():
         rows.add(table)
-    done = others | (rows.done if retry else rows.dealt_with)
+    done = others | rows.done
     spans, solved, lost = missing_spans(done, ensemble.first), bool(rows.done.any()), 0
     if spans:
         _check_fields(points)
@@ -87,7 +86,7 @@ def gather(
                 solved, lost = solved or table.rows.size > 0, lost + len(table.failures)
                 if not solved and lost >= min(HOPELESS, total):
                     failure = table.failures[0]
-                    raise (InputError if failure.input else RuntimeError)(str(failure))
+                    raise (InputError if failure.input else RunError)(str(failure))
             if meter.over:
                 break
     found = store.pilot if store else None
@@ -119,7 +118,7 @@ def monte_carlo(
     first: Number = 0,
     keep: Names = (),
     workers: Count | None = None,
-    executor: AnyExecutor | None = None,
+    executor: Executor | None = None,
     progress: Progress = True,
     time_limit: Positive | None = None,
     pilot: Flag = True,
@@ -134,16 +133,9 @@ def monte_carlo(
     random : RandomInterface or RandomField
         The random properties; a field alone is the peak strength, Pa.
     method : LocalCriterion, Equilibrium or Rupture
-    samples : int
-        Number of samples.
-    seed : int
-        Not negative.
-    first : int
-        Number of the first sample, to continue an ensemble.
-    keep : str or tuple of str
-        Variables kept along the interface: random fields, such as ``"strength"``, and
-        optional ones of the method, such as ``"sensitivity"``. For a figure, repeat the first
-        few samples: another call with the same seed and fewer samples gives the same ones.
+    samples, seed, first, keep
+        As in `Ensemble`. For profiles of a few samples, repeat these: another call with the same
+        seed and fewer samples gives the same ones.
     workers : int, optional
         Threads; all cores by default. The compiled kernels release the interpreter lock.
     executor : concurrent.futures.Executor, optional
@@ -151,8 +143,8 @@ def monte_carlo(
     progress : bool or callable
         True shows progress on standard error after two seconds; a callable gets (done, total).
     time_limit : float, optional
-        Time limit, s. Samples that are not done by then are NaN, and the attribute
-        'cut_short' gives the number that are done.
+        Seconds. Samples that are not done by then are NaN; the attribute 'cut_short' counts the
+        others.
     pilot : bool
         With the local criterion, also solve the first samples (32 on a line, 8 on a plane)
         by `Equilibrium` and report the difference; the ensemble stays the same.
@@ -170,7 +162,7 @@ def monte_carlo(
     ------
     InputError
         If any argument is invalid (the message lists every problem), or no sample is valid.
-    RuntimeError
+    RunError
         If the solver fails on all samples; the message names one with its seed.
 
     Warns

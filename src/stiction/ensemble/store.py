@@ -17,7 +17,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -37,15 +37,6 @@ SAVE_BYTES = 32 * 2**20
 
 class Damaged(ValueError):
     """A stored file is damaged; the message gives the defect."""
-
-
-class Chunk(NamedTuple):
-    """One file of samples: its size, its table, and what computed it for which study."""
-
-    bytes: int
-    table: Table
-    versions: str
-    study: str
 
 
 class Store:
@@ -95,7 +86,7 @@ class Store:
 
     # -- reading -------------------------------------------------------------------------------
 
-    def chunks(self) -> Iterator[Chunk]:
+    def chunks(self) -> Iterator[Table]:
         """Yield the undamaged chunks; the defects of the others are in `damage`.
 
         A file that exists and cannot be read may be whole: it raises a `StoreError`.
@@ -109,22 +100,22 @@ class Store:
             raise cannot("read", folder, error) from error
         for name in names:
             try:
-                chunk = _read_chunk(folder / name)
+                study, table = _read_chunk(folder / name)
             except FileNotFoundError:  # it was damaged, and another process has deleted it
                 continue
             except Damaged as error:
                 self.damage[name] = str(error)
                 continue
-            if chunk.study != self._mark:
+            if study != self._mark:
                 raise StoreError(f"{self.path}: {CHUNKS}/{name} belongs to another study")
-            yield chunk
+            yield table
 
     def load(self) -> Iterator[Table]:
         """Yield all tables; delete damaged chunks, and warn of them and of other versions."""
         found = set()
-        for chunk in self.chunks():
-            yield chunk.table
-            found.add(chunk.versions)
+        for table in self.chunks():
+            yield table
+            found.add(table.versions)
         for other in sorted(found - {versions()}):
             self._warn(
                 f"was begun with {other}, not {versions()}: samples of the two may differ"
@@ -152,17 +143,16 @@ class Store:
         If they cannot be written (a `StoreError`), what was stored before stays readable.
         """
         self._taken += tables
-        now = time.monotonic()
+        now, size = time.monotonic(), sum(table.rows.nbytes for table in self._taken)
         interval = min(max(SAVE_SECONDS, SAVE_SHARE * (now - self._begun)), SAVE_MOST)
-        late = now - self._saved >= interval
-        if late or sum(table.rows.nbytes for table in self._taken) >= SAVE_BYTES:
+        if now - self._saved >= interval or size >= SAVE_BYTES:
             self.save()
 
     def save(self) -> None:
         """Store the tables that were taken, one chunk for each set of variables."""
         groups: dict[Any, list[Table]] = {}
         for table in self._taken:
-            groups.setdefault(table.rows.dtype, []).append(table)
+            groups.setdefault((table.rows.dtype, table.versions), []).append(table)
         for group in groups.values():
             data = _encode(group, self._mark)
             write_whole(self.path / CHUNKS / f"{digest(data)}.npz", data)
@@ -185,25 +175,25 @@ def _encode(tables: list[Table], study: str) -> bytes:
     """Return tables as the bytes of an .npz archive, with a short description as JSON."""
     seconds = round(sum(table.seconds for table in tables), 3)
     failures = [failure for table in tables for failure in table.failures]
-    about = json.dumps([study, versions(), seconds, failures]).encode()
+    about = json.dumps([study, tables[0].versions, seconds, failures]).encode()
     rows, file = np.concatenate([table.rows for table in tables]), io.BytesIO()
     np.savez(file, about=np.frombuffer(about, dtype=np.uint8), rows=rows)
     return file.getvalue()
 
 
-def _read_chunk(file: Path) -> Chunk:
-    """Return a chunk, or raise `Damaged` or an error of `_read`."""
+def _read_chunk(file: Path) -> tuple[str, Table]:
+    """Return the mark of a study and samples of it, or raise `Damaged` or an error of `_read`."""
     data = _read(file)
     if file.stem != digest(data):
         raise Damaged("fails its checksum")
     try:
         with np.load(io.BytesIO(data), max_header_size=len(data)) as archive:
-            study, made_by, seconds, failures = json.loads(archive["about"].tobytes())
-            table = Table(archive["rows"], tuple(Failure(*one) for one in failures), seconds)
+            study, made_by, seconds, failed = json.loads(archive["about"].tobytes())
+            failures = tuple(Failure(*one) for one in failed)
+            return study, Table(archive["rows"], failures, seconds, made_by)
     except (*UNREADABLE, AttributeError, TypeError) as error:
         # Made by a program that names its files likewise.
         raise Damaged(f"cannot be read: {error}") from None
-    return Chunk(len(data), table, made_by, study)
 
 
 def _write_json(file: Path, content: Mapping[str, Any]) -> None:
@@ -258,8 +248,8 @@ def _refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any
     """Refuse a study that differs from the stored one in more than a growing number of samples."""
     now, before = here["ensemble"]["samples"], there["ensemble"]["samples"]
     found = _differences(_identity(here), _identity(there))
-    if now < before and not found:
-        found = [f"ensemble.samples: {now} here, {before} there: a run can grow, not shrink"]
+    if now < before:
+        found += [f"ensemble.samples: {now} here, {before} there: a run can grow, not shrink"]
     if found:
         raise StoreError(
             f"{path}: holds another study; choose another place, or make the study the same:\n"
@@ -269,8 +259,7 @@ def _refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any
 
 def _differences(here: Any, there: Any, path: str = "") -> list[str]:
     """Return the entries in which two plain tables differ, with their paths."""
-    if isinstance(here, list) and isinstance(there, list):
-        here, there = dict(enumerate(here)), dict(enumerate(there))
+    here, there = (dict(enumerate(x)) if isinstance(x, list) else x for x in (here, there))
     if isinstance(here, Mapping) and isinstance(there, Mapping):
         return [
             text

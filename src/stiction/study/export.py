@@ -18,16 +18,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 OVERHEAD = 2**16
-SUFFIXES = (".nc", ".csv")
-
-
-def check_suffix(path: Path) -> None:
-    """Refuse a file name whose suffix names no format that can be written."""
-    if path.suffix not in SUFFIXES:
-        raise InputError(
-            f"{path}: the suffix must be one of {', '.join(SUFFIXES)}; got"
-            f" {path.suffix or 'none'!r}"
-        )
 
 
 def export(result: xr.Dataset, path: Path) -> None:
@@ -44,15 +34,19 @@ def export(result: xr.Dataset, path: Path) -> None:
 
     Raises
     ------
+    InputError
+        If the suffix is another one.
     StoreError
         If it cannot be written.
     """
     if path.suffix == ".nc":
         write_result(result, path)
-        return
-    frame = table_of(result)
-    # Numbers are written as the shortest text that reads back to the same bits.
-    write_whole(path, lambda aside: frame.to_csv(aside, index=False, na_rep="nan"))
+    elif path.suffix == ".csv":
+        frame = table_of(result)
+        # Numbers are written as the shortest text that reads back to the same bits.
+        write_whole(path, lambda aside: frame.to_csv(aside, index=False, na_rep="nan"))
+    else:
+        raise InputError(f"{path}: the suffix must be .nc or .csv, got {path.suffix!r}")
 
 
 def write_result(result: xr.Dataset, path: Path) -> None:

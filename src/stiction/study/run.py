@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
-from stiction.ensemble.batches import Failure
+from stiction.ensemble.batches import Failure, Table
 from stiction.ensemble.dataset import Gathered
-from stiction.ensemble.store import Chunk, Store
+from stiction.ensemble.store import Store
 from stiction.errors import warn_user
-from stiction.model import FilePath, brief, check, is_whole
+from stiction.model import FilePath, brief, check
 from stiction.random.synthesis import BLOCK
-from stiction.study.export import check_suffix, export
+from stiction.study.export import export
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,17 +27,16 @@ FEWEST_BLOCKS = 8
 
 
 def _part(value: Any) -> tuple[int, int]:
-    pair: Any = value
-    if isinstance(value, str):
-        pair = [int(text) if text.isdecimal() else text for text in value.split("/")]
-    if isinstance(pair, tuple | list) and len(pair) == 2 and all(is_whole(n, 1) for n in pair):
-        number, of = map(int, pair)
-        if number <= of:
-            return number, of
-    raise ValueError(
-        "must be a part and the number of parts, such as 3/100 (in Python also (3, 100)), from"
-        " 1/100 to 100/100"
-    )
+    try:
+        number, of = map(int, value.split("/") if isinstance(value, str) else value)
+    except (TypeError, ValueError):
+        number = of = 0
+    if not 1 <= number <= of:
+        raise ValueError(
+            "must be a part and the number of parts, such as 3/100 (in Python also (3, 100)), from"
+            " 1/100 to 100/100"
+        )
+    return number, of
 
 
 AnyPart: TypeAlias = Annotated[Any, BeforeValidator(_part)]
@@ -66,7 +65,6 @@ class Status:
     failures: tuple[Failure, ...]
     damaged: tuple[str, ...]  # defect of each damaged chunk; running the study again repairs it
     chunks: int
-    bytes: int
     seconds: float  # of all workers together
     versions: tuple[str, ...]  # of the packages that computed the samples
 
@@ -90,11 +88,6 @@ class StoredRun:
     def __init__(self, store: Store, study: Any) -> None:
         self.path, self.study, self._store = store.path, study, store
 
-    def __repr__(self) -> str:
-        points = len(self.study.experiments)
-        each = f"{points} points of " if points > 1 else ""
-        return f"<StoredRun {str(self.path)!r}: {each}{self.study.ensemble.samples} samples>"
-
     def status(self) -> Status:
         """Return the state of the run, after a comparison of all chunks with their checksums.
 
@@ -111,8 +104,7 @@ class StoredRun:
             failures=tuple(rows.failed),
             damaged=tuple(f"{name}: {text}" for name, text in self._store.damage.items()),
             chunks=len(chunks),
-            bytes=sum(chunk.bytes for chunk in chunks),
-            seconds=sum(chunk.table.seconds for chunk in chunks),
+            seconds=sum(chunk.seconds for chunk in chunks),
             versions=tuple(dict.fromkeys(chunk.versions for chunk in chunks)),
         )
 
@@ -137,13 +129,13 @@ class StoredRun:
             {**self.study.attributes, **(self._store.pilot or {})}, self.study.axes
         )
 
-    def _read(self, only: Sequence[str] | None) -> tuple[Gathered, list[Chunk]]:
+    def _read(self, only: Sequence[str] | None) -> tuple[Gathered, list[Table]]:
         """Return everything that is stored, and the chunks without their rows."""
         ensemble, chunks = self.study.ensemble, []
         rows = Gathered(self.study.experiments, ensemble.samples, ensemble.first, only)
-        for chunk in self._store.chunks():
-            rows.add(chunk.table)
-            chunks.append(chunk._replace(table=chunk.table._replace(rows=np.empty(0))))
+        for table in self._store.chunks():
+            rows.add(table)
+            chunks.append(table._replace(rows=np.empty(0)))
         return rows, chunks
 
     def export(self, path: str | Path) -> None:
@@ -156,6 +148,4 @@ class StoredRun:
         StoreError
             If the file cannot be written.
         """
-        target = check("path", path, FilePath)
-        check_suffix(target)
-        export(self.dataset(), target)
+        export(self.dataset(), check("path", path, FilePath))

@@ -7,7 +7,8 @@ import itertools
 import json
 import operator
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from concurrent.futures import Executor
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -17,8 +18,7 @@ import tomli_w
 from pydantic import BeforeValidator, Field, model_validator
 
 from stiction.dynamics.save import Save
-from stiction.ensemble.batches import AnyExecutor
-from stiction.ensemble.dataset import GridAxis, variables_in
+from stiction.ensemble.dataset import GridAxes, variables_in
 from stiction.ensemble.dotted_keys import with_values
 from stiction.ensemble.experiment import Ensemble, Experiment
 from stiction.ensemble.monte_carlo import gather
@@ -43,13 +43,7 @@ from stiction.profiles.reading import profile_in_file
 from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
 from stiction.study.run import AnyPart, StoredRun, samples_of_part
-from stiction.study.sweep import (
-    Point,
-    Sweep,
-    grid_axes,
-    name_point,
-    with_first_values,
-)
+from stiction.study.sweep import Point, Sweep, grid_axes, with_first_values
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -144,10 +138,10 @@ class Study(_Parts):
     def _fits_together(self) -> Study:
         points = self.experiments
         wide = [name for name, one in variables_in(points).items() if {"x", "y"} & {*one.dims}]
-        if wide and len({point.problem.interface.shape for point in points}) > 1:
+        if wide and len({point.problem.interface for point in points}) > 1:
             raise InputError(
-                f"sweep: {', '.join(wide)} cannot be kept along the interface while its number of"
-                " nodes is swept; make a study of each"
+                f"sweep: {', '.join(wide)} cannot be kept along an interface that is swept; make a"
+                " study of each"
             )
         return self
 
@@ -165,7 +159,7 @@ class Study(_Parts):
     def experiments(self) -> list[Experiment]:
         """The experiment at each point; objects that points share are built once.
 
-        A mistake is reported once, with the points where it is.
+        A mistake is reported once, with the first point where it is.
         """
         base = _Parts(**{name: getattr(self, name) for name in _PARTS})
         made: dict[Any, Any] = {}
@@ -178,7 +172,7 @@ class Study(_Parts):
             return made[key]
 
         found: list[Experiment] = []
-        problems: dict[str, list[Point]] = {}
+        problems: dict[str, str] = {}
         for point in self.points:
             try:
                 problem, random, method, ensemble = (part(n, point.values) for n in _PARTS)
@@ -187,17 +181,18 @@ class Study(_Parts):
                     made[key] = Experiment(problem, random, method, self.ensemble.keep)
                 found.append(made[key].with_seed(ensemble.seed))
             except InputError as error:
+                where = f", at {point} of the sweep" if point.values else ""
                 for text in error.problems:
-                    problems.setdefault(text, []).append(point)
+                    problems.setdefault(text, text + where)
         if problems:
-            raise InputError(text + _place(points) for text, points in problems.items())
+            raise InputError(problems.values())
         return found
 
     @property
-    def axes(self) -> list[GridAxis]:
+    def axes(self) -> GridAxes:
         """The axes of the sweep as dimensions of the result."""
-        variables = set(variables_in(self.experiments))
-        return grid_axes(self.sweep, sorted(variables | {"sample", "x", "y", "position"}))
+        taken = {*variables_in(self.experiments), "sample", "x", "y"}
+        return grid_axes(self.sweep, taken)
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -215,10 +210,9 @@ class Study(_Parts):
         *,
         out: FilePath | None = None,
         workers: Count | None = None,
-        executor: AnyExecutor | None = None,
+        executor: Executor | None = None,
         progress: Progress = True,
         time_limit: Positive | None = None,
-        retry: Flag = False,
         part: AnyPart | None = None,
         pilot: Flag = True,
     ) -> xr.Dataset:
@@ -227,12 +221,10 @@ class Study(_Parts):
         Parameters
         ----------
         out : path, optional
-            Folder in which results are stored as they are computed. The same call resumes
-            an interrupted run, and computes only the new samples if `samples` was raised.
+            Folder in which results are stored as they are computed. The same call resumes an
+            interrupted run, computes failed samples again, and new ones if `samples` was raised.
         workers, executor, progress, time_limit, pilot
             See `stiction.monte_carlo`.
-        retry : bool
-            Compute stored samples that failed again.
         part : (int, int) or str, optional
             Compute only one of several parts, such as (3, 100) or "3/100", into the same
             folder as the other parts: for independent jobs.
@@ -244,8 +236,8 @@ class Study(_Parts):
 
         Raises
         ------
-        InputError, RuntimeError, WorkerError
-            See `stiction.monte_carlo`.
+        InputError, RunError
+            See `stiction.monte_carlo`; also if a worker is lost.
         StoreError
             If `out` cannot be used.
         """
@@ -265,7 +257,6 @@ class Study(_Parts):
             self.axes,
             store=store,
             others=others,
-            retry=retry,
             workers=workers,
             executor=executor,
             progress=progress,
@@ -281,11 +272,8 @@ class Study(_Parts):
         InputError
             If a part exists in Python only (a spectrum that is a function).
         """
-        plain: dict[str, Any] = to_plain(self)
-        for name in ("title", "sweep"):
-            if not plain[name]:
-                del plain[name]
-        return plain
+        plain = to_plain(self).items()
+        return {name: one for name, one in plain if one or name not in ("title", "sweep")}
 
     def to_toml(self, path: str | Path) -> None:
         """Write the study as a TOML file.
@@ -319,16 +307,9 @@ class Study(_Parts):
         if "study" not in about:
             raise InputError("result: must be a dataset with the attribute 'study'")
         try:
-            given = json.loads(about["study"])
-        except (TypeError, ValueError, RecursionError) as error:
+            return cls.from_dict(json.loads(about["study"]))
+        except json.JSONDecodeError as error:
             raise InputError(f"result: its attribute 'study' is not JSON: {error}") from None
-        return cls.from_dict(given)
-
-
-def _place(points: Sequence[Point]) -> str:
-    """Return where a mistake is; nothing without a sweep."""
-    more = f" and {len(points) - 1} more" if len(points) > 1 else ""
-    return f", at {name_point(points[0])}{more} of the sweep" if points[0].values else ""
 
 
 def study_schema() -> dict[str, Any]:
@@ -377,12 +358,11 @@ def _read_toml(path: Path) -> dict[str, Any]:
 def _read(cls: type[T], given: dict[str, Any], folder: str | Path | None) -> T:
     """Validate a study in plain form, or its `Setup`; names of files are relative to `folder`."""
     check("study", given, dict)
-    context: dict[str, Any] = {"folder": None}
+    context = {}
     if folder is not None:
         place = check("folder", folder, FilePath)
-        context["folder"] = place
         context["read"] = lambda profile, name: profile_in_file(profile, name, place)
-    plain = with_first_values(given, context["folder"])
+    plain = with_first_values(given)
     try:
         return pydantic.TypeAdapter(cls).validate_python(plain, context=context)
     except pydantic.ValidationError as error:
@@ -410,12 +390,10 @@ def open_run(path: Any) -> StoredRun:
         If the folder holds no run, or the run cannot be read.
     """
     place = check("path", path, FilePath)
-    if not place.is_dir():
-        raise StoreError(f"{place}: there is no run here; a run is a folder")
     try:
         study = read_study(place)
     except FileNotFoundError:
-        raise StoreError(f"{place}: holds no run") from None
+        raise StoreError(f"{place}: there is no run here") from None
     except Damaged as error:
         raise StoreError(f"{error}; run the study again into the folder to repair it") from None
     try:

@@ -3,49 +3,29 @@
 import dataclasses
 import math
 import numbers
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
 from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
-import pydantic
-from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
 
-from stiction.ensemble.dataset import GridAxis
+from stiction.ensemble.dataset import Coordinates, GridAxes
 from stiction.errors import InputError, prefixed, unknown_name
-from stiction.model import (
-    Real,
-    at_least,
-    describe,
-    explain,
-    model,
-    to_plain,
-)
-from stiction.profiles.reading import profile_in_file, quantity_of
-from stiction.variables import PROFILES, QUANTITIES, Variable
+from stiction.model import Real, at_least, describe, model, to_plain
+from stiction.variables import PROFILES, Variable
 
 MOST_POINTS = 100_000
-_FIXED = (
-    "ensemble",
-    "ensemble.samples",
-    "ensemble.first",
-    "ensemble.keep",
-    "title",
-    "sweep",
-)
-_TABLES = ("problem", "random", "method", "ensemble", "save")
+_FIXED = ("ensemble", "ensemble.samples", "ensemble.first", "ensemble.keep")
+_TABLES = ("problem", "random", "method", "ensemble")
 _UNITS = {name: variable.units for name, variable in PROFILES.items()} | {
     "length": "m",
     "correlation_length": "m",
     "shear_modulus": "Pa",
     "density": "kg m-3",
-    "low": "Pa",
-    "high": "Pa",
-    "loc": "Pa",
-    "scale": "Pa",
     "loading_rate": "Pa s-1",
 }
-
 
 Axis: TypeAlias = dict[str, list[Any]]
 """Keys that vary together, each with one value for each step."""
@@ -57,9 +37,13 @@ class Point(NamedTuple):
     number: int
     values: dict[str, Any]
 
+    def __str__(self) -> str:
+        values = ", ".join(f"{key} = {_text(value)}" for key, value in self.values.items())
+        return f"point {self.number} ({values})" if values else f"point {self.number}"
+
 
 @model(kw_only=True)
-class _Range:
+class Range:
     """Values from start to stop, both included."""
 
     start: Real
@@ -67,31 +51,21 @@ class _Range:
     count: Annotated[at_least(2), Field(le=MOST_POINTS)]  # type: ignore[valid-type]
     spacing: Literal["linear", "log"] = "linear"
 
-    @model_validator(mode="after")
-    def _log_of_positive(self) -> "_Range":
-        if self.spacing == "log" and min(self.start, self.stop) <= 0.0:
-            ends = f"{self.start!r} and {self.stop!r}"
-            raise InputError(f"a log range needs positive ends, got {ends}")
-        return self
+    def values(self) -> list[float]:
+        """Return the values."""
+        if self.spacing == "linear":
+            return np.linspace(self.start, self.stop, self.count).tolist()
+        if min(self.start, self.stop) <= 0.0:
+            raise InputError(
+                f"a log range needs positive ends, got {self.start:g} and {self.stop:g}"
+            )
+        return np.geomspace(self.start, self.stop, self.count).tolist()
 
 
-def _range(key: str, given: Mapping[str, Any]) -> list[Any]:
-    try:
-        found: _Range = pydantic.TypeAdapter(_Range).validate_python(given)
-    except pydantic.ValidationError as error:
-        raise InputError(explain(error, key)) from None
-    spread = np.geomspace if found.spacing == "log" else np.linspace
-    values = spread(found.start, found.stop, found.count)
-    whole = all(isinstance(given[name], numbers.Integral) for name in ("start", "stop"))
-    if whole and np.all(values == np.round(values)):
-        values = values.astype(np.int64)
-    return values.tolist()
-
-
-def _values(key: str, given: Any, folder: Path | None) -> list[Any]:
-    """Return the values of a key; profiles in files are read."""
+def _values(key: str, given: Any) -> list[Any]:
     if isinstance(given, Mapping):
-        return _range(key, given)
+        with prefixed(key):
+            return Range(**given).values()
     if isinstance(given, np.ndarray):
         given = given.tolist()
     if not isinstance(given, list | tuple) or not given:
@@ -99,29 +73,18 @@ def _values(key: str, given: Any, folder: Path | None) -> list[Any]:
             f"{key}: must be a list of values or a range such as {{start = 1e-3, stop = 4e-3,"
             f" count = 4}}, got {describe(given)}"
         )
-    found = []
-    for value in given:
-        file = isinstance(value, str) or (isinstance(value, Mapping) and "file" in value)
-        if file and folder is not None and quantity_of(key) in QUANTITIES:
-            with prefixed(key):
-                value = profile_in_file(value, key, folder)
-        found.append(value.tolist() if isinstance(value, np.generic | np.ndarray) else value)
-    return found
+    return [one.tolist() if isinstance(one, np.generic | np.ndarray) else one for one in given]
 
 
-def _axis(number: int, given: Any, folder: Path | None) -> Axis:
-    where = f"[{number}]"
+def _axis(given: Any) -> Axis:
     if not isinstance(given, Mapping) or not given:
-        raise InputError(
-            f"{where}: must be a table of keys and their values, got {describe(given)}"
-        )
-    with prefixed(where, "."):
-        axis = {key: _values(key, values, folder) for key, values in _flat(given).items()}
+        raise InputError(f"must be a table of keys and their values, got {describe(given)}")
+    axis = {key: _values(key, values) for key, values in _flat(given).items()}
     if len({len(values) for values in axis.values()}) > 1:
         named = ", ".join(f"{key} has {len(values)}" for key, values in axis.items())
         raise InputError(
-            f"{where}: keys of one table vary together and need as many values each ({named});"
-            " to cross them, give each a [[sweep]] of its own"
+            f"keys of one table vary together and need as many values each ({named}); to cross"
+            " them, give each a [[sweep]] of its own"
         )
     return axis
 
@@ -130,11 +93,10 @@ def _flat(given: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """Dotted keys of a table: TOML reads an unquoted ``a.b = 1`` as nested tables."""
     result: dict[str, Any] = {}
     for key, value in given.items():
-        name = f"{prefix}.{key}" if prefix else str(key)
         if isinstance(value, Mapping) and not {"start", "stop", "count"} & set(value):
-            result |= _flat(value, name)
+            result |= _flat(value, f"{prefix}{key}.")
         else:
-            result[name] = value
+            result[f"{prefix}{key}"] = value
     return result
 
 
@@ -143,34 +105,30 @@ def size_of(axis: Axis) -> int:
     return len(next(iter(axis.values())))
 
 
-def _axes(given: Any, info: pydantic.ValidationInfo) -> list[Axis]:
+def read_axes(given: Any) -> list[Axis]:
     """Return the axes of a sweep from what was written."""
-    folder = (info.context or {}).get("folder")
     if not isinstance(given, list | tuple):
         raise InputError(f"must be a list of tables, each a [[sweep]], got {describe(given)}")
-    problems: list[str] = []
     axes: list[Axis] = []
     for number, table in enumerate(given):
-        try:
-            axes.append(_axis(number, table, folder))
-        except InputError as error:
-            problems += error.problems
+        with prefixed(f"[{number}]"):
+            axes.append(_axis(table))
     keys = [key for axis in axes for key in axis]
-    for key in sorted(keys):
+    problems: dict[str, None] = {}
+    for key in keys:
         table = key.split(".")[0]
+        inside = [other for other in keys if f"{other}.".startswith(f"{key}.")]
         if key in _FIXED:
-            problems.append(f"{key}: cannot be swept")
+            problems[f"{key}: cannot be swept"] = None
         elif table not in _TABLES:
-            problems.append(unknown_name(key, table, _TABLES))
-        if keys.count(key) > 1:
-            problems.append(f"{key}: is swept twice")
-        inner = [other for other in keys if other.startswith(f"{key}.")]
-        problems += [f"{other}: is part of {key}, which is swept too" for other in inner]
+            problems[unknown_name(key, table, _TABLES)] = None
+        elif len(inside) > 1:
+            problems[f"{key}: is swept twice, by {' and '.join(inside)}"] = None
     points = math.prod(map(size_of, axes))
     if points > MOST_POINTS:
-        problems.append(f"makes {points} points, at most {MOST_POINTS} are allowed")
+        problems[f"makes {points} points, at most {MOST_POINTS} are allowed"] = None
     if problems:
-        raise InputError(list(dict.fromkeys(problems)))
+        raise InputError(problems)
     return axes
 
 
@@ -186,7 +144,7 @@ def _plain_axes(axes: Sequence[Axis]) -> list[Axis]:
 
 Sweep: TypeAlias = Annotated[
     Any,
-    BeforeValidator(_axes),
+    BeforeValidator(read_axes),
     PlainSerializer(_plain_axes),
     WithJsonSchema(
         {
@@ -200,17 +158,14 @@ Sweep: TypeAlias = Annotated[
 """A list of tables of dotted keys and their values."""
 
 
-def with_first_values(given: dict[str, Any], folder: Path | None) -> dict[str, Any]:
+def with_first_values(given: dict[str, Any]) -> dict[str, Any]:
     """Return a study in plain form, each swept key without a value with the first of its sweep.
 
     A sweep that is not valid is left to the validation of the whole.
     """
-    context = {"folder": folder}
     try:
-        axes = pydantic.TypeAdapter(Sweep).validate_python(
-            given.get("sweep", ()), context=context
-        )
-    except pydantic.ValidationError:
+        axes = read_axes(given.get("sweep", ()))
+    except InputError:
         return given
     for axis in axes:
         for key, values in axis.items():
@@ -226,12 +181,6 @@ def _with_default(table: dict[str, Any], steps: list[str], value: Any) -> dict[s
     return table if rest or name in table else table | {name: value}
 
 
-def name_point(point: Point) -> str:
-    """For messages: 'point 3 (problem.interface.nodes = 512)'."""
-    values = ", ".join(f"{key} = {_text(value)}" for key, value in point.values.items())
-    return f"point {point.number} ({values})" if values else f"point {point.number}"
-
-
 def _text(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:g}"
@@ -239,40 +188,39 @@ def _text(value: Any) -> str:
     return str(kind) if kind else describe(value)
 
 
-def grid_axes(axes: Sequence[Axis], taken: Sequence[str]) -> list[GridAxis]:
+def grid_axes(axes: Sequence[Axis], taken: Collection[str]) -> GridAxes:
     """Return the axes as dimensions of a result, named by the ends of their keys."""
     names = _short_names([key for axis in axes for key in axis], taken)
-    result = []
+    result: dict[str, Coordinates] = {}
     for axis in axes:
         dim = names[next(iter(axis))]
-        coordinates = {}
+        own = result[dim] = {}
         for key, values in axis.items():
-            labels, parts = _coordinate(values), key.split(".")
+            labels, parts = _labels(values), key.split(".")
             number = labels.dtype.kind in "if" and "correlation" not in parts
             unit = _UNITS.get(parts[-1], "1") if number else "1"
-            coordinates[names[key]] = (labels, Variable(unit, key, (dim,)))
-        result.append(GridAxis(dim, size_of(axis), coordinates))
+            own[names[key]] = (labels, Variable(unit, key, (dim,)))
     return result
 
 
-def _short_names(keys: Sequence[str], taken: Sequence[str]) -> dict[str, str]:
-    names: dict[str, str] = {}
+def _short_names(keys: Sequence[str], taken: Collection[str]) -> dict[str, str]:
+    """Name each key by so many of its last parts that the name is its own."""
+    ends: dict[str, list[str]] = {}
     for key in keys:
         parts = key.split(".")
         fewest = parts[::-1].index("correlation") + 1 if "correlation" in parts else 1
-        for count in range(fewest, len(parts) + 1):
-            name = "_".join(parts[-count:])
-            alike = [other for other in keys if other.split(".")[-count:] == parts[-count:]]
-            if len(alike) == 1 and name not in taken:
-                break
-        names[key] = name if name not in taken else f"swept_{name}"
-    return names
+        ends[key] = ["_".join(parts[-n:]) for n in range(fewest, len(parts) + 1)]
+    count = Counter(name for names in ends.values() for name in names)
+    return {
+        key: next(name for name in names if count[name] == 1 and name not in taken)
+        for key, names in ends.items()
+    }
 
 
-def _coordinate(values: Sequence[Any]) -> np.ndarray[Any, Any]:
+def _labels(values: Sequence[Any]) -> NDArray[Any]:
+    """Return numbers as they are, of anything else its name, with a number where names repeat."""
     if all(isinstance(value, numbers.Real) and not isinstance(value, bool) for value in values):
-        whole = all(isinstance(value, numbers.Integral) for value in values)
-        return np.array(values, dtype=np.int64 if whole else np.float64)
+        return np.array(values)
     texts = [value if isinstance(value, str) else _text(value) for value in values]
     if len(set(texts)) < len(texts):  # two tables of one type, say
         texts = [f"{number}: {text}" for number, text in enumerate(texts)]
