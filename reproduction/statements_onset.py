@@ -155,7 +155,7 @@ PARAMETERS = [
         " correlation is 1/e does.", "Sec. 2.2, par. 2, sentences 3 to 5",
         within(0.5, 2.0, "two definitions of one length"),
         lambda d: ([one("length where C = 1/e, over xi_0",
-                        setting.strength(1.0).efolding_length(of="z") / setting.H)], [])),
+                        setting.strength(1.0).spectrum.efolding_length / setting.H)], [])),
     Check("fracture-energy-varies", "The fracture energy varies with (tau_p - tau_r)²: stronger"
         " places dissipate more.", "Sec. 5.1, par. 4, sentences 4 and 5 (Eq. 14)", above(0.0),
         lambda d: ([one("coefficient of variation of the fracture energy", energy_variation())],

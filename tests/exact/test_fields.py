@@ -296,21 +296,19 @@ def test_tails_too_heavy_for_a_correlation_are_said(distribution):
 
 
 @pytest.mark.parametrize("exponent", [0.7, 1.0, 2.0, 4.0])
-@pytest.mark.parametrize("of", ["z", "strength"])
-def test_efolding_length_is_that_of_the_modes_that_are_sampled(exponent, of):
+def test_efolding_length_is_that_of_the_modes_that_are_sampled(exponent):
     """On an interface of a thousand lengths, by its modes."""
-    field = st.RandomField(
-        marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
-        spectrum=st.PowerLawSpectrum(correlation_length=1.0, exponent=exponent),
-        mean_mode=True,
-    ).with_efolding_length(0.05, of=of)
+    spectrum = st.PowerLawSpectrum(1.0, exponent=exponent).with_efolding_length(0.05)
+    marginal = st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6)
+    field = st.RandomField(marginal, spectrum, mean_mode=True)
     interface = st.Interface(length=50.0, nodes=1000 * 64)
-    correlation = field.correlation(interface, of=of)
-    # Without truncation the length was .0665 for exponent 1. Left over: the sum over modes, which
-    # at exponent 0.7 meets a density that is sharp at k = 0, and the line between two nodes.
-    found = np.interp(-np.exp(-1.0), -correlation[:200], interface.x[:200])
-    assert found == pytest.approx(0.05, rel=2e-3)
-    assert field.efolding_length(of="z") > field.efolding_length(of="strength")
+    for of, length in (("z", 0.05), ("strength", field.efolding_length())):
+        correlation = field.correlation(interface, of=of)
+        # Without truncation the length was .0665 for exponent 1. Left over: the sum over modes,
+        # which at exponent 0.7 meets a density that is sharp at k = 0, and the line between nodes.
+        found = np.interp(-np.exp(-1.0), -correlation[:200], interface.x[:200])
+        assert found == pytest.approx(length, rel=2e-3)
+    assert field.efolding_length() < 0.05
 
 
 def test_truncated_correlation_is_the_sum_of_cosines():

@@ -115,7 +115,7 @@ def test_one_class_and_one_line_add_a_marginal_and_a_spectrum(monkeypatch):
     # 3,200 values, of which neighbours are correlated: 0.04 is exceeded once in a thousand times.
     assert scipy.stats.kstest(values.ravel(), field.marginal.distribution.cdf).statistic < 0.04
     # sin(x/xi)/(x/xi) of a band falls to 1/e at 2.2006 xi, a little further without 0.03 % of it.
-    assert field.efolding_length(of="z") == pytest.approx(2.2006e-3, rel=1e-3)
+    assert field.spectrum.efolding_length == pytest.approx(2.2006e-3, rel=1e-3)
 
 
 @pytest.mark.parametrize(

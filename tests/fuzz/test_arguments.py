@@ -94,7 +94,6 @@ def calls():
         (st.RandomInterface, {"strength": strength}),
         (strength.sample, {"interface": interface}),
         (strength.correlation, {"interface": interface}),
-        (strength.with_efolding_length, {"length": 0.02}),
         (st.LocalCriterion, {}),
         (st.Equilibrium, {}),
         (st.Rupture, {"loading_rate": 1e9}),

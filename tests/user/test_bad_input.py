@@ -70,8 +70,8 @@ test_numbers = refusals({
     "profile ... positive": lambda: st.Load(profile=[1.0, 0.0]),
     "low=2 ... high=1": lambda: st.Beta(alpha=1.0, beta=1.0, low=2.0, high=1.0),
     "alpha ... 0": lambda: st.Beta(alpha=0.0, beta=1.0, low=1.0, high=2.0),
-    "finite squares ... 1e+308": lambda: st.Lognormal(mean=1e308, cv=1e308),
-    "finite squares ... 4.94066e-324": lambda: st.Gamma(mean=5e-324, cv=0.2),
+    "mean: must be less than ... 1e+308": lambda: st.Lognormal(mean=1e308, cv=1e308),
+    "mean: must be greater than ... 5e-324": lambda: st.Gamma(mean=5e-324, cv=0.2),
     "slip ... got an array of shape ()": lambda: st.PiecewiseWeakening(
         slip=np.array(0.5), strength=[0.5, 0.0], critical_slip=1e-6
     ),

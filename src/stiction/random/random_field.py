@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from functools import lru_cache
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -20,14 +20,12 @@ from stiction.random.conditioning import Conditioning, Conditions, Measured
 from stiction.random.mapping import correlation_of_mapped, from_normal, hermite_coefficients
 from stiction.random.marginals import AnyMarginal
 from stiction.random.modes import Modes, make_modes
-from stiction.random.spectra import CustomSpectrum, Share, Spectrum, lag_of_correlation
+from stiction.random.spectra import Share, Spectrum, lag_of_correlation
 from stiction.random.synthesis import Stream, block_of
 
-FEWEST_LENGTHS = 8.0 * math.pi  # e-folding lengths that make a mean mode superfluous
-# Limits of warnings: a share of the variance, a negative correlation, an error of one.
-LOST, FALLEN, UNCERTAIN = 1e-4, 0.02, 0.01
-
-Of: TypeAlias = Literal["strength", "z"]
+# Limits of warnings: shares of the variance that the grid or the mean mode would hold, and the
+# error of a correlation.
+LOST, WITHOUT_MEAN, UNCERTAIN = 1e-4, 0.075, 0.01
 
 
 @model
@@ -162,13 +160,12 @@ class RandomField:
         known: Any = {"profile": profile, "noise": noise}
         return dataclasses.replace(self, conditions=known)
 
-    def measured(self, interface: Interface, factor: Any = None) -> Measured:
-        """Return the checked measured values, with the marginal of a factor between specimens."""
+    def measured(self, interface: Interface) -> Measured:
+        """Return the measured values, once checked."""
         given = self.conditions
         assert given is not None
-        given.check(self.marginal, interface, factor)
-        phi = self.modes(interface).basis(given.places)
-        return Measured(given, self.marginal, phi, factor)
+        given.check(self.marginal, interface)
+        return Measured(given, self.marginal, self.modes(interface).basis(given.places))
 
     @checked
     def quantile(self, interface: Interface, probability: Share) -> Array:
@@ -210,20 +207,21 @@ class RandomField:
                 f" are exact, but {100.0 * lost:.2g} % of the variance lies at wavelengths that the"
                 f" grid does not resolve (interface.nodes >= {enough} resolves all)"
             )
-        across = (1.0, self.anisotropy or 1.0)[: len(interface.shape)]
-        ratio = min(interface.lengths / np.array(across)) / self.spectrum.efolding_length
-        if self.mean_mode or ratio >= FEWEST_LENGTHS:
+        if self.mean_mode:
             return
-        lowest = _lowest_correlation(self, interface)
-        if lowest < -FALLEN:
+        with_mean = make_modes(self.spectrum, True, self.anisotropy or 1.0, interface)
+        share = float(with_mean.sigma[0] ** 2)
+        if share > WITHOUT_MEAN:
             warn_accuracy(
-                f"the interface is only {ratio:.1f} e-folding lengths long and the field has no"
-                f" mean mode: the correlation falls to {lowest:.2f} instead of 0;"
-                " RandomField(mean_mode=True) restores the mean's variability"
+                "the field has no mean mode, which on so short an interface would hold"
+                f" {100.0 * share:.2g} % of the variance: all samples have nearly the same mean;"
+                " RandomField(mean_mode=True) lets it vary"
             )
 
     @checked
-    def correlation(self, interface: Interface, *, of: Of = "strength") -> Array:
+    def correlation(
+        self, interface: Interface, *, of: Literal["strength", "z"] = "strength"
+    ) -> Array:
         """Compute the correlation at the lags ``interface.coordinates``, (*shape), periodic.
 
         It is that of the mapped field (Hermite expansion; Grigoriu, 1995) or of the Gaussian
@@ -248,15 +246,11 @@ class RandomField:
             )
         return coefficients
 
-    @checked
-    def efolding_length(self, *, of: Of = "strength") -> float:
-        """Return the distance (m) at which the correlation on a line first falls to 1/e.
+    def efolding_length(self) -> float:
+        """Return the distance (m) at which the correlation of the field first falls to 1/e.
 
-        The correlation is that of the mapped field or of the Gaussian one, z, with
-        truncation; on a plane, along x.
+        It is that on a line, on a plane along x; the one of z is `spectrum.efolding_length`.
         """
-        if of == "z":
-            return float(self.spectrum.efolding_length)
         coefficients = self._map_coefficients()
 
         def excess(rho: float) -> float:
@@ -265,27 +259,8 @@ class RandomField:
         # The correlation of the mapped field is monotone in that of z.
         return lag_of_correlation(self.spectrum, brentq(excess, 0.0, 1.0, xtol=1e-16))
 
-    @checked
-    def with_efolding_length(self, length: Positive, *, of: Of = "strength") -> RandomField:
-        """Return the same field with a correlation that falls to 1/e at `length` (m).
-
-        The correlation is that of the mapped field or of the Gaussian one, z.
-        """
-        if isinstance(self.spectrum, CustomSpectrum):
-            raise InputError(
-                "spectrum: a user-defined spectrum has no correlation length to set"
-            )
-        xi = self.spectrum.correlation_length * length / self.efolding_length(of=of)
-        spectrum = dataclasses.replace(self.spectrum, correlation_length=xi)
-        return dataclasses.replace(self, spectrum=spectrum)
-
 
 @lru_cache(maxsize=16)
 def conditioning(field: RandomField, interface: Interface) -> Conditioning:
     """Return how the draws of a field alone are conditioned on what was measured of it."""
     return Conditioning([field.measured(interface)])
-
-
-@lru_cache(maxsize=64)
-def _lowest_correlation(field: RandomField, interface: Interface) -> float:
-    return float(field.correlation(interface, of="z").min())

@@ -33,18 +33,17 @@ def _pairs(value: Any) -> Any:
     """{("a", "b"): rho} or {"a": {"b": rho}} as the latter, each pair once, in order of names."""
     if not isinstance(value, Mapping):
         return value
-    flat: list[tuple[Any, Any]] = []
-    for key, inner in value.items():
-        nested = inner.items() if isinstance(inner, Mapping) else ()
-        flat += [((key, other), rho) for other, rho in nested] or [(key, inner)]
     found: dict[str, dict[str, Any]] = {}
-    for pair, rho in flat:
-        if not isinstance(pair, tuple) or len(pair) != 2 or pair[0] == pair[1]:
-            raise InputError(f"must name two different properties, got {describe(pair)}")
-        first, second = sorted(map(str, pair), key=[*NAMES, *map(str, pair)].index)
-        if second in found.setdefault(first, {}):
-            raise InputError(f"{first}, {second}: given twice")
-        found[first][second] = rho
+    for key, inner in value.items():
+        nested = inner if isinstance(inner, Mapping) else {None: inner}
+        for other, rho in nested.items():
+            pair = key if other is None else (key, other)
+            if not isinstance(pair, tuple) or len({*pair}) != 2 or len(pair) != 2:
+                raise InputError(f"must name two different properties, got {describe(pair)}")
+            first, second = sorted(map(str, pair), key=[*NAMES, *map(str, pair)].index)
+            if second in found.setdefault(first, {}):
+                raise InputError(f"{first}, {second}: given twice")
+            found[first][second] = rho
     return found
 
 
@@ -160,6 +159,11 @@ class RandomInterface:
                     f"between.{name}: a factor must be positive with mean 1, got mean {mean:g} and"
                     f" lower bound {low:g}"
                 )
+            if name in self.names and self.properties[name].conditions is not None:
+                problems.append(
+                    f"between.{name}: a measured property takes no factor; give its field the"
+                    " marginal of this specimen, such as st.fit_field finds"
+                )
         if not problems and np.linalg.eigvalsh(self.matrix)[0] < -DEFINITE:
             problems.append(
                 "correlation: these coefficients contradict each other (their matrix is not"
@@ -272,33 +276,23 @@ def _layout(random: RandomInterface, interface: Interface) -> list[Stream]:
 def _conditioned(
     random: RandomInterface, interface: Interface
 ) -> list[tuple[NDArray[np.int64], Conditioning]]:
-    """Measured values of each group of correlated properties, with the columns of its draws.
-
-    The last column is that of the factor between specimens on which it depends, if any.
-    """
-    streams, names, between = _layout(random, interface), random.names, random.between or {}
+    """Measured values of each group of correlated properties, with the columns of its draws."""
+    streams, fields = _layout(random, interface), list(random.properties.values())
     columns = [np.r_[stream.columns] for stream in streams]
     factor, found = lower_factor(random.matrix), []
     for group in np.unique(random.linked, axis=0):
-        members = np.flatnonzero(group)
-        known = [i for i in members if random.properties[names[i]].conditions is not None]
-        factors = [names[i] for i in known if names[i] in between]
-        if len(factors) > 1:
-            raise InputError(
-                f"between: {' and '.join(factors)} are correlated, were measured and have factors;"
-                " at most one of them may have one"
-            )
+        members, measured = np.flatnonzero(group), []
         of_group = np.concatenate([columns[j] for j in members])
-        measured = []
-        for i in known:
-            one = random.properties[names[i]].measured(interface, between.get(names[i]))
+        for i in members:
+            if fields[i].conditions is None:
+                continue
+            one = fields[i].measured(interface)
             phi = np.zeros((len(one.phi), random.dimension(interface)))
             for j in np.flatnonzero(factor[i]):
                 phi[:, columns[j][streams[i].own]] = factor[i, j] * one.phi
             measured.append(one._replace(phi=phi[:, of_group]))
         if measured:
-            last = [columns[len(names) + list(between).index(name)] for name in factors]
-            found.append((np.concatenate([of_group, *last]), Conditioning(measured)))
+            found.append((of_group, Conditioning(measured)))
     return found
 
 
