@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -301,7 +302,8 @@ def test_an_empty_run(command, tmp_path):
 
 
 def test_escape_sequences_of_a_run_are_not_printed_raw(command):
-    hostile = st.Study.from_dict(STUDY | {"title": "\x1b[2Jnice\x07\nsamples 9 of 9"})
+    title = "\x1b[2Jnice\x07\nsamples 9 of 9 <script>"
+    hostile = st.Study.from_dict(STUDY | {"title": title})
     hostile.to_toml("hostile.toml")
     command("run", "hostile.toml", "--out", "run")
     for name in ("check", "status"):
@@ -311,6 +313,8 @@ def test_escape_sequences_of_a_run_are_not_printed_raw(command):
         assert "\x07" not in out + errors
         assert "\\x1b[2Jnice" in out
         assert "\nsamples 9" not in out
+    command("report", "run")
+    assert "9 <script>" not in Path("run/report.html").read_text()
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="Windows has other means")

@@ -1,18 +1,29 @@
-"""What the pages of docs/ show: python that runs, study files that parse, links, names."""
+"""What README.md, docs/ and docstrings show: python that runs, study files, links, names."""
 
+import doctest
 import re
 import runpy
 import shutil
 import tomllib
+from importlib import import_module
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 
 import stiction as st
+from stiction.study.study import study_schema
 
 ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text("utf-8")
 PAGES = sorted((ROOT / "docs").glob("*.md"))
+MORE = [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
+COMMANDS = (
+    "python3 -m venv .venv && .venv/bin/python -m pip install . && .venv/bin/python reproduction",
+    'python3 -m venv .venv && .venv/bin/python -m pip install -e ".[test]"'
+    " && .venv/bin/python -m pytest",
+)
 
 
 def blocks(page, language):
@@ -24,12 +35,34 @@ def blocks(page, language):
     return [re.sub(rf"^{indent}", "", block, flags=re.MULTILINE) for indent, block in found]
 
 
-def run_blocks(page, scope, **fewer):
-    """Run the python of a page, numbers of samples replaced by smaller ones."""
+def run_blocks(page, scope, **less):
+    """Run the python of a page, some of its words replaced."""
     for block in blocks(page, "python"):
-        for name, value in fewer.items():
-            block = re.sub(rf"\b{name}=[\d_]+", f"{name}={value}", block)
+        for words, other in less.items():
+            block = re.sub(words, other, block)
         exec(compile(block, page, "exec"), scope)
+    return scope
+
+
+# -- what runs -----------------------------------------------------------------------------------
+
+
+def test_the_two_commands_stand_there_each_on_its_own_line():
+    for command in COMMANDS:
+        assert README.splitlines().count(command) == 1
+    # Continuous integration takes both from the README, so that they are run as printed.
+    assert (ROOT / ".ci" / "run").read_text().count("README.md") >= 2
+
+
+def test_python_of_the_readme(monkeypatch, tmp_path):
+    """On a coarser grid, and less far out in the tail."""
+    monkeypatch.chdir(tmp_path)
+    less = {
+        "nodes=(1024|512)": "nodes=256",
+        "probability=1e-3, method": "probability=0.1, method",
+    }
+    scope = run_blocks("README.md", {}, **less)
+    assert scope["result"].sizes["sample"] == 10_000
 
 
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
@@ -37,11 +70,10 @@ def test_python_of_the_page_on_studies(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     problem = st.paper.problem()
     strength = st.paper.strength(problem)
-    tau_p = strength.sample(problem.interface)[0]
-    table = np.column_stack([problem.interface.x, tau_p])
+    table = np.column_stack([problem.interface.x, strength.sample(problem.interface)[0]])
     np.savetxt("profile.csv", table, delimiter=",", header="x (m),strength (Pa)", comments="")
     scope = {"st": st, "problem": problem, "strength": strength}
-    run_blocks("docs/studies.md", scope, samples=4)
+    run_blocks("docs/studies.md", scope, **{r"\bsamples=[\d_]+": "samples=4"})
     assert scope["result"]["critical_stress"].dims == ("correlation_length", "length", "sample")
 
 
@@ -49,40 +81,50 @@ def test_python_of_the_page_on_studies(monkeypatch, tmp_path):
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 def test_the_tutorial_from_a_profile_to_a_failure_probability(monkeypatch, tmp_path):
     """Every block and command, with fewer repetitions."""
-    page = "docs/tutorials/measured-profile.md"
     monkeypatch.chdir(tmp_path)
     shutil.copytree(ROOT / "examples" / "data", tmp_path / "examples" / "data")
-    scope = {}
-    for block in blocks(page, "python"):
-        block = block.replace("bootstrap=200", "bootstrap=20").replace("[:20]", "[:2]")
-        exec(compile(block.replace("seed=1)", "seed=1, target_cv=0.3)"), page, "exec"), scope)
+    less = {
+        "bootstrap=200": "bootstrap=20", r"\[:20\]": "[:2]", r"seed=1\)": "seed=1, target_cv=0.3)"
+    }  # fmt: skip
+    scope = run_blocks("docs/tutorials/measured-profile.md", {}, **less)
     fit, truth = scope["fit"], {"mean": 1e6, "noise": 0.03e6, "spectrum.exponent": 2.0}
     for name, value in truth.items():
         assert fit.parameters[name] == pytest.approx(value, rel=0.2)
     assert 0.0 < scope["found"].probability < 0.5
     assert 0.2e6 < scope["design"].stress < 1e6
-    joint = st.Problem(
-        **tomllib.loads((ROOT / "examples/data/joint.toml").read_text())["problem"]
-    )
-    assert joint == scope["joint"]
-
-
-def test_the_tutorials_data_are_what_the_script_makes_and_say_so():
-    script = runpy.run_path(str(ROOT / "examples" / "data" / "make_strength_profile.py"))
-    text = (ROOT / "examples" / "data" / "strength_profile.csv").read_text("utf-8")
-    assert "synthetic" in text.splitlines()[0]
-    profile = st.read_profile(ROOT / "examples" / "data" / "strength_profile.csv")
-    x, strength = script["record"]()
-    np.testing.assert_allclose(profile["x"], 1e-3 * x, atol=1e-9)  # to the digits of the file
-    np.testing.assert_allclose(profile, 1e6 * strength, atol=51.0)
+    joint = tomllib.loads((ROOT / "examples/data/joint.toml").read_text())["problem"]
+    assert st.Problem(**joint) == scope["joint"]
 
 
 @pytest.mark.slow
 def test_python_of_the_page_on_reliability():
     """With a failure curve by equilibrium: about a minute."""
-    scope = {}
-    run_blocks("docs/reliability.md", scope)
+    scope = run_blocks("docs/reliability.md", {})
     assert 1e-6 < scope["found"].probability < 1e-3
+
+
+WITH_EXAMPLES = [
+    ".".join(path.relative_to(ROOT / "src").with_suffix("").parts)
+    for path in sorted((ROOT / "src").rglob("*.py"))
+    if ">>>" in path.read_text(encoding="utf-8")
+]
+
+
+@pytest.mark.parametrize("module", WITH_EXAMPLES)
+def test_examples_in_docstrings(module):
+    found = doctest.testmod(import_module(module))
+    assert found.attempted > 0
+    assert found.failed == 0
+
+
+def test_the_tutorials_data_are_what_the_script_makes_and_say_so():
+    data = ROOT / "examples" / "data"
+    script = runpy.run_path(str(data / "make_strength_profile.py"))
+    assert "synthetic" in (data / "strength_profile.csv").read_text("utf-8").splitlines()[0]
+    profile = st.read_profile(data / "strength_profile.csv")
+    x, strength = script["record"]()
+    np.testing.assert_allclose(profile["x"], 1e-3 * x, atol=1e-9)  # to the digits of the file
+    np.testing.assert_allclose(profile, 1e6 * strength, atol=51.0)
 
 
 def test_tables_of_study_files():
@@ -96,11 +138,26 @@ def test_tables_of_study_files():
             st.Study.from_dict(whole | table)
 
 
-def test_links():
-    # The entry of the site links pages that are made when it is built, and is checked there.
-    for page in [*(p for p in PAGES if p.name != "index.md"), ROOT / "CONTRIBUTING.md"]:
-        for target in re.findall(r"\]\((?!http)([^)#]+)", page.read_text("utf-8")):
-            assert (page.parent / target).exists(), f"{page.name}: {target}"
+@pytest.mark.parametrize("path", (ROOT / "examples").glob("*.toml"), ids=lambda path: path.name)
+def test_every_study_file_is_valid(path):
+    study = st.Study.from_toml(path)
+    jsonschema.validate(tomllib.loads(path.read_text()), study_schema())
+    assert st.Study.from_dict(study.to_dict()) == study
+
+
+# -- what the pages name -------------------------------------------------------------------------
+
+
+def test_links_and_paths():
+    pattern = r"`((?:examples|validation|benchmarks|tests|docs)/[\w./]+\.\w+)`"
+    for page in [*PAGES, *MORE]:
+        text = page.read_text("utf-8")
+        # The entry of the site links pages that are made when it is built, and is checked there.
+        links = [] if page.name == "index.md" else re.findall(r"\]\((?!http)([^)#]+)", text)
+        for place in [page.parent / link for link in links] + [
+            ROOT / path for path in re.findall(pattern, text)
+        ]:
+            assert place.exists(), f"{page.name}: {place}"
 
 
 def test_the_glossary_names_what_the_code_names():
@@ -109,12 +166,4 @@ def test_the_glossary_names_what_the_code_names():
     names = {name.split(".")[-1] for row in rows for name in re.findall(r"`([\w.]+)`", row)}
     assert len(names) > 50
     code = "\n".join(path.read_text("utf-8") for path in (ROOT / "src").rglob("*.py"))
-    words = set(re.findall(r"\w+", code))
-    assert names - words == set()
-
-
-def test_every_path_that_the_pages_name_is_there():
-    pattern = r"`((?:examples|validation|benchmarks|tests|docs)/[\w./]+\.\w+)`"
-    for page in [*PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md"]:
-        for path in re.findall(pattern, page.read_text("utf-8")):
-            assert (ROOT / path).exists(), f"{page.name}: {path}"
+    assert names - set(re.findall(r"\w+", code)) == set()

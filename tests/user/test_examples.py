@@ -1,12 +1,12 @@
 """How-tos and other scripts run, the long ones in small, and what they find is right."""
 
 import ast
-import dataclasses
 import importlib
 import itertools
 import re
 import runpy
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,12 +16,14 @@ ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
 
 
+def mean_and_error(values):
+    return float(values.mean()), float(values.std()) / np.sqrt(values.size)
+
+
 def measured_profile(found):
     """Interaction only lowers the onset; both begin where the strength is low."""
-    exact = found["onset"]  # of the last method, equilibrium
-    local = found["st"].onset(
-        found["problem"], found["profile"], method=found["st"].LocalCriterion()
-    )
+    st, exact = found["st"], found["onset"]  # of the last method, equilibrium
+    local = st.onset(found["problem"], found["profile"], method=st.LocalCriterion())
     assert exact.critical_stress < local.critical_stress.item()
     near = np.abs(found["x"] * 1e-3 - exact.critical_position.item()) < 1.5e-3
     assert found["tau_p"][near].mean() < np.quantile(found["tau_p"], 0.1)
@@ -30,11 +32,10 @@ def measured_profile(found):
 def spectrum(found):
     """Both fields have one distribution and one decay length, and still another onset."""
     machined, power_law = (found["onsets"][name] for name in ("machined", "power law"))
-    assert found["alike"].efolding_length == pytest.approx(
-        found["own"].efolding_length, rel=1e-9
-    )
-    difference = abs(float(machined.mean() - power_law.mean()))
-    assert difference > 5.0 * float(machined.std()) / np.sqrt(machined.size)
+    lengths = [found[name].efolding_length for name in ("alike", "own")]
+    assert lengths[0] == pytest.approx(lengths[1], rel=1e-9)
+    (one, error), (other, _) = mean_and_error(machined), mean_and_error(power_law)
+    assert abs(one - other) > 5.0 * error
 
 
 def method(found):
@@ -53,9 +54,8 @@ def nonuniform_load(found):
     place = onsets["high at the ends"].critical_position / length
     assert not ((place > 0.25) & (place < 0.75)).any()
     # Strength less initial stress differs by 0.2 MPa at most, and so does the load (monotony).
-    change = (
-        onsets["uniform, with initial stress"].critical_load - onsets["uniform"].critical_load
-    )
+    pushed = onsets["uniform, with initial stress"].critical_load
+    change = pushed - onsets["uniform"].critical_load
     assert (abs(change) <= 0.2e6).all()
     assert change.mean() < 0.0
 
@@ -69,17 +69,17 @@ def correlated(found):
 def critical_slip(found):
     """Where it varies, weak places may also weaken fast: the same samples slide earlier."""
     onsets = found["onsets"]
-    change = onsets["d_c random"].critical_stress - onsets["d_c uniform"].critical_stress
-    assert float(change.mean()) < -2.0 * float(change.std()) / np.sqrt(change.size)
+    mean, error = mean_and_error(
+        onsets["d_c random"].critical_stress - onsets["d_c uniform"].critical_stress
+    )
+    assert mean < -2.0 * error
 
 
 def failure(found):
     """Two methods agree in the tail, and P = 1e-6 lies between 1 and 3 kPa above the bound."""
     one, other = found["found"], found["again"]
-    error = np.hypot(one.cv, other.cv)
-    assert (
-        abs(np.log(one.probability / other.probability)) < 4.0 * error
-    )  # joint standard errors
+    error = np.hypot(one.cv, other.cv)  # joint
+    assert abs(np.log(one.probability / other.probability)) < 4.0 * error
     assert 1e3 < found["design"].stress_above_bound < 3e3
 
 
@@ -92,8 +92,8 @@ def scanned(found):
 
 def between(found):
     """Both scatters add, as squares, and the tail lies lower."""
-    one, other = (onset.critical_stress for onset in found["onsets"].values())
-    cv = [float(each.std() / each.mean()) for each in (one, other)]
+    stresses = [onset.critical_stress for onset in found["onsets"].values()]
+    cv = [float(each.std() / each.mean()) for each in stresses]
     assert cv[1] ** 2 - cv[0] ** 2 == pytest.approx(0.1**2, rel=0.25)  # 2,000 samples: 3 % each
 
 
@@ -189,29 +189,21 @@ def test_memory_script():
     assert 1e-4 < found["history cut at 100"].max() < 1e-2
 
 
-def test_energy_script():
+def test_energy_and_onset_scripts():
     errors = load("energy").compute()
     order = np.log2(errors[0][1] / errors[1][1])
     assert order == pytest.approx(2.0, abs=0.3)  # 1.93 on the page
-
-
-def test_onset_script():
-    found = load("onset").compute(nodes=256, samples=2, rates=(1e5, 2e7))
-    for difference in found.values():
-        assert np.abs(difference[0]).max() < 5e-6
-        assert np.abs(difference[1]).max() < 1e-3
-
-
-def test_grid_script():
-    found = load("grid").compute((0.25,), (512, 2048), samples=2)
-    slip, stress = found[0.25, 512]
-    # Largest of six fields on the page: 3.1 % and 0.06 %; a quarter of the dx^2 is left out.
-    assert 1e-4 < slip.max() < 0.04
-    assert stress.max() < 1e-3
+    for slow, fast in load("onset").compute(256, 2, (1e5, 2e7)).values():
+        assert np.abs(slow).max() < 5e-6
+        assert np.abs(fast).max() < 1e-3
 
 
 @pytest.mark.slow
 def test_remaining_scripts(tmp_path):
+    slip, stress = load("grid").compute((0.25,), (512, 2048), samples=2)[0.25, 512]
+    # Largest of six fields on the page: 3.1 % and 0.06 %; a quarter of the dx^2 is left out.
+    assert 1e-4 < slip.max() < 0.04
+    assert stress.max() < 1e-3
     waves = load("waves")
     errors = waves.compute()
     assert errors[0][1] / errors[1][1] == pytest.approx(4.0, abs=0.4)
@@ -233,34 +225,28 @@ def test_remaining_scripts(tmp_path):
 def test_line_and_plane_in_small(tmp_path, monkeypatch, capsys):
     """Eight nodes in h_n, six samples, and one correlation length."""
     study = load("line_and_plane")
-    coarse = [
-        dataclasses.replace(case, nodes=16 if "fine" in case.name else 8)
-        for case in study.CASES
-    ]
+    coarse = [replace(case, nodes=16 if "fine" in case.name else 8) for case in study.CASES]
     monkeypatch.setattr(study, "CASES", tuple(coarse))
     monkeypatch.setattr(study, "RATIOS", (0.5,))
     monkeypatch.setattr(study, "NEIGHBOURS", 2)
-    arguments = [str(tmp_path / "runs"), "--samples", "6", "--figures", str(tmp_path)]
-    drawing = load("line_and_plane_figures")
     drawn = []  # laying out and writing the figures takes longer than all the rest
     monkeypatch.setattr(study, "draw", lambda folder, *shown: drawn.append(shown))
-    study.main(arguments)
+    study.main([str(tmp_path / "runs"), "--samples", "6", "--figures", str(tmp_path)])
     heads = "| xi_0/h_n | line, 16 h_n | line, 64 h_n | plane, 4 h_n by 4 h_n |"
     assert heads in capsys.readouterr().out
-    assert [len(figure.axes) for figure in drawing.figures(*drawn[0]).values()] == [3, 4, 4]
+    figures = load("line_and_plane_figures").figures(*drawn[0])
+    assert [len(figure.axes) for figure in figures.values()] == [3, 4, 4]
     found = study.compute(tmp_path / "runs", 6, progress=False)  # what is stored
-    plane = found["plane, small"]
+    plane, line = found["plane, small"], found["line, small"]
     # The local criterion is an upper bound of the discrete problem, up to the gap of 1e-6.
     assert np.all(study.lowering(plane) > -1e-4)
-    assert plane.sizes["sample"] == 6
     # Finer nodes carry the same samples: 8 in h_n cost a per cent at most.
     fine = found["plane, small, fine"]
     np.testing.assert_allclose(fine.first_instability, plane.first_instability, rtol=0.01)
     # Slip that is held back near the critical patch can only raise the onset.
     (far,) = study.far_lowering(study.CASES[2], plane)
     assert far.value > 0.0
-    line, wide = (study.lowering(found[f"{kind}, small"]).mean() for kind in ("line", "plane"))
-    assert wide > line
+    assert study.lowering(plane).mean() > study.lowering(line).mean()
 
 
 def test_weakest_link_is_the_mean_over_all_choices():

@@ -1,11 +1,10 @@
 """Maps of a plane, with gaps and as text: the rules of lines."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 import xarray as xr
 from refusals import refuses
+from setups import make_problem
 from small_study import small_study
 
 import stiction as st
@@ -24,14 +23,19 @@ def text(path, head="x (mm); y (mm); strength (MPa)", without=0):
     return path
 
 
+def read(source, **options):
+    return st.read_profile(source, interface=PLANE, **options)
+
+
+# -- gaps ----------------------------------------------------------------------------------------
+
+
 def test_gaps_are_refused_filled_or_left_and_stay_where_they_are(tmp_path):
     path = text(tmp_path / "map.csv", without=3)
-    with pytest.raises(st.InputError, match="at 3 of 512 nodes, the first at x = 0 m, y = 0 m"):
-        st.read_profile(path, interface=PLANE)
-    left = st.read_profile(path, interface=PLANE, gaps="skip")
-    assert int(np.isnan(left).sum()) == 3
+    refuses("at 3 of 512 nodes, the first at x = 0 m, y = 0 m", lambda: read(path))
+    assert int(np.isnan(read(path, gaps="skip")).sum()) == 3
     with pytest.warns(st.AccuracyWarning, match="filled smoothly"):
-        filled = st.read_profile(path, interface=PLANE, gaps="fill")
+        filled = read(path, gaps="fill")
     assert int((~filled["measured"]).sum()) == 3
     # The map varies along x as a sine and is odd about x = 0: Laplace keeps it between its rim.
     assert np.abs(filled.values[0, :3] - 1e6).max() < 1e3
@@ -47,28 +51,24 @@ def test_a_filled_gap_is_harmonic():
     values = plane.astype(float)
     values[8:13, 4:9] = np.nan
     with pytest.warns(st.AccuracyWarning, match="filled"):
-        found = st.read_profile(
-            xr.DataArray(values, dims=("x", "y")), interface=PLANE, gaps="fill"
-        )
+        found = read(xr.DataArray(values, dims=("x", "y")), gaps="fill")
     np.testing.assert_allclose(found, plane, rtol=1e-12)
 
 
 def test_an_onset_in_a_gap_of_a_map_says_so():
-    problem = st.Problem(
-        solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.3, density=1200.0),
-        interface=PLANE,
-        friction=st.LinearWeakening(weakening_rate=3e11),
-    )
+    problem = make_problem((32, 16), (0.02, 0.01), weakening_rate=3e11)
     values = VALUES.copy()
     values[22:27, 5:9] = np.nan  # around the weakest line, x = 15 mm
     values[24, 4] = values[24, 9] = 0.3e6
-    with pytest.raises(st.InputError, match="values are missing"):
-        st.onset(problem, values, method=st.LocalCriterion())
+    given = {"method": st.LocalCriterion()}
+    refuses("values are missing", lambda: st.onset(problem, values, **given))
     with pytest.warns(st.AccuracyWarning, match="reaches into a gap of the profile"):
-        found = st.onset(problem, values, method=st.LocalCriterion(), gaps="fill")
+        found = st.onset(problem, values, **given, gaps="fill")
     assert bool(found["in_gap"].item())
-    whole = st.onset(problem, VALUES, method=st.LocalCriterion())
-    assert "in_gap" not in whole
+    assert "in_gap" not in st.onset(problem, VALUES, **given)
+
+
+# -- files of maps -------------------------------------------------------------------------------
 
 
 @pytest.fixture(params=[".csv", ".nc", ".npy"])
@@ -85,31 +85,24 @@ def heights(request, tmp_path):
     return text(path, "x (mm); y (mm); z (um)"), {}
 
 
-def test_heights_of_a_map_are_no_strength(heights):
+def test_heights_of_a_map_are_no_strength_and_no_line(heights):
     path, options = heights
     with pytest.raises(st.InputError, match="clearly the strength|cannot be converted to Pa"):
-        st.read_profile(path, interface=PLANE, **options)
-    found = st.read_profile(path, interface=PLANE, quantity="height", **options)
+        read(path, **options)
+    found = read(path, quantity="height", **options)
     np.testing.assert_allclose(found, VALUES * 1e-12, rtol=1e-8)
     assert found.attrs["units"] == "m"
-
-
-def test_a_map_is_not_read_as_a_line(tmp_path, heights):
-    np.savetxt(tmp_path / "matrix.csv", VALUES, delimiter=",")
-    line = st.Interface(length=0.02, nodes=32)
-    for source in (heights[0], tmp_path / "matrix.csv", MAP):
-        for options in ({}, {"quantity": "height", "unit": "um"}):
-            with pytest.raises(st.InputError, match=r"interface=st.Interface\(length=\(Lx, Ly"):
-                st.read_profile(source, interface=line, **options)
-
-
-def test_a_map_without_an_interface_keeps_its_coordinates(heights):
-    path, options = heights
-    found = st.read_profile(path, quantity="height", **options)
+    found = st.read_profile(path, quantity="height", **options)  # keeps its coordinates
     np.testing.assert_allclose(found, VALUES * 1e-12, rtol=1e-8)
     assert found.dims == ("x", "y")
     if path.suffix != ".npy":
         np.testing.assert_allclose(found.x, PLANE.x, rtol=1e-8)
+    np.savetxt(path.parent / "matrix.csv", VALUES, delimiter=",")
+    line = st.Interface(length=0.02, nodes=32)
+    for source in (path, path.parent / "matrix.csv", MAP):
+        for wrong in ({}, {"quantity": "height", "unit": "um"}):
+            with pytest.raises(st.InputError, match=r"interface=st.Interface\(length=\(Lx, Ly"):
+                st.read_profile(source, interface=line, **wrong)
 
 
 def test_a_study_file_reads_maps(heights):
@@ -121,21 +114,30 @@ def test_a_study_file_reads_maps(heights):
     np.testing.assert_allclose(found, VALUES * 1e-12, rtol=1e-8)
 
 
-def test_other_maps_are_refused(tmp_path):
-    metres = text(tmp_path / "map.csv", "x (m); y (m); strength (MPa)")
+OTHERS = {
+    "x reaches from 0 to 19.375 m ... check the unit of x": "metres.csv",
+    "16 columns without names, as of a matrix ... .npy": "matrix.csv",
+    "no columns x and y: got 'x', 'strength' ... .npy": "line.csv",
+    "x and y are swapped": "turned.npy",
+    "y reaches from 0 to 0.019375 m": MAP.rename(x="y", y="x"),
+    "x must be finite": MAP.assign_coords(x=np.where(MAP.x == 0.0, np.nan, MAP.x)),
+}
+
+
+@pytest.mark.parametrize("words", OTHERS)
+def test_other_maps_are_refused(tmp_path, words):
+    text(tmp_path / "metres.csv", "x (m); y (m); strength (MPa)")
     np.savetxt(tmp_path / "matrix.csv", VALUES, delimiter=",")
+    (tmp_path / "line.csv").write_text("x,strength\n0,1e6\n0.05,2e6\n")
     np.save(tmp_path / "turned.npy", VALUES.T)
-    unknown = MAP.assign_coords(x=np.where(MAP.x == 0.0, np.nan, MAP.x))
-    for words, source, options in (
-        ("x reaches from 0 to 19.375 m ... check the unit of x", metres, {}),
-        ("16 columns without names, as of a matrix ... .npy", tmp_path / "matrix.csv", {}),
-        ("x and y are swapped", tmp_path / "turned.npy", {}),
-        ("y reaches from 0 to 0.019375 m", MAP.rename(x="y", y="x"), {}),
-        ("x must be finite", unknown, {}),
-        ("interpolate: is an option of profiles of a line", MAP, {"interpolate": True}),
-        ("value: 'q' is not the name of the only variable, 'strength'", MAP, {"value": "q"}),
-    ):
-        refuses(words, partial(st.read_profile, source, interface=PLANE, **options))
+    source = OTHERS[words]
+    refuses(words, lambda: read(tmp_path / source if isinstance(source, str) else source))
+
+
+def test_options_of_lines_and_other_names_are_refused():
+    refuses("interpolate: is an option of profiles of a", lambda: read(MAP, interpolate=True))
+    words = "value: 'q' is not the name of the only variable, 'strength'"
+    refuses(words, lambda: read(MAP, value="q"))
 
 
 @pytest.mark.parametrize("order", ["descending", "shuffled"])
@@ -143,10 +145,8 @@ def test_coordinates_of_a_map_decide_and_not_the_order(tmp_path, order):
     values = VALUES + 1e4 * np.arange(16)
     array = MAP.copy(data=values)
     for dim, count in array.sizes.items():
-        index = np.arange(count)[::-1]
-        if order == "shuffled":
-            index = np.random.default_rng(0).permutation(count)
-        array = array.isel({dim: index})
+        shuffled = np.random.default_rng(0).permutation(count)
+        array = array.isel({dim: shuffled if order == "shuffled" else np.arange(count)[::-1]})
     array.to_netcdf(tmp_path / "map.nc")
     for source in (array, tmp_path / "map.nc"):
-        np.testing.assert_array_equal(st.read_profile(source, interface=PLANE), values)
+        np.testing.assert_array_equal(read(source), values)

@@ -7,38 +7,36 @@ import numpy as np
 import pytest
 import scipy.stats
 from refusals import refuses
+from setups import beta_strength, make_problem
 from small_study import small_study
 
 import stiction as st
-from stiction.errors import StoreError
 
-LENGTH, NODES = 0.1, 256
-SPECTRUM = st.PowerLawSpectrum(correlation_length=4e-3)
-FIELD = st.RandomField(st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6), SPECTRUM)
+FIELD = beta_strength(4e-3)
+LOCAL = st.LocalCriterion()
 
 
-def problem(modulus=1e9, density=1170.0, rate=0.5e12, length=LENGTH, pressure=None, slip=None):
-    rate = {"critical_slip": slip} if slip else {"weakening_rate": rate}
-    return st.Problem(
-        st.Solid(shear_modulus=modulus, poisson_ratio=0.33, density=density),
-        st.Interface(length=length, nodes=NODES),
-        st.LinearWeakening(**rate),
-        st.Load(normal_pressure=pressure),
-    )
+def problem(modulus=1e9, density=1170.0, length=0.1, pressure=None, **weakening):
+    solid, load = st.Solid(modulus, 0.33, density), st.Load(normal_pressure=pressure)
+    return make_problem(256, length, solid=solid, load=load, **weakening)
+
+
+PLAIN = problem()
 
 
 def monte_carlo(field):
-    return st.monte_carlo(problem(), field, method=st.LocalCriterion(), samples=2)
+    return st.monte_carlo(PLAIN, field, method=LOCAL, samples=2)
 
 
 DOUBTS = {
-    "units of shear_modulus = 1e.09 Pa and density = 1.17 kg/m3": lambda: problem(density=1.17),
+    "units of shear_modulus = 1e.09 Pa and density = 1.17 kg/m3": lambda: st.Solid(
+        1e9, 0.33, 1.17
+    ),
     "shear wave speed is 0.02924 m/s, which no solid has": lambda: st.Solid(1.0, 0.33, 1170.0),
-    "nucleation length 3.46e.03 m. fills the interface": lambda: problem(rate=0.5e6),
-    "fills the interface": lambda: problem(slip=2.0).warn_of_units(1e6),
-    "is 1e.03 of the shear modulus": lambda: problem(slip=2.0).warn_of_units(1e12),
+    "fills the interface": lambda: problem(critical_slip=2.0).warn_of_units(1e6),
+    "is 1e.03 of the shear modulus": lambda: problem(critical_slip=2.0).warn_of_units(1e12),
     "its mean, 1 Pa, is 1e-09 of the shear modulus": lambda: st.onset(
-        problem(), np.ones(NODES), method=st.LocalCriterion()
+        PLAIN, np.ones(256), method=LOCAL
     ),
     "2e-06 of the normal pressure": lambda: problem(pressure=5e11).warn_of_units(1e6),
     "percentages": lambda: problem(pressure=5e4).warn_of_units(1e6),
@@ -47,9 +45,12 @@ DOUBTS = {
         st.RandomField(FIELD.marginal, st.PowerLawSpectrum(4.0), mean_mode=True)
     ),
     "friction_coefficient: 8e.07 Pa is 81 times": lambda: st.failure_probability(
-        problem(pressure=2e6), FIELD, friction_coefficient=40, method=st.LocalCriterion()
+        problem(pressure=2e6), FIELD, friction_coefficient=40, method=LOCAL
     ),
-    "residual_strength: its mean, 0.45 Pa": lambda: problem().warn_of_units(1e6, 0.45),
+    "residual_strength: its mean, 0.45 Pa": lambda: PLAIN.warn_of_units(1e6, 0.45),
+    "of the shear modulus": lambda: monte_carlo(
+        st.RandomField(scipy.stats.uniform(0.3, 0.2), FIELD.spectrum)
+    ),
 }
 
 
@@ -57,7 +58,13 @@ DOUBTS = {
 def test_a_wrong_unit_is_doubted(words):
     with pytest.warns(st.UnitWarning, match=words) as caught:
         DOUBTS[words]()
-    assert caught[0].filename == __file__
+    (unit, *_) = [one for one in caught if one.category is st.UnitWarning]
+    assert unit.filename == __file__
+
+
+def test_the_nucleation_length_is_doubted_by_its_value():
+    with pytest.warns(st.UnitWarning, match="nucleation length 3.46e.03 m. fills the interf"):
+        problem(weakening_rate=0.5e6)
 
 
 @pytest.mark.parametrize("family", [st.Lognormal, st.Weibull, st.Gamma, st.TruncatedNormal])
@@ -67,18 +74,7 @@ def test_a_coefficient_of_variation_in_per_cent_is_refused(family):
 
 @pytest.mark.parametrize("changes", [{"modulus": 1e3}, {"length": 100.0}])
 def test_more_nodes_than_anybody_has_suggest_a_unit(changes):
-    with pytest.raises(st.InputError, match="check the units of all lengths, moduli"):
-        problem(**changes)
-
-
-def test_ensembles_warn_too_and_point_at_the_caller():
-    field = st.RandomField(scipy.stats.uniform(0.3, 0.2), SPECTRUM)
-    method = st.LocalCriterion()
-    with pytest.warns(st.UnitWarning, match="of the shear modulus") as caught:
-        monte_carlo(field)
-    assert {one.filename for one in caught if one.category is st.UnitWarning} == {__file__}
-    with pytest.warns(st.UnitWarning, match="of the shear modulus"):
-        st.failure_probability(problem(), field, 0.1, method=method)
+    refuses("check the units of all lengths, moduli", lambda: problem(**changes))
 
 
 @pytest.mark.parametrize(
@@ -102,27 +98,19 @@ def test_what_people_study_raises_no_doubt(solid, friction, length, strength):
 
 
 def test_harmless_forms_are_taken():
-    method = st.LocalCriterion()
-    result = st.monte_carlo(
-        problem(), FIELD, method=method, samples=1e1, keep="strength", seed=2.0
-    )
-    expected = FIELD.sample(problem().interface, samples=np.float64(10.0), seed=2)
+    given = {"samples": 1e1, "keep": "strength", "seed": 2.0}
+    result = st.monte_carlo(PLAIN, FIELD, method=LOCAL, **given)
+    expected = FIELD.sample(PLAIN.interface, samples=np.float64(10.0), seed=2)
     np.testing.assert_array_equal(result["strength"], expected)
     assert st.Interface(length=0.1, nodes=256.0).nodes == 256
     assert st.Ensemble(samples=1e4, keep="strength").keep == ("strength",)
-    for words, options in {
-        "keep: must be a name or a list of names, got 3": {"samples": 2, "keep": 3},
-        "samples: must be a whole number >= 1, got 2.5": {"samples": 2.5},
-    }.items():
-        refuses(words, partial(st.monte_carlo, problem(), FIELD, method=method, **options))
 
 
 def test_representations_fit_on_a_screen(tmp_path):
-    system = problem(pressure=np.linspace(1e6, 2e6, NODES))
+    system = problem(pressure=np.linspace(1e6, 2e6, 256))
     assert len(repr(system)) < 600
     assert "<256 array, 1e+06 to 2e+06>" in repr(system)
     st.Study.from_dict(small_study(ensemble={"samples": 3})).run(out=tmp_path / "run")
     assert repr(st.open_run(tmp_path / "run")).endswith("run': 3 samples>")
     assert len(repr(st.open_run(tmp_path / "run").status())) < 200
     assert len(repr(st.statistics.density(np.random.default_rng(0).random(1000)))) < 300
-    assert issubclass(StoreError, st.RunError)

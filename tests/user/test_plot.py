@@ -9,11 +9,16 @@ import pytest
 import xarray as xr
 from PIL import Image
 from refusals import refuses
+from setups import make_problem
 
 import stiction as st
 
 PRESSURE = 5e6
 LOCAL = st.LocalCriterion()
+PLAIN = st.paper.problem(nodes=256)
+PROBLEM = dataclasses.replace(PLAIN, load=st.Load(normal_pressure=PRESSURE))
+FIELD = st.paper.strength(PROBLEM, correlation_ratio=0.5)
+TAU_P = FIELD.sample(PROBLEM.interface, samples=3, seed=1)
 
 
 @pytest.fixture(autouse=True)
@@ -24,28 +29,17 @@ def quiet_figures():
 
 
 @pytest.fixture(scope="module")
-def system():
-    plain = st.paper.problem(nodes=256)
-    problem = dataclasses.replace(plain, load=st.Load(normal_pressure=PRESSURE))
-    strength = st.paper.strength(problem, correlation_ratio=0.5)
-    tau_p = strength.sample(problem.interface, samples=3, seed=1)
-    return problem, strength, tau_p
-
-
-@pytest.fixture(scope="module")
-def run(system):
+def run():
     """A rupture."""
-    problem, _, tau_p = system
     method = st.Rupture(loading_rate=1e8)
-    return st.simulate_rupture(problem, tau_p[0], method=method, save=st.Save(every=20))
+    return st.simulate_rupture(PROBLEM, TAU_P[0], method=method, save=st.Save(every=20))
 
 
 @pytest.fixture(scope="module")
-def swept(system):
-    problem, strength, _ = system
+def swept():
     return st.Study(
-        problem=dataclasses.replace(problem, load=st.Load()),
-        random=strength,
+        problem=PLAIN,
+        random=FIELD,
         method=LOCAL,
         ensemble=st.Ensemble(samples=50),
         sweep=[
@@ -55,11 +49,16 @@ def swept(system):
     ).run()
 
 
-def test_an_onset_is_drawn_where_the_result_says(system):
+def coefficients(axes, scale, limits):
+    """The second scale shows the stresses, MPa, of the first as coefficients."""
+    axes.figure.canvas.draw()
+    return np.array(getattr(scale, limits)()) * PRESSURE * 1e-6
+
+
+def test_an_onset_is_drawn_where_the_result_says():
     """Of the sample asked for, by each method, with coefficients beside the stresses."""
-    problem, _, tau_p = system
-    results = [st.onset(problem, tau_p, method=m) for m in (LOCAL, st.Equilibrium())]
-    axes = st.plot.onset(results, tau_p, sample=2)
+    results = [st.onset(PROBLEM, TAU_P, method=m) for m in (LOCAL, st.Equilibrium())]
+    axes = st.plot.onset(results, TAU_P, sample=2)
     marked = [line for line in axes.lines if line.get_marker() != "None"]
     marks = {line.get_label(): line.get_xydata() for line in marked}
     assert len(marks) == 2
@@ -68,34 +67,31 @@ def test_an_onset_is_drawn_where_the_result_says(system):
         assert place[0, 1] == pytest.approx(result.critical_load[2].item() * 1e-6)
         assert f"{result.friction_coefficient[2].item():.4f}" in label
     (scale,) = axes.child_axes
-    axes.figure.canvas.draw()
-    assert np.array(scale.get_ylim()) * PRESSURE * 1e-6 == pytest.approx(axes.get_ylim())
+    assert coefficients(axes, scale, "get_ylim") == pytest.approx(axes.get_ylim())
 
 
-def test_plots_take_axes_and_leave_the_others_alone(system):
-    problem, _, tau_p = system
+def test_plots_take_axes_and_leave_the_others_alone():
     _, (left, right) = plt.subplots(1, 2)
-    assert st.plot.field(problem, tau_p, ax=right) is right
+    assert st.plot.field(PROBLEM, TAU_P, ax=right) is right
     assert not left.lines
-    assert right.lines[0].get_ydata() == pytest.approx(tau_p[0] * 1e-6)
+    assert right.lines[0].get_ydata() == pytest.approx(TAU_P[0] * 1e-6)
 
 
-def test_monte_carlo_shows_coefficients_where_there_is_a_pressure(system, swept):
-    problem, strength, _ = system
-    found = st.monte_carlo(problem, strength, method=LOCAL, samples=200, seed=0)
+def test_monte_carlo_shows_coefficients_where_there_is_a_pressure(swept):
+    found = st.monte_carlo(PROBLEM, FIELD, method=LOCAL, samples=200, seed=0)
     axes = st.plot.monte_carlo(found)
     assert axes.get_xlabel() == "static friction coefficient"
     curve = axes.lines[0].get_xydata()
     assert np.trapezoid(curve[:, 1], curve[:, 0]) == pytest.approx(1.0, abs=0.02)
     mean = np.trapezoid(curve[:, 0] * curve[:, 1], curve[:, 0])
     assert mean == pytest.approx(found.critical_stress.mean().item() / PRESSURE, rel=0.01)
-    assert st.plot.monte_carlo(found, quantity="critical_stress").get_xlabel().endswith("(MPa)")
     both = st.plot.monte_carlo({"one": found, "other": found})
     assert [text.get_text() for text in both.get_legend().get_texts()] == ["one", "other"]
     assert len(st.plot.monte_carlo(swept.isel(residual_strength=0)).lines) == 3
     weak = found.map(lambda values: 0.01 * values, keep_attrs=True)
-    curves = st.plot.monte_carlo([weak, found], quantity="critical_stress").lines
-    tops = [curve.get_xdata()[curve.get_ydata().argmax()] for curve in curves]
+    axes = st.plot.monte_carlo([weak, found], quantity="critical_stress")
+    assert axes.get_xlabel().endswith("(MPa)")
+    tops = [curve.get_xdata()[curve.get_ydata().argmax()] for curve in axes.lines]
     assert tops[0] == pytest.approx(0.01 * tops[1])  # both in MPa
 
 
@@ -107,35 +103,29 @@ def test_quantiles_of_sweeps(swept):
     assert medians == pytest.approx(expected, rel=2e-3)  # the estimator smooths a little
 
 
-def test_failure_curve_and_weak_spots(system):
-    problem, strength, _ = system
-    curve = st.failure_curve(problem, strength, method=LOCAL, smallest=1e-3)
+def test_failure_curve_and_weak_spots():
+    curve = st.failure_curve(PROBLEM, FIELD, method=LOCAL, smallest=1e-2)
     axes = st.plot.failure_curve(curve)
     assert axes.get_yscale() == "log"
-    axes.figure.canvas.draw()
     (above,) = axes.child_axes
-    assert np.array(above.get_xlim()) * PRESSURE * 1e-6 == pytest.approx(axes.get_xlim())
-    found = st.failure_probability(problem, strength, stress=0.7e6, method=LOCAL)
+    assert coefficients(axes, above, "get_xlim") == pytest.approx(axes.get_xlim())
+    found = st.failure_probability(PROBLEM, FIELD, stress=0.7e6, method=LOCAL)
     mean = st.plot.weak_spots(found).lines[-2].get_xydata()
     assert abs(mean[mean[:, 1].argmin(), 0]) < 0.5  # weakest within the critical patch
 
 
-def test_a_rupture(system, run, tmp_path):
-    onset = st.plot.rupture(run).lines[0].get_xydata()[0]
-    assert onset == pytest.approx([run.critical_position.item() * 1e3, 0.0])
-    assert st.plot.rupture(run.drop_attrs(), problem=system[0]).lines
-    at_once = run.assign(onset_time=run.onset_time * 0.0)  # it begins with the run
-    st.plot.rupture(at_once).figure.savefig(tmp_path / "rupture.png")
-
-
-def test_units_follow_the_size_of_the_fault(system, run):
+def test_a_rupture_in_the_units_of_its_size(run, tmp_path):
     axes = st.plot.rupture(run)
+    onset = axes.lines[0].get_xydata()[0]
+    assert onset == pytest.approx([run.critical_position.item() * 1e3, 0.0])
     assert axes.get_xlabel() == "position $x$ (mm)"
     assert axes.get_ylabel() == "time since the onset (µs)"
-    weak = st.LinearWeakening(weakening_rate=0.2e6)
-    large = st.Problem(system[0].solid, st.Interface(length=5e4, nodes=256), weak)
-    later = run.assign_coords(time=run.time * 1e6)
-    axes = st.plot.rupture(later.assign(onset_time=run.onset_time * 1e6), problem=large)
+    assert st.plot.rupture(run.drop_attrs(), problem=PROBLEM).lines
+    at_once = run.assign(onset_time=run.onset_time * 0.0)  # it begins with the run
+    st.plot.rupture(at_once).figure.savefig(tmp_path / "rupture.png")
+    large = make_problem(256, 5e4, weakening_rate=0.2e6)
+    later = run.assign_coords(time=run.time * 1e6).assign(onset_time=run.onset_time * 1e6)
+    axes = st.plot.rupture(later, problem=large)
     assert axes.get_xlabel() == "position $x$ (km)"
     assert axes.get_ylabel() == "time since the onset (s)"
 
@@ -149,44 +139,37 @@ def test_film_moves(run, tmp_path):
 
 
 def test_planes():
-    solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0)
-    interface = st.Interface(length=(0.02, 0.01), nodes=(64, 32))
-    problem = st.Problem(solid, interface, st.LinearWeakening(weakening_rate=5e11))
-    tau_p = st.paper.strength(problem, correlation_ratio=1.0).sample(interface, seed=0)
+    problem = make_problem((64, 32), (0.02, 0.01))
+    tau_p = st.paper.strength(problem, correlation_ratio=1.0).sample(problem.interface, seed=0)
     assert st.plot.field(problem, tau_p).images
     local = st.onset(problem, tau_p, method=LOCAL)
-    place = local.critical_position.values[0] * 1e3
     axes = st.plot.onset(local, tau_p)
+    place = local.critical_position.values[0] * 1e3
     assert axes.lines[0].get_xydata()[0] == pytest.approx(place)
     assert len(axes.patches) == 9  # the ellipse and its periodic images
     exact = st.onset(problem, tau_p, method=st.Equilibrium(slip=True, sensitivity=True))
     assert len(st.plot.onset([local, exact], tau_p).collections) == 2  # two outlines
 
 
-def test_what_does_not_fit_is_refused(system, run, swept):
-    problem, _, tau_p = system
-    found = st.onset(problem, tau_p, method=LOCAL)
+def test_what_does_not_fit_is_refused(run, swept):
+    found = st.onset(PROBLEM, TAU_P, method=LOCAL)
     one = swept.isel(residual_strength=0, correlation_length=0)
+    plot = st.plot
     for words, call in {
-        "must have shape (256) or (samples, 256)": lambda: st.plot.onset(found, tau_p[:, :100]),
-        "sample: 3 of results and strength with 3 samples": lambda: st.plot.onset(
-            found, tau_p, sample=3
-        ),
-        "with 1, 3 samples": lambda: st.plot.onset(found, tau_p[0]),
-        "quantity: must be one of strength": lambda: st.plot.field(
-            problem, tau_p, quantity="roughness"
-        ),
-        "ax: must be matplotlib axes, got ndarray": lambda: st.plot.field(
-            problem, tau_p, ax=np.zeros(2)
-        ),
-        "has no slip_patches; it holds": lambda: st.plot.monte_carlo(
-            one, quantity="slip_patches"
-        ),
-        "result.isel(": lambda: st.plot.monte_carlo(swept),
-        "one or two parameters, got none": lambda: st.plot.quantiles(one),
-        "holds no failing profile": lambda: st.plot.weak_spots(xr.Dataset()),
-        "give problem=": lambda: st.plot.rupture(run.drop_attrs()),
-        "has no slip_rate": lambda: st.plot.rupture(run.drop_vars("slip_rate")),
-        ".gif, got 'film.avi'": lambda: st.plot.film(run, "film.avi"),
+        "must have shape (256) or (samples, 256)": lambda: plot.onset(found, TAU_P[:, :100]),
+        "sample: 3 of results and strength": lambda: plot.onset(found, TAU_P, sample=3),
+        "with 1, 3 samples": lambda: plot.onset(found, TAU_P[0]),
+        "quantity: must be one of strength": lambda: plot.field(PROBLEM, ONE, quantity="rough"),
+        "ax: must be matplotlib axes, got ndarray": lambda: plot.field(PROBLEM, ONE, ax=ONE),
+        "has no slip_patches; it holds": lambda: plot.monte_carlo(one, quantity="slip_patches"),
+        "result.isel(": lambda: plot.monte_carlo(swept),
+        "one or two parameters, got none": lambda: plot.quantiles(one),
+        "holds no failing profile": lambda: plot.weak_spots(xr.Dataset()),
+        "give problem=": lambda: plot.rupture(run.drop_attrs()),
+        "has no slip_rate": lambda: plot.rupture(run.drop_vars("slip_rate")),
+        ".gif, got 'film.avi'": lambda: plot.film(run, "film.avi"),
     }.items():
         refuses(words, call)
+
+
+ONE = TAU_P[0]

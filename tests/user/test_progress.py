@@ -9,6 +9,7 @@ import types
 
 import numpy as np
 import pytest
+from refusals import refuses
 
 import stiction as st
 from stiction import progress
@@ -86,25 +87,20 @@ def test_one_of_nested_meters_is_shown(hasty, capsys):
 
 def test_a_call_ends_when_its_time_is_over():
     problem = st.paper.problem(nodes=256)
-    random = st.paper.strength(problem, 0.5)
-    method = st.LocalCriterion()
-    with pytest.warns(st.AccuracyWarning, match="samples are done; the others are NaN"):
-        part = st.monte_carlo(
-            problem, random, method=method, samples=10**6, workers=1, time_limit=0.3
-        )
+    given = {"random": st.paper.strength(problem, 0.5), "method": st.LocalCriterion()}
+    words = "samples are done; the others are NaN"
+    with pytest.warns(st.AccuracyWarning, match=words):
+        part = st.monte_carlo(problem, **given, samples=10**6, workers=1, time_limit=0.3)
     done = part["critical_stress"].notnull().values
     assert 0 < done.sum() < 10**6
     assert part.attrs["cut_short"] == f"{done.sum()} of 1000000 samples are done"
-    told = []
-    whole = st.onset(
-        problem,
-        random.sample(problem.interface, samples=100, seed=0),
-        method=method,
-        progress=lambda *done: told.append(done),
-    )
-    assert told[-1] == (100, 100)
+    whole = st.monte_carlo(problem, **given, samples=100)
     same = done[:100]
     np.testing.assert_array_equal(whole.critical_stress[same], part.critical_stress[:100][same])
-    for limit in (0, -1.0, True, "10", np.nan, np.inf):
-        with pytest.raises(st.InputError, match="time_limit"):
-            st.monte_carlo(problem, random, method=method, samples=1, time_limit=limit)
+
+
+@pytest.mark.parametrize("limit", [0, True, "10", np.nan])
+def test_what_is_no_time_limit_is_refused(limit):
+    problem = st.paper.problem(nodes=256)
+    given = {"random": st.paper.strength(problem, 0.5), "method": st.LocalCriterion()}
+    refuses("time_limit", lambda: st.monte_carlo(problem, **given, samples=1, time_limit=limit))

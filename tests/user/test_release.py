@@ -16,21 +16,17 @@ CODEMETA = json.loads((ROOT / "codemeta.json").read_text())
 RECIPE = (ROOT / "conda" / "recipe.yaml").read_text()
 
 
-def test_the_version_stands_everywhere():
+def test_the_version_and_its_date_stand_everywhere():
     assert f"\nversion: {st.__version__}\n" in CITATION
     assert CODEMETA["version"] == st.__version__
     assert f'version: "{st.__version__}"' in RECIPE
-
-
-def test_the_version_is_in_the_changelog_with_its_date():
-    found = re.search(
-        rf"^## {re.escape(st.__version__)} - (\d{{4}}-\d\d-\d\d)$",
-        (ROOT / "CHANGELOG.md").read_text(),
-        flags=re.MULTILINE,
-    )
-    assert found is not None
-    assert f"date-released: {found[1]}" in CITATION
-    assert CODEMETA["datePublished"] == found[1]
+    heading = rf"^## {re.escape(st.__version__)} - (\d{{4}}-\d\d-\d\d)$"
+    (date,) = re.findall(heading, (ROOT / "CHANGELOG.md").read_text(), flags=re.MULTILINE)
+    assert f"date-released: {date}" in CITATION
+    assert CODEMETA["datePublished"] == date
+    command = [sys.executable, "-m", "stiction", "--version"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout == f"stiction {st.__version__}\n"
 
 
 def test_the_recipe_needs_what_the_package_needs():
@@ -50,9 +46,6 @@ def test_pythons_are_those_that_the_workflow_runs():
     matrix = re.search(r"python: \[(.*)\]", workflow)
     assert re.findall(r"3\.\d+", matrix[1]) == named
     assert META["requires-python"] == f">={named[0]}"
-    assert "bash .ci/run" in workflow
-    for system in ("ubuntu", "macos", "windows"):
-        assert f"{system}-latest" in workflow
 
 
 def test_addresses_agree_once_there_are_any():
@@ -65,9 +58,3 @@ def test_references_of_the_article_are_there():
     text = (ROOT / "paper" / "paper.md").read_text()
     there = set(re.findall(r"@\w+\{(\w+),", (ROOT / "paper" / "paper.bib").read_text()))
     assert set(re.findall(r"@([a-z]+\d*)", text.split("---")[2])) == there
-
-
-def test_the_command_says_its_version():
-    command = [sys.executable, "-m", "stiction", "--version"]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert done.stdout == f"stiction {st.__version__}\n"

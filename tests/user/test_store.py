@@ -36,16 +36,12 @@ def make_study(samples=120, **changes):
     return st.Study.from_dict(study | changes)
 
 
-def pieces_of(size):
-    return lambda experiment, span, *rest: min(size, span.samples)
-
-
 @pytest.fixture
 def often(monkeypatch):
     """Many chunks of twenty samples instead of one a second."""
     monkeypatch.setattr(store, "SAVE_SECONDS", 0.0)
     monkeypatch.setattr(store, "SAVE_SHARE", 0.0)
-    monkeypatch.setattr(batches, "piece_size", pieces_of(20))
+    monkeypatch.setattr(batches, "piece_size", lambda one, span, *rest: min(20, span.samples))
 
 
 @pytest.fixture(scope="module")
@@ -69,8 +65,7 @@ def again(folder, words=None, executor=None):
         warnings.simplefilter("always")
         result = make_study().run(out=folder, workers=1, executor=executor)
     texts = "\n".join(str(w.message) for w in caught if w.category is UserWarning)
-    assert bool(texts) == bool(words), texts
-    assert all(word in texts for word in words or ()), texts
+    assert words in texts if words else not texts, texts
     return result
 
 
@@ -146,7 +141,7 @@ def test_every_sample_is_in_one_part_and_parts_are_alike(points, samples, of):
     assert max(sizes) - min(sizes) <= max(1, points * samples // (8 * of))
 
 
-@pytest.mark.parametrize("value", ["0/3", "4/3", "3", "a/b", (1, 0), (1, 2, 3), 3, 1.5])
+@pytest.mark.parametrize("value", ["0/3", "4/3", "3", "a/b", (1, 0), 1.5])
 def test_what_is_no_part_is_refused(value):
     refuses("part: must be", lambda: make_study().run(out="none", part=value))
 
@@ -160,9 +155,7 @@ def test_parts_in_one_folder_are_one_run(tmp_path, often, reference):
     assert again(tmp_path / "run", executor=Forbidding()).identical(reference)
 
 
-def test_a_reader_beside_a_writer_sees_no_damage(tmp_path, monkeypatch):
-    monkeypatch.setattr(store, "SAVE_SECONDS", 0.0)
-    monkeypatch.setattr(batches, "piece_size", pieces_of(10))
+def test_a_reader_beside_a_writer_sees_no_damage(tmp_path, often):
     options = {"out": tmp_path / "run", "workers": 1, "pilot": False}
     thread = threading.Thread(target=lambda: make_study().run(**options), daemon=True)
     thread.start()
@@ -200,7 +193,7 @@ def test_damaged_chunks_are_found_and_computed_again(run, reference, damage):
         part = st.open_run(run).dataset()
     assert any("samples are missing" in str(w.message) for w in caught) != gone
     assert int(part["critical_stress"].isnull().sum()) == lost
-    assert again(run, None if gone else ["its samples are computed again"]).identical(reference)
+    assert again(run, None if gone else "its samples are computed again").identical(reference)
     after = {path: path.stat().st_mtime_ns for path in chunks(run)}
     kept = [path for path in before if path != victim]
     assert {path: after[path] for path in kept} == {path: before[path] for path in kept}
@@ -217,7 +210,7 @@ def test_a_damaged_study_is_made_of_the_one_given_and_the_chunks(run, reference,
         st.open_run(run)
     with pytest.raises(StoreError, match="belongs to another study"):
         make_study(ensemble={"samples": 120, "seed": 4}).run(out=run)
-    assert again(run, ["study.json is damaged or missing"]).identical(reference)
+    assert again(run, "study.json is damaged or missing").identical(reference)
     assert again(run).identical(reference)
 
 

@@ -3,10 +3,7 @@
 import copy
 import dataclasses
 import json
-import tomllib
-from pathlib import Path
 
-import jsonschema
 import numpy as np
 import pytest
 import scipy.stats
@@ -15,9 +12,7 @@ from refusals import refusals, refuses
 from small_study import lengths, small_study
 
 import stiction as st
-from stiction.study.study import study_schema
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 STUDY = small_study()
 BASE = st.Study.from_dict(STUDY)
 LENGTH = "random.strength.spectrum.correlation_length"
@@ -136,13 +131,6 @@ def test_a_function_cannot_be_written_down(tmp_path):
 def test_files_that_are_not_toml(tmp_path, text):
     (tmp_path / "study.toml").write_bytes(text.encode("latin-1"))
     refuses("study.toml", lambda: st.Study.from_toml(tmp_path / "study.toml"))
-
-
-@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.toml")), ids=lambda path: path.name)
-def test_every_example_is_valid(path):
-    study = st.Study.from_toml(path)
-    jsonschema.validate(tomllib.loads(path.read_text()), study_schema())
-    assert st.Study.from_dict(study.to_dict()) == study
 
 
 # -- points of a sweep ---------------------------------------------------------------------------
