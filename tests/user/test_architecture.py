@@ -57,13 +57,6 @@ def test_an_edited_message_compiles_no_kernel_anew():
             assert module == "stiction.jit" or "InputError" not in imported, (path, module)
 
 
-def test_the_files_that_the_page_names_exist():
-    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
-    known = [path.as_posix() for path in ROOT.glob("*/**/*.py") if ".venv" not in path.parts]
-    for name in re.findall(r"`([\w/]+\.py)`", page):
-        assert any(path.endswith(f"/{name}") for path in known), name
-
-
 def test_the_worked_examples_run():
     """A friction law, a load, a spectrum and a marginal of one's own, as the page shows them."""
     page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")

@@ -11,8 +11,6 @@ from setups import SOLID, beta_strength, make_problem
 
 import stiction as st
 from stiction.equilibrium.solver import Solver
-from stiction.random.marginals import Marginal
-from stiction.random.spectra import SpectralDensity
 from stiction.reliability import subset
 
 LOCAL = st.LocalCriterion()
@@ -55,8 +53,6 @@ def loaded(profile):
 
 test_numbers = refusals({
     "density ... number ... '1170'": lambda: solid(density="1170"),
-    "density ... nan": lambda: solid(density=np.nan),
-    "0.5 ... less": lambda: solid(poisson_ratio=0.5),
     "length ... True": lambda: st.Interface(length=True, nodes=64),
     "length ... finite": lambda: st.Interface(length=10**400, nodes=64),
     "length ... positive": lambda: st.Interface(length=0.0, nodes=64),
@@ -65,9 +61,7 @@ test_numbers = refusals({
     "nodes ... whole": lambda: st.Interface(length=0.1, nodes=64.5),
     "nodes ... at most 2^24": lambda: st.Interface(length=0.1, nodes=10**30),
     "-2 ... positive": lambda: st.LinearWeakening(weakening_rate=[1.0, -2.0]),
-    "residual_strength ... -1": lambda: st.LinearWeakening(1.0, residual_strength=-1.0),
     "profile ... finite ... entry 1": lambda: st.Load(profile=[1.0, np.nan]),
-    "profile ... positive": lambda: st.Load(profile=[1.0, 0.0]),
     "low=2 ... high=1": lambda: st.Beta(alpha=1.0, beta=1.0, low=2.0, high=1.0),
     "alpha ... 0": lambda: st.Beta(alpha=0.0, beta=1.0, low=1.0, high=2.0),
     "mean: must be less than ... 1e+308": lambda: st.Lognormal(mean=1e308, cv=1e308),
@@ -76,7 +70,6 @@ test_numbers = refusals({
         slip=np.array(0.5), strength=[0.5, 0.0], critical_slip=1e-6
     ),
     "correlation_length ... 0.000000000000001": lambda: st.PowerLawSpectrum(5e-324),
-    "exponent ... 0.6 ... 0.5": lambda: st.PowerLawSpectrum(1.0, exponent=0.5),
     "power_kept ... less than 1": lambda: st.ExponentialSpectrum(1.0, power_kept=1.0),
     "slip ... valid boolean ... '1'": lambda: st.Equilibrium(slip="1"),
     "arrest ... valid boolean ... 'no'": lambda: st.theory.griffith_length(
@@ -87,13 +80,8 @@ test_numbers = refusals({
         PROBLEM, make_strength(), seed="1"
     ),
     "samples ... >= 1 ... 0": lambda: monte_carlo(samples=0),
-    "samples ... less than or equal to 10000000000": lambda: st.Ensemble(samples=10**13),
-    "title ... valid string ... b'x'": lambda: make_study(title=b"x"),
     "title ... valid string": lambda: make_study(title="\udcff"),
-    "amplitude": lambda: st.GradientLoad(amplitude=1.0),
-    "decay": lambda: st.EdgeLoad(excess=1.0, decay=0.0),
     "events": lambda: st.Equilibrium(events=-1),
-    "gap": lambda: st.Equilibrium(gap=1.0),
 })  # fmt: skip
 
 test_names_and_choices = refusals({
@@ -102,28 +90,22 @@ test_names_and_choices = refusals({
     "'II' or 'III' ... 'iii'": lambda: SOLID.effective_modulus("iii"),
     "poisson_ratio ... missing": lambda: st.Solid(shear_modulus=1e9, density=1.0),
     "by name ... alpha, beta, low, high": lambda: st.Beta(1.5, 3.0, 1.0, 2.0),
-    "Interface": lambda: st.Interface(0.1, 64, 3),
     "weakening_rate ... critical_slip ... got none": lambda: st.LinearWeakening(),
     "rate and critical_slip": lambda: st.LinearWeakening(1.0, critical_slip=1.0),
     "truncation ... power_kept ... not both": lambda: st.PowerLawSpectrum(
         1.0, truncation=2.0, power_kept=0.9
     ),
-    "marginal ... type: unknown": lambda: make_strength(marginal={"type": {"a": 1}}),
     "'lognrm' ... did you mean 'lognorm'": lambda: make_strength(
         marginal={"type": "lognrm", "s": 1.0}
     ),
     "unknown 'sigma' ... valid: s, loc, scale": lambda: make_strength(
         marginal={"type": "lognorm", "sigma": 0.3}
     ),
-    "'powerlaw' ... did you mean 'power_law'": lambda: make_strength(
-        spectrum={"type": "powerlaw", "correlation_length": 1.0}
-    ),
     "did you mean 'edge'": lambda: st.Load(profile={"type": "egde", "excess": 1.0}),
     "progress ... boolean or callable ... 3": lambda: monte_carlo(progress=3),
     "keep ... 'initial_stress' ... valid: strength": lambda: monte_carlo(
         keep=("initial_stress",)
     ),
-    "keep: must be a name or a list of names, got 3": lambda: monte_carlo(keep=3),
     "sweep ... unknown 'type' ... valid: problem": lambda: make_study(
         sweep=[{"type": ["beta"]}]
     ),
@@ -136,13 +118,9 @@ test_objects_in_the_place_of_others = refusals({
     "interface ... must be an Interface": lambda: make_strength().sample(PROBLEM),
     "marginal ... scipy.stats ... int": lambda: make_strength(marginal=3),
     "a frozen continuous scipy.stats": lambda: make_strength(marginal=scipy.stats.lognorm),
-    "continuous": lambda: make_strength(marginal=scipy.stats.poisson(3)),
     "st.PowerLawSpectrum(...) ... class": lambda: make_strength(spectrum=st.PowerLawSpectrum),
     "method ... write st.LocalCriterion(...)": lambda: onset(ONE, st.LocalCriterion),
     "method ... 'local'": lambda: onset(ONE, "local"),
-    "method ... method object ... got 3": lambda: st.external.limit_state(
-        PROBLEM, make_strength(), 3
-    ),
     "Study.method: must be a method object such as st.LocalCriterion() ... got 0": lambda: (
         make_study(method=0)
     ),
@@ -172,9 +150,6 @@ test_fields_that_cannot_be = refusals({
     "draws ... finite": lambda: make_strength().profiles(LINE, np.full((1, 250), np.nan)),
     # More memory than there is
     "samples: this takes ... GiB": lambda: make_strength().sample(LINE, samples=10**400),
-    "samples: this takes ... GiB of memory": lambda: make_strength().sample(
-        PLANE, samples=10**6
-    ),
     "this takes ... GiB of memory": lambda: st.RandomInterface(
         strength=make_strength()
     ).profiles(PLANE, samples=10**6),
@@ -289,17 +264,3 @@ def test_objects_are_frozen_compare_and_hash_by_value():
         a.mode = "III"
     with pytest.raises(ValueError, match="read-only"):
         a.load.profile[0] = 2.0
-
-
-def test_a_spectrum_and_a_marginal_name_what_they_lack():
-    class Ring(SpectralDensity):
-        def density(self, wavenumber, dimensions=1):
-            return np.exp(-(wavenumber**2))
-
-    class Nameless(Marginal):
-        type = "nameless"
-
-    with pytest.raises(TypeError, match="cutoff"):
-        Ring()
-    with pytest.raises(TypeError, match="distribution"):
-        Nameless()

@@ -150,6 +150,10 @@ def test_every_study_file_is_valid(path):
 
 def test_links_and_paths():
     pattern = r"`((?:examples|validation|benchmarks|tests|docs)/[\w./]+\.\w+)`"
+    known = [path.as_posix() for path in (ROOT / "src").rglob("*.py")]
+    page = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+    for name in re.findall(r"`([\w/]+\.py)`", page):
+        assert any(path.endswith(f"/{name}") for path in [*known, f"{ROOT}/{name}"]), name
     for page in [*PAGES, *MORE]:
         text = page.read_text("utf-8")
         # The entry of the site links pages that are made when it is built, and is checked there.

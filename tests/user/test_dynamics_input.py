@@ -81,13 +81,6 @@ test_what_cannot_be_simulated = refusals({
 }, simulate)  # fmt: skip
 
 
-@pytest.mark.filterwarnings("ignore::stiction.UnitWarning")
-def test_a_weakening_rate_next_to_nothing_is_refused():
-    """A denormal rate: no critical slip can be a number then."""
-    problem = make_problem(128, weakening_rate=5e-324)
-    refuses("infinitely much slip", lambda: simulate(problem=problem))
-
-
 def test_unstable_time_step_is_refused_with_the_limit():
     limit = METHOD.medium(PROBLEM).largest_step
     # 0.42 dx/c_s at this solid; the limit is found by bisection to 0.1 %.
@@ -96,17 +89,6 @@ def test_unstable_time_step_is_refused_with_the_limit():
     with pytest.raises(InputError, match=f"stability limit {limit:.6g} s"):
         Rupture(loading_rate=1e7, time_step=1.01 * limit).prepare(PROBLEM)
     Rupture(loading_rate=1e7, time_step=0.99 * limit).prepare(PROBLEM)
-
-
-@pytest.mark.parametrize(
-    ("mode", "ratio", "plane", "courant"),
-    [("II", 0.0, "strain", 0.56), ("II", 0.33, "stress", 0.42), ("III", 0.25, "strain", 0.99)],
-)
-def test_stability_limits(mode, ratio, plane, courant):
-    solid = st.Solid(shear_modulus=1.0, poisson_ratio=ratio, density=1.0, plane=plane)
-    problem = make_problem(64, 64.0, solid=solid, mode=mode, weakening_rate=0.05)
-    # The figures are known to two digits.
-    assert METHOD.medium(problem).largest_step == pytest.approx(courant, abs=0.006)
 
 
 @pytest.mark.parametrize(

@@ -156,8 +156,7 @@ def test_a_load_that_stops_below_the_onset_lets_the_run_end():
 
 
 def test_kinetic_stress_is_that_of_the_first_global_sliding():
-    friction = st.LinearWeakening(weakening_rate=0.2e12, residual_strength=3e5)
-    problem = dataclasses.replace(PROBLEM, friction=friction)
+    problem = ruptures.wavy_line(NODES, residual_strength=3e5)[0]
     load = ([0.0, 0.12, 0.1201, 0.1203, 0.121], [0.0, 1.2e6, 1.2e6, 1e5, 1e5])
     # Slides at its residual strength, is unloaded, and stands still at 0.1 MPa.
     options = {"load": load, "stop": "time", "end_time": 0.1206}
@@ -206,6 +205,9 @@ def test_rates_that_cannot_be_resolved_are_said(exact):
 
 test_what_a_rupture_cannot_do_is_refused = refusals({
     "first slip would come after": lambda: critical_stress(st.Rupture(loading_rate=1e-300)),
+    "infinitely much slip": lambda: simulate(
+        problem=make_problem(NODES, weakening_rate=5e-324)
+    ),
     "max_steps: 20 steps": lambda: critical_stress(st.Rupture(loading_rate=1e8, max_steps=20)),
     "loading_rate: in one explicit step": lambda: critical_stress(
         st.Rupture(loading_rate=1e15)
@@ -240,13 +242,10 @@ def test_the_place_of_a_slow_onset_is_that_of_equilibrium():
         assert abs((nodes + 256) % 512 - 256) < 2.0
 
 
-@pytest.mark.parametrize(
-    ("plane", "ratio"), [("stress", 0.4999), ("stress", -0.6), ("strain", -0.6)]
-)
-def test_poisson_ratios_that_waves_allow(plane, ratio):
-    solid = dataclasses.replace(PROBLEM.solid, poisson_ratio=ratio, plane=plane)
-    friction = st.LinearWeakening(weakening_rate=0.2e12 * solid.effective_modulus() / 1.33e9)
-    problem = dataclasses.replace(PROBLEM, solid=solid, friction=friction)
+def test_a_negative_poisson_ratio():
+    solid = dataclasses.replace(PROBLEM.solid, poisson_ratio=-0.6, plane="strain")
+    rate = 0.2e12 * solid.effective_modulus() / 1.33e9
+    problem = make_problem(NODES, 0.05, solid=solid, weakening_rate=rate)
     slow = st.Rupture(loading_rate=1e5, kernel_tolerance=1e-4)
     exact, found = (
         critical_stress(method, problem=problem) for method in (st.Equilibrium(), slow)
@@ -256,18 +255,12 @@ def test_poisson_ratios_that_waves_allow(plane, ratio):
 
 def test_one_node_of_no_strength_costs_next_to_nothing():
     """It was not done after 400,000 steps."""
-    friction = st.LinearWeakening(weakening_rate=0.2e12, residual_strength=0.3e6)
-    problem = dataclasses.replace(PROBLEM, friction=friction)
+    problem = ruptures.wavy_line(NODES, residual_strength=0.3e6)[0]
     weak = TAU_P + 0.3e6
     weak[100] = 0.3e6 * (1 + 1e-5)
-    plain, found = (
-        st.onset(problem, tau_p, method=dataclasses.replace(METHOD, max_steps=20_000))
-        for tau_p in (TAU_P + 0.3e6, weak)
-    )
-    steps = [run.implicit_steps.item() + run.explicit_steps.item() for run in (plain, found)]
-    assert steps[1] < 6 * steps[0]
-    expected = critical_stress(st.Equilibrium(), weak, problem)
-    assert found.critical_stress.item() == pytest.approx(expected, rel=5e-4)
+    found = critical_stress(dataclasses.replace(METHOD, max_steps=20_000), weak, problem)
+    exact = critical_stress(st.Equilibrium(), weak, problem)
+    assert found == pytest.approx(exact, rel=5e-4)
 
 
 def test_nodes_below_their_residual_strength():
