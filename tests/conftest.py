@@ -114,3 +114,17 @@ def command(monkeypatch, capfd):
         return code, said.out, said.err
 
     return run
+
+
+@pytest.fixture
+def runs(command):
+    """Run a command line whose exit code and words are expected: what it prints."""
+
+    def runs(line, *words, code=0):
+        ended, out, errors = command(*line.split(" "))
+        assert ended == code, errors
+        for word in words:
+            assert word in out + errors
+        return out + errors
+
+    return runs

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future
 
 import pytest
 
@@ -26,18 +25,3 @@ class Forbidding(Executor):
 
     def submit(self, *arguments):
         pytest.fail("work was begun")
-
-
-class SlowFrom(ThreadPoolExecutor):
-    """Two threads that take longer for samples from a number on."""
-
-    def __init__(self, sample, seconds):
-        super().__init__(2)
-        self.sample, self.seconds = sample, seconds
-
-    def submit(self, function, experiment, span, *marks):
-        def later():
-            time.sleep(self.seconds if span.first >= self.sample else 0.0)
-            return function(experiment, span, *marks)
-
-        return super().submit(later)

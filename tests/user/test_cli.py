@@ -1,7 +1,9 @@
 """The commands: what they print and write, how they end, and what they make of mistakes."""
 
+import csv
 import errno
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,6 +14,7 @@ import numpy as np
 import pytest
 import tomli_w
 import xarray as xr
+from refusals import refuses
 from small_study import lengths, small_study
 
 import stiction as st
@@ -29,29 +32,27 @@ STUDY = small_study(
 STUDY["problem"]["load"] = {"normal_pressure": 5e6}
 TEXT = tomli_w.dumps(STUDY)
 LONG = "x" * 300
+LOADED = st.Study.from_dict(STUDY)
+PROFILE = LOADED.random.strength.sample(LOADED.problem.interface, seed=8)[0]
+OWN = "onset study.toml --strength p.npy --method local_criterion"
 
 
 @pytest.fixture(autouse=True)
 def study(monkeypatch, tmp_path):
-    """Commands run in a folder of their own, which holds a study."""
+    """Commands run in a folder of their own, which holds a study and a profile."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "study.toml").write_text(TEXT)
-    return tmp_path / "study.toml"
-
-
-def strength():
-    loaded = st.Study.from_dict(STUDY)
-    interface = loaded.problem.interface
-    return interface, loaded.random.strength.sample(interface, seed=8)[0]
+    np.save("p.npy", PROFILE)
+    path = Path("study.toml")
+    path.write_text(TEXT)
+    return path
 
 
 # -- studies and runs ----------------------------------------------------------------------------
 
 
-def test_check_says_what_will_be_done(command):
-    code, out, _ = command("check", "study.toml")
-    assert code == 0
-    for words in (
+def test_check_says_what_will_be_done_and_lists_every_mistake(runs, study):
+    runs(
+        "check study.toml",
         "valid, 'a small sweep'",
         "100 (seed 3) at each of 3 points: 300 in all",
         "strength.spectrum.correlation_length: 3 values, 0.004 to 0.008",
@@ -59,39 +60,25 @@ def test_check_says_what_will_be_done(command):
         "xi_0 / h_n",
         "a sample, probed at 3 of 3 points",
         "size",
-    ):
-        assert words in out
-
-
-def test_check_lists_every_mistake(command, study):
-    text = TEXT.replace("density = 1170.0", "densty = 1170.0").replace(
-        "samples = 100", "samples=0"
     )
+    text = TEXT.replace("density =", "densty =").replace("samples = 100", "samples=0")
     study.write_text(text + '\n[[sweep]]\n"ensemble.sed" = [1]\n')
-    code, out, err = command("check", study)
-    assert (code, out) == (2, "")
-    for words in ("densty", "ensemble.samples", "did you mean 'seed'", "problem.solid.density"):
-        assert words in err
-    assert all(line.startswith("error: ") for line in err.splitlines())
+    words = ("densty", "ensemble.samples", "did you mean 'seed'", "problem.solid.density")
+    said = runs("check study.toml", *words, code=2)
+    assert all(line.startswith("error: ") for line in said.splitlines())
 
 
-def test_run_grow_look_export_report(command, study):
-    assert command("run", study, "--out", "run", "--workers", 1)[0] == 0
+def test_run_grow_look_export_report(runs, study):
+    runs("run study.toml --out run --workers 1")
     study.write_text(TEXT.replace("samples = 100", "samples = 150"))
-    code, out, _ = command("run", study, "--out", "run")
-    assert code == 0
-    assert "450 of 450 samples in run" in out
-    assert "critical_stress, MPa" in out
+    out = runs("run study.toml --out run", "450 of 450 samples in run", "critical_stress, MPa")
     assert out.count("150.0") == 6  # samples at three points, of stress and coefficient
-    code, out, _ = command("status", "run")
-    assert code == 0
-    assert "450 of 450 (100.0 %)" in out
-    assert "all stored chunks match their checksums" in out
-    assert command("export", "run", "result.nc")[0] == 0
+    runs("status run", "450 of 450 (100.0 %)", "all stored chunks match their checksums")
+    runs("export run result.nc")
     with xr.open_dataset("result.nc") as result:
         assert result.load().identical(st.Study.from_toml(study).run())
-    assert command("report", "run")[0] == 0
-    page = (study.parent / "run" / "report.html").read_text()
+    runs("report run")
+    page = Path("run/report.html").read_text()
     for words in (
         "a small sweep", "numpy", "correlation_length", "450 of 450 samples", "[problem.solid]",
         "Densities of the static friction coefficient",
@@ -100,25 +87,22 @@ def test_run_grow_look_export_report(command, study):
     assert page.count("<img") == 2
 
 
-def test_points_with_one_label_are_not_thrown_together(command, study):
+def test_points_with_one_label_are_not_thrown_together(runs, study):
     axis = {"problem.interface.nodes": [256, 256], "random.strength.marginal.alpha": [1.5, 3.0]}
     study.write_text(tomli_w.dumps(STUDY | {"sweep": [axis]}))
-    out = command("run", study, "--out", "run", "--no-pilot")[1]
+    out = runs("run study.toml --out run --no-pilot")
     assert out.count("100.0") == 4  # two points, of stress and coefficient
 
 
-def test_parts_and_the_time_limit(command):
-    code, out, _ = command("run", "study.toml", "--out", "run", "--part", "1/2")
-    assert code == 0
-    assert "part 1/2: 156 of 300 samples in run" in out
-    code, _, err = command("run", "study.toml", "--out", "run", "--time-limit", "1e-9")
-    assert code == 3
-    assert "rerun the command to resume" in err
-    code, out, _ = command("run", "study.toml", "--out", "run", "--part", "2/2")
-    assert "300 of 300" in command("status", "run")[1]
+def test_parts_and_the_time_limit(runs):
+    runs("run study.toml --out run --part 1/2", "part 1/2: 156 of 300 samples in run")
+    words = "rerun the command to resume"
+    runs("run study.toml --out run --time-limit 1e-9", words, code=3)
+    runs("run study.toml --out run --part 2/2")
+    runs("status run", "300 of 300")
 
 
-def test_failed_samples_make_exit_code_one(command, monkeypatch):
+def test_failed_samples_make_exit_code_one(runs, monkeypatch):
     original = Experiment.results
 
     def results(self, first, count):
@@ -126,31 +110,27 @@ def test_failed_samples_make_exit_code_one(command, monkeypatch):
             raise FloatingPointError("not finite")
         return original(self, first, count)
 
-    run = ["run", "study.toml", "--out", "run", "--workers", 1]
+    run = "run study.toml --out run --workers 1"
     with monkeypatch.context() as patch:
         patch.setattr(Experiment, "results", results)
-        code, out, err = command(*run)
-    assert code == 1
-    assert "297 of 300 samples in" in out
-    assert "sample 17 of point 2 (seed 3): FloatingPointError: not finite" in err
-    assert "sample 17 (seed 3)" in command("status", "run")[1]
-    assert command(*run)[0] == 0
+        words = "sample 17 of point 2 (seed 3): FloatingPointError: not finite"
+        runs(run, "297 of 300 samples in", words, code=1)
+    runs("status run", "sample 17 (seed 3)")
+    runs(run)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "SIGTERM"])
-def test_interrupted_from_outside(command, study, number):
+def test_interrupted_from_outside(runs, study, number):
     # A shell that starts tests in the background lets them, and what they start, ignore Ctrl-C.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     study.write_text(TEXT.replace("samples = 100", "samples = 3_000_000"))
-    chunks = study.parent / "run" / "chunks"
+    command = [sys.executable, "-m", "stiction", "run", str(study), "--out", "run"]
+    environment = os.environ | {"COLUMNS": "200"}
     with subprocess.Popen(
-        [sys.executable, "-m", "stiction", "run", str(study), "--out", "run"],
-        stderr=subprocess.PIPE,
-        text=True,
-        env=os.environ | {"COLUMNS": "200"},
+        command, stderr=subprocess.PIPE, text=True, env=environment
     ) as process:
         deadline = time.monotonic() + 120.0
-        while not list(chunks.glob("*.npz")):
+        while not list(Path("run/chunks").glob("*.npz")):
             assert time.monotonic() < deadline
             time.sleep(0.05)
         process.send_signal(number)
@@ -159,80 +139,85 @@ def test_interrupted_from_outside(command, study, number):
     assert "interrupted:" in err
     assert "samples so far are in run; rerun the command to resume" in err
     assert "Traceback" not in err
-    assert "of 9000000" in command("status", "run")[1]
+    runs("status run", "of 9000000")
 
 
-# -- one interface, and the tail -----------------------------------------------------------------
+def test_what_is_exported_reads_back_to_the_last_bit(runs):
+    """A sweep with profiles kept."""
+    local = {"type": "local_criterion"}
+    sweep = [*lengths(4e-3, 6e-3, 8e-3), {"method": [local, local]}]
+    ensemble = {"samples": 5, "first": 2, "keep": ["strength"]}
+    whole = st.Study.from_dict(small_study(ensemble=ensemble, sweep=sweep)).run(out="run")
+    with pytest.warns(st.AccuracyWarning, match="strength: profiles along the interface"):
+        st.open_run("run").export("out.csv")
+    with open("out.csv", newline="", encoding="utf-8") as file:
+        head, *rows = list(csv.reader(file))
+    # Every column says its unit, in the last brackets.
+    names = {re.fullmatch(r"(\w+) \((.+)\)", column).groups() for column in head}
+    assert {("correlation_length", "m"), ("sample", "1"), ("critical_stress", "Pa")} <= names
+    flat = whole["critical_stress"].stack(row=("correlation_length", "method", "sample"))
+    columns = dict(zip(head, np.array(rows).T, strict=True))
+    for name, expected in {
+        "critical_stress (Pa)": flat,
+        "correlation_length (m)": flat["correlation_length"],
+        "sample (1)": [2, 3, 4, 5, 6] * 6,
+    }.items():
+        np.testing.assert_array_equal(columns[name].astype(float), expected)
+    runs("export run out.nc")
+    with xr.open_dataset("out.nc") as found:
+        assert found["strength"].attrs["units"] == "Pa"
+        assert found["strength"].dims[-1] == "x"
+    for name in ("out.txt", "out"):
+        runs(f"export run {name}", ".nc", ".csv", code=2)
+        assert not Path(name).exists()
+        refuses("suffix", lambda name=name: st.open_run("run").export(name))
 
 
-def test_onset_of_ones_own_profile(command, study):
-    profile = strength()[1]
-    np.save("p.npy", profile)
+# -- one interface -------------------------------------------------------------------------------
+
+
+def test_onset_of_ones_own_profile(runs, study):
     study.write_text(TEXT[: TEXT.index("[random.strength.marginal]")])  # a problem is enough
-    ask = ("onset", study, "--strength", "p.npy", "--method", "local_criterion")
-    code, out, _ = command(*ask)
-    assert code == 0
-    expected = st.onset(st.Study.from_dict(STUDY).problem, profile, method=st.LocalCriterion())
-    head, line = out.splitlines()
+    expected = st.onset(LOADED.problem, PROFILE, method=st.LocalCriterion())
+    head, line = runs(OWN).splitlines()
     for name in ("critical_stress", "friction_coefficient", "critical_position"):
         assert name in head
         assert f"{expected[name].item():.8g}"[:8] in line
     study.write_text("title = 'nothing'\n[randon]\na = 1\n")
-    code, _, err = command(*ask)
-    assert code == 2
-    assert "problem: missing" in err
-    assert "unknown 'randon'; did you mean 'random'?" in err
+    runs(OWN, "problem: missing", "unknown 'randon'; did you mean 'random'?", code=2)
 
 
-def test_messages_are_in_the_words_of_the_command_line(command):
-    interface, profile = strength()
-    profile[20:31] = np.nan
-    np.savetxt("p.csv", np.column_stack([interface.x, profile]), delimiter=",")
-    ask = ("onset", "study.toml", "--strength", "p.csv", "--method", "local_criterion")
-    code, _, err = command(*ask)
-    assert code == 2
-    assert "11 of 256 nodes" in err
-    assert "--gaps fill" in err
-    assert "gaps=" not in err
-    code, out, err = command(*ask, "--gaps", "fill")
-    assert (code, "local_criterion" in out) == (0, True)
+def test_messages_are_in_the_words_of_the_command_line(runs):
+    holes = PROFILE.copy()
+    holes[20:31] = np.nan
+    table = np.column_stack([LOADED.problem.interface.x, holes])
+    np.savetxt("p.csv", table, delimiter=",")
+    own = OWN.replace("npy", "csv")
+    assert "gaps=" not in runs(own, "11 of 256 nodes", "--gaps fill", code=2)
+    runs(f"{own} --gaps fill", "local_criterion")
     np.savetxt("three.csv", np.ones((2, 3)), delimiter=",")
-    err = command("onset", "study.toml", "--strength", "three.csv")[2]
-    assert "give --x, --value" in err
-    assert in_options('pass gaps="skip" or interpolate=True', onset) == (
-        "pass --gaps skip or --interpolate"
-    )
+    runs("onset study.toml --strength three.csv", "give --x, --value", code=2)
+    said = in_options('pass gaps="skip" or interpolate=True', onset)
+    assert said == "pass --gaps skip or --interpolate"
 
 
-def test_a_method_that_does_not_apply_says_why(command, study):
+def test_a_method_that_does_not_apply_says_why(runs, study):
     text = TEXT.replace("weakening_rate = 250000000000.0", "critical_slip = 8e-6")
     study.write_text(text.replace('"local_criterion"', '"equilibrium"'))
-    np.save("p.npy", strength()[1])
-    ask = ("onset", study, "--strength", "p.npy", "--method", "local_criterion")
-    code, out, _ = command(*ask)
-    assert code == 1
-    assert "local_criterion does not apply" in out
-    assert "varies along the interface" in out
+    runs(OWN, "local_criterion does not apply", "varies along the interface", code=1)
 
 
 @pytest.mark.slow
-def test_rupture_of_an_overstressed_patch_under_a_load_of_its_own(command, study):
+def test_rupture_of_an_overstressed_patch_under_a_load_of_its_own(runs, study):
     """Slip begins at once; load, end and stations stand in the study file, and no loading rate."""
-    nodes = 256
-    tau_p = np.full(nodes, 1.2e6)
-    np.save("p.npy", tau_p)
-    away = np.abs(np.arange(nodes) - nodes // 2)
-    np.save("i.npy", np.where(away < 40, 1.3e6, 0.6e6))
-    given = small_study(length=0.05, nodes=nodes)
+    np.save("p.npy", np.full(256, 1.2e6))
+    np.save("i.npy", np.where(np.abs(np.arange(256) - 128) < 40, 1.3e6, 0.6e6))
+    held = {"type": "rupture", "load": [[0.0, 1.0], [0.0, 0.0]], "stop": "time"}
+    given = small_study(length=0.05, nodes=256, method=held | {"end_time": 4e-5})
     given["problem"]["load"] = {"initial_stress": "i.npy"}
-    given["method"] = {
-        "type": "rupture", "load": [[0.0, 1.0], [0.0, 0.0]], "stop": "time", "end_time": 4e-5,
-    }  # fmt: skip
     given["save"] = {"every": 5, "stations": {"beside": 0.01}}
     study.write_text(tomli_w.dumps(given))
-    code, text, _ = command("rupture", study, "--strength", "p.npy", "--out", "rupture")
-    assert code == 0
-    assert "ended by: time" in text
+    runs("rupture study.toml --strength p.npy --out rupture", "ended by: time")
     with xr.open_dataset("rupture/rupture.nc") as result:
         assert np.isnan(result.critical_load)
         assert result.station_slip.sizes["step"] > 50
@@ -251,9 +236,7 @@ MISTAKES = {
     f"run study.toml --out {LONG}": (2, "error: "),
     "run study.toml --out not-utf8-\udcff": (2, "error: "),
     f"check {LONG}.toml": (2, "error: "),
-    "status nothing": (1, "there is no run here"),
     "status .": (1, "there is no run here"),
-    f"status {LONG}": (2, "error: "),
     "export nothing result.nc": (1, "there is no run here"),
     "report study.toml": (1, "Not a directory"),
     "onset study.toml --strength missing.npy": (2, "missing.npy"),
@@ -266,54 +249,45 @@ MISTAKES = {
 }
 
 
-@pytest.mark.parametrize("arguments", MISTAKES)
-def test_mistakes_end_with_a_message(command, arguments):
-    code, _, err = command(*arguments.split(" "))
-    assert code == MISTAKES[arguments][0]
-    assert MISTAKES[arguments][1] in err
+@pytest.mark.parametrize("line", MISTAKES)
+def test_mistakes_end_with_a_message(runs, line):
+    code, words = MISTAKES[line]
+    runs(line, words, code=code)
 
 
 @pytest.mark.parametrize("name", [run.callback.__name__ for run in app.registered_commands])
-def test_help_of_every_command(command, name):
-    code, out, _ = command(name, "--help")
-    assert (code, len(out.splitlines()) > 5) == (0, True)
+def test_help_of_every_command(runs, name):
+    assert len(runs(f"{name} --help").splitlines()) > 5
 
 
-@pytest.mark.parametrize("arguments", ["report run --out page.html", "export run out.nc"])
-def test_a_full_disk_is_called_so_and_leaves_nothing_half(command, monkeypatch, arguments):
-    assert command("run", "study.toml", "--out", "run")[0] == 0
+@pytest.mark.parametrize("line", ["report run --out page.html", "export run out.nc"])
+def test_a_full_disk_is_called_so_and_leaves_nothing_half(runs, monkeypatch, line):
+    runs("run study.toml --out run")
+    before = sorted(os.listdir())
 
     def fail(handle):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(files.os, "fsync", fail)  # as of a file system that allocates late
-    code, _, errors = command(*arguments.split())
-    assert code == 1
-    assert "cannot be written: No space left on device" in errors
-    assert sorted(os.listdir()) == ["run", "study.toml"]
+    runs(line, "cannot be written: No space left on device", code=1)
+    assert sorted(os.listdir()) == before
 
 
-def test_an_empty_run(command, tmp_path):
-    command("run", "study.toml", "--out", "run")
-    for chunk in (tmp_path / "run" / "chunks").iterdir():
+def test_an_empty_run(runs):
+    runs("run study.toml --out run")
+    for chunk in Path("run/chunks").iterdir():
         chunk.unlink()
-    code, _, errors = command("report", "run")
-    assert (code, "no sample is stored yet" in errors) == (2, True)
+    runs("report run", "no sample is stored yet", code=2)
 
 
-def test_escape_sequences_of_a_run_are_not_printed_raw(command):
+def test_escape_sequences_of_a_run_are_not_printed_raw(runs):
     title = "\x1b[2Jnice\x07\nsamples 9 of 9 <script>"
-    hostile = st.Study.from_dict(STUDY | {"title": title})
-    hostile.to_toml("hostile.toml")
-    command("run", "hostile.toml", "--out", "run")
-    for name in ("check", "status"):
-        code, out, errors = command(name, "hostile.toml" if name == "check" else "run")
-        assert code == 0
-        assert "\x1b" not in out + errors
-        assert "\x07" not in out + errors
-        assert "\\x1b[2Jnice" in out
-        assert "\nsamples 9" not in out
-    command("report", "run")
+    st.Study.from_dict(STUDY | {"title": title}).to_toml("hostile.toml")
+    runs("run hostile.toml --out run")
+    for line in ("check hostile.toml", "status run"):
+        said = runs(line, "\\x1b[2Jnice")
+        assert not any(raw in said for raw in ("\x1b", "\x07", "\nsamples 9"))
+    runs("report run")
     assert "9 <script>" not in Path("run/report.html").read_text()
 
 

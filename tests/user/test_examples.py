@@ -16,28 +16,6 @@ ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
 
 
-def mean_and_error(values):
-    return float(values.mean()), float(values.std()) / np.sqrt(values.size)
-
-
-def measured_profile(found):
-    """Interaction only lowers the onset; both begin where the strength is low."""
-    st, exact = found["st"], found["onset"]  # of the last method, equilibrium
-    local = st.onset(found["problem"], found["profile"], method=st.LocalCriterion())
-    assert exact.critical_stress < local.critical_stress.item()
-    near = np.abs(found["x"] * 1e-3 - exact.critical_position.item()) < 1.5e-3
-    assert found["tau_p"][near].mean() < np.quantile(found["tau_p"], 0.1)
-
-
-def spectrum(found):
-    """Both fields have one distribution and one decay length, and still another onset."""
-    machined, power_law = (found["onsets"][name] for name in ("machined", "power law"))
-    lengths = [found[name].efolding_length for name in ("alike", "own")]
-    assert lengths[0] == pytest.approx(lengths[1], rel=1e-9)
-    (one, error), (other, _) = mean_and_error(machined), mean_and_error(power_law)
-    assert abs(one - other) > 5.0 * error
-
-
 def method(found):
     """The window is off by more than the criterion, but no more than some per cent."""
     exact = found["exact"]
@@ -46,18 +24,6 @@ def method(found):
         for name in ("weakest window", "local criterion")
     )
     assert local < window < 0.05
-
-
-def nonuniform_load(found):
-    """None begins in the middle where the ends are loaded twice as high."""
-    onsets, length = found["onsets"], found["plain"].interface.length
-    place = onsets["high at the ends"].critical_position / length
-    assert not ((place > 0.25) & (place < 0.75)).any()
-    # Strength less initial stress differs by 0.2 MPa at most, and so does the load (monotony).
-    pushed = onsets["uniform, with initial stress"].critical_load
-    change = pushed - onsets["uniform"].critical_load
-    assert (abs(change) <= 0.2e6).all()
-    assert change.mean() < 0.0
 
 
 def correlated(found):
@@ -69,10 +35,8 @@ def correlated(found):
 def critical_slip(found):
     """Where it varies, weak places may also weaken fast: the same samples slide earlier."""
     onsets = found["onsets"]
-    mean, error = mean_and_error(
-        onsets["d_c random"].critical_stress - onsets["d_c uniform"].critical_stress
-    )
-    assert mean < -2.0 * error
+    change = onsets["d_c random"].critical_stress - onsets["d_c uniform"].critical_stress
+    assert float(change.mean()) < -2.0 * float(change.std()) / np.sqrt(change.size)
 
 
 def failure(found):
@@ -83,20 +47,6 @@ def failure(found):
     assert 1e3 < found["design"].stress_above_bound < 3e3
 
 
-def scanned(found):
-    """The scan holds a specimen near its measured values, and its answer is not that of any."""
-    given, line = found["given"], found["problem"].interface
-    near = np.abs(given.quantile(line, 0.5)[: line.size // 3] - found["scan"].values)
-    assert near.mean() < 20e3  # the error of the scan
-
-
-def between(found):
-    """Both scatters add, as squares, and the tail lies lower."""
-    stresses = [onset.critical_stress for onset in found["onsets"].values()]
-    cv = [float(each.std() / each.mean()) for each in stresses]
-    assert cv[1] ** 2 - cv[0] ** 2 == pytest.approx(0.1**2, rel=0.25)  # 2,000 samples: 3 % each
-
-
 def stored(found):
     """All is there; longer correlation lowers the static strength."""
     assert found["status"].done == found["status"].samples == 3000
@@ -104,35 +54,17 @@ def stored(found):
     assert np.all(np.diff(medians) < 0.0)
 
 
-def rupture(found):
-    """Without residual strength all of the critical stress drops; the front is supershear here."""
-    run = found["run"]
-    assert run.stress_drop.item() == pytest.approx(run.critical_stress.item(), rel=1e-3)
-    solid = found["problem"].solid
-    assert run.median_rupture_speed.item() > np.sqrt(solid.shear_modulus / solid.density)
-
-
-def arrested(found):
-    """The path passes the events that the method counts for that sample."""
-    onset, path = found["onset"], found["path"]
-    assert onset.arrested_events.item() >= path.arrested_events[-1] > 0
-    assert found["onset"].critical_stress > found["onset"].first_instability
-
-
-HOW_TOS = {
-    "my_measured_profile": measured_profile,
-    "my_spectrum": spectrum,
+CHECKS = {
     "my_method": method,
-    "nonuniform_load": nonuniform_load,
     "correlated_residual_strength": correlated,
     "random_critical_slip": critical_slip,
     "failure_probability": failure,
-    "scanned_interface": scanned,
-    "between_specimens": between,
     "stored_sweep": stored,
-    "one_rupture": rupture,
-    "arrested_events": arrested,
 }
+HOW_TOS = [
+    "my_measured_profile", "my_spectrum", "nonuniform_load", "scanned_interface",
+    "between_specimens", "one_rupture", "arrested_events", *CHECKS,
+]  # fmt: skip
 
 
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
@@ -147,7 +79,8 @@ def test_a_how_to(name, monkeypatch, tmp_path, capsys):
     assert re.search(r"\d", said)
     assert "nan" not in said
     assert "?" in ast.get_docstring(ast.parse(path.read_text()))  # the question that it answers
-    HOW_TOS[name](found)
+    if name in CHECKS:
+        CHECKS[name](found)
 
 
 def test_the_tables_list_every_how_to():
@@ -195,24 +128,15 @@ def test_scripts_of_validation():
 
 @pytest.mark.slow
 def test_remaining_scripts(tmp_path):
+    """What they compute is checked in exact/ and paper/."""
     slip, stress = load("grid").compute((0.25,), (512, 2048), samples=2)[0.25, 512]
     # Largest of six fields on the page: 3.1 % and 0.06 %; a quarter of the dx^2 is left out.
     assert 1e-4 < slip.max() < 0.04
     assert stress.max() < 1e-3
-    waves = load("waves")
-    errors = waves.compute()
-    assert errors[0][1] / errors[1][1] == pytest.approx(4.0, abs=0.4)
-    waves.draw(tmp_path, errors)
-    kernels = load("kernels")
-    for (_, tolerance), (pairs, error) in kernels.compute().items():
-        assert error < 1.2 * tolerance
-        assert pairs <= 26
+    waves, kernels, speeds = load("waves"), load("kernels"), load("rupture_speed")
+    waves.draw(tmp_path, waves.compute())
     kernels.draw(tmp_path)
-    speeds = load("rupture_speed")
-    curves = speeds.compute((0.5, 2.0))
-    speeds.draw(tmp_path, curves)
-    assert np.nanmean(curves[0.5][1][-50:]) == pytest.approx(1.865, abs=0.01)
-    assert np.nanmean(curves[2.0][1][-50:]) == pytest.approx(0.993, abs=0.003)
+    speeds.draw(tmp_path, speeds.compute((0.5, 2.0)))
     assert len(list(tmp_path.glob("*.png"))) == 3
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import warnings
 from typing import NamedTuple
 
@@ -15,7 +14,6 @@ from setups import LENGTH, beta_strength, make_problem
 import stiction as st
 from stiction.friction import FrictionLaw, register
 from stiction.model import model
-from stiction.study.study import study_schema
 
 LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
 EXPONENTIAL = st.ExponentialWeakening(weakening_rate=0.5e12)
@@ -116,17 +114,6 @@ def test_law_in_a_study_file(tmp_path, law):
     path.write_text(path.read_text().replace(f'"{law.type}"', '"exponentail"'))
     words = "friction ... exponentail ... exponential ... piecewise"
     refuses(words, lambda: st.Study.from_toml(path))
-
-
-def test_schema_asks_for_the_type_of_laws_and_marginals():
-    definitions = study_schema()["$defs"]
-    linear, *others = definitions["Problem"]["properties"]["friction"]["anyOf"]
-    assert "LinearWeakening" in json.dumps(linear)
-    assert len(others) == 2
-    assert all(other["allOf"][1] == {"required": ["type"]} for other in others)
-    assert "FrictionLaw" not in definitions
-    marginals = definitions["RandomField"]["properties"]["marginal"]["anyOf"]
-    assert all("type" in one["required"] for one in marginals)
 
 
 # -- laws of one's own ---------------------------------------------------------------------------

@@ -15,60 +15,19 @@ import stiction as st
 from stiction.results import onset_variables
 from stiction.variables import Variable
 
-METHOD = '''\
-from dataclasses import dataclass
-from typing import Literal
-
-from stiction.results import onset_variables
-from stiction.variables import Variable
-
-
-@dataclass(frozen=True)
-class WeakestNode:
-    """The interface slides when its weakest node does."""
-
-    share: float = 1.0
-    type: Literal["weakest_node"] = "weakest_node"
-
-    label = "weakest node"
-    chunk_size = 256
-
-    def variables(self, problem):
-        return onset_variables(problem.interface) | {"margin": Variable("Pa", "mean less least")}
-
-    def seconds_per_sample(self, problem):
-        return 1e-6
-
-    def supports(self, problem):
-        return ["it does not take planes"] if problem.interface.is_plane else []
-
-    def prepare(self, problem):
-        def solve(sample):
-            load = self.share * sample.strength.min(axis=1)
-            return {
-                "critical_load": load,
-                "critical_stress": load,
-                "first_instability": load,
-                "critical_position": problem.interface.x[sample.strength.argmin(axis=1)],
-                "margin": sample.strength.mean(axis=1) - load,
-            }
-
-        return solve
-'''
-
+EXAMPLE = Path(__file__).parents[2] / "examples" / "my_method.py"
 SCRIPT = """\
 import sys
 import numpy as np, stiction as st
-from weakest import WeakestNode
+from weakest import WeakestWindow
 from stiction.cli import main
 
 study = st.Study.from_toml("study.toml")
-assert study.method == WeakestNode(0.5)
+assert study.method == WeakestWindow(0.005)
 found = study.run()
 tau_p = study.random.profiles(study.problem.interface, samples=64)["strength"]
-assert np.array_equal(found.critical_load, 0.5 * tau_p.min(axis=1))
-own = st.onset(study.problem, tau_p, method=WeakestNode(0.5))
-assert own.margin.attrs["units"] == "Pa" and own.critical_load.equals(found.critical_load)
+own = st.onset(study.problem, tau_p, method=WeakestWindow(0.005))
+assert own.critical_load.equals(found.critical_load)
 assert st.Study.from_result(found) == study
 for words in ("run study.toml --out found", "report found"):
     sys.argv = ["stiction", *words.split()]
@@ -80,14 +39,17 @@ for words in ("run study.toml --out found", "report found"):
 
 
 def test_a_method_from_another_package(tmp_path):
-    """Offered by an entry point, without a line in this package that names it."""
-    (tmp_path / "weakest.py").write_text(METHOD)
+    """The one of the example, offered by an entry point, as docs/architecture.md describes it."""
+    text = EXAMPLE.read_text().split("\n\nproblem = ")[0]
+    text = text.replace("from dataclasses", "from typing import Literal\nfrom dataclasses")
+    text = text.replace("type = ", 'type: Literal["weakest_window"] = ')
+    (tmp_path / "weakest.py").write_text(text)
     info = tmp_path / "weakest-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: weakest\nVersion: 1.0\n")
-    entry = "[stiction.methods]\nweakest_node = weakest:WeakestNode\n"
+    entry = "[stiction.methods]\nweakest_window = weakest:WeakestWindow\n"
     (info / "entry_points.txt").write_text(entry)
-    method = {"type": "weakest_node", "share": 0.5}
+    method = {"type": "weakest_window", "length": 0.005}
     study = small_study(method=method, ensemble={"samples": 64})
     (tmp_path / "study.toml").write_text(tomli_w.dumps(study))
     paths = os.pathsep.join([str(tmp_path), str(Path(st.__file__).parents[1])])
@@ -96,7 +58,7 @@ def test_a_method_from_another_package(tmp_path):
     done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     (page,) = tmp_path.rglob("*.html")
-    assert "weakest node" in page.read_text()
+    assert "weakest window" in page.read_text()
 
 
 class Broken:

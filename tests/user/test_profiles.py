@@ -323,12 +323,9 @@ test_what_is_no_profile_is_refused = refusals({
 })  # fmt: skip
 
 
-def test_centres_of_cells_are_taken_with_a_word():
+def test_other_places_are_said_and_interpolated_only_where_it_is_asked_for():
     with pytest.warns(st.AccuracyWarning, match="0.5 of a spacing from the nodes"):
         assert found(labelled(x=X + 0.05 / NODES)) == found(STRENGTH)
-
-
-def test_interpolation_only_where_it_is_asked_for():
     with pytest.warns(st.AccuracyWarning, match="40 points are interpolated linearly to 128"):
         profile = st.read_profile(TENT, interface=LINE, interpolate=True)
     inside = (X > 1e-3) & (X < 0.045)

@@ -321,41 +321,30 @@ def test_auto_leaves_a_guide_whose_samples_do_not_fail(joint):
 # -- strength that may lie below the residual strength ---------------------------------------------
 
 
-@pytest.fixture
-def residual():
-    """The problem with a residual strength."""
-    return lambda level, nodes=256: make_problem(
-        nodes, weakening_rate=0.5e12, residual_strength=level
-    )
-
-
-def sampled(what, problem, field, method):
+def above(residual, what, field=FIELD, method=LOCAL):
+    """Ask for samples, onsets or a probability where there is a residual strength."""
+    problem = make_problem(weakening_rate=0.5e12, residual_strength=residual)
     if what == "onset":
         tau_p = field.sample(problem.interface, samples=8, seed=1)
-        return st.onset(problem, tau_p, method=method)
-    if what == "monte_carlo":
-        return st.monte_carlo(problem, field, samples=16, method=method)
-    if what == "design_stress":
-        return design(0.01, method, (problem, field))
-    plain = {"algorithm": "plain", "max_evaluations": 100}
-    return failure(1e6, method, (problem, field), **plain)
+        st.onset(problem, tau_p, method=method)
+    elif what == "monte_carlo":
+        st.monte_carlo(problem, field, samples=16, method=method)
+    else:
+        failure(1e6, method, (problem, field), algorithm="plain", max_evaluations=100)
 
 
-@pytest.mark.parametrize("what", ["monte_carlo", "failure_probability", "design_stress"])
-def test_strength_below_the_residual_strength_is_refused(residual, what):
+@pytest.mark.parametrize("what", ["monte_carlo", "failure_probability"])
+def test_strength_below_the_residual_strength_is_refused(what):
     """60 % of the marginal, which reaches from 0.66 MPa, lie below 1 MPa."""
-    refuses(
-        "most of the interface would not weaken",
-        lambda: sampled(what, residual(1.0e6), FIELD, LOCAL),
-    )
+    refuses("most of the interface would not weaken", lambda: above(1e6, what))
 
 
 @pytest.mark.parametrize("what", ["onset", "monte_carlo", "failure_probability"])
-def test_some_strength_below_the_residual_strength_is_said_once(residual, what):
+def test_some_strength_below_the_residual_strength_is_said_once(what):
     field = st.paper.strength(PROBLEM, 2.0)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        sampled(what, residual(0.73e6), field, EXACT)
+        above(0.73e6, what, field, EXACT)
     (said,) = [str(w.message) for w in caught if "residual" in str(w.message)]
     if what != "onset":
         share = 100.0 * field.marginal.distribution.cdf(0.73e6)
@@ -382,13 +371,11 @@ def test_strengths_in_coefficients_are_compared_as_stresses(units):
 # -- the command ---------------------------------------------------------------------------------
 
 
-def test_command_writes_table_data_and_figure(command, tmp_path):
+def test_command_writes_table_data_and_figure(runs, tmp_path):
     study, out = tmp_path / "study.toml", tmp_path / "out"
     ensemble = st.Ensemble(samples=10, seed=3)
     st.Study(problem=PROBLEM, random=FIELD, method=LOCAL, ensemble=ensemble).to_toml(study)
-    code, text, _ = command("reliability", study, "--out", out, "--smallest", "1e-3")
-    assert code == 0
-    assert "probability" in text
+    runs(f"reliability {study} --out {out} --smallest 1e-3", "probability")
     assert {"failure_curve.png", "failure_curve.pdf"} <= {path.name for path in out.iterdir()}
     with xr.open_dataset(out / "failure_curve.nc") as curve:
         assert curve["stress"].attrs["units"] == "Pa"

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from executors import Counting, Forbidding, SlowFrom
+from executors import Counting, Forbidding
 from refusals import refuses
 from small_study import lengths, small_study
 
@@ -99,15 +99,12 @@ def test_another_study_is_refused_with_the_difference(tmp_path):
     make_study(samples=20).run(out=tmp_path / "run")
     problem = copy.deepcopy(STUDY["problem"])
     problem["solid"]["density"] = 2000.0
-    del problem["friction"]["weakening_rate"]
-    problem["friction"]["critical_slip"] = 1e-6
+    problem["friction"] = {"critical_slip": 1e-6}
     other = make_study(samples=20, problem=problem, sweep=STUDY["sweep"][:1])
-    with pytest.raises(StoreError) as caught:
+    with pytest.raises(StoreError, match="sweep") as caught:
         other.run(out=tmp_path / "run")
-    text = str(caught.value)
-    assert "problem.solid.density: 2000.0 here, 1170.0 there" in text
-    assert "problem.friction.critical_slip: 1e-06 here, nothing there" in text
-    assert "sweep" in text
+    assert "problem.solid.density: 2000.0 here, 1170.0 there" in str(caught.value)
+    assert "problem.friction.critical_slip: 1e-06 here, nothing there" in str(caught.value)
     make_study(samples=20, title="another title").run(out=tmp_path / "run")
 
 
@@ -172,19 +169,18 @@ def test_a_reader_beside_a_writer_sees_no_damage(tmp_path, often):
 # -- damage --------------------------------------------------------------------------------------
 
 
-def swapped(path):
-    path.write_bytes(chunks(path.parents[1])[0].read_bytes())
-
-
-@pytest.mark.parametrize("damage", [swapped, Path.unlink])
-def test_damaged_chunks_are_found_and_computed_again(run, reference, damage):
+@pytest.mark.parametrize("gone", [False, True])
+def test_damaged_chunks_are_found_and_computed_again(run, reference, gone):
+    """More kinds of damage are in tests/fuzz."""
     before = {path: path.stat().st_mtime_ns for path in chunks(run)}
     victim = chunks(run)[1]
     # How many samples a chunk holds depends on how long they took.
     with np.load(victim) as stored:
         lost = len(stored["rows"])
-    damage(victim)
-    gone = not victim.exists()
+    if gone:
+        victim.unlink()
+    else:
+        victim.write_bytes(chunks(run)[0].read_bytes())
     state = st.open_run(run).status()
     assert [victim.name in text for text in state.damaged] == ([] if gone else [True])
     assert state.done == ALL - lost
@@ -194,9 +190,7 @@ def test_damaged_chunks_are_found_and_computed_again(run, reference, damage):
     assert any("samples are missing" in str(w.message) for w in caught) != gone
     assert int(part["critical_stress"].isnull().sum()) == lost
     assert again(run, None if gone else "its samples are computed again").identical(reference)
-    after = {path: path.stat().st_mtime_ns for path in chunks(run)}
-    kept = [path for path in before if path != victim]
-    assert {path: after[path] for path in kept} == {path: before[path] for path in kept}
+    assert all(path.stat().st_mtime_ns == before[path] for path in before if path != victim)
 
 
 def displaced(path):
@@ -360,15 +354,6 @@ def test_memory_is_bounded_by_the_pieces_in_flight(monkeypatch):
     assert most <= 6  # two a worker
     # 128 nodes and six more numbers a sample make 1072 bytes: a fair share would be 3.5 MB.
     assert 2**18 < largest < 1.1 * 2**20
-
-
-def test_time_between_chunks_is_about_a_second(tmp_path):
-    """A sample that takes long does not keep finished ones from being stored."""
-    with SlowFrom(256, seconds=1.6) as executor:
-        make_study(samples=600, sweep=[]).run(
-            out=tmp_path / "run", executor=executor, workers=2
-        )
-    assert st.open_run(tmp_path / "run").status().chunks >= 2
 
 
 def test_a_run_that_grows_from_few_samples_has_the_whole_pilot(tmp_path):
