@@ -72,13 +72,11 @@ test_numbers = refusals({
     "correlation_length ... 0.000000000000001": lambda: st.PowerLawSpectrum(5e-324),
     "power_kept ... less than 1": lambda: st.ExponentialSpectrum(1.0, power_kept=1.0),
     "slip ... valid boolean ... '1'": lambda: st.Equilibrium(slip="1"),
-    "arrest ... valid boolean ... 'no'": lambda: st.theory.griffith_length(
-        PROBLEM, 1e6, 1.0, arrest="no"
-    ),
+    "arrest ... valid boolean ... 'no'":
+        lambda: st.theory.griffith_length(PROBLEM, 1e6, 1.0, arrest="no"),
     "seed ... -1 ... >= 0": lambda: make_strength().sample(LINE, seed=-1),
-    "seed ... whole ... '1'": lambda: st.theory.rice_distribution(
-        PROBLEM, make_strength(), seed="1"
-    ),
+    "seed ... whole ... '1'":
+        lambda: st.theory.rice_distribution(PROBLEM, make_strength(), seed="1"),
     "samples ... >= 1 ... 0": lambda: monte_carlo(samples=0),
     "title ... valid string": lambda: make_study(title="\udcff"),
     "events": lambda: st.Equilibrium(events=-1),
@@ -92,23 +90,18 @@ test_names_and_choices = refusals({
     "by name ... alpha, beta, low, high": lambda: st.Beta(1.5, 3.0, 1.0, 2.0),
     "weakening_rate ... critical_slip ... got none": lambda: st.LinearWeakening(),
     "rate and critical_slip": lambda: st.LinearWeakening(1.0, critical_slip=1.0),
-    "truncation ... power_kept ... not both": lambda: st.PowerLawSpectrum(
-        1.0, truncation=2.0, power_kept=0.9
-    ),
-    "'lognrm' ... did you mean 'lognorm'": lambda: make_strength(
-        marginal={"type": "lognrm", "s": 1.0}
-    ),
-    "unknown 'sigma' ... valid: s, loc, scale": lambda: make_strength(
-        marginal={"type": "lognorm", "sigma": 0.3}
-    ),
+    "truncation ... power_kept ... not both":
+        lambda: st.PowerLawSpectrum(1.0, truncation=2.0, power_kept=0.9),
+    "'lognrm' ... did you mean 'lognorm'":
+        lambda: make_strength(marginal={"type": "lognrm", "s": 1.0}),
+    "unknown 'sigma' ... valid: s, loc, scale":
+        lambda: make_strength(marginal={"type": "lognorm", "sigma": 0.3}),
     "did you mean 'edge'": lambda: st.Load(profile={"type": "egde", "excess": 1.0}),
     "progress ... boolean or callable ... 3": lambda: monte_carlo(progress=3),
-    "keep ... 'initial_stress' ... valid: strength": lambda: monte_carlo(
-        keep=("initial_stress",)
-    ),
-    "sweep ... unknown 'type' ... valid: problem": lambda: make_study(
-        sweep=[{"type": ["beta"]}]
-    ),
+    "keep ... 'initial_stress' ... valid: strength":
+        lambda: monte_carlo(keep=("initial_stress",)),
+    "sweep ... unknown 'type' ... valid: problem":
+        lambda: make_study(sweep=[{"type": ["beta"]}]),
     "'strength' or 'z' ... 'tau'": lambda: make_strength().correlation(LINE, of="tau"),
 })  # fmt: skip
 
@@ -121,19 +114,16 @@ test_objects_in_the_place_of_others = refusals({
     "st.PowerLawSpectrum(...) ... class": lambda: make_strength(spectrum=st.PowerLawSpectrum),
     "method ... write st.LocalCriterion(...)": lambda: onset(ONE, st.LocalCriterion),
     "method ... 'local'": lambda: onset(ONE, "local"),
-    "Study.method: must be a method object such as st.LocalCriterion() ... got 0": lambda: (
-        make_study(method=0)
-    ),
+    "Study.method: must be a method object such as st.LocalCriterion() ... got 0":
+        lambda: (make_study(method=0)),
     "where: must be a Problem or an Interface, got 3": lambda: st.plot.field(3, ONE),
-    "profile ... must be a DataArray over x ... (64, 64)": lambda: make_strength().given(
-        np.ones((64, 64)), noise=1e4
-    ),
+    "profile ... must be a DataArray over x ... (64, 64)":
+        lambda: make_strength().given(np.ones((64, 64)), noise=1e4),
     "sweep: slip cannot be kept ... an interface that is swept": lambda: make_study(
         method=st.Equilibrium(slip=True), sweep=[{"problem.interface.nodes": [128, 256]}]
     ),
-    "shear_modulus ... poisson_ratio ... density": lambda: st.Solid(
-        shear_modulus=-1.0, poisson_ratio=2.0, density=0.0
-    ),
+    "shear_modulus ... poisson_ratio ... density":
+        lambda: st.Solid(shear_modulus=-1.0, poisson_ratio=2.0, density=0.0),
     "problem ... random ... seed": lambda: monte_carlo(problem=3, random=4, seed="x"),
 })  # fmt: skip
 
@@ -153,9 +143,8 @@ test_fields_that_cannot_be = refusals({
     "this takes ... GiB of memory": lambda: st.RandomInterface(
         strength=make_strength()
     ).profiles(PLANE, samples=10**6),
-    "subset ... GiB of memory ... fewer nodes": lambda: subset.descend(
-        lambda draws: draws[:, 0], 10**9, rng=None, samples=1000
-    ),
+    "subset ... GiB of memory ... fewer nodes":
+        lambda: subset.descend(lambda draws: draws[:, 0], 10**9, rng=None, samples=1000),
 })  # fmt: skip
 
 test_profiles_and_loads = refusals({
@@ -171,18 +160,14 @@ test_profiles_and_loads = refusals({
     "strength ... (0, 256)": lambda: onset(np.ones((0, 256))),
     "strength ... complex128": lambda: onset(np.ones(256) * 1j),
     "strength ... masked": lambda: onset(np.ma.masked_less(np.arange(256.0), 3)),
-    "residual_strength ... in sample 0 ... residual_strength 2e+06 to 2e+06 Pa": lambda: onset(
-        ONE, residual_strength=2e6
-    ),
-    "initial_stress ... (2, 256) ... (3, 256)": lambda: onset(
-        np.ones((3, 256)), initial_stress=np.zeros((2, 256))
-    ),
-    "strength ... initial_stress ... sample 0, node 77": lambda: onset(
-        ONE, initial_stress=2e6 * (np.arange(256) == 77)
-    ),
-    "weakening_rate ... must be finite": lambda: onset(
-        ONE, st.Equilibrium(), weakening_rate=np.nan
-    ),
+    "residual_strength ... in sample 0 ... residual_strength 2e+06 to 2e+06 Pa":
+        lambda: onset(ONE, residual_strength=2e6),
+    "initial_stress ... (2, 256) ... (3, 256)":
+        lambda: onset(np.ones((3, 256)), initial_stress=np.zeros((2, 256))),
+    "strength ... initial_stress ... sample 0, node 77":
+        lambda: onset(ONE, initial_stress=2e6 * (np.arange(256) == 77)),
+    "weakening_rate ... must be finite":
+        lambda: onset(ONE, st.Equilibrium(), weakening_rate=np.nan),
     "strength ... residual_strength ... initial_stress ... weakening_rate": lambda: onset(
         np.full(256, np.nan), residual_strength=-1.0, initial_stress="x", weakening_rate=-1.0
     ),
@@ -194,13 +179,11 @@ test_profiles_and_loads = refusals({
     "complex": lambda: path([1e5 + 1j]),
     # What a method does not take
     "interface.nodes ... at least 4 ... 64 ... >= 116": lambda: make_problem(64),
-    "weakening_rate ... st.Equilibrium()": lambda: onset(
-        ONE, problem=make_problem(weakening_rate=np.linspace(1, 2, 256) * 1e11)
-    ),
+    "weakening_rate ... st.Equilibrium()":
+        lambda: onset(ONE, problem=make_problem(weakening_rate=np.linspace(1, 2, 256) * 1e11)),
     "weakening_rate ... uniform": lambda: make_problem(critical_slip=1e-6).nucleation_length,
-    "interface.length ... longer than the interface ... st.Equilibrium()": lambda: onset(
-        ONE, problem=make_problem(weakening_rate=1e10)
-    ),
+    "interface.length ... longer than the interface ... st.Equilibrium()":
+        lambda: onset(ONE, problem=make_problem(weakening_rate=1e10)),
     "multiple of four ... got 258; take 260": lambda: onset(
         np.ones(258), st.Equilibrium(discretization_error=True), make_problem(258)
     ),

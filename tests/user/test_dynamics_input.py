@@ -75,9 +75,8 @@ test_what_cannot_be_simulated = refusals({
     "not after the start": {"method": Rupture(loading_rate=1e8, end_time=1e-9)},
     "goes down at t = 0.001": {"method": Rupture(load=FALLING)},
     "first slip needs": {"method": Rupture(load=([0.0, 1.0], [1e5, 1e5]))},
-    "above residual_strength at one node or more": {
-        "problem": make_problem(128, critical_slip=2e-6, residual_strength=2e6)
-    },
+    "above residual_strength at one node or more":
+        {"problem": make_problem(128, critical_slip=2e-6, residual_strength=2e6)},
 }, simulate)  # fmt: skip
 
 

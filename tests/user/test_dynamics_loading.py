@@ -205,24 +205,19 @@ def test_rates_that_cannot_be_resolved_are_said(exact):
 
 test_what_a_rupture_cannot_do_is_refused = refusals({
     "first slip would come after": lambda: critical_stress(st.Rupture(loading_rate=1e-300)),
-    "infinitely much slip": lambda: simulate(
-        problem=make_problem(NODES, weakening_rate=5e-324)
-    ),
+    "infinitely much slip":
+        lambda: simulate(problem=make_problem(NODES, weakening_rate=5e-324)),
     "max_steps: 20 steps": lambda: critical_stress(st.Rupture(loading_rate=1e8, max_steps=20)),
-    "loading_rate: in one explicit step": lambda: critical_stress(
-        st.Rupture(loading_rate=1e15)
-    ),
-    "kernel_tolerance: ... waves grow at any time step": lambda: critical_stress(
-        st.Rupture(loading_rate=1e7, kernel_tolerance=1e-2)
-    ),
+    "loading_rate: in one explicit step":
+        lambda: critical_stress(st.Rupture(loading_rate=1e15)),
+    "kernel_tolerance: ... waves grow at any time step":
+        lambda: critical_stress(st.Rupture(loading_rate=1e7, kernel_tolerance=1e-2)),
     "strength: must be finite and above residual": lambda: simulate(strength=np.inf + X),
     # Methods without waves say what they take.
-    "strength: must be finite; entry": lambda: critical_stress(
-        st.LocalCriterion(), barred(np.inf)
-    ),
-    "above initial_stress ... only st.Rupture()": lambda: critical_stress(
-        st.LocalCriterion(), problem=OVERSTRESSED
-    ),
+    "strength: must be finite; entry":
+        lambda: critical_stress(st.LocalCriterion(), barred(np.inf)),
+    "above initial_stress ... only st.Rupture()":
+        lambda: critical_stress(st.LocalCriterion(), problem=OVERSTRESSED),
 })  # fmt: skip
 
 

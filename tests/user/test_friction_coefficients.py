@@ -48,16 +48,13 @@ test_moduli = refusals({
     "poisson_ratio: missing": {"youngs_modulus": 1e9},
 }, partial(st.Solid, density=1200.0))  # fmt: skip
 test_what_is_contradicting_or_missing_is_refused = refusals({
-    "need a normal pressure": lambda: st.monte_carlo(
-        FREE, COEFFICIENT, method=LOCAL, samples=2
-    ),
-    "friction_coefficient: needs a normal pressure": lambda: counted(
-        FREE, STRENGTH, friction_coefficient=0.3
-    ),
+    "need a normal pressure":
+        lambda: st.monte_carlo(FREE, COEFFICIENT, method=LOCAL, samples=2),
+    "friction_coefficient: needs a normal pressure":
+        lambda: counted(FREE, STRENGTH, friction_coefficient=0.3),
     "either stress ... or friction_coefficient": lambda: counted(PRESSED, STRENGTH),
-    "critical_slip: of = 'friction_coefficient'": lambda: st.RandomInterface(
-        strength=STRENGTH, critical_slip=COEFFICIENT
-    ),
+    "critical_slip: of = 'friction_coefficient'":
+        lambda: st.RandomInterface(strength=STRENGTH, critical_slip=COEFFICIENT),
 })  # fmt: skip
 
 

@@ -52,15 +52,13 @@ test_what_a_law_does_not_allow_is_refused = refusals({
     PIECES: lambda: onset(EXPONENTIAL),
     f"{PIECES}ure": lambda: st.equilibrium_path(with_law(EXPONENTIAL), TAU_P, [0.6e6]),
     "2.33 times as steeply": lambda: onset(STEEPENING, method=LOCAL),
-    "up to 2.33 times as steeply": lambda: st.theory.nucleation_stress(
-        with_law(STEEPENING), TAU_P
-    ),
+    "up to 2.33 times as steeply":
+        lambda: st.theory.nucleation_stress(with_law(STEEPENING), TAU_P),
     "strength does not fall linearly": lambda: st.failure_probability(
         with_law(DUAL), FIELD, 0.7e6, method=EXACT, algorithm="two_level"
     ),
-    "pieces: must be a whole number >= 2, got 1": lambda: st.PiecewiseWeakening.from_law(
-        EXPONENTIAL, 1
-    ),
+    "pieces: must be a whole number >= 2, got 1":
+        lambda: st.PiecewiseWeakening.from_law(EXPONENTIAL, 1),
     "law: must be a FrictionLaw, got": lambda: st.PiecewiseWeakening.from_law("exponential", 4),
     "friction: must be a friction law such as ... got 0.2": lambda: with_law(0.2),
     "must fall at every corner ... got (0.5, 0.5, 0.0); give a plateau a small fall": lambda: (
@@ -215,12 +213,10 @@ LAWS = {
     "strength must not rise with slip, as beyond u = 0": (hump, lambda f: 1.0 - 0.8 * f / 1.1),
     "f(0) must be 1, got 0.5": (lambda law, u: (0.5 * np.exp(-u), 0.5 * np.exp(-u)), logarithm),
     "slip_at(0), or ... must be positive and finite, got 0": (plateau, lambda f: f),
-    "f(slip_at(0)) is 0, but 0.3 by its f": (
-        plateau, lambda f: 0.9 * plateau_slip(f), plateau_area,
-    ),
-    "initial_slope is 2, but 1 by its f ... -f'(0.568) is": (
-        lambda law, u: (np.exp(-u), 2.0 * np.exp(-u)), logarithm, exponential_area, 2.0,
-    ),
+    "f(slip_at(0)) is 0, but 0.3 by its f":
+        (plateau, lambda f: 0.9 * plateau_slip(f), plateau_area),
+    "initial_slope is 2, but 1 by its f ... -f'(0.568) is":
+        (lambda law, u: (np.exp(-u), 2.0 * np.exp(-u)), logarithm, exponential_area, 2.0),
 }  # fmt: skip
 
 

@@ -119,12 +119,10 @@ test_mistakes = refusals({
     "unit ... Mstone ... Pa": {"unit": "Mstone"},
     "unit ... force ... area": {"unit": "kN"},
     "30 of 30 ... below all that ... unit": {"peaks": PEAKS / 1e6},
-    "200000, which lies below ... lowest come from marginal.low = 400000": {
-        "peaks": np.append(PEAKS, 0.2e6)
-    },
-    "lies above ... highest come from ... marginal.low = 900000": {
-        "peaks": PEAKS + 1e6, "prior": PRIOR
-    },
+    "200000, which lies below ... lowest come from marginal.low = 400000":
+        {"peaks": np.append(PEAKS, 0.2e6)},
+    "lies above ... highest come from ... marginal.low = 900000":
+        {"peaks": PEAKS + 1e6, "prior": PRIOR},
     "at least 3 different ... got 2 in 2 peaks": {"peaks": PEAKS[:2]},
     "at least 3 different ... got 1 in 5 peaks": {"peaks": [0.7e6] * 5},
     "number 1 is nan": {"peaks": [0.7e6, np.nan, 0.71e6]},
@@ -135,23 +133,20 @@ test_mistakes = refusals({
     "0.001": {"peaks": {0.1: PEAKS, 1e-3: PEAKS}},
     "coefficients of friction ... normal_pressure": {"peaks": PEAKS / 2e6, "unit": "1"},
     "load_cell_error ... equal to 0": {"load_cell_error": -1.0},
-    "load_cell_error ... unit of the peaks": {
-        "peaks": PEAKS / 1e6, "unit": "MPa", "load_cell_error": 5e3
-    },
+    "load_cell_error ... unit of the peaks":
+        {"peaks": PEAKS / 1e6, "unit": "MPa", "load_cell_error": 5e3},
     "corelation": {"prior": {"corelation_length": (1.0, 2.0)}},
     "did you mean 'marginal.mean'": {"prior": {"mean": (1.0, 2.0)}},
     "prior ... must map": {"prior": {}},
     "same parameter": {"prior": LOW | {"random.strength.marginal.low": (0.1e6, 0.2e6)}},
     "low < high": {"prior": {"marginal.low": (0.9e6, 0.4e6)}},
-    "of a positive range": {
-        "prior": {"marginal.low": {"low": 0.0, "high": 1e6, "spacing": "log"}}
-    },
+    "of a positive range":
+        {"prior": {"marginal.low": {"low": 0.0, "high": 1e6, "spacing": "log"}}},
     "frozen": {"prior": {"marginal.low": scipy.stats.uniform}},
     "continuous": {"prior": {"marginal.low": scipy.stats.poisson(3)}},
     "prior: at marginal.low = 2e+06 ... below high": {"prior": {"marginal.low": (1e6, 2e6)}},
-    "prior: at correlation_length = 0.5005 ... no mode": {
-        "prior": {"correlation_length": (1e-3, 1.0)}
-    },
+    "prior: at correlation_length = 0.5005 ... no mode":
+        {"prior": {"correlation_length": (1e-3, 1.0)}},
     "method": {"method": "local"},
     "problem ... Problem": {"problem": STRENGTH, "random": PROBLEM},
     "5 parameters would have to be simulated": {"prior": FIVE},

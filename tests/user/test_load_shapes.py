@@ -98,8 +98,7 @@ def test_a_load_of_ones_own():
 
 
 test_loads_of_ones_own_that_are_refused = refusals({
-    "BumpLoad.width: must be greater than 0": lambda: st.Load(
-        profile={"type": "hump", "width": 0.0}
-    ),
+    "BumpLoad.width: must be greater than 0":
+        lambda: st.Load(profile={"type": "hump", "width": 0.0}),
     "Bump ... must be positive everywhere": lambda: loaded(NegativeBump(width=0.02)),
 })  # fmt: skip

@@ -305,21 +305,18 @@ test_what_is_no_profile_is_refused = refusals({
     "load.profile: x does not coincide": problem_with(profile=labelled(1.0 + X, X * 0.99)),
     "profile: load_profile is in Pa": problem_with(profile=labelled(1.0 + X, units="Pa")),
     "interpolate=True": read(TENT, interface=LINE),
-    "values are missing ... the first at x = 0.0265625 m": read(
-        TENT.drop_isel(x=[11, 12, 13, 14]), interface=LINE, interpolate=True
-    ),
+    "values are missing ... the first at x = 0.0265625 m":
+        read(TENT.drop_isel(x=[11, 12, 13, 14]), interface=LINE, interpolate=True),
     "gaps: must be 'refuse' or 'fill'": lambda: onset(STRENGTH, gaps="drop"),
     "clearly the strength ... 'z'": read(labelled().to_dataset(name="z")),
-    "value: unknown '1' ... strength, tau_i": read(
-        labelled().to_dataset(name="strength").assign(tau_i=labelled()), x=0, value=1
-    ),
+    "value: unknown '1' ... strength, tau_i":
+        read(labelled().to_dataset(name="strength").assign(tau_i=labelled()), x=0, value=1),
     "not clear from (time)": lambda: make_problem(
         (NODES, NODES), (0.1, 0.1),
         load=st.Load(normal_pressure=xr.DataArray(STRENGTH, dims="time")),
     ),
-    "value: 'q' is not the name of the only variable, 'tau'": read(
-        labelled().rename("tau"), value="q"
-    ),
+    "value: 'q' is not the name of the only variable, 'tau'":
+        read(labelled().rename("tau"), value="q"),
 })  # fmt: skip
 
 

@@ -88,9 +88,8 @@ VARYING = make_problem(
 )
 RUPTURES = Standing("rupture"), st.Rupture(loading_rate=1e9)
 test_a_mistake_is_named = refusals({
-    "stress ... method ... target_cv ... max_evaluations": {
-        "stress": "low", "method": st.LocalCriterion, "target_cv": 0.0, "max_evaluations": 3,
-    },
+    "stress ... method ... target_cv ... max_evaluations":
+        {"stress": "low", "method": st.LocalCriterion, "target_cv": 0.0, "max_evaluations": 3},
     "algorithm: must be ... 'subset' ... got 'subsets'": {"algorithm": "subsets"},
     "event": {"event": "collapse"},
     "workers": {"workers": 1.5},
@@ -98,9 +97,8 @@ test_a_mistake_is_named = refusals({
     "stress ... [670000.0]": {"stress": [0.67e6]},
     "plain": {"method": RUPTURES[0], "algorithm": "subset"},
     "method ... plain": {"method": RUPTURES[0], "algorithm": "two_level"},
-    "weakening rate": {
-        "system": (VARYING, FIELD), "method": EXACT, "algorithm": "two_level",
-    },
+    "weakening rate":
+        {"system": (VARYING, FIELD), "method": EXACT, "algorithm": "two_level"},
     "names no less expensive method": {"algorithm": "two_level"},
 }, failure)  # fmt: skip
 
