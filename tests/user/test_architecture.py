@@ -8,8 +8,11 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
+import pydantic
+from refusals import refuses
 
 import stiction as st
+from stiction.model import to_plain
 
 MIXED = {
     "average.py", "diagnostics.py", "explicit.py", "implicit.py", "loading.py",
@@ -57,7 +60,7 @@ def test_an_edited_message_compiles_no_kernel_anew():
             assert module == "stiction.jit" or "InputError" not in imported, (path, module)
 
 
-def test_the_worked_examples_run():
+def test_the_worked_examples_run(monkeypatch):
     """A friction law, a load, a spectrum and a marginal of one's own, as the page shows them."""
     page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
     names: dict = {"__name__": __name__}
@@ -68,3 +71,12 @@ def test_the_worked_examples_run():
     sample = problem.sample(names["field"].sample(base.interface, samples=2, seed=0))
     found = st.onset(problem, sample, method=st.LocalCriterion(), progress=False)
     assert np.all(np.abs(found.critical_position - 0.05) < 0.02)
+    # The load in study files, and what is refused of it.
+    loaded, bump = dataclasses.replace(base, load=names["load"]), names["BumpLoad"]
+    plain = to_plain(loaded)
+    assert plain["load"]["profile"] == {"type": "bump", "width": 0.02}
+    assert pydantic.TypeAdapter(st.Problem).validate_python(plain) == loaded
+    words = "BumpLoad.width: must be greater than 0"
+    refuses(words, lambda: st.Load(profile={"type": "bump", "width": 0.0}))
+    monkeypatch.setattr(bump, "values", lambda self, interface: interface.x - 0.01)
+    refuses("Bump ... must be positive everywhere", lambda: bump(width=0.01).on(base.interface))

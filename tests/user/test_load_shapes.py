@@ -1,16 +1,10 @@
-"""Load shapes and event sequences: in Python, in study files, swept, and refused by name."""
-
-from typing import Literal
+"""Load shapes and event sequences: in Python, in study files, and swept."""
 
 import numpy as np
-import pydantic
 import pytest
-from refusals import refusals
 from setups import beta_strength
 
 import stiction as st
-from stiction.load import LoadShape, distance, register
-from stiction.model import Positive, model, to_plain
 
 PLAIN = st.paper.problem(nodes=256)
 STRENGTH = st.paper.strength(PLAIN)
@@ -69,36 +63,3 @@ def test_events_are_those_of_the_path():
         own = st.equilibrium_path(PLAIN, tau_p[sample], [0.0])["event_moment"].values[:4]
         np.testing.assert_array_equal(kept[sample, : own.size], own)
         assert np.isnan(kept[sample, own.size :]).all()
-
-
-@register
-@model(kw_only=True)
-class BumpLoad(LoadShape):
-    """A load of one's own: higher within `width` (m) of the middle."""
-
-    width: Positive
-    type: Literal["hump"] = "hump"
-
-    def values(self, interface):
-        return 1.0 + (distance(interface, 0.5) < self.width)
-
-
-@model(kw_only=True)
-class NegativeBump(BumpLoad):
-    def values(self, interface):
-        return super().values(interface) - 1.5
-
-
-def test_a_load_of_ones_own():
-    """In a study file; docs/architecture.md has one in Python."""
-    problem = loaded(BumpLoad(width=0.02))
-    plain = to_plain(problem)
-    assert plain["load"]["profile"] == {"type": "hump", "width": 0.02}
-    assert pydantic.TypeAdapter(st.Problem).validate_python(plain) == problem
-
-
-test_loads_of_ones_own_that_are_refused = refusals({
-    "BumpLoad.width: must be greater than 0":
-        lambda: st.Load(profile={"type": "hump", "width": 0.0}),
-    "Bump ... must be positive everywhere": lambda: loaded(NegativeBump(width=0.02)),
-})  # fmt: skip
