@@ -10,9 +10,11 @@ import pytest
 import stiction as st
 
 
-def refuses(words: str, call: Callable[[], Any]) -> None:
+def refuses(
+    words: str, call: Callable[[], Any], error: type[Exception] = st.InputError
+) -> None:
     """Fail unless the call is refused with a message that holds all words."""
-    with pytest.raises(st.InputError) as caught:
+    with pytest.raises(error) as caught:
         call()
     for word in words.split(" ... "):
         assert word in str(caught.value), str(caught.value)

@@ -274,7 +274,6 @@ def test_a_folder_with_another_run_is_refused(tmp_path):
         {"load": dataclasses.replace(load, profile=1.2)},
         {"load": dataclasses.replace(load, initial_stress=5e4)},
         {"friction": dataclasses.replace(friction, residual_strength=3e5)},
-        {"friction": dataclasses.replace(friction, weakening_rate=2e11)},
     ):
         other = {"problem": dataclasses.replace(VARIED, **change)}
         refuses("holds another run", partial(simulate, save, **given | other))

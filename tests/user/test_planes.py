@@ -60,12 +60,6 @@ def test_what_comes_back(found):
     assert onset(SAMPLES[1])["critical_load"].item() == found["critical_load"].values[1]
 
 
-def test_a_coarse_direction_is_warned_of_by_name():
-    words = r"in mode III, 5\.3 along y; 16 are recommended"
-    with pytest.warns(st.AccuracyWarning, match=words):
-        onset(smooth((96, 36)), plane_of((96, 36)))
-
-
 def test_bounds_that_do_not_close_are_warned_of_with_their_distance(monkeypatch):
     # As if Newton's method and bisection had got nowhere.
     monkeypatch.setattr(transforms, "close", lambda *a, **k: (False, 0.0))

@@ -78,15 +78,12 @@ def test_the_names_of_dimensions_decide_where_samples_equal_nodes():
     array = xr.DataArray(rows, dims=("sample", "x"), coords={"x": X})
     expected = onset(rows)
     for given in (array, array.transpose("x", "sample"), array.drop_vars("x").T):
-        np.testing.assert_array_equal(
-            onset(given)["critical_stress"], expected["critical_stress"]
-        )
+        assert onset(given)["critical_stress"].equals(expected["critical_stress"])
     # One value a sample, not a profile, although there are as many of them as nodes.
     residual = np.linspace(0.0, 3e5, NODES)
     given = {"strength": rows, "residual_strength": xr.DataArray(residual, dims="sample")}
-    np.testing.assert_array_equal(
-        SYSTEM.sample(given).residual_strength, np.tile(residual[:, np.newaxis], NODES)
-    )
+    rows = np.tile(residual[:, np.newaxis], NODES)
+    np.testing.assert_array_equal(SYSTEM.sample(given).residual_strength, rows)
 
 
 class Quantity:
@@ -116,15 +113,14 @@ def test_units_that_are_stated_are_converted(given):
 
 def test_everything_beside_the_strength_is_read_alike():
     residual = 1e5 + 1e6 * X
-    given = labelled(residual[::-1] * 1e-3, X[::-1] * 1e3, "mm", units="kPa")
+    tau_r = labelled(residual[::-1] * 1e-3, X[::-1] * 1e3, "mm", units="kPa")
     initial = xr.DataArray(0.01, attrs={"units": "MPa"})
-    rows = SYSTEM.sample(
-        {"strength": STRENGTH, "residual_strength": given, "initial_stress": initial}
-    )
+    given = {"strength": STRENGTH, "residual_strength": tau_r, "initial_stress": initial}
+    rows = SYSTEM.sample(given)
     np.testing.assert_allclose(rows.residual_strength[0], residual, rtol=1e-14)
     np.testing.assert_allclose(rows.initial_stress, 1e4)
     load = st.Load(profile=labelled(1.0 + X[::-1], X[::-1]), initial_stress=Quantity(0.1, 1e6))
-    problem = make_problem(NODES, weakening_rate=0.2e12, residual_strength=given, load=load)
+    problem = make_problem(NODES, weakening_rate=0.2e12, residual_strength=tau_r, load=load)
     np.testing.assert_allclose(problem.friction.residual_strength, residual, rtol=1e-14)
     np.testing.assert_array_equal(problem.load.profile, 1.0 + X)
     assert problem.load.initial_stress == pytest.approx(1e5)
@@ -226,9 +222,7 @@ def test_heights_are_no_strength(tmp_path, head):
     path.write_text(text_of([X * 1e3, STRENGTH], head=head))
     words = "no variable that is clearly the strength ... 'height'"
     refuses(words, lambda: st.read_profile(path, interface=LINE))
-    with pytest.raises(
-        st.InputError, match="cannot be converted to Pa|no variable that is clearly"
-    ):
+    with pytest.raises(st.InputError, match="be converted to Pa|no variable that is clearly"):
         st.read_profile(path, value=1, unit="um")
 
 
@@ -336,9 +330,7 @@ def test_gaps_are_named_filled_on_request_and_remembered():
     for given in (holes, labelled(holes), labelled(holes[::-1], X[::-1])):
         refuses(f"strength: values are missing ... {words}", lambda given=given: found(given))
         result = onset(given, gaps="fill")
-        np.testing.assert_allclose(
-            result["critical_stress"], onset(expected)["critical_stress"], rtol=1e-14
-        )
+        assert result["critical_stress"][0] == pytest.approx(found(expected)[0], rel=1e-14)
         np.testing.assert_array_equal(result["measured"], ~np.isnan(holes))
     profile = st.read_profile(labelled(holes), interface=LINE, gaps="fill")
     np.testing.assert_allclose(profile, expected, rtol=1e-14)
