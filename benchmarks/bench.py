@@ -286,7 +286,7 @@ def rupture_onset():
         for rate in (1e5, 2e7, 1e9):
             method = st.Rupture(loading_rate=rate, start="rest")
             rest, first = solver_time(problem, method, tau_p, 1)
-            method = st.Rupture(loading_rate=rate, stop="runaway")
+            method = st.Rupture(loading_rate=rate)
             ours, found = solver_time(problem, method, tau_p, 1)
             apart = np.abs(found["critical_stress"] / first["critical_stress"] - 1.0).max()
             label = f"xi_0/h_n = {ratio}, {rate:.0e} Pa/s"

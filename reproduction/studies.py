@@ -15,7 +15,6 @@ from reproduction.setting import MEAN, PROBLEM, RATIOS, SIMULATED, STRAIN, H, st
 
 LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
 RUPTURE = st.Rupture(loading_rate=setting.LOADING_RATE)
-RUNAWAY = dataclasses.replace(RUPTURE, stop="runaway")
 CELLS = 2048
 TREND = (0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 30.0)
 WINDOWS = (2.0, 4.0, 8.0, 16.0)
@@ -50,8 +49,8 @@ def ruptures(run: Runner) -> xr.Dataset:
 
 
 def dynamic(run: Runner) -> xr.Dataset:
-    """Monte Carlo study by ruptures, until nothing can stop them."""
-    return run.sweep("dynamic", PROBLEM, strength, RUNAWAY, run.size.dynamic)
+    """Monte Carlo study by ruptures."""
+    return run.sweep("dynamic", PROBLEM, strength, RUPTURE, run.size.dynamic)
 
 
 @kept(samples=lambda size: size.samples)
@@ -457,7 +456,7 @@ def arrest(run: Runner, samples: int, most: int) -> xr.Dataset:
         centre = float(static["event_position"][0, 0])
         at = beside(tau_p, centre, length)
         by_chance = [beside(tau_p, place, length) for place in interface.x[::8]]
-        moving = st.onset(PROBLEM, tau_p, method=RUNAWAY, progress=False)
+        moving = st.onset(PROBLEM, tau_p, method=RUPTURE, progress=False)
         rank = float(np.mean(np.array(by_chance) < at))
         return ratio, number, length, rank, float(moving["arrested_events"][0])
 
@@ -600,7 +599,7 @@ def what_if_dynamic(run: Runner, name: str) -> xr.Dataset:
         {key: [values[i] for i in chosen] for key, values in axis.items()}
         for axis, chosen in zip(plain["sweep"], ARRESTS[name], strict=True)
     ]
-    plain["method"] = RUNAWAY
+    plain["method"] = RUPTURE
     plain["ensemble"] = {"samples": run.size.arrests, "seed": run.seed}
     found = stacked(run.study(f"{name}-inertia", st.Study.from_dict(plain)))
     return found.assign_coords(point=numbers.ravel())

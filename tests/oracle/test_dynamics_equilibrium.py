@@ -133,5 +133,5 @@ def test_arrested_events_are_those_of_equilibrium_whatever_the_rate(rate):
     whole = solid.shear_modulus * interface.length
     moments = [st.equilibrium_path(problem, one, [0.0]).event_moment.values for one in tau_p]
     expected = [int(np.sum(moment / whole > 5e-3 * unit)) for moment in moments]
-    found = st.onset(problem, tau_p, method=st.Rupture(loading_rate=rate, stop="runaway"))
+    found = st.onset(problem, tau_p, method=st.Rupture(loading_rate=rate))
     assert found.arrested_events.values.tolist() == expected == [1, 1]

@@ -54,7 +54,7 @@ def assert_agree(near, rest, median=5e-5):
 @pytest.mark.parametrize("rate", RATES)
 @pytest.mark.parametrize("ratio", RATIOS)
 def test_same_onset_as_from_rest(problem, ratio, rate):
-    near, rest = both(problem, profiles(problem, ratio, 3), loading_rate=rate, stop="runaway")
+    near, rest = both(problem, profiles(problem, ratio, 3), loading_rate=rate)
     assert_agree(near, rest)
     begun = near["start_error"] > 0.0
     assert begun.any()
@@ -67,14 +67,14 @@ def test_same_onset_as_from_rest(problem, ratio, rate):
 @pytest.mark.parametrize("rate", RATES)
 @pytest.mark.parametrize("ratio", RATIOS)
 def test_same_onset_as_from_rest_of_twenty(problem, ratio, rate):
-    near, rest = both(problem, profiles(problem, ratio, 20), loading_rate=rate, stop="runaway")
+    near, rest = both(problem, profiles(problem, ratio, 20), loading_rate=rate)
     assert_agree(near, rest)
 
 
 @pytest.mark.parametrize("number", ARRESTED)
 def test_with_an_event_arrested_before_the_onset(problem, number):
     tau_p = profiles(problem, 0.5, 1, number)
-    near, rest = both(problem, tau_p, loading_rate=2e7, stop="runaway")
+    near, rest = both(problem, tau_p, loading_rate=2e7)
     assert_agree(near, rest, median=1e-4)  # of one; waves of the event scatter what follows
     assert near["start_error"][0] > 0.0
     assert near["arrested_events"][0] == rest["arrested_events"][0] == 1
@@ -92,7 +92,7 @@ def test_where_the_onset_depends_most_on_the_rate(problem):
     worst = np.argsort(rise)[-3:]
     assert np.all(rise[worst] > 2e-3)  # ten times the agreement that is asked for
     for rate in (2e7, 2e8):
-        assert_agree(*both(problem, tau_p[worst], loading_rate=rate, stop="runaway"))
+        assert_agree(*both(problem, tau_p[worst], loading_rate=rate))
 
 
 def test_what_follows_the_onset_is_the_same(problem):
@@ -168,33 +168,9 @@ def test_everything_may_vary_and_a_sample_alone_gives_the_same_bits(problem):
     phases = rng.uniform(0.0, 2.0 * np.pi, (3, 1, 30))
     waves = np.cos(2.0 * np.pi * np.arange(1, 31) * x[:, None] / 0.1 + phases)
     tau_p = 1.1e6 + 4e5 * np.tanh(waves.sum(axis=2) / np.sqrt(15.0))
-    near, rest = both(other, tau_p, loading_rate=1e6, stop="runaway")
+    near, rest = both(other, tau_p, loading_rate=1e6)
     assert_agree(near, rest)
     assert np.all(near["start_error"] > 0.0)
-    alone = Rupture(loading_rate=1e6, stop="runaway").prepare(other)(other.sample(tau_p[2]))
+    alone = Rupture(loading_rate=1e6).prepare(other)(other.sample(tau_p[2]))
     for name, values in alone.items():
         np.testing.assert_array_equal(values, near[name][2:], err_msg=name)
-
-
-def test_runaway_knows_the_loads_of_the_whole_run(problem):
-    tau_p = np.concatenate([profiles(problem, 0.5, 3), profiles(problem, 0.5, 1, ARRESTED[0])])
-    rows = problem.sample(tau_p)
-    whole, short = (
-        Rupture(loading_rate=2e7, stop=stop).prepare(problem)(rows)
-        for stop in ("sliding", "runaway")
-    )
-    for name in (
-        "critical_stress", "critical_load", "first_instability", "critical_position",
-        "arrested_events", "applied_load", "onset_time", "start_load",
-    ):  # fmt: skip
-        np.testing.assert_array_equal(short[name], whole[name], err_msg=name)
-    assert np.all(short["explicit_steps"] < whole["explicit_steps"])
-    assert np.all(short["explicit_steps"][:3] < 0.5 * whole["explicit_steps"][:3])
-    assert np.all(np.isnan(short["kinetic_stress"]))
-
-
-def test_runaway_on_a_plane_is_refused():
-    problem = make_problem((32, 32), (0.1, 0.1), weakening_rate=5e10)
-    method = Rupture(loading_rate=1e7, stop="runaway")
-    with pytest.raises(st.InputError, match="stop: 'runaway' works on lines only"):
-        st.onset(problem, np.full((32, 32), 1e6), method=method)

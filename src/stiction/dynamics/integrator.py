@@ -1,12 +1,10 @@
 """One run: explicit steps and implicit steps, the switch between them, and when it ends."""
 
 import dataclasses
-import functools
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.dynamics.energies import fracture_energy
 from stiction.dynamics.explicit import explicit_steps
 from stiction.dynamics.implicit import LARGEST_STEP, implicit_steps
 from stiction.dynamics.loading import first_reach, load_at
@@ -29,14 +27,12 @@ from stiction.dynamics.state import (
     Setting,
     State,
 )
-from stiction.elasticity.line import griffith_length
 from stiction.friction.kernels import strengths
 from stiction.friction.laws import FrictionLaw
 
 _OVERSTRESSED = 1e-6  # stress scales above the strength beyond which slip begins with waves
 _NO_SLIP = 1e-9  # Z V below which nothing slips, in units of the stress scale
-_MARGIN = 1.5  # factor on the length beyond which nothing stops a rupture, as in equilibrium
-_RUNAWAY_STEPS, _STEPS = 32, 1000  # between two looks at whether a run has ended
+_STEPS = 1000  # between two looks at whether a run has ended
 
 _ENDINGS: dict[int, str] = {
     Reason.ALL_SLID: "sliding",
@@ -160,8 +156,6 @@ class Run:
         """Return the reason why a run ends here, in a word; None if it goes on."""
         if reason in _ENDINGS:
             return _ENDINGS[reason]
-        if self.stop == "runaway" and self._runs_away(state):
-            return "runaway"
         if self.ended(state):
             return "time"
         times, values = self.history
@@ -173,40 +167,14 @@ class Run:
         )
         return "rest" if self.stop != "time" and resting else None
 
-    @functools.cached_property
-    def _largest_fracture_energy(self) -> float:
-        """Largest fracture energy, J/m²; infinite if there are barriers that never break."""
-        nodes = self.setting.nodes
-        if not np.all(np.isfinite(nodes.strength)):
-            return np.inf
-        return float(fracture_energy(self.friction, nodes.critical, nodes).max())
-
-    def _runs_away(self, state: State) -> bool:
-        """Return whether so many nodes in a row are at their residual that the rest must follow.
-
-        A crack of half-length a with the stress drop D releases pi a D²/(2 G*) at each tip
-        (Griffith), and more as it grows or the load rises; the largest fracture energy of the
-        interface, infinite with barriers that never break, is the most that it needs.
-        """
-        nodes, medium, now = self.setting.nodes, self.medium, state.now
-        if not (now["slid"] > 0 and now["in_event"]):
-            return False
-        drop = float((now["load"] * nodes.profile + nodes.initial - nodes.residual).min())
-        energy, modulus = self._largest_fracture_energy, medium.effective_modulus
-        needed = _MARGIN * griffith_length(drop, energy, modulus) / medium.grid.cell
-        return bool(
-            now["slid"] >= needed and longest_row(state.slip >= nodes.critical) >= needed
-        )
-
     def follow(self, state: State, most: int) -> tuple[str | None, int]:
         """Go on to the end of the run, or to `most` steps in all; return why it ended and the code.
 
         The reason is None if it has not ended; the code is then NOT_FINITE or DONE (all steps).
         """
-        portion = _RUNAWAY_STEPS if self.stop == "runaway" else _STEPS
         word, reason = None, int(Reason.DONE)
         while word is None and reason != Reason.NOT_FINITE and state.steps < most:
-            _, reason = self.advance(state, min(portion, most - state.steps))
+            _, reason = self.advance(state, min(_STEPS, most - state.steps))
             word = self.ending(state, reason)
         return word, reason
 
@@ -267,11 +235,3 @@ class Run:
         state.phase[:] = 0.0, 2.0 * self.setting.thresholds.smallest_step
         state.now["past_step"] = 0.0  # the first implicit step is one of first order
         state.now["radiated"] = self.medium.impedance * state.rate.mean()
-
-
-def longest_row(marked: NDArray[np.bool_]) -> int:
-    """Return the length of the longest row of marked nodes on a circle, (nodes,) bool."""
-    others = np.flatnonzero(~marked)
-    if others.size == 0:
-        return int(marked.size)
-    return int(np.diff(others, append=others[0] + marked.size).max()) - 1

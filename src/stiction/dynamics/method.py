@@ -40,8 +40,8 @@ _CALM_STEPS = 300
 _UNSTABLE_STRESS = 0.075
 
 Start = Literal["equilibrium", "rest"]
-Stop = Literal["sliding", "onset", "rest", "runaway", "time"]
-# Not known yet when a run stops at its onset; the events are once it runs away.
+Stop = Literal["sliding", "onset", "rest", "time"]
+# Not known yet when a run stops at its onset.
 _LATER = (
     "kinetic_stress", "stress_drop", "seismic_moment", "radiated_energy", "fracture_energy",
     "arrested_events", "rupture_speed", "median_rupture_speed",
@@ -98,12 +98,11 @@ class Rupture:
     arrival : float
         Share of tau_p - tau_r that a node has lost when the front arrives there, in (0, 1]:
         0.5 is the middle of the cohesive zone, 1e-3 its tip.
-    stop : {"sliding", "onset", "rest", "runaway", "time"}
+    stop : {"sliding", "onset", "rest", "time"}
         When to end (see Notes), unless nothing slips and the load has stopped rising:
         "sliding": every node that can break is at its residual strength. "onset": the first
         instability has begun. "rest": the interface is at rest after an instability, or
-        slides. "runaway": the rupture is so long that no fracture energy of the interface can
-        stop it (Griffith), or the interface slides; lines only. "time": at `end_time`.
+        slides. "time": at `end_time`.
     implicit : bool
         False takes explicit steps only (slow loading then costs a million steps).
     max_steps : int
@@ -130,10 +129,10 @@ class Rupture:
     energies are those of the first step after which every node that can break is at its
     residual strength; radiated energy and moment grow by about 2 % in that step.
 
-    With "onset" and "runaway", quantities that are not final are NaN: kinetic stress, stress
-    drop, moment, energies and rupture speeds, with "onset" also arrested events; its critical
-    values are those of the first maximum of the mean stress. With "rest" they are those of the
-    largest mean stress so far, and kinetic stress and stress drop are NaN unless it slides.
+    With "onset", what is not final is NaN: kinetic stress, stress drop, moment, energies,
+    rupture speeds and arrested events; critical values are those of the first maximum of the
+    mean stress. With "rest" they are those of the largest mean stress so far, and kinetic
+    stress and stress drop are NaN unless it slides.
 
     Slip never reverses: a node whose slip rate would become negative sticks, keeps its
     weakened strength, and slips again only when the stress reaches it. Boundary integral in
@@ -181,8 +180,6 @@ class Rupture:
 
     def supports(self, problem: Problem) -> list[str]:
         """Return the reasons why the method cannot solve a problem; none if it can."""
-        if self.stop == "runaway" and problem.interface.is_plane:
-            return ["stop: 'runaway' works on lines only; stop at 'sliding' or 'onset'"]
         return []
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
@@ -221,14 +218,12 @@ class Rupture:
             raise InputError(
                 f"max_steps: {self.max_steps} steps led to tau_0 = {state.now['load']:.6g} Pa, and "
                 f"{state.now['slid']} nodes to their residual strength, but not to stop="
-                f"{self.stop!r}; raise max_steps or the loading rate, or stop at 'onset', 'rest' "
-                "or 'runaway'"
+                f"{self.stop!r}; raise max_steps or the loading rate, or stop at 'onset' or 'rest'"
             )
         warn_if_unresolved(problem, run, state)
         found = summary(problem, run, state)
-        if self.stop in ("onset", "runaway"):
-            later = [n for n in _LATER if self.stop == "onset" or n != "arrested_events"]
-            found |= {name: np.full(np.shape(found[name]), np.nan) for name in later}
+        if self.stop == "onset":
+            found |= {name: np.full(np.shape(found[name]), np.nan) for name in _LATER}
         return found
 
 
