@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -46,8 +45,7 @@ def misfit(run: xr.Dataset, measured: xr.DataArray, *, align: bool = True) -> Mi
     Parameters
     ----------
     run : xarray.Dataset
-        From `simulate_rupture`, with stations at the gauges, or with the measured quantity
-        among its fields and frames dense enough in time.
+        From `simulate_rupture`, with a station within half a node spacing of every gauge.
     measured : xarray.DataArray
         Over 'time' (s) and 'x' (m), named 'slip', 'slip_rate' or 'shear_stress', in SI
         units or in the units of its attributes. NaN where nothing was recorded.
@@ -63,15 +61,13 @@ def misfit(run: xr.Dataset, measured: xr.DataArray, *, align: bool = True) -> Mi
     Raises
     ------
     InputError
-        If the run lacks the quantity, a gauge is not on the interface, or the record is too short,
-        unsorted or all zero.
+        If a gauge has no station, or the record is too short, unsorted or all zero.
 
     Notes
     -----
-    If every gauge has a station within half a node spacing, records at every step are compared;
-    otherwise frames, interpolated linearly between nodes. Both are interpolated linearly in
-    time, and constant before the first and after the last. The search starts from every shift
-    that puts the steepest point of the record on a step or frame, and refines the best three.
+    Between steps the run is interpolated linearly in time; before the first and after the last it
+    is constant. The search starts from the best of the shifts that put the steepest point of the
+    record on a step.
     """
     times, values, places, kind = _checked(measured)
     clock, simulated = _at_gauges(run, kind, places)
@@ -83,30 +79,22 @@ def misfit(run: xr.Dataset, measured: xr.DataArray, *, align: bool = True) -> Mi
         model = [np.interp(times + shift, clock, own) for own in simulated.T]
         return np.asarray(np.nansum((np.stack(model, axis=1) - values) ** 2, axis=0))
 
+    def total(shift: float) -> float:
+        return float(squares(shift).sum())
+
     shift = 0.0
     if align:
-        shift = _best_shift(lambda shift: squares(shift).sum(), clock, times, values)
+        slope = np.abs(np.diff(np.nan_to_num(values), axis=0)).sum(axis=1) / np.diff(times)
+        steepest, step = int(slope.argmax()), float(np.diff(times).min())
+        starts = clock - 0.5 * (times[steepest] + times[steepest + 1])
+        first = int(np.argmin([total(start) for start in starts]))
+        reach = max(10.0 * step, np.diff(clock)[max(0, first - 2) : first + 1].max())
+        bounds = starts[first] - reach, starts[first] + reach
+        shift = float(minimize_scalar(total, bounds=bounds, options={"xatol": 1e-4 * step}).x)
     own = squares(shift)
     with np.errstate(divide="ignore", invalid="ignore"):
         by_gauge = np.sqrt(own / weight)
     return Misfit(float(np.sqrt(own.sum() / weight.sum())), shift, by_gauge)
-
-
-def _best_shift(
-    squares: Callable[[float], float], clock: Array, times: Array, values: Array
-) -> float:
-    """Return the shift with the least sum of squares."""
-    slope = np.abs(np.diff(np.nan_to_num(values), axis=0)).sum(axis=1) / np.diff(times)
-    steepest = int(slope.argmax())
-    starts = clock - 0.5 * (times[steepest] + times[steepest + 1])
-    order = np.argsort([squares(shift) for shift in starts])
-    step, gaps = float(np.diff(times).min()), np.diff(clock)
-    found = []
-    for first in order[:3]:
-        reach = max(10.0 * step, gaps[max(0, first - 2) : first + 1].max())
-        bounds = starts[first] - reach, starts[first] + reach
-        found.append(minimize_scalar(squares, bounds=bounds, options={"xatol": 1e-4 * step}))
-    return float(min(found, key=lambda one: one.fun).x)
 
 
 def _checked(record: Any) -> tuple[Array, Array, Array, str]:
@@ -126,38 +114,27 @@ def _checked(record: Any) -> tuple[Array, Array, Array, str]:
         return scale * np.asarray(part.values, dtype=np.float64)
 
     times, values = si(record["time"], "s"), si(record, UNITS[kind])
-    if times.size < FEWEST or not (np.isfinite(times).all() and (np.diff(times) > 0.0).all()):
+    rising = np.isfinite(times).all() and np.all(np.diff(times) > 0.0)
+    known = not np.isinf(values).any() and np.isfinite(values).any(axis=0).all()
+    if times.size < FEWEST or not (rising and known):
         raise InputError(
-            f"measured: needs at least {FEWEST} times, finite and rising; got {times.size}"
+            f"measured: needs at least {FEWEST} times, finite and rising, and in every gauge finite"
+            f" values, with NaN in its gaps; got {times.size} times"
         )
-    if np.isinf(values).any() or not np.isfinite(values).any(axis=0).all():
-        raise InputError("measured: every gauge needs finite values, and NaN in its gaps")
     return times, values, si(record["x"], "m"), kind
 
 
 def _at_gauges(run: xr.Dataset, kind: str, places: Array) -> tuple[Array, Array]:
-    """Return moments, s, and the quantity at the gauges then, (moments, gauges)."""
-    if "x" not in getattr(run, "dims", ()) or "y" in run.dims:
-        raise InputError("run: must be the Dataset of a rupture on a line")
-    x = np.asarray(run["x"].values, dtype=np.float64)
-    spacing = x[1] - x[0]
-    length = x.size * spacing
-    outside = places[~((places >= 0.0) & (places <= length))]
-    if outside.size:
+    """Return the times of steps, s, and the quantity at the gauges then, (steps, gauges)."""
+    if f"station_{kind}" not in run or "y" in run.dims:
+        raise InputError("run: must be the Dataset of a rupture on a line, with stations")
+    x = run["x"].values
+    away = np.abs(run["station_x"].values - places[:, None])
+    missed = away.min(axis=1) > 0.5 * (x[1] - x[0]) * (1.0 + 1e-9)
+    if missed.any():
         raise InputError(
-            f"measured: a gauge at x = {outside[0]:g} m is not on the interface, 0 to {length:g} m;"
-            " check its unit"
+            f"run: has no station at the gauge at x = {places[missed][0]:g} m; give its place to"
+            " st.Save(stations=...), and check its unit"
         )
-    if f"station_{kind}" in run:
-        away = np.abs(run["station_x"].values - places[:, None])
-        if np.all(away.min(axis=1) <= 0.5 * spacing * (1.0 + 1e-9)):
-            recorded = run[f"station_{kind}"].transpose("step", "station").values
-            return run["step_time"].values, recorded[:, away.argmin(axis=1)]
-    if kind not in run or "x" not in run[kind].dims:
-        raise InputError(
-            f"run: holds no {kind} at the gauges; give save=st.Save([{kind!r}]), or stations at "
-            "the gauges, to st.simulate_rupture"
-        )
-    field = np.asarray(run[kind].transpose("time", "x").values, dtype=np.float64)
-    values = [[np.interp(place, x, row, period=length) for row in field] for place in places]
-    return np.asarray(run["time"].values, dtype=np.float64), np.stack(values, axis=1)
+    recorded = run[f"station_{kind}"].transpose("step", "station").values
+    return run["step_time"].values, recorded[:, away.argmin(axis=1)]
