@@ -29,7 +29,7 @@ def final_speed(ratio, nodes):
         method=Rupture(load=([0.0, 1.0], [load, load]), implicit=False),
         save=st.Save([], every=1000),
     )
-    speed = rupture_speed(run["arrival_time"].values, [spacing], [problem.nucleation_length])
+    speed = rupture_speed(run["arrival_time"].values, spacing, problem.nucleation_length)
     at = nodes // 2 + np.arange(int(0.38 * nodes), int(0.42 * nodes))
     return float(np.mean(speed[at])) / solid.rayleigh_wave_speed
 

@@ -257,7 +257,7 @@ def test_moment_and_energies(run):
 def test_front_speed_is_that_of_a_front_and_not_where_fronts_meet():
     x = np.arange(64.0)
     away = np.abs((x - 10.0 + 32.0) % 64.0 - 32.0)  # both ways from node 10, around the period
-    speed = rupture_speed(away / 3.0, [1.0], [8.0])
+    speed = rupture_speed(away / 3.0, 1.0, 8.0)
     assert np.isnan(speed[[8, 10, 12, 40, 42, 44]]).all()
     known = speed[np.isfinite(speed)]
     assert known.size == 64 - 2 * 7

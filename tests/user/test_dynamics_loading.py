@@ -190,11 +190,7 @@ def test_where_a_run_stops_and_what_is_known_then(stop):
         assert simulate(strength=tau_p, stop=stop).top_slip_rate[-1].item() < 1e-3
 
 
-def test_rates_that_cannot_be_resolved_are_said(exact):
-    with pytest.warns(AccuracyWarning, match="too late for floating-point times"):
-        slow = st.onset(PROBLEM, TAU_P, method=st.Rupture(loading_rate=1e-2))
-    assert slow.critical_stress.item() == pytest.approx(exact, rel=1e-9)
-    assert np.isnan(slow.rupture_speed[0])
+def test_rates_that_cannot_be_resolved_are_said():
     with pytest.warns(AccuracyWarning, match="rises by 0.16 of .* use time_step=5e-09"):
         fast = critical_stress(st.Rupture(loading_rate=1e12))
     with warnings.catch_warnings():
@@ -204,7 +200,7 @@ def test_rates_that_cannot_be_resolved_are_said(exact):
 
 
 test_what_a_rupture_cannot_do_is_refused = refusals({
-    "first slip would come after": lambda: critical_stress(st.Rupture(loading_rate=1e-300)),
+    "first slip would come after": lambda: critical_stress(st.Rupture(loading_rate=1e-2)),
     "infinitely much slip":
         lambda: simulate(problem=make_problem(NODES, weakening_rate=5e-324)),
     "max_steps: 20 steps": lambda: critical_stress(st.Rupture(loading_rate=1e8, max_steps=20)),

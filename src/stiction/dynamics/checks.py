@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.dynamics.implicit import LARGEST_STEP
 from stiction.dynamics.integrator import Run
 from stiction.dynamics.loading import load_at
 from stiction.dynamics.state import Reason, State
@@ -43,15 +42,10 @@ def warn_if_unresolved(problem: Problem, run: Run, state: State) -> None:
 def at_first_slip(run: Run) -> State:
     """Return the state of rest at first slip; refuse or warn of loads that cannot be followed."""
     time, step = run.first_slip(), run.medium.step
-    if time > LARGEST_STEP:
+    if np.spacing(time) > 0.01 * step:
         raise InputError(
-            f"loading_rate: the first slip would come after {time:.3g} s, more than "
-            f"{LARGEST_STEP:g} s; load faster (the onset no longer depends on the rate)"
-        )
-    if not resolves_steps(run, time):
-        warn_accuracy(
-            f"the first slip comes after {time:.3g} s, too late for floating-point times"
-            f" to resolve steps of {step:.2g} s: rupture speeds are NaN, times rounded"
+            f"loading_rate: the first slip would come after {time:.3g} s, too late to resolve "
+            f"steps of {step:.2g} s; load faster (the onset no longer depends on the rate)"
         )
     scale = run.scale_at(float(load_at(*run.history, time)))
     if not scale > 0.0:
@@ -74,11 +68,6 @@ def at_first_slip(run: Run) -> State:
     below = lowest * nodes.profile + nodes.initial < -nodes.strength
     _warn_of_reverse(run, below, time, lowest)
     return run.start(time)
-
-
-def resolves_steps(run: Run, time: float) -> bool:
-    """Return whether the time since zero load, as a float, resolves explicit steps."""
-    return float(np.spacing(time)) <= 0.01 * run.medium.step
 
 
 def warn_if_reversed(run: Run, state: State) -> bool:

@@ -18,7 +18,7 @@ from stiction.dynamics.integrator import Run
 from stiction.dynamics.method import Rupture, make_run
 from stiction.dynamics.save import SCALARS, Recorder, Save, open_rupture
 from stiction.dynamics.state import State
-from stiction.dynamics.summary import front_speed, summary
+from stiction.dynamics.summary import summary
 from stiction.errors import InputError, warn_accuracy
 from stiction.model import Progress, checked, to_plain
 from stiction.problem import Problem, refusals
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 _ALONG: dict[str, Variable] = {
     "peak_strength": Variable("Pa", "peak strength tau_p", ()),
     "arrival_time": Variable("s", "arrival time of the front, see `Rupture.arrival`", ()),
-    "front_speed": Variable("m/s", "apparent speed of the rupture front", ()),
 }
 
 
@@ -72,8 +71,8 @@ def simulate_rupture(
         `top_slip_rate`, `weakened_fraction`, `seismic_moment`, `work` and energies; over 'step'
         some of these at every step, with `step_time`; over ('step', 'station') `station_slip`,
         `station_slip_rate` and `station_shear_stress`, and `station_x` (and `station_y`), where
-        their nodes are; over 'x' `peak_strength`, `arrival_time` and `front_speed`; and the scalars
-        of `Rupture` for the run so far. The attribute `stopped` is the reason why it ended.
+        their nodes are; over 'x' `peak_strength` and `arrival_time`; and the scalars of
+        `Rupture` for the run so far. The attribute `stopped` is the reason why it ended.
 
     Raises
     ------
@@ -170,7 +169,6 @@ def _complete(
     found: dict[str, Any] = {
         "peak_strength": run.setting.nodes.strength.reshape(interface.shape),
         "arrival_time": state.arrival.reshape(interface.shape),
-        "front_speed": front_speed(problem, run, state),
     }
     with np.errstate(over="ignore", invalid="ignore"):  # after a run that became non-finite
         found |= summary(problem, run, state)

@@ -1,12 +1,11 @@
 """The scalars of a run: loads, moment, energies, rupture speeds."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from stiction.dynamics.checks import resolves_steps
 from stiction.dynamics.energies import energy_balance
 from stiction.dynamics.integrator import Run
 from stiction.dynamics.state import Floats, State
@@ -55,26 +54,6 @@ def scalars(interface: Interface) -> dict[str, Variable]:
     return found
 
 
-def _windows(problem: Problem, run: Run, lengths: float) -> list[float]:
-    """Return the lengths, m, of which speeds are means, in units of the shortest h_n there."""
-    interface, nucleation = problem.interface, problem.nucleation_lengths(run.steepest_rate)
-    windows = zip(nucleation, interface.spacings, interface.lengths, strict=True)
-    return [min(max(lengths * one, 8.0 * spacing), 0.25 * end) for one, spacing, end in windows]
-
-
-def _arrival(run: Run, state: State) -> Floats:
-    """When the front arrived, s, of the interface's shape; nan where times are too coarse."""
-    arrival = state.arrival.reshape(run.medium.interface.shape)
-    resolved = resolves_steps(run, float(state.now["time"]))
-    return arrival if resolved else np.full_like(arrival, np.nan)
-
-
-def front_speed(problem: Problem, run: Run, state: State) -> Floats:
-    """Apparent speed of the front, m/s, over half of the shortest h_n, of the interface's shape."""
-    windows = _windows(problem, run, 0.5)
-    return rupture_speed(_arrival(run, state), problem.interface.spacings, windows)
-
-
 def _axis_speeds(
     problem: Problem,
     run: Run,
@@ -82,14 +61,20 @@ def _axis_speeds(
     lengths: float,
     statistic: Callable[[Floats], Any],
 ) -> list[float]:
-    """A statistic of the front's speed along each axis, on the lines through its origin."""
-    interface, arrival = problem.interface, _arrival(run, state)
+    """A statistic of the front's speed along each axis, on the lines through its origin.
+
+    Speeds are means over `lengths` times the shortest h_n along the axis.
+    """
+    interface, nucleation = problem.interface, problem.nucleation_lengths(run.steepest_rate)
+    arrival = state.arrival.reshape(interface.shape)
     began = np.unravel_index(int(state.now["peak_node"]), interface.shape)
-    windows = _windows(problem, run, lengths)
     found = []
-    for axis, (spacing, window) in enumerate(zip(interface.spacings, windows, strict=True)):
+    for axis, spacing in enumerate(interface.spacings):
+        window = min(
+            max(lengths * nucleation[axis], 8.0 * spacing), 0.25 * interface.lengths[axis]
+        )
         through = tuple(slice(None) if i == axis else node for i, node in enumerate(began))
-        speeds = rupture_speed(arrival[through], (spacing,), [window])
+        speeds = rupture_speed(arrival[through], spacing, window)
         speeds = speeds[np.isfinite(speeds)]
         found.append(float(statistic(speeds)) if speeds.size else np.nan)
     return found
@@ -145,28 +130,19 @@ def summary(problem: Problem, run: Run, state: State) -> dict[str, Any]:
     return found
 
 
-def rupture_speed(
-    arrival: Floats, spacings: Sequence[float], windows: Sequence[float]
-) -> Floats:
-    """Return the apparent speed of the front at each node, m/s; nan where no front passed.
+def rupture_speed(arrival: Floats, spacing: float, window: float) -> Floats:
+    """Return the apparent speed of the front at each node of a line, m/s; nan where none passed.
 
-    `arrival` (s) is periodic and nan where the front never came. The speed is 1/|gradient of
-    arrival|, a mean over `windows` (m, one a direction), where the arrival is strictly monotone
-    over the window in some direction: the birth of patches and the meeting of fronts do not count.
+    `arrival` (s) is periodic and nan where the front never came. The speed is a mean over `window`
+    (m), where the arrival is strictly monotone over the window: the birth of patches and the
+    meeting of fronts do not count.
     """
-    slowness, moves = np.zeros(arrival.shape), np.zeros(arrival.shape, dtype=bool)
-    for axis, (spacing, window) in enumerate(zip(spacings, windows, strict=True)):
-        half = max(1, round(0.5 * window / spacing))
-        n = arrival.shape[axis]
-        if 2 * half >= n:
-            return np.full(arrival.shape, np.nan)
-        along = np.moveaxis(arrival, axis, -1)
-        wrapped = np.concatenate([along[..., -half:], along, along[..., :half]], axis=-1)
-        difference = np.diff(wrapped, axis=-1)
-        steps = np.lib.stride_tricks.sliding_window_view(difference, 2 * half, axis=-1)
-        monotone = np.all(steps > 0.0, axis=-1) | np.all(steps < 0.0, axis=-1)
-        change = np.abs(wrapped[..., 2 * half :] - wrapped[..., : -2 * half])
-        slowness += np.moveaxis((change / (2 * half * spacing)) ** 2, -1, axis)
-        moves |= np.moveaxis(monotone, -1, axis)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(moves, 1.0 / np.sqrt(slowness), np.nan)
+    half = max(1, round(0.5 * window / spacing))
+    if 2 * half >= arrival.size:
+        return np.full(arrival.shape, np.nan)
+    wrapped = np.concatenate([arrival[-half:], arrival, arrival[:half]])
+    steps = np.lib.stride_tricks.sliding_window_view(np.diff(wrapped), 2 * half)
+    monotone = np.all(steps > 0.0, axis=1) | np.all(steps < 0.0, axis=1)
+    slowness = np.abs(wrapped[2 * half :] - wrapped[: -2 * half]) / (2 * half * spacing)
+    with np.errstate(divide="ignore"):
+        return np.where(monotone, 1.0 / slowness, np.nan)
