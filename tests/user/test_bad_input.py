@@ -64,6 +64,8 @@ test_numbers = refusals({
     "nodes ... at most 2^24": lambda: st.Interface(length=0.1, nodes=10**30),
     "-2 ... positive": lambda: st.LinearWeakening(weakening_rate=[1.0, -2.0]),
     "profile ... finite ... entry 1": lambda: st.Load(profile=[1.0, np.nan]),
+    "profile ... positive ... pressure ... positive on average":
+        lambda: st.Load(profile=[1.0, 0.0], normal_pressure=[1.0, -1.0]),
     "low=2 ... high=1": lambda: st.Beta(alpha=1.0, beta=1.0, low=2.0, high=1.0),
     "alpha ... 0": lambda: st.Beta(alpha=0.0, beta=1.0, low=1.0, high=2.0),
     "mean: must be less than ... 1e+308": lambda: st.Lognormal(mean=1e308, cv=1e308),

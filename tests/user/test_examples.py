@@ -121,8 +121,6 @@ def test_scripts_of_validation():
     # 4.8e-8 and 1.3e-3 on the page.
     assert found["exponentials, 1e-06"].max() < 1e-6
     assert 1e-4 < found["history cut at 100"].max() < 1e-2
-    (_, coarse), (_, fine), *_ = load("energy").compute()
-    assert np.log2(coarse / fine) == pytest.approx(2.0, abs=0.3)  # 1.93 on the page
     for slow, fast in load("onset").compute(256, 2, (1e5, 2e7)).values():
         assert np.abs(slow).max() < 5e-6
         assert np.abs(fast).max() < 1e-3
@@ -135,6 +133,8 @@ def test_remaining_scripts(tmp_path):
     # Largest of six fields on the page: 3.1 % and 0.06 %; a quarter of the dx^2 is left out.
     assert 1e-4 < slip.max() < 0.04
     assert stress.max() < 1e-3
+    (_, coarse), (_, fine), *_ = load("energy").compute()
+    assert np.log2(coarse / fine) == pytest.approx(2.0, abs=0.3)  # 1.93 on the page
     waves, kernels, speeds = load("waves"), load("kernels"), load("rupture_speed")
     waves.draw(tmp_path, waves.compute())
     kernels.draw(tmp_path)
@@ -161,13 +161,10 @@ def test_line_and_plane_in_small(tmp_path, monkeypatch, capsys):
     plane, line = found["plane, small"], found["line, small"]
     # The local criterion is an upper bound of the discrete problem, up to the gap of 1e-6.
     assert np.all(study.lowering(plane) > -1e-4)
-    # Finer nodes carry the same samples: 8 in h_n cost a per cent at most.
-    fine = found["plane, small, fine"]
-    np.testing.assert_allclose(fine.first_instability, plane.first_instability, rtol=0.01)
+    assert study.lowering(plane).mean() > study.lowering(line).mean()
     # Slip that is held back near the critical patch can only raise the onset.
     (far,) = study.far_lowering(study.CASES[2], plane)
     assert far.value > 0.0
-    assert study.lowering(plane).mean() > study.lowering(line).mean()
 
 
 def test_weakest_link_is_the_mean_over_all_choices():

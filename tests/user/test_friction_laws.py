@@ -1,10 +1,8 @@
 """Which method takes which law, what it says if not, laws in files, and laws of one's own."""
 
-from __future__ import annotations
-
 import dataclasses
 import warnings
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 import pytest
@@ -117,17 +115,15 @@ def test_law_in_a_study_file(tmp_path, law):
 # -- laws of one's own ---------------------------------------------------------------------------
 
 
-def own_law(shape, slip_at, area=np.asarray, slope=1.0):
+def own_law(shape, slip_at, area=np.asarray, slope=1.0, name="initial_slope"):
     """A law as somebody else would write it: f and its slope, its inverse and its integral."""
 
-    class Parameters(NamedTuple):
-        initial_slope: float = slope
-
-    register(Parameters, shape)
+    parameters_type = namedtuple("Parameters", [name], defaults=[slope])
+    register(parameters_type, shape)
 
     @model
     class Own(FrictionLaw):
-        parameters = Parameters()
+        parameters = parameters_type()
 
         def area(self, u):
             return area(np.asarray(u, dtype=float))
@@ -211,6 +207,9 @@ def hump(law, u):
 
 LAWS = {
     "strength must not rise with slip, as beyond u = 0": (hump, lambda f: 1.0 - 0.8 * f / 1.1),
+    "its parameters need a field initial_slope": (
+        plateau, plateau_slip, plateau_area, 1.0, "scale",
+    ),
     "f(0) must be 1, got 0.5": (lambda law, u: (0.5 * np.exp(-u), 0.5 * np.exp(-u)), logarithm),
     "slip_at(0), or ... must be positive and finite, got 0": (plateau, lambda f: f),
     "f(slip_at(0)) is 0, but 0.3 by its f":

@@ -1,7 +1,5 @@
 """Planes as a user meets them: results, warnings, refusals, study files, commands, figures."""
 
-from __future__ import annotations
-
 import csv
 import functools
 import warnings

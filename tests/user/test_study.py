@@ -9,6 +9,7 @@ import pytest
 import scipy.stats
 import xarray as xr
 from refusals import refusals, refuses
+from setups import beta_strength
 from small_study import lengths, small_study
 
 import stiction as st
@@ -241,6 +242,53 @@ def test_kept_profiles():
     direct = field.sample(interface, samples=2, seed=3)
     np.testing.assert_array_equal(result["strength"].values[1], direct)
     refuses("GiB of memory", loaded(ensemble=keeping | {"samples": 10**9}).run)
+
+
+# -- load shapes, and events under a load --------------------------------------------------------
+
+
+def under(profile):
+    return dataclasses.replace(BASE.problem, load=st.Load(profile=profile))
+
+
+def test_load_shapes_have_mean_one_and_their_ends():
+    gradient = under(st.GradientLoad(amplitude=0.5, centre=0.25)).load_profile
+    assert gradient.mean() == pytest.approx(1.0, abs=1e-14)
+    assert (gradient.max(), gradient.min()) == (pytest.approx(1.5), pytest.approx(0.5))
+    assert gradient.argmax() == 32
+    edge = under(st.EdgeLoad(excess=4.0, decay=0.005)).load_profile
+    assert edge.mean() == pytest.approx(1.0, abs=1e-14)
+    # Half a period away exp(-10) of the excess is left, 2e-4.
+    assert edge[0] / edge[64] == pytest.approx(5.0, rel=2e-4)
+    plane = st.Interface(length=(0.1, 0.05), nodes=(64, 32))
+    assert np.ptp(st.EdgeLoad(excess=1.0, decay=0.01).on(plane), axis=1).max() == 0.0
+
+
+def test_load_shapes_in_a_study_file_and_swept(tmp_path):
+    study = in_python(
+        problem=under(st.EdgeLoad(excess=2.0, decay=0.01)),
+        method=st.Equilibrium(events=3),
+        ensemble=st.Ensemble(samples=2),
+        sweep=({"problem.load.profile.excess": [0.5, 4.0]},),
+    )
+    study.to_toml(tmp_path / "study.toml")
+    again = st.Study.from_toml(tmp_path / "study.toml")
+    assert again.problem == study.problem
+    result = again.run()
+    assert result["event_length"].dims == ("excess", "sample", "event")
+    assert result["critical_stress"][0].mean() > result["critical_stress"][1].mean()
+
+
+def test_events_are_those_of_the_path():
+    problem = st.paper.problem(nodes=256)
+    tau_p = beta_strength(1.5e-3, high=4.66e6).sample(problem.interface, samples=6, seed=0)
+    found = st.onset(problem, tau_p, method=st.Equilibrium(events=4))
+    kept = found["event_moment"].values
+    assert np.isfinite(kept).sum() > 2
+    for sample in range(6):
+        own = st.equilibrium_path(problem, tau_p[sample], [0.0])["event_moment"].values[:4]
+        np.testing.assert_array_equal(kept[sample, : own.size], own)
+        assert np.isnan(kept[sample, own.size :]).all()
 
 
 # -- mistakes ------------------------------------------------------------------------------------
