@@ -44,9 +44,6 @@ def run_blocks(page, scope, **less):
     return scope
 
 
-# -- what runs -----------------------------------------------------------------------------------
-
-
 def test_the_two_commands_stand_there_each_on_its_own_line():
     for command in COMMANDS:
         assert README.splitlines().count(command) == 1
@@ -125,6 +122,8 @@ def test_the_tutorials_data_are_what_the_script_makes_and_say_so():
     x, strength = script["record"]()
     np.testing.assert_allclose(profile["x"], 1e-3 * x, atol=1e-9)  # to the digits of the file
     np.testing.assert_allclose(profile, 1e6 * strength, atol=51.0)
+    assert (data / "peaks.csv").read_text().startswith("# synthetic")
+    assert "Nothing here was measured" in (data / "make_peaks.py").read_text()
 
 
 def test_tables_of_study_files():
@@ -143,9 +142,6 @@ def test_every_study_file_is_valid(path):
     study = st.Study.from_toml(path)
     jsonschema.validate(tomllib.loads(path.read_text()), study_schema())
     assert st.Study.from_dict(study.to_dict()) == study
-
-
-# -- what the pages name -------------------------------------------------------------------------
 
 
 def test_links_and_paths():

@@ -112,9 +112,6 @@ def test_law_in_a_study_file(tmp_path, law):
     refuses(words, lambda: st.Study.from_toml(path))
 
 
-# -- laws of one's own ---------------------------------------------------------------------------
-
-
 def own_law(shape, slip_at, area=np.asarray, slope=1.0, name="initial_slope"):
     """A law as somebody else would write it: f and its slope, its inverse and its integral."""
 

@@ -153,9 +153,6 @@ test_mistakes = refusals({
 }, infer)  # fmt: skip
 
 
-# -- peaks in files ------------------------------------------------------------------------------
-
-
 def written(tmp_path, text):
     path = tmp_path / "peaks.csv"
     path.write_text(text)
@@ -190,8 +187,6 @@ def test_files_that_are_not_taken(words, tmp_path):
     path = written(tmp_path, BAD_FILES[words])
     refuses(f"{words} ... peaks.csv", lambda: st.read_peaks(path))
 
-
-# -- for other libraries -------------------------------------------------------------------------
 
 simulator = partial(st.external.simulator, PROBLEM, STRENGTH, method=LOCAL, samples=30, seed=99)
 
@@ -265,8 +260,3 @@ def test_the_page_runs_and_says_what_it_prints(monkeypatch, tmp_path):
     length = told.sel(parameter="correlation_length")
     assert length.sel(design="marginal measured") > length.sel(design="25 tests")
     assert told.sel(parameter="marginal.low", design="25 tests") > length.sel(design="25 tests")
-
-
-def test_the_data_say_that_they_are_synthetic():
-    assert (DATA / "peaks.csv").read_text().startswith("# synthetic")
-    assert "Nothing here was measured" in (DATA / "make_peaks.py").read_text()

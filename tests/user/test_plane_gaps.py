@@ -27,9 +27,6 @@ def read(source, **options):
     return st.read_profile(source, interface=PLANE, **options)
 
 
-# -- gaps ----------------------------------------------------------------------------------------
-
-
 def test_gaps_are_refused_filled_or_left_and_stay_where_they_are(tmp_path):
     path = text(tmp_path / "map.csv", without=3)
     refuses("at 3 of 512 nodes, the first at x = 0 m, y = 0 m", lambda: read(path))
@@ -66,9 +63,6 @@ def test_an_onset_in_a_gap_of_a_map_says_so():
         found = st.onset(problem, values, **given, gaps="fill")
     assert bool(found["in_gap"].item())
     assert "in_gap" not in st.onset(problem, VALUES, **given)
-
-
-# -- files of maps -------------------------------------------------------------------------------
 
 
 @pytest.fixture(params=[".csv", ".nc", ".npy"])
