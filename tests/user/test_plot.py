@@ -109,6 +109,12 @@ def test_failure_curve_and_weak_spots():
     assert axes.get_yscale() == "log"
     (above,) = axes.child_axes
     assert coefficients(axes, above, "get_xlim") == pytest.approx(axes.get_xlim())
+    axes = st.plot.failure_curve(curve, stress=0.7e6, area=2e-3)
+    assert axes.get_legend_handles_labels()[1][-1].startswith("demand: 0.7 MPa, P = 0.1")
+    axes.figure.canvas.draw()
+    (above,) = axes.child_axes
+    assert above.get_xlabel() == "shear force (kN)"
+    assert np.array(above.get_xlim()) / 2.0 == pytest.approx(axes.get_xlim())
     found = st.failure_probability(PROBLEM, FIELD, stress=0.7e6, method=LOCAL)
     mean = st.plot.weak_spots(found).lines[-2].get_xydata()
     assert abs(mean[mean[:, 1].argmin(), 0]) < 0.5  # weakest within the critical patch

@@ -11,7 +11,6 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from stiction.errors import InputError
-from stiction.interface import Interface
 from stiction.model import check
 from stiction.plot.style import COLUMN, paper_style
 from stiction.problem import Problem
@@ -21,6 +20,7 @@ _MULTIPLES: dict[str, tuple[float, dict[str, float]]] = {
     "m": (1.0, {"km": 1e-3, "m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}),
     "s": (1.0, {"s": 1.0, "ms": 1e3, "µs": 1e6, "ns": 1e9}),
     "Pa": (0.1, {"MPa": 1e-6, "kPa": 1e-3, "Pa": 1.0}),
+    "N": (1.0, {"MN": 1e-6, "kN": 1e-3, "N": 1.0}),
 }
 """Largest value on a scale from which on a unit is used, in that unit; units and their factors."""
 
@@ -132,15 +132,13 @@ def add_friction_scale(axes: Axes, problem: Problem, which: str, factor: float) 
     if problem.load.normal_pressure is None:
         return
     pressure = float(np.mean(problem.load.normal_pressure)) * factor
-    convert = (lambda stress: stress / pressure, lambda ratio: ratio * pressure)
-    label = r"$\tau / \langle p \rangle$"
+    add_scale(axes, which, 1.0 / pressure, r"$\tau / \langle p \rangle$")
+
+
+def add_scale(axes: Axes, which: str, ratio: float, label: str) -> None:
+    """Add a second scale on the other side: that of the values times a ratio."""
+    convert = (lambda value: value * ratio, lambda value: value / ratio)
     if which == "y":
         axes.secondary_yaxis("right", functions=convert).set_ylabel(label)
     else:
         axes.secondary_xaxis("top", functions=convert).set_xlabel(label)
-
-
-def node_of(place: Any, interface: Interface) -> tuple[int, ...]:
-    """Return the node nearest to a place on an interface, m."""
-    steps = np.atleast_1d(place) / interface.spacings
-    return tuple(int(step) for step in np.round(steps).astype(int) % interface.shape)

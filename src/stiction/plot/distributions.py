@@ -59,14 +59,13 @@ def monte_carlo(result: Any, *, quantity: str | None = None, ax: Axes | None = N
     along: list[str] = []
     for name, one in results.items():
         need(one, quantity)
-        variable = one[quantity]
-        along = _swept(variable)
+        along = _swept(one[quantity])
         if len(along) > 1:
             raise InputError(
                 f"result: is swept over {', '.join(along)}; choose steps of all but one with"
                 f" result.isel({along[0]}=0)"
             )
-        curves += _steps(variable, along[0]) if along else [(name, variable)]
+        curves += _steps(one[quantity], along[0]) if along else [(name, one[quantity])]
     single = isinstance(result, xr.Dataset) and not along
     factor, unit, text = scaled(*(variable for _, variable in curves))
     with on_axes(ax) as axes:
@@ -84,19 +83,16 @@ def _draw_values(
     axes: Axes, variable: xr.DataArray, factor: float, label: str | None, number: int
 ) -> None:
     """Draw the density of a variable; of positions a histogram, of few values marks."""
-    values = _finite(variable) * factor
-    if values.size == 0:
-        return
-    if variable.attrs.get("units") == "m":
+    values, style = _finite(variable) * factor, {"label": label} | series(number)
+    if variable.attrs.get("units") == "m" and values.size:
         cells = int(np.clip(values.size / 50, 5, 40))
-        counts, edges = np.histogram(values, cells, density=True)
-        axes.stairs(counts, edges, label=label, **series(number))
+        axes.stairs(*np.histogram(values, cells, density=True), **style)
     elif values.size >= FEWEST and np.ptp(values) > 0.0:
         found = density(values)
-        axes.plot(found.x, found.value, label=label, **series(number))
+        axes.plot(found.x, found.value, **style)
     else:
-        zeros = np.zeros_like(values)
-        axes.plot(values, zeros, "|", color=color(number), label=label, clip_on=False)
+        style |= {"linestyle": "none", "marker": "|", "clip_on": False}
+        axes.plot(values, np.zeros_like(values), **style)
 
 
 def quantiles(
@@ -148,11 +144,11 @@ def quantiles(
     with on_axes(ax, height=3.2) as axes:
         for number, (label, part) in enumerate(curves):
             values, errors = _quantiles(part, factor, along)
-            style: dict[str, Any] = {"color": color(number), "linewidth": 0}
+            band: dict[str, Any] = {"color": color(number), "linewidth": 0}
             if label is None:
-                axes.fill_between(place, values[0], values[4], alpha=0.12, **style)
+                axes.fill_between(place, values[0], values[4], alpha=0.12, **band)
             pale = 0.12 if label else 0.25
-            axes.fill_between(place, values[1], values[3], alpha=pale, **style)
+            axes.fill_between(place, values[1], values[3], alpha=pale, **band)
             style = {"capsize": 2, "label": label, **series(number, marker=True)}
             axes.errorbar(place, values[2], yerr=errors, **style)
         axes.set_xlabel(name)
@@ -160,7 +156,7 @@ def quantiles(
         if not by_name and place.min() > 0.0 and place.max() >= 4.0 * place.min():
             axes.set_xscale("log")
         if by_name or place.size <= 8:  # powers of ten would not name the steps
-            axes.set_xticks(place, [_step_text(variable[along], i) for i in range(place.size)])
+            axes.set_xticks(place, _step_texts(variable[along]))
             axes.minorticks_off()
         if within is not None:
             axes.legend(title=scaled(variable[within])[2])
@@ -174,12 +170,9 @@ def _swept(variable: xr.DataArray) -> list[str]:
 
 def _steps(variable: xr.DataArray, along: str) -> list[tuple[str | None, xr.DataArray]]:
     """Return at most `CURVES` steps of a sweep, spread evenly, each with its name."""
-    last = variable.sizes[along] - 1
+    last, names = variable.sizes[along] - 1, _step_texts(variable[along])
     steps = np.unique(np.linspace(0, last, min(CURVES, last + 1)).round().astype(int))
-    names = [_step_text(variable[along], step) for step in steps]
-    return [
-        (name, variable.isel({along: step})) for name, step in zip(names, steps, strict=True)
-    ]
+    return [(names[step], variable.isel({along: step})) for step in steps]
 
 
 def _quantiles(
@@ -193,8 +186,8 @@ def _quantiles(
         if values.size:
             one = estimate_quantiles(values, LEVELS)
             found[:, step] = one.value
-            ends = max(one.lower[2], values.min()), min(one.upper[2], values.max())
-            errors[:, step] = np.abs(np.array(ends) - one.value[2])
+            ends = np.clip([one.lower[2], one.upper[2]], values.min(), values.max())
+            errors[:, step] = np.abs(ends - one.value[2])
     return found, errors
 
 
@@ -203,10 +196,9 @@ def _finite(values: Any) -> NDArray[np.float64]:
     return array[np.isfinite(array)]
 
 
-def _step_text(coordinate: xr.DataArray, step: int) -> str:
-    """Return the value of one step of a sweep in the unit of its name."""
-    value = coordinate.values[step]
-    if isinstance(value, float | np.floating):
-        return f"{value * scaled(coordinate)[0]:.4g}"
-    text = str(value)
-    return text if len(text) <= 40 else text[:37] + "..."
+def _step_texts(coordinate: xr.DataArray) -> list[str]:
+    """Return the values of the steps of a sweep in the unit of its name."""
+    if coordinate.dtype.kind == "f":
+        return [f"{value:.4g}" for value in coordinate.values * scaled(coordinate)[0]]
+    texts = map(str, coordinate.values)
+    return [text if len(text) <= 40 else text[:37] + "..." for text in texts]

@@ -1,4 +1,4 @@
-"""Profiles along an interface."""
+"""Profiles along a line, and maps of a plane: x to the right, nodes at the centres of cells."""
 
 from typing import Any
 
@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from stiction.errors import InputError
 from stiction.interface import Interface
 from stiction.model import check
-from stiction.plot import maps
 from stiction.plot.axes import add_friction_scale, on_axes, unit_for, with_unit
 from stiction.plot.style import INK, PAGE, color, series
 from stiction.problem import Problem
@@ -74,13 +73,13 @@ def field(
     scale, _ = unit_for("m", interface.lengths)
     conditions = profile.conditions if of_field else None
     if interface.is_plane:
-        with on_axes(ax, height=maps.height(interface)) as axes:
-            maps.image(axes, interface, rows[0] * factor, text, cmap="cividis")
+        with on_axes(ax, height=map_height(interface)) as axes:
+            draw_map(axes, interface, rows[0] * factor, text, cmap="cividis")
             if conditions is not None:
                 axes.plot(*(scale * conditions.places), ".", color="w", markersize=2.0)
         return axes
+    x = interface.x * scale
     with on_axes(ax, width=PAGE, height=2.4) as axes:
-        x = places(interface)
         for number, row in enumerate(rows[:MOST_LINES]):
             style = {"color": INK} if rows.shape[0] == 1 else series(number)
             axes.plot(x, row * factor, linewidth=0.9, label=str(number), **style)
@@ -90,7 +89,7 @@ def field(
         if conditions is not None:
             place, values = scale * conditions.places[0], conditions.values * factor
             axes.plot(place, values, ".", color=color(1), markersize=3.0)
-        finish_line(axes, interface, text)
+        name_line(axes, interface, text)
         if isinstance(where, Problem) and PROFILES[quantity].units == "Pa":
             add_friction_scale(axes, where, "y", factor)
     return axes
@@ -108,14 +107,47 @@ def rows_of(interface: Interface, profile: Any) -> NDArray[np.float64]:
     return values.reshape(-1, *shape)
 
 
-def places(interface: Interface) -> NDArray[np.float64]:
-    """Return the places of the nodes of a line in the unit of its axis."""
-    return interface.x * unit_for("m", interface.lengths)[0]
-
-
-def finish_line(axes: Axes, interface: Interface, text: str) -> None:
+def name_line(axes: Axes, interface: Interface, text: str) -> None:
     """Name the scales of profiles along a line."""
     factor, unit = unit_for("m", interface.lengths)
     axes.set_xlim(0.0, interface.extent * factor)
     axes.set_xlabel(f"position $x$ ({unit})")
     axes.set_ylabel(text)
+
+
+def draw_map(
+    axes: Axes, interface: Interface, values: NDArray[Any], text: str, **options: Any
+) -> Any:
+    """Draw values (nx, ny) of a plane with their scale and names of the directions."""
+    factor, unit = unit_for("m", interface.lengths)
+    (x, y), (dx, dy) = interface.lengths, interface.spacings
+    ends: Any = factor * np.array([-0.5 * dx, x - 0.5 * dx, -0.5 * dy, y - 0.5 * dy])
+    options |= {"origin": "lower", "extent": ends, "interpolation": "nearest"}
+    drawn = axes.imshow(values.T, aspect="equal", **options)
+    axes.figure.colorbar(
+        drawn, ax=axes, label=text, location="bottom", shrink=0.8, pad=0.02, aspect=40
+    )
+    axes.set_xlabel(f"$x$ ({unit}), direction of slip")
+    axes.set_ylabel(f"$y$ ({unit})")
+    axes.autoscale(False)  # whatever is drawn beyond it
+    return drawn
+
+
+def draw_outline(
+    axes: Axes, interface: Interface, mask: NDArray[np.bool_], ink: str, width: float
+) -> None:
+    """Draw the border of a set of nodes, closed across the borders of the map."""
+    padded = np.pad(mask.astype(float), 1, mode="wrap")
+    factor, _ = unit_for("m", interface.lengths)
+    x, y = (
+        np.arange(-1, n + 1) * h * factor
+        for h, n in zip(interface.spacings, mask.shape, strict=True)
+    )
+    if 0.0 < padded.mean() < 1.0:
+        axes.contour(x, y, padded.T, levels=[0.5], colors=[ink], linewidths=[width])
+
+
+def map_height(interface: Interface, more: float = 1.0) -> float:
+    """Return the height of a figure, inches, with one map and `more` for the rest."""
+    x, y = interface.lengths
+    return more + 4.0 * float(np.clip(y / x, 0.2, 2.0))

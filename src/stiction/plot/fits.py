@@ -32,6 +32,8 @@ Array = NDArray[np.float64]
 
 SHOWN = 100
 """Repetitions, or simulated records, that a band is drawn from: it holds 90 % of them."""
+LEVELS = np.linspace(0.002, 0.998, 250)
+"""Quantiles of the predicted peaks that are joined to a curve."""
 LAGS = 2.5
 """Correlation lengths that the panel of the correlation shows."""
 
@@ -76,14 +78,14 @@ def fit(found: FieldFit) -> Figure:
 def _histogram(axes: Axes, found: FieldFit) -> None:
     values = np.concatenate(found._rows)
     factor, unit = unit_for(QUANTITIES[found.quantity].units, values)
-    counts, _, _ = axes.hist(
-        values * factor, bins=40, density=True, color=PALE, label="measured"
-    )
+    counts, *_ = axes.hist(values * factor, bins=40, density=True, color=PALE, label="measured")
     at = np.linspace(values.min(), values.max(), 400)
-    spread = [one.marginal.distribution.pdf(at) for one in found.repetitions[:SHOWN]]
-    _band(axes, at * factor, np.array(spread) / factor)
+    density, *spread = (
+        one.marginal.distribution.pdf(at) / factor
+        for one in (found.field, *found.repetitions[:SHOWN])
+    )
+    _band(axes, at * factor, spread)
     noisy = found._estimate.model.noise > 0.05 * found.parameters["standard_deviation"]
-    density = found.field.marginal.distribution.pdf(at) / factor
     name = "fitted, without the noise" if noisy else "fitted"
     axes.plot(at * factor, density, color=color(1), label=name)
     # A density that is infinite at a bound must not set the scale of the panel.
@@ -252,17 +254,15 @@ def _draw_peaks(figure: Any, found: Posterior) -> None:
     """Draw the distribution functions of the measured and predicted peaks."""
     peaks, error = found.peaks, found.likelihood.error
     panels = figure.subplots(len(peaks.values), 1, squeeze=False)[:, 0]
-    levels = np.linspace(0.002, 0.998, 250)
     rows = zip(panels, peaks.lengths, peaks.values, found.predicted, strict=True)
     for axes, length, values, more in rows:
         factor, unit = unit_for("1" if peaks.coefficients else "Pa", values)
-        ordered = np.sort(values) * factor
+        ordered, expected = np.sort(values) * factor, np.quantile(more, LEVELS) * factor
         steps = (np.arange(ordered.size) + 0.5) / ordered.size
-        axes.plot(np.quantile(more, levels) * factor, levels, color=INK, label="predicted")
-        axes.errorbar(
-            ordered, steps, xerr=error * factor or None, fmt="o", color=ACCENT, markersize=3.5,
-            elinewidth=0.6, label="measured",
-        )  # fmt: skip
+        axes.plot(expected, LEVELS, color=INK, label="predicted")
+        style: dict[str, Any] = {"fmt": "o", "color": ACCENT, "markersize": 3.5}
+        bars = error * factor or None
+        axes.errorbar(ordered, steps, xerr=bars, elinewidth=0.6, label="measured", **style)
         name = "coefficient of friction" if peaks.coefficients else "peak"
         axes.set_xlabel(with_unit(name, unit))
         axes.set_ylabel("share of tests")

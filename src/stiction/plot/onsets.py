@@ -15,7 +15,6 @@ from stiction.criterion.local import nucleation_stress
 from stiction.equilibrium.patches import critical_patch
 from stiction.errors import InputError
 from stiction.interface import Interface
-from stiction.plot import maps
 from stiction.plot.axes import (
     add_friction_scale,
     named,
@@ -25,8 +24,8 @@ from stiction.plot.axes import (
     unit_for,
     with_unit,
 )
-from stiction.plot.fields import finish_line, places, rows_of
-from stiction.plot.style import ACCENT, PAGE, PALE, QUIET, color, marker, series
+from stiction.plot.fields import draw_map, draw_outline, map_height, name_line, rows_of
+from stiction.plot.style import ACCENT, PAGE, PALE, QUIET, color, series
 from stiction.problem import Problem
 from stiction.profiles.placing import IN_GAP, MEASURED
 
@@ -90,7 +89,7 @@ def onset(
         )
     chosen = {name: one.isel(sample=slice(sample, sample + 1)) for name, one in results.items()}
     is_plane = problem.interface.is_plane
-    size = {"height": maps.height(problem.interface, 2.0)} if is_plane else {"width": PAGE}
+    size = {"height": map_height(problem.interface, 2.0)} if is_plane else {"width": PAGE}
     with on_axes(ax, **size) as axes:
         (_draw_plane if is_plane else _draw_line)(axes, problem, rows[sample], chosen)
         if ax is None:  # below new axes; inside those of the caller, whose layout stays
@@ -104,7 +103,7 @@ def _draw_line(
     axes: Axes, problem: Problem, tau_p: Array, results: Mapping[str, xr.Dataset]
 ) -> None:
     interface = problem.interface
-    x = places(interface)
+    x = interface.x * unit_for("m", interface.lengths)[0]
     factor, unit = unit_for("Pa", tau_p)
     found = next(iter(results.values()))
     measured = tau_p * factor
@@ -123,7 +122,7 @@ def _draw_line(
         axes.plot(x, averaged * factor, label=r"nucleation stress $\tau_n$", **series(0))
     for number, (name, result) in enumerate(results.items()):
         _mark(axes, interface, number, name, result, factor)
-    finish_line(axes, interface, with_unit("shear stress", unit))
+    name_line(axes, interface, with_unit("shear stress", unit))
     axes.margins(y=0.08)
     add_friction_scale(axes, problem, "y", factor)
 
@@ -134,8 +133,9 @@ def _draw_plane(
     exact = next((one for one in results.values() if {"slip", "sensitivity"} <= set(one)), None)
     interface = problem.interface
     factor, unit = unit_for("Pa", tau_p)
-    shades = maps.GREYS if exact is not None else "cividis"
-    maps.image(axes, interface, tau_p * factor, rf"strength $\tau_p$ ({unit})", cmap=shades)
+    # Light enough for outlines on it, if there are any.
+    shades: Any = {"cmap": "cividis"} if exact is None else {"cmap": "gray", "alpha": 0.6}
+    draw_map(axes, interface, tau_p * factor, rf"strength $\tau_p$ ({unit})", **shades)
     if exact is not None:
         inside, _ = critical_patch(exact["sensitivity"].values[0], interface.spacings)
         sliding = exact["slip"].values[0] > 0.0
@@ -143,13 +143,12 @@ def _draw_plane(
             (sliding, color(1), 0.9, "slips at the first instability"),
             (inside, ACCENT, 1.6, "critical patch"),
         ):
-            maps.outline(axes, interface, mask, ink, width)
+            draw_outline(axes, interface, mask, ink, width)
             axes.plot([], [], color=ink, linewidth=width, label=text)
     for number, (name, result) in enumerate(results.items()):
         _mark(axes, interface, number, name, result, factor)
         if exact is None and "critical_aspect" in result:
             _ellipse(axes, interface, result)
-    maps.keep_edges(axes, interface)
 
 
 def _mark(
@@ -165,11 +164,10 @@ def _mark(
         text += f" (coefficient {float(result['friction_coefficient'][0]):.4f})"
     text += f" at {', '.join(f'{one:.2f}' for one in place)} {length_unit}"
     text += " (in a gap)" if IN_GAP in result and bool(result[IN_GAP][0]) else ""
-    axes.plot(
-        *(place if interface.is_plane else (*place, load * factor)), linestyle="none",
-        marker=marker(number), markersize=9.0 - 3.5 * number, color=color(number + 1),
-        markeredgecolor="white", markeredgewidth=0.8, label=text,
-    )  # fmt: skip
+    style: dict[str, Any] = {"linestyle": "none", "color": color(number + 1), "label": text}
+    style |= {"marker": "os^DvP"[number % 6], "markersize": 9.0 - 3.5 * number}
+    at = place if interface.is_plane else (*place, load * factor)
+    axes.plot(*at, markeredgecolor="white", markeredgewidth=0.8, **style)
 
 
 def _ellipse(axes: Axes, interface: Interface, result: xr.Dataset) -> None:

@@ -1,28 +1,36 @@
-"""One rupture: slip rate in space and time, and the advance of its front on a plane."""
+"""One rupture: slip rate in space and time, the advance of its front on a plane, and its film."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from PIL import Image
 
-from stiction.plot import maps
+from stiction.errors import InputError
+from stiction.model import FilePath, at_least, check
 from stiction.plot.axes import need, on_axes, problem_of, unit_for, with_unit
-from stiction.plot.fields import finish_line
-from stiction.plot.style import ACCENT, INK, PAGE
+from stiction.plot.fields import draw_map, map_height, name_line
+from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, new_figure, paper_style
 from stiction.problem import Problem
+from stiction.progress import Meter, Show
 
 Array = NDArray[np.float64]
+Moving = list[tuple[Any, str, Any]]
+"""What moves in a figure: an artist, the name of its data, and these for each frame of the run."""
 
 COLORS = "inferno_r"
 DECADES = 7.0
 """Of slip rate below the largest that are drawn."""
 BEFORE = 0.11
 """Time before the onset that is drawn, in units of L/c_s."""
-KEEP = "; keep it with simulate_rupture(save=st.Save(['slip_rate']))"
+KEEP = "; keep them with simulate_rupture(save=st.Save(['slip_rate', 'shear_stress']))"
 
 
 def rupture(run: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None = None) -> Axes:
@@ -53,7 +61,7 @@ def rupture(run: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None 
     problem = problem_of(run, problem)
     if problem.interface.is_plane:
         need(run, "peak_strength", "arrival_time")
-        with on_axes(ax, height=maps.height(problem.interface, 1.6)) as axes:
+        with on_axes(ax, height=map_height(problem.interface, 1.6)) as axes:
             _draw_front(axes, run, problem)
         return axes
     need(run, "slip_rate", hint=KEEP)
@@ -62,7 +70,71 @@ def rupture(run: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None 
     return axes
 
 
-def since_onset(run: xr.Dataset) -> tuple[Array, str]:
+def film(
+    run: xr.Dataset,
+    path: str | Path,
+    *,
+    frames: int = 160,
+    fps: int = 20,
+    progress: Show = True,
+) -> Path:
+    """Write a film of a rupture: stress and slip rate.
+
+    Parameters
+    ----------
+    run : Dataset
+        From `simulate_rupture`, with `slip_rate` and `shear_stress`.
+    path : path
+        Ends in .gif.
+    frames : int
+        Maximum number of frames, evenly spaced over those of the run, which lie closer in time
+        as the interface accelerates.
+    fps : int
+        Frames per second.
+    progress : bool or callable
+        As in `stiction.monte_carlo`.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InputError
+        If a variable was not kept, or the path does not end in .gif.
+    """
+    need(run, "slip_rate", "shear_stress", "peak_strength", hint=KEEP)
+    check("frames", frames, at_least(1))
+    check("fps", fps, at_least(1))
+    target = check("path", path, FilePath)
+    if target.suffix != ".gif":
+        raise InputError(f"path: must end in .gif, got {target.name!r}")
+    shown = np.unique(np.linspace(0, run.sizes["time"] - 1, frames).round().astype(int))
+    images, still = [], Image.Dither.NONE  # with dithering, parts at rest would flicker
+    with paper_style(), Meter("film", shown.size, progress, unit="frames") as meter:
+        figure, moving = (_plane_film if "y" in run.dims else _line_film)(run)
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        figure.set_layout_engine("none")  # the panels must not move between frames
+        for artist, _, _ in moving:  # only these are drawn for each frame: 40 times as fast
+            artist.set_animated(True)
+        canvas.draw()
+        background = canvas.copy_from_bbox(figure.bbox)
+        for i in shown:
+            canvas.restore_region(background)
+            for artist, name, values in moving:
+                artist.set(**{name: values[i]})
+                figure.draw_artist(artist)
+            frame = Image.fromarray(np.asarray(canvas.buffer_rgba()).copy()).convert("RGB")
+            images.append(frame.quantize(128, Image.Quantize.FASTOCTREE, dither=still))
+            meter.advance()
+        images[0].save(
+            target, save_all=True, append_images=images[1:], duration=round(1000 / fps), loop=0
+        )
+    return target
+
+
+def _since_onset(run: xr.Dataset) -> tuple[Array, str]:
     """Return the times of the frames, s, and their name: from the onset, if there is one."""
     onset = float(run["onset_time"])
     if np.isfinite(onset):
@@ -70,17 +142,22 @@ def since_onset(run: xr.Dataset) -> tuple[Array, str]:
     return run["time"].values, "time"
 
 
-def rate_scale(rate: Array, decades: float) -> LogNorm:
-    """Return the scale of colours: some decades below the largest slip rate."""
+def _rates(rate: Array, decades: float) -> tuple[Any, LogNorm]:
+    """Return slip rates, masked some decades below the largest, and the scale of colours."""
     top = max(float(rate.max()), 1e-12)
-    return LogNorm(top * 10.0**-decades, top)
+    low = top * 10.0**-decades
+    return np.ma.masked_less(rate, low), LogNorm(low, top)
+
+
+def _strength(run: xr.Dataset) -> tuple[Array, float, str]:
+    """Return the peak strength, Pa, NaN where it is infinite, with factor and unit of a scale."""
+    strength = run["peak_strength"].where(np.isfinite(run["peak_strength"])).values
+    return strength, *unit_for("Pa", strength)
 
 
 def _draw_space_time(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
-    """Draw slip rate and the onset."""
     interface = problem.interface
-    (since, name), rate = since_onset(run), run["slip_rate"].values
-    norm = rate_scale(rate, DECADES)
+    (since, name), (rate, norm) = _since_onset(run), _rates(run["slip_rate"].values, DECADES)
     near = since >= -BEFORE * interface.extent / problem.solid.shear_wave_speed
     if near.sum() > 2:
         since, rate = since[near], rate[near]
@@ -89,32 +166,19 @@ def _draw_space_time(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
     along = (np.arange(interface.size + 1) - 0.5) * interface.spacing
     edges = np.concatenate([since[:1], 0.5 * (since[1:] + since[:-1]), since[-1:]])
     mesh = axes.pcolormesh(
-        along * length, edges * factor, masked(rate, norm), norm=norm,
-        cmap=COLORS, rasterized=True,
-    )  # fmt: skip
+        along * length, edges * factor, rate, norm=norm, cmap=COLORS, rasterized=True
+    )
     if name != "time":
         place = float(run["critical_position"]) * length
         axes.plot([place], [0.0], "o", color=INK, markersize=3.5, clip_on=False, zorder=5)
-    finish_line(axes, interface, with_unit(name, unit))
+    name_line(axes, interface, with_unit(name, unit))
     axes.figure.colorbar(mesh, ax=axes, extend="min", label="slip rate (m/s)")
 
 
-def masked(rate: Array, norm: LogNorm) -> Any:
-    """Return slip rates with what is below the scale left out: it stays white."""
-    return np.ma.masked_less(rate, norm.vmin or 0.0)
-
-
-def finite_strength(run: xr.Dataset) -> Array:
-    """Return the peak strength, Pa, NaN where it is infinite."""
-    strength = run["peak_strength"].values
-    return np.where(np.isfinite(strength), strength, np.nan)
-
-
 def _draw_front(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
-    """Draw the front at equal intervals of time on a map of the strength."""
-    interface, strength = problem.interface, finite_strength(run)
-    factor, unit = unit_for("Pa", strength)
-    maps.image(axes, interface, strength * factor, rf"strength $\tau_p$ ({unit})", cmap="Greys")
+    interface, (strength, factor, unit) = problem.interface, _strength(run)
+    text = rf"strength $\tau_p$ ({unit})"
+    draw_map(axes, interface, strength * factor, text, cmap="Greys")
     since = run["arrival_time"].values - float(run["onset_time"])
     scale, time_unit = unit_for("s", since)
     latest = scale * float(np.nanmax(since, initial=0.0))
@@ -128,5 +192,58 @@ def _draw_front(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
         bar = ScalarMappable(lines.norm, lines.cmap)
         text = f"front ({time_unit} since the onset)"
         axes.figure.colorbar(bar, ax=axes, label=text, shrink=0.8)
-    place = [length * float(one) for one in run["critical_position"]]
+    place = length * run["critical_position"].values
     axes.plot(*place, "o", color=ACCENT, markersize=4.0, markeredgecolor="white")
+
+
+def _clock(axes: Axes, run: xr.Dataset) -> tuple[Any, str, list[str]]:
+    """Return a line of text above axes, with time and mean stress."""
+    since, _ = _since_onset(run)
+    late = since[since > 0.0]
+    factor, unit = unit_for("s", late if late.size else since)
+    stress, stress_unit = unit_for("Pa", run["mean_stress"].values)
+    mean = (run["mean_stress"].values * stress).round(3) + 0.0  # no minus before a zero
+    texts = [
+        f"{time:,.1f} {unit} since the onset,  mean stress {one:.3f} {stress_unit}"
+        for time, one in zip(factor * since, mean, strict=True)
+    ]
+    return axes.text(0.0, 1.04, " ", transform=axes.transAxes, color=QUIET), "text", texts
+
+
+def _line_film(run: xr.Dataset) -> tuple[Figure, Moving]:
+    length, length_unit = unit_for("m", run["x"].values)
+    x, (strength, factor, unit) = run["x"].values * length, _strength(run)
+    strength, stress = strength * factor, run["shear_stress"].values * factor
+    top = max(float(run["slip_rate"].max()), 1e-12)
+    rate = np.maximum(run["slip_rate"].values, 1e-10 * top)
+    figure = new_figure(PAGE * 0.9, 3.8)
+    above, below = figure.subplots(2, 1, sharex=True)
+    above.plot(x, strength, color=PALE, linewidth=1.0, label=r"$\tau_p$")
+    (line,) = above.plot(x, stress[0], color=INK, label=r"$\tau$")
+    above.set_ylabel(f"stress ({unit})")
+    highest = np.nanmax(strength)
+    margin = 0.06 * (highest - min(np.nanmin(strength), stress.min()))
+    above.set_ylim(min(0.0, stress.min()) - margin, max(highest, stress.max()) + margin)
+    above.legend(loc="upper right", ncols=2)
+    (slip,) = below.semilogy(x, rate[0], color=ACCENT)
+    below.set_ylim(10.0**-DECADES * top, 3.0 * top)
+    below.set_xlim(0.0, x[-1] + x[1] - x[0])
+    below.set_xlabel(f"position $x$ ({length_unit})")
+    below.set_ylabel("slip rate (m/s)")
+    return figure, [(line, "ydata", stress), (slip, "ydata", rate), _clock(above, run)]
+
+
+def _plane_film(run: xr.Dataset) -> tuple[Figure, Moving]:
+    interface = problem_of(run).interface
+    (rate, norm), stress = _rates(run["slip_rate"].values, 4.0), run["shear_stress"].values
+    factor, unit = unit_for("Pa", stress)
+    stress = stress * factor
+    low, high = np.quantile(stress, [0.001, 0.999])
+    figure = new_figure(PAGE * 1.15, 3.4)
+    left, right = figure.subplots(1, 2, sharey=True)
+    slip = draw_map(left, interface, rate[0], "slip rate (m/s)", norm=norm, cmap=COLORS)
+    text, ends = f"shear stress ({unit})", {"vmin": low, "vmax": high}
+    load = draw_map(right, interface, stress[0], text, cmap="cividis", **ends)
+    right.label_outer()
+    moving = [(slip, "data", rate.swapaxes(1, 2)), (load, "data", stress.swapaxes(1, 2))]
+    return figure, [*moving, _clock(left, run)]

@@ -38,19 +38,12 @@ _RC: dict[str, Any] = {
     "axes.labelsize": 9.0,
     "axes.titlesize": 9.0,
     "axes.linewidth": 0.6,
-    "axes.edgecolor": INK,
-    "axes.labelcolor": INK,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "xtick.labelsize": 8.0,
     "ytick.labelsize": 8.0,
-    "xtick.direction": "out",
-    "ytick.direction": "out",
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "text.color": INK,
     "lines.linewidth": 1.2,
     "lines.markersize": 4.0,
     "legend.fontsize": 7.5,
@@ -60,8 +53,6 @@ _RC: dict[str, Any] = {
     "savefig.dpi": 220,
     "pdf.fonttype": 42,
     "figure.constrained_layout.use": True,
-    "figure.constrained_layout.w_pad": 0.04,
-    "figure.constrained_layout.h_pad": 0.04,
 }
 
 
@@ -97,11 +88,6 @@ def series(index: int, *, marker: bool = False) -> dict[str, Any]:
 def color(index: int) -> str:
     """Colour of series number `index`."""
     return str(series(index)["color"])
-
-
-def marker(index: int) -> str:
-    """Marker of series number `index`."""
-    return str(series(index, marker=True)["marker"])
 
 
 def panel(axes: Axes, letter: str) -> None:
