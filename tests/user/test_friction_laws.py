@@ -36,15 +36,6 @@ def onset(law, strength=TAU_P, method=EXACT):
     return st.onset(with_law(law), strength, method=method)
 
 
-def test_no_law_is_taken_for_another():
-    """By equilibrium; what ruptures make of each law is in tests/properties."""
-    base, *others = (
-        onset(law, ROUGH).critical_stress.item()
-        for law in (st.LinearWeakening(weakening_rate=0.5e12), DUAL, STEEPENING)
-    )
-    assert all(abs(other / base - 1.0) > 1e-3 for other in others)
-
-
 PIECES = "ExponentialWeakening has none ... from_law ... Rupt"
 test_what_a_law_does_not_allow_is_refused = refusals({
     PIECES: lambda: onset(EXPONENTIAL),
