@@ -10,6 +10,7 @@ from setups import beta_strength, make_problem
 import stiction as st
 from stiction.random.mapping import from_normal
 from stiction.random.random_field import conditioning
+from stiction.random.random_interface import _conditioned
 
 LINE = st.Interface(length=0.05, nodes=64)
 PLANE = st.Interface(length=(0.02, 0.01), nodes=(16, 8))
@@ -161,3 +162,26 @@ def test_a_factor_changes_no_other_draw_and_is_constant_along_each_specimen():
     assert np.ptp(factors, axis=1).max() < 1e-14
     assert kstest(factors[:, 0], FACTOR.distribution.cdf).pvalue > 1e-3
     assert random.dimension(LINE) == plain.dimension(LINE) + 1
+
+
+def test_a_scan_tells_of_the_factor_of_its_specimen():
+    """Ranks of the true factors in their posteriors are uniform over 50 specimens."""
+    factor, noise = st.Lognormal(mean=1.0, cv=0.15), 10e3
+    rng = np.random.default_rng(2)
+    ranks, spreads = [], []
+    for i, profile in enumerate(FIELD.sample(LINE, samples=50, seed=11)):
+        truth = float(factor.distribution.ppf(rng.uniform()))
+        measured = truth * profile[:20] + noise * rng.standard_normal(20)
+        given = FIELD.given(on_line(LINE.x[:20], measured), noise=noise)
+        random = st.RandomInterface(strength=given, between={"strength": factor})
+        ((_, known),) = _conditioned(random, LINE)
+        u = np.random.default_rng(i).standard_normal(400)
+        u = np.interp(u, known.score, known.quantile)
+        factors = from_normal(factor, u)
+        ranks.append(np.mean(factors < truth))
+        spreads.append(factors.std())
+        if i == 0:
+            found = random.profiles(LINE, samples=100, seed=0)["strength"]
+            assert np.abs(found[:, :20] - measured).mean() < 1.5 * noise
+    assert kstest(ranks, "uniform").pvalue > 1e-3
+    assert np.median(spreads) < 0.05  # of 0.15 before

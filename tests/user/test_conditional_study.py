@@ -26,10 +26,7 @@ def study(tmp_path, monkeypatch):
     table = np.column_stack([LINE.x[:40] * 1e3, SCANNED[:40] * 1e-6])
     np.savetxt("scan.csv", table, delimiter=",", header=header, comments="")
     plain["random"]["strength"]["given"] = {"profile": "scan.csv", "noise": 20e3}
-    marginal = {"type": "beta", "alpha": 2.0, "beta": 2.0, "low": 0.0, "high": 1e5}
-    plain["random"]["residual_strength"] = small_study()["random"]["strength"]
-    plain["random"]["residual_strength"]["marginal"] = marginal
-    plain["random"]["between"] = {"residual_strength": dict(BETWEEN)}
+    plain["random"]["between"] = {"strength": dict(BETWEEN)}
     return plain
 
 
@@ -37,19 +34,16 @@ def test_a_study_file_is_the_same_as_the_calls(study):
     read = st.Study.from_dict(study, folder=".")
     result = read.run()
     given = FIELD.given(st.read_profile("scan.csv"), noise=20e3)
-    residual = read.random.residual_strength
-    between = {"residual_strength": st.Lognormal(mean=1.0, cv=0.1)}
-    random = st.RandomInterface(strength=given, residual_strength=residual, between=between)
+    between = {"strength": st.Lognormal(mean=1.0, cv=0.1)}
+    random = st.RandomInterface(strength=given, between=between)
     called = st.monte_carlo(read.problem, random, method=read.method, samples=30, seed=3)
     assert np.array_equal(result.critical_stress, called.critical_stress)
     assert st.Study.from_result(result) == read
     read.run(out="RUN")
     assert st.open_run("RUN").study == read
-    noises, factors = [5e3, 20e3], [0.05, 0.2]
     sweep = [
-        {"random.strength.given.noise": noises},
-        {"random.between.residual_strength.cv": factors},
-    ]
+        {"random.strength.given.noise": [5e3, 20e3]}, {"random.between.strength.cv": [0.05, 0.2]}
+    ]  # fmt: skip
     swept = study | {"sweep": sweep, "ensemble": {"samples": 3}}
     found = st.Study.from_dict(swept, folder=".").run()
     assert found.critical_stress.sizes == {"noise": 2, "cv": 2, "sample": 3}
@@ -104,8 +98,7 @@ def test_a_file_holds_the_property_that_was_measured(study, name, heading, unit)
         ("strength", {"nois": 1.0}, "did you mean 'noise'"),
         ("strength", {"profile": "scam.csv"}, "scam.csv: cannot be read"),
         ("between", {"strenght": BETWEEN}, "unknown 'strenght'; did you mean 'strength'"),
-        ("between", {"strength": BETWEEN}, "a measured property takes no factor"),
-        ("between", {"residual_strength": BETWEEN | {"mean": 1.2}}, "positive with mean 1"),
+        ("between", {"strength": BETWEEN | {"mean": 1.2}}, "must be positive with mean 1"),
     ],
 )
 def test_a_mistake_is_named(study, table, change, text):
@@ -140,11 +133,8 @@ def test_unlikely_values_are_warned_of():
         FIELD.given(rough, noise=1e3).sample(LINE)
 
 
-@pytest.mark.parametrize("scanned", [True, False], ids=["scanned specimen", "with factors"])
-def test_the_tail_against_counting_ten_times_as_many_samples(study, scanned):
-    if not scanned:
-        del study["random"]["strength"]["given"]
-        study["random"]["between"]["strength"] = BETWEEN
+def test_the_tail_of_a_scanned_specimen_and_of_specimens_with_factors(study):
+    """Failure probability against counting ten times as many samples."""
     read = st.Study.from_dict(study, folder=".")
     given = {"problem": read.problem, "random": read.random, "method": read.method}
     counted = st.monte_carlo(**given, samples=10_000, seed=8, pilot=False).critical_stress
@@ -152,3 +142,15 @@ def test_the_tail_against_counting_ten_times_as_many_samples(study, scanned):
     found = st.failure_probability(**given, stress=stress, algorithm="subset", target_cv=0.15)
     error = np.hypot(0.1, found.cv)  # of 100 failures, and of the answer
     assert abs(np.log(found.probability / 0.01)) < 3.5 * error
+
+
+def test_a_factor_may_carry_measured_values_beyond_the_marginal():
+    high = 1.5 * xr.DataArray(SCANNED, {"x": LINE.x}, "x")
+    assert high.max() > 1.66e6 + 4.0 * 20e3
+    random = st.RandomInterface(
+        strength=FIELD.given(high, noise=20e3),
+        between={"strength": st.Lognormal(mean=1.0, cv=0.3)},
+    )
+    found = st.monte_carlo(OWN.problem, random, method=OWN.method, samples=50, seed=0)
+    exact = st.onset(OWN.problem, high, method=OWN.method).critical_stress.item()
+    assert found.critical_stress.mean() == pytest.approx(exact, rel=0.03)  # the scan's error

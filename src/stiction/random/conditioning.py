@@ -32,7 +32,7 @@ from stiction.interface import Interface
 from stiction.model import PROFILE_SCHEMA, Numbers, Positive, check, check_memory, model
 from stiction.profiles.placing import MEASURED
 from stiction.profiles.units import parse
-from stiction.random.mapping import from_normal
+from stiction.random.mapping import from_normal, quantile_of_normal
 from stiction.random.synthesis import condition
 
 DOUBTFUL = 5.0  # standard deviations of chi-square beyond which values do not suit a field
@@ -116,7 +116,7 @@ class Conditions:
         """The measured values, (points,)."""
         return self.profile[-1]
 
-    def check(self, marginal: Any, interface: Interface) -> None:
+    def check(self, marginal: Any, interface: Interface, factor: Any = None) -> None:
         """Raise an `InputError` if places or values are impossible for a field."""
         names, places = interface.dims, self.places
         if len(places) != len(names):
@@ -132,7 +132,7 @@ class Conditions:
         ]
         low, high = marginal.distribution.support()
         away = np.maximum(low - self.values, self.values - high)
-        if away.max() > IMPOSSIBLE * self.noise:
+        if factor is None and away.max() > IMPOSSIBLE * self.noise:
             *place, value = self.profile[:, away.argmax()]
             at = ", ".join(f"{name} = {x:g} m" for name, x in zip(names, place, strict=True))
             problems.append(
@@ -144,23 +144,29 @@ class Conditions:
 
 
 class Measured(NamedTuple):
-    """Measured values of one property: z at its places is phi @ draws, (points, dimension)."""
+    """Measured values of one property: z at its places is phi @ draws, (points, dimension).
+
+    `factor` is the marginal of the factor between specimens, by whose draw it is multiplied.
+    """
 
     conditions: Conditions
     marginal: Any
     phi: Array
+    factor: Any = None
 
-    def gaussian(self, mean: Array, variance: Array) -> tuple[Array, Array]:
+    def gaussian(self, u: float, mean: Array, variance: Array) -> tuple[Array, Array, float]:
         """Replace the likelihood of z at each place by a Gaussian, given z from all else.
 
-        Returned are values of z and their precisions, (points,).
+        `u` is the draw of the factor. Returned are values of z and their precisions, (points,),
+        and the logarithm of the factor of the product of all, with unit maxima.
         """
-        noise, value = self.conditions.noise, self.conditions.values
-        law = self.marginal.distribution
+        factor, law = 1.0, self.marginal.distribution
+        if self.factor is not None:
+            factor = float(quantile_of_normal(self.factor.distribution, np.array(u)))
+        noise, value = self.conditions.noise / factor, self.conditions.values / factor
         # Where the likelihood and z from all else overlap.
         edges = value + REACH * noise * np.array([[-1.0], [1.0]])
-        below, above = law.cdf(edges), law.sf(edges)
-        score = np.where(below < 0.5, ndtri(below), -ndtri(above)).clip(-FURTHEST, FURTHEST)
+        score = _normal_score(law.cdf(edges), law.sf(edges)).clip(-FURTHEST, FURTHEST)
         width = REACH * np.sqrt(variance)
         low, high = np.maximum(score[0], mean - width), np.minimum(score[1], mean + width)
         low, high = np.where(low < high, (low, high), (mean - width, mean + width))
@@ -168,42 +174,78 @@ class Measured(NamedTuple):
         z = 0.5 * (low + high)[:, None] + half * np.linspace(-1.0, 1.0, NODES)
         off = (z - mean[:, None]) ** 2 / variance[:, None]
         density = -0.5 * (off + ((value[:, None] - from_normal(self.marginal, z)) / noise) ** 2)
-        weight = np.exp(density - density.max(axis=1, keepdims=True))
+        top = density.max(axis=1, keepdims=True)
+        weight = np.exp(density - top)
         total = weight.sum(axis=1)
         centre = (weight * z).sum(axis=1) / total
         spread = (weight * (z - centre[:, None]) ** 2).sum(axis=1) / total
         spread = np.maximum(spread, (half[:, 0] / NODES) ** 2)
         precision = np.maximum(1.0 / spread - 1.0 / variance, FLAT)
-        return mean + (centre - mean) * (1.0 + 1.0 / (precision * variance)), precision
+        found = mean + (centre - mean) * (1.0 + 1.0 / (precision * variance))
+        whole = variance + 1.0 / precision
+        scale = np.log(total * half[:, 0]) + top[:, 0]
+        scale += 0.5 * (np.log(whole * precision) + (found - mean) ** 2 / whole)
+        return found, precision, float(scale.sum())
+
+
+def _normal_score(below: Array, above: Array) -> Array:
+    """z of which these are the probabilities below and above, from the smaller one."""
+    return np.where(below < 0.5, ndtri(below), -ndtri(above))
 
 
 class Conditioning:
-    """Standard normal draws, given what was measured of one or several properties."""
+    """Standard normal draws, given what was measured of properties, one with a factor at most.
+
+    The draw u of a factor between specimens has the posterior
+
+        log p(u | values) = -u^2/2 + log scale(u) - chi^2(u)/2 - sum log(1 + s^2(u))/2,
+
+    with the Gaussians for one place at a time. It is tabulated, and u mapped to it
+    quantile by quantile. The regression is made at its mean; elsewhere values of z move by
+    as much as the Gaussians for one place at a time do.
+    """
 
     def __init__(self, measured: Sequence[Measured]) -> None:
+        self.measured = measured
         self.phi = np.concatenate([one.phi for one in measured])
         check_memory("given.profile", 24.0 * self.phi.size, "give fewer places")
-        ends = np.cumsum([len(one.phi) for one in measured])[:-1]
-        mean, variance = np.zeros(len(self.phi)), np.ones(len(self.phi))
+        self.grid: Array | None = None
+        others = alone = np.zeros(len(self.phi)), np.ones(len(self.phi))
+        middle, moves = 0.0, np.zeros((1, len(self.phi)))
+        if any(one.factor is not None for one in measured):
+            middle, moves = self._tabulate(alone)
         for _ in range(TURNS):
-            others = zip(np.split(mean, ends), np.split(variance, ends), strict=True)
-            each = [one.gaussian(*rest) for one, rest in zip(measured, others, strict=True)]
-            z, precision = map(np.concatenate, zip(*each, strict=True))
+            z, precision, _ = self._gaussian(middle, others)
             self._regress(z, precision)
-            before, (mean, variance) = mean, self._others(z, precision)
-            if np.abs(mean - before).max() < SETTLED:
+            before, others = others, self._others(z, precision)
+            if np.abs(others[0] - before[0]).max() < SETTLED:
                 break
+        self.data = (z + moves) @ self.left
+
+    def _gaussian(self, u: float, others: tuple[Array, Array]) -> tuple[Array, Array, float]:
+        """Gaussians that stand for the measured values, given z from all others."""
+        ends = np.cumsum([len(one.phi) for one in self.measured])[:-1]
+        each = zip(self.measured, *(np.split(part, ends) for part in others), strict=True)
+        z, precision, scale = zip(
+            *(one.gaussian(u, *given) for one, *given in each), strict=True
+        )
+        return np.concatenate(z), np.concatenate(precision), sum(scale)
 
     def _regress(self, z: Array, precision: Array) -> None:
         root = np.sqrt(precision)
         left, values, right = svd(self.phi * root[:, None], full_matrices=False)
         kept = values > NEGLIGIBLE
-        self.values = values[kept]
+        self.left, self.values = root[:, None] * left[:, kept], values[kept]
         self.right = np.ascontiguousarray(right[kept].T)
-        self.data = z @ (root[:, None] * left[:, kept])
-        power = self.values**2
-        # z^T (C + S)^-1 z
-        self.chi_square = float(precision @ z**2 - power / (1.0 + power) @ self.data**2)
+        self.data = (z @ self.left)[None, :]
+        self.precision = precision
+        self.chi_square = self._chi_square(z, 1.0)
+
+    def _chi_square(self, z: Array, ratio: float) -> float:
+        """z^T (C + S)^-1 z with errors `ratio` times those of the regression."""
+        power = (self.values / ratio) ** 2
+        left = (z @ self.left) / ratio
+        return float(self.precision @ z**2 / ratio**2 - power / (1.0 + power) @ left**2)
 
     def _others(self, z: Array, precision: Array) -> tuple[Array, Array]:
         """Mean and variance of z at each place from what was measured at all others."""
@@ -215,11 +257,40 @@ class Conditioning:
         found = (mean / deviation**2 - precision * z) / rest
         return np.where(sharp, 0.0, found), np.where(sharp, 1.0, 1.0 / rest)
 
+    def _tabulate(self, alone: tuple[Array, Array]) -> tuple[float, Array]:
+        """Find the posterior of u; return its mean, and how values of z move along the grid."""
+        middle, spread = 0.0, 1.0
+        for _ in range(3):
+            grid = middle + spread * np.linspace(-REACH, REACH, NODES)
+            grid = np.clip(grid, -FURTHEST, FURTHEST)
+            z, precision, _ = self._gaussian(middle, alone)
+            self._regress(z, precision)
+            values = [self._gaussian(u, alone) for u in grid]
+            density = -0.5 * grid**2
+            for i, (here, errors, scale) in enumerate(values):
+                ratio = float(np.exp(0.5 * np.log(precision / errors).mean()))
+                volume = np.log1p((self.values / ratio) ** 2).sum()
+                density[i] += scale - 0.5 * (volume + self._chi_square(here, ratio))
+            weight = np.exp(density - density.max())
+            weight /= weight.sum()
+            middle = float(weight @ grid)
+            spread = max(float(weight @ (grid - middle) ** 2) ** 0.5, REACH * spread / NODES)
+        mass = 0.5 * (weight[1:] + weight[:-1])
+        score = _normal_score(np.cumsum(mass)[:-1], np.cumsum(mass[::-1])[-2::-1])
+        usable = np.isfinite(score)
+        self.grid, self.score, self.quantile = grid, score[usable], grid[1:-1][usable]
+        now = self._gaussian(middle, alone)[0]
+        return middle, np.array([here for here, _, _ in values]) - now
+
     def draws(self, draws: Array) -> Array:
-        """Return conditioned draws, (samples, dimension)."""
-        out, share = np.array(draws), 1.0 + self.values**2
+        """Return conditioned draws (samples, dimension), a factor between specimens in the last."""
+        data, out = self.data, np.array(draws)
+        if self.grid is not None:
+            u = out[:, -1] = np.interp(out[:, -1], self.score, self.quantile)
+            data = np.stack([np.interp(u, self.grid, row) for row in data.T], axis=1)
+        share = 1.0 + self.values**2
         transposed = np.ascontiguousarray(self.right.T)
-        offsets = self.data * (self.values / share)
+        offsets = np.ascontiguousarray(data * (self.values / share))
         condition(self.right, transposed, offsets, share**-0.5 - 1.0, out)
         return out
 
@@ -229,7 +300,7 @@ class Conditioning:
         share = self.values**2 / (1.0 + self.values**2)
         free = (phi**2).sum(axis=1) - (along**2).sum(axis=1)
         variance = along**2 @ (1.0 - share) + np.where(free > TINY, free, 0.0)
-        return along @ (share / self.values * self.data), np.sqrt(variance)
+        return along @ (share / self.values * self.data[0]), np.sqrt(variance)
 
     def warn(self) -> None:
         """Warn of measured values that do not suit the field."""

@@ -160,12 +160,12 @@ class RandomField:
         known: Any = {"profile": profile, "noise": noise}
         return dataclasses.replace(self, conditions=known)
 
-    def measured(self, interface: Interface) -> Measured:
-        """Return the measured values, once checked."""
+    def measured(self, interface: Interface, factor: Any = None) -> Measured:
+        """Return the checked measured values, with the marginal of a factor between specimens."""
         given = self.conditions
         assert given is not None
-        given.check(self.marginal, interface)
-        return Measured(given, self.marginal, self.modes(interface).basis(given.places))
+        given.check(self.marginal, interface, factor)
+        return Measured(given, self.marginal, self.modes(interface).basis(given.places), factor)
 
     @checked
     def quantile(self, interface: Interface, probability: Share) -> Array:

@@ -159,11 +159,6 @@ class RandomInterface:
                     f"between.{name}: a factor must be positive with mean 1, got mean {mean:g} and"
                     f" lower bound {low:g}"
                 )
-            if name in self.names and self.properties[name].conditions is not None:
-                problems.append(
-                    f"between.{name}: a measured property takes no factor; give its field the"
-                    " marginal of this specimen, such as st.fit_field finds"
-                )
         if not problems and np.linalg.eigvalsh(self.matrix)[0] < -DEFINITE:
             problems.append(
                 "correlation: these coefficients contradict each other (their matrix is not"
@@ -276,23 +271,35 @@ def _layout(random: RandomInterface, interface: Interface) -> list[Stream]:
 def _conditioned(
     random: RandomInterface, interface: Interface
 ) -> list[tuple[NDArray[np.int64], Conditioning]]:
-    """Measured values of each group of correlated properties, with the columns of its draws."""
+    """Measured values of each group of correlated properties, with the columns of its draws.
+
+    The last column is that of the factor between specimens on which it depends, if any.
+    """
     streams, fields = _layout(random, interface), list(random.properties.values())
-    columns = [np.r_[stream.columns] for stream in streams]
+    columns, between = [np.r_[stream.columns] for stream in streams], random.between or {}
     factor, found = lower_factor(random.matrix), []
     for group in np.unique(random.linked, axis=0):
-        members, measured = np.flatnonzero(group), []
+        members, measured, factors = np.flatnonzero(group), [], []
         of_group = np.concatenate([columns[j] for j in members])
         for i in members:
             if fields[i].conditions is None:
                 continue
-            one = fields[i].measured(interface)
+            name = random.names[i]
+            if name in between:
+                factors.append(name)
+            one = fields[i].measured(interface, between.get(name))
             phi = np.zeros((len(one.phi), random.dimension(interface)))
             for j in np.flatnonzero(factor[i]):
                 phi[:, columns[j][streams[i].own]] = factor[i, j] * one.phi
             measured.append(one._replace(phi=phi[:, of_group]))
+        if len(factors) > 1:
+            raise InputError(
+                f"between: {' and '.join(factors)} are correlated, were measured and have factors;"
+                " at most one of them may have one"
+            )
         if measured:
-            found.append((of_group, Conditioning(measured)))
+            last = [columns[len(fields) + list(between).index(name)] for name in factors]
+            found.append((np.concatenate([of_group, *last]), Conditioning(measured)))
     return found
 
 

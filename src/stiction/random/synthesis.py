@@ -107,7 +107,8 @@ def condition(
             draw = out[i, j]
             for k in range(count):
                 weights[k] += draw * right[j, k]
+        row = min(i, offsets.shape[0] - 1)
         for k in range(count):
-            weight = offsets[k] + factors[k] * weights[k]
+            weight = offsets[row, k] + factors[k] * weights[k]
             for j in range(dimension):
                 out[i, j] += weight * transposed[k, j]
