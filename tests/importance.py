@@ -7,6 +7,7 @@ the dip is that of the middle one of the critical ellipses.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 
@@ -22,6 +23,13 @@ from stiction.random.random_field import RandomField
 
 SIZES = (1.0, 1.15)
 """Shifts in units of the dips: the failures lie a little beyond them."""
+
+
+def longer(problem: st.Problem, times: int) -> st.Problem:
+    """The same problem on a line that is so many times longer."""
+    line = problem.interface
+    interface = st.Interface(times * line.extent, times * line.size)
+    return dataclasses.replace(problem, interface=interface)
 
 
 def dips(problem: st.Problem, field: RandomField, stress: float) -> Array:

@@ -1,4 +1,4 @@
-"""A line that breaks from its weakest place, and its simulation."""
+"""A line that breaks from its weakest place, its simulation, and runs by single steps."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-from setups import SOLID, make_problem
+from setups import QUARTER, SOLID, make_problem
 
 import stiction as st
+from stiction.dynamics.energies import energy_balance
+from stiction.dynamics.method import make_run
 from stiction.dynamics.simulate import simulate_rupture
 
 STRESS = dataclasses.replace(SOLID, plane="stress")
@@ -27,3 +29,47 @@ def simulate(problem: Any, strength: Any, save: Any = None, **method: Any) -> An
     return simulate_rupture(
         problem, strength, method=st.Rupture(**options | method), save=save or st.Save(["slip"])
     )
+
+
+def run_of(problem: Any, strength: Any, method: Any, **options: Any) -> Any:
+    """A run of one sample that has not begun."""
+    rows = problem.sample(strength, **options)
+    return make_run(method, problem.friction, method.medium(problem), rows, 0)
+
+
+def stepped(
+    problem: Any, strength: Any, load: float, end: float, steps: int, slip: Any = None
+) -> Any:
+    """A run of so many explicit steps at a constant load from t = 0 to `end`, and its state."""
+    method = st.Rupture(
+        load=([0.0, 1.0], [load, load]), stop="time", end_time=1.0, implicit=False,
+        time_step=end / steps,
+    )  # fmt: skip
+    run = run_of(problem, strength, method, accept=("overstress",))
+    state = run.start(0.0, slip)
+    run.advance(state, steps)
+    return run, state
+
+
+def radiated_energy(problem: Any, run: Any, state: Any) -> float:
+    """Energy that has gone off as waves, J/m or J."""
+    found = energy_balance(problem.friction, run.setting.nodes, run.medium.grid, state)
+    return found["radiated_energy"]
+
+
+def dip(interface: st.Interface, centre: Any, radius: float) -> Any:
+    """A smooth bump of height one around a place, on a line or a plane."""
+    places = np.meshgrid(*interface.coordinates.values(), indexing="ij")
+    centre = np.atleast_1d(centre)
+    return np.exp(-sum(((x - c) / radius) ** 2 for x, c in zip(places, centre, strict=True)))
+
+
+BREAKING_PLANE = make_problem(
+    (40, 36), (0.04, 0.03), solid=QUARTER, weakening_rate=3e11, residual_strength=2e5
+)
+BREAKING_STRENGTH = (
+    1e6
+    - 3e5 * dip(BREAKING_PLANE.interface, (0.012, 0.011), 0.007)
+    - 1e5 * dip(BREAKING_PLANE.interface, (0.03, 0.02), 0.007)
+)
+"""A plane that breaks from the weaker one of two dips."""

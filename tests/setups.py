@@ -1,20 +1,19 @@
-"""Problems, strengths and a reference that many tests begin with."""
+"""Problems, strengths and onsets that many tests begin with."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
-import mpmath
 import numpy as np
-from scipy.optimize import linprog
 
 import stiction as st
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="strain")
+QUARTER = st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0, plane="strain")
 RATE = 0.5e12
 LENGTH = 3.46e-3
-"""Nucleation length h_n of that solid at that rate, along x."""
+"""Nucleation length h_n of the paper's solid at that rate, along x."""
+LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
 
 
 def make_problem(
@@ -57,36 +56,28 @@ def smooth_noise(correlation: float, rng: np.random.Generator, shape: Any) -> An
     return (field - field.min()) / np.ptp(field)
 
 
-def by_linear_programme(
-    stiffness: Any, rate: Any, excess: Any, profile: Any
-) -> tuple[float, Any, Any]:
-    """max tau_0: (K - W) d + s - tau_0 p >= 0, d >= 0, by the simplex method of HiGHS.
-
-    The load, its slip and its multiplier; in units that make the matrix of order one. Feasibility
-    is kept to 1e-7 at worst, 1e-10 on request; the vertex is exact.
-    """
-    n, unit = len(stiffness), float(np.max(rate))
-    matrix = (stiffness - np.diag(np.broadcast_to(rate, n))) / unit
-    found = linprog(
-        np.r_[np.zeros(n), -1.0],
-        A_ub=np.c_[-matrix, np.broadcast_to(profile, n)],
-        b_ub=excess / 1e6,
-        bounds=[(0, None)] * n + [(None, None)],
-        method="highs-ds",
-        options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
-    )
-    assert found.status == 0
-    return found.x[-1] * 1e6, found.x[:-1] * 1e6 / unit, -found.ineqlin.marginals
+def local_onset(problem: st.Problem, profiles: Any) -> Any:
+    """Onsets by the local criterion."""
+    return st.onset(problem, profiles, method=LOCAL, progress=False)
 
 
-def mode_two_stiffness(s: Any, eta: float) -> Any:
-    """D(s) of mode II over wavenumber and impedance; for mpmath, s in units of k c_s."""
-    shear = mpmath.sqrt(s - 1j) * mpmath.sqrt(s + 1j)
-    fast = mpmath.sqrt(s - 1j * eta) * mpmath.sqrt(s + 1j * eta) / eta
-    return ((2 + s * s) ** 2 - 4 * shear * fast) / (s * s * shear)
+def exact_onset(problem: st.Problem, profiles: Any, **options: Any) -> Any:
+    """Onsets by equilibrium, with options of the method."""
+    return st.onset(problem, profiles, method=st.Equilibrium(**options), progress=False)
 
 
-def from_laplace(transform: Callable[[Any], Any], t: float, degree: int = 90) -> float:
-    """The inverse transform, to double precision."""
-    with mpmath.workdps(40):
-        return float(mpmath.invertlaplace(transform, t, method="talbot", degree=degree))
+def ensemble(problem: st.Problem, random: Any, samples: int, **options: Any) -> Any:
+    """An ensemble by the local criterion, or by another method."""
+    given = {"method": LOCAL, "pilot": False, "progress": False} | options
+    return st.monte_carlo(problem, random, samples=samples, **given)
+
+
+def turns(nodes: int) -> Any:
+    """Angles 2 pi x/L at the nodes of a line."""
+    return 2.0 * np.pi * np.arange(nodes) / nodes
+
+
+def repeated(profile: Any, across: int, axis: int = 0) -> Any:
+    """Profiles along one axis of a plane (0 for x) of so many nodes along the other."""
+    wide = np.repeat(np.asarray(profile)[..., None], across, axis=-1)
+    return wide if axis == 0 else np.ascontiguousarray(np.swapaxes(wide, -1, -2))

@@ -1,8 +1,9 @@
-"""Random fields against closed forms."""
+"""Random fields on lines against closed forms, and their draws on lines and planes."""
 
 import numpy as np
 import pytest
 import scipy.stats
+from setups import beta_strength
 
 import stiction as st
 from stiction.random.mapping import (
@@ -14,10 +15,12 @@ from stiction.random.mapping import (
 )
 
 LINE = st.Interface(length=0.1, nodes=256)
+COARSE = st.Interface(length=0.1, nodes=64)
+PLANE = st.Interface(length=(0.1, 0.15), nodes=(64, 64))
 
 
-def field_of(marginal, correlation_length):
-    return st.RandomField(marginal, st.PowerLawSpectrum(correlation_length))
+def field_of(marginal, correlation_length=2e-3, **options):
+    return st.RandomField(marginal, st.PowerLawSpectrum(correlation_length), **options)
 
 
 @pytest.mark.parametrize(
@@ -25,8 +28,7 @@ def field_of(marginal, correlation_length):
 )
 def test_power_kept_by_truncating_at_two_and_a_half_lambda(exponent, kept):
     spectrum = st.PowerLawSpectrum(correlation_length=1.0, exponent=exponent, truncation=2.5)
-    # The figures are printed with this many digits.
-    digits = len(str(kept)) - 2
+    digits = len(str(kept)) - 2  # as many as are printed
     assert round(spectrum.power_within(spectrum.cutoff()), digits) == kept
 
 
@@ -94,8 +96,7 @@ def test_table_of_the_map_matches_the_quantile(distribution):
     np.testing.assert_array_equal(
         from_normal(marginal, beyond), quantile_of_normal(distribution, beyond)
     )
-    # Where the table gives way to scipy, it must be rare, or sampling would be slow.
-    assert np.isnan(quantile_table(marginal)[:, 1]).mean() < 0.02
+    assert np.isnan(quantile_table(marginal)[:, 1]).mean() < 0.02  # where scipy is slow
 
 
 def test_quantile_of_normal_by_scipy_below_the_median():
@@ -112,12 +113,10 @@ def test_gaussian_field_is_the_sum_of_its_modes_on_any_grid(make_strength, nodes
     """The grid of 64 nodes resolves 32 modes of the field's 289."""
     strength = make_strength(0.25, mean_mode=mean_mode)
     interface = st.Interface(length=0.1, nodes=nodes)
-    modes = strength.modes(interface)
+    modes, draws = strength.modes(interface), strength.draws(interface, 3, seed=5)
     assert modes.count == 289
-    draws = strength.draws(interface, 3, seed=5)
     a0, pairs = (draws[:, :1], draws[:, 1:]) if mean_mode else (np.zeros((3, 1)), draws)
-    j = np.arange(1, modes.count + 1)
-    phase = 2.0 * np.pi * np.outer(j, interface.x) / interface.length
+    phase = 2.0 * np.pi * np.outer(np.arange(1, 290), interface.x) / interface.length
     direct = (
         modes.sigma[0] * a0
         + (pairs[:, 0::2] * modes.sigma[1:]) @ np.cos(phase)
@@ -143,14 +142,26 @@ def test_discrete_spectrum_is_the_density_at_the_modes(make_strength):
     assert with_mean[0] ** 2 / with_mean[1] ** 2 == pytest.approx(expected, rel=1e-12)
 
 
-def test_sample_i_is_the_same_in_every_batch(make_strength):
-    strength = make_strength(0.5)
-    whole = strength.sample(LINE, samples=600, seed=3)
+@pytest.mark.parametrize(
+    ("interface", "length"), [(LINE, 1.7e-3), (PLANE, 0.025)], ids=["line", "plane"]
+)
+def test_sample_i_is_the_same_in_every_batch(interface, length):
+    strength = beta_strength(length)
+    whole = strength.sample(interface, samples=600, seed=3)
     for first, samples in [(0, 1), (255, 2), (300, 300), (599, 1)]:
-        part = strength.sample(LINE, samples=samples, seed=3, first=first)
+        part = strength.sample(interface, samples=samples, seed=3, first=first)
         np.testing.assert_array_equal(part, whole[first : first + samples])
-    assert not np.array_equal(whole[0], strength.sample(LINE, samples=1, seed=4)[0])
+    assert not np.array_equal(whole[0], strength.sample(interface, samples=1, seed=4)[0])
     assert 0.66e6 <= whole.min() < whole.max() <= 1.66e6
+
+
+def test_finer_grids_extend_the_field():
+    fine, coarse = (
+        beta_strength(0.025).sample(st.Interface(PLANE.length, nodes), samples=3, seed=5)
+        for nodes in ((64, 64), (32, 16))
+    )
+    # Exact but for the round-off of two transforms through the map.
+    np.testing.assert_allclose(coarse, fine[:, ::2, ::4], rtol=1e-9)
 
 
 def test_the_same_modes_have_the_same_draws_whatever_the_spectrum(make_strength):
@@ -163,8 +174,7 @@ def test_the_same_modes_have_the_same_draws_whatever_the_spectrum(make_strength)
 
 def test_with_the_mean_mode_only_the_field_is_constant(make_strength):
     """The limit of a correlation length that is infinite against the interface."""
-    interface = st.Interface(length=0.1, nodes=64)
-    profiles = make_strength(1e6, mean_mode=True).sample(interface, samples=300, seed=1)
+    profiles = make_strength(1e6, mean_mode=True).sample(COARSE, samples=300, seed=1)
     # Round-off of one transform.
     np.testing.assert_allclose(profiles, profiles[:, :1] * np.ones(64), rtol=1e-13)
     assert np.ptp(profiles[:, 0]) > 0.5e6
@@ -191,8 +201,8 @@ def test_custom_spectrum_agrees_with_the_named_one():
     assert custom.efolding_length == pytest.approx(0.02, rel=1e-9)
     interface = st.Interface(length=1.0, nodes=256)
     fields = [st.RandomField(marginal=scipy.stats.norm(), spectrum=s) for s in (named, custom)]
-    sigma = [f.modes(interface).sigma for f in fields]
-    np.testing.assert_allclose(sigma[1][: sigma[0].size], sigma[0], atol=2e-4)
+    one, other = (field.modes(interface).sigma for field in fields)
+    np.testing.assert_allclose(other[: one.size], one, atol=2e-4)
 
 
 def test_efolding_length_is_the_first_crossing():
@@ -215,20 +225,18 @@ def test_distributions_that_scipy_has_no_name_for():
     counts = np.histogram(np.random.default_rng(0).normal(5.0, 1.0, 1000), 20)
     distribution = scipy.stats.rv_histogram(counts)()
     field = field_of(distribution, 0.01)
-    interface = st.Interface(length=0.1, nodes=64)
     z = np.array([[-1.0, 0.3]])
     values = from_normal(field.marginal, z)
     np.testing.assert_allclose(values, quantile_of_normal(distribution, z), rtol=1e-9)
     assert field.mean == pytest.approx(distribution.mean())
-    assert field.correlation(interface)[0] == pytest.approx(1.0, rel=1e-12)
+    assert field.correlation(COARSE)[0] == pytest.approx(1.0, rel=1e-12)
 
     class Narrow(scipy.stats.rv_continuous):
         def _pdf(self, x):
             return 1.0 + 0.0 * x
 
     # Named like scipy's normal distribution, but not it.
-    named = Narrow(name="norm", a=0.0, b=1.0)()
-    assert st.RandomField(marginal=named, spectrum=field.spectrum).mean == pytest.approx(0.5)
+    assert field_of(Narrow(name="norm", a=0.0, b=1.0)()).mean == pytest.approx(0.5)
 
 
 def test_a_function_that_returns_its_own_array_keeps_it():
@@ -238,37 +246,31 @@ def test_a_function_that_returns_its_own_array_keeps_it():
         return table.setdefault(np.shape(k), np.ones(np.shape(k)))
 
     spectrum = st.CustomSpectrum(function=density, max_wavenumber=500.0)
-    field = st.RandomField(marginal=scipy.stats.norm(), spectrum=spectrum)
-    field.modes(st.Interface(length=0.1, nodes=64))
+    st.RandomField(marginal=scipy.stats.norm(), spectrum=spectrum).modes(COARSE)
     assert all(np.all(values == 1.0) for values in table.values())
 
 
 @pytest.mark.parametrize(
-    "distribution",
+    ("distribution", "apart"),
     [
-        scipy.stats.rice(5.0),
-        scipy.stats.moyal(),
-        scipy.stats.genlogistic(1.0),
-        scipy.stats.invgauss(0.145),
+        (scipy.stats.rice(5.0), 0.03),
+        (scipy.stats.moyal(), 0.03),
+        (scipy.stats.genlogistic(1.0), 0.03),
+        (scipy.stats.invgauss(0.145), 0.03),
+        (scipy.stats.beta(0.05, 0.05), 1.0),  # forty terms cannot follow it
     ],
-    ids=lambda d: d.dist.name,
+    ids=lambda d: getattr(d, "dist", scipy.stats.norm).name,
 )
-def test_correlation_of_families_whose_tails_scipy_inverts_poorly(distribution):
-    field = field_of(distribution, 2e-3)
+def test_correlation_of_families_whose_tails_scipy_inverts_poorly(distribution, apart):
+    """Mildly nonlinear maps: the correlations of strength and z stay close."""
+    field = field_of(distribution)
     strength, z = field.correlation(LINE), field.correlation(LINE, of="z")
     assert strength[0] == pytest.approx(1.0, rel=1e-12)
-    # These maps are mildly nonlinear: the correlations stay close.
-    np.testing.assert_allclose(strength, z, atol=0.03)
+    np.testing.assert_allclose(strength, z, atol=apart)
 
 
-def test_a_marginal_that_the_forty_terms_cannot_follow_has_correlation_one_at_zero_lag():
-    field = field_of(st.Beta(alpha=0.05, beta=0.05, low=0.0, high=1.0), 2e-3)
-    assert field.correlation(LINE)[0] == pytest.approx(1.0, rel=1e-12)
-
-
-def _mapped(distribution, rho):
-    coefficients = hermite_coefficients(field_of(distribution, 2e-3).marginal)
-    return correlation_of_mapped(rho, coefficients)
+def mapped(distribution, rho):
+    return correlation_of_mapped(rho, hermite_coefficients(field_of(distribution).marginal))
 
 
 def test_correlation_of_a_heavy_lognormal():
@@ -276,31 +278,29 @@ def test_correlation_of_a_heavy_lognormal():
     rho, s2 = np.linspace(-1.0, 1.0, 21), 1.5**2
     expected = np.expm1(s2 * rho) / np.expm1(s2)
     # Less than a millionth of the variance is left to the last coefficient.
-    np.testing.assert_allclose(_mapped(scipy.stats.lognorm(1.5), rho), expected, atol=1e-6)
+    np.testing.assert_allclose(mapped(scipy.stats.lognorm(1.5), rho), expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("width", [1e2, 1.0, 1e-2])
 def test_narrow_marginals_have_the_correlation_of_wide_ones(width):
     rho = np.linspace(-1.0, 1.0, 21)
-    wide = _mapped(scipy.stats.beta(2.0, 2.0), rho)
-    narrow = _mapped(scipy.stats.beta(2.0, 2.0, loc=1e6, scale=width), rho)
+    wide = mapped(scipy.stats.beta(2.0, 2.0), rho)
+    narrow = mapped(scipy.stats.beta(2.0, 2.0, loc=1e6, scale=width), rho)
     # Values of 1e6 have 1e-10 of round-off, that is 1e-8 of the narrowest width.
     np.testing.assert_allclose(narrow, wide, atol=1e-7)
 
 
 @pytest.mark.parametrize("distribution", [scipy.stats.t(2.01), scipy.stats.pareto(2.01)])
 def test_tails_too_heavy_for_a_correlation_are_said(distribution):
-    field = field_of(distribution, 0.1)
     with pytest.warns(st.AccuracyWarning, match=r"uncertain by up to 0\.\d"):
-        field.correlation(st.Interface(length=1.0, nodes=64))
+        field_of(distribution, 0.1).correlation(st.Interface(length=1.0, nodes=64))
 
 
 @pytest.mark.parametrize("exponent", [0.7, 1.0, 2.0, 4.0])
 def test_efolding_length_is_that_of_the_modes_that_are_sampled(exponent):
     """On an interface of a thousand lengths, by its modes."""
     spectrum = st.PowerLawSpectrum(1.0, exponent=exponent).with_efolding_length(0.05)
-    marginal = st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6)
-    field = st.RandomField(marginal, spectrum, mean_mode=True)
+    field = st.RandomField(beta_strength(1.0).marginal, spectrum, mean_mode=True)
     interface = st.Interface(length=50.0, nodes=1000 * 64)
     for of, length in (("z", 0.05), ("strength", field.efolding_length())):
         correlation = field.correlation(interface, of=of)

@@ -1,48 +1,44 @@
 """Friction laws against their own definitions, and the polygon of one piece against the line."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
 import pytest
+from checks import assert_same
 from scipy.integrate import quad
 
 import stiction as st
 from stiction.friction.kernels import line_at, strength_at, strengths
 
 DROP, RESIDUAL, RATE = 1.1e6, 0.3e6, 0.4e12
+TWO_PIECES = {"slip": [0.2, 1.0], "strength": [0.4, 0.0]}
 LAWS = {
     "linear": st.LinearWeakening(weakening_rate=RATE),
     "exponential": st.ExponentialWeakening(weakening_rate=RATE),
-    "dual": st.PiecewiseWeakening(slip=[0.2, 1.0], strength=[0.4, 0.0], weakening_rate=RATE),
+    "dual": st.PiecewiseWeakening(**TWO_PIECES, weakening_rate=RATE),
     "steepening": st.PiecewiseWeakening(
         slip=[0.3, 0.8, 1.0], strength=[0.9, 0.2, 0.0], weakening_rate=RATE
     ),
 }
-ONE_PIECE = {"slip": [1.0], "strength": [0.0]}
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_kernels_follow_the_law(law):
     critical = law.critical_slip_of(DROP, RATE)
     u = np.array([0.0, 0.1, 0.25, 0.5, 0.7, 0.9, 2.0])
-    ones = np.ones(u.size)
-    found = strengths(
-        law.parameters, (RESIDUAL + DROP) * ones, RESIDUAL * ones, RATE * ones, u * critical
-    )
+    nodes = [value * np.ones(u.size) for value in (RESIDUAL + DROP, RESIDUAL, RATE)]
+    found = strengths(law.parameters, *nodes, u * critical)
     np.testing.assert_allclose(found, RESIDUAL + DROP * law.fraction(u), rtol=1e-14)
-    # No corner lies in the interval of the difference, which is exact on straight pieces.
     arguments = law.parameters, RESIDUAL + DROP, RESIDUAL, RATE
 
     def slope_at(slip):
         return line_at(*arguments, slip, 0.0)[1]
 
     for slip in u * critical:
-        here, there = slip, slip + 1e-4 * critical
-        fall = strength_at(*arguments, here) - strength_at(*arguments, there)
-        slope = slope_at(0.5 * (here + there))
-        assert fall == pytest.approx(slope * (there - here), rel=1e-6, abs=1e-6)
+        # No corner lies in the interval of the difference, which is exact on straight pieces.
+        step = 1e-4 * critical
+        fall = strength_at(*arguments, slip) - strength_at(*arguments, slip + step)
+        assert fall == pytest.approx(slope_at(slip + 0.5 * step) * step, rel=1e-6, abs=1e-6)
         start, steep = line_at(*arguments, 0.1 * critical, slip - 0.1 * critical)
         assert steep == slope_at(slip)
         reached = start - steep * (slip - 0.1 * critical)
@@ -68,11 +64,9 @@ def test_energy_is_the_area_under_the_law(law):
 
 def test_each_scale_means_the_same_law():
     critical = LAWS["dual"].critical_slip_of(DROP, RATE)
-    for name, value in (
-        ("fracture_energy", DROP * critical * LAWS["dual"].integral),
-        ("critical_slip", critical),
-    ):
-        law = st.PiecewiseWeakening(slip=[0.2, 1.0], strength=[0.4, 0.0], **{name: value})
+    energy = DROP * critical * LAWS["dual"].integral
+    for scale in ({"fracture_energy": energy}, {"critical_slip": critical}):
+        law = st.PiecewiseWeakening(**TWO_PIECES, **scale)
         assert law.rate(np.array([DROP]), *law.scale)[0] == pytest.approx(RATE, rel=1e-14)
 
 
@@ -100,19 +94,17 @@ def test_polygon_along_a_law():
 )
 def test_one_piece_is_the_linear_law_to_the_bit(problem, make_strength, scale):
     scale |= {"residual_strength": 0.3e6}
-    linear = dataclasses.replace(problem, friction=st.LinearWeakening(**scale))
-    piece = dataclasses.replace(problem, friction=st.PiecewiseWeakening(**ONE_PIECE, **scale))
+    laws = (
+        st.PiecewiseWeakening(slip=[1.0], strength=[0.0], **scale),
+        st.LinearWeakening(**scale),
+    )
+    piece, linear = (dataclasses.replace(problem, friction=law) for law in laws)
     tau_p = make_strength(1.0).sample(problem.interface, samples=3, seed=4)
-    wide = 0.4e6 + 3.0 * (
-        tau_p - tau_p.min()
-    )  # the residual strength is reached, events arrest
-    for method, strength in (
-        (st.Equilibrium(slip=True, sensitivity=True), wide),
-        (st.Rupture(loading_rate=2e8, kernel_tolerance=1e-4), tau_p[:1]),
-    ):
-        ours = st.onset(piece, strength, method=method)
-        theirs = st.onset(linear, strength, method=method)
-        for name in theirs.data_vars:
-            np.testing.assert_array_equal(ours[name], theirs[name], err_msg=str(name))
-        if "weakening_rate" in scale and method.type == "equilibrium":
+    wide = 0.4e6 + 3.0 * (tau_p - tau_p.min())  # some of it weakens to the residual strength
+    equilibrium = st.Equilibrium(slip=True, sensitivity=True)
+    rupture = st.Rupture(loading_rate=2e8, kernel_tolerance=1e-4)
+    for method, strength in ((equilibrium, wide), (rupture, tau_p[:1])):
+        ours, theirs = (st.onset(one, strength, method=method) for one in (piece, linear))
+        assert_same(ours, theirs)
+        if "weakening_rate" in scale and method is equilibrium:
             assert theirs.residual_reached.any()

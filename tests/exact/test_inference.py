@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 import scipy.stats
+from setups import EXACT, LOCAL, turns
 
 import stiction as st
 from stiction.inference.density import log_likelihoods, tabulate
@@ -20,17 +21,13 @@ pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 PROBLEM = st.paper.problem(nodes=256)
 H_N = PROBLEM.nucleation_length
 STRENGTH = st.paper.strength(PROBLEM, correlation_ratio=0.6)
-LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
 LENGTH = {"low": 0.25 * H_N, "high": 4.0 * H_N, "spacing": "log"}
-THREE = {
-    "correlation_length": LENGTH,
-    "marginal.low": (0.4e6, 0.9e6),
-    "marginal.high": (1.2e6, 2.2e6),
-}
+LOW, SMALL = {"marginal.low": (0.4e6, 0.9e6)}, {"marginal.low": (0.1, 0.3)}
+THREE = {"correlation_length": LENGTH} | LOW | {"marginal.high": (1.2e6, 2.2e6)}
 
 
-def with_marginal(marginal):
-    return dataclasses.replace(STRENGTH, marginal=marginal)
+def with_marginal(marginal, field=STRENGTH):
+    return dataclasses.replace(field, marginal=marginal)
 
 
 def with_friction(**options):
@@ -41,36 +38,28 @@ def with_load(**options):
     return dataclasses.replace(PROBLEM, load=st.Load(**options))
 
 
-def likelihood_of(prior, method=LOCAL, error=0.0, samples=400, **options):
+def likelihood_of(prior, error=0.0, samples=400):
     return make_likelihood(
-        prior,
-        method=method,
-        lengths=options.pop("lengths", [None]),
-        error=error,
-        samples=samples,
-        seed=0,
-        variable="critical_stress",
-        meter=SILENT,
-        **options,
-    )
+        prior, method=LOCAL, lengths=[None], error=error, samples=samples, seed=0,
+        variable="critical_stress", meter=SILENT,
+    )  # fmt: skip
 
 
-def onsets(prior, theta, method, samples=60, seed=3):
+def onsets(prior, theta, method=LOCAL, samples=60, seed=3):
     return simulate(
         experiments_at(prior, np.atleast_2d(theta), method),
         samples=samples, first=0, seed=seed, variable="critical_stress", meter=SILENT,
     )  # fmt: skip
 
 
-LOW, SMALL = {"marginal.low": (0.4e6, 0.9e6)}, {"marginal.low": (0.1, 0.3)}
-WAVE = np.cos(2.0 * np.pi * np.arange(256) / 256)
+WAVE = np.cos(turns(256))
 PRESSED = with_load(normal_pressure=3e6)
 UNEVEN = with_load(normal_pressure=3e6 * (1.0 + 0.7 * WAVE))
 WITH_RESIDUAL = with_friction(weakening_rate=0.5e12, residual_strength=0.3e6)
 WEIBULL = with_marginal(scipy.stats.weibull_min(4.0, scale=1e6))
-COEFFICIENTS = st.RandomField(
-    st.Beta(alpha=2.0, beta=3.0, low=0.2, high=0.6),
-    STRENGTH.spectrum,
+COEFFICIENTS = dataclasses.replace(
+    STRENGTH,
+    marginal=st.Beta(alpha=2.0, beta=3.0, low=0.2, high=0.6),
     of="friction_coefficient",
 )
 
@@ -78,11 +67,8 @@ SCALING = {
     "bounds": (PROBLEM, STRENGTH, LOCAL, LOW, 1),
     "both bounds": (PROBLEM, STRENGTH, LOCAL, THREE, 2),
     "loc and scale": (
-        PROBLEM,
-        with_marginal(scipy.stats.lognorm(0.3, loc=0.3e6, scale=0.5e6)),
-        LOCAL,
-        {"marginal.loc": (0.1e6, 0.5e6), "marginal.scale": (0.3e6, 0.9e6)},
-        2,
+        PROBLEM, with_marginal(scipy.stats.lognorm(0.3, loc=0.3e6, scale=0.5e6)), LOCAL,
+        {"marginal.loc": (0.1e6, 0.5e6), "marginal.scale": (0.3e6, 0.9e6)}, 2,
     ),
     "residual strength, local": (WITH_RESIDUAL, STRENGTH, LOCAL, THREE, 2),
     "uniform initial stress, local": (
@@ -90,18 +76,12 @@ SCALING = {
     ),
     "coefficients": (PRESSED, COEFFICIENTS, LOCAL, SMALL, 1),
     "coefficients under a pressure that varies": (
-        UNEVEN,
-        dataclasses.replace(COEFFICIENTS, marginal=scipy.stats.weibull_min(4.0, scale=0.5)),
-        LOCAL,
-        {"marginal.scale": (0.2, 0.8)},
-        1,
+        UNEVEN, with_marginal(scipy.stats.weibull_min(4.0, scale=0.5), COEFFICIENTS), LOCAL,
+        {"marginal.scale": (0.2, 0.8)}, 1,
     ),
     "stretch by equilibrium": (
-        with_friction(weakening_rate=0.5e12, residual_ratio=0.4),
-        WEIBULL,
-        EXACT,
-        {"marginal.scale": (0.5e6, 2e6)},
-        1,
+        with_friction(weakening_rate=0.5e12, residual_ratio=0.4), WEIBULL, EXACT,
+        {"marginal.scale": (0.5e6, 2e6)}, 1,
     ),
 }  # fmt: skip
 
@@ -152,26 +132,26 @@ def test_where_scaling_does_not_hold_it_is_not_used(name):
 def test_a_load_profile_really_breaks_the_scaling():
     """The test above would be met by never scaling: here a shift changes onsets otherwise."""
     prior = make_prior(*NOT_SCALING["load profile"][:2], {"marginal.low": (0.4e6, 0.6e6)})
-    low, high = onsets(prior, [[0.4e6], [0.6e6]], LOCAL)
+    low, high = onsets(prior, [[0.4e6], [0.6e6]])
     stretch = (1.66e6 - 0.6e6) / (1.66e6 - 0.4e6)
     scaled = 0.6e6 + stretch * (low - 0.4e6)
     assert np.abs(high / scaled - 1.0).max() > 0.01
 
 
 def log_densities_at(samples, points, error=0.0, bound=-np.inf):
-    found = tabulate(samples[None, :], np.array([bound]))
-    out = np.empty((1, points.size))
+    found, out = tabulate(samples[None, :], np.array([bound])), np.empty((1, points.size))
     nodes, weights = np.zeros((1, 1), dtype=np.int64), np.ones((1, 1))
-    shift, stretch = np.zeros(1), np.ones(1)
-    log_likelihoods(nodes, weights, shift, stretch, error, found, points, out)
+    log_likelihoods(nodes, weights, np.zeros(1), np.ones(1), error, found, points, out)
     return out[0]
+
+
+EVEN = (np.arange(4000) + 0.5) / 4000
 
 
 @pytest.mark.parametrize("error", [0.0, 0.1, 2.0])
 def test_density_of_a_normal_sample(error):
-    quantiles = scipy.stats.norm.ppf((np.arange(4000) + 0.5) / 4000)
     points = np.linspace(-8.0, 8.0, 1601)
-    found = np.exp(log_densities_at(3.0 + quantiles, 3.0 + points, error))
+    found = np.exp(log_densities_at(3.0 + scipy.stats.norm.ppf(EVEN), 3.0 + points, error))
     exact = scipy.stats.norm.pdf(points, scale=np.hypot(1.0, error))
     # The kernel keeps mean and variance; groups and the grid's interpolation cost 0.5 % of it.
     assert np.abs(found - exact).max() < 0.005 * exact.max()
@@ -192,9 +172,8 @@ def test_density_far_out_falls_and_stays_finite():
 def test_density_above_a_bound(shape, error, most):
     """Gamma distributions, one of which begins steeply at its bound, with a load cell's error."""
     family = scipy.stats.gamma(shape, loc=10.0)
-    sample = family.ppf((np.arange(4000) + 0.5) / 4000)
     points = 10.0 + np.linspace(0.02, 12.0, 400)
-    found = np.exp(log_densities_at(sample, points, error, bound=10.0))
+    found = np.exp(log_densities_at(family.ppf(EVEN), points, error, bound=10.0))
     exact = family.pdf(points)
     if error:
         fine = 10.0 + (np.arange(40_000) + 0.5) * 5e-4  # to 20 above the bound
@@ -202,18 +181,16 @@ def test_density_above_a_bound(shape, error, most):
         exact = 5e-4 * kernel @ family.pdf(fine)
     # The logarithm is not normal: a kernel of 0.2 in it rounds the steep flank a little.
     assert np.abs(found - exact).max() < most * exact.max()
-    nothing = log_densities_at(sample, np.array([9.99]), 0.0, bound=10.0)
+    nothing = log_densities_at(family.ppf(EVEN), np.array([9.99]), bound=10.0)
     assert nothing[0] == -np.inf
 
 
 def test_the_likelihood_between_nodes_is_that_of_a_simulation_there():
     """Interpolated and scaled, against simulated at the very point, with the same draws."""
     prior = make_prior(PROBLEM, STRENGTH, THREE)
-    model = likelihood_of(prior, samples=2000)
-    u = np.array([[0.31, 0.45, 0.4], [0.72, 0.6, 0.3]])
-    peaks = 1e6 * np.linspace(0.66, 0.78, 7)
-    for place in u:
-        theta = prior.theta(place[None, :])
+    model, peaks = likelihood_of(prior, samples=2000), 1e6 * np.linspace(0.66, 0.78, 7)
+    for place in ([0.31, 0.45, 0.4], [0.72, 0.6, 0.3]):
+        theta = prior.theta(np.array([place]))
         direct = onsets(prior, theta, LOCAL, 2000, seed=0)
         exact = log_densities_at(direct[0], peaks, bound=theta[0, 1])
         found = model.log_densities(0, theta, peaks)[0]
@@ -226,17 +203,16 @@ def test_the_likelihood_between_nodes_is_that_of_a_simulation_there():
 def test_grid_against_a_sum_by_hand():
     """One shift, likelihood known on a fine grid: evidence, information and quantiles."""
     prior = make_prior(PROBLEM, STRENGTH, {"marginal.low": (0.5e6, 0.8e6)})
-    simulated = likelihood_of(prior, error=2e4)
     rng = np.random.default_rng(1)
     peaks = onsets(prior, [[0.66e6]], LOCAL, 12)[0] + 2e4 * rng.standard_normal(12)
-    likelihood = simulated.of([peaks])
+    likelihood = likelihood_of(prior, error=2e4).of([peaks])
     u = (np.arange(100_000) + 0.5) / 100_000
     values = likelihood(u[:, None])
     density = np.exp(values - values.max())
     evidence = values.max() + np.log(density.mean())
     density /= density.mean()
-    held = density > 0.0
-    information = np.mean(density[held] * np.log(density[held]))
+    held = density[density > 0.0]
+    information = np.mean(held * np.log(held))
     grid = grid_of(likelihood, likelihood.low, likelihood.high)
     # The midpoint rule on 512 cells of a smooth function within the zoomed box.
     assert grid.log_evidence == pytest.approx(evidence, abs=1e-3)
@@ -247,11 +223,8 @@ def test_grid_against_a_sum_by_hand():
 
 
 def test_draws_of_the_prior_and_back():
-    prior = make_prior(
-        PROBLEM,
-        STRENGTH,
-        {"correlation_length": LENGTH, "marginal.low": scipy.stats.norm(0.6e6, 0.02e6)},
-    )
+    low = scipy.stats.norm(0.6e6, 0.02e6)
+    prior = make_prior(PROBLEM, STRENGTH, {"correlation_length": LENGTH, "marginal.low": low})
     u = np.random.default_rng(0).random((50, 2))
     np.testing.assert_allclose(prior.u(prior.theta(u)), u, atol=1e-12)
     outside = prior.theta(u[:1]) * np.array([100.0, 1.0])

@@ -4,9 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
+from setups import exact_onset, make_problem
 
 import stiction as st
 from stiction.random.random_interface import lower_factor
+
+LINE = st.Interface(length=0.1, nodes=256)
 
 
 @pytest.fixture
@@ -16,32 +19,31 @@ def residual(make_strength):
     )
 
 
-def test_a_property_keeps_its_draws_whatever_else_is_random(problem, make_strength, residual):
-    strength = make_strength(1.0)
-    alone = st.RandomInterface(strength=strength)
-    both = st.RandomInterface(strength=strength, residual_strength=residual)
-    third = st.RandomInterface(
-        strength=strength, residual_strength=residual, initial_stress=residual,
-        correlation={("residual_strength", "initial_stress"): 0.5},
-    )  # fmt: skip
-    where = problem.interface
-    one, two, three = (r.profiles(where, samples=5, seed=3) for r in (alone, both, third))
-    first = one["strength"]
-    assert np.array_equal(first, strength.sample(where, samples=5, seed=3))
-    assert np.array_equal(first, two["strength"])
-    assert np.array_equal(first, three["strength"])
+def tied(strength, residual, rho=1.0):
+    correlation = {("residual_strength", "strength"): rho}
+    return st.RandomInterface(
+        strength=strength, residual_strength=residual, correlation=correlation
+    )
+
+
+def test_a_property_keeps_its_draws_whatever_else_is_random(make_strength, residual):
+    fields = {"strength": make_strength(1.0), "residual_strength": residual}
+    correlation = {("residual_strength", "initial_stress"): 0.5}
+    both = st.RandomInterface(**fields)
+    third = st.RandomInterface(**fields, initial_stress=residual, correlation=correlation)
+    alone = st.RandomInterface(strength=fields["strength"])
+    one, two, three = (r.profiles(LINE, samples=5, seed=3) for r in (alone, both, third))
+    first = fields["strength"].sample(LINE, samples=5, seed=3)
+    for profiles in (one, two, three):
+        assert np.array_equal(first, profiles["strength"])
     assert np.array_equal(two["residual_strength"], three["residual_strength"])
 
 
 @pytest.mark.parametrize("rho", [0.8, -0.6])
-def test_correlation_of_the_gaussian_fields(problem, make_strength, residual, rho):
+def test_correlation_of_the_gaussian_fields(make_strength, residual, rho):
     """Same spectrum: the fields z have this correlation at every node."""
-    random = st.RandomInterface(
-        strength=make_strength(1.0), residual_strength=residual,
-        correlation={("residual_strength", "strength"): rho},
-    )  # fmt: skip
-    where = problem.interface
-    found = random.profiles(where, samples=4000, seed=1)
+    random = tied(make_strength(1.0), residual, rho)
+    found = random.profiles(LINE, samples=4000, seed=1)
     # Ranks of the mapped fields are those of z; of a normal pair, Spearman's rho is known.
     ranks = [np.argsort(np.argsort(found[name][:, 7])) for name in random.names]
     spearman = np.corrcoef(ranks)[0, 1]
@@ -49,42 +51,28 @@ def test_correlation_of_the_gaussian_fields(problem, make_strength, residual, rh
     assert spearman == pytest.approx(6.0 / np.pi * np.arcsin(rho / 2.0), abs=0.04)
 
 
-def test_full_correlation_makes_the_residual_proportional(problem, make_strength):
+def test_full_correlation_makes_the_residual_proportional(make_strength):
     """One field is the other, scaled: an affine marginal and correlation 1."""
+    half = st.Beta(alpha=1.5, beta=3.0, low=0.33e6, high=0.83e6)
     strength = make_strength(1.0)
-    residual = dataclasses.replace(
-        strength, marginal=st.Beta(alpha=1.5, beta=3.0, low=0.33e6, high=0.83e6)
-    )
-    random = st.RandomInterface(
-        strength=strength, residual_strength=residual,
-        correlation={("strength", "residual_strength"): 1.0},
-    )  # fmt: skip
-    found = random.profiles(problem.interface, samples=20, seed=5)
+    random = tied(strength, dataclasses.replace(strength, marginal=half))
+    found = random.profiles(LINE, samples=20, seed=5)
     # The map from z to the marginal is tabulated to 1e-9.
     assert np.allclose(found["residual_strength"], 0.5 * found["strength"], rtol=1e-8)
 
 
 def test_residual_ratio_is_the_same_thing(problem, make_strength):
-    tau_p = make_strength(1.0).sample(problem.interface, samples=3, seed=2)
-    friction = st.LinearWeakening(weakening_rate=0.5e12, residual_ratio=0.5)
-    ratio = dataclasses.replace(problem, friction=friction)
-    own = st.onset(ratio, tau_p, method=st.Equilibrium())
-    given = {"strength": tau_p, "residual_strength": 0.5 * tau_p}
-    other = st.onset(problem, given, method=st.Equilibrium())
+    tau_p = make_strength(1.0).sample(LINE, samples=3, seed=2)
+    own = exact_onset(make_problem(residual_ratio=0.5), tau_p)
+    other = exact_onset(problem, {"strength": tau_p, "residual_strength": 0.5 * tau_p})
     assert np.array_equal(own.critical_stress, other.critical_stress)
 
 
-def test_modes_beyond_a_short_spectrum_are_drawn_for_the_longer_one(problem, make_strength):
+def test_modes_beyond_a_short_spectrum_are_drawn_for_the_longer_one(make_strength):
     """Two spectra of different lengths under full correlation share their draws mode by mode."""
     short, long = make_strength(0.5), make_strength(4.0)
-    random = st.RandomInterface(
-        strength=long, residual_strength=short,
-        correlation={("strength", "residual_strength"): 1.0},
-    )  # fmt: skip
-    where = problem.interface
-    found = random.profiles(where, samples=2, seed=4)
-    expected = short.profiles(where, short.draws(where, 2, 4))
-    assert np.array_equal(found["residual_strength"], expected)
+    found = tied(long, short).profiles(LINE, samples=2, seed=4)["residual_strength"]
+    assert np.array_equal(found, short.profiles(LINE, short.draws(LINE, 2, 4)))
 
 
 def test_fracture_energy_and_critical_slip_as_random_properties(make_strength):
@@ -102,29 +90,3 @@ def test_factor_of_a_singular_matrix():
     matrix = np.array([[1.0, 1.0, 0.3], [1.0, 1.0, 0.3], [0.3, 0.3, 1.0]])
     factor = lower_factor(matrix)
     assert np.allclose(factor @ factor.T, matrix, atol=1e-15)
-
-
-PAIR = ("strength", "residual_strength")
-THREE = {PAIR: 0.9, ("strength", "initial_stress"): 0.9, (PAIR[1], "initial_stress"): -0.9}
-REFUSED = {
-    "did you mean 'residual_strength'": {("strength", "residual"): 0.5},
-    "must be less than or equal to 1, got 1.5": {PAIR: 1.5},
-    "correlation: unknown 'critical_slip'": {("strength", "critical_slip"): 0.5},
-    "two different properties": {("strength", "strength"): 0.5},
-    "must be a valid dictionary": 0.5,
-    "given twice": {PAIR: 0.5, PAIR[::-1]: 0.4},
-    "contradict each other": THREE,
-}
-
-
-@pytest.mark.parametrize("words", REFUSED)
-def test_bad_correlations_are_refused(make_strength, residual, words):
-    fields = {name: residual for name in ("residual_strength", "initial_stress")}
-    with pytest.raises(st.InputError, match=words):
-        st.RandomInterface(strength=make_strength(1.0), correlation=REFUSED[words], **fields)
-
-
-def test_two_scales_of_slip_are_refused(make_strength):
-    field = make_strength(1.0)
-    with pytest.raises(st.InputError, match="at most one of weakening_rate"):
-        st.RandomInterface(strength=field, weakening_rate=field, critical_slip=field)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from scipy.stats import binom, nbinom
+from setups import LOCAL, ensemble, local_onset, turns
 
 import stiction as st
 from stiction.progress import SILENT
@@ -18,18 +19,13 @@ from stiction.reliability.uncertainty import (
     lognormal_interval,
 )
 
-LOCAL = st.LocalCriterion()
-
-
-@pytest.fixture(scope="module")
-def system():
-    problem = st.paper.problem(nodes=256)
-    return problem, st.paper.strength(problem)
+PROBLEM = st.paper.problem(nodes=256)
+STRENGTH = st.paper.strength(PROBLEM)
 
 
 @pytest.mark.parametrize(("stress", "expected"), [(0.66e6, 0.0), (0.1e6, 0.0), (1.66e6, 1.0)])
-def test_beyond_the_bounds_nothing_is_sampled(system, stress, expected):
-    result = st.failure_probability(*system, stress, method=LOCAL)
+def test_beyond_the_bounds_nothing_is_sampled(stress, expected):
+    result = st.failure_probability(PROBLEM, STRENGTH, stress, method=LOCAL)
     assert result.probability == expected
     assert result.interval == (expected, expected)
     assert result.cv == 0.0
@@ -47,40 +43,34 @@ def test_all_of_a_count_is_not_certainty():
 
 def test_bounds_follow_load_and_initial_stress():
     """Nothing slips below min (tau_p - tau_i)/p; in mean stress that is <tau_i> + load <p>."""
-    nodes = 256
-    wave = np.cos(2.0 * np.pi * np.arange(nodes) / nodes)
-    base = st.paper.problem(nodes=nodes)
+    wave = np.cos(turns(256))
     load = st.Load(profile=1.5 + 0.3 * wave, initial_stress=1e5 + 2e4 * wave)
-    problem = st.Problem(base.solid, base.interface, base.friction, load)
-    field = st.paper.strength(base)
+    problem = st.Problem(PROBLEM.solid, PROBLEM.interface, PROBLEM.friction, load)
     # At x = 0: (0.66e6 - 0.12e6)/1.8 = 0.3e6, times 1.5, plus the mean initial stress 0.1e6.
-    below = st.failure_probability(problem, field, 0.5499e6, method=LOCAL)
+    below = st.failure_probability(problem, STRENGTH, 0.5499e6, method=LOCAL)
     assert below.lower_bound == pytest.approx(0.55e6, rel=1e-12)
     assert below.probability == 0.0
-    onset = st.onset(problem, field.sample(base.interface, samples=500), method=LOCAL)
+    onset = local_onset(problem, STRENGTH.sample(problem.interface, samples=500))
     assert float(onset["critical_stress"].min()) > below.lower_bound
 
 
 def test_nothing_is_below_the_bound_where_the_local_criterion_rings():
     """Strength in jumps between its two bounds, on few nodes: the filtered profile overshoots."""
-    problem = st.paper.problem(nodes=256)
     marginal = st.Beta(alpha=0.2, beta=0.2, low=0.66e6, high=1.66e6)
-    field = st.RandomField(marginal, st.paper.strength(problem, 0.5).spectrum)
-    profiles = field.sample(problem.interface, samples=200)
-    found = st.onset(problem, profiles, method=LOCAL)
+    field = st.RandomField(marginal, st.paper.strength(PROBLEM, 0.5).spectrum)
+    found = local_onset(PROBLEM, field.sample(PROBLEM.interface, samples=200))
     # A mean over the interface of equal values is rounded; on some machines to below them.
     assert float(found["critical_stress"].min()) >= 0.66e6 * (1.0 - 1e-15)
-    state = st.external.limit_state(problem, field, LOCAL)
+    state = st.external.limit_state(PROBLEM, field, LOCAL)
     assert state(state.draws(0, 0, 200)).min() == 0.66e6
 
 
 def test_binomial_interval_has_its_coverage():
+    """By definition of Clopper and Pearson (1934), and the rule of three on two sides."""
     low, high = binomial_interval(7, 100)
-    # By definition of Clopper and Pearson (1934).
     assert binom.sf(6, 100, low) == pytest.approx(0.025, rel=1e-9)
     assert binom.cdf(7, 100, high) == pytest.approx(0.025, rel=1e-9)
     assert binomial_interval(0, 100)[0] == 0.0
-    # The rule of three, two-sided: 1 - 0.025^(1/100).
     assert binomial_interval(0, 100)[1] == pytest.approx(1.0 - 0.025**0.01, rel=1e-9)
     assert binomial_interval(100, 100)[1] == 1.0
 
@@ -166,13 +156,13 @@ def test_frequent_failures_of_an_interface_are_counted_without_bias(algorithm):
     """Near P = 1e-2, where 'auto' takes now one algorithm and now another."""
     problem = st.paper.problem(nodes=136)
     field = st.paper.strength(problem, 0.5)
-    onset = st.monte_carlo(problem, field, method=LOCAL, samples=1_000_000, seed=10**6)
-    stress = float(np.quantile(onset["critical_stress"], 0.01))
+    onsets = ensemble(problem, field, 1_000_000, seed=10**6)["critical_stress"]
+    stress = float(np.quantile(onsets, 0.01))
     options = {"method": LOCAL, "algorithm": algorithm, "target_cv": 0.3}
-    runs = [
-        st.failure_probability(problem, field, stress, seed=i, **options) for i in range(150)
-    ]
-    found = np.array([run.probability for run in runs])
+    found = np.array([
+        st.failure_probability(problem, field, stress, seed=i, **options).probability
+        for i in range(150)
+    ])  # fmt: skip
     # Two standard errors: about 5 % for the mean of 150 runs, 2 % for the reference.
     error = math.hypot(2.0 * found.std() / 0.01 / math.sqrt(150), 0.02)
     assert abs(found.mean() / 0.01 - 1.0) < error

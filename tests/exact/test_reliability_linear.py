@@ -5,6 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from checks import assert_mean, standard_error
 from scipy.stats import norm
 
 from stiction.reliability.subset import descend
@@ -13,7 +14,6 @@ from stiction.reliability.two_level import bridge
 from stiction.reliability.uncertainty import generator, log_width
 
 DIMENSION = 200
-REPEATS = 50
 RUNS = 100
 
 
@@ -22,43 +22,41 @@ def linear(draws):
     return draws.sum(axis=1) / math.sqrt(DIMENSION)
 
 
-def unbiased(found, errors):
-    """Whether the mean of found/true is one, within so many standard errors."""
-    return abs(found.mean() - 1.0) < errors * found.std(ddof=1) / math.sqrt(found.size)
-
-
 def first(draws):
     return draws[:, 0]
 
 
-across = []
-"""Difference of two draws in the last level of each run, which failure does not depend on."""
+def root_mean(values):
+    return math.sqrt(np.mean(values))
 
 
 @lru_cache(maxsize=1)
 def descents():
-    """Independent runs to beta = 5; shallower tails are read off their earlier levels."""
-    runs = []
+    """Independent runs to beta = 5; shallower tails are read off their earlier levels.
+
+    And the difference of two draws in the last level of each, which failure does not depend on.
+    """
+    runs, across = [], []
     for seed in range(RUNS):
         run = descend(linear, DIMENSION, rng=generator(seed, 0), samples=1000, threshold=-5.0)
         across.append(run.populations[-1].draws[:, :2] @ (1.0, -1.0))
         runs.append(run.light())
-    return runs
+    return runs, np.concatenate(across)
 
 
 @pytest.mark.parametrize("beta", [3.0, 4.0, 5.0])
 def test_subset_simulation_is_unbiased_and_knows_its_error(beta):
-    found = np.array([run.probability(-beta) for run in descents()]) / norm.cdf(-beta)
+    runs, _ = descents()
+    found = np.array([run.probability(-beta) for run in runs]) / norm.cdf(-beta)
     # Three standard errors of the mean of a hundred runs, 0.13 at beta = 5.
-    assert unbiased(found, 3.0)
-    observed = found.std(ddof=1) / found.mean()
-    reported = math.sqrt(np.mean([run.relative_variance(-beta) for run in descents()]))
+    assert_mean(found, 1.0, errors=3.0)
+    reported = root_mean([run.relative_variance(-beta) for run in runs])
     # A hundred runs know their own spread to about 10 %; 30 % is three standard errors.
-    assert reported == pytest.approx(observed, rel=0.3)
+    assert reported == pytest.approx(found.std(ddof=1) / found.mean(), rel=0.3)
 
 
 def test_levels_are_tenths_and_chains_move():
-    for run in descents()[:5]:
+    for run in descents()[0][:5]:
         chances = np.exp([one.log_probability for one in run.populations])
         shares = chances[1:] / chances[:-1]
         # Ties, states that repeat along a chain, leave a few fewer than a tenth.
@@ -72,42 +70,37 @@ def test_levels_are_tenths_and_chains_move():
 
 def test_levels_chosen_from_the_samples_do_not_bias_the_estimate():
     """Four hundred small runs: ten seeds a level, where a biased rule adds a tenth each."""
-    runs = [
-        descend(first, 20, rng=generator(seed, 6), samples=100, threshold=-3.5)
-        for seed in range(400)
-    ]
+    options = {"samples": 100, "threshold": -3.5}
+    runs = [descend(first, 20, rng=generator(seed, 6), **options) for seed in range(400)]
     found = np.array([run.probability(-3.5) for run in runs]) / norm.cdf(-3.5)
-    error = found.std(ddof=1) / math.sqrt(found.size)
-    # Four standard errors, about 0.23; with the threshold at the highest value that goes on, not
-    # the lowest that does not, the mean is 1.34.
-    assert error < 0.07
-    assert unbiased(found, 4.0)
+    # With the threshold at the highest value that goes on, not the lowest that does not, the mean
+    # is 1.34.
+    assert standard_error(found) < 0.07
+    assert_mean(found, 1.0, errors=4.0)
 
 
 def test_samples_of_the_last_level_have_the_truncated_normal_distribution():
-    last = [run.populations[-1] for run in descents()]
-    means = [population.values.mean() for population in last]
-    truth = [-norm.pdf(p.ceiling) / norm.cdf(p.ceiling) for p in last]
-    excess = np.array(means) - np.array(truth)
-    # Each run's mean scatters by a few hundredths; their average by the standard error.
-    assert abs(excess.mean()) < 3.0 * excess.std(ddof=1) / math.sqrt(RUNS)
+    runs, across = descents()
+    excess = []
+    for last in (run.populations[-1] for run in runs):
+        excess.append(last.values.mean() + norm.pdf(last.ceiling) / norm.cdf(last.ceiling))
+    assert_mean(excess, 0.0, errors=3.0)
     # Orthogonal directions remain standard normal. Each run holds some five independent families,
     # 500 in all: a standard error of 2 sqrt(2/500) = 0.13.
-    assert np.concatenate(across).var() == pytest.approx(2.0, abs=0.4)
+    assert across.var() == pytest.approx(2.0, abs=0.4)
 
 
 def test_quantiles_of_pooled_runs():
-    tail = Tail(descents())
+    tail = Tail(descents()[0])
     for beta in (1.0, 3.0, 4.5):
-        chance = norm.cdf(-beta)
         # dP/P = beta d(beta): the pooled c.o.v. is below 0.06, so the quantile is good to 0.02.
         cv = tail.cv(-beta)
         assert cv < 0.07
-        assert tail.quantile(chance) == pytest.approx(-beta, abs=3.0 * cv / beta)
+        assert tail.quantile(norm.cdf(-beta)) == pytest.approx(-beta, abs=3.0 * cv / beta)
 
 
 def test_interval_of_a_stress_is_where_the_interval_of_its_probability_ends():
-    tail = Tail(descents()[:10])
+    tail = Tail(descents()[0][:10])
     chance, cv = norm.cdf(-4.0), 0.3
     low, high = tail.stress_interval(chance, cv, -9.0)
     width = log_width(cv)
@@ -129,41 +122,33 @@ def test_runs_until_precise_are_unbiased(beta):
             rng = generator(seed, 1, number)
             return descend(linear, DIMENSION, rng=rng, samples=samples, threshold=-beta)
 
+        limits = {"first": 1000, "largest": 5000, "max_evaluations": 10**7}
         runs = repeat_until_precise(
-            make,
-            lambda runs: Tail(runs).cv(-beta),
-            target_cv=0.2,
-            first=1000,
-            largest=5000,
-            max_evaluations=10**7,
+            make, lambda runs: Tail(runs).cv(-beta), target_cv=0.2, **limits
         )
         return Tail(runs).probability(-beta), Tail(runs).cv(-beta)
 
-    found, reported = np.array([one(seed) for seed in range(REPEATS)]).T
+    found, reported = np.array([one(seed) for seed in range(50)]).T
     found /= norm.cdf(-beta)
     assert np.all(reported <= 0.2)
-    assert unbiased(found, 3.0)
+    assert_mean(found, 1.0, errors=3.0)
     observed = found.std(ddof=1) / found.mean()
-    assert math.sqrt(np.mean(reported**2)) == pytest.approx(observed, rel=0.3)
+    assert root_mean(reported**2) == pytest.approx(observed, rel=0.3)
 
 
 @pytest.mark.parametrize("likeness", [1.0, 0.9])
 def test_two_levels_correct_for_an_imperfect_first_stage(likeness):
     """The cheap limit state may fail where the exact one holds and the other way round."""
-    other = math.sqrt(1.0 - likeness**2)
 
     def cheap(draws):
-        return likeness * draws[:, 0] + other * draws[:, 1]
+        return draws[:, :2] @ (likeness, math.sqrt(1.0 - likeness**2))
 
     options = {"samples": 300, "max_evaluations": 10**6, "threshold": -4.0}
-    runs = [
-        bridge(cheap, first, 50, rng=generator(seed, 2), **options)
-        for seed in range(4 * REPEATS)
-    ]
+    runs = [bridge(cheap, first, 50, rng=generator(i, 2), **options) for i in range(200)]
     found = np.array([run.probability(-4.0) for run in runs]) / norm.cdf(-4.0)
-    # Three standard errors of two hundred runs, some 0.06 and 0.14. Walks that start from what the
-    # cheap limit state sees, and forget too little of it, are 0.25 low at a likeness of 0.9.
-    assert unbiased(found, 3.0)
+    # Standard errors of some 0.06 and 0.14. Walks that start from what the cheap limit state
+    # sees, and forget too little of it, are 0.25 low at a likeness of 0.9.
+    assert_mean(found, 1.0, errors=3.0)
     # The median: a few runs with two or three failures report an error of several hundred per cent.
     reported = math.sqrt(np.median([run.relative_variance(-4.0) for run in runs]))
     assert reported == pytest.approx(found.std(ddof=1) / found.mean(), rel=0.35)
@@ -197,10 +182,8 @@ def test_runs_over_two_levels_that_find_no_failure_count_as_well():
     options = {"samples": 100, "max_evaluations": 10**5, "threshold": -2.0}
     runs = [bridge(first, exact, 10, rng=generator(seed, 4), **options) for seed in range(600)]
     found = np.array([run.probability(-2.0) for run in runs])
-    truth = norm.cdf(-2.0) * norm.cdf(-3.0)
     assert all(run.complete for run in runs)
     assert np.mean(found == 0.0) > 0.9
-    # Some 20 runs find one: four standard errors of their number. Were those that find none left
-    # out, or replaced by a look at a more frequent level, the mean would be thirty times too high.
-    error = found.std(ddof=1) / math.sqrt(found.size)
-    assert abs(found.mean() - truth) < 4.0 * error
+    # Some 20 runs find one. Were those that find none left out, or replaced by a look at a more
+    # frequent level, the mean would be thirty times too high.
+    assert_mean(found, norm.cdf(-2.0) * norm.cdf(-3.0), errors=4.0)

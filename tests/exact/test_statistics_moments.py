@@ -4,19 +4,19 @@ import dataclasses
 
 import numpy as np
 import pytest
+from oracles import angle_rule
+from setups import make_problem
 
 import stiction as st
 from stiction.criterion import eigenfunction
 from stiction.random.mapping import correlation_of_mapped, hermite_coefficients
 from stiction.statistics.moments import nucleation_statistics, strength_spectrum
-
-SPECTRUM = st.PowerLawSpectrum(correlation_length=5e-3)
+from stiction.statistics.rice import rice_distribution
 
 
 def infinite_ratio(problem, strength):
     """Var[tau_n]/Var[tau_p] on an infinite line: 1500 x 1500 cells of the definition."""
-    t = (np.arange(1500) + 0.5) * np.pi / 1500
-    s, measure = np.cos(t), np.sin(t) * np.pi / 1500
+    s, measure = angle_rule(1500)
     share = eigenfunction.weight(s) * measure
     lags = np.abs(s[:, None] - s[None, :]) * problem.nucleation_length / 2.0
     rho = strength.spectrum.untruncated_correlation(lags)
@@ -28,7 +28,6 @@ def test_periodic_variance_is_that_of_the_grid(problem, make_strength):
     """The covariance matrix of the nodes, averaged by the weights of nucleation_stress itself."""
     strength = make_strength(0.5)
     c = strength.correlation(problem.interface)
-    # Of every node.
     weights = st.theory.nucleation_stress(problem, 1e6 + np.eye(256))[:, 0] - 1e6
     matrix = c[(np.arange(256)[:, None] - np.arange(256)[None, :]) % 256]
     found = nucleation_statistics(problem, strength)
@@ -43,8 +42,7 @@ def test_periodic_tends_to_infinite(problem, make_strength):
     infinite = infinite_ratio(problem, strength)
     gaps = []
     for factor in (1, 2, 4):
-        grid = st.Interface(length=0.1 * factor, nodes=256 * factor)
-        longer = dataclasses.replace(problem, interface=grid)
+        longer = make_problem(256 * factor, 0.1 * factor)
         gaps.append(infinite - nucleation_statistics(longer, strength).variance_ratio)
     assert gaps[0] > 0.0
     # What is missing falls as 1/L; truncation at 2.5 lambda leaves a few 1e-5 besides.
@@ -63,21 +61,28 @@ def test_a_uniform_field_is_averaged_to_itself(problem, make_strength):
     assert found.variance_ratio == pytest.approx(1.0, abs=1e-6)
 
 
-def test_friction_coefficients_are_taken_times_the_pressure(problem, make_strength):
+def test_friction_coefficients_are_taken_times_the_pressure(problem):
     """0.22 was taken for 0.22 Pa."""
     pressed = dataclasses.replace(problem, load=st.Load(normal_pressure=2e6))
-    in_stress = st.RandomField(st.Beta(alpha=2.0, beta=3.0, low=0.4e6, high=1.2e6), SPECTRUM)
-    coefficient = st.RandomField(
-        st.Beta(alpha=2.0, beta=3.0, low=0.2, high=0.6), SPECTRUM, of="friction_coefficient"
+    in_pascals, coefficient = (
+        st.RandomField(
+            st.Beta(alpha=2.0, beta=3.0, low=low, high=3.0 * low),
+            st.PowerLawSpectrum(correlation_length=5e-3),
+            of=of,
+        )
+        for low, of in ((0.4e6, None), (0.2, "friction_coefficient"))
     )
-    found, expected = (nucleation_statistics(pressed, f) for f in (coefficient, in_stress))
+    found, expected = (nucleation_statistics(pressed, f) for f in (coefficient, in_pascals))
     assert found.mean == pytest.approx(expected.mean, rel=1e-12)
     assert found.variance == pytest.approx(expected.variance, rel=1e-12)
-    varying = dataclasses.replace(
-        problem, load=st.Load(normal_pressure=np.linspace(1e6, 2e6, problem.interface.size))
-    )
+    varying = make_problem(load=st.Load(normal_pressure=np.linspace(1e6, 2e6, 256)))
     with pytest.raises(st.InputError, match=r"load\.normal_pressure: varies"):
         nucleation_statistics(varying, coefficient)
+    found, expected = (
+        rice_distribution(pressed, field, profiles=64) for field in (coefficient, in_pascals)
+    )
+    np.testing.assert_allclose(found.stress, expected.stress, rtol=1e-9)
+    assert np.mean(found.probability == expected.probability) > 0.99
 
 
 def test_spectrum_sums_to_one(problem, make_strength):
@@ -93,9 +98,3 @@ def test_uniform_load_and_initial_stress_scale(problem, make_strength):
     found = nucleation_statistics(loaded, make_strength())
     assert found.mean == pytest.approx((plain.mean - 1e5) / 2.0)
     assert found.variance == pytest.approx(plain.variance / 4.0)
-
-
-def test_load_that_varies_is_refused(problem, make_strength):
-    varying = dataclasses.replace(problem, load=st.Load(profile=np.linspace(0.9, 1.1, 256)))
-    with pytest.raises(st.InputError, match=r"load\.profile.*monte_carlo"):
-        nucleation_statistics(varying, make_strength())

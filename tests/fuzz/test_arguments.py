@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 import scipy.stats
 from harness import trial
+from setups import LOCAL, SOLID, beta_strength, make_problem
 
 import stiction as st
 
@@ -59,48 +60,44 @@ VALUES = (
 
 def calls():
     """Functions and classes with arguments that work and take little time."""
-    solid = {"shear_modulus": 1e9, "poisson_ratio": 0.33, "density": 1170.0}
-    interface = st.Interface(length=0.1, nodes=NODES)
-    friction = st.LinearWeakening(weakening_rate=0.1e12)
-    problem = st.Problem(st.Solid(**solid), interface, friction)
-    beta = {"alpha": 1.5, "beta": 3.0, "low": 0.66e6, "high": 1.66e6}
-    spectrum = st.PowerLawSpectrum(correlation_length=0.02)
-    strength = st.RandomField(st.Beta(**beta), spectrum)
+    problem, strength = make_problem(NODES, weakening_rate=0.1e12), beta_strength(0.02)
+    interface, friction = problem.interface, problem.friction
     tau_p = strength.sample(interface, samples=2)
-    local, rupture = st.LocalCriterion(), st.Rupture(loading_rate=1e9, max_steps=50_000)
+    beta = {"alpha": 1.5, "beta": 3.0, "low": 0.66e6, "high": 1.66e6}
+    rupture = st.Rupture(loading_rate=1e9, max_steps=50_000)
     ensemble = st.Ensemble(samples=2)
-    study = st.Study(problem=problem, random=strength, method=local, ensemble=ensemble)
-    given = {"problem": problem, "random": strength, "method": local}
+    given = {"problem": problem, "random": strength, "method": LOCAL}
+    study = st.Study(**given, ensemble=ensemble)
     tail = {**given, "target_cv": 0.5, "max_evaluations": 5000, "workers": 1}
-    mean = {"mean": 1e6, "cv": 0.2}
+    mean, length = {"mean": 1e6, "cv": 0.2}, {"correlation_length": 0.02}
+    one = {"problem": problem, "profiles": tau_p[0]}
     moments = {"problem": problem, "strength": strength}
     return [
-        (st.Solid, solid),
+        (st.Solid, {"shear_modulus": 1e9, "poisson_ratio": 0.33, "density": 1170.0}),
         (st.Interface, {"length": 0.1, "nodes": NODES}),
         (st.LinearWeakening, {"weakening_rate": 1e11}),
         (st.ExponentialWeakening, {"critical_slip": 1e-6}),
         (st.Load, {"normal_pressure": 1e6}),
         (st.GradientLoad, {"amplitude": 0.1}),
-        (st.Problem, {"solid": problem.solid, "interface": interface, "friction": friction}),
+        (st.Problem, {"solid": SOLID, "interface": interface, "friction": friction}),
         (problem.sample, {"profiles": tau_p}),
         (st.Beta, beta),
         (st.Lognormal, mean),
         (st.Weibull, mean),
-        (st.PowerLawSpectrum, {"correlation_length": 0.02, "power_kept": 0.9}),
-        (st.SquaredExponentialSpectrum, {"correlation_length": 0.02}),
-        (st.ExponentialSpectrum, {"correlation_length": 0.02, "truncation": 3.0}),
+        (st.PowerLawSpectrum, {**length, "power_kept": 0.9}),
+        (st.SquaredExponentialSpectrum, length),
+        (st.ExponentialSpectrum, {**length, "truncation": 3.0}),
         (st.CustomSpectrum, {"function": lambda k: np.exp(-k), "max_wavenumber": 500.0}),
-        (st.RandomField, {"marginal": st.Beta(**beta), "spectrum": spectrum}),
+        (st.RandomField, {"marginal": st.Beta(**beta), "spectrum": strength.spectrum}),
         (st.RandomInterface, {"strength": strength}),
         (strength.sample, {"interface": interface}),
         (strength.correlation, {"interface": interface}),
         (st.LocalCriterion, {}),
         (st.Equilibrium, {}),
         (st.Rupture, {"loading_rate": 1e9}),
-        (st.onset, {"problem": problem, "profiles": tau_p, "method": local}),
-        (st.equilibrium_path, {"problem": problem, "profiles": tau_p[0], "loads": [1e5, 2e5]}),
-        (st.simulate_rupture,
-         {"problem": problem, "profiles": tau_p[0], "method": rupture, "stop": "onset"}),
+        (st.onset, {"problem": problem, "profiles": tau_p, "method": LOCAL}),
+        (st.equilibrium_path, {**one, "loads": [1e5, 2e5]}),
+        (st.simulate_rupture, {**one, "method": rupture, "stop": "onset"}),
         (st.monte_carlo, {**given, "samples": 2, "workers": 1, "progress": False}),
         (st.theory.nucleation_stress, {"problem": problem, "tau_p": tau_p}),
         (st.theory.nucleation_statistics, moments),
@@ -116,8 +113,8 @@ def calls():
         (st.Study.from_result, {"result": study.run()}),
         (study.to_toml, {"path": "/nonexistent/x.toml"}),
         (st.open_run, {"path": "/nonexistent"}),
-        (st.paper.strength, {"problem": st.paper.problem(256)}),
-    ]  # fmt: skip
+        (st.paper.strength, {"problem": problem}),
+    ]
 
 
 @pytest.mark.slow
@@ -142,8 +139,7 @@ def test_bad_arguments_are_refused(fuzz, tmp_path, monkeypatch):
         outcome, detail = trial(lambda function=function, given=given: function(**given))
         refused += outcome == "refused"
         if outcome.startswith("FAULT"):
-            faults.append(
-                f"{function.__qualname__}({name} = VALUES[{value}]): {outcome}: {detail}"
-            )
+            call = f"{function.__qualname__}({name} = VALUES[{value}])"
+            faults.append(f"{call}: {outcome}: {detail}")
     assert refused > fuzz.count // 2
     assert not faults, "\n".join(faults)

@@ -3,8 +3,6 @@
 More of them: pytest tests/fuzz/test_stores.py --fuzz-count 15000 --fuzz-seed 771.
 """
 
-from __future__ import annotations
-
 import errno
 import multiprocessing
 import os
@@ -24,16 +22,14 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore"),
     pytest.mark.skipif(not hasattr(os, "fork"), reason="writers are forked"),
 ]
+METHODS = [{"type": "local_criterion"}, {"type": "equilibrium"}]
 STUDY = st.Study.from_dict(
     small_study(
-        nodes=64, ensemble={"samples": 60, "seed": 3, "keep": ["strength"]},
-        sweep=[{
-            **lengths(8e-3, 12e-3)[0],
-            "method": [{"type": "local_criterion"}, {"type": "equilibrium"}],
-        }],
+        nodes=64,
+        ensemble={"samples": 60, "seed": 3, "keep": ["strength"]},
+        sweep=[lengths(8e-3, 12e-3)[0] | {"method": METHODS}],
     )
-)  # fmt: skip
-FORK = multiprocessing.get_context("fork")
+)
 
 
 @pytest.fixture
@@ -65,7 +61,8 @@ def write(folder):
 
 
 def begin(folder):
-    writer = FORK.Process(target=write, args=(folder,), daemon=True)
+    fork = multiprocessing.get_context("fork")
+    writer = fork.Process(target=write, args=(folder,), daemon=True)
     writer.start()
     return writer
 
@@ -93,7 +90,6 @@ def test_writers_killed_at_random(tmp_path, fuzz, reference, writers):
         assert state.complete
         assert state.damaged == ()
         runs += 1
-    print(f"{kills} kills in {runs} runs of {writers}")
 
 
 def test_calls_of_the_system_that_fail(tmp_path, fuzz, reference, monkeypatch):
@@ -122,7 +118,6 @@ def test_calls_of_the_system_that_fail(tmp_path, fuzz, reference, monkeypatch):
                     assert left < 0
         assert write(folder).identical(reference)
         assert st.open_run(folder).dataset().identical(reference)
-    print(f"{faults} faults")
 
 
 def test_damage_anywhere(tmp_path, fuzz, reference):

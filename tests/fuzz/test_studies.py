@@ -1,6 +1,5 @@
 """Mutated study files are refused with a message or right, soon and in little memory.
 
-Values of a study are replaced, removed, renamed, moved and swept, or bytes of the file changed.
 What is called valid is described as `stiction check` does, and one sample of it computed. More of
 them: pytest tests/fuzz --fuzz-count 3000 --fuzz-seed 771.
 """
@@ -8,61 +7,32 @@ them: pytest tests/fuzz --fuzz-count 3000 --fuzz-seed 771.
 from __future__ import annotations
 
 import copy
+import functools
+import operator
 import random
-import tomllib
 import warnings
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 from harness import trial
+from small_study import lengths, small_study
 
 from stiction.cli import description
 from stiction.study.study import Study
 
-STUDY = """
-title = "a study"
-[problem]
-mode = "II"
-[problem.solid]
-shear_modulus = 1e9
-poisson_ratio = 0.33
-density = 1170.0
-plane = "stress"
-[problem.interface]
-length = 0.1
-nodes = 128
-[problem.friction]
-weakening_rate = 0.1e12
-residual_strength = 0.0
-[problem.load]
-profile = 1.0
-initial_stress = 0.0
-normal_pressure = 5e6
-[random.strength]
-mean_mode = true
-[random.strength.marginal]
-type = "beta"
-alpha = 1.5
-beta = 3.0
-low = 0.66e6
-high = 1.66e6
-[random.strength.spectrum]
-type = "power_law"
-correlation_length = 0.02
-exponent = 4.0
-truncation = 2.5
-[method]
-type = "local_criterion"
-[ensemble]
-samples = 20
-seed = 11
-first = 0
-[[sweep]]
-"random.strength.spectrum.correlation_length" = [0.02, 0.03]
-[[sweep]]
-"problem.interface.length" = { start = 0.1, stop = 0.2, count = 2 }
-"""
+PLAIN = small_study(
+    weakening_rate=0.1e12,
+    correlation_length=0.02,
+    ensemble={"samples": 20, "seed": 11, "first": 0},
+    sweep=[
+        *lengths(0.02, 0.03),
+        {"problem.interface.length": {"start": 0.1, "stop": 0.2, "count": 2}},
+    ],
+)
+PLAIN["problem"]["load"] = {"profile": 1.0, "initial_stress": 0.0, "normal_pressure": 5e6}
+PLAIN["random"]["strength"]["mean_mode"] = True
+PLAIN["random"]["strength"]["spectrum"] |= {"exponent": 4.0, "truncation": 2.5}
 
 VALUES: tuple[Any, ...] = (
     True, "", "x", "1", "\x1b[2J", "a\nb", "x" * 10_000, "profile.npy", "missing.csv", "/dev/zero",
@@ -78,22 +48,16 @@ VALUES: tuple[Any, ...] = (
 def _leaves(tree: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     """Paths to everything inside, tables too."""
     found = [path] if path else []
-    items = tree.items() if isinstance(tree, dict) else ()
-    items = enumerate(tree) if isinstance(tree, list) else items
-    for key, value in items:
+    items = enumerate(tree) if isinstance(tree, list) else ()
+    for key, value in tree.items() if isinstance(tree, dict) else items:
         found += _leaves(value, (*path, key))
     return found
 
 
-def _parent(tree: Any, path: tuple[Any, ...]) -> Any:
-    for key in path[:-1]:
-        tree = tree[key]
-    return tree
-
-
 def _mutated_tree(tree: Any, chance: random.Random) -> str:
     path = chance.choice(_leaves(tree))
-    owner, key = _parent(tree, path), path[-1]
+    *above, key = path
+    owner = functools.reduce(operator.getitem, above, tree)
     kind = chance.choice(("value",) * 6 + ("scale", "remove", "rename", "move", "sweep"))
     if kind == "scale" and isinstance(owner[key], int | float):
         owner[key] = owner[key] * 10 ** chance.choice((-12, -6, -3, 3, 6, 12))
@@ -114,7 +78,7 @@ def _mutated_tree(tree: Any, chance: random.Random) -> str:
 def mutation(chance: random.Random) -> tuple[str, bytes]:
     """What was done, and the file that came of it."""
     if chance.random() < 0.25:
-        data = bytearray(STUDY.encode())
+        data = bytearray(tomli_w.dumps(PLAIN).encode())
         for _ in range(chance.randint(1, 4)):
             place, kind = chance.randrange(len(data)), chance.randrange(4)
             if kind == 0:
@@ -128,7 +92,7 @@ def mutation(chance: random.Random) -> tuple[str, bytes]:
                     (b"[" * 2000, b"\xff", b"9" * 400, b"\n", b'"""')
                 )
         return "bytes", bytes(data)
-    tree = tomllib.loads(STUDY)
+    tree = copy.deepcopy(PLAIN)
     texts = [_mutated_tree(tree, chance) for _ in range(chance.choice((1, 1, 1, 2, 3)))]
     return "; ".join(texts), tomli_w.dumps(tree).encode("utf-8", "surrogatepass")
 
@@ -146,7 +110,7 @@ def use(path: Path) -> None:
 def test_mutated_studies_are_refused_or_right(tmp_path, fuzz):
     chance, faults = random.Random(fuzz.seed), []
     path = tmp_path / "study.toml"
-    path.write_text(STUDY)
+    path.write_text(tomli_w.dumps(PLAIN))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         use(path)  # compiles kernels

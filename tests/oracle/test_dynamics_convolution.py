@@ -1,10 +1,10 @@
 """Memory by exponentials against the full history: the same steps by direct convolution."""
 
 import numpy as np
+from ruptures import run_of
 from setups import make_problem
 
 import stiction as st
-from stiction.dynamics.method import Rupture, make_run
 from stiction.elasticity.memory_kernels import arc_quadrature
 
 
@@ -49,9 +49,8 @@ def test_slip_through_a_rupture_equals_that_of_the_full_history():
     problem = make_problem(128, 0.05, solid=st.paper.problem().solid)
     x = problem.interface.x
     strength = 1e6 - 2e5 * np.exp(-(((x - 0.02) / 0.004) ** 2)) - 5e4 * np.cos(600.0 * x)
-    method = Rupture(loading_rate=3e9, implicit=False, stop="time", end_time=1.0)
-    medium, rows = method.medium(problem), problem.sample(strength)
-    run = make_run(method, problem.friction, medium, rows, 0)
+    method = st.Rupture(loading_rate=3e9, implicit=False, stop="time", end_time=1.0)
+    run = run_of(problem, strength, method)
     state = run.start(run.first_slip())
     slip, rate = direct_convolution(run, state, 900)
     run.advance(state, 900)

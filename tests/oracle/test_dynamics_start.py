@@ -2,40 +2,33 @@
 
 import numpy as np
 import pytest
-from setups import make_problem
+from checks import assert_same
+from ruptures import run_of
+from setups import make_problem, turns
 
 import stiction as st
 from stiction.dynamics import slow_start as module
-from stiction.dynamics.method import Rupture, make_run
 from stiction.dynamics.slow_start import slow_start, static_setting
 
 RATES = (2e5, 2e7, 2e8)
 RATIOS = (0.25, 0.5, 1.0, 2.0)
 ARRESTED = (18, 819, 1083)  # of the samples of seed 0 at xi_0/h_n = 0.5
+PROBLEM = st.paper.problem(nodes=512)
 
 
-@pytest.fixture(scope="module")
-def problem():
-    return st.paper.problem(nodes=512)
+def profiles(ratio, samples, first=0):
+    field = st.paper.strength(PROBLEM, correlation_ratio=ratio)
+    return field.sample(PROBLEM.interface, samples=samples, seed=0, first=first)
 
 
-def profiles(problem, ratio, samples, first=0):
-    field = st.paper.strength(problem, correlation_ratio=ratio)
-    return field.sample(problem.interface, samples=samples, seed=0, first=first)
+def solve(tau_p, problem=PROBLEM, **options):
+    method = st.Rupture(**options)
+    return method.prepare(problem)(problem.sample(tau_p, accept=method.accepts))
 
 
-def both(problem, tau_p, **options):
+def both(tau_p, problem=PROBLEM, **options):
     """Onsets from the equilibrium and from rest."""
-    rows = problem.sample(tau_p)
-    return [
-        Rupture(start=start, **options).prepare(problem)(rows)
-        for start in ("equilibrium", "rest")
-    ]
-
-
-def assert_same(near, rest):
-    for name, values in rest.items():
-        np.testing.assert_array_equal(near[name], values, err_msg=name)
+    return [solve(tau_p, problem, start=start, **options) for start in ("equilibrium", "rest")]
 
 
 def assert_agree(near, rest, median=5e-5):
@@ -53,51 +46,42 @@ def assert_agree(near, rest, median=5e-5):
 
 @pytest.mark.parametrize("rate", RATES)
 @pytest.mark.parametrize("ratio", RATIOS)
-def test_same_onset_as_from_rest(problem, ratio, rate):
-    near, rest = both(problem, profiles(problem, ratio, 3), loading_rate=rate)
+@pytest.mark.parametrize("samples", [3, pytest.param(20, marks=pytest.mark.slow)])
+def test_same_onset_as_from_rest(ratio, rate, samples):
+    near, rest = both(profiles(ratio, samples), loading_rate=rate)
     assert_agree(near, rest)
     begun = near["start_error"] > 0.0
     assert begun.any()
-    assert np.all(near["implicit_steps"][begun] < 0.8 * rest["implicit_steps"][begun])
     assert np.all(near["start_load"] < near["critical_load"])
     assert np.all(near["start_load"][begun] > rest["start_load"][begun])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("rate", RATES)
-@pytest.mark.parametrize("ratio", RATIOS)
-def test_same_onset_as_from_rest_of_twenty(problem, ratio, rate):
-    near, rest = both(problem, profiles(problem, ratio, 20), loading_rate=rate)
-    assert_agree(near, rest)
+    if samples == 3:
+        assert np.all(near["implicit_steps"][begun] < 0.8 * rest["implicit_steps"][begun])
 
 
 @pytest.mark.parametrize("number", ARRESTED)
-def test_with_an_event_arrested_before_the_onset(problem, number):
-    tau_p = profiles(problem, 0.5, 1, number)
-    near, rest = both(problem, tau_p, loading_rate=2e7)
+def test_with_an_event_arrested_before_the_onset(number):
+    near, rest = both(profiles(0.5, 1, number), loading_rate=2e7)
     assert_agree(near, rest, median=1e-4)  # of one; waves of the event scatter what follows
     assert near["start_error"][0] > 0.0
     assert near["arrested_events"][0] == rest["arrested_events"][0] == 1
     assert near["start_load"] < near["first_instability"] < 0.999 * near["critical_stress"]
 
 
-def test_where_the_onset_depends_most_on_the_rate(problem):
+def test_where_the_onset_depends_most_on_the_rate():
     """Of 40 fields the three whose onset rises most from 2e5 to 2e8 Pa/s."""
-    tau_p = profiles(problem, 0.5, 40)
+    tau_p = profiles(0.5, 40)
     slow, fast = (
-        Rupture(loading_rate=rate, stop="onset").prepare(problem)(problem.sample(tau_p))
-        for rate in (2e5, 2e8)
+        solve(tau_p, loading_rate=rate, stop="onset")["critical_stress"] for rate in (2e5, 2e8)
     )
-    rise = fast["critical_stress"] / slow["critical_stress"] - 1.0
-    worst = np.argsort(rise)[-3:]
-    assert np.all(rise[worst] > 2e-3)  # ten times the agreement that is asked for
+    worst = np.argsort(fast / slow)[-3:]
+    assert np.all((fast / slow)[worst] > 1.0 + 2e-3)  # ten times the agreement asked for
     for rate in (2e7, 2e8):
-        assert_agree(*both(problem, tau_p[worst], loading_rate=rate))
+        assert_agree(*both(tau_p[worst], loading_rate=rate))
 
 
-def test_what_follows_the_onset_is_the_same(problem):
+def test_what_follows_the_onset_is_the_same():
     """Sliding, moment, energies, speeds: as close as the same rupture shifted in time by a step."""
-    near, rest = both(problem, profiles(problem, 1.0, 4), loading_rate=2e7)
+    near, rest = both(profiles(1.0, 4), loading_rate=2e7)
     for name, share in {
         "critical_stress": 5e-5, "onset_time": 1e-4, "seismic_moment": 0.03,
         "radiated_energy": 0.03, "fracture_energy": 1e-3, "median_rupture_speed": 0.02,
@@ -105,31 +89,30 @@ def test_what_follows_the_onset_is_the_same(problem):
         assert near[name] == pytest.approx(rest[name], rel=share), name
 
 
-def test_the_estimate_bounds_the_error_and_grows_towards_the_onset(problem, monkeypatch):
+def test_the_estimate_bounds_the_error_and_grows_towards_the_onset(monkeypatch):
     """Trials that begin ever closer: where the estimate is above the solver's own error, it holds.
 
     The run's own error at 2e7 Pa/s, seen by halving its steps, is 1e-5 of the stress scale.
     """
-    method = Rupture(loading_rate=2e7, stop="onset")
-    rows, medium = problem.sample(profiles(problem, 0.5, 3)), method.medium(problem)
-    rest = Rupture(loading_rate=2e7, stop="onset", start="rest").prepare(problem)(rows)
-    setting = static_setting(problem)
+    method = st.Rupture(loading_rate=2e7, stop="onset")
+    tau_p, setting = profiles(0.5, 3), static_setting(PROBLEM)
+    rest = solve(tau_p, loading_rate=2e7, stop="onset", start="rest")["critical_stress"]
     monkeypatch.setattr(module, "_TOLERANCE", 1.0)
-    for number in range(3):
+    for strength, exact in zip(tau_p, rest, strict=True):
         estimates = []
         for crossings in (20.0, 5.0, 1.25, 0.4):
             monkeypatch.setattr(module, "_CROSSINGS", crossings)
-            run = make_run(method, problem.friction, medium, rows, number)
-            state = slow_start(setting, run, rows, number, 2e7)
+            run = run_of(PROBLEM, strength, method)
+            state = slow_start(setting, run, PROBLEM.sample(strength), 0, 2e7)
             estimates.append(state.now["start_error"])
             run.advance(state, 10_000)
-            error = abs(state.now["peak_stress"] - rest["critical_stress"][number])
+            error = abs(state.now["peak_stress"] - exact)
             assert error < max(estimates[-1], 3e-5 * state.now["scale"])
         assert np.all(np.diff(estimates) > 0.0)
 
 
-def test_loading_too_fast_begins_at_rest(problem):
-    near, rest = both(problem, profiles(problem, 2.0, 2), loading_rate=3e10, stop="onset")
+def test_loading_too_fast_begins_at_rest():
+    near, rest = both(profiles(2.0, 2), loading_rate=3e10, stop="onset")
     assert np.all(near["start_error"] == 0.0)
     assert_same(near, rest)
 
@@ -141,13 +124,10 @@ def test_loading_too_fast_begins_at_rest(problem):
 )
 def test_where_no_equilibrium_is_followed_it_begins_at_rest(initial_stress, factor):
     problem = make_problem(load=st.Load(initial_stress=initial_stress))
-    tau_p = profiles(problem, 1.0, 1)[0]
+    field = st.paper.strength(problem, correlation_ratio=1.0)
+    tau_p = field.sample(problem.interface, samples=1, seed=0)[0]
     tau_p[100:110] *= factor
-    method = Rupture(loading_rate=1e8, stop="onset")
-    rows = problem.sample(tau_p, accept=method.accepts)
-    near = method.prepare(problem)(rows)
-    rest = Rupture(loading_rate=1e8, stop="onset", start="rest").prepare(problem)(rows)
-    assert_same(near, rest)
+    assert_same(*both(tau_p, problem, loading_rate=1e8, stop="onset"))
 
 
 def test_laws_without_straight_pieces_and_planes_have_no_equilibrium_to_begin_from():
@@ -158,19 +138,17 @@ def test_laws_without_straight_pieces_and_planes_have_no_equilibrium_to_begin_fr
     assert static_setting(plane) is None
 
 
-def test_everything_may_vary_and_a_sample_alone_gives_the_same_bits(problem):
-    x = st.Interface(length=0.1, nodes=256).x
-    wave = np.cos(2.0 * np.pi * x / 0.1)
+def test_everything_may_vary_and_a_sample_alone_gives_the_same_bits():
+    angle = turns(256)
+    wave = np.cos(angle)
     load = {"profile": 1.0 + 0.1 * np.roll(wave, 40), "initial_stress": np.roll(2e4 * wave, 90)}
     weakening = {"weakening_rate": 4e11 + 5e10 * wave, "residual_strength": 1e5 + 2e4 * wave}
-    other = make_problem(solid=problem.solid, load=st.Load(**load), **weakening)
-    rng = np.random.default_rng(7)
-    phases = rng.uniform(0.0, 2.0 * np.pi, (3, 1, 30))
-    waves = np.cos(2.0 * np.pi * np.arange(1, 31) * x[:, None] / 0.1 + phases)
+    other = make_problem(solid=PROBLEM.solid, load=st.Load(**load), **weakening)
+    phases = np.random.default_rng(7).uniform(0.0, 2.0 * np.pi, (3, 1, 30))
+    waves = np.cos(np.arange(1, 31) * angle[:, None] + phases)
     tau_p = 1.1e6 + 4e5 * np.tanh(waves.sum(axis=2) / np.sqrt(15.0))
-    near, rest = both(other, tau_p, loading_rate=1e6)
+    near, rest = both(tau_p, other, loading_rate=1e6)
     assert_agree(near, rest)
     assert np.all(near["start_error"] > 0.0)
-    alone = Rupture(loading_rate=1e6).prepare(other)(other.sample(tau_p[2]))
-    for name, values in alone.items():
-        np.testing.assert_array_equal(values, near[name][2:], err_msg=name)
+    alone = solve(tau_p[2], other, loading_rate=1e6)
+    assert_same(alone, {name: values[2:] for name, values in near.items()})

@@ -1,87 +1,69 @@
 """Equilibrium against other algorithms: HiGHS, path following, transforms, relaxation."""
 
-from __future__ import annotations
-
-import dataclasses
-import warnings
-
 import numpy as np
 import pytest
-from scipy.linalg import circulant
-from setups import by_linear_programme, make_problem
+from oracles import by_relaxation, largest_load, symbol_of
+from setups import RATE, exact_onset, make_problem, turns
 
 import stiction as st
 import stiction.equilibrium.dense
-from stiction.elasticity.line import stiffness_column
 from stiction.equilibrium.dense import LineProgram
-from stiction.equilibrium.method import Equilibrium
-from stiction.equilibrium.path import equilibrium_path
 from stiction.equilibrium.solver import follow
 from stiction.equilibrium.transforms import Plane, plane_onset
 
 
-def largest_load(problem, strength, rate=None):
-    if rate is None:
-        rate = problem.friction.weakening_rate
-    line, load = problem.interface, problem.load
-    column = stiffness_column(line.nodes, line.length, problem.effective_modulus)
-    excess = strength - load.initial_stress
-    return by_linear_programme(circulant(column), rate, excess, load.profile)[0]
-
-
-def by_relaxation(problem, strength, load, limit=200_000, rate=None):
-    """Least equilibrium at a load: strictly local, monotone relaxation from zero slip."""
-    n = problem.interface.nodes
-    symbol = 0.5 * problem.effective_modulus * problem.interface.wavenumbers
-    if rate is None:
-        rate = problem.friction.weakening_rate
+def relaxed(problem, strength, load, rate=RATE):
+    """Slip at a load by relaxation, or None where the line slides."""
     floor = np.minimum(problem.friction.residual_strength, strength)
+
+    def law(slip):
+        return np.maximum(strength - rate * slip, floor)
+
     end = np.max((strength - floor) / rate)
-    slip = np.zeros(n)
-    for _ in range(limit):
-        stress = load - np.fft.irfft(symbol * np.fft.rfft(slip), n)
-        drive = stress - np.maximum(strength - rate * slip, floor)
-        new = np.maximum(slip, slip + drive / symbol[-1])
-        if np.max(new - slip) < 1e-19:
-            return new
-        slip = new
-        if slip.min() > end:
-            return None
-    raise AssertionError("relaxation did not come to rest")
+    return by_relaxation(symbol_of(problem), np.full(strength.size, load), law, end)
+
+
+def assert_first(problem, tau_p, rate=None):
+    """The first instability is that of the linear programme; returns all results."""
+    onset = exact_onset(problem, tau_p)
+    rates = [rate] * len(tau_p) if rate is None else rate
+    theirs = [largest_load(problem, *given)[0] for given in zip(tau_p, rates, strict=True)]
+    found = onset.critical_load if np.ndim(problem.load.profile) else onset.first_instability
+    np.testing.assert_allclose(found, theirs, rtol=1e-11)
+    return onset
 
 
 @pytest.mark.parametrize("ratio", [0.25, 0.5, 1.0, 2.0])
-def test_linear_programme(problem, make_strength, ratio):
-    tau_p = make_strength(ratio).sample(problem.interface, samples=3, seed=7)
-    ours = st.onset(problem, tau_p, method=Equilibrium()).first_instability.values
-    theirs = [largest_load(problem, profile) for profile in tau_p]
-    np.testing.assert_allclose(ours, theirs, rtol=1e-11)
+def test_linear_programme_and_path_of_events(problem, make_strength, ratio):
+    tau_p = make_strength(ratio).sample(problem.interface, samples=5, seed=7)
+    loads = assert_first(problem, tau_p).first_instability.values
+    rows, program = problem.sample(tau_p), LineProgram(problem)
+    for row, load in enumerate(loads):
+        sample = program.sample_of(rows, row)
+        found = program.next(sample, program.at_rest(sample))
+        assert found.unstable
+        assert found.load == pytest.approx(load, rel=1e-11)
 
 
-def test_linear_programme_with_everything_varying(make_strength):
-    x = np.arange(256) / 256
-    load = st.Load(
-        profile=1.0 + 0.3 * np.cos(2 * np.pi * x), initial_stress=1e5 * np.sin(4 * np.pi * x)
+@pytest.mark.parametrize("mode", ["II", "III"])
+def test_linear_programme_with_everything_varying(make_strength, mode):
+    angle = turns(256)
+    load = st.Load(profile=1.0 + 0.3 * np.cos(angle), initial_stress=1e5 * np.sin(2 * angle))
+    rate = 0.4e12 * (1.0 + 0.6 * np.sin(3 * angle))
+    problem = make_problem(load=load, mode=mode, weakening_rate=rate)
+    ours = assert_first(
+        problem, make_strength(0.5).sample(problem.interface, samples=3, seed=8)
     )
-    rate = 0.4e12 * (1.0 + 0.6 * np.sin(6 * np.pi * x))
-    for mode in ("II", "III"):
-        problem = make_problem(load=load, mode=mode, weakening_rate=rate)
-        tau_p = make_strength(0.5).sample(problem.interface, samples=3, seed=8)
-        ours = st.onset(problem, tau_p, method=Equilibrium())
-        theirs = [largest_load(problem, profile) for profile in tau_p]
-        np.testing.assert_allclose(ours.critical_load, theirs, rtol=1e-11)
-        assert np.all(ours.certificate_gap < 1e-9 * ours.critical_load)
-        # The mean stress differs from the load factor here.
-        mean = load.initial_stress.mean() + ours.critical_load * load.profile.mean()
-        np.testing.assert_allclose(ours.critical_stress, mean, rtol=1e-14)
+    assert np.all(ours.certificate_gap < 1e-9 * ours.critical_load)
+    # The mean stress differs from the load factor here.
+    mean = load.initial_stress.mean() + ours.critical_load * load.profile.mean()
+    np.testing.assert_allclose(ours.critical_stress, mean, rtol=1e-14)
 
 
 def test_uniform_critical_slip(make_strength):
     problem = make_problem(critical_slip=2e-6)
     tau_p = make_strength(0.5).sample(problem.interface, samples=3, seed=9)
-    ours = st.onset(problem, tau_p, method=Equilibrium()).first_instability.values
-    theirs = [largest_load(problem, profile, profile / 2e-6) for profile in tau_p]
-    np.testing.assert_allclose(ours, theirs, rtol=1e-11)
+    assert_first(problem, tau_p, tau_p / 2e-6)
 
 
 def test_interface_shorter_than_a_critical_patch(solid, make_strength):
@@ -89,30 +71,14 @@ def test_interface_shorter_than_a_critical_patch(solid, make_strength):
     rate = 2.0 * 0.57888694185 * solid.effective_modulus() / 0.2
     problem = make_problem(128, weakening_rate=rate)
     tau_p = make_strength(2.0).sample(problem.interface, samples=4, seed=10)
-    onset = st.onset(problem, tau_p, method=Equilibrium(slip=True))
-    theirs = [largest_load(problem, profile) for profile in tau_p]
-    np.testing.assert_allclose(onset.first_instability, theirs, rtol=1e-11)
+    onset = assert_first(problem, tau_p)
     assert np.all(onset.first_instability.values <= tau_p.mean(axis=1) * (1 + 1e-12))
-
-
-@pytest.mark.parametrize("ratio", [0.25, 1.0])
-def test_path_of_events_ends_at_the_same_load(problem, make_strength, ratio):
-    tau_p = make_strength(ratio).sample(problem.interface, samples=5, seed=11)
-    rows = problem.sample(tau_p)
-    program = LineProgram(problem)
-    loads = st.onset(problem, tau_p, method=Equilibrium()).first_instability.values
-    for row in range(5):
-        sample = program.sample_of(rows, row)
-        found = program.next(sample, program.at_rest(sample))
-        assert found.unstable
-        assert found.load == pytest.approx(loads[row], rel=1e-11)
 
 
 @pytest.mark.parametrize("rough", [0.0, 0.4])
 def test_transforms_agree_with_the_dense_factor(make_strength, monkeypatch, rough):
     """Lines on which very many nodes slip are solved as planes are."""
-    x = np.arange(2048) / 2048
-    rate = 0.5e12 * (1.0 + rough * np.sin(10 * np.pi * x))
+    rate = 0.5e12 * (1.0 + rough * np.sin(5 * turns(2048)))
     problem = make_problem(2048, 0.2, weakening_rate=rate)
     program = LineProgram(problem)
     rows = problem.sample(make_strength(0.25).sample(problem.interface, samples=4, seed=12))
@@ -126,16 +92,14 @@ def test_transforms_agree_with_the_dense_factor(make_strength, monkeypatch, roug
         # At the optimum slip may be steep in the load; 1e-3 of d_c is far below any use of it.
         np.testing.assert_allclose(found.slip, exact.slip, atol=1e-3 * sample.critical.max())
         # Nodes at rest have no part in the multiplier.
-        alike = (found.direction > 0.0) == (exact.direction > 0.0)
-        assert alike.mean() > 0.99
+        assert np.mean((found.direction > 0.0) == (exact.direction > 0.0)) > 0.99
 
 
 def test_a_patch_that_does_not_slip_yet_is_no_division_by_zero(solid):
     """One dip, so wide that hardly a node slips before the instability."""
-    strength = 1e6 + 3e5 * np.cos(2.0 * np.pi * np.arange(4096) / 4096)
-    one = np.ones(4096)
+    strength, one = 1e6 + 3e5 * np.cos(turns(4096)), np.ones(4096)
     line = Plane((0.4,), solid.effective_modulus(), 0.0)
-    found = plane_onset(line, strength, one, 0.5e12 * one, 1e-9)
+    found = plane_onset(line, strength, one, RATE * one, 1e-9)
     assert found.closed
     assert 0.7e6 < found.lower < 0.701e6
 
@@ -144,7 +108,7 @@ def test_onset_of_a_long_line(make_strength):
     """Certified, and with the quick test for arrest, as shorter lines are."""
     problem = make_problem(4096, 0.4)
     tau_p = make_strength(0.25).sample(problem.interface, samples=2, seed=12)
-    onset = st.onset(problem, tau_p, method=Equilibrium(sensitivity=True))
+    onset = exact_onset(problem, tau_p, sensitivity=True)
     assert np.all(onset.certificate_gap < 1e-9 * onset.critical_load)
     loads = (onset.sensitivity.values * tau_p).sum(axis=1)
     np.testing.assert_allclose(onset.first_instability, loads, rtol=1e-11)
@@ -155,14 +119,12 @@ def test_patches_alike_on_a_long_interface():
 
     By symmetry there is a multiplier with the period of the profile.
     """
-    dip = 1e6 + 0.3e6 * np.cos(2.0 * np.pi * np.arange(128) / 128)
     loads = []
     for periods in (1, 32):
         problem = make_problem(128 * periods, 0.0135 * periods)
+        tau_p = np.tile(1e6 + 0.3e6 * np.cos(turns(128)), periods)
         program = LineProgram(problem)
-        found = program.programme(program.sample_of(problem.sample(np.tile(dip, periods)), 0))
-        assert found is not None
-        loads.append(found.load)
+        loads.append(program.programme(program.sample_of(problem.sample(tau_p), 0)).load)
     assert loads[1] == pytest.approx(loads[0], rel=1e-11)
 
 
@@ -172,34 +134,34 @@ def test_events_against_relaxation(problem, make_strength, low, high):
     """Wide ranges of strength: nodes reach the floor, patches are arrested."""
     strength = make_strength(0.5, low=low, high=high)
     tau_p = strength.sample(problem.interface, samples=2, seed=13)
-    onset = st.onset(problem, tau_p, method=Equilibrium())
-    for row, profile in enumerate(tau_p):
-        load = onset.critical_load.values[row]
+    for profile, load in zip(
+        tau_p, exact_onset(problem, tau_p).critical_load.values, strict=True
+    ):
         loads = load * np.array([0.8, 0.95, 0.999])
-        path = equilibrium_path(problem, profile, loads)
+        path = st.equilibrium_path(problem, profile, loads)
         for i in range(3):
-            slip = by_relaxation(problem, profile, loads[i])
+            slip = relaxed(problem, profile, loads[i])
             assert slip is not None
             # Relaxation stops at increments of 1e-19 m, up to 1e4 of them away from the limit.
             np.testing.assert_allclose(path.slip.values[i], slip, atol=1e-14)
-        assert by_relaxation(problem, profile, 1.001 * load) is None
+        assert relaxed(problem, profile, 1.001 * load) is None
 
 
 def test_arrested_samples_of_the_paper_rest_in_relaxation(problem, make_strength):
     """Most samples slide at the first instability; the few that do not are not an artefact."""
     tau_p = make_strength(0.5).sample(problem.interface, samples=1000, seed=14)
-    onset = st.onset(problem, tau_p, method=Equilibrium())
+    onset = exact_onset(problem, tau_p)
+    firsts, lasts = onset.first_instability.values, onset.critical_load.values
     arrested = np.flatnonzero(onset.arrested_events.values)
     assert arrested.size > 0
     for row in arrested[:2]:
-        first = onset.first_instability.values[row]
-        last = onset.critical_load.values[row]
+        first, last = firsts[row], lasts[row]
         assert last > first
         beyond = first + 0.5 * min(last - first, 1e-3 * first)
-        assert by_relaxation(problem, tau_p[row], beyond) is not None
+        assert relaxed(problem, tau_p[row], beyond) is not None
     row = arrested[0]
-    first = onset.first_instability.values[row]
-    path = equilibrium_path(problem, tau_p[row], first * np.array([1 - 1e-12, 1 + 1e-9]))
+    loads = firsts[row] * np.array([1 - 1e-12, 1 + 1e-9])
+    path = st.equilibrium_path(problem, tau_p[row], loads)
     added = (path.slip[1] - path.slip[0]).values
     modulus = problem.solid.shear_modulus
     moment = modulus * added.sum() * problem.interface.spacing
@@ -209,28 +171,26 @@ def test_arrested_samples_of_the_paper_rest_in_relaxation(problem, make_strength
     assert added.max() / 5 < event.event_mean_slip.item() < added.max()
     share = event.event_mean_slip * event.event_length * modulus / event.event_moment
     assert 0.9 < share.item() <= 1.0  # the patch has most of the moment
-    events = st.onset(problem, tau_p, method=Equilibrium(events=8))
-    count = np.isfinite(events.event_stress).sum("event")
-    np.testing.assert_array_equal(count, onset.arrested_events)
-    np.testing.assert_allclose(
-        events.event_stress.values[arrested, 0],
-        onset.first_instability.values[arrested],
-        rtol=1e-14,
-    )
+    stresses = exact_onset(problem, tau_p, events=8).event_stress
+    np.testing.assert_array_equal(np.isfinite(stresses).sum("event"), onset.arrested_events)
+    np.testing.assert_allclose(stresses.values[arrested, 0], firsts[arrested], rtol=1e-14)
 
 
 def test_residual_strength_only_shifts_the_stress(problem, make_strength):
     """Only tau_p - tau_r and tau_0 - tau_r matter, floor and all."""
     strength = make_strength(0.5).sample(problem.interface, samples=20, seed=15)
     wide = 0.05e6 + 2.0 * (strength - 0.66e6)
-    shifted = dataclasses.replace(
-        problem, friction=st.LinearWeakening(weakening_rate=0.5e12, residual_strength=0.3e6)
-    )
-    one = st.onset(problem, wide, method=Equilibrium())
-    two = st.onset(shifted, wide + 0.3e6, method=Equilibrium())
+    one = exact_onset(problem, wide)
+    two = exact_onset(make_problem(residual_strength=0.3e6), wide + 0.3e6)
     assert one.arrested_events.values.sum() > 0
     np.testing.assert_allclose(two.critical_load, one.critical_load + 0.3e6, rtol=1e-11)
     np.testing.assert_array_equal(two.arrested_events, one.arrested_events)
+
+
+def assert_onset(problem, profile, load, rate=RATE):
+    """Close enough to see that weak nodes matter, and far enough for relaxation to end."""
+    assert relaxed(problem, profile, 0.9995 * load, rate) is not None
+    assert relaxed(problem, profile, 1.0005 * load, rate) is None
 
 
 @pytest.mark.parametrize("law", ["weakening_rate", "critical_slip"])
@@ -241,18 +201,14 @@ def test_nodes_that_do_not_weaken(make_strength, law):
     tau_p = 2.0 * make_strength(0.5).sample(problem.interface, samples=2, seed=16) - 0.8e6
     constant = tau_p <= 0.8e6
     assert constant.any(axis=1).all()
-    with pytest.warns(
-        st.AccuracyWarning, match=f"{100.0 * constant.mean():.2g} % of the nodes"
-    ):
-        onset = st.onset(problem, tau_p, method=Equilibrium())
+    words = f"{100.0 * constant.mean():.2g} % of the nodes"
+    with pytest.warns(st.AccuracyWarning, match=words):
+        onset = exact_onset(problem, tau_p)
     assert np.all(onset.certificate_gap < 1e-9 * onset.critical_load)
     for row, profile in enumerate(tau_p):
         rate = np.full(256, 0.5e12) if law == "weakening_rate" else (profile - 0.8e6) / 3e-6
         rate[constant[row]] = 1e9  # any positive one
-        load = onset.critical_load.values[row]
-        # Close enough to see that the nodes matter, and far enough for relaxation to end.
-        assert by_relaxation(problem, profile, 0.9995 * load, rate=rate) is not None
-        assert by_relaxation(problem, profile, 1.0005 * load, rate=rate) is None
+        assert_onset(problem, profile, onset.critical_load.values[row], rate)
 
 
 @pytest.mark.parametrize("above", [1e-13, 1e-9])
@@ -260,33 +216,26 @@ def test_flat_stretches_just_above_the_residual(make_strength, above):
     """Cut off at the residual strength, 1e-13 or 1e-9 of it above: an onset, and soon."""
     floor = 0.99e6
     problem = make_problem(residual_strength=floor)
-    tau_p = np.maximum(
-        make_strength(0.5).sample(problem.interface, samples=3, seed=0), floor * (1.0 + above)
-    )
-    onset = st.onset(problem, tau_p, method=Equilibrium())
-    for row, profile in enumerate(tau_p):
-        load = onset.critical_load.values[row]
-        assert by_relaxation(problem, profile, 0.9995 * load) is not None
-        assert by_relaxation(problem, profile, 1.0005 * load) is None
+    strength = make_strength(0.5).sample(problem.interface, samples=3, seed=0)
+    tau_p = np.maximum(strength, floor * (1.0 + above))
+    onset = exact_onset(problem, tau_p)
+    for profile, load in zip(tau_p, onset.critical_load.values, strict=True):
+        assert_onset(problem, profile, load)
     assert onset.arrested_events.max() < 30
 
 
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 def test_estimated_error_is_of_the_size_of_the_error(make_strength):
     """Against the same fields on a grid eight times as fine."""
     reference = make_problem(2048)
     tau_p = make_strength(0.25).sample(reference.interface, samples=40, seed=3)
-    exact = st.onset(reference, tau_p, method=Equilibrium()).first_instability.values
+    exact = exact_onset(reference, tau_p).first_instability.values
     for nodes, resolves in ((256, 8.8), (512, 17.7)):
         problem = make_problem(nodes)
         in_length = problem.nucleation_length / problem.interface.spacing
         assert in_length == pytest.approx(resolves, rel=0.01)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", st.AccuracyWarning)
-            onset = st.onset(
-                problem,
-                tau_p[:, :: 2048 // nodes],
-                method=Equilibrium(discretization_error=True),
-            )
+        coarse = tau_p[:, :: 2048 // nodes]
+        onset = exact_onset(problem, coarse, discretization_error=True)
         error = np.abs(onset.first_instability.values - exact)
         estimate = onset.discretization_error.values
         # Measured: 80 and 92 % below the estimate, and 94 and 99 % below twice it; the estimate
@@ -299,7 +248,7 @@ def test_estimated_error_is_of_the_size_of_the_error(make_strength):
 def test_sliding_is_proved(problem, make_strength, high):
     """Without any length taken for unstoppable, the same loads and events."""
     tau_p = make_strength(0.5, high=high).sample(problem.interface, samples=200, seed=17)
-    plain = st.onset(problem, tau_p, method=Equilibrium())
+    plain = exact_onset(problem, tau_p)
     program = LineProgram(problem)
     # Griffith's length grows with the modulus, of which the test for arrest knows only here.
     program.runs = program.runs._replace(modulus=np.inf)

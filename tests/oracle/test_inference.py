@@ -5,56 +5,47 @@ import dataclasses
 import numpy as np
 import pytest
 import scipy.stats
+from checks import standard_error
+from setups import EXACT, LOCAL, QUARTER, ensemble, turns
 
 import stiction as st
 
 pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 
-SOLID = st.Solid(1e9, 0.25, 1170.0)
-SPECTRUM = st.PowerLawSpectrum(8e-3)
-LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
-NODES = 128
-WAVE = 1.0 + 0.6 * np.cos(2.0 * np.pi * np.arange(NODES) / NODES)
+WAVE = 1.0 + 0.6 * np.cos(turns(128))
+SLOW = pytest.mark.slow
 
 
-def problem(nodes=NODES, share=0.1, residual_ratio=None, **load):
+def problem(nodes=128, share=0.1, residual_ratio=None, **load):
     """An interface of 0.1 m with a nucleation length of a share of it."""
-    rate = 2.0 * 0.5788869418506 * SOLID.effective_modulus() / (share * 0.1)
+    rate = 2.0 * 0.5788869418506 * QUARTER.effective_modulus() / (share * 0.1)
     friction = st.LinearWeakening(weakening_rate=rate, residual_ratio=residual_ratio)
-    return st.Problem(SOLID, st.Interface(0.1, nodes), friction, st.Load(**load))
+    return st.Problem(QUARTER, st.Interface(0.1, nodes), friction, st.Load(**load))
 
 
-def beta(low, high, of=None):
-    return st.RandomField(
-        st.Beta(alpha=2.0, beta=3.0, low=low, high=high), SPECTRUM, True, of=of
-    )
+def beta(low, high=1.6e6, of=None):
+    marginal = st.Beta(alpha=2.0, beta=3.0, low=low, high=high)
+    return st.RandomField(marginal, st.PowerLawSpectrum(8e-3), True, of=of)
+
+
+def coefficient(low):
+    return beta(low, 0.6, "friction_coefficient")
 
 
 def lognormal(cv):
     return st.RandomField(st.Lognormal(mean=1e6, cv=cv), st.PowerLawSpectrum(7.5e-3), True)
 
 
+SMALL, LARGE = ("marginal.low", (0.1, 0.3), 0.2), ("marginal.low", (0.4e6, 0.8e6), 0.6e6)
 CASES = {
-    "coefficients": (
-        problem(normal_pressure=3e6),
-        lambda low: beta(low, 0.6, "friction_coefficient"),
-        LOCAL, "marginal.low", (0.1, 0.3), 0.2, 30,
-    ),
+    "coefficients": (problem(normal_pressure=3e6), coefficient, LOCAL, *SMALL, 30),
     "coefficients under a pressure that varies": (
-        problem(normal_pressure=3e6 * WAVE),
-        lambda low: beta(low, 0.6, "friction_coefficient"),
-        LOCAL, "marginal.low", (0.1, 0.3), 0.2, 30,
+        problem(normal_pressure=3e6 * WAVE), coefficient, LOCAL, *SMALL, 30,
     ),
     "gradient load": (
-        problem(profile=st.GradientLoad(amplitude=0.6)),
-        lambda low: beta(low, 1.6e6),
-        LOCAL, "marginal.low", (0.4e6, 0.8e6), 0.6e6, 30,
+        problem(profile=st.GradientLoad(amplitude=0.6)), beta, LOCAL, *LARGE, 30,
     ),
-    "residual strength": (
-        problem(64, 0.25, residual_ratio=0.5),
-        lambda low: beta(low, 1.6e6),
-        EXACT, "marginal.low", (0.4e6, 0.8e6), 0.6e6, 30,
-    ),
+    "residual strength": (problem(64, 0.25, residual_ratio=0.5), beta, EXACT, *LARGE, 30),
     "beyond what the local criterion finds": (
         problem(64, 0.25), lognormal, EXACT, "marginal.cv", (0.1, 1.5), 0.9, 60,
     ),
@@ -63,10 +54,7 @@ CASES = {
 
 def simulate(base, field, method, samples, seed):
     """Critical stresses."""
-    found = st.monte_carlo(
-        base, field, method=method, samples=samples, seed=seed, progress=False, pilot=False
-    )
-    return found.critical_stress.values
+    return ensemble(base, field, samples, method=method, seed=seed).critical_stress.values
 
 
 def by_counting(base, field, method, values, peaks, samples):
@@ -89,18 +77,16 @@ def by_counting(base, field, method, values, peaks, samples):
         "coefficients",
         "gradient load",
         "residual strength",
-        pytest.param("coefficients under a pressure that varies", marks=pytest.mark.slow),
-        pytest.param("beyond what the local criterion finds", marks=pytest.mark.slow),
+        pytest.param("coefficients under a pressure that varies", marks=SLOW),
+        pytest.param("beyond what the local criterion finds", marks=SLOW),
     ],
 )
 def test_posterior_of_one_parameter(name):
     base, field, method, key, prior, truth, count = CASES[name]
     peaks = simulate(base, field(truth), method, count, 4)
     samples = 1500 if method is LOCAL else 150
-    found = st.infer(
-        base, field(prior[0]), peaks, prior={key: prior}, method=method, samples=samples,
-        progress=False,
-    )  # fmt: skip
+    options = {"method": method, "samples": samples, "progress": False}
+    found = st.infer(base, field(prior[0]), peaks, prior={key: prior}, **options)
     own = found.draws[key]
     near = np.linspace(*np.clip(truth + 0.2 * np.array([-1, 1]) * np.ptp(prior), *prior), 13)
     mean, deviation = by_counting(base, field, method, near, peaks, samples)
@@ -108,20 +94,17 @@ def test_posterior_of_one_parameter(name):
     assert own.mean() == pytest.approx(mean, abs=1.0 * deviation)
     assert own.std() == pytest.approx(deviation, rel=0.4)
     # The box that was simulated holds it.
-    model = found.likelihood
-    for end, side in (
-        (model.low[0], found.u[:, 0]),
-        (1.0 - model.high[0], 1.0 - found.u[:, 0]),
-    ):
-        assert end == 0.0 or np.mean(side < end + 0.05 * (model.high - model.low)[0]) < 2e-3
+    model, u = found.likelihood, found.u[:, 0]
+    margin = 0.05 * (model.high - model.low)[0]
+    for end, side in ((model.low[0], u), (1.0 - model.high[0], 1.0 - u)):
+        assert end == 0.0 or np.mean(side < end + margin) < 2e-3
 
 
 def test_designs_of_one_parameter():
     """Expected information of five tests, by counting: a shift of a known distribution."""
-    base = problem()
-    prior = {"marginal.loc": (0.5e6, 0.7e6)}
+    base, prior = problem(), {"marginal.loc": (0.5e6, 0.7e6)}
     marginal = scipy.stats.lognorm(0.3, loc=0.6e6, scale=0.5e6)
-    field = dataclasses.replace(beta(0.6e6, 1.6e6), marginal=marginal)
+    field = dataclasses.replace(beta(0.6e6), marginal=marginal)
     onsets = simulate(base, field, LOCAL, 1000, 5)
     kernels = scipy.stats.gaussian_kde(onsets - 0.6e6, "silverman")
     steps = 0.5e6 + 0.2e6 * (np.arange(200) + 0.5) / 200
@@ -138,7 +121,7 @@ def test_designs_of_one_parameter():
         base, field, prior=prior, designs={"five": 5}, method=LOCAL, repetitions=100,
         progress=False,
     )  # fmt: skip
-    error = 3.0 * np.hypot(float(found.standard_error[0, 0]), np.std(gains) / np.sqrt(100))
+    error = 3.0 * np.hypot(float(found.standard_error[0, 0]), standard_error(gains))
     assert float(found.information[0, 0]) == pytest.approx(np.mean(gains), abs=error)
     assert float(found.spread_left[0, 0]) == pytest.approx(np.mean(spreads), rel=0.15)
 
@@ -147,9 +130,7 @@ def test_a_posterior_by_a_criterion_that_does_not_hold_says_so():
     """Lognormal strength of cv 0.9 reaches its residual strength long before the onset."""
     base, random = problem(64, 0.25), lognormal(0.9)
     peaks = simulate(base, random, LOCAL, 40, 3)
-    prior = {"marginal.cv": (0.3, 1.5)}
+    options = {"prior": {"marginal.cv": (0.3, 1.5)}, "samples": 300, "progress": False}
     with pytest.warns(st.AccuracyWarning, match="differs from the exact onset"):
-        found = st.infer(
-            base, random, peaks, prior=prior, method=LOCAL, samples=300, progress=False
-        )
+        found = st.infer(base, random, peaks, method=LOCAL, **options)
     assert any("Equilibrium" in note for note in found.notes)

@@ -1,16 +1,14 @@
-"""What holds for every rupture: energy, symmetry, restart, independence of the batch."""
-
-import threading
+"""What holds for every rupture of a line: energy, symmetry, restart."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
+from ruptures import radiated_energy, run_of
 from setups import make_problem
 
 import stiction as st
-from stiction.dynamics.energies import energy_balance
-from stiction.dynamics.method import Rupture, make_run
+from stiction.dynamics.method import Rupture
 from stiction.dynamics.save import read_checkpoint, write_checkpoint
 from stiction.dynamics.simulate import simulate_rupture
 from stiction.dynamics.state import Reason
@@ -18,6 +16,8 @@ from stiction.dynamics.state import Reason
 NODES = 128
 PROBLEM = make_problem(NODES, 0.05, solid=st.paper.problem().solid)
 METHOD = Rupture(loading_rate=1e7)
+WEAK_SPOT = np.where((np.arange(NODES) >= 40) & (np.arange(NODES) < 60), 0.8e6, 3e6)
+"""Twenty nodes between strong ones, which arrest what begins there."""
 
 
 def strength(seed, low=0.7e6, high=1.5e6):
@@ -28,13 +28,6 @@ def strength(seed, low=0.7e6, high=1.5e6):
     return low + (high - low) * (noise - noise.min()) / np.ptp(noise)
 
 
-def weak_spot():
-    """Twenty nodes between strong ones, which arrest what begins there."""
-    profile = np.full(NODES, 3e6)
-    profile[40:60] = 0.8e6
-    return profile
-
-
 def through_file(path, run, state):
     """The state as it is read from a checkpoint."""
     write_checkpoint(path, run, state)
@@ -42,8 +35,7 @@ def through_file(path, run, state):
 
 
 def fresh_run(profile, method=METHOD):
-    medium, rows = method.medium(PROBLEM), PROBLEM.sample(profile)
-    run = make_run(method, PROBLEM.friction, medium, rows, 0)
+    run = run_of(PROBLEM, profile, method)
     return run, run.start(run.first_slip())
 
 
@@ -82,24 +74,6 @@ def test_onset_moves_with_the_profile_and_mirrors_with_it(seed, shift):
     assert abs((at[2] + at[0] + NODES / 2) % NODES - NODES / 2) <= 2
 
 
-def test_samples_do_not_depend_on_their_batch_or_thread():
-    profiles = np.stack([strength(seed) for seed in range(4)])
-    solver = METHOD.prepare(PROBLEM)
-    together = solver(PROBLEM.sample(profiles))
-    alone = [None] * 4
-
-    def solve(i):
-        alone[i] = solver(PROBLEM.sample(profiles[i]))
-
-    threads = [threading.Thread(target=solve, args=(i,)) for i in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    for name, values in together.items():
-        assert np.array_equal(values, np.concatenate([one[name] for one in alone])), name
-
-
 def test_restart_at_any_step_is_the_uninterrupted_run(tmp_path):
     profile = strength(5)
     run, straight = fresh_run(profile)
@@ -129,25 +103,24 @@ def test_the_pass_over_the_memory_meets_whole_cache_lines(tmp_path):
 
 def test_restart_across_a_return_to_implicit_steps(tmp_path):
     """A weak spot that is arrested by a strong surrounding: explicit and back."""
-    run, straight = fresh_run(weak_spot())
+    run, straight = fresh_run(WEAK_SPOT)
     count = 0
     while straight.now["arrested"] == 0 or straight.explicit:
         run.advance(straight, 5)
         count += 5
         assert count < 20_000
     run.advance(straight, 3)
-    path = tmp_path / "state.npz"
-    run, state = fresh_run(weak_spot())
+    run, state = fresh_run(WEAK_SPOT)
     for cut in (count // 3, count - count // 3 - 25, 25):
         run.advance(state, cut)
-        state = through_file(path, run, state)
+        state = through_file(tmp_path / "state.npz", run, state)
     run.advance(state, 3)
     assert not straight.explicit
     assert same(state, straight)
 
 
 def test_radiated_energy_is_steady_after_arrest():
-    run, state = fresh_run(weak_spot())
+    run, state = fresh_run(WEAK_SPOT)
     while state.now["arrested"] == 0:
         run.advance(state, 20)
     # Hold the load: from here on nothing slips, and what was radiated stays radiated.
@@ -156,21 +129,16 @@ def test_radiated_energy_is_steady_after_arrest():
     run.history[1][:] = [held, held * (1.0 + 1e-15)]
     thresholds = run.setting.thresholds._replace(explicit_only=True, calm_count=10**9)
     run.setting = run.setting._replace(thresholds=thresholds)
-
-    def radiated():
-        found = energy_balance(PROBLEM.friction, run.setting.nodes, run.medium.grid, state)
-        return found["radiated_energy"]
-
     run.advance(state, 3000)
-    middle = radiated()
+    middle = radiated_energy(PROBLEM, run, state)
     run.advance(state, 3000)
     assert middle > 0.0
-    assert radiated() == pytest.approx(middle, rel=1e-6)
+    assert radiated_energy(PROBLEM, run, state) == pytest.approx(middle, rel=1e-6)
     assert state.rate.max() == 0.0
 
 
 def test_arrested_event_is_counted_and_first_instability_below_the_critical_stress():
-    found = METHOD.prepare(PROBLEM)(PROBLEM.sample(weak_spot()))
+    found = METHOD.prepare(PROBLEM)(PROBLEM.sample(WEAK_SPOT))
     assert found["arrested_events"][0] >= 1
     assert found["first_instability"][0] < 0.9 * found["critical_stress"][0]
 
@@ -178,9 +146,8 @@ def test_arrested_event_is_counted_and_first_instability_below_the_critical_stre
 @pytest.mark.parametrize("rate", [1e5, 2e9])
 def test_work_is_the_load_times_the_slip_of_every_step(rate):
     """For a uniform load, int tau_0 d<slip> L by the trapezoidal rule, to round-off."""
-    run = simulate_rupture(
-        PROBLEM, strength(7), method=Rupture(loading_rate=rate), save=st.Save([])
-    )
+    method = Rupture(loading_rate=rate)
+    run = simulate_rupture(PROBLEM, strength(7), method=method, save=st.Save([]))
     load = np.r_[float(run["load"][0]), run["step_load"].values]
     slip = np.r_[0.0, run["step_mean_slip"].values]
     work = np.cumsum(0.5 * (load[1:] + load[:-1]) * np.diff(slip)) * 0.05

@@ -1,12 +1,10 @@
 """What ruptures do whatever the friction law, and what depends on its shape."""
 
-from __future__ import annotations
-
-import dataclasses
-
 import numpy as np
 import pytest
+from ruptures import dip
 from scipy.signal import find_peaks
+from setups import QUARTER, make_problem
 
 import stiction as st
 
@@ -22,19 +20,14 @@ LAWS = {
 @pytest.fixture(scope="module")
 def runs():
     """A weak spot breaks an interface of 512 nodes, with the same fracture energy for each law."""
-    solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0)
-    interface = st.Interface(length=0.1, nodes=512)
-    strength = 1e6 - 0.4e6 * np.exp(-(((interface.x - 0.05) / 0.015) ** 2))
-    problem = st.Problem(solid, interface, LAWS["linear"], mode="III")
-    return {
-        name: st.simulate_rupture(
-            dataclasses.replace(problem, friction=law),
-            strength,
-            method=st.Rupture(loading_rate=1e8, kernel_tolerance=1e-4, courant=0.25),
-            save=st.Save(["slip", "slip_rate", "shear_stress", "strength"], every=1),
-        )
-        for name, law in LAWS.items()
-    }
+    method = st.Rupture(loading_rate=1e8, kernel_tolerance=1e-4, courant=0.25)
+    save = st.Save(["slip", "slip_rate", "shear_stress", "strength"], every=1)
+    found = {}
+    for name, law in LAWS.items():
+        problem = make_problem(512, solid=QUARTER, friction=law, mode="III")
+        strength = 1e6 - 0.4e6 * dip(problem.interface, 0.05, 0.015)
+        found[name] = st.simulate_rupture(problem, strength, method=method, save=save)
+    return found
 
 
 @pytest.mark.parametrize("name", LAWS)

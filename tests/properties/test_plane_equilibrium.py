@@ -1,53 +1,71 @@
-"""What must hold for st.Equilibrium on any plane: symmetries, the gradient, batches, threads."""
-
-from __future__ import annotations
-
-from concurrent.futures import ThreadPoolExecutor
+"""What must hold for equilibrium on any plane: symmetries, gradients, bounds, certificates."""
 
 import numpy as np
 import pytest
-from planes import Lattice
-from setups import LENGTH, RATE, make_problem, smooth_noise
+from planes import WAVENUMBERS, Lattice, plane_sample
+from setups import LENGTH, RATE, exact_onset, local_onset, make_problem, smooth_noise
 
 import stiction as st
+from stiction.criterion.average import least_average
+from stiction.criterion.windows import ellipse_window
+from stiction.elasticity.operator import make_operator
+from stiction.equilibrium.relaxation import BALANCED, SLIDING, least_equilibrium
 from stiction.equilibrium.transforms import Plane, plane_onset
 
-NODES = (48, 40)
+NODES, SHAPE = (48, 40), (40, 32)
 LENGTHS = (6.0 * LENGTH, 4.0 * LENGTH)
-METHOD = st.Equilibrium(gap=1e-9, slip=True, sensitivity=True)
+PLANE = make_problem(NODES, LENGTHS)
+ONE = np.ones(SHAPE)
+PLANES = {
+    name: plane((5.0 * LENGTH, 4.0 * LENGTH), 1e9, 0.33) for name, plane in WAVENUMBERS.items()
+}
 
 
-def smooth(seed, correlation=4.0):
-    return smooth_noise(correlation, np.random.default_rng(seed), NODES)
+def smooth(seed, correlation=4.0, shape=NODES):
+    return smooth_noise(correlation, np.random.default_rng(seed), shape)
 
 
-def strength_of(seed):
-    return 0.66e6 + 1e6 * smooth(seed)
+def strength_of(seed, correlation=4.0, shape=NODES):
+    return 0.66e6 + 1e6 * smooth(seed, correlation, shape)
 
 
-@pytest.fixture
-def plane():
-    return make_problem(NODES, LENGTHS)
+def rough_strength(seed):
+    return strength_of(seed, 5.0, SHAPE)
 
 
-@pytest.mark.parametrize(
-    ("change", "move"),
-    [
-        (lambda s: np.roll(s, (7, -3), (0, 1)), lambda x, y: (x + 7, y - 3)),
-        (lambda s: np.roll(s[::-1], 1, 0), lambda x, y: (-x, y)),
-        (lambda s: np.roll(s[:, ::-1], 1, 1), lambda x, y: (x, -y)),
-    ],
-)
-def test_translations_and_reflections(plane, change, move):
+def solve(strength, problem=PLANE, gap=1e-9):
+    return exact_onset(problem, strength, gap=gap, slip=True, sensitivity=True)
+
+
+def first_of(strength, **options):
+    return solve(strength, **options)["first_instability"].values
+
+
+def bounds_of(strength, wavenumbers="lattice", gap=1e-9):
+    found = plane_onset(PLANES[wavenumbers], strength, ONE, RATE * ONE, gap)
+    assert found.closed
+    return found
+
+
+CHANGES = [
+    (lambda s: np.roll(s, (7, -3), (0, 1)), lambda x, y: (x + 7, y - 3)),
+    (lambda s: np.roll(s[::-1], 1, 0), lambda x, y: (-x, y)),
+    (lambda s: np.roll(s[:, ::-1], 1, 1), lambda x, y: (x, -y)),
+]
+
+
+@pytest.mark.parametrize(("change", "move"), CHANGES)
+def test_translations_and_reflections(change, move):
     strength = strength_of(0)
-    first, second = (st.onset(plane, s, method=METHOD) for s in (strength, change(strength)))
+    first, second = solve(strength), solve(change(strength))
     for name in ("first_instability", "critical_load"):
         # The gap asked for.
         assert second[name].item() == pytest.approx(first[name].item(), rel=2e-9)
-    same = "slip_patches", "critical_patch_extent", "critical_patch_area", "arrested_events"
-    for name in same:
+    for name in (
+        "slip_patches", "critical_patch_extent", "critical_patch_area", "arrested_events",
+    ):  # fmt: skip
         assert np.array_equal(second[name].values, first[name].values)
-    spacings, lengths = np.array(plane.interface.spacings), np.array(plane.interface.lengths)
+    spacings, lengths = np.array(PLANE.interface.spacings), np.array(LENGTHS)
     place = np.array(move(*(first["critical_position"].values[0] / spacings))) * spacings
     off = second["critical_position"].values[0] - place
     off = (off + 0.5 * lengths) % lengths - 0.5 * lengths
@@ -58,109 +76,56 @@ def test_translations_and_reflections(plane, change, move):
         assert np.abs(change(one) - other).max() < 1e-3 * one.max()
 
 
+@pytest.mark.parametrize("wavenumbers", ["spectral", "lattice"])
+@pytest.mark.parametrize("change", [change for change, _ in CHANGES])
+def test_translations_and_reflections_keep_the_bounds(change, wavenumbers):
+    strength = rough_strength(0)
+    first, second = (bounds_of(s, wavenumbers) for s in (strength, change(strength)))
+    assert second.upper == pytest.approx(first.upper, rel=1e-9)  # the gap asked for
+    assert np.abs(change(first.slip) - second.slip).max() < 1e-3 * first.slip.max()
+
+
 def test_sensitivity_is_the_gradient_of_the_mean_stress():
     load = st.Load(profile=1.0 + 0.3 * smooth(6), initial_stress=1e5 * smooth(7))
     rate = RATE * (0.9 + 0.1 * smooth(5))
     problem = make_problem(NODES, LENGTHS, load=load, weakening_rate=rate)
-    strength = strength_of(1)
-    method = st.Equilibrium(gap=1e-10, sensitivity=True)
-    found = st.onset(problem, strength, method=method)
-    direction = smooth(8, 1.0) - 0.3
+    strength, direction = strength_of(1), smooth(8, 1.0) - 0.3
+    found = solve(strength, problem, gap=1e-10)["sensitivity"].values[0]
     ends = np.array([strength + direction, strength - direction])
-    up, down = st.onset(problem, ends, method=method)["first_instability"].values
-    slope = (found["sensitivity"].values[0] * direction).sum()
+    up, down = first_of(ends, problem=problem, gap=1e-10)
     # A step of 1e-6 of the strength, since with longer ones nodes join; loads are known to 1e-10,
     # and to better where, as here, it is the same bound that decides.
-    assert 0.5 * (up - down) == pytest.approx(slope, rel=1e-5)
-    # Under a uniform load it sums to one.
-    weighted = (found["sensitivity"].values[0] * problem.load.profile).sum()
-    assert weighted == pytest.approx(problem.load.profile.mean(), rel=1e-12)
+    assert 0.5 * (up - down) == pytest.approx((found * direction).sum(), rel=1e-5)
+    weighted = (found * load.profile).sum()
+    assert weighted == pytest.approx(load.profile.mean(), rel=1e-12)
+    uniform = solve(strength_of(2))["sensitivity"]
+    assert uniform.sum().item() == pytest.approx(1.0, abs=1e-12)
 
 
-def test_sensitivity_sums_to_one_under_a_uniform_load(plane):
-    found = st.onset(plane, strength_of(2), method=METHOD)
-    assert found["sensitivity"].sum().item() == pytest.approx(1.0, abs=1e-12)
-
-
-def test_loads_scale_and_shift_with_the_strength(plane):
+def test_loads_scale_and_shift_with_the_strength():
     strength = strength_of(3)
-    exact = st.onset(plane, strength, method=METHOD)["first_instability"].item()
-    shifted = st.onset(plane, strength + 1e5, method=METHOD)["first_instability"].item()
+    exact, shifted = first_of(np.array([strength, strength + 1e5]))
     assert shifted == pytest.approx(exact + 1e5, rel=2e-9)
-    initial = {"strength": strength, "initial_stress": np.full((1, 1), 1e5)}
-    under = st.onset(plane, initial, method=METHOD)
+    under = solve({"strength": strength, "initial_stress": np.full((1, 1), 1e5)})
     assert under["first_instability"].item() == pytest.approx(exact, rel=2e-9)
     assert under["critical_load"].item() == pytest.approx(exact - 1e5, rel=2e-9)
 
 
-def test_a_sample_does_not_depend_on_those_beside_it(plane):
+def test_local_criterion_bounds_the_onset():
     strength = np.array([strength_of(seed) for seed in range(3)])
-    together = st.onset(plane, strength, method=METHOD)
-    for number in range(3):
-        alone = st.onset(plane, strength[number], method=METHOD)
-        for name, values in alone.items():
-            assert np.array_equal(values.values[0], together[name].values[number]), name
-
-
-def test_two_threads_give_the_bits_of_one(plane):
-    solve = METHOD.prepare(plane)
-    samples = [plane.sample(strength_of(seed)) for seed in range(4)]
-    one = [solve(sample) for sample in samples]
-    with ThreadPoolExecutor(2) as threads:
-        two = list(threads.map(solve, samples))
-    for first, second in zip(one, two, strict=True):
-        for name in first:
-            assert np.array_equal(first[name], second[name]), name
-
-
-def test_local_criterion_bounds_the_lattice_onset(plane):
-    strength = np.array([strength_of(seed) for seed in range(3)])
-    local = st.onset(plane, strength, method=st.LocalCriterion())["critical_load"].values
-    exact = st.onset(plane, strength, method=st.Equilibrium())["critical_load"].values
+    local = local_onset(PLANE, strength)["critical_load"].values
+    exact = exact_onset(PLANE, strength)["critical_load"].values
     assert (exact <= local * (1.0 + 1e-3)).all()  # the error of the grid
     assert (exact > 0.8 * local).all()
-
-
-def test_ensemble_of_random_properties(plane):
-    def field(low, high):
-        return st.RandomField(
-            marginal=st.Beta(alpha=2.0, beta=2.0, low=low, high=high),
-            spectrum=st.SquaredExponentialSpectrum(correlation_length=LENGTH),
-        )
-
-    random = st.RandomInterface(
-        strength=field(0.7e6, 1.6e6),
-        residual_strength=field(0.0, 1e5),
-        weakening_rate=field(0.3e12, 0.5e12),
-        initial_stress=field(0.0, 2e5),
-    )
-    given = {"method": st.Equilibrium(), "seed": 3, "keep": tuple(random.names)}
-    given["progress"] = False
-    result = st.monte_carlo(plane, random, samples=4, workers=2, **given)
-    part = st.monte_carlo(plane, random, samples=2, first=2, workers=1, **given)
-    for name, values in part.items():
-        assert np.array_equal(values.values, result[name].values[2:]), name
-    profiles = {name: result[name].isel(sample=[1]) for name in random.names}
-    again = st.onset(plane, profiles, method=st.Equilibrium())
-    assert again["critical_load"].values[0] == result["critical_load"].values[1]
-    assert result["critical_position"].dims == ("sample", "direction")
 
 
 def test_discretization_error_is_of_the_size_of_the_error():
     fine, coarse = (
         make_problem((nodes, nodes), (4.0 * LENGTH, 4.0 * LENGTH)) for nodes in (128, 32)
     )
-    rng = np.random.default_rng(1)
-    k = np.hypot(
-        *np.meshgrid(np.fft.fftfreq(128, 1 / 128), np.fft.rfftfreq(128, 1 / 128), indexing="ij")
-    )
-    noise = rng.standard_normal((4, 128, 128))
-    fields = np.fft.irfft2(np.fft.rfft2(noise) * np.exp(-((k / 8.0) ** 2)), (128, 128))
-    fields = 0.7e6 + 1e6 * (fields - fields.min()) / np.ptp(fields)
-    exact = st.onset(fine, fields, method=st.Equilibrium())["first_instability"].values
-    found = st.onset(
-        coarse, fields[:, ::4, ::4], method=st.Equilibrium(discretization_error=True)
-    )
+    fields = np.array([0.7e6 + 1e6 * smooth(seed, 16.0, (128, 128)) for seed in range(4)])
+    exact = exact_onset(fine, fields)["first_instability"].values
+    found = exact_onset(coarse, fields[:, ::4, ::4], discretization_error=True)
     error = np.abs(found["first_instability"].values - exact)
     estimate = found["discretization_error"].values
     # The estimate is meant to be twice the error at most, and not a hundred times as much.
@@ -194,3 +159,82 @@ def test_bounds_hold_where_they_do_not_meet():
         assert spectral.lower < 1.5 * bounds.upper
         assert spectral.upper > 0.6 * bounds.lower
     assert 10 < sum(closed) < 30
+
+
+def test_bounds_hold_for_the_certificates_returned():
+    strength = rough_strength(1)
+    for name, plane in PLANES.items():
+        found = bounds_of(strength, name)
+        symbol = plane.symbol(SHAPE)
+
+        def product(field, symbol=symbol):
+            return np.fft.irfft2(symbol * np.fft.rfft2(field), SHAPE) - RATE * field
+
+        assert (found.slip >= 0.0).all()
+        assert (found.multiplier >= 0.0).all()
+        round_off = 1e-12 * strength.max()
+        assert (product(found.slip) + strength - found.lower).min() > -round_off
+        assert product(found.multiplier).max() < 1e-12 * RATE * found.multiplier.max()
+        assert found.multiplier.sum() == pytest.approx(1.0, abs=1e-12)
+        assert (found.multiplier * strength).sum() == pytest.approx(found.upper, rel=1e-12)
+
+
+def test_monotone_and_concave_in_the_strength():
+    first, second = rough_strength(2), rough_strength(3)
+    one, other = bounds_of(first).upper, bounds_of(second).upper
+    middle = bounds_of(0.5 * (first + second)).lower
+    assert middle >= 0.5 * (one + other) * (1.0 - 1e-9)
+    stronger = first.copy()
+    stronger[10:20, 5:15] *= 1.05
+    assert bounds_of(stronger).upper >= one * (1.0 - 1e-9)
+    assert bounds_of(first + 1e5).upper == pytest.approx(one + 1e5, rel=2e-9)
+
+
+def test_multiplier_is_the_derivative_by_the_strength():
+    strength = rough_strength(4)
+    multiplier = bounds_of(strength, gap=1e-10).multiplier
+    direction = np.random.default_rng(0).standard_normal(SHAPE)
+    direction *= 1e-4 * strength.mean() / np.abs(direction).max()
+    up, down = (bounds_of(strength + d, gap=1e-10).upper for d in (direction, -direction))
+    # Second order: the step changes the slope itself.
+    assert 0.5 * (up - down) == pytest.approx((multiplier * direction).sum(), rel=0.02)
+
+
+def test_local_criterion_is_an_upper_bound_for_every_aspect():
+    plane = PLANES["lattice"]
+    symbol = plane.symbol(SHAPE)
+    aspects = (1.0, 1.25, 1.5)
+    windows = [ellipse_window(symbol, SHAPE, plane.lengths, RATE, a) for a in aspects]
+    interface = st.Interface(plane.lengths, SHAPE)
+    for seed in range(4):
+        strength = rough_strength(seed)
+        exact = bounds_of(strength, gap=1e-6)
+        local = least_average(interface, windows, strength[None], ONE).load[0]
+        assert exact.lower <= local < 1.2 * exact.upper
+        uneven = 1.0 + 0.2 * rough_strength(seed + 10) / 1e6
+        found = plane_onset(plane, strength, uneven, RATE * ONE, 1e-6)
+        assert least_average(interface, windows, strength[None], uneven).load[0] >= found.lower
+
+
+def test_path_is_the_slip_at_onset_just_below_it():
+    strength = rough_strength(5)
+    sample = plane_sample(strength, 0.0, RATE)
+    operator = make_operator(PLANES["lattice"].symbol(SHAPE), RATE, SHAPE)
+    found = bounds_of(strength)
+    slips, status = [np.zeros(strength.size)], []
+    for load in found.lower * np.array([0.9, 0.95, 1.0 - 1e-6, 1.01]):
+        there = least_equilibrium(operator, sample, load, slips[-1])
+        slips.append(there.slip)
+        status.append(there.status)
+    assert status == [BALANCED, BALANCED, BALANCED, SLIDING]
+    assert (np.diff(slips[:4], axis=0) >= -1e-12 * slips[3].max()).all()
+    # slip comes up to that at onset with the square root of the load, 1e-3 of it
+    assert np.abs(slips[3].reshape(SHAPE) - found.slip).max() < 0.01 * found.slip.max()
+
+
+def test_tiny_and_negative_loads_close_as_well():
+    strength = rough_strength(6)
+    exact = bounds_of(strength).upper
+    for shift in (exact, 1.2 * exact):
+        found = bounds_of(strength - shift, gap=1e-7)
+        assert found.upper == pytest.approx(exact - shift, abs=1e-6 * exact)
