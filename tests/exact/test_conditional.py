@@ -159,16 +159,15 @@ def test_a_scan_tells_of_the_factor_of_its_specimen():
     for i, profile in enumerate(FIELD.sample(LINE, samples=50, seed=11)):
         truth = float(factor.distribution.ppf(rng.uniform()))
         measured = truth * profile[:20] + noise * rng.standard_normal(20)
-        given = FIELD.given(on_line(LINE.x[:20], measured), noise=noise)
+        given = given_on(LINE.x[:20], measured, noise)
         random = st.RandomInterface(strength=given, between={"strength": factor})
         ((_, known),) = _conditioned(random, LINE)
         u = np.random.default_rng(i).standard_normal(400)
-        u = np.interp(u, known.score, known.quantile)
-        factors = from_normal(factor, u)
+        factors = from_normal(factor, np.interp(u, known.score, known.quantile))
         ranks.append(np.mean(factors < truth))
         spreads.append(factors.std())
         if i == 0:
-            found = random.profiles(LINE, samples=100, seed=0)["strength"]
+            found = strengths(random, 100, 0)
             assert np.abs(found[:, :20] - measured).mean() < 1.5 * noise
     assert kstest(ranks, "uniform").pvalue > 1e-3
     assert np.median(spreads) < 0.05  # of 0.15 before

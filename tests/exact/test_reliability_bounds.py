@@ -34,13 +34,6 @@ def test_beyond_the_bounds_nothing_is_sampled(stress, expected):
     assert result.stress_above_bound == stress - 0.66e6
 
 
-def test_all_of_a_count_is_not_certainty():
-    assert Count(0, 100).cv == math.inf
-    # As if one in 101 had held.
-    assert Count(100, 100).cv == pytest.approx(1.0 / math.sqrt(101 * 100))
-    assert Count(50, 100).cv == pytest.approx(0.1)
-
-
 def test_bounds_follow_load_and_initial_stress():
     """Nothing slips below min (tau_p - tau_i)/p; in mean stress that is <tau_i> + load <p>."""
     wave = np.cos(turns(256))
@@ -141,7 +134,12 @@ def test_counting_is_unbiased_whenever_it_stops(chance, target_cv, least, most):
     assert all(count.samples <= values.size <= most for count, values in counts)
 
 
-def test_counting_until_a_failure_has_the_interval_of_the_negative_binomial_law():
+def test_errors_and_intervals_of_counts():
+    """Until a failure: the interval of the negative binomial law."""
+    assert Count(0, 100).cv == math.inf
+    # All of a count is no certainty: as if one in 101 had held.
+    assert Count(100, 100).cv == pytest.approx(1.0 / math.sqrt(101 * 100))
+    assert Count(50, 100).cv == pytest.approx(0.1)
     count = Count(5, 200, until_failure=True)
     low, high = count.interval()
     # So many or fewer samples until the fifth failure; so many or more.
