@@ -9,7 +9,8 @@ import re
 import signal
 import sys
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -88,10 +89,30 @@ def _save_figure(axes: Any, path: Path) -> None:
 # -- studies and runs ----------------------------------------------------------------------------
 
 
+@contextmanager
+def _executor(scheduler: str | None) -> Iterator[Any]:
+    """The executor of a Dask scheduler; None without one."""
+    if scheduler is None:
+        yield None
+        return
+    try:
+        from distributed import Client
+
+        client = Client(scheduler)
+    except (ImportError, OSError, ValueError, TypeError) as error:
+        raise InputError(f"--scheduler: {scheduler} cannot be reached: {error}") from None
+    with client:
+        yield client.get_executor(pure=False)
+
+
 def run(
     study: StudyFile,
     out: Annotated[Path, Option(metavar="RUN", help="Folder in which samples are stored.")],
     workers: Workers = None,
+    scheduler: Annotated[
+        str | None,
+        Option(metavar="ADDRESS", help="Address of a Dask scheduler, such as tcp://host:8786."),
+    ] = None,
     time_limit: Annotated[float | None, Option(help="Stop after this many seconds.")] = None,
     part: Annotated[
         str | None,
@@ -115,9 +136,15 @@ def run(
     # A batch system's SIGTERM ends a run as Ctrl-C does: what is done is stored.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        result = loaded.run(
-            out=out, workers=workers, time_limit=time_limit, part=part, pilot=pilot
-        )
+        with _executor(scheduler) as executor:
+            result = loaded.run(
+                out=out,
+                workers=workers,
+                executor=executor,
+                time_limit=time_limit,
+                part=part,
+                pilot=pilot,
+            )
     except KeyboardInterrupt:
         echo(f"interrupted: samples so far are in {out}; rerun the command to resume", err=True)
         raise typer.Exit(130) from None

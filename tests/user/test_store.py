@@ -423,13 +423,18 @@ def test_the_pilot_says_how_far_the_local_criterion_is_from_the_exact_onset():
 
 
 @pytest.mark.slow
-def test_a_dask_scheduler():
-    """By the executor of a client."""
+def test_a_dask_scheduler(tmp_path, command):
+    """By the executor of a client, and by the address on the command line."""
     distributed = pytest.importorskip("distributed")
+    SMALL.to_toml(tmp_path / "study.toml")
     reference = SMALL.run(workers=1)
     options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
     with distributed.LocalCluster(**options) as cluster, distributed.Client(cluster) as client:
         assert SMALL.run(executor=client.get_executor(pure=False)).identical(reference)
+        given = tmp_path / "study.toml", "--out", tmp_path / "run"
+        code, _, errors = command("run", *given, "--scheduler", cluster.scheduler_address)
+    assert code == 0, errors
+    assert st.open_run(tmp_path / "run").dataset().identical(reference)
 
 
 MPI = """
