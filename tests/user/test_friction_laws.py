@@ -202,7 +202,7 @@ LAWS = {
     "slip_at(0), or ... must be positive and finite, got 0": (plateau, lambda f: f),
     "f(slip_at(0)) is 0, but 0.3 by its f":
         (plateau, lambda f: 0.9 * plateau_slip(f), plateau_area),
-    "initial_slope is 2, but 1 by its f ... -f'(0.568) is":
+    "the integral of -f' is 1.98, but 0.99 by its f":
         (lambda law, u: (np.exp(-u), 2.0 * np.exp(-u)), logarithm, exponential_area, 2.0),
 }  # fmt: skip
 

@@ -12,12 +12,9 @@ from scipy.special import jv
 
 from stiction.arrays import Array
 
-TERMS = 40
-"""Number of terms of the eigenfunction."""
-EDGE = 16
-"""Nodes at either end of a patch whose weights are fitted; samples of g are exact further in."""
-SMOOTH = 2.0
-"""|k| h_n/2 above which the fit counts less, as the fourth power."""
+TERMS = 40  # of the eigenfunction
+EDGE = 16  # nodes at either end of a patch that are fitted; samples of g are exact further in
+SMOOTH = 2.0  # |k| h_n/2 above which the fit counts less, as the fourth power
 
 
 @lru_cache(maxsize=4)
@@ -78,9 +75,8 @@ def multiplier(z: Array) -> Array:
 def odd_bessel(z: Array, count: int) -> Array:
     """Return J_1, J_3, ..., J_(2 count - 1) at positive z (m,), shape (count, m).
 
-    By recurrence, which is far less expensive than each order by itself: upwards where z is above
-    the highest order, downwards from order 120 elsewhere (Miller, 1952), and order by order for
-    the few z below 1, where the downward recurrence would overflow.
+    By recurrence: upwards where z is above the highest order, downwards elsewhere (Miller, 1952),
+    and order by order for the few z below 1, where the downward recurrence would overflow.
     """
     orders = 2 * count
     result = np.empty((count, z.size))
@@ -110,15 +106,13 @@ def grid_weights(half_width: float) -> Array:
 
     `half_width` is h_n/2 in nodes; w_0 + 2 (w_1 + w_2 + ...) is one. With weights that are not
     negative, an average lies between the least and the greatest strength, whatever jumps the
-    strength has. A product in Fourier space with the transform of g is exact for smooth strength,
-    but its weights ring: beside a strong barrier the average falls below the lowest strength.
+    strength has; those of a product with the transform of g would ring.
 
-    Inside a patch plain samples of g are as accurate as can be (the trapezoidal rule), only its
-    ends, where g falls like a root, need other weights (as in Alpert, 1999, SIAM J. Sci. Comput.
-    20, 1551). These are fitted to the transform of g at all wavenumbers of the grid, by least
-    squares among weights that are not negative (Lawson and Hanson, 1974). The fit is weighted
-    towards long waves, which carry nearly all of tau_n. Error of the transform at |k| h_n/2 = 3:
-    1e-4, 5e-6, 1e-9 with 9, 16, 35 nodes in h_n.
+    Inside a patch plain samples of g are as accurate as can be (the trapezoidal rule); its ends,
+    where g falls like a root, need other weights (as in Alpert, 1999, SIAM J. Sci. Comput. 20,
+    1551). These are fitted to the transform of g by least squares among weights that are not
+    negative (Lawson and Hanson, 1974), long waves first, which carry nearly all of tau_n. Error of
+    the transform at |k| h_n/2 = 3: 1e-4, 5e-6, 1e-9 with 9, 16, 35 nodes in h_n.
     """
     last = int(np.ceil(half_width)) + 1
     inner = max(last + 1 - EDGE, 0)

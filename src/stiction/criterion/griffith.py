@@ -9,12 +9,9 @@ from stiction.errors import InputError
 from stiction.model import Flag, Numbers, Positive, Real, checked, describe
 from stiction.problem import Problem
 
-POINTS = 512
-"""Fewest Gauss-Chebyshev points along a crack; smooth drops are exact to round-off."""
-SHORT = np.geomspace(1e-6, 1.0, 40, endpoint=False)
-"""Lengths below one node spacing at which a crossing is sought, in units of it."""
-BATCH = 1 << 20
-"""Number of points evaluated at once."""
+POINTS = 512  # fewest Gauss-Chebyshev points along a crack; smooth drops are exact to round-off
+SHORT = np.geomspace(1e-6, 1.0, 40, endpoint=False)  # lengths below one node spacing
+BATCH = 1 << 20  # points evaluated at once
 HALVINGS = 30
 
 
@@ -44,16 +41,15 @@ def energy_release_rate(
     Raises
     ------
     InputError
-        If the interface has two dimensions, the residual strength is a share of the strength, a
-        length is out of range, or a number is not finite.
+        On a plane, with `residual_ratio`, or if a length is out of range.
 
     Notes
     -----
     G = K|K|/(2 G*) between identical half-spaces, K the integral of the drop times the weight of
     Bueckner (1970). The interface is periodic: u = tan(pi x/L) maps the row of collinear cracks to
     one crack, so that a uniform drop gives K = drop (L tan(pi a/L))^(1/2), a the half-length
-    (Koiter, 1959). This is how Kammer et al. (2015) and Ke et al. (2018) predict the length of
-    confined ruptures. Between the nodes the drop is linear.
+    (Koiter, 1959). Kammer et al. (2015) and Ke et al. (2018) predict the length of confined
+    ruptures so. Between the nodes the drop is linear.
 
     Examples
     --------
@@ -104,10 +100,6 @@ def griffith_length(
     float or (k,) array
         Length, m; infinite where there is none.
 
-    Raises
-    ------
-    InputError
-        As `energy_release_rate`, or if Gamma is not positive.
     """
     if load.ndim > 1 or not np.all(np.isfinite(load)):
         raise InputError(
@@ -138,16 +130,13 @@ def griffith_length(
 
 def _stress_drops(problem: Problem) -> Array:
     """Return the stress drop (Pa) without a load, and by a unit load, at the nodes: (2, nodes)."""
-    problems = []
     if problem.interface.is_plane:
-        problems.append("problem: must have a line interface")
+        raise InputError("problem: must have a line interface")
     if problem.friction.residual_ratio is not None:
-        problems.append(
+        raise InputError(
             "problem.friction.residual_ratio: the stress drop needs the residual strength in Pa;"
             " give friction.residual_strength, for random strength the ratio times its mean"
         )
-    if problems:
-        raise InputError(problems)
     resting = problem.load.initial_stress - problem.friction.residual_strength
     drops = np.empty((2, problem.interface.size))
     drops[0], drops[1] = resting, problem.load_profile

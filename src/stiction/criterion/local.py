@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from itertools import islice
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,10 +39,9 @@ class LocalCriterion:
 
     If no node reaches its residual strength (zero included) before the onset, this is an
     upper bound of the exact equilibrium onset, up to discretisation: interaction only makes
-    patches unstable earlier. A node at its residual strength weakens no more, so that the
-    onset comes later than the criterion predicts. An `AccuracyWarning` estimates in how
-    many samples, and by how much. Events are assumed not to be arrested, so
-    `first_instability` and `critical_stress` are equal.
+    patches unstable earlier. Where nodes do, the onset comes later than predicted, and an
+    `AccuracyWarning` estimates in how many samples, and by how much. Events are assumed not
+    to be arrested, so `first_instability` and `critical_stress` are equal.
 
     Notes
     -----
@@ -54,9 +53,8 @@ class LocalCriterion:
 
     On a plane the average is over critical ellipses of five shapes, each the smallest on which the
     stiffness K - W of the discrete problem is unstable, with its eigenvector as the weight; the
-    minimum is taken over nodes and shapes. Beside the variables of every method there are then
-    `critical_aspect`, `critical_patch_extent` (m, along x and y) and `critical_patch_area` (m²) of
-    the critical ellipse.
+    minimum is taken over nodes and shapes. `critical_aspect`, `critical_patch_extent` (m, along x
+    and y) and `critical_patch_area` (m²) are those of the critical ellipse.
 
     Examples
     --------
@@ -66,16 +64,8 @@ class LocalCriterion:
     """
 
     type: Literal["local_criterion"] = "local_criterion"
-
-    @property
-    def chunk_size(self) -> int:
-        """Number of samples in a batch of an ensemble."""
-        return 1024
-
-    @property
-    def label(self) -> str:
-        """Name in figures and tables."""
-        return "local criterion"
+    chunk_size: ClassVar[int] = 1024
+    label: ClassVar[str] = "local criterion"
 
     def seconds_per_sample(self, problem: Problem) -> float:
         """Return the approximate time of a sample on one core, s."""
@@ -87,9 +77,8 @@ class LocalCriterion:
         if friction.steepest_slope > friction.initial_slope:
             times = friction.steepest_slope / friction.initial_slope
             reasons.append(
-                "friction: the local criterion takes the weakening rate at zero slip, and this"
-                f" law falls up to {times:.3g} times as steeply later, so that patches become"
-                f" unstable at lower loads than it predicts{INSTEAD}"
+                f"friction: this law falls up to {times:.3g} times as steeply later as at zero"
+                f" slip, whose weakening rate the local criterion takes{INSTEAD}"
             )
         if friction.weakening_rate is not None and problem.uniform_rate is None:
             reasons.append(
@@ -125,8 +114,10 @@ class LocalCriterion:
             for windows, same in _by_rate(problem, sample):
                 some = excess if same.size == len(excess) else excess[same]
                 load, place, chosen = least_average(interface, windows, some, profile)
-                values = {"critical_load": load}
-                values["critical_position"] = place * interface.spacings
+                values = {
+                    "critical_load": load,
+                    "critical_position": place * interface.spacings,
+                }
                 if interface.is_plane:
                     one = [(one.aspect, one.extents, one.area) for one in windows]
                     each = zip(OWN_VARIABLES, zip(*one, strict=True), strict=True)
@@ -146,13 +137,15 @@ class LocalCriterion:
 
     def warn_of(self, problem: Problem, sample: Sample, values: dict[str, Array]) -> None:
         """Warn if samples reach their residual strength before the onset."""
+        if not problem.friction.linear:  # `check_law` has warned of it
+            return
         reached, missing = beyond_residual(problem, sample, values)
         if reached.any():
             middle, most = 100.0 * np.quantile(missing[reached], (0.5, 1.0))
             warn_accuracy(
                 f"in about {100.0 * reached.mean():.2g} % of {reached.size} samples nodes of the"
                 " critical patch reach their residual strength before the onset: there the local"
-                " criterion is not an upper bound, and its onset is too low by an estimated"
+                " criterion is no upper bound but too low by an estimated"
                 f" {middle:.2g} % (median; at most {most:.2g} %); use st.Equilibrium()"
             )
 
@@ -164,8 +157,7 @@ def beyond_residual(
 
     Of the first thousand samples: whether a node of the critical patch has slipped as far as it
     weakens, (tau_p - tau_r)/W, at the critical load; and by what share that load is too low, to
-    first order: the strength that slip would have taken below the residual one, averaged with the
-    weights of the patch. No sample of a law that is not linear counts: `check_law` warns of it.
+    first order: the mean strength that slip would have taken below the residual one.
 
     At the critical load tau_0 the slip of the patch follows from (K - W) slip = tau_0 p - (tau_p -
     tau_i) with no singularity at its rim. For a parabola of strength, tau_0 + c s^2 with s the
@@ -174,8 +166,6 @@ def beyond_residual(
     """
     sample, shape = sample.part(slice(0, ENOUGH)), problem.interface.shape
     reached, missing = np.zeros(sample.samples, dtype=np.bool_), np.zeros(sample.samples)
-    if not problem.friction.linear:
-        return reached, missing
     spacings = np.array(problem.interface.spacings)
     loads, places = (np.asarray(values[f"critical_{name}"]) for name in ("load", "position"))
     aspects = np.asarray(values.get("critical_aspect", np.ones(len(loads))))
@@ -253,7 +243,7 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     excess, profile = excess_of(sample), sample.load_profile
     each = averages(interface, windows, excess, profile)
     result = np.array([np.minimum.reduce(list(islice(each, len(windows)))) for _ in excess])
-    # The weights keep to these bounds; only the rounding of the transforms may not.
+    # The weights keep to these bounds, the rounding of the transforms does not.
     ratio = windows[0].total * (excess / profile)
     low, high = (end(axis=sample.axes, keepdims=True) for end in (ratio.min, ratio.max))
     result = np.clip(result, low, high)
@@ -266,38 +256,32 @@ def check_law(problem: Problem) -> None:
         raise InputError(refused)
     if not problem.friction.linear:
         warn_accuracy(
-            "friction: the local criterion takes the weakening rate at zero slip as constant;"
-            " as strength falls ever less steeply, patches become unstable later than it"
-            " predicts: for an exponential law and strength from 0.66 to 1.66 MPa by 2 % (at"
-            " most 7 %) at a correlation length of a quarter of h_n, by 0.6 % (at most 3 %) at"
-            " one of h_n; st.Equilibrium() is exact for piecewise linear laws"
+            "friction: the local criterion takes the weakening rate at zero slip as constant, so"
+            " the onset is later than it predicts: with an exponential law by 0.6 % (at most 3 %)"
+            " at a correlation length of h_n, by 2 % (at most 7 %) at one of h_n/4;"
+            " st.Equilibrium() is exact for piecewise linear laws"
         )
 
 
 def _warn_if_coarse(problem: Problem, sample: Sample) -> None:
     """Warn where the moving average is a coarse sum."""
     if problem.interface.is_plane:
-        enough = 8.0
-        cost = (
-            "the local criterion takes the lowest node and critical patches of whole nodes, which"
-            " makes it about 0.15 % too high at 8 nodes, 0.4 % at 5 and 0.7 % at 4"
-        )
+        cost = "the local criterion is about 0.15 % too high at 8 nodes, 0.4 % at 5, 0.7 % at 4"
+        problem.warn_if_coarse(sample, 8.0, cost)
     else:
-        enough = 12.0
         cost = (
             "where the strength varies within a quarter of it, the local criterion is off by about"
             " 0.8 % (rms) at 8 nodes and 3 % at 4; for smoother strength by far less"
         )
-    problem.warn_if_coarse(sample, enough, cost)
+        problem.warn_if_coarse(sample, 12.0, cost)
 
 
 def excess_of(sample: Sample) -> Array:
     """Return tau_p - tau_i, Pa; `InputError` where the strength is not finite."""
     if not np.isfinite(sample.strength).all():
         raise InputError(
-            "strength: must be finite everywhere for the local criterion, which averages it over"
-            " the nucleation length; where some of it cannot break, give a large finite strength,"
-            " or use st.Rupture()"
+            "strength: must be finite everywhere for the local criterion, which averages it; where"
+            " some of it cannot break, give a large finite strength, or use st.Rupture()"
         )
     return np.ascontiguousarray(sample.strength - sample.initial_stress)
 

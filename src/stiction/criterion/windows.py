@@ -23,41 +23,22 @@ from stiction.elasticity.operator import make_operator, stiffness_symbol
 from stiction.errors import InputError
 from stiction.problem import Problem
 
+# Aspects of the ellipses over that of the middle one. With the paper's strength nine shapes from
+# 0.8 to 2 lower the bound by less than 0.05 % more.
 STRETCHES = (2.0 / 3.0, 5.0 / 6.0, 1.0, 6.0 / 5.0, 3.0 / 2.0)
-"""Aspects of the ellipses over that of the middle one. With the paper's strength nine shapes from
-0.8 to 2 lower the bound by less than 0.05 % more."""
-TOLERANCE = 1e-9
-"""Residual of an eigenvector, as a share of W."""
-ITERATIONS = 500
-SMALLEST_BOX = 32
-"""Nodes along each side of the part of a plane that is searched first."""
+TOLERANCE, ITERATIONS = 1e-9, 500  # residual of an eigenvector, as a share of W
+SMALLEST_BOX = 32  # nodes along each side of the part of a plane that is searched first
 
 
 class Window(NamedTuple):
-    """A critical patch, centred on the first node.
+    """A critical patch, centred on the first node."""
 
-    Attributes
-    ----------
-    aspect : float
-        Semi-axis along x over that along y; 1 on a line.
-    extents : tuple of float
-        Length in each direction, m.
-    area : float
-        Its length (m), on a plane the area of its nodes (m²).
-    eigenvalue : float
-        Lowest eigenvalue of K on it, not above W, Pa/m.
-    weight : (*shape) array
-        Weight of each node, never negative, of unit sum.
-    spectrum : array
-        Conjugate of its transform: what the moving average does to each wave.
-    """
-
-    aspect: float
-    extents: tuple[float, ...]
-    area: float
-    eigenvalue: float
-    weight: Array
-    spectrum: NDArray[Any]
+    aspect: float  # semi-axis along x over that along y; 1 on a line
+    extents: tuple[float, ...]  # length in each direction, m
+    area: float  # its length (m), on a plane the area of its nodes (m²)
+    eigenvalue: float  # lowest eigenvalue of K on it, not above W, Pa/m
+    weight: Array  # of each node (*shape), never negative, of unit sum
+    spectrum: NDArray[Any]  # conjugate of its transform: what the moving average does to waves
 
     @property
     def total(self) -> float:
@@ -68,11 +49,10 @@ class Window(NamedTuple):
 def windows_of(
     problem: Problem, rate: float, stretches: Sequence[float] = STRETCHES
 ) -> list[Window]:
-    """Return the critical windows of a weakening rate (Pa/m).
+    """Return the critical windows of a weakening rate (Pa/m); `InputError` if one does not fit.
 
-    One on a line; on a plane one for each multiple of the middle aspect 1/sqrt(1 - nu), because a
-    line of mode II is critical at a length that is 1/(1 - nu) times that of mode III. `InputError`
-    if a window does not fit on the interface.
+    One on a line; on a plane one for each multiple of the aspect 1/sqrt(1 - nu), because a line of
+    mode II is critical at a length that is 1/(1 - nu) times that of mode III.
     """
     interface, solid = problem.interface, problem.solid
     length = problem.nucleation_lengths(rate)[0]
@@ -93,9 +73,8 @@ def windows_of(
         if window is None:
             size = " x ".join(f"{one:.4g}" for one in interface.lengths)
             raise InputError(
-                f"interface.length: a critical patch of aspect {aspect:.3g} does not fit on a plane"
-                f" of {size} m (in each direction nearly twice the nucleation length,"
-                f" {length:.4g} m, is needed); {advice}"
+                f"interface.length: a critical patch does not fit on a plane of {size} m: in each"
+                f" direction it takes nearly twice the nucleation length, {length:.4g} m; {advice}"
             )
         found.append(window)
     return found
@@ -132,8 +111,6 @@ def ellipse_window(
 ) -> Window | None:
     """Return the smallest unstable ellipse of one aspect; None if it meets its images.
 
-    K(k) and W are in Pa/m, the periods in m; the aspect is that of the semi-axes along x and y.
-
     The problem on the nodes of an ellipse is the same on a box of the plane that is twice as
     long, made periodic with the stiffness between its own nodes: a block of a Toeplitz matrix is
     one of a circulant. So the cost follows the ellipse and not the plane.
@@ -167,11 +144,10 @@ def ellipse_window(
 def _smallest_unstable(
     column: Array, distance: Array, rate: float, least: float, most: float
 ) -> tuple[float, float, Array] | None:
-    """Find by bisection the distance within which K has an eigenvalue that is not above W.
+    """Find by bisection the squared distance (m²) within which K has an eigenvalue up to W.
 
-    The column is the stress (Pa) at each node of a box by unit slip at node (0, 0). Distances from
-    this node are squared (m²); nodes up to `least` are stable. Returns the squared distance, the
-    eigenvalue and the eigenvector.
+    The column is the stress (Pa) at each node of a box by unit slip at node (0, 0). Nodes up to
+    `least` are stable. The eigenvalue and the eigenvector come along.
     """
     symbol = np.fft.rfft2(column).real
     operator = make_operator(symbol, rate, column.shape)._replace(
