@@ -98,7 +98,7 @@ def coverage(
             fit = st.fit_field(
                 record(case, lengths, noise, seed), interface, marginal=case.marginal,
                 spectrum=case.spectrum, noise=noise > 0.0, bootstrap=bootstrap, seed=seed,
-                workers=1, progress=False,
+                progress=False,
             )  # fmt: skip
         for name, (low, high) in fit.interval.items():
             if name in truth:

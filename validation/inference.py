@@ -19,8 +19,7 @@ import scipy.stats
 
 import stiction as st
 from stiction.inference.grid import grid_of
-from stiction.inference.likelihood import make_likelihood
-from stiction.inference.onset_table import experiments_at, simulate
+from stiction.inference.likelihood import experiments_at, make_likelihood, simulate
 from stiction.inference.prior import make_prior
 from stiction.progress import SILENT
 

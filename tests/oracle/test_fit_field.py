@@ -34,15 +34,6 @@ def test_marginals_are_scipys_of_greatest_likelihood(given, family, fixed):
     assert ours.std() == pytest.approx(theirs.std(), rel=1e-2)
 
 
-def test_a_cut_normal_distribution_has_the_greatest_likelihood():
-    values = VALUES[VALUES > 0.4e6]
-    found = family_of({"type": "truncated_normal", "low": 0.4e6}).fit(values)
-    best = found.distribution.logpdf(values).sum()
-    for mean, cv in ((1.01, 1.0), (0.99, 1.0), (1.0, 1.03), (1.0, 0.97)):
-        other = st.TruncatedNormal(mean=found.mean * mean, cv=found.cv * cv, low=0.4e6)
-        assert other.distribution.logpdf(values).sum() < best
-
-
 @pytest.mark.parametrize("name", ["lognormal", "beta", *SLOW])
 def test_noise_is_taken_out_of_a_marginal(name):
     """Of many independent values: two per cent of the standard deviation, by sampling."""

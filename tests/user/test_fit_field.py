@@ -1,7 +1,5 @@
 """`st.fit_field` as a laboratory uses it: units, gaps, order, bad records."""
 
-import re
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -196,9 +194,6 @@ def test_bounds_lie_outside_of_values_without_noise(bounded):
     assert interval["spectrum.exponent"][1] <= 16.0
     for name in ("marginal.low", "marginal.high", "spectrum.exponent"):
         assert interval[name][0] < interval[name][1]
-    interval = fitted(labelled(), marginal="uniform").interval
-    assert interval["marginal.loc"][1] <= VALUES.min()
-    assert interval["marginal.scale"][0] >= np.ptp(VALUES) * (1.0 - 1e-12)
 
 
 def test_a_field_of_coefficients_says_so():
@@ -230,4 +225,4 @@ def test_intervals_hold_nothing_that_cannot_be(bounded):
     assert interval["marginal.high"][0] >= min(high, quiet.max()) * (1.0 - 1e-9)
     # The estimate is the end of the range; repetitions end there too, which tells nothing.
     assert interval["spectrum.exponent"] == (0.65, 16.0)
-    assert re.search(r"exponent +16 +0.65 to 16 \(searched from 0.65 to 16\)", str(fit))
+    assert "exponent 16 lies at an end" in str(fit)

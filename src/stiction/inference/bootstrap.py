@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from stiction.arrays import Array
+from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.errors import InputError
 from stiction.inference.marginal_fit import Family, distance
 from stiction.inference.whittle import (
@@ -62,8 +62,7 @@ class Estimate:
     model: Model
     distance: float  # Kolmogorov's, between values and marginal
     roughness: float  # mean square of log(periodogram/expectation), both averaged over bands
-    # Variance, which may be negative, and its error; 0 if it is known.
-    noise: tuple[float, float]
+    noise: tuple[float, float]  # its variance, which may be negative, and the error of that
 
     @cached_property
     def parameters(self) -> dict[str, float]:
@@ -117,7 +116,7 @@ def estimate(
     vector: Any = None
     marginal, noise = None, family.noise or 0.0
     if start is not None:
-        vector = family.vector(list(family.of(start.model).values()))
+        vector = family.vector_of(start.model)
         marginal, noise = start.marginal, start.model.noise
     for _ in range(2):
         marginal = setting.marginal.fit(values, noise, marginal)
@@ -141,7 +140,7 @@ def estimate(
         model=model,
         distance=distance(marginal, setting.marginal.quiet(values, model.noise)),
         roughness=float(np.mean(np.square(ratios))),
-        noise=(0.0, 0.0) if family.noise is not None else likelihood.noise_variance(vector),
+        noise=likelihood.noise_variance(vector) if family.noise is None else (0.0, 0.0),
     )
 
 
@@ -165,49 +164,48 @@ class Repetitions(NamedTuple):
 
 
 def bootstrapped(
-    found: Estimate, count: int, confidence: float, seed: int, workers: int, progress: Show
-) -> tuple[list[Repetitions], int]:
+    found: Estimate, count: int, confidence: float, seed: int, progress: Show
+) -> list[Repetitions]:
     """Fit records simulated from an estimate, and from it `at_ends` of its correlation length.
 
-    Returns the repetitions to which the family can be fitted, and the number requested.
+    Repetitions to which the family cannot be fitted are missing.
     """
 
-    def one(field: Estimate, number: int) -> Estimate | None:
-        rng = np.random.default_rng([seed, number])
-        try:
-            again = estimate(field.simulate(rng), found.setting, field)
-        except InputError:  # no member of the family fits: counted by its absence
-            return None
-        meter.advance()
-        return again
+    def repeat(truth: Estimate) -> Repetitions:
+        def one(number: int) -> Estimate | None:
+            rng = np.random.default_rng([seed, number])
+            try:
+                again = estimate(truth.simulate(rng), found.setting, truth)
+            except InputError:
+                return None
+            meter.advance()
+            return again
 
-    def repeat(field: Estimate) -> Repetitions:
-        results = pool.map(partial(one, field), range(count))
-        return Repetitions(field, [result for result in results if result is not None])
+        results = in_threads(one, range(count), usable_cores())
+        fits = [result for result in results if result is not None]
+        if len(fits) < FEWEST:
+            raise InputError(
+                f"marginal: {found.setting.marginal.name!r} could be fitted to only {len(fits)} of"
+                f" {count} repetitions; take another marginal"
+            )
+        return Repetitions(truth, fits)
 
     ends = "correlation_length" in found.setting.spectrum.free
-    asked = 3 * count if ends else count
-    with Meter("fit_field", asked, progress) as meter, ThreadPoolExecutor(workers) as pool:
+    with Meter("fit_field", 3 * count if ends else count, progress) as meter:
         repeated = [repeat(found)]
-        if ends and len(repeated[0].fits) >= FEWEST:
-            repeated += [repeat(field) for field in at_ends(repeated[0], confidence)]
-    done = [len(own.fits) for own in repeated]
-    if min(done) < FEWEST:
-        raise InputError(
-            f"marginal: {found.setting.marginal.name!r} could be fitted to only {sum(done)} of"
-            f" {asked} repetitions; take another marginal"
-        )
-    return repeated, asked
+        if ends:
+            repeated += [repeat(truth) for truth in at_ends(repeated[0], confidence)]
+    return repeated
 
 
 def at_ends(around: Repetitions, confidence: float) -> list[Estimate]:
     """Return the field with its correlation length at either end of a first interval."""
     found, family = around.truth, around.truth.setting.spectrum
-    values, place = family.of(found.model), family.free.index("correlation_length")
+    place = family.free.index("correlation_length")
     moved = []
     scale, tail = Scale("spectrum.correlation_length"), 0.5 * (1.0 - confidence)
     for share in (1.0 - tail, tail):
-        vector = family.vector(list(values.values()))
+        vector = family.vector_of(found.model)
         vector[place] = np.clip(scale.end(found, around, share), *family.limits[place])
         moved.append(replace(found, model=family.model(vector, found.model.shares)))
     return moved
@@ -216,7 +214,8 @@ def at_ends(around: Repetitions, confidence: float) -> list[Estimate]:
 class Scale(NamedTuple):
     """Scale on which the error of a parameter is about normal: a logarithm, unless `linear`.
 
-    For bounds of a marginal it is the logarithm of the distance from the mean.
+    For bounds of a marginal it is the logarithm of the distance from the mean; for the noise it is
+    the variance, which may be negative: estimates at zero would all have an error of zero.
     """
 
     name: str
@@ -228,24 +227,24 @@ class Scale(NamedTuple):
             return values["mean"], SIDES[self.name]
         return origin(self.name), 1.0
 
-    def to(self, values: Mapping[str, float]) -> float:
-        """Return the parameter on this scale."""
-        (start, side), value = self._from(values), values[self.name]
-        return value if self.linear else math.log(max(side * (value - start), 1e-300))
-
-    def back(self, scaled: float, values: Mapping[str, float]) -> float:
-        """Return a parameter from this scale."""
-        start, side = self._from(values)
-        return scaled if self.linear else start + side * math.exp(scaled)
-
     def of(self, one: Estimate) -> tuple[float, float]:
-        """Return an estimate on this scale, and a quantity that scales its error."""
-        if self.name == "noise":  # its variance, which may be negative, and its own error
+        """Return an estimate on this scale, and a quantity to which its error is in proportion."""
+        if self.name == "noise":
             return one.noise
+        (start, side), value = self._from(one.parameters), one.parameters[self.name]
         width = math.sqrt(one.parameters["efolding_length"])
         if self.name in PLACES:
             width *= one.parameters["standard_deviation"]
-        return self.to(one.parameters), width
+        if self.linear:
+            return value, width
+        return math.log(max(side * (value - start), 1e-300)), width
+
+    def back(self, scaled: float, values: Mapping[str, float]) -> float:
+        """Return a parameter from this scale."""
+        if self.name == "noise":
+            return math.sqrt(max(scaled, 0.0))
+        start, side = self._from(values)
+        return scaled if self.linear else start + side * math.exp(scaled)
 
     def end(self, found: Estimate, repeated: Repetitions, share: float) -> float:
         """Return an estimate less a quantile of its error in units of its width."""
@@ -263,8 +262,7 @@ def intervals(
     Errors are in units of the root of the correlation length, of which a record holds few. Upper
     and lower ends come from fields of longer and shorter correlation, `at_ends` (one step of a test
     inversion; Carpenter, 1999): the longer one at the upper end of parameters whose estimates rise
-    with the correlation length. The noise has an interval by its variance and its own standard
-    error, as if it could be negative: estimates at zero would all have an error of zero.
+    with the correlation length. Intervals of bounds end outside of `values` without noise.
     """
     around, *ends = repeated
     found, estimated = around.truth, around.truth.parameters
@@ -275,42 +273,30 @@ def intervals(
         least = min(one.parameters[name] for own in repeated for one in (own.truth, *own.fits))
         scale = Scale(name, name in PLACES or (name not in SIDES and least < 0.0))
         shorter, longer = ends if ends and name != "noise" else (around, around)
-        own = [scale.to(one.parameters) for one in around.fits]
-        if np.cov(own, lengths)[0, 1] < 0.0:
+        if np.cov([scale.of(one)[0] for one in around.fits], lengths)[0, 1] < 0.0:
             shorter, longer = longer, shorter
         low, high = scale.end(found, shorter, 1.0 - tail), scale.end(found, longer, tail)
-        if name == "noise":
-            if high <= 0.0:  # far below zero by chance: as wide as of an estimate of zero
-                high -= found.noise[0]
-            result[name] = math.sqrt(max(low, 0.0)), math.sqrt(max(high, 0.0))
-        else:
-            ordered = sorted(scale.back(end, estimated) for end in (low, high))
-            result[name] = ordered[0], ordered[1]
+        if name == "noise" and high <= 0.0:  # by chance: as wide as of an estimate of zero
+            high -= found.noise[0]
+        first, last = sorted(scale.back(end, estimated) for end in (low, high))
+        result[name] = first, last
     noise = result["noise"][1] if "noise" in result else found.model.noise
     quiet = found.setting.marginal.quiet(values, noise)
-    for name, limits in limits_of(found, quiet).items():
-        result[name] = cut(result[name], limits, estimated[name])
-    return result
-
-
-def limits_of(found: Estimate, quiet: Array) -> dict[str, tuple[float, float]]:
-    """Return the limits of bounds of the marginal, by values without noise, and of searches."""
-    estimated = found.parameters
-    bottom, top = (float(end) for end in found.marginal.distribution.support())
-    least, most = max(float(quiet.min()), bottom), min(float(quiet.max()), top)
-    below, above = (-math.inf, least), (most, math.inf)
     limits = {
         "spectrum.exponent": RANGES["exponent"],
         "anisotropy": RANGES["anisotropy"],
-        "marginal.low": below,
-        "marginal.high": above,
+        "marginal.low": (
+            -math.inf,
+            max(float(quiet.min()), estimated.get("marginal.low", 0.0)),
+        ),
+        "marginal.high": (
+            min(float(quiet.max()), estimated.get("marginal.high", 0.0)),
+            math.inf,
+        ),
     }
-    loc, scale = estimated.get("marginal.loc"), estimated.get("marginal.scale")
-    if loc in (bottom, top):  # else it is inside, such as a mean
-        limits["marginal.loc"] = below if loc == bottom else above
-    if scale is not None and math.isclose(scale, top - bottom):
-        limits["marginal.scale"] = (most - least, math.inf)
-    return {name: limits[name] for name in limits if name in estimated}
+    for name in limits.keys() & result.keys():
+        result[name] = cut(result[name], limits[name], estimated[name])
+    return result
 
 
 def cut(

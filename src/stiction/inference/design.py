@@ -24,12 +24,9 @@ from stiction.variables import Variable
 
 POINTS = 8_000
 """Number of points of the grid of each posterior."""
-UNIFORM = 12.0**-0.5
-"""Standard deviation of u before any test."""
 VARIABLES = {
     "information": "expected information about a parameter, nats",
     "standard_error": "standard error of the information, nats",
-    "spread_left": "posterior over prior standard deviation, expected",
 }
 
 
@@ -66,9 +63,8 @@ def design_of_tests(
     -------
     xarray.Dataset
         Over 'design' and 'parameter': `information`, the expected divergence of the
-        posterior of a parameter from its prior (nats; NaN where it is known), its
-        `standard_error`, and `spread_left`, the expected standard deviation of the
-        posterior over that of the prior, in units in which the prior is uniform.
+        posterior of a parameter from its prior (nats; NaN where it is known), and its
+        `standard_error`.
 
     Raises
     ------
@@ -162,9 +158,9 @@ def _expected(
     seed: int,
     meter: Meter,
 ) -> Array:
-    """Return information, its standard error and the spread left, (3, parameters)."""
+    """Return information and its standard error, (2, parameters)."""
     rng, dimension = np.random.default_rng([seed, 2]), simulated.prior.dimension
-    gains, left = np.full((2, repetitions, dimension), np.nan)
+    gains = np.full((repetitions, dimension), np.nan)
     for row in range(repetitions):
         truth, start = rng.random(dimension), int(rng.integers(2**32))
         likelihood = simulated.of(
@@ -188,7 +184,6 @@ def _expected(
         )
         if grid is not None:
             gains[row, free] = [grid.information(place) for place in range(len(free))]
-            left[row, free] = [grid.spread(place) / UNIFORM for place in range(len(free))]
         meter.advance()
     error = gains.std(axis=0) / np.sqrt(repetitions)
-    return np.stack([gains.mean(axis=0), error, left.mean(axis=0)])
+    return np.stack([gains.mean(axis=0), error])

@@ -9,7 +9,6 @@ import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo
 
 from stiction.arrays import Array
-from stiction.ensemble.batches import usable_cores
 from stiction.errors import InputError, unknown_name, warn_accuracy
 from stiction.inference.between import scatter_between, variances_within
 from stiction.inference.bootstrap import (
@@ -22,11 +21,12 @@ from stiction.inference.bootstrap import (
 )
 from stiction.inference.marginal_fit import Family, family_of, mean_log_likelihood
 from stiction.inference.records import Record, records_of
-from stiction.inference.whittle import RANGES, SpectrumFamily, spectrum_of
+from stiction.inference.whittle import SpectrumFamily, spectrum_of
 from stiction.inference.window import Window
 from stiction.interface import Interface
-from stiction.model import Count, Flag, Number, Progress, Real, at_least, checked, is_finite
+from stiction.model import Flag, Number, Progress, at_least, checked, is_finite
 from stiction.random.random_field import RandomField
+from stiction.random.spectra import Share
 from stiction.variables import QUANTITIES
 
 MARGINALS = ("lognormal", "weibull", "gamma", "beta")
@@ -38,7 +38,6 @@ ADVICE = {
     "marginal": "the values are far from its family; compare families",
     "spectrum": "the periodogram is far from its family; take another spectrum or a higher detrend",
 }
-FIXED = {"exponent": ", as in spectrum={'type': 'power_law', 'exponent': 4}"}
 STRESSES = ("mean", "standard_deviation", "noise", "low", "high", "loc", "scale")
 """Parameters in the unit of the field."""
 
@@ -67,7 +66,6 @@ DEFAULT_TOO = Field(validate_default=True)
 Known = Annotated[Any, BeforeValidator(_known), DEFAULT_TOO]
 Marginals = Annotated[Any, BeforeValidator(_families), DEFAULT_TOO]
 Spectrum = Annotated[Any, BeforeValidator(spectrum_of), DEFAULT_TOO]
-Share = Annotated[Real, Field(gt=0.0, lt=1.0)]
 
 
 class Goodness(NamedTuple):
@@ -149,11 +147,7 @@ class FieldFit:
             own = QUANTITIES[self.quantity].units if last in STRESSES else "1"
             unit = "m" if last.endswith("length") else own
             line = f"  {name:{width}s}  {value:<11.5g} {low:.4g} to {high:.4g}"
-            line += "" if unit == "1" else f" {unit}"
-            least, most = RANGES.get(last, (-math.inf, math.inf))
-            if low <= least or high >= most:
-                line += f" (searched from {least:g} to {most:g})"
-            lines.append(line)
+            lines.append(line if unit == "1" else f"{line} {unit}")
         p_values = ", ".join(f"{name} {p:.3g}" for name, p in self.p_values.items())
         lines.append(f"  p-values: {p_values} ({len(self.repetitions)} repetitions)")
         return "\n".join([*lines, *(f"  ! {doubt}" for doubt in self.doubts)])
@@ -176,7 +170,6 @@ def fit_field(
     bootstrap: at_least(FEWEST) = 200,  # type: ignore[valid-type]
     confidence: Share = 0.9,
     seed: Number = 0,
-    workers: Count | None = None,
     progress: Progress = True,
 ) -> FieldFit:
     """Fit a random field to measured profiles, with an interval for every parameter.
@@ -193,7 +186,7 @@ def fit_field(
         Needed for arrays without coordinates. A warning is issued if it is too short, or its nodes
         too coarse, for the fitted field.
     marginal : str, dict or sequence of them
-        Family: 'beta', 'lognormal', 'weibull', 'gamma', 'truncated_normal', 'normal' or any
+        Family: 'beta', 'lognormal', 'weibull', 'gamma', 'normal' or any
         continuous distribution of `scipy.stats`. Of several, the best is chosen, and
         `families` in the result compares them. A table fixes parameters: ``{"type": "beta",
         "low": 0, "high": 2e6}``. Both bounds of 'beta' are estimated unless they are given;
@@ -222,8 +215,6 @@ def fit_field(
         Of the intervals.
     seed : int
         Seed of the repetitions.
-    workers : int, optional
-        Threads; all cores by default. Results do not depend on it.
     progress : bool or callable
         As in `stiction.monte_carlo`.
 
@@ -283,11 +274,10 @@ def fit_field(
     levels = _levels(rows) if between else np.ones(len(rows))
     rows = [row * levels.mean() / level for row, level in zip(rows, levels, strict=True)]
     found, compared = _best([Setting(windows, one, family) for one in marginal], rows)
-    cores = usable_cores() if workers is None else workers
-    repeated, asked = bootstrapped(found, bootstrap, confidence, seed, cores, progress)
+    repeated = bootstrapped(found, bootstrap, confidence, seed, progress)
     tests = {"marginal": "distance", "spectrum": "roughness"}
     p_values = {name: _p_value(of, *repeated[0]) for name, of in tests.items()}
-    done = sum(len(one.fits) for one in repeated)
+    failed = len(repeated) * bootstrap - sum(len(one.fits) for one in repeated)
     points = sum(record.values.size for record in records)
     parameters = dict(found.parameters)
     ends = intervals(repeated, confidence, np.concatenate(rows))
@@ -308,7 +298,7 @@ def fit_field(
         lengths_held=_lengths_held(found),
         missing=(points - sum(row.size for row in rows), points),
         quantity=quantity,
-        doubts=tuple(_doubts(found, p_values, done, asked)),
+        doubts=tuple(_doubts(found, p_values, failed)),
         _estimate=found,
         _rows=rows,
     )
@@ -387,7 +377,7 @@ def _p_value(name: str, truth: Estimate, fits: Sequence[Estimate]) -> float:
     return (sum(getattr(one, name) >= own for one in fits) + 1) / (len(fits) + 1)
 
 
-def _doubts(found: Estimate, p_values: Mapping[str, float], done: int, asked: int) -> list[str]:
+def _doubts(found: Estimate, p_values: Mapping[str, float], failed: int) -> list[str]:
     """Reasons not to trust a fit."""
     doubts = []
     held, noise = _lengths_held(found), found.model.noise
@@ -403,9 +393,9 @@ def _doubts(found: Estimate, p_values: Mapping[str, float], done: int, asked: in
             f" {math.sqrt(left):.3g} left: the correlation length depends on the family"
         )
     doubts += [
-        f"{name} {value:.3g} lies at the end of the searched range, {end:.3g}: the data do not"
-        f" determine it; fix its value{FIXED.get(name, '')}"
-        for name, value, end in found.setting.spectrum.ends_met(found.model)
+        f"{name} {value:.3g} lies at an end of the searched range: the data do not determine it;"
+        f" fix its value, as in spectrum={{'type': 'power_law', 'exponent': 4}}"
+        for name, value in found.setting.spectrum.at_end(found.model).items()
     ]
     doubts += [
         f"the p-value of the {name} is {p:.2g}, below {FAR:g}: {ADVICE[name]}, or look at"
@@ -413,10 +403,8 @@ def _doubts(found: Estimate, p_values: Mapping[str, float], done: int, asked: in
         for name, p in p_values.items()
         if p <= FAR
     ]
-    if done < asked:
-        doubts.append(
-            f"intervals are from {done} of {asked} repetitions; the family does not fit the others"
-        )
+    if failed:
+        doubts.append(f"the family does not fit {failed} repetitions, which the intervals omit")
     return doubts
 
 

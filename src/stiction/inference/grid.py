@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from stiction.arrays import Array
-from stiction.progress import SILENT, Meter
 
 Function = Callable[[Array], Array]
 """Logarithms at points (points, parameters)."""
@@ -37,7 +36,9 @@ class Grid:
 
     def marginal(self, axis: int) -> Array:
         """Return the mass of the cells along one parameter."""
-        return _along(self.mass, axis)
+        others = tuple(i for i in range(self.mass.ndim) if i != axis)
+        result: Array = self.mass.sum(axis=others)
+        return result
 
     def held(self, axis: int, low: float, high: float) -> float:
         """Return the mass between two values of one parameter, as u."""
@@ -51,11 +52,6 @@ class Grid:
         held = mass > 0.0
         return float(np.sum(mass[held] * np.log(mass[held] / prior)))
 
-    def spread(self, axis: int) -> float:
-        """Return the standard deviation of one parameter, as u."""
-        mass, centres = self.marginal(axis), self.centres(axis)
-        return float(np.sqrt(mass @ (centres - mass @ centres) ** 2))
-
     def draws(self, count: int, seed: int) -> Array:
         """Draw from the posterior as u, (count, parameters), uniform within the cells."""
         rng = np.random.default_rng(seed)
@@ -66,40 +62,7 @@ class Grid:
         return result
 
 
-def _along(mass: Array, axis: int) -> Array:
-    result: Array = mass.sum(axis=tuple(i for i in range(mass.ndim) if i != axis))
-    return result
-
-
-def _evaluated(function: Function, low: Array, high: Array, along: int, meter: Meter) -> Array:
-    """Evaluate the function at the centres of the cells of a box."""
-    dimension = low.size
-    steps = (np.arange(along) + 0.5) / along
-    mesh = np.stack(np.meshgrid(*([steps] * dimension), indexing="ij"), axis=-1)
-    u = low + (high - low) * mesh.reshape(-1, dimension)
-    parts = []
-    for start in range(0, u.shape[0], BATCH):
-        parts.append(function(u[start : start + BATCH]))
-        meter.advance(parts[-1].size)
-    return np.concatenate(parts).reshape((along,) * dimension)
-
-
-def _closer(mass: Array, low: Array, high: Array) -> tuple[Array, Array]:
-    """Return the box without the cells on either side that hold almost no mass."""
-    new_low, new_high = low.copy(), high.copy()
-    for axis in range(mass.ndim):
-        along = _along(mass, axis)
-        below = int(np.sum(np.cumsum(along) <= NEGLIGIBLE))
-        above = int(np.sum(np.cumsum(along[::-1]) <= NEGLIGIBLE))
-        width = (high[axis] - low[axis]) / along.size
-        new_low[axis] += max(below - 1, 0) * width  # one cell of margin
-        new_high[axis] -= max(above - 1, 0) * width
-    return new_low, new_high
-
-
-def grid_of(
-    function: Function, low: Array, high: Array, meter: Meter = SILENT, points: int = POINTS
-) -> Grid | None:
+def grid_of(function: Function, low: Array, high: Array, points: int = POINTS) -> Grid | None:
     """Return a density, given by its logarithm, between two corners; None if it is zero.
 
     The first grid covers all of it; each next one the box that holds all but a millionth of the
@@ -107,17 +70,24 @@ def grid_of(
     faster than any power of the step once a cell is narrower than the density.
     """
     along = int(min(MOST_ALONG, max(8, points ** (1.0 / low.size))))
-    for zoom in range(ZOOMS):
-        values = _evaluated(function, low, high, along, meter)
+    steps = [(np.arange(along) + 0.5) / along] * low.size
+    unit = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1)
+    for _ in range(ZOOMS):
+        u = (low + (high - low) * unit).reshape(-1, low.size)
+        parts = [function(u[start : start + BATCH]) for start in range(0, u.shape[0], BATCH)]
+        values = np.concatenate(parts).reshape(unit.shape[:-1])
         top = float(values.max())
         if top == -np.inf:
             return None
-        mass = np.exp(values - top)
-        total = float(mass.sum())
-        cell = float(np.prod((high - low) / along))
-        mass /= total
-        closer = _closer(mass, low, high)
-        if zoom == ZOOMS - 1 or np.all(closer[1] - closer[0] > 0.9 * (high - low)):
+        mass, cell = np.exp(values - top), (high - low) / along
+        evidence = top + float(np.log(mass.sum() * np.prod(cell)))
+        grid = Grid(low, high, mass / mass.sum(), evidence)
+        # Cells on either side that hold almost no mass, less one of margin.
+        rows = [grid.marginal(axis) for axis in range(low.size)]
+        below = [np.sum(np.cumsum(row) <= NEGLIGIBLE) - 1 for row in rows]
+        above = [np.sum(np.cumsum(row[::-1]) <= NEGLIGIBLE) - 1 for row in rows]
+        closer = low + np.maximum(below, 0) * cell, high - np.maximum(above, 0) * cell
+        if np.all(closer[1] - closer[0] > 0.9 * (high - low)):
             break
         low, high = closer
-    return Grid(low, high, mass, top + float(np.log(total * cell)))
+    return grid

@@ -12,8 +12,7 @@ from stiction.ensemble.limit_state import no_single_length
 from stiction.ensemble.pilot import compare, doubt
 from stiction.errors import InputError, warn_accuracy
 from stiction.inference.grid import Grid, grid_of
-from stiction.inference.likelihood import Likelihood, make_likelihood
-from stiction.inference.onset_table import experiments_at
+from stiction.inference.likelihood import Likelihood, experiments_at, make_likelihood
 from stiction.inference.peaks import Peaks, factor_of, make_peaks
 from stiction.inference.posterior import Posterior
 from stiction.inference.prior import Prior, make_prior
@@ -146,17 +145,15 @@ def infer(
         own.problem.warn_of_units(mean_in_stress(own.problem, own.random, "strength"))
 
         def likelihood_of(method: Any, samples: int | None, *box: Array) -> Likelihood:
-            made = make_likelihood(
+            return make_likelihood(
                 parameters, *box, method=method, lengths=measured.lengths, error=error,
                 samples=samples, seed=seed, variable=measured.variable, meter=meter,
-            )  # fmt: skip
-            meter.stage("posterior")
-            return made.of(measured.values)
+            ).of(measured.values)  # fmt: skip
 
         box = np.zeros(parameters.dimension), np.ones(parameters.dimension)
         if method.type != "local_criterion" and not no_single_length(own.problem, own.random):
-            box = _first_box(likelihood_of(LocalCriterion(), None, *box), meter)
-        likelihood, grid = _located(partial(likelihood_of, method, samples), *box, meter)
+            box = _first_box(likelihood_of(LocalCriterion(), None, *box))
+        likelihood, grid = _located(partial(likelihood_of, method, samples), *box)
     u = grid.draws(DRAWS, seed)
     theta = parameters.theta(u)
     error = np.sqrt(sum(map(np.size, measured.values)) / likelihood.samples)
@@ -173,14 +170,14 @@ def infer(
     )
 
 
-def _first_box(likelihood: Likelihood, meter: Meter) -> tuple[Array, Array]:
+def _first_box(likelihood: Likelihood) -> tuple[Array, Array]:
     """Return corners, as u, between which the local criterion finds the posterior.
 
     All of the prior if it cannot produce the peaks: where nodes reach their residual strength
     before the onset, the other methods may.
     """
     low, high = likelihood.low, likelihood.high
-    grid = None if likelihood.refusals() else grid_of(likelihood, low, high, meter)
+    grid = None if likelihood.refusals() else grid_of(likelihood, low, high)
     if grid is None:
         return low, high
     room = np.maximum(WIDEN * (grid.high - grid.low), 1e-3)
@@ -188,7 +185,7 @@ def _first_box(likelihood: Likelihood, meter: Meter) -> tuple[Array, Array]:
 
 
 def _located(
-    likelihood_in: Callable[..., Likelihood], low: Array, high: Array, meter: Meter
+    likelihood_in: Callable[..., Likelihood], low: Array, high: Array
 ) -> tuple[Likelihood, Grid]:
     """Return the likelihood in a box of the prior that holds the posterior, and the posterior."""
     while True:
@@ -196,7 +193,7 @@ def _located(
         whole = bool(np.all(low == 0.0) and np.all(high == 1.0))
         if whole and (refused := likelihood.refusals()):
             raise InputError(refused)
-        grid = grid_of(likelihood, low, high, meter)
+        grid = grid_of(likelihood, low, high)
         if whole and grid is None:
             raise InputError(
                 "peaks: no point of the prior can produce all of them; widen the prior, or give"
@@ -221,7 +218,7 @@ def grown(grid: Grid | None, low: Array, high: Array) -> tuple[Array, Array]:
 
 
 def _notes(likelihood: Likelihood, error: float, u: Array) -> tuple[str, ...]:
-    """Return the limitations of the posterior; serious ones are also issued as warnings."""
+    """Return the limitations of the posterior, and issue them as warnings."""
     prior = likelihood.prior
     notes = _piled_up(prior, u)
     middle = prior.theta(u.mean(axis=0, keepdims=True))
@@ -236,8 +233,6 @@ def _notes(likelihood: Likelihood, error: float, u: Array) -> tuple[str, ...]:
         )
     for text in notes:
         warn_accuracy(text)
-    if likelihood.scaling.reason:
-        notes.append(f"every parameter was simulated: {likelihood.scaling.reason}")
     return tuple(notes)
 
 

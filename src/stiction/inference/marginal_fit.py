@@ -30,67 +30,51 @@ LEAST = 1e-12
 DIFFERENCE = 1e-5
 WIDEST = 10.0
 """Largest distance of free bounds from the values, in their ranges: more has no effect."""
-INSIDE = 1e-2
-"""Least distance of noisy values from a bound for a first guess, as a share of their range."""
 NEGLIGIBLE = 1e-4
 """Share of noise that does not change a marginal."""
+INSIDE = 1e-2
+"""Least distance of noisy values from a bound for a first guess, as a share of their range."""
 MOST_NOISE = 0.95
-
-
-class Search(NamedTuple):
-    """Where to begin, between which limits, and scipy's parameters of a vector."""
-
-    start: Any
-    limits: Sequence[tuple[float, float]]
-    parameters: Callable[[Array], tuple[float, ...]]
-
-
-class Kind(NamedTuple):
-    """A family fitted here: scipy's, and functions of u = (value - loc)/scale and its shapes."""
-
-    family: Any
-    distribution: Callable[..., Array]
-    log_density: Callable[..., Array]
 
 
 def _positive(u: Array) -> Array:
     return np.maximum(u, 1e-300)
 
 
-def _between(below: float, above: float) -> float:
-    """Probability of a standard normal number between two bounds."""
-    return max(float(ndtr(above) - ndtr(below)), 1e-300)
-
-
-KINDS = {
-    "lognormal": Kind(
+KINDS: dict[str, tuple[Any, Callable[..., Array], Callable[..., Array]]] = {
+    "lognormal": (
         scipy.stats.lognorm,
         lambda u, s: ndtr(np.log(_positive(u)) / s),
         lambda u, s: -np.log(u) - math.log(s) - 0.5 * (np.log(u) / s) ** 2,
     ),
-    "weibull": Kind(
+    "weibull": (
         scipy.stats.weibull_min,
         lambda u, k: -np.expm1(-(_positive(u) ** k)),
         lambda u, k: math.log(k) + (k - 1.0) * np.log(u) - u**k,
     ),
-    "gamma": Kind(
+    "gamma": (
         scipy.stats.gamma,
         lambda u, a: gammainc(a, _positive(u)),
         lambda u, a: (a - 1.0) * np.log(u) - u - math.lgamma(a),
     ),
-    "beta": Kind(
+    "beta": (
         scipy.stats.beta,
         lambda u, a, b: betainc(a, b, np.clip(u, 0.0, 1.0)),
         lambda u, a, b: (a - 1.0) * np.log(u) + (b - 1.0) * np.log1p(-u) - betaln(a, b),
     ),
-    "truncated_normal": Kind(
-        scipy.stats.truncnorm,
-        lambda u, a, b: (ndtr(np.clip(u, a, b)) - ndtr(a)) / _between(a, b),
-        lambda u, a, b: -0.5 * u * u - math.log(_between(a, b)),
-    ),
 }
+"""Families fitted here: scipy's, its distribution function and its log density, both of
+(value - loc)/scale."""
 SCIPYS = {"normal": "norm"}
 """Our names of families of scipy."""
+
+
+class Search(NamedTuple):
+    """Where to begin, between which limits, and scipy's parameters of a vector."""
+
+    start: Array
+    limits: Sequence[tuple[float, float]]
+    parameters: Callable[[Array], tuple[float, ...]]
 
 
 @dataclass(frozen=True)
@@ -107,19 +91,21 @@ class Family:
             return self._by_scipy(quiet)
         if noise**2 <= NEGLIGIBLE * values.var():
             noise, values = 0.0, quiet
-        kind, search = KINDS[self.name], self._search(values, quiet, noise, start)
-        limits = np.array(search.limits)
-        counts, at, probabilities = (
-            _bins(values, noise) if noise else (np.ones(values.size), values, None)
+        family, distribution, log_density = KINDS[self.name]
+        search = (_beta if self.name == "beta" else _by_scale)(
+            self, values, quiet, noise, start
         )
+        limits = np.array(search.limits)
+        counts, at = np.ones(values.size), values
+        if noise:
+            counts, at, probabilities = _bins(values, noise)
 
         def terms(v: Array) -> Array:
             *shapes, low, scale = search.parameters(v)
             u = (at - low) / scale
-            if probabilities is not None:
-                return np.log(probabilities(kind.distribution(u, *shapes)))
-            found: Array = kind.log_density(u, *shapes) - math.log(scale)
-            return found
+            if noise:
+                return np.log(probabilities(distribution(u, *shapes)))
+            return log_density(u, *shapes) - math.log(scale)
 
         def value_of(v: Array) -> tuple[float, Array]:
             found = terms(v)
@@ -131,42 +117,12 @@ class Family:
             return slopes @ counts, (slopes * counts) @ slopes.T
 
         best = climb(search.start, limits, value_of, derivatives, longest=0.5, settled=1e-4)
-        return self._member(search.parameters(best))
-
-    def _search(self, values: Array, quiet: Array, noise: float, start: Any) -> Search:
-        if self.name == "beta":
-            return _beta(values, quiet, noise, self.fixed, start)
-        low, high = self.bounds
-        mean, unit = float(quiet.mean()), float(quiet.std())
-        if self.name == "truncated_normal":
-
-            def parameters(v: Array) -> tuple[float, ...]:
-                middle, width = mean + unit * float(v[0]), unit * math.exp(v[1])
-                return (low - middle) / width, (high - middle) / width, middle, width
-
-            return Search(np.zeros(2), [(-8.0, 8.0), (-3.0, 2.5)], parameters)
-        start = start or MARGINALS[self.name](mean=mean, cv=unit / mean, low=low)
-        shape, _, scale = start.distribution.args
-        limits = [(-700.0, 700.0), (-5.0, 5.0) if self.name == "lognormal" else (-1.6, 7.0)]
-        return Search(
-            np.log([scale, shape]), limits, lambda v: (math.exp(v[1]), low, math.exp(v[0]))
-        )
-
-    def _member(self, parameters: tuple[float, ...]) -> Any:
-        """The marginal of scipy's parameters; most of ours have a mean and a cv instead."""
+        parameters = search.parameters(best)
         if self.name == "beta":
             a, b, low, width = parameters
             return Beta(alpha=a, beta=b, low=low, high=low + width)
-        mean, variance = map(float, KINDS[self.name].family.stats(*parameters))
-        # A cut normal distribution may tend to an exponential or uniform one: the widest is taken
-        # that its moments still determine.
-        for narrower in 0.97 ** np.arange(60):
-            try:
-                cv = narrower * math.sqrt(variance) / mean
-                return MARGINALS[self.name](mean=mean, cv=cv, **self.fixed)
-            except InputError:
-                continue
-        raise InputError(f"marginal: no {self.name!r} distribution resembles the values")
+        mean, variance = map(float, family.stats(*parameters))
+        return MARGINALS[self.name](mean=mean, cv=math.sqrt(variance) / mean, **self.fixed)
 
     def _by_scipy(self, values: Array) -> Any:
         family = getattr(scipy.stats, SCIPYS.get(self.name, self.name))
@@ -227,7 +183,7 @@ def family_of(given: Any) -> Family:
     fixed = table_of(given)
     name = str(fixed.pop("type", None))
     if name in KINDS:
-        known = ("low", "high") if name in ("beta", "truncated_normal") else ("low",)
+        known = ("low", "high") if name == "beta" else ("low",)
     else:
         family = getattr(scipy.stats, SCIPYS.get(name, name), None)
         if not isinstance(family, scipy.stats.rv_continuous):
@@ -245,10 +201,20 @@ def family_of(given: Any) -> Family:
     return Family(name, zero | {key: float(value) for key, value in fixed.items()})
 
 
-def _beta(
-    values: Array, quiet: Array, noise: float, fixed: dict[str, float], start: Any
-) -> Search:
+def _by_scale(family: Family, values: Array, quiet: Array, noise: float, start: Any) -> Search:
+    """Return the search of scale and shape above a known lower bound, as logarithms."""
+    low, mean = family.fixed["low"], float(quiet.mean())
+    first = start or MARGINALS[family.name](mean=mean, cv=float(quiet.std()) / mean, low=low)
+    shape, _, scale = first.distribution.args
+    limits = [(-700.0, 700.0), (-5.0, 5.0) if family.name == "lognormal" else (-1.6, 7.0)]
+    return Search(
+        np.log([scale, shape]), limits, lambda v: (math.exp(v[1]), low, math.exp(v[0]))
+    )
+
+
+def _beta(family: Family, values: Array, quiet: Array, noise: float, start: Any) -> Search:
     """Return the search of shapes and distances of free bounds from the mean, as logarithms."""
+    fixed = family.fixed
     mean, unit = float(values.mean()), float(values.std())
     sides = {name: side for name, side in (("low", -1.0), ("high", 1.0)) if name not in fixed}
     room = {"low": mean - float(values.min()), "high": float(values.max()) - mean}

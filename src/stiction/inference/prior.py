@@ -19,7 +19,6 @@ from stiction.random.random_interface import RandomInterface, as_random_interfac
 
 TAIL = 1e-4
 """Probability that is cut from either end of a prior without bounds."""
-MOST = 8
 MARGINAL = ("mean", "cv", "low", "high", "scale", "alpha", "beta")
 """Parameters of a marginal, whose keys begin with its name."""
 
@@ -91,15 +90,12 @@ def with_parameters(
     problem: Problem, random: RandomInterface, names: Sequence[str], values: Array
 ) -> tuple[Problem, RandomInterface]:
     """Return both with some parameters replaced, by the keys of a prior."""
-    replaced: dict[str, dict[str, float]] = {"problem": {}, "random": {}}
-    for name, value in zip(names, values, strict=True):
-        part, _, key = full_key(name).partition(".")
-        replaced[part][key] = float(value)
-    own, others = replaced["problem"], replaced["random"]
-    return (
-        with_values(problem, own) if own else problem,
-        with_values(random, others) if others else random,
-    )
+    parts: dict[str, Any] = {"problem": problem, "random": random}
+    for part in parts:
+        pairs = zip(map(full_key, names), values, strict=True)
+        own = {k.partition(".")[2]: float(v) for k, v in pairs if k.startswith(part + ".")}
+        parts[part] = with_values(parts[part], own) if own else parts[part]
+    return parts["problem"], parts["random"]
 
 
 def _tails(distribution: Any) -> tuple[float, float]:
@@ -125,31 +121,28 @@ def distribution_of(key: str, value: Any) -> Any:
     """Return a frozen distribution, given one, two ends, or a table {low, high, spacing}."""
     if isinstance(getattr(value, "dist", None), scipy.stats.rv_continuous):
         return value
-    table: dict[str, Any] = {"spacing": "linear"}
-    if isinstance(value, Mapping):
-        table |= value
-    elif isinstance(value, list | tuple) and len(value) == 2:
-        table |= {"low": value[0], "high": value[1]}
+    if isinstance(value, list | tuple) and len(value) == 2:
+        value = {"low": value[0], "high": value[1]}
+    table = {"spacing": "linear"} | dict(value) if isinstance(value, Mapping) else {}
     low, high, spacing = (table.get(name, np.nan) for name in ("low", "high", "spacing"))
-    known = len(table) == 3 and spacing in ("linear", "log")
-    known = known and is_finite(low) and is_finite(high) and low < high
-    if not known or (spacing == "log" and low <= 0.0):
-        raise InputError(
-            f"prior: {key}: must be a frozen continuous scipy.stats distribution such as"
-            " scipy.stats.uniform(1e-3, 9e-3), a range (low, high) with low < high, or"
-            " {'low': ..., 'high': ..., 'spacing': 'linear' or, of a positive range, 'log'}, got"
-            f" {describe(value)}"
-        )
-    if spacing == "linear":
+    valid = len(table) == 3 and is_finite(low) and is_finite(high) and low < high
+    if valid and spacing == "linear":
         return scipy.stats.uniform(low, high - low)
-    return scipy.stats.loguniform(low, high)
+    if valid and spacing == "log" and low > 0.0:
+        return scipy.stats.loguniform(low, high)
+    raise InputError(
+        f"prior: {key}: must be a frozen continuous scipy.stats distribution such as"
+        " scipy.stats.uniform(1e-3, 9e-3), a range (low, high) with low < high, or"
+        " {'low': ..., 'high': ..., 'spacing': 'linear' or, of a positive range, 'log'}, got"
+        f" {describe(value)}"
+    )
 
 
 def make_prior(problem: Problem, random: Any, given: Any) -> Prior:
     """Return the prior of these arguments, or raise one `InputError` with all that is wrong."""
-    if not isinstance(given, Mapping) or not 0 < len(given) <= MOST:
+    if not isinstance(given, Mapping) or not given:
         raise InputError(
-            f"prior: must map 1 to {MOST} parameters to distributions or ranges, such as"
+            "prior: must map parameters to distributions or ranges, such as"
             f" {{'correlation_length': (1e-3, 1e-2)}}, got {describe(given)}"
         )
     problems: list[str] = []

@@ -38,7 +38,6 @@ class Scaling(NamedTuple):
     reference: Array  # (parameters,): where shift is 0 and stretch 1
     shifts: Array  # in the unit of the peaks: a constant, then one slope for each key
     stretches: Array  # the same
-    reason: str = ""  # why there are none
 
     def of(self, theta: Array) -> tuple[Array, Array]:
         """Return shift (unit of the peaks) and stretch at points (points, parameters)."""
@@ -52,19 +51,17 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
     """Find the parameters of a prior that scale the onset; `variable` names the peaks."""
     middle = prior.middle
     problem, random = prior.at(middle)
-    if reason := _no_scaling(prior, problem, random, method):
-        return _none(middle, reason)
-    field = random.strength
+    none = Scaling((), middle, np.zeros(1), np.ones(1))
+    field, full = random.strength, [full_key(name) for name in prior.names]
+    if not _may_scale(problem, random, method) or PRESSURE in full:
+        return none
     names, location, scale = affine_parameters(field.marginal)
-    full = [full_key(name) for name in prior.names]
     places = {
         key.removeprefix(MARGINAL): i for i, key in enumerate(full) if key.startswith(MARGINAL)
     }
     if "mean" in names and {"low", "high"} & places.keys():
-        names = ()  # a bound of such a marginal changes its shape
+        return none  # a bound of such a marginal changes its shape
     keys = tuple(i for name, i in places.items() if name in names)
-    if places and not keys:
-        return _none(middle, "the parameters of the marginal change its shape")
     shifts, stretches = np.zeros(len(keys) + 1), np.zeros(len(keys) + 1)
     shifts[0], stretches[0] = location, scale
     aside = prior.theta(np.full((1, prior.dimension), 0.9))[0]
@@ -75,38 +72,29 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
         stretches[slope] = (stretched - scale) / (aside[i] - middle[i])
         shifts[0] -= shifts[slope] * middle[i]
         stretches[0] -= stretches[slope] * middle[i]
-    varies = field.of is not None and np.ndim(problem.load.normal_pressure) > 0
-    if keys and (varies or method.type != "local_criterion") and (location or shifts[1:].any()):
-        why = "the normal pressure varies" if varies else "a residual strength may be reached"
-        return _none(middle, f"the parameters of the marginal shift it, and {why}")
+    pressure = problem.load.normal_pressure
+    varies = field.of is not None and np.ndim(pressure) > 0
+    if (varies or method.type != "local_criterion") and (location or shifts[1:].any()):
+        return none
     stretches /= scale
     shifts -= location * stretches
-    pressure = problem.load.normal_pressure
     mean = 1.0 if pressure is None else float(np.mean(pressure))
     factor = 1.0 if field.of is None else mean
     factor = factor / mean if variable == "friction_coefficient" else factor
     return Scaling(keys, middle, factor * shifts, stretches)
 
 
-def _none(middle: Array, reason: str) -> Scaling:
-    return Scaling((), middle, np.zeros(1), np.ones(1), reason)
-
-
-def _no_scaling(prior: Prior, problem: Any, random: Any, method: Any) -> str:
-    """Return the reason why no parameter scales the onset, or an empty text."""
+def _may_scale(problem: Any, random: Any, method: Any) -> bool:
+    """Whether the onset scales with the strength if this keeps its distribution."""
     friction, load = problem.friction, problem.load
-    if method.type not in ("local_criterion", "equilibrium"):
-        return f"the onset by {method.label} does not scale with the strength"
-    if len(random.names) > 1:
-        return "more than the strength is random"
-    if any(full_key(name) == PRESSURE for name in prior.names):
-        return "the normal pressure is not known"
-    if friction.weakening_rate is None:
-        return "the weakening rate follows from the strength"
-    if np.ptp(problem.load_profile) > 0.0 or np.ptp(load.initial_stress) > 0.0:
-        return "the load is not uniform"
-    if method.type != "local_criterion" and np.any(np.asarray(friction.residual_strength)):
-        return "the residual strength does not scale with the strength"
-    if method.type != "local_criterion" and np.any(np.asarray(load.initial_stress)):
-        return "the initial stress does not scale with the strength"
-    return ""
+    exact = method.type == "equilibrium"
+    return bool(
+        (exact or method.type == "local_criterion")
+        and len(random.names) == 1
+        and friction.weakening_rate is not None
+        and np.ptp(problem.load_profile) == 0.0
+        and np.ptp(load.initial_stress) == 0.0
+        # Neither of these scales with the strength; the local criterion needs no zero.
+        and not (exact and np.any(np.asarray(friction.residual_strength)))
+        and not (exact and np.any(np.asarray(load.initial_stress)))
+    )

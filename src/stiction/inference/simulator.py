@@ -1,6 +1,6 @@
 """Peaks of tests as a function of parameters, for other inference codes."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from stiction.arrays import Array
 from stiction.ensemble.experiment import Experiment
 from stiction.errors import InputError
-from stiction.inference.onset_table import simulate
+from stiction.inference.likelihood import simulate
 from stiction.inference.prior import with_parameters
 from stiction.load import NotNegative
 from stiction.methods import MethodObject
@@ -45,8 +45,8 @@ def simulator(
     Returns
     -------
     callable
-        ``simulate(theta)`` returns the peaks, Pa, of shape (samples,); theta is a sequence
-        of numbers or a mapping by name. ``simulate(theta, first=k)`` returns those of
+        ``simulate(theta)`` returns the peaks, Pa, of shape (samples,); theta has a
+        number for each parameter. ``simulate(theta, first=k)`` returns those of
         samples k, k + 1, ..., independent of the first call if k >= samples. All theta
         share the samples, so that peaks are smooth in theta.
 
@@ -74,13 +74,6 @@ def simulator(
     def simulated(theta: Any, *, first: int = 0) -> Array:
         """Peaks of samples first, first + 1, ... at these parameters, Pa, (samples,)."""
         first = check("first", first, at_least(0))
-        if isinstance(theta, Mapping):
-            if set(theta) != set(parameters):
-                given = describe(list(theta))
-                raise InputError(
-                    f"theta: must have the keys {', '.join(parameters)}, got {given}"
-                )
-            theta = [theta[name] for name in parameters]
         values = check("theta", theta, Numbers)
         if values.shape != (len(parameters),) or not np.isfinite(values).all():
             raise InputError(

@@ -14,7 +14,7 @@ expectation alike. The score stays unbiased; what lies below the floor ceases to
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -51,6 +51,7 @@ FLOOR = 1e-3
 NEIGHBOURS = 5
 ORDERS = 10
 REACH, POINTS = 6.0, 121
+SHOWN = ("correlation_length", "exponent", "anisotropy")
 AT_END = 1e-3
 """Distance from an end of a range, as a share of it, within which an estimate is at it."""
 DIFFERENCE = 1e-4
@@ -182,17 +183,11 @@ class SpectrumFamily:
         return tuple(n for n in names if known.get(n) is None and n not in others)
 
     @cached_property
-    def ranges(self) -> dict[str, tuple[float, float]]:
-        """Ends of the searched range of each parameter."""
-        ranges = RANGES | {"correlation_length": self.lengths}
-        return {name: ranges[name] for name in self.free}
-
-    @cached_property
     def limits(self) -> Array:
-        """The same on the scale of the search, (parameters, 2)."""
-        return np.transpose(
-            [self.vector(ends) for ends in zip(*self.ranges.values(), strict=True)]
-        )
+        """Ends of the searched ranges on the scale of the search, (parameters, 2)."""
+        ranges = RANGES | {"correlation_length": self.lengths}
+        ends = zip(*[ranges[name] for name in self.free], strict=True)
+        return np.transpose([self.vector(end) for end in ends])
 
     def model(self, vector: Array, shares: Array) -> Model:
         """Return the model of a vector of parameters."""
@@ -212,19 +207,21 @@ class SpectrumFamily:
         """Return free parameters on the scale of the search."""
         return np.array([_scaled(*one) for one in zip(self.free, values, strict=True)])
 
-    def ends_met(self, model: Model) -> Iterator[tuple[str, float, float]]:
-        """Yield parameters that lie at an end of their range: name, value and that end."""
-        found = self.of(model)
-        beside = np.abs(self.limits - self.vector(list(found.values()))[:, None])
-        near = beside < AT_END * np.ptp(self.limits, axis=1, keepdims=True)
-        for (name, value), ends in zip(found.items(), near, strict=True):
-            if name in ("correlation_length", "exponent", "anisotropy") and ends.any():
-                yield name, value, self.ranges[name][ends.argmax()]
+    def vector_of(self, model: Model) -> Array:
+        """Return the vector of a model."""
+        return self.vector(list(self.of(model).values()))
 
     def of(self, model: Model) -> dict[str, float]:
         """Return the free parameters of a model."""
         owners = {name: model.spectrum for name in ("correlation_length", "exponent")}
         return {name: float(getattr(owners.get(name, model), name)) for name in self.free}
+
+    def at_end(self, model: Model) -> dict[str, float]:
+        """Return the parameters of a spectrum that lie at an end of their range."""
+        aside = np.abs(self.limits - self.vector_of(model)[:, None]).min(axis=1)
+        near = aside < AT_END * np.ptp(self.limits, axis=1)
+        values = zip(self.of(model).items(), near, strict=True)
+        return {name: value for (name, value), is_near in values if is_near and name in SHOWN}
 
 
 class Whittle(NamedTuple):
@@ -234,15 +231,15 @@ class Whittle(NamedTuple):
     shares: Array
     observed: Sequence[Observed]
 
-    def loss(self, expected: Sequence[Array]) -> float:
-        """Return minus the log likelihood; infinite where less than nothing is expected."""
+    def of(self, expected: Sequence[Array]) -> float:
+        """Return the log likelihood; -inf where less than nothing is expected."""
         value = 0.0
         for one, e in zip(self.observed, expected, strict=True):
             lifted = e + one.floor
             if lifted.min() <= 0.0:
-                return math.inf
+                return -math.inf
             terms = np.log(lifted) + (one.average + one.floor) / lifted
-            value += one.records * float(np.sum(one.window.weights * terms))
+            value -= one.records * float(np.sum(one.window.weights * terms))
         return value
 
     def coarse(self) -> Array:
@@ -251,16 +248,16 @@ class Whittle(NamedTuple):
         tried = TRIED | {"correlation_length": lengths}
         windows = [one.window for one in self.observed]
         power = sum(float(np.sum(one.window.weights * one.average)) for one in self.observed)
-        best, least = np.zeros(0), math.inf
+        best, most = np.zeros(0), -math.inf
         for values in itertools.product(*[tried[name] for name in self.family.free]):
             at = self.family.vector(values)
             model = self.family.model(at, self.shares)
             expected = [model.expectation(window) for window in windows]
             pairs = zip(windows, expected, strict=True)
             scale = power / sum(float(np.sum(window.weights * e)) for window, e in pairs)
-            value = self.loss([scale * e for e in expected])
-            if value < least:
-                best, least = at, value
+            value = self.of([scale * e for e in expected])
+            if value > most:
+                best, most = at, value
                 best[0] = math.log(scale)
         return best
 
@@ -274,34 +271,26 @@ class Whittle(NamedTuple):
         model = self.family.model(at, self.shares)
         signals = [model.signal(one.window) for one in self.observed]
         pairs = zip(self.observed, signals, strict=True)
-        loss = self.loss([model.expectation(one.window, signal) for one, signal in pairs])
-        return -loss, (model, signals)
+        value = self.of([model.expectation(one.window, signal) for one, signal in pairs])
+        return value, (model, signals)
 
     def score(self, at: Array, state: tuple[Model, list[Array]]) -> tuple[Array, Array]:
         """Return sum w d (I/E - 1) and Fisher's information sum w d d^T, d = d log E/d theta."""
         family, limits = self.family, self.family.limits
         model, signals = state
-        moved = {}
-        for i, name in enumerate(family.free):
-            if name not in ("variance", "noise_share"):
-                aside = at.copy()
-                aside[i] += DIFFERENCE if at[i] + DIFFERENCE <= limits[i, 1] else -DIFFERENCE
-                moved[name] = family.model(aside, self.shares), aside[i] - at[i]
+        steps = np.where(at + DIFFERENCE <= limits[:, 1], DIFFERENCE, -DIFFERENCE)
+        aside = [family.model(at + step, self.shares) for step in np.diag(steps)]
         result, information = np.zeros(at.size), np.zeros((at.size, at.size))
         for one, signal in zip(self.observed, signals, strict=True):
             expected = model.expectation(one.window, signal)
-            # Of a known noise the share falls as the variance grows.
-            slopes = {
-                "variance": expected if family.noise is None else model.variance * signal,
-                "noise_share": model.variance * (one.window.white - signal),
-            }
-            scale = model.variance * (1.0 - model.noise_share)
-            for name, (other, step) in moved.items():
-                slopes[name] = scale * (other.signal(one.window) - signal) / step
-            lifted = expected + one.floor
-            d = np.stack([(slopes[name] / lifted).ravel() for name in family.free])
+            d = np.empty((at.size, expected.size))
+            for i, (name, other) in enumerate(zip(family.free, aside, strict=True)):
+                same = name in ("variance", "noise_share")
+                moved = other.expectation(one.window, signal if same else None)
+                d[i] = ((moved - expected) / steps[i] / (expected + one.floor)).ravel()
             weight = one.records * one.window.weights.ravel()
-            result += d @ (weight * ((one.average - expected) / lifted).ravel())
+            away = (one.average - expected) / (expected + one.floor)
+            result += d @ (weight * away.ravel())
             information += (d * weight) @ d.T
         return result, information
 
