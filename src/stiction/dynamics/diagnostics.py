@@ -109,7 +109,6 @@ def finish_step(state: State, setting: Setting, record: Array, row: int, step: S
     now.time, now.load = step.time, step.load
     now.top_rate, now.slid = step.top, step.slid
     now.work += step.work
-    now.step = step.size
     now.scale = max(now.scale, load_at(setting.scale_loads, setting.scales, step.load))
     fall = observe(now, setting.thresholds.unstable_rate, mean_stress, step)
     if step.slid >= setting.thresholds.breakable and now.kinetic_stress == -np.inf:

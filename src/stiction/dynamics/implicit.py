@@ -268,7 +268,6 @@ def implicit_steps(
             break
         too_much = largest > 2.0 * thresholds.slip_step
         if failed or too_much or _accelerates(now, thresholds, attempt, largest, radiated):
-            now.rejected_steps += 1
             step = size / 2.0
             if step < smallest:
                 reason = Reason.TO_EXPLICIT

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,7 +15,7 @@ from stiction.dynamics.energies import energy_balance
 from stiction.dynamics.integrator import Run
 from stiction.dynamics.state import RECORD, Floats, State
 from stiction.dynamics.summary import per_area
-from stiction.errors import InputError, StoreError, unknown_name
+from stiction.errors import InputError, unknown_name
 from stiction.files import UNREADABLE, read_arrays, write_arrays, write_whole
 from stiction.interface import Interface
 from stiction.model import Count, FilePath, Names, Real, Text, checked, model
@@ -124,21 +123,17 @@ class Save:
 
     def nodes(self, interface: Interface) -> NDArray[np.int64]:
         """Return the numbers of the stations' nodes, flat; refuse those not on the interface."""
-        lengths, problems, numbers = interface.lengths, [], []
+        lengths, numbers = interface.lengths, []
         for name, place in self.stations.items():
             at = np.array(place)
-            if at.size == len(lengths) and np.all((at >= 0.0) & (at <= lengths)):
-                steps = np.round(at / interface.spacings).astype(int)
-                index = tuple(steps % interface.shape)
-                numbers.append(int(np.ravel_multi_index(index, interface.shape)))
-            else:
+            if at.size != len(lengths) or not np.all((at >= 0.0) & (at <= lengths)):
                 reach = " x ".join(f"{length:g}" for length in lengths)
-                problems.append(
+                raise InputError(
                     f"stations[{name!r}]: {place} is not on the interface of {reach} m; give"
                     f" {' and '.join(interface.dims)} in m, from the first node"
                 )
-        if problems:
-            raise InputError(problems)
+            index = tuple(np.round(at / interface.spacings).astype(int) % interface.shape)
+            numbers.append(np.ravel_multi_index(index, interface.shape))
         return np.array(numbers, dtype=np.int64)
 
 
@@ -148,6 +143,7 @@ class Recorder:
     def __init__(self, run: Run, save: Save, attributes: dict[str, Any]) -> None:
         self.run, self.save, self.attributes = run, save, attributes
         interface = run.medium.interface
+        self._others = repr([save.fields, save.stations])  # on which a folder depends, too
         self._columns = len(RECORD) + len(STATIONS) * len(save.stations)
         self._record = np.empty((save.every, self._columns))
         self._frames: list[dict[str, Any]] = []
@@ -212,12 +208,10 @@ class Recorder:
 
         If it holds a part of the run, the state becomes that which was written last.
         """
-        import xarray as xr
-
         folder = self.save.to
         if folder is None:
             return False
-        checkpoint, whole = folder / _CHECKPOINT, folder / _SUMMARY
+        checkpoint = folder / _CHECKPOINT
         if not checkpoint.exists():
             if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
                 raise InputError(
@@ -226,20 +220,12 @@ class Recorder:
             write_checkpoint(checkpoint, self.run, state, self._others)
             return False
         read_checkpoint(checkpoint, self.run, state, self._others)
-        if whole.exists():
-            with xr.open_dataset(whole, engine="netcdf4") as summary:
-                if summary.attrs.get("study") == json.dumps(self.attributes.get("study")):
-                    return True
-            whole.unlink()  # of a run that goes on, to another end
+        if (folder / _SUMMARY).exists():
+            return True
         for path in folder.glob(_CHUNKS):
             if int(path.stem.removeprefix("frames-")) > state.steps:
                 path.unlink()
         return False
-
-    @property
-    def _others(self) -> str:
-        """Everything besides the run on which a folder depends."""
-        return repr([self.save.fields, self.save.stations])
 
     def flush(self, state: State, stopped: str | None = None) -> None:
         """Write what was gathered, if there is enough or the run has stopped, and the state."""
@@ -248,20 +234,13 @@ class Recorder:
         full = len(self._frames) >= FRAMES or steps >= _MOST_STEPS
         if folder is None or not (full or (stopped and (self._frames or steps))):
             return
-        path = folder / f"frames-{state.steps:012d}.nc"
-        try:
-            _write(path, self.take())
-            if stopped in (None, "max_steps"):  # at its end a run would take another step
-                write_checkpoint(folder / _CHECKPOINT, self.run, state, self._others)
-        except StoreError as error:
-            raise StoreError(
-                f"to: cannot write {path.name} to {str(folder)!r} ({error}); the files before it "
-                "are complete and can be opened"
-            ) from error
+        _write(folder / f"frames-{state.steps:012d}.nc", self.take())
+        if stopped in (None, "max_steps"):  # at its end a run would take another step
+            write_checkpoint(folder / _CHECKPOINT, self.run, state, self._others)
 
-    def finish(self, dataset: xr.Dataset) -> None:
-        """Write the variables of the whole run beside its frames."""
-        if self.save.to is not None:
+    def finish(self, dataset: xr.Dataset, stopped: str) -> None:
+        """Write the variables of the whole run beside its frames, unless it can go on."""
+        if self.save.to is not None and stopped != "max_steps":
             whole = dataset.drop_dims(["time", "step"], errors="ignore")
             _write(self.save.to / _SUMMARY, whole)
 
@@ -271,17 +250,14 @@ def _write(path: Path, dataset: xr.Dataset) -> None:
 
 
 def _digest(run: Run, others: str) -> str:
-    """SHA-256 of all that a run depends on besides its state, except when to stop."""
+    """SHA-256 of all that a run depends on besides its state."""
     medium, setting = run.medium, run.setting
     grid = medium.grid
-    thresholds = setting.thresholds._replace(
-        slid_stop=0.0, event_stop=False, rest_stop=False, end_time=0.0
-    )
     slips = np.linspace(0.0, 5.0, 101)  # where laws are compared, in units of d_c
     law = np.concatenate([run.friction.fraction(slips), *map(np.ravel, setting.law)])
     digest = hashlib.sha256(repr([medium.interface, float(medium.step), others]).encode())
     for values in (
-        *setting.nodes, law, *run.history, np.array(thresholds, float),
+        *setting.nodes, law, *run.history, np.array(setting.thresholds, float),
         grid.impedance, grid.stiffness, grid.poles, grid.weights,
     ):  # fmt: skip
         digest.update(np.ascontiguousarray(values).tobytes())

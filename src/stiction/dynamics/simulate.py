@@ -120,7 +120,7 @@ def simulate_rupture(
     dataset = recorder.take() if save.to is None else open_rupture(save.to, fields=())
     dataset.attrs["stopped"] = stopped
     result = _complete(dataset, problem, method, run, state)
-    recorder.finish(result)
+    recorder.finish(result, stopped)
     return with_gaps(problem, result, measured)
 
 

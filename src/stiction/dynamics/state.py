@@ -47,12 +47,10 @@ DIAGNOSTICS = np.dtype(
         ("top_rate", "f8"),  # largest slip rate, m/s
         ("slid", "i8"),  # nodes at the residual strength
         ("bad_node", "i8"),  # first node whose slip rate became non-finite; -1 if none
-        ("step", "f8"),  # size of the last step, s
         ("past_step", "f8"),  # of the last implicit step; 0 before the first one
         ("radiated", "f8"),  # Z <V> after the last implicit step
         ("explicit_steps", "i8"),
         ("implicit_steps", "i8"),
-        ("rejected_steps", "i8"),
         ("calm_steps", "i8"),  # in a row, and the largest slip rate when the row began, m/s
         ("calm_rate", "f8"),
         ("scale", "f8"),  # stress scale of the largest load so far

@@ -8,10 +8,10 @@ Pereyra 1973), and reweighting in the way of Lawson (1961) levels the error. A f
 only if its error on another, denser set of times is below the tolerance.
 """
 
+import contextlib
 import dataclasses
 import hashlib
 import itertools
-import logging
 from functools import cache
 from pathlib import Path
 
@@ -22,8 +22,6 @@ from stiction.arrays import one_blas_thread
 from stiction.elasticity.memory_kernels import arc_quadrature, exponential_sum
 from stiction.errors import InputError, StoreError
 from stiction.files import UNREADABLE, cache_folder, read_arrays, write_arrays
-
-logger = logging.getLogger("stiction")
 
 Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
@@ -233,10 +231,10 @@ def kernel_sum(mode: str, eta: float, tolerance: float = 1e-6) -> ExponentialSum
     kernel = _read(path)
     if kernel is None:
         kernel = fit_exponentials(mode, eta, tolerance)
-        try:
+        with contextlib.suppress(
+            StoreError
+        ):  # where nothing can be written, it stays in memory
             write_arrays(path, vars(kernel))
-        except StoreError as error:
-            logger.info("cannot write the kernel cache (%s); kernels stay in memory", error)
     return kernel
 
 
