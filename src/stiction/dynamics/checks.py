@@ -1,7 +1,6 @@
 """Refusals and warnings of a run: coarse grids, rates of loading, loads that reverse."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction.dynamics.integrator import Run
 from stiction.dynamics.loading import load_at
@@ -63,37 +62,26 @@ def at_first_slip(run: Run) -> State:
         if rise > _COARSEST:
             raise InputError(text)
         warn_accuracy(f"{text} (the onset is sampled coarsely)")
-    times, values = run.history
-    lowest, nodes = float(values[times <= time].min()), run.setting.nodes
-    below = lowest * nodes.profile + nodes.initial < -nodes.strength
-    _warn_of_reverse(run, below, time, lowest)
+    _warn_of_reverse(run, time)
     return run.start(time)
 
 
-def warn_if_reversed(run: Run, state: State) -> bool:
-    """Warn if the stress is below minus the strength now; return whether it is.
-
-    Where a rupture overshot, what has slipped may be left with a negative stress at a positive
-    load: that is not counted.
-    """
-    if state.stress.min() >= 0.0:
-        return False
-    now, strength = state.now, run.strength_after(state.slip)
-    below = state.stress < -strength - 1e-6 * now["scale"]
-    below &= (state.slip == 0.0) | (now["load"] < 0.0)
-    return _warn_of_reverse(run, below, now["time"], now["load"])
-
-
-def _warn_of_reverse(run: Run, below: NDArray[np.bool_], time: float, load: float) -> bool:
-    nodes = np.flatnonzero(below)
-    if nodes.size:
+def _warn_of_reverse(run: Run, first_slip: float) -> None:
+    """Warn if the load may take the stress below minus the strength, which falls by slip."""
+    times, values = run.history
+    nodes, lowest = run.setting.nodes, float(values.min())
+    later = values[times > first_slip].min(initial=0.0)
+    below = lowest * nodes.profile + nodes.initial < -nodes.strength
+    if later < 0.0:
+        below |= later * nodes.profile + nodes.initial < -nodes.residual
+    at = np.flatnonzero(below)
+    if at.size:
         warn_accuracy(
-            f"the stress is below minus the strength at {nodes.size} nodes, the first at "
-            f"{run.medium.interface.describe_node(nodes[0])} (up to t = {time:.6g} s, tau_0 = "
-            f"{load:.6g} Pa): they would slip in reverse, which is not modelled, and are kept at "
-            "rest; change the sign of the load, or keep it above minus the strength"
+            f"the stress falls below minus the strength at {at.size} nodes, the first at "
+            f"{run.medium.interface.describe_node(at[0])}, where tau_0 = {lowest:.6g} Pa: they "
+            "would slip in reverse, which is not modelled, and are kept at rest; change the sign "
+            "of the load, or keep it above minus the strength"
         )
-    return bool(nodes.size)
 
 
 def check_finite(run: Run, state: State, reason: int) -> None:

@@ -14,6 +14,7 @@ from stiction.dynamics.memory import (
     explicit_tables,
     implicit_tables,
     scale_memory,
+    step_table,
     sum_memory,
 )
 from stiction.dynamics.state import (
@@ -219,7 +220,8 @@ class Run:
     def _explicit_tables(self) -> ExplicitTables:
         if not isinstance(self.tables, ExplicitTables):
             self.tables, medium = None, self.medium
-            self.tables = explicit_tables(medium.grid, medium.step, *medium.step_table())
+            table = medium.step_table or step_table(medium.grid, medium.step)
+            self.tables = explicit_tables(medium.grid, medium.step, *table)
         return self.tables
 
     def _to_explicit(self, state: State) -> None:

@@ -31,22 +31,13 @@ class Medium:
     largest_step: float  # limit of stability of the explicit step, s
     shear_modulus: float  # G, Pa
     effective_modulus: float  # G*, Pa
+    # Kept for a line; on a plane it would leave no room for tables of implicit steps.
+    step_table: tuple[Floats, Floats] | None
 
     @property
     def impedance(self) -> float:
         """Z = G/(2 c_s), Pa s/m."""
         return self.grid.impedance
-
-    def step_table(self) -> tuple[Floats, Floats]:
-        """Return tables of the explicit step, kept for a line; those of a plane are too large.
-
-        (Beside them a run on a plane would have no room for those of its implicit steps.)
-        """
-        return step_table(self.grid, self.step) if self.interface.is_plane else self._line_table
-
-    @functools.cached_property
-    def _line_table(self) -> tuple[Floats, Floats]:
-        return step_table(self.grid, self.step)
 
 
 def prepare_medium(
@@ -82,7 +73,9 @@ def prepare_medium(
             f"and solid; use at most {0.9 * limit:.6g} s"
         )
     grid = _grid(problem, kernels)
-    return Medium(interface, grid, step, limit, solid.shear_modulus, problem.effective_modulus)
+    table = None if interface.is_plane else step_table(grid, step)
+    moduli = solid.shear_modulus, problem.effective_modulus
+    return Medium(interface, grid, step, limit, *moduli, table)
 
 
 def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:

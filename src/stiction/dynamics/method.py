@@ -60,21 +60,18 @@ LoadHistory = Annotated[
 class Rupture:
     """Onset from an elastodynamic simulation under a slowly rising load.
 
-    Adaptive implicit steps follow the creeping interface, explicit steps its rupture. A run
-    begins just below the first instability (see `start`) and ends when every node that can
-    break has reached its residual strength, or as `stop` specifies. Strength may be
-    infinite where nothing ever breaks, and the initial stress may be above the strength:
-    such a patch breaks at once, at zero load.
+    Adaptive implicit steps follow the creeping interface, explicit steps its rupture. Strength
+    may be infinite where nothing ever breaks, and the initial stress may be above the
+    strength: such a patch breaks at once, at zero load.
 
     Parameters
     ----------
     loading_rate : float, optional
         d tau_0/dt, Pa/s, positive. Either this or `load` must be given.
     kernel_tolerance : float
-        Allowed error of the memory kernel C(T), a sum of exponentials (1), up to T = |k|
-        c_s t = 1e5. The sum is fitted once for each solid and stored on disk, in 1 s at 1e-6
-        (22 pairs) or half a minute at 1e-8 (35). From about 1e-3 on, waves may grow at any
-        time step, which raises an error.
+        Allowed error (1) of the memory kernel, a sum of exponentials. The sum is fitted once
+        for each solid and stored on disk, in 1 s at 1e-6 (22 pairs) or half a minute at 1e-8
+        (35). From about 1e-3 on, waves may grow at any time step, which raises an error.
     courant : float
         Explicit time step in units of the stability limit, in (0, 1].
     time_step : float, optional
@@ -86,10 +83,9 @@ class Rupture:
     start : {"equilibrium", "rest"}
         "rest": at the first slip. "equilibrium": on the quasi-static path, as close below
         the first instability as the estimated error allows; `start_load` is the load there,
-        and `start_error` (Pa) the estimate. The run begins at the first slip, with
-        `start_error` 0, if the loading rate is too high, if a node loses half of its
-        strength before, on planes, with laws that are not piecewise linear, and with
-        barriers or stress above the strength.
+        and `start_error` (Pa) the estimate. The run still begins at the first slip if the
+        loading rate is too high, if a node loses half of its strength before, on planes, with
+        laws that are not piecewise linear, and with barriers or stress above the strength.
     end_time : float, optional
         Time at which a run ends at the latest, s, but for a part of the last explicit step.
     load : (times, values), optional

@@ -11,10 +11,9 @@ import pydantic
 from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
-from stiction.dynamics.energies import energy_balance
 from stiction.dynamics.integrator import Run
 from stiction.dynamics.state import RECORD, Floats, State
-from stiction.dynamics.summary import per_area
+from stiction.dynamics.summary import energy_balance, per_area
 from stiction.errors import InputError, unknown_name
 from stiction.files import UNREADABLE, read_arrays, write_arrays, write_whole
 from stiction.interface import Interface

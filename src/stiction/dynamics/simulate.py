@@ -11,7 +11,6 @@ from stiction.dynamics.checks import (
     at_first_slip,
     check_finite,
     warn_if_coarse,
-    warn_if_reversed,
     warn_if_unresolved,
 )
 from stiction.dynamics.integrator import Run
@@ -135,7 +134,7 @@ def _attributes(problem: Problem, method: Rupture) -> dict[str, Any]:
 
 def _follow(run: Run, state: State, recorder: Recorder, most: int, meter: Meter) -> str:
     """Take steps and keep frames until the run ends; return the reason."""
-    every, reversed_ = recorder.save.every, False
+    every = recorder.save.every
     while state.steps < most:
         count = every if state.explicit else max(1, every // 10)
         taken, reason = recorder.advance(state, min(count, most - state.steps))
@@ -144,7 +143,6 @@ def _follow(run: Run, state: State, recorder: Recorder, most: int, meter: Meter)
         except FloatingPointError as error:
             warn_accuracy(str(error))
             return f"not finite: {error}"
-        reversed_ = reversed_ or warn_if_reversed(run, state)
         recorder.add(state)
         now = state.now
         meter.note = (

@@ -13,10 +13,10 @@ the error of the state and, as a stress, the amount by which the onset can be mi
 
 import numpy as np
 
-from stiction.dynamics.energies import energy_balance
 from stiction.dynamics.integrator import Run
 from stiction.dynamics.memory import grown_memory
 from stiction.dynamics.state import State
+from stiction.dynamics.summary import energy_balance
 from stiction.equilibrium.dense import LineProgram
 from stiction.equilibrium.sample import Sample as StaticSample
 from stiction.equilibrium.sample import exceeds, refused
