@@ -330,10 +330,3 @@ def test_a_damaged_cache_file_is_built_again(tmp_path, monkeypatch):
     path.write_bytes(path.read_bytes()[:50])
     assert np.array_equal(built_again().poles, first.poles)
     assert path.stat().st_size > 500
-    for poles, weights in (
-        (first.poles, first.weights[1:]),
-        (-first.poles, first.weights),
-        (np.array(["a"]), np.array(["b"])),
-    ):
-        np.savez(path, poles=poles, weights=weights, error=0.0)
-        assert np.array_equal(built_again().poles, first.poles)

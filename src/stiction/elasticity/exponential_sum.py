@@ -181,18 +181,7 @@ def _attempt(
 def fit_exponentials(mode: str, eta: float, tolerance: float) -> ExponentialSum:
     """Return the shortest sum of exponentials found whose validated error is below the tolerance.
 
-    Parameters
-    ----------
-    mode : {"II", "III"}
-    eta : float
-        c_d / c_s (1); not used in mode III.
-    tolerance : float
-        Allowed error of C(T), absolute (1), between 1e-9 and 1e-2; C(0) = G*/G.
-
-    Raises
-    ------
-    InputError
-        If the tolerance is out of range or no sum of up to 60 pairs reaches it.
+    `eta` is c_d/c_s, not used in mode III; the tolerance is absolute, and C(0) = G*/G.
     """
     if not 1e-9 <= tolerance <= 1e-2:
         raise InputError(f"kernel tolerance: must lie in [1e-09, 0.01], got {tolerance!r}")
@@ -220,11 +209,7 @@ def fit_exponentials(mode: str, eta: float, tolerance: float) -> ExponentialSum:
 
 @cache
 def kernel_sum(mode: str, eta: float, tolerance: float = 1e-6) -> ExponentialSum:
-    """Return the validated sum of exponentials, from memory, from disk, or built now (about 1 s).
-
-    Parameters and errors as in `fit_exponentials`. Two processes that build the same kernel
-    at once both succeed: each writes aside and renames.
-    """
+    """Return the sum of `fit_exponentials`, from memory, from disk, or built now (about 1 s)."""
     eta = 1.0 if mode == "III" else float(eta)
     text = f"{_FORMAT} {mode} {eta.hex()} {float(tolerance).hex()} {T_MAX.hex()}"
     path = cache_folder() / f"kernel-{hashlib.sha256(text.encode()).hexdigest()[:20]}.npz"
@@ -241,9 +226,6 @@ def kernel_sum(mode: str, eta: float, tolerance: float = 1e-6) -> ExponentialSum
 def _read(path: Path) -> ExponentialSum | None:
     try:
         data = read_arrays(path)
-        poles, weights = data["poles"], data["weights"]
-        kernel = ExponentialSum(poles, weights, float(data["error"]))
-        whole = poles.dtype == weights.dtype == np.complex128 and poles.shape == weights.shape
-        return kernel if whole and poles.ndim == 1 and np.all(poles.real < 0.0) else None
-    except (*UNREADABLE, TypeError):
+        return ExponentialSum(data["poles"], data["weights"], float(data["error"]))
+    except UNREADABLE:
         return None  # not there, or damaged: it is built and written again

@@ -125,12 +125,8 @@ def solve_inside(
 
     x is a guess, then the solution, with its residual, as from `residual_of`; both are zero
     outside. Of the three fields of the workspace the second is the direction of negative
-    curvature if one is met.
-
-    Returns
-    -------
-    status, iterations : int
-        SOLVED (no residual above the tolerance, Pa), NEGATIVE (curvature) or EXHAUSTED.
+    curvature if one is met. Returns SOLVED (no residual above the tolerance, Pa), NEGATIVE
+    (curvature) or EXHAUSTED, and the number of iterations.
     """
     z, direction, image = workspace[0], workspace[1], workspace[2]
     restrict(residual, inside)

@@ -38,23 +38,12 @@ def stiffness_symbol(
 
 
 class Transform(NamedTuple):
-    """Shapes and axes of the transform of an interface; read-only, shared by threads.
+    """Shapes and axes of the transform of an interface; read-only, shared by threads."""
 
-    Attributes
-    ----------
-    shape : (int, int)
-        Shape of a profile; (1, nodes) on a line, so that one compiled kernel serves both.
-    half : (int, int)
-        Shape of its real transform.
-    every, first, last : int arrays
-        All axes that are transformed, all but the last of them, the last; of a line counted
-        on flat arrays.
-    """
-
-    shape: tuple[int, int]
-    half: tuple[int, int]
-    every: NDArray[np.int64]
-    first: NDArray[np.int64]
+    shape: tuple[int, int]  # of a profile; (1, nodes) on a line: one kernel serves both
+    half: tuple[int, int]  # of its real transform
+    every: NDArray[np.int64]  # axes that are transformed; of a line counted on flat arrays
+    first: NDArray[np.int64]  # all but the last of them
     last: NDArray[np.int64]
 
 
@@ -98,24 +87,13 @@ def convolve(
 
 
 class Operator(NamedTuple):
-    """K - W of an interface, an approximate inverse and a workspace; not for two threads at once.
-
-    Attributes
-    ----------
-    transform : Transform
-    symbol, inverse : (modes,) arrays
-        K(k) (Pa/m) and 1/(K(k) + W/2) with the mean W.
-    rate : (nodes,) array
-        W, Pa/m, zero where the residual strength is reached.
-    spectrum : (modes,) complex array
-        Overwritten by each transform.
-    """
+    """K - W of an interface, an approximate inverse and a workspace; for one thread at a time."""
 
     transform: Transform
-    symbol: Array
-    inverse: Array
-    rate: Array
-    spectrum: NDArray[np.complex128]
+    symbol: Array  # (modes,): K(k), Pa/m
+    inverse: Array  # (modes,): 1/(K(k) + W/2) with the mean W
+    rate: Array  # (nodes,): W, Pa/m, zero where the residual strength is reached
+    spectrum: NDArray[np.complex128]  # (modes,): overwritten by each transform
 
 
 def make_operator(symbol: Array, rate: Array | float, shape: tuple[int, ...]) -> Operator:
