@@ -303,9 +303,7 @@ def cut(
     interval: tuple[float, float], limits: tuple[float, float], at: float
 ) -> tuple[float, float]:
     """Cut an interval at limits; one beyond becomes the whole range, or reaches to the estimate."""
-    low, high = (min(max(end, limits[0]), limits[1]) for end in interval)
-    near = SAME if np.isfinite(limits).all() else 0.0
-    for end in limits:
-        if math.isclose(low, end, rel_tol=near) and math.isclose(high, end, rel_tol=near):
-            low, high = (end if math.isfinite(end) else at for end in limits)
+    low, high = np.clip(interval, *limits).tolist()
+    if high - low <= (SAME * high if np.isfinite(limits).all() else 0.0):
+        low, high = (end if math.isfinite(end) else at for end in limits)
     return low, high

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -163,27 +164,24 @@ def _expected(
     gains = np.full((repetitions, dimension), np.nan)
     for row in range(repetitions):
         truth, start = rng.random(dimension), int(rng.integers(2**32))
-        likelihood = simulated.of(
-            [
-                simulated.predicted(kind, np.tile(truth, (count, 1)), start + kind)
-                for kind, count in enumerate(tests)
-            ]
-        )
-
-        def given_what_is_known(
-            v: Array, truth: Array = truth, likelihood: Likelihood = likelihood
-        ) -> Array:
-            u = np.tile(truth, (v.shape[0], 1))
-            u[:, free] = v
-            return likelihood(u)
-
+        peaks = [
+            simulated.predicted(kind, np.tile(truth, (count, 1)), start + kind)
+            for kind, count in enumerate(tests)
+        ]
+        likelihood = simulated.of(peaks)
         box = simulated.low[free], simulated.high[free]
+        given = partial(_given_the_rest, likelihood, truth, free)
         # A posterior may fall between the points of a coarse grid.
-        grid = grid_of(given_what_is_known, *box, points=POINTS) or grid_of(
-            given_what_is_known, *box, points=50 * POINTS
-        )
+        grid = grid_of(given, *box, POINTS) or grid_of(given, *box, 50 * POINTS)
         if grid is not None:
             gains[row, free] = [grid.information(place) for place in range(len(free))]
         meter.advance()
     error = gains.std(axis=0) / np.sqrt(repetitions)
     return np.stack([gains.mean(axis=0), error])
+
+
+def _given_the_rest(likelihood: Likelihood, truth: Array, free: list[int], v: Array) -> Array:
+    """Return the likelihood at points `v` of the free parameters, the others being known."""
+    u = np.tile(truth, (v.shape[0], 1))
+    u[:, free] = v
+    return likelihood(u)

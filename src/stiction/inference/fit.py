@@ -71,10 +71,9 @@ Spectrum = Annotated[Any, BeforeValidator(spectrum_of), DEFAULT_TOO]
 class Goodness(NamedTuple):
     """Quality of a family of marginals: its best member, and two measures of the fit.
 
-    `distance` is the largest difference of the distribution functions (Kolmogorov). `score`
-    is the log likelihood of as many independent values as the records hold correlation
-    lengths, less the number of parameters, and less that of the best family; differences
-    below about 2 are not significant.
+    `distance` is Kolmogorov's. `score` is the log likelihood of as many independent values as the
+    records hold correlation lengths, less the number of parameters, and less that of the best
+    family; differences below about 2 are not significant.
     """
 
     marginal: Any
@@ -244,9 +243,8 @@ def fit_field(
     (Sykulski et al., 2019; Guillaumin et al., 2022). Correlations of values follow from
     those of the Gaussian field z by Hermite expansion (Grigoriu, 1995).
 
-    The curvature of the likelihood understates the error. The intervals come from a studentised
-    bootstrap (Davison and Hinkley, 1997, section 5.2), and their upper and lower ends from
-    fields of longer and shorter correlation (Carpenter, 1999), which matters for short records.
+    Intervals come from a studentised bootstrap (Davison and Hinkley, 1997, section 5.2), their
+    upper and lower ends from fields of longer and shorter correlation (Carpenter, 1999).
 
     Examples
     --------

@@ -108,9 +108,9 @@ def infer(
     The likelihood is a kernel density of simulated onsets, combined with the error of the
     load cell. Parameters that only shift and stretch the strength need no simulation: see
     `stiction.inference.scaling` for when the onset follows them exactly. The others are
-    simulated on a grid with the same draws everywhere, and interpolated. The posterior is
-    summed on a grid that closes in on it, for up to four parameters or so; for more, give
-    `log_likelihood` and `prior_transform` of the result to emcee or dynesty.
+    simulated on a grid with the same draws everywhere, and interpolated. The posterior is summed
+    on a grid, for up to about four parameters; for more, give `log_likelihood` and
+    `prior_transform` of the result to emcee or dynesty.
 
     Examples
     --------

@@ -41,9 +41,9 @@ class Peaks(NamedTuple):
         return "friction_coefficient" if self.coefficients else "critical_stress"
 
     def __str__(self) -> str:
+        pairs = zip(self.lengths, self.values, strict=True)
         kinds = [
-            f"{values.size} peaks{'' if length is None else f' at {length:g} m'}"
-            for length, values in zip(self.lengths, self.values, strict=True)
+            f"{v.size} peaks" + (f" at {length:g} m" if length else "") for length, v in pairs
         ]
         return ", ".join(kinds)
 

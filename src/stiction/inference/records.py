@@ -77,9 +77,7 @@ def _of_array(values: Any, interface: Interface | None) -> list[Record]:
     try:
         array = real_array(values)
     except TypeError as error:
-        raise InputError(
-            f"must be numbers, or a DataArray such as st.read_profile returns; {error}"
-        ) from None
+        raise InputError(f"must be numbers or a DataArray; {error}") from None
     if interface is None:
         raise InputError(
             f"an array of shape {array.shape} has no point spacing; give the interface, or a"
@@ -107,9 +105,8 @@ def _spacing(x: Array, name: str) -> float:
     if uneven or np.diff(np.round(place)).min() < 1:
         raise InputError(
             f"{name} is not equally spaced: the point at {x[off.argmax()]:.6g} m is off by"
-            f" {off.max():.2g} of the mean spacing, {spacing:.6g} m; first put the profile on the"
-            " nodes of an interface: st.read_profile(..., interface=..., interpolate=True,"
-            " gaps='skip')"
+            f" {off.max():.2g} of the mean spacing; first st.read_profile(..., interface=...,"
+            " interpolate=True, gaps='skip')"
         )
     return spacing
 
