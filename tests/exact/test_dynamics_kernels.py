@@ -74,8 +74,7 @@ def test_symbol_has_its_limits():
 
 
 @pytest.mark.parametrize(
-    ("mode", "eta"),
-    [("II", ETA), ("II", ALMOST_INCOMPRESSIBLE), ("III", 1.0)],
+    ("mode", "eta"), [("II", ETA), ("II", ALMOST_INCOMPRESSIBLE), ("III", 1.0)]
 )
 def test_short_sum_reaches_its_tolerance_on_times_it_never_saw(mode, eta):
     kernel = kernel_sum(mode, eta, 1e-6)

@@ -8,10 +8,7 @@ import pytest
 
 VALIDATION = runpy.run_path(str(Path(__file__).parents[2] / "validation" / "inference.py"))
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning"),
-]
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")]
 
 
 def test_ranks_of_the_truth_are_uniform():

@@ -37,18 +37,10 @@ if __name__ == "__main__":
 def marks(folder):
     script = folder / "script.py"
     script.write_text(CODE)
-    environment = {
-        **os.environ,
-        "PYTHONPATH": str(SOURCES),
-        "NUMBA_CACHE_DIR": str(folder / "c"),
-    }
-    done = subprocess.run(
-        [sys.executable, str(script)],
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=600,
-    )
+    places = {"PYTHONPATH": str(SOURCES), "NUMBA_CACHE_DIR": str(folder / "c")}
+    environment = os.environ | places
+    command = [sys.executable, str(script)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
     found = done.stdout.split()
     assert len(found) == 6
