@@ -49,11 +49,7 @@ def least_average(
     is exact for the discrete problem, and only the place lies between the nodes.
     """
     count = len(excess)
-    load, place, chosen = (
-        np.full(count, np.inf),
-        np.zeros(count),
-        np.zeros(count, dtype=np.int64),
-    )
+    load, place, chosen = np.full(count, np.inf), np.zeros(count), np.zeros(count, np.int64)
     if not interface.is_plane:
         multiplier, axis = np.array(windows[0].spectrum), np.arange(1)
         scale, spectrum = np.empty(excess.shape[1]), np.empty(multiplier.size, dtype=complex)

@@ -16,12 +16,11 @@ from stiction.problem import Problem, Sample, refusals
 from stiction.results import onset_variables, position
 from stiction.variables import Variable
 
+# W times the slip at the centre of a critical patch over the curvature of its strength, on lines
+# and planes: the slip of (K - W) slip = tau_0 - curvature r^2 on the unit ball, K scalar, without
+# a singularity at the rim.
 SLIP = {1: 0.6614, 2: 1.3788}
-"""W times the slip at the centre of a critical patch over the curvature of its strength, on
-lines and planes: the slip of (K - W) slip = tau_0 - curvature r^2 on the unit ball, K scalar,
-without a singularity at the rim."""
-ENOUGH = 1000
-"""Number of samples for the estimate of how many reach their residual strength."""
+ENOUGH = 1000  # samples that tell how many reach their residual strength
 INSTEAD = "; use st.Equilibrium() or st.Rupture()"
 
 OWN_VARIABLES = {
@@ -98,11 +97,8 @@ class LocalCriterion:
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, Array]]:
         """Return a solver for samples of this problem.
 
-        Raises
-        ------
-        InputError
-            From the solver: if the weakening rate varies along the interface, or a critical patch
-            does not fit on it.
+        It raises an `InputError` if the weakening rate varies along the interface, or a critical
+        patch does not fit on it.
         """
         check_law(problem)
         interface = problem.interface
@@ -182,10 +178,8 @@ def beyond_residual(
             weight = window.weight[tuple(offsets.T)]
             weight = weight / weight.sum()
             slope = weight * (square - weight @ square)
-            node = np.rint(places[some].reshape(some.size, 1, len(shape)) / spacings).astype(
-                np.int64
-            )
-            at = tuple(np.moveaxis((node + offsets) % shape, -1, 0))
+            node = np.rint(places[some].reshape(some.size, 1, len(shape)) / spacings)
+            at = tuple(np.moveaxis((node.astype(np.int64) + offsets) % shape, -1, 0))
             patch, profile = (some[:, None], *at), sample.load_profile[at]
             load = loads[some]
             bend = (excess[patch] - load[:, None] * profile) @ slope / (slope @ square)
@@ -220,13 +214,10 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     Raises
     ------
     InputError
-        If the profile does not fit the problem, the weakening rate varies along the interface, or
-        a critical patch is larger than the interface.
+        If the weakening rate varies along the interface, or a critical patch is larger than it.
 
     Examples
     --------
-    The average of a uniform strength is that strength; of any other it lies between the extremes.
-
     >>> import stiction as st
     >>> problem = st.paper.problem(nodes=512)
     >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(problem.interface, seed=1)

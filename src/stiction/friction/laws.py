@@ -20,10 +20,10 @@ from stiction.model import OptionalProfile, Profile, Real, at_least, checked, is
 
 SCALES = ("weakening_rate", "critical_slip", "fracture_energy")
 """Any one of them sets how fast a law weakens."""
-NEARLY_RESIDUAL = 0.01
-"""Share of tau_p - tau_r that is left where a law that never ends counts as at its residual."""
-SLIPS = 4097
-"""Number of slips up to `FrictionLaw.reach` at which a law of one's own is examined."""
+NEARLY_RESIDUAL = (
+    0.01  # of tau_p - tau_r is left where a law that never ends counts as residual
+)
+SLIPS = 4097  # up to `FrictionLaw.reach`, at which a law of one's own is examined
 _VALID = {
     **dict.fromkeys(SCALES, (lambda value: value > 0.0, "be positive everywhere")),
     "residual_strength": (lambda value: value >= 0.0, "not be negative"),
@@ -121,8 +121,7 @@ class FrictionLaw(ABC):
     @property
     def scale(self) -> tuple[str, Any]:
         """Which of W, d_c and Gamma was given, and its value."""
-        name = next(name for name in SCALES if getattr(self, name) is not None)
-        return name, getattr(self, name)
+        return next((s, getattr(self, s)) for s in SCALES if getattr(self, s) is not None)
 
     def residual(self, strength: Array) -> Array:
         """Return tau_r, Pa, of a peak strength (Pa, any shape)."""
@@ -168,15 +167,11 @@ class LinearWeakening(FrictionLaw):
     Parameters
     ----------
     weakening_rate, critical_slip, fracture_energy : float or (nodes,) array, optional
-        One of W (Pa/m), d_c (m) and Gamma (J/m²), positive. With d_c, W = (tau_p - tau_r)/d_c
-        varies with the strength; with Gamma, W = (tau_p - tau_r)²/(2 Gamma) does.
+        Exactly one of W (Pa/m), d_c (m) and Gamma (J/m²), positive. With d_c,
+        W = (tau_p - tau_r)/d_c varies with the strength; with Gamma,
+        W = (tau_p - tau_r)²/(2 Gamma) does.
     residual_strength, residual_ratio : float or (nodes,) array, optional
         tau_r (Pa) or tau_r/tau_p in [0, 1).
-
-    Raises
-    ------
-    InputError
-        If none or several of W, d_c and Gamma are given, or a value is out of range.
 
     Notes
     -----
@@ -230,7 +225,7 @@ class ExponentialWeakening(FrictionLaw):
 
 
 def _listed(value: Any) -> Any:
-    return value.tolist() if isinstance(value, np.ndarray) else value
+    return value.tolist() if isinstance(value, np.ndarray) and value.ndim else value
 
 
 Corners: TypeAlias = Annotated[tuple[Real, ...], BeforeValidator(_listed)]
@@ -250,12 +245,6 @@ class PiecewiseWeakening(FrictionLaw):
     weakening_rate, critical_slip, fracture_energy, residual_strength, residual_ratio : optional
         As for `LinearWeakening`; W is that of the first piece, and the residual strength is
         reached at d_c.
-
-    Raises
-    ------
-    InputError
-        If the strength does not fall from corner to corner, none or several of W, d_c and
-        Gamma are given, or a value is out of range.
 
     Examples
     --------
@@ -334,11 +323,6 @@ class PiecewiseWeakening(FrictionLaw):
 
         Corners lie on the law at equal steps of strength. If the law never reaches its residual
         strength, the last piece dissipates as much as the rest of the law.
-
-        Raises
-        ------
-        InputError
-            If `law` is not a friction law or contradicts itself, or `pieces` is too small.
 
         Examples
         --------

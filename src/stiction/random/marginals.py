@@ -1,9 +1,7 @@
 """Marginal distributions: how strength is distributed at a point.
 
-In the families that are given by mean and coefficient of variation, `mean` is the mean of
-the field and `cv` its standard deviation over its mean, whatever the bound `low`. To add a
-family, derive from `Marginal`, with a `distribution`, and add it to `MARGINALS`; study files take
-every continuous distribution of `scipy.stats` by its name as it is.
+To add a family, derive from `Marginal`, with a `distribution`, and add it to `MARGINALS`; study
+files take every continuous distribution of `scipy.stats` by its name.
 """
 
 import math

@@ -20,18 +20,12 @@ HAIR = 1.0 + 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """The discrete spectrum on an interface: J modes, and the mean mode in front.
-
-    `sigma`, (J + 1,), are standard deviations, whose squares sum to 1; the first is zero
-    without the mean mode. `numbers`, (dimensions, J + 1), are the wave vectors in units of
-    2 pi/length; of k and -k, one. `ranks`, (J,), are the places of modes 1..J in the order of
-    draws, rising, whatever the spectrum leaves out.
-    """
+    """The discrete spectrum on an interface: J modes, and the mean mode in front."""
 
     interface: Interface
-    sigma: Array
-    numbers: NDArray[np.int64]
-    ranks: NDArray[np.int64]
+    sigma: Array  # standard deviations, (J + 1,), of unit sum of squares; 0 without a mean
+    numbers: NDArray[np.int64]  # wave vectors over 2 pi/length, (dimensions, J + 1); of +-k one
+    ranks: NDArray[np.int64]  # places of modes 1..J in the order of draws, rising, (J,)
     has_mean: bool
 
     @property
@@ -78,10 +72,7 @@ class Modes:
 def make_modes(
     spectrum: Any, mean_mode: bool, anisotropy: float, interface: Interface
 ) -> Modes:
-    """Find the modes of a spectrum: wave vectors on a line, or in an ellipse; of k and -k one.
-
-    An `InputError` if there are too many, or none.
-    """
+    """Find the modes of a spectrum; `InputError` if there are too many, or none."""
     dimensions = len(interface.shape)
     cutoff = spectrum.cutoff(dimensions)
     units = 2.0 * math.pi / np.array(interface.lengths)
@@ -115,10 +106,10 @@ def make_modes(
 
 
 def _numbers(interface: Interface, reach: Array) -> NDArray[np.int64]:
-    """Wave vectors in units of 2 pi/length among which the modes are, in the order of draws.
+    """Wave vectors over 2 pi/length among which the modes are, in the order of draws.
 
-    On a plane this is the order of growing rectangles of its proportions, so that a mode
-    has the same draws whatever the spectrum, its truncation and the grid.
+    On a plane that is the order of growing rectangles of its proportions, so that a mode has
+    the same draws whatever the spectrum and the grid.
     """
     if reach.size == 1:
         _refuse_too_many(reach[0])

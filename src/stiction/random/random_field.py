@@ -53,10 +53,9 @@ class RandomField:
 
     Notes
     -----
-    The same object serves lines and planes. A line cut through a plane along x has the
-    correlation of the field on a line, except that truncation removes slightly more power
-    on a plane. Translation process after Grigoriu (1995), spectral representation after
-    Shinozuka and Deodatis (1991); Albertini et al. (2020), Eqs. 2 to 7.
+    On a plane, a line along x has the correlation of the field on a line, except that
+    truncation removes slightly more power. Translation process after Grigoriu (1995), spectral
+    representation after Shinozuka and Deodatis (1991); Albertini et al. (2020), Eqs. 2 to 7.
 
     Examples
     --------
@@ -132,8 +131,7 @@ class RandomField:
     def given(self, profile: Any, *, noise: Positive) -> RandomField:
         """Return the field conditioned on measured values: fixed there, random elsewhere.
 
-        It is a field of the measured interface only. Its samples use the draws of this field,
-        and tend to the samples of this field as the noise grows.
+        Its samples use the draws of this field, and tend to its samples as the noise grows.
 
         Parameters
         ----------
@@ -224,8 +222,8 @@ class RandomField:
     ) -> Array:
         """Compute the correlation at the lags ``interface.coordinates``, (*shape), periodic.
 
-        It is that of the mapped field (Hermite expansion; Grigoriu, 1995) or of the Gaussian
-        one, z. An `AccuracyWarning` gives its error if the tails of the marginal are too heavy.
+        It is that of the mapped field (Hermite expansion; Grigoriu, 1995) or of z. An
+        `AccuracyWarning` gives its error if the tails of the marginal are too heavy.
         """
         modes = self.modes(interface)
         # The field whose amplitudes are its own standard deviations.

@@ -87,11 +87,10 @@ class RandomInterface:
 
     Notes
     -----
-    Correlated translation fields after Grigoriu (1995): the draws of a property are a
-    combination, by the Cholesky factor of the correlation matrix, of draws of its own and of
-    the properties before it in the list above. So a property keeps its draws whatever else is
-    random, unless it is correlated with one before it. Where spectra differ, the correlation
-    of the fields at a point is a little less than that of the modes.
+    Correlated translation fields after Grigoriu (1995): the draws of a property combine, by
+    the Cholesky factor of the correlation matrix, draws of its own and of the properties
+    before it in the list above. Where spectra differ, the correlation of the fields at a
+    point is a little less than that of the modes.
 
     Examples
     --------
@@ -231,10 +230,7 @@ class RandomInterface:
     def profiles(
         self, interface: Interface, *, samples: int = 1, seed: int = 0, first: int = 0
     ) -> dict[str, Array]:
-        """Sample profiles by name, (samples, *shape) each, in the unit of each property.
-
-        Sample i depends on (seed, i) only.
-        """
+        """Sample profiles by name, (samples, *shape) each; sample i depends on (seed, i) only."""
         return self.from_draws(interface, self.draws(interface, samples, seed, first))
 
     def warn_if_inaccurate(self, interface: Interface) -> None:

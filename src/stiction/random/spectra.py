@@ -1,11 +1,9 @@
 """Power spectral densities of the underlying Gaussian field, on lines and on planes.
 
-On a plane the field is isotropic, and a line cut through it has the correlation of the
-field on a line. That fixes the density in D dimensions as a function of the length of the
-wave vector (it is the inverse Abel transform of the line's): to the power of 1 + k^2 is
-added (D - 1)/2, and a Gaussian keeps its form. Samples have the truncated
-spectrum, and so correlations and lengths are those of it. To add a spectrum, derive from
-`ScaledSpectrum` and add it to `SPECTRA`.
+On a plane the field is isotropic, and a line cut through it has the correlation of the field
+on a line: to the power of 1 + k^2 is added (D - 1)/2 in D dimensions, and a Gaussian keeps its
+form. Samples have the truncated spectrum, and so correlations and lengths are those of it. To
+add a spectrum, derive from `ScaledSpectrum` and add it to `SPECTRA`.
 """
 
 from __future__ import annotations
@@ -69,10 +67,9 @@ def _integrate(
     lag: float = 0.0,
     power: float = 0.0,
 ) -> float:
-    """Integrate g(k) k^order cos(k lag) from the first of `edges` to the last, piece by piece.
+    """Integrate g(k) k^order cos(k lag) over all pieces (QUADPACK's QAWO).
 
-    `lag` (m) may be any number of periods (QUADPACK's QAWO). `power`, if known, decides
-    which errors are small: 1e-12 of it, and of each piece otherwise.
+    `power`, if known, decides which errors are small: 1e-12 of it, and of each piece otherwise.
     """
     options: dict[str, Any] = {"weight": "cos", "wvar": lag} if lag > 0.0 else {}
     options |= {"epsabs": ACCURACY * power, "epsrel": ACCURACY, "limit": 200, "full_output": 1}
@@ -247,8 +244,8 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
     correlation_length : float
         xi_0, m: without truncation the correlation of z is 1/e there.
     truncation, power_kept : float, optional
-        Truncation in multiples of 2 pi/xi_0, or the share of the power that is retained;
-        the default retains 0.9997.
+        Truncation in multiples of 2 pi/xi_0, or the share of the power that is retained:
+        0.9997 if left out.
     """
 
     type: Literal["squared_exponential"] = "squared_exponential"
@@ -272,8 +269,8 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
 class ExponentialSpectrum(_PowerOfWavenumber):
     """Correlation exp(-|x|/xi_0): g(k) ~ 1/(1 + (k xi_0)^2). A rough field.
 
-    The parameters are those of `SquaredExponentialSpectrum`, but 0.99 of the power is
-    retained by default, since every further nine takes ten times as many modes.
+    As `SquaredExponentialSpectrum`, but 0.99 of the power is retained by default: every further
+    nine takes ten times as many modes.
     """
 
     type: Literal["exponential"] = "exponential"

@@ -10,10 +10,10 @@ from stiction.errors import InputError, warn_accuracy
 from stiction.problem import Problem
 from stiction.random.random_interface import RandomInterface
 
+# Shares of the strength at or below the residual strength that give a warning, or an error.
 WORTH_SAYING, MOST = 1e-6, 0.5
-"""Shares of the strength at or below the residual strength that give a warning, or an error."""
+# Equally likely values of a random residual strength, and of a pressure or factor.
 QUANTILES, PRESSURES = 2000, 64
-"""Number of equally likely values of a random residual strength, and of a normal pressure."""
 
 
 def coefficients_of(random: RandomInterface) -> list[str]:
@@ -35,12 +35,8 @@ def profiles_in_stress(
     problem: Problem, random: RandomInterface, profiles: Mapping[str, Array]
 ) -> dict[str, Array]:
     """Return sampled profiles with coefficients multiplied by the pressure at each node."""
-    found = dict(profiles)
-    for name in coefficients_of(random):
-        found[name] = found[name] * profiles.get(
-            "normal_pressure", problem.load.normal_pressure
-        )
-    return found
+    pressure = profiles.get("normal_pressure", problem.load.normal_pressure)
+    return {**profiles, **{name: profiles[name] * pressure for name in coefficients_of(random)}}
 
 
 def support_in_stress(
@@ -108,10 +104,9 @@ def share_below_residual(problem: Problem, random: RandomInterface) -> float:
 
 
 def check_residual(problem: Problem, random: RandomInterface) -> None:
-    """Warn of the share of the strength that does not exceed the residual strength.
+    """Warn of a share of the strength, above 1e-6, that does not exceed the residual strength.
 
-    There a node does not weaken: an `AccuracyWarning` gives a share above one in a million; a
-    share above a half is an `InputError`.
+    There a node does not weaken; a share above a half is an `InputError`.
     """
     share = share_below_residual(problem, random)
     if share <= WORTH_SAYING:
@@ -123,10 +118,7 @@ def check_residual(problem: Problem, random: RandomInterface) -> None:
     )
     if share > MOST:
         raise InputError(
-            f"{found}: most of the interface would not weaken at all. Raise the strength, lower"
+            f"{found}: most of the interface would not weaken at all; raise the strength, lower"
             " the residual strength, or check the unit of both (Pa)"
         )
-    warn_accuracy(
-        f"{found}; there the interface does not weaken. If this is not intended, lower the"
-        " residual strength or choose a marginal that stays above it"
-    )
+    warn_accuracy(f"{found}, where the interface does not weaken; lower that if it should")
