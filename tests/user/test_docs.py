@@ -137,7 +137,9 @@ def test_tables_of_study_files():
             st.Study.from_dict(whole | table)
 
 
-@pytest.mark.parametrize("path", (ROOT / "examples").glob("*.toml"), ids=lambda path: path.name)
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "examples").glob("*.toml")), ids=lambda path: path.name
+)
 def test_every_study_file_is_valid(path):
     study = st.Study.from_toml(path)
     jsonschema.validate(tomllib.loads(path.read_text()), study_schema())
