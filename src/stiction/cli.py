@@ -113,7 +113,6 @@ def run(
         str | None,
         Option(metavar="ADDRESS", help="Address of a Dask scheduler, such as tcp://host:8786."),
     ] = None,
-    time_limit: Annotated[float | None, Option(help="Stop after this many seconds.")] = None,
     part: Annotated[
         str | None,
         Option(metavar="K/N", help="Compute the K-th of N parts, into one folder RUN."),
@@ -126,7 +125,7 @@ def run(
     if `samples` was raised. The results do not depend on workers, machines or interruptions.
 
     Exit code 0: complete; 1: samples failed or the run could not continue; 2: errors in the study
-    or the command; 3: the time limit was reached; 130: interrupted.
+    or the command; 130: interrupted.
     """
     import pandas as pd
 
@@ -138,12 +137,7 @@ def run(
     try:
         with _executor(scheduler) as executor:
             result = loaded.run(
-                out=out,
-                workers=workers,
-                executor=executor,
-                time_limit=time_limit,
-                part=part,
-                pilot=pilot,
+                out=out, workers=workers, executor=executor, part=part, pilot=pilot
             )
     except KeyboardInterrupt:
         echo(f"interrupted: samples so far are in {out}; rerun the command to resume", err=True)
@@ -163,9 +157,6 @@ def run(
         echo(f"{len(state.failures)} samples failed; the same command retries:", err=True)
         _show_some(state.failures, "  ", err=True)
         raise typer.Exit(1)
-    if "cut_short" in result.attrs and part is None:
-        echo(f"{result.attrs['cut_short']}; rerun the command to resume", err=True)
-        raise typer.Exit(3)
 
 
 def status(run: RunPath) -> None:

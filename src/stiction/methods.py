@@ -110,13 +110,11 @@ def as_method(value: Any) -> Any:
     if isinstance(value, type):
         raise ValueError(f"must be an object; write st.{value.__name__}(...)")
     missing = [name for name in MEMBERS if not hasattr(value, name)]
-    if "prepare" in missing:
+    if missing:
         raise ValueError(
             "must be a method object such as st.LocalCriterion(), st.Equilibrium() or"
-            " st.Rupture(loading_rate=...)"
+            f" st.Rupture(loading_rate=...); lacks {', '.join(missing)}"
         )
-    if missing:
-        raise ValueError(f"lacks {', '.join(missing)}")
     return value
 
 

@@ -124,8 +124,6 @@ def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
         array = np.array(real_array(value))
     except TypeError as error:
         raise ValueError(f"must be a number or an array of numbers, {error}") from None
-    if array.ndim == 2 and 1 in array.shape:  # a column, as out of a table
-        array = array.reshape(-1)
     if array.ndim not in (1, 2) or array.size == 0:
         raise ValueError(f"must have shape (nodes,) or (nx, ny), got shape {array.shape}")
     if not np.all(np.isfinite(array)):

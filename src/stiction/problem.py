@@ -214,22 +214,17 @@ class Problem:
         """Warn if mean peak and residual strengths (Pa) do not fit the rest of the problem."""
         modulus, pressure = self.solid.shear_modulus, self.load.normal_pressure
         doubts = [("strength", strength, "shear modulus", modulus, RIGIDITY)]
-        hint = ""
         if pressure is not None:
-            doubts.append(
-                ("strength", strength, "normal pressure", np.mean(pressure), FRICTION)
-            )
-            hint = (
-                "; normal_pressure is in Pa; coefficients are fractions, not percentages,"
-                " and need of='friction_coefficient'"
-            )
+            mean = float(np.mean(pressure))
+            doubts.append(("strength", strength, "normal pressure", mean, FRICTION))
         if residual:
             doubts.append(("residual_strength", residual, "shear modulus", modulus, RIGIDITY))
         for name, mean, what, of, (least, most) in doubts:
             if not least * of <= mean <= most * of:
                 warn_user(
                     f"{name}: its mean, {mean:.4g} Pa, is {mean / of:.2g} of the {what}; check the"
-                    f" units of both{hint}",
+                    " units of both (all in Pa; coefficients are fractions, not percentages, and"
+                    " need of='friction_coefficient')",
                     UnitWarning,
                 )
                 return
@@ -457,8 +452,6 @@ def _rows(
         array = real_array(value)
     except TypeError as error:
         raise InputError(f"{name}: must be numbers; {error}") from None
-    if array.shape == (*shape, 1) and samples != shape[0]:  # a column, as out of a table
-        array = array[..., 0]
     if array.shape == (samples, 1):
         array = array.reshape(column)
     several = array.shape[1:] == shape and samples in (None, len(array)) and array.size > 0

@@ -1,8 +1,7 @@
-"""Progress of long work, and its time limit: one mechanism for everything that takes long.
+"""Progress of long work: one mechanism for everything that takes long.
 
 A terminal and a notebook show a line with a bar, a pipe has a line now and then; all of it on
-standard error, and only after two seconds. The code that works reports what is done (`advance`)
-and tests whether its time is `over`.
+standard error, and only after two seconds. The code that works reports what is done (`advance`).
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ def duration(seconds: float) -> str:
 
 
 class Meter:
-    """Progress of a computation, and its time limit; a context manager.
+    """Progress of a computation; a context manager.
 
     Parameters
     ----------
@@ -47,8 +46,6 @@ class Meter:
         See `Show`.
     unit : str
         What is counted, plural.
-    time_limit : float, optional
-        Seconds from the start.
     """
 
     def __init__(
@@ -58,9 +55,8 @@ class Meter:
         show: Show = True,
         *,
         unit: str = "samples",
-        time_limit: float | None = None,
     ) -> None:
-        self.unit, self.time_limit, self._show = unit, time_limit, show
+        self.unit, self._show = unit, show
         self._watcher: threading.Thread | None = None
         self.stage(what, total)
         self._begun = time.monotonic()
@@ -79,11 +75,6 @@ class Meter:
             self._show(self.done, self.total or 0)
 
     @property
-    def over(self) -> bool:
-        """Whether the time allowed has passed."""
-        return self.time_limit is not None and self.elapsed >= self.time_limit
-
-    @property
     def elapsed(self) -> float:
         """Seconds since the start."""
         return time.monotonic() - self._begun
@@ -98,8 +89,6 @@ class Meter:
         if self.total and self.done > before:
             pace = (time.monotonic() - begin) / (self.done - before)
             left = pace * (self.total - self.done)
-            if self.time_limit is not None:
-                left = min(left, self.time_limit - self.elapsed)
             if left >= 1.0:
                 parts.append(f"about {duration(round(left))} left")
         return ", ".join(part for part in parts if part)

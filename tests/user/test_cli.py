@@ -94,10 +94,8 @@ def test_points_with_one_label_are_not_thrown_together(runs, study):
     assert out.count("100.0") == 4  # two points, of stress and coefficient
 
 
-def test_parts_and_the_time_limit(runs):
+def test_parts_of_a_run(runs):
     runs("run study.toml --out run --part 1/2", "part 1/2: 156 of 300 samples in run")
-    words = "rerun the command to resume"
-    runs("run study.toml --out run --time-limit 1e-9", words, code=3)
     runs("run study.toml --out run --part 2/2")
     runs("status run", "300 of 300")
 

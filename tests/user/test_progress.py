@@ -7,9 +7,7 @@ import threading
 import time
 import types
 
-import numpy as np
 import pytest
-from refusals import refuses
 
 import stiction as st
 from stiction import progress
@@ -85,22 +83,11 @@ def test_one_of_nested_meters_is_shown(hasty, capsys):
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 
-def test_a_call_ends_when_its_time_is_over():
+def test_a_function_of_ones_own_gets_the_progress():
     problem = st.paper.problem(nodes=256)
-    given = {"random": st.paper.strength(problem, 0.5), "method": st.LocalCriterion()}
-    words = "samples are done; the others are NaN"
-    with pytest.warns(st.AccuracyWarning, match=words):
-        part = st.monte_carlo(problem, **given, samples=10**6, workers=1, time_limit=0.3)
-    done = part["critical_stress"].notnull().values
-    assert 0 < done.sum() < 10**6
-    assert part.attrs["cut_short"] == f"{done.sum()} of 1000000 samples are done"
-    whole = st.monte_carlo(problem, **given, samples=100)
-    same = done[:100]
-    np.testing.assert_array_equal(whole.critical_stress[same], part.critical_stress[:100][same])
-
-
-@pytest.mark.parametrize("limit", [0, True, "10", np.nan])
-def test_what_is_no_time_limit_is_refused(limit):
-    problem = st.paper.problem(nodes=256)
-    given = {"random": st.paper.strength(problem, 0.5), "method": st.LocalCriterion()}
-    refuses("time_limit", lambda: st.monte_carlo(problem, **given, samples=1, time_limit=limit))
+    tau_p = st.paper.strength(problem, 0.5).sample(problem.interface, samples=100, seed=0)
+    told = []
+    st.onset(
+        problem, tau_p, method=st.LocalCriterion(), progress=lambda *done: told.append(done)
+    )
+    assert told[-1] == (100, 100)

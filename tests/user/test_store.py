@@ -319,9 +319,8 @@ def test_versions_that_differ_are_said(tmp_path, often, monkeypatch):
         make_study(samples=40).run(out=tmp_path / "run")
     with pytest.warns(UserWarning, match=r"begun with stiction 99\.0, numpy .*, not stiction"):
         make_study(samples=60).run(out=tmp_path / "run")
-    point = make_study(samples=40).experiments[0]
     with pytest.raises(WorkerError, match="install the same versions"):
-        batches.solve_span(point, Span(0, 0, 1), "stiction 99.0")
+        make_study(samples=40).run(executor=Counting(versions="stiction 99.0"))
 
 
 # -- size and time -------------------------------------------------------------------------------
@@ -334,7 +333,7 @@ def test_memory_is_bounded_by_the_pieces_in_flight(monkeypatch):
     alive, most = set(), 0
 
     class Watching:
-        def submit(self, function, experiment, span, *marks):
+        def submit(self, function, experiment, span):
             nonlocal most
             future = Future()
             alive.add(span)
@@ -350,8 +349,8 @@ def test_memory_is_bounded_by_the_pieces_in_flight(monkeypatch):
     keep = {"samples": 20000, "keep": ["strength"]}
     points = make_study(sweep=[], ensemble=keep).experiments
     spans, largest = [Span(0, 0, 20000)], 0
-    for tables in solve_spans(points, spans, executor=Watching(), workers=3):
-        largest = max(largest, *(table.rows.nbytes for table in tables), 0)
+    for table in solve_spans(points, spans, executor=Watching(), workers=3):
+        largest = max(largest, table.rows.nbytes)
     assert most <= 6  # two a worker
     # 128 nodes and six more numbers a sample make 1072 bytes: a fair share would be 3.5 MB.
     assert 2**18 < largest < 1.1 * 2**20

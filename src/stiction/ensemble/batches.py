@@ -1,7 +1,6 @@
 """Samples computed in batches, by threads or any executor: the same numbers from each."""
 
 import os
-import socket
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Mapping, Sequence
@@ -29,7 +28,7 @@ SECONDS = 0.5
 MOST_BYTES = 16 * 2**20
 """Largest size of the values of a piece of work."""
 TICK = 1.0
-"""Seconds after which an iteration continues although no work is done."""
+"""Seconds after which workers are counted again; Windows lets nothing interrupt a longer wait."""
 
 
 class Span(NamedTuple):
@@ -106,16 +105,11 @@ def versions() -> str:
     return f"stiction {__version__}, numpy {version('numpy')}, numba {version('numba')}"
 
 
-def solve_span(experiment: Experiment, span: Span, expected: str = "") -> Table:
+def solve_span(experiment: Experiment, span: Span) -> Table:
     """Solve a span of samples; a sample that fails does not stop the others.
 
-    A plain function, for any executor. Other `versions` than `expected` are a `WorkerError`.
+    A plain function, for any executor.
     """
-    if expected and expected != versions():
-        raise WorkerError(
-            f"a worker on {socket.gethostname()} has {versions()}, the run has {expected}; install"
-            " the same versions there, or end that worker"
-        )
     begin = time.perf_counter()
     parts: list[NDArray[Any]] = []
     failures: list[Failure] = []
@@ -170,20 +164,18 @@ def solve_spans(
     *,
     executor: Executor | None = None,
     workers: int = 1,
-) -> Generator[list[Table], None, None]:
+) -> Generator[Table, None, None]:
     """Solve spans of samples, and yield tables as they are done.
 
     At most two pieces of work a worker are under way at once, so that memory stays bounded whatever
-    the number of samples. An empty list is yielded about every second while nothing is done.
-    Closing the generator cancels what has not begun.
+    the number of samples. Closing the generator cancels what has not begun.
 
     `workers` is the number of threads, or of workers if an executor does not report theirs.
     A worker that is lost, or has other versions, is a `WorkerError`.
     """
     waiting = deque(spans)
     left = sum(span.samples for span in spans)
-    paces: dict[int, float] = {}
-    latest: float | None = None
+    pace: float | None = None  # of the latest piece, in s a sample
     running: dict[Future[Table], Span] = {}
     with ExitStack() as stack:
         stack.enter_context(one_blas_thread())
@@ -195,22 +187,18 @@ def solve_spans(
                 while waiting and len(running) < 2 * slots:
                     point, first, samples = whole = waiting.popleft()
                     experiment = points[point]
-                    size = piece_size(experiment, whole, paces.get(point, latest), left, slots)
+                    size = piece_size(experiment, whole, pace, left, slots)
                     if size < samples:
                         waiting.appendleft(Span(point, first + size, samples - size))
                     left -= size
                     span = Span(point, first, size)
-                    running[executor.submit(solve_span, experiment, span, versions())] = span
+                    running[executor.submit(solve_span, experiment, span)] = span
                 done, _ = wait(running, timeout=TICK, return_when=FIRST_COMPLETED)
-                tables = []
                 for future in done:
                     span = running.pop(future)
                     table = _result(future, span, points[span.point].seed)
-                    # The fastest so far: the first pieces may have compiled kernels.
-                    latest = min(paces.get(span.point, np.inf), table.seconds / table.size)
-                    paces[span.point] = latest
-                    tables.append(table)
-                yield tables
+                    pace = table.seconds / table.size
+                    yield table
         finally:
             for future in running:
                 future.cancel()
@@ -218,15 +206,19 @@ def solve_spans(
 
 def _result(future: Future[Table], span: Span, seed: int) -> Table:
     try:
-        return future.result()
-    except WorkerError:  # it was refused, with a reason
-        raise
+        table = future.result()
     except Exception as error:
         last = span.first + span.samples - 1
         raise WorkerError(
             f"the worker on samples {span.first} to {last} of point {span.point} (seed {seed}) was"
             f" lost: {type(error).__name__}: {error}"
         ) from error
+    if table.versions != versions():
+        raise WorkerError(
+            f"a worker has {table.versions}, the run has {versions()}; install the same versions"
+            " there, or end that worker"
+        )
+    return table
 
 
 def missing_spans(done: NDArray[np.bool_], first: int) -> list[Span]:

@@ -17,7 +17,7 @@ from stiction.ensemble.pilot import pilot_attributes
 from stiction.ensemble.store import Store
 from stiction.errors import InputError, RunError, collect_warnings, warn_accuracy, warn_user
 from stiction.methods import MethodObject, study_attributes
-from stiction.model import Count, Flag, Names, Number, Positive, Progress, checked
+from stiction.model import Count, Flag, Names, Number, Progress, checked
 from stiction.problem import Problem
 from stiction.progress import Meter, Show
 
@@ -54,7 +54,6 @@ def gather(
     workers: int | None = None,
     executor: Executor | None = None,
     progress: Show = True,
-    time_limit: float | None = None,
     pilot: bool = True,
 ) -> xr.Dataset:
     """Compute an ensemble at every point of a sweep, or the part of it that is not stored.
@@ -75,20 +74,17 @@ def gather(
     with ExitStack() as stack:
         if store:  # also on Ctrl-C, and when workers are lost: what is done is kept
             stack.callback(store.save)
-        meter = stack.enter_context(Meter(label, total, progress, time_limit=time_limit))
+        meter = stack.enter_context(Meter(label, total, progress))
         work = solve_spans(points, spans, executor=executor, workers=workers or usable_cores())
-        for tables in stack.enter_context(closing(work)):
+        for table in stack.enter_context(closing(work)):
             if store:
-                store.add(tables)
-            for table in tables:
-                rows.add(table)
-                meter.advance(table.size)
-                solved, lost = solved or table.rows.size > 0, lost + len(table.failures)
-                if not solved and lost >= min(HOPELESS, total):
-                    failure = table.failures[0]
-                    raise (InputError if failure.input else RunError)(str(failure))
-            if meter.over:
-                break
+                store.add(table)
+            rows.add(table)
+            meter.advance(table.size)
+            solved, lost = solved or table.rows.size > 0, lost + len(table.failures)
+            if not solved and lost >= min(HOPELESS, total):
+                failure = table.failures[0]
+                raise (InputError if failure.input else RunError)(str(failure))
     found = store.pilot if store else None
     if found is None and pilot:
         found = pilot_attributes(points, ensemble, show=progress is True)
@@ -102,8 +98,6 @@ def gather(
             f"{len(failed)} of {rows.done.size} samples could not be solved and are NaN (the"
             f" attribute {FAILED!r} lists them): {some}{more}"
         )
-    if store is None and "cut_short" in result.attrs:
-        warn_accuracy(f"{result.attrs['cut_short']}; the others are NaN")
     return result
 
 
@@ -120,7 +114,6 @@ def monte_carlo(
     workers: Count | None = None,
     executor: Executor | None = None,
     progress: Progress = True,
-    time_limit: Positive | None = None,
     pilot: Flag = True,
 ) -> xr.Dataset:
     """Compute the onset of many random interfaces.
@@ -142,9 +135,6 @@ def monte_carlo(
         Any object with `submit` instead of threads, such as a process pool or a Dask executor.
     progress : bool or callable
         True shows progress on standard error after two seconds; a callable gets (done, total).
-    time_limit : float, optional
-        Seconds. Samples that are not done by then are NaN; the attribute 'cut_short' counts the
-        others.
     pilot : bool
         With the local criterion, also solve the first samples (32 on a line, 8 on a plane)
         by `Equilibrium` and report the difference; the ensemble stays the same.
@@ -168,8 +158,8 @@ def monte_carlo(
     Warns
     -----
     AccuracyWarning
-        If samples could not be solved or were not done in time, or the pilot differs from the
-        local criterion by more than 1 %.
+        If samples could not be solved, or the pilot differs from the local criterion by more
+        than 1 %.
 
     Examples
     --------
@@ -193,6 +183,5 @@ def monte_carlo(
         workers=workers,
         executor=executor,
         progress=progress,
-        time_limit=time_limit,
         pilot=pilot,
     )

@@ -137,12 +137,12 @@ class Store:
 
     # -- writing -------------------------------------------------------------------------------
 
-    def add(self, tables: list[Table]) -> None:
-        """Take tables, and store all that were taken if it is time or they are large.
+    def add(self, table: Table) -> None:
+        """Take a table, and store all that were taken if it is time or they are large.
 
         If they cannot be written (a `StoreError`), what was stored before stays readable.
         """
-        self._taken += tables
+        self._taken.append(table)
         now, size = time.monotonic(), sum(table.rows.nbytes for table in self._taken)
         interval = min(max(SAVE_SECONDS, SAVE_SHARE * (now - self._begun)), SAVE_MOST)
         if now - self._saved >= interval or size >= SAVE_BYTES:

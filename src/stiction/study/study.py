@@ -29,7 +29,6 @@ from stiction.model import (
     Count,
     FilePath,
     Flag,
-    Positive,
     Progress,
     Text,
     check,
@@ -212,7 +211,6 @@ class Study(_Parts):
         workers: Count | None = None,
         executor: Executor | None = None,
         progress: Progress = True,
-        time_limit: Positive | None = None,
         part: AnyPart | None = None,
         pilot: Flag = True,
     ) -> xr.Dataset:
@@ -223,7 +221,7 @@ class Study(_Parts):
         out : path, optional
             Folder in which results are stored as they are computed. The same call resumes an
             interrupted run, computes failed samples again, and new ones if `samples` was raised.
-        workers, executor, progress, time_limit, pilot
+        workers, executor, progress, pilot
             See `stiction.monte_carlo`.
         part : (int, int) or str, optional
             Compute only one of several parts, such as (3, 100) or "3/100", into the same
@@ -260,7 +258,6 @@ class Study(_Parts):
             workers=workers,
             executor=executor,
             progress=progress,
-            time_limit=time_limit,
             pilot=pilot,
         )
 
