@@ -20,7 +20,6 @@ class WeakestWindow:
     length: float  # m
     type = "weakest_window"
     label = "weakest window"
-    chunk_size = 512
 
     def variables(self, problem):
         return onset_variables(problem.interface)

@@ -30,8 +30,8 @@ from stiction.variables import (
 if TYPE_CHECKING:
     import xarray as xr
 
-TICK = 0.5
-"""Seconds of work after which progress is shown."""
+TICK, MOST = 0.5, 512
+"""Seconds of work, and most samples, that are solved at once."""
 
 Values = dict[str, NDArray[Any]]
 Solver = Callable[[Sample], Mapping[str, NDArray[Any]]]
@@ -65,10 +65,6 @@ class Method(Protocol):
     @property
     def label(self) -> str:
         """Its name in figures, tables and progress."""
-
-    @property
-    def chunk_size(self) -> int:
-        """Samples that make a good piece of work."""
 
     def variables(self, problem: Problem) -> Mapping[str, Variable]:
         """What the solver returns, each with 'sample' as first dimension.
@@ -171,6 +167,11 @@ def _check_values(
             )
 
 
+def batch_size(problem: Problem, method: Method) -> int:
+    """Return how many samples to solve at once: half a second of work, at most 512."""
+    return max(1, min(MOST, int(TICK / max(method.seconds_per_sample(problem), 1e-9))))
+
+
 def variables_of(
     problem: Problem, method: Method, pressure: bool = False
 ) -> dict[str, Variable]:
@@ -259,10 +260,7 @@ def onset(
     attributes = study_attributes(problem=problem, method=method)
     sample, measured = problem.placed_sample(profiles, getattr(method, "accepts", ()), gaps)
     problem.warn_of_units(sample.mean_strength, float(sample.residual_strength.mean()))
-    solver, parts = prepared(problem, method), []
-    size = max(
-        1, min(method.chunk_size, int(TICK / max(method.seconds_per_sample(problem), 1e-9)))
-    )
+    solver, parts, size = prepared(problem, method), [], batch_size(problem, method)
     with Meter(f"onset by {method.label}", sample.samples, progress) as meter:
         for start in range(0, sample.samples, size):
             part = sample.part(slice(start, start + size))

@@ -64,7 +64,7 @@ def test_a_method_from_another_package(tmp_path):
 class Broken:
     """A method whose solver does not keep what its variables promise."""
 
-    type, label, chunk_size = "broken", "broken", 4
+    type, label = "broken", "broken"
 
     def __init__(self, change, promise=()):
         self.change, self.promise = change, promise

@@ -47,7 +47,6 @@ class Standing:
     first_stage: str | None = "local_criterion"
     change: Callable = np.asarray
     label = "stand-in"
-    chunk_size = 1024
     variables = staticmethod(LOCAL.variables)
 
     def supports(self, problem):

@@ -63,7 +63,6 @@ class LocalCriterion:
     """
 
     type: Literal["local_criterion"] = "local_criterion"
-    chunk_size: ClassVar[int] = 1024
     label: ClassVar[str] = "local criterion"
 
     def seconds_per_sample(self, problem: Problem) -> float:

@@ -151,7 +151,6 @@ class Rupture:
     type: Literal["rupture"] = "rupture"
     # Combinations that `Problem.sample` may let through.
     accepts: ClassVar[tuple[str, ...]] = ("barriers", "overstress")
-    chunk_size: ClassVar[int] = 8
     label: ClassVar[str] = "rupture"
 
     @pydantic.model_validator(mode="after")

@@ -14,7 +14,7 @@ from pydantic import Field
 
 from stiction.arrays import Array
 from stiction.errors import InputError, UnitWarning, unknown_name, warn_user
-from stiction.methods import Solver, Values, prepared, variables_of
+from stiction.methods import Solver, Values, batch_size, prepared, variables_of
 from stiction.model import Count, Names, Number, model
 from stiction.problem import Problem, refusals
 from stiction.random.random_field import RandomField
@@ -160,7 +160,7 @@ class Experiment:
     @property
     def batch(self) -> int:
         """Number of samples to solve at once: suited to the method, on planes to the memory."""
-        interface, size = self.problem.interface, int(self.method.chunk_size)
+        interface, size = self.problem.interface, batch_size(self.problem, self.method)
         if not interface.is_plane:  # draws come in blocks: a part is as expensive as the whole
             return size
         # A rough field has hundreds of draws for each node.

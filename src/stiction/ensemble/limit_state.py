@@ -23,8 +23,8 @@ from stiction.random.stresses import support_in_stress
 
 Event = Literal["critical_stress", "first_instability"]
 
-SHORTEST, LONGEST = 2e-3, 0.5
-"""Seconds of work that justify a thread, and after which progress is shown."""
+SHORTEST = 2e-3
+"""Seconds of work that justify a thread."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,7 @@ class LimitState:
         experiment = self.experiment
         pace = max(experiment.method.seconds_per_sample(experiment.problem), 1e-9)
         size = max(int(SHORTEST / pace), -(-len(rows) // self.workers))
-        size = max(1, min(size, int(LONGEST / pace), experiment.batch))
+        size = max(1, min(size, experiment.batch))
         parts = np.split(rows, range(size, len(rows), size))
         if len(parts) == 1:
             found = self._stress(rows)

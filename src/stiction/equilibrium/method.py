@@ -115,11 +115,6 @@ class Equilibrium:
     first_stage: ClassVar[str] = "local_criterion"
 
     @property
-    def chunk_size(self) -> int:
-        """Number of samples in a batch of an ensemble."""
-        return 256
-
-    @property
     def label(self) -> str:
         """Name in figures and tables."""
         return "equilibrium"
