@@ -45,11 +45,7 @@ LOADING_RATE = 2e7
 
 
 def echo(text: Any = "", *, err: bool = False) -> None:
-    """Print what may come from a file: nothing in it can steer the terminal.
-
-    Control characters other than line ends and tabs, and what is no valid UTF-8, are written as
-    their escapes.
-    """
+    """Print what may come from a file, with escapes for all that could steer the terminal."""
     safe = "".join(
         char if char.isprintable() or char in "\n\t" else repr(char)[1:-1] for char in str(text)
     )
@@ -57,10 +53,7 @@ def echo(text: Any = "", *, err: bool = False) -> None:
 
 
 def in_options(text: str, command: Callable[..., Any] | None) -> str:
-    """Return a message in the words of a command: ``--gaps fill`` for ``gaps="fill"``.
-
-    The options of a command have the names of the arguments that functions of the package name.
-    """
+    """Return a message in the words of a command: ``--gaps fill`` for ``gaps="fill"``."""
     parameters = {} if command is None else inspect.signature(command, eval_str=True).parameters
     for name, parameter in parameters.items():
         extras = getattr(parameter.annotation, "__metadata__", ())

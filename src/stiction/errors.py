@@ -91,10 +91,9 @@ _collected: ContextVar[list[Warned] | None] = ContextVar("collected", default=No
 
 @contextmanager
 def collect_warnings() -> Iterator[list[Warned]]:
-    """Collect the warnings of this package meanwhile, in the order in which they occur.
+    """Collect the warnings of this package in this thread, and in those that run in its context.
 
-    In this thread, and in those that run in its context. `warnings.catch_warnings` is for one
-    thread at a time: it changes the whole process, and two threads would take each other's.
+    `warnings.catch_warnings` changes the whole process: two threads would take each other's.
     """
     found: list[Warned] = []
     token = _collected.set(found)

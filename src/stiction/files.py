@@ -28,16 +28,8 @@ UNREADABLE = (
 def write_whole(path: Path, content: bytes | Callable[[Path], object]) -> None:
     """Write a file aside, sync it and rename it: an older one stays until the new one is whole.
 
-    Parameters
-    ----------
-    path : Path
-    content : bytes or callable
-        What to write, or a function that writes it to the path that it is given.
-
-    Raises
-    ------
-    StoreError
-        If the disk is full or the folder cannot be written; nothing is left behind.
+    The content is bytes, or a function that writes to the path that it is given. If it fails (a
+    `StoreError`), nothing is left behind.
     """
     aside = path.with_name(f"{path.name}.{uuid.uuid4().hex[:12]}{PART}")
     try:
@@ -96,11 +88,6 @@ def private_folder(folder: Path) -> Path:
     """Return a folder, made if need be, in which nobody else can have put anything.
 
     Compiled kernels are pickles: who can write one can run code as whoever loads it.
-
-    Raises
-    ------
-    InputError
-        If it belongs to somebody else, or others may write there.
     """
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)

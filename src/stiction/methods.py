@@ -127,10 +127,7 @@ def study_attributes(**parts: Any) -> dict[str, Any]:
 
 
 def prepared(problem: Problem, method: Method) -> Solver:
-    """Return the solver of a method, with what follows from its values for every method alike.
-
-    The solver raises `InputError` if its values are not those that the method promises.
-    """
+    """Return the solver of a method, which checks its values and adds friction coefficients."""
     solver = method.prepare(problem)
     variables = method.variables(problem)
     lacking = [name for name in ONSET_VARIABLES if name not in variables]

@@ -379,10 +379,7 @@ def _shown(value: Any) -> str:
 def to_plain(value: Any) -> Any:
     """Return the object as plain dicts, lists and numbers: what TOML and JSON hold.
 
-    Raises
-    ------
-    InputError
-        If something in it exists in Python only, such as a function.
+    It is an `InputError` if something in it exists in Python only, such as a function.
     """
     try:
         return pydantic.TypeAdapter(type(value)).dump_python(

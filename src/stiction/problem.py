@@ -345,10 +345,7 @@ class Problem:
     def placed_sample(
         self, profiles: Any, accept: Collection[str] = (), gaps: Gaps = "refuse"
     ) -> tuple[Sample, Any]:
-        """Return a sample, and where all of its profiles were measured.
-
-        The mask has the shape (samples, *shape) or (1, *shape); it is True if nothing is missing.
-        """
+        """Return a sample, and a mask of where all of its profiles were measured, or True."""
         if isinstance(profiles, Sample):
             return profiles, True
         given, friction, interface = named_profiles(profiles), self.friction, self.interface

@@ -34,19 +34,7 @@ def duration(seconds: float) -> str:
 
 
 class Meter:
-    """Progress of a computation; a context manager.
-
-    Parameters
-    ----------
-    what : str
-        Label.
-    total : int, optional
-        Number of units to do, if it is known.
-    show : bool or callable
-        See `Show`.
-    unit : str
-        What is counted, plural.
-    """
+    """Progress of a computation, of `total` units if that is known; a context manager."""
 
     def __init__(
         self,

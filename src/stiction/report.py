@@ -32,13 +32,7 @@ LEVELS = (0.05, 0.5, 0.95)
 
 @dataclass
 class Page:
-    """Text, figures, tables and listings in the order in which they are added.
-
-    Attributes
-    ----------
-    title : str
-    parts : list of dict
-    """
+    """Text, figures, tables and listings in the order in which they are added."""
 
     title: str
     parts: list[dict[str, Any]] = field(default_factory=list)
@@ -87,15 +81,7 @@ def shown(entry: Any) -> str:
 
 
 def write_report(run: StoredRun, path: Path) -> None:
-    """Write a page about a run: figures, tables, failed samples, the study and versions.
-
-    Raises
-    ------
-    InputError
-        If nothing is stored yet.
-    StoreError
-        If the page cannot be written.
-    """
+    """Write a page about a run: figures, tables, failed samples, the study and versions."""
     state = run.status()
     if not state.done:
         raise InputError(f"{run.path}: no sample is stored yet")
@@ -131,11 +117,7 @@ def write_report(run: StoredRun, path: Path) -> None:
 
 
 def add_figures(page: Page, result: xr.Dataset, dims: list[str]) -> None:
-    """Add densities of the onset and, for a sweep, its quantiles.
-
-    The longest axis of a sweep runs along the figure, the next one over curves, others over
-    figures.
-    """
+    """Add densities of the onset and its quantiles along the longest axis of a sweep."""
     what = scaled(result[shown_quantity(result)])[2].partition(" (")[0]
     if not dims:
         figure = densities(result, None)

@@ -51,10 +51,9 @@ def to_dataset(
     attributes: Mapping[str, Any],
     interface: Interface | None = None,
 ) -> xr.Dataset:
-    """Label arrays with dimensions, coordinates, units and long names.
+    """Label arrays with dimensions, coordinates (those of an `interface` too), units and names.
 
-    Of the attributes, strings and numbers are kept; anything else is written as JSON. The places of
-    nodes are added if they lie on one `interface`.
+    Attributes other than strings and numbers are written as JSON.
     """
     import xarray as xr
 

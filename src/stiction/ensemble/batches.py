@@ -106,10 +106,7 @@ def versions() -> str:
 
 
 def solve_span(experiment: Experiment, span: Span) -> Table:
-    """Solve a span of samples; a sample that fails does not stop the others.
-
-    A plain function, for any executor.
-    """
+    """Solve a span of samples; a sample that fails does not stop the others."""
     begin = time.perf_counter()
     parts: list[NDArray[Any]] = []
     failures: list[Failure] = []
@@ -135,10 +132,7 @@ def solve_span(experiment: Experiment, span: Span) -> Table:
 def piece_size(
     experiment: Experiment, span: Span, pace: float | None, left: int, workers: int
 ) -> int:
-    """Return how many samples of `span` go into the next piece of work, at a pace in s a sample.
-
-    It takes about `SECONDS`, is a fair share of the samples that are left, and bounded in bytes.
-    """
+    """Return how many samples go into the next piece of work, at a pace in s a sample."""
     block = block_of(len(experiment.problem.interface.shape))
     size = int(SECONDS / max(pace, 1e-9)) if pace else min(experiment.batch, BLOCK)
     # A fair share of what is left, but not so small that drawing blocks in parts costs more.
@@ -167,11 +161,9 @@ def solve_spans(
 ) -> Generator[Table, None, None]:
     """Solve spans of samples, and yield tables as they are done.
 
-    At most two pieces of work a worker are under way at once, so that memory stays bounded whatever
-    the number of samples. Closing the generator cancels what has not begun.
-
-    `workers` is the number of threads, or of workers if an executor does not report theirs.
-    A worker that is lost, or has other versions, is a `WorkerError`.
+    At most two pieces of work a worker are under way, so that memory stays bounded. Closing the
+    generator cancels what has not begun. A worker that is lost, or has other versions, is a
+    `WorkerError`.
     """
     waiting = deque(spans)
     left = sum(span.samples for span in spans)
@@ -222,10 +214,7 @@ def _result(future: Future[Table], span: Span, seed: int) -> Table:
 
 
 def missing_spans(done: NDArray[np.bool_], first: int) -> list[Span]:
-    """Return the stretches of samples that are not `done` (points, samples), point after point.
-
-    The samples are numbered from `first`.
-    """
+    """Return the stretches of samples, from `first` on, that are not `done` (points, samples)."""
     found = []
     for point, row in enumerate(done):
         edges = np.flatnonzero(np.diff(row, prepend=True, append=True)).reshape(-1, 2)

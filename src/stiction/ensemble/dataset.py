@@ -91,8 +91,7 @@ class Gathered:
     ) -> xr.Dataset:
         """Return everything as a dataset over the axes of a sweep, the samples and the nodes.
 
-        Samples that failed are NaN, and listed in the attribute 'failed_samples'. If others are
-        missing too, the attribute 'cut_short' gives the number that are done.
+        What is missing is NaN; the attributes 'failed_samples' and 'cut_short' give the cause.
         """
         dims = tuple(axes)
         shape = tuple(len(axes[dim][dim][0]) for dim in dims)

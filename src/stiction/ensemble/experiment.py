@@ -104,10 +104,7 @@ class Experiment:
         return float("nan") if given is None else float(np.mean(given))
 
     def check_fields(self) -> None:
-        """Warn of fields that do not suit the grid, the interface, or their units.
-
-        Most of the strength below the residual strength is an `InputError`.
-        """
+        """Warn of fields that do not suit the grid, the interface, or their units."""
         self.random.warn_if_inaccurate(self.problem.interface)
         for name, field in self.random.properties.items():
             if not field.modes(self.problem.interface).ranks.size:
@@ -121,26 +118,16 @@ class Experiment:
         check_residual(self.problem, self.random)
 
     def draws(self, first: int, count: int) -> Array:
-        """Return standard normal draws of samples first .. first + count - 1.
-
-        An array of shape (count, dimension), whose row i depends on (seed, first + i) only.
-        """
+        """Return standard normal draws (count, dimension) of samples first, first + 1, ..."""
         return self.random.draws(self.problem.interface, count, self.seed, first)
 
     def profiles(self, draws: Array) -> dict[str, Array]:
-        """Return the profiles of draws (samples, dimension) by name, (samples, *shape) each.
-
-        Coefficients are turned into stresses, Pa.
-        """
+        """Return the profiles of draws by name, (samples, *shape) each, all of them in SI."""
         found = self.random.from_draws(self.problem.interface, draws)
         return profiles_in_stress(self.problem, self.random, found)
 
     def onset(self, profiles: Mapping[str, Array]) -> Values:
-        """Solve profiles by name, (samples, *shape) each; a row for each sample.
-
-        A row does not depend on the other samples. A sample that does not fit the method is an
-        `InputError`.
-        """
+        """Solve profiles by name, (samples, *shape) each; no sample depends on the others."""
         # `check_fields` has warned of nodes of constant strength.
         accept = (*getattr(self.method, "accepts", ()), "constant")
         return dict(self.prepare()(self.problem.sample(profiles, accept=accept)))
@@ -150,10 +137,7 @@ class Experiment:
         return _solver(self.problem, self.method)
 
     def results(self, first: int, count: int) -> Values:
-        """Return all `variables` of samples first .. first + count - 1, solved at once.
-
-        A plain computation without threads, for any executor.
-        """
+        """Return all `variables` of samples first .. first + count - 1, solved without threads."""
         profiles = self.profiles(self.draws(first, count))
         return self.onset(profiles) | {name: profiles[name] for name in self.keep}
 
@@ -167,10 +151,7 @@ class Experiment:
         return min(size, max(1, MOST_NUMBERS // max(interface.size, self.dimension)))
 
     def batches(self, first: int, count: int, size: int = 0) -> Iterator[tuple[int, int]]:
-        """Cut samples first .. first + count - 1 into (first, count), at multiples of `size`.
-
-        The default of `size` is `batch`.
-        """
+        """Cut samples first .. first + count - 1 into (first, count), at multiples of a size."""
         size = size or self.batch
         start, end = first, first + count
         while start < end:

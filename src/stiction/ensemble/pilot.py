@@ -29,10 +29,7 @@ class Pilot(NamedTuple):
 
 
 def exact_counterpart(experiment: Experiment) -> Experiment | None:
-    """Return the experiment by `Equilibrium` if the given one is by the local criterion.
-
-    None for other methods, and if `Equilibrium` cannot take the problem.
-    """
+    """Return an experiment by the local criterion as one by `Equilibrium`, if that can take it."""
     method, problem = Equilibrium(), experiment.problem
     if not isinstance(experiment.method, LocalCriterion) or method.supports(problem):
         return None
@@ -40,10 +37,7 @@ def exact_counterpart(experiment: Experiment) -> Experiment | None:
 
 
 def compare(experiment: Experiment, first: int = 0, most: int = ON_A_LINE) -> Pilot | None:
-    """Solve samples from `first` on by a method and by its exact counterpart, in threads.
-
-    The result is None if there is no counterpart, or fewer than two samples are solved by both.
-    """
+    """Solve samples by a method and by its exact counterpart, in threads; None if there is none."""
     exact = exact_counterpart(experiment)
     if exact is None:
         return None
@@ -83,8 +77,7 @@ def pilot_attributes(
 ) -> dict[str, Any]:
     """Compare the first samples of at most eight points, and warn of a difference beyond 1 %.
 
-    The result has 'pilot_samples', 'pilot_bias' and 'pilot_scatter', the largest of the points; it
-    is empty if no method has an exact counterpart.
+    Return the largest bias and scatter of the points; nothing if there is no exact counterpart.
     """
     chosen = np.unique(np.linspace(0, len(points) - 1, MOST_POINTS).round().astype(int))
     found: list[Pilot] = []

@@ -54,10 +54,7 @@ class Store:
 
     @classmethod
     def open(cls, path: Path, study: dict[str, Any]) -> Store:
-        """Open a folder for writing: a new one, or one that holds the same study.
-
-        It is a `StoreError` if the folder cannot be written, or holds other files or another study.
-        """
+        """Open a folder for writing: a new one, or one that holds the same study."""
         if path.exists() and not path.is_dir():
             raise StoreError(f"{path}: is a file; a run needs a folder")
         try:
@@ -138,10 +135,7 @@ class Store:
     # -- writing -------------------------------------------------------------------------------
 
     def add(self, table: Table) -> None:
-        """Take a table, and store all that were taken if it is time or they are large.
-
-        If they cannot be written (a `StoreError`), what was stored before stays readable.
-        """
+        """Take a table, and store all that were taken if it is time or they are large."""
         self._taken.append(table)
         now, size = time.monotonic(), sum(table.rows.nbytes for table in self._taken)
         interval = min(max(SAVE_SECONDS, SAVE_SHARE * (now - self._begun)), SAVE_MOST)

@@ -21,24 +21,7 @@ OVERHEAD = 2**16
 
 
 def export(result: xr.Dataset, path: Path) -> None:
-    """Write a result in the format of its suffix, whole or not at all.
-
-    Parameters
-    ----------
-    result : Dataset
-        From `monte_carlo`, `Study.run` or `open_run(...).dataset()`.
-    path : Path
-        ``.nc`` (NetCDF) holds everything. ``.csv`` holds a table: a row a sample, columns named
-        ``name (unit)`` with the unit 1 for pure numbers, every number in full, ``nan`` where a
-        sample is missing. Profiles along the interface are left out with a warning.
-
-    Raises
-    ------
-    InputError
-        If the suffix is another one.
-    StoreError
-        If it cannot be written.
-    """
+    """Write a result as NetCDF (.nc) or as a table of samples (.csv), whole or not at all."""
     if path.suffix == ".nc":
         write_result(result, path)
     elif path.suffix == ".csv":

@@ -44,11 +44,7 @@ AnyPart: TypeAlias = Annotated[Any, BeforeValidator(_part)]
 
 
 def samples_of_part(part: tuple[int, int], points: int, samples: int) -> NDArray[np.bool_]:
-    """Return which samples a part has, (points, samples).
-
-    Blocks of consecutive samples are dealt out in turn, through all points of a sweep, so that
-    parts are alike even where points are not.
-    """
+    """Return which samples a part has, (points, samples): blocks in turn, through all points."""
     (number, of), total = part, points * samples
     block = min(BLOCK, max(1, total // (FEWEST_BLOCKS * of)))
     mine: NDArray[np.bool_] = np.arange(total) // block % of == number - 1

@@ -310,10 +310,7 @@ class Study(_Parts):
 
 
 def study_schema() -> dict[str, Any]:
-    """Return the JSON schema of a study file.
-
-    It requires no key but `type`: a swept key needs no value, and `stiction onset` no method.
-    """
+    """Return the JSON schema of a study file; a sweep may give any key, so none is required."""
 
     def relaxed(table: dict[str, Any]) -> dict[str, Any]:
         if "required" in table:

@@ -159,13 +159,10 @@ Sweep: TypeAlias = Annotated[
 
 
 def with_first_values(given: dict[str, Any]) -> dict[str, Any]:
-    """Return a study in plain form, each swept key without a value with the first of its sweep.
-
-    A sweep that is not valid is left to the validation of the whole.
-    """
+    """Return a study in plain form, each swept key without a value with the first of its sweep."""
     try:
         axes = read_axes(given.get("sweep", ()))
-    except InputError:
+    except InputError:  # which the validation of the whole explains
         return given
     for axis in axes:
         for key, values in axis.items():
