@@ -56,10 +56,7 @@ class LimitState:
         return replace(self, experiment=self.experiment.by(method))
 
     def draws(self, seed: int, first: int, samples: int) -> Array:
-        """Return the draws of samples first .. first + samples - 1 of this seed.
-
-        They are those of `stiction.monte_carlo`, of shape (samples, dimension).
-        """
+        """Return the draws of `stiction.monte_carlo`, (samples, dimension)."""
         return self.experiment.with_seed(seed).draws(first, samples)
 
     def profiles(self, draws: Array) -> dict[str, Array]:
@@ -67,17 +64,7 @@ class LimitState:
         return self.experiment.profiles(draws)
 
     def __call__(self, draws: Array) -> Array:
-        """Return the stress at onset, Pa: (samples,) or a number.
-
-        Parameters
-        ----------
-        draws : (samples, dimension) or (dimension,) array
-
-        Raises
-        ------
-        InputError
-            If the draws are not finite numbers of this shape.
-        """
+        """Return the stress at onset, Pa, of finite draws (samples, dimension) or (dimension,)."""
         given = check("draws", draws, Numbers)
         if given.ndim not in (1, 2) or given.shape[-1] != self.dimension:
             raise InputError(
