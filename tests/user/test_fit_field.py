@@ -194,6 +194,9 @@ def test_bounds_lie_outside_of_values_without_noise(bounded):
     assert interval["spectrum.exponent"][1] <= 16.0
     for name in ("marginal.low", "marginal.high", "spectrum.exponent"):
         assert interval[name][0] < interval[name][1]
+    interval = fitted(labelled(), marginal="uniform").interval
+    assert interval["marginal.loc"][1] <= VALUES.min()
+    assert interval["marginal.scale"][0] >= np.ptp(VALUES) * (1.0 - 1e-12)
 
 
 def test_a_field_of_coefficients_says_so():

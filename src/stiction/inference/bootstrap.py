@@ -282,18 +282,20 @@ def intervals(
         result[name] = first, last
     noise = result["noise"][1] if "noise" in result else found.model.noise
     quiet = found.setting.marginal.quiet(values, noise)
+    bottom, top = (float(end) for end in found.marginal.distribution.support())
+    least, most = max(float(quiet.min()), bottom), min(float(quiet.max()), top)
+    below, above = (-math.inf, least), (most, math.inf)
     limits = {
         "spectrum.exponent": RANGES["exponent"],
         "anisotropy": RANGES["anisotropy"],
-        "marginal.low": (
-            -math.inf,
-            max(float(quiet.min()), estimated.get("marginal.low", 0.0)),
-        ),
-        "marginal.high": (
-            min(float(quiet.max()), estimated.get("marginal.high", 0.0)),
-            math.inf,
-        ),
+        "marginal.low": below,
+        "marginal.high": above,
     }
+    loc, extent = estimated.get("marginal.loc"), estimated.get("marginal.scale")
+    if loc in (bottom, top):  # else it is inside, such as a mean
+        limits["marginal.loc"] = below if loc == bottom else above
+    if extent is not None and math.isclose(extent, top - bottom):
+        limits["marginal.scale"] = (most - least, math.inf)
     for name in limits.keys() & result.keys():
         result[name] = cut(result[name], limits[name], estimated[name])
     return result

@@ -278,19 +278,27 @@ class Whittle(NamedTuple):
         """Return sum w d (I/E - 1) and Fisher's information sum w d d^T, d = d log E/d theta."""
         family, limits = self.family, self.family.limits
         model, signals = state
-        steps = np.where(at + DIFFERENCE <= limits[:, 1], DIFFERENCE, -DIFFERENCE)
-        aside = [family.model(at + step, self.shares) for step in np.diag(steps)]
+        moved = {}
+        for i, name in enumerate(family.free):
+            if name not in ("variance", "noise_share"):
+                aside = at.copy()
+                aside[i] += DIFFERENCE if at[i] + DIFFERENCE <= limits[i, 1] else -DIFFERENCE
+                moved[name] = family.model(aside, self.shares), aside[i] - at[i]
         result, information = np.zeros(at.size), np.zeros((at.size, at.size))
         for one, signal in zip(self.observed, signals, strict=True):
             expected = model.expectation(one.window, signal)
-            d = np.empty((at.size, expected.size))
-            for i, (name, other) in enumerate(zip(family.free, aside, strict=True)):
-                same = name in ("variance", "noise_share")
-                moved = other.expectation(one.window, signal if same else None)
-                d[i] = ((moved - expected) / steps[i] / (expected + one.floor)).ravel()
+            # Of a known noise the share falls as the variance grows.
+            slopes = {
+                "variance": expected if family.noise is None else model.variance * signal,
+                "noise_share": model.variance * (one.window.white - signal),
+            }
+            scale = model.variance * (1.0 - model.noise_share)
+            for name, (other, step) in moved.items():
+                slopes[name] = scale * (other.signal(one.window) - signal) / step
+            lifted = expected + one.floor
+            d = np.stack([(slopes[name] / lifted).ravel() for name in family.free])
             weight = one.records * one.window.weights.ravel()
-            away = (one.average - expected) / (expected + one.floor)
-            result += d @ (weight * away.ravel())
+            result += d @ (weight * ((one.average - expected) / lifted).ravel())
             information += (d * weight) @ d.T
         return result, information
 
