@@ -16,11 +16,6 @@ from stiction.random.random_field import RandomField
 from stiction.variables import PROFILES
 
 MOST_LINES = 6
-_SYMBOLS = {
-    "strength": r"$\tau_p$",
-    "residual_strength": r"$\tau_r$",
-    "initial_stress": r"$\tau_i$",
-}
 
 
 def field(
@@ -59,7 +54,7 @@ def field(
     >>> problem = st.paper.problem(nodes=256)
     >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(problem.interface, seed=1)
     >>> st.plot.field(problem, tau_p).get_ylabel()
-    'strength $\\\\tau_p$ (MPa)'
+    'strength (MPa)'
     """
     check("where", where, Problem | Interface)
     interface = where.interface if isinstance(where, Problem) else where
@@ -68,8 +63,7 @@ def field(
     of_field = isinstance(profile, RandomField)
     rows = rows_of(interface, profile.quantile(interface, 0.5) if of_field else profile)
     factor, unit = unit_for(PROFILES[quantity].units, rows)
-    name = " ".join(filter(None, (quantity.replace("_", " "), _SYMBOLS.get(quantity))))
-    text = with_unit(name, unit)
+    text = with_unit(quantity.replace("_", " "), unit)
     scale, _ = unit_for("m", interface.lengths)
     conditions = profile.conditions if of_field else None
     if interface.is_plane:

@@ -106,22 +106,18 @@ def _draw_line(
     x = interface.x * unit_for("m", interface.lengths)[0]
     factor, unit = unit_for("Pa", tau_p)
     found = next(iter(results.values()))
-    measured = tau_p * factor
+    axes.plot(x, tau_p * factor, color=QUIET, linewidth=0.8, label=r"strength $\tau_p$")
     if MEASURED in found.coords:
         missing = ~found[MEASURED].values.reshape(-1)
-        axes.plot(x, measured, color=QUIET, linewidth=0.8, linestyle=(0, (2, 2)))
         beside = np.roll(missing, 1) | np.roll(missing, -1)
         axes.fill_between(
             x, 0.0, 1.0, where=missing | beside, transform=axes.get_xaxis_transform(),
             facecolor=PALE, alpha=0.6, linewidth=0.0, zorder=0.0, label="not measured, filled in",
         )  # fmt: skip
-        measured = np.where(missing, np.nan, measured)
-    axes.plot(x, measured, color=QUIET, linewidth=0.8, label=r"strength $\tau_p$")
     with suppress(InputError):  # no single nucleation length: the strength alone is drawn
         averaged = nucleation_stress(problem, tau_p)
         axes.plot(x, averaged * factor, label=r"nucleation stress $\tau_n$", **series(0))
-    for number, (name, result) in enumerate(results.items()):
-        _mark(axes, interface, number, name, result, factor)
+    _mark(axes, interface, results, factor)
     name_line(axes, interface, with_unit("shear stress", unit))
     axes.margins(y=0.08)
     add_friction_scale(axes, problem, "y", factor)
@@ -145,29 +141,30 @@ def _draw_plane(
         ):
             draw_outline(axes, interface, mask, ink, width)
             axes.plot([], [], color=ink, linewidth=width, label=text)
-    for number, (name, result) in enumerate(results.items()):
-        _mark(axes, interface, number, name, result, factor)
+    _mark(axes, interface, results, factor)
+    for result in results.values():
         if exact is None and "critical_aspect" in result:
             _ellipse(axes, interface, result)
 
 
 def _mark(
-    axes: Axes, interface: Interface, number: int, name: str, result: xr.Dataset, factor: float
+    axes: Axes, interface: Interface, results: Mapping[str, xr.Dataset], factor: float
 ) -> None:
-    """Mark the position of an onset, on a line at its load in the unit of that factor."""
+    """Mark the positions of onsets, on a line at their loads in the unit of that factor."""
     length, length_unit = unit_for("m", interface.lengths)
-    place = np.atleast_1d(result["critical_position"].values[0]) * length
-    load = float(result["critical_load"][0])
-    own, unit = unit_for("Pa", load)
-    text = f"{name}: {load * own:.4f} {unit}"
-    if "friction_coefficient" in result:
-        text += f" (coefficient {float(result['friction_coefficient'][0]):.4f})"
-    text += f" at {', '.join(f'{one:.2f}' for one in place)} {length_unit}"
-    text += " (in a gap)" if IN_GAP in result and bool(result[IN_GAP][0]) else ""
-    style: dict[str, Any] = {"linestyle": "none", "color": color(number + 1), "label": text}
-    style |= {"marker": "os^DvP"[number % 6], "markersize": 9.0 - 3.5 * number}
-    at = place if interface.is_plane else (*place, load * factor)
-    axes.plot(*at, markeredgecolor="white", markeredgewidth=0.8, **style)
+    for number, (name, result) in enumerate(results.items()):
+        place = np.atleast_1d(result["critical_position"].values[0]) * length
+        load = float(result["critical_load"][0])
+        own, unit = unit_for("Pa", load)
+        text = f"{name}: {load * own:.4f} {unit}"
+        if "friction_coefficient" in result:
+            text += f" (coefficient {float(result['friction_coefficient'][0]):.4f})"
+        text += f" at {', '.join(f'{one:.2f}' for one in place)} {length_unit}"
+        text += " (in a gap)" if IN_GAP in result and bool(result[IN_GAP][0]) else ""
+        style: dict[str, Any] = {"linestyle": "none", "color": color(number + 1), "label": text}
+        style |= {"marker": "os^DvP"[number % 6], "markersize": max(9.0 - 3.5 * number, 2.0)}
+        at = place if interface.is_plane else (*place, load * factor)
+        axes.plot(*at, markeredgecolor="white", markeredgewidth=0.8, **style)
 
 
 def _ellipse(axes: Axes, interface: Interface, result: xr.Dataset) -> None:

@@ -145,7 +145,7 @@ def read_profile(
 
 
 def _in_order(array: Any) -> Any:
-    """Return a profile with rising coordinates; a list of points on a plane becomes a map."""
+    """Return a profile with rising coordinates, and points on a plane as a map."""
     if "row" in array.dims:
         array = array.set_index(row=["x", "y"])
     for index in array.indexes.values():
@@ -169,13 +169,14 @@ def is_labelled(value: Any) -> bool:
 
 def simplified(value: Any, quantity: str) -> Any:
     """Return `value` as labelled, a pandas Series over positions too, or as numbers in SI."""
+    si = QUANTITIES[quantity].units
     if is_labelled(value):
         plain = not value.dims and not hasattr(value, "data_vars")
-        return _in_si(value, quantity, QUANTITIES[quantity].units) if plain else value
+        return _in_si(value, quantity, si) if plain else value
     kind = getattr(getattr(getattr(value, "index", None), "dtype", None), "kind", "")
     if kind == "f" and hasattr(value, "to_xarray"):
         return value.to_xarray()
-    return _magnitude(value, QUANTITIES[quantity].units)
+    return _magnitude(value, si)
 
 
 def _magnitude(value: Any, si: str) -> Any:
@@ -284,8 +285,8 @@ def _is_map(data: Any) -> bool:
     if "row" not in data.dims:
         return {"x", "y"} <= {*data.dims}
     columns = {_plain(name): data[name].values for name in data.data_vars}
-    several = len(columns) > 2 and {"x", "y"} <= {*columns}
-    return several and np.unique(columns["x"]).size < columns["x"].size
+    both = len(columns) > 2 and {"x", "y"} <= {*columns}
+    return both and np.unique(columns["x"]).size < columns["x"].size
 
 
 def _choose(data: Any, names: list[Any], called: tuple[str, ...], si: str) -> Any:

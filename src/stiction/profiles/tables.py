@@ -70,7 +70,7 @@ def _read_npy(path: Path) -> Array:
     try:
         array = np.load(io.BytesIO(data), allow_pickle=False)
     except Exception as error:  # numpy lets through whatever Python's own parser raises
-        text = str(error).splitlines()[0] if str(error) else "its header cannot be read"
+        text = (str(error) or "its header cannot be read").splitlines()[0]
         raise InputError(f"is not a .npy file of numbers: {text}") from None
     if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
         raise InputError(f"must hold numbers, got {getattr(array, 'dtype', 'an archive')}")
@@ -83,13 +83,11 @@ def _read_npy(path: Path) -> Array:
 def read_table(path: Path) -> xr.Dataset:
     """Read a table of numbers from a text file.
 
-    Columns are separated by semicolons, tabs, commas or blanks, in this order of preference; the
-    decimal sign may be a comma unless commas separate. Lines that begin with ``#`` are comments;
-    the last one before the numbers names the columns if no other line does. Names may have a line
-    of units below them, and lines of another number of cells above them.
-
-    The columns are variables along 'row', NaN where a cell is empty, with `units` and `heading` as
-    attributes; those without names are called by their numbers, from 0.
+    Columns are separated by semicolons, tabs, commas or blanks, in this order; the decimal sign may
+    be a comma unless commas separate. Lines that begin with ``#`` are comments; the last one before
+    the numbers names the columns if no other line does. Names may have a line of units below them,
+    and lines of another number of cells above them. Columns become variables along 'row', NaN where
+    a cell is empty; those without names are called by their numbers, from 0.
     """
     import xarray as xr
 

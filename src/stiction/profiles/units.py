@@ -18,7 +18,6 @@ _BASE = {
     "m meter metre meters metres": Unit(1.0, _LENGTH),
     "s second seconds": Unit(1.0, (0, 0, 1)),
     "N newton newtons": Unit(1.0, (1, 1, -2)),
-    "J joule joules": Unit(1.0, (1, 2, -2)),
     "Pa pascal pascals": Unit(1.0, _STRESS),
     "bar": Unit(1e5, _STRESS),
     "g": Unit(1e-3, (1, 0, 0)),
@@ -62,10 +61,7 @@ def parse(text: str) -> Unit | None:
     factor = 1.0
     powers: tuple[int, ...] = (0, 0, 0)
     for place, part in enumerate(plain.split("/")):
-        words = part.split()
-        if not words:
-            return None
-        for number, word in enumerate(words):
+        for number, word in enumerate(part.split() or ("",)):
             match = _POWER.match(word)
             unit = _UNITS.get(match[1]) if match else None
             if match is None or unit is None:

@@ -13,11 +13,7 @@ BATCH = 1024
 
 
 class Count(NamedTuple):
-    """Failures among the first samples of an ensemble.
-
-    If counting ended at a failure, because it was the last one wanted, that failure does not
-    count towards their frequency, and neither does its sample.
-    """
+    """Failures among the first samples of an ensemble; a failure that ended it does not count."""
 
     failures: int
     samples: int
@@ -27,8 +23,7 @@ class Count(NamedTuple):
     def probability(self) -> float:
         """Unbiased estimate: the share of failures, of all samples but the last failure.
 
-        Haldane (1945); with a least or a greatest number of samples, Girshick, Mosteller and
-        Savage (1946).
+        Haldane (1945); with limits on the samples, Girshick, Mosteller and Savage (1946).
         """
         last = int(self.until_failure)
         return (self.failures - last) / (self.samples - last)
@@ -63,9 +58,8 @@ def count_failures(
 ) -> tuple[Count, Array]:
     """Count until there are enough failures, among at least `least` samples from `start` on.
 
-    Stopping when the estimate looks precise enough would favour counts with many failures
-    early. So the number of failures is fixed beforehand, and what was computed beyond the last of
-    them does not count; the stresses that are returned include it.
+    The number of failures is fixed beforehand: stopping at a precise estimate would favour early
+    failures. Stresses beyond the last of them do not count, and are returned.
     """
     wanted = 2 + math.ceil(1.0 / (target_cv * target_cv))  # the error falls like 1/sqrt(r - 1)
     least = min(least, max_evaluations)

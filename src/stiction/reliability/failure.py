@@ -1,11 +1,10 @@
 """Failure probability, design stress and the curve of both: counting, or the tail of the onset."""
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
-from pydantic import Field
 
 from stiction.arrays import Array
 from stiction.ensemble.experiment import Experiment
@@ -40,8 +39,8 @@ PILOT = 1_000
 """Number of plain samples by which the algorithm is chosen."""
 FREQUENT = 0.01
 """Probability above which plain sampling needs no more evaluations than subset simulation."""
-COMMONEST = 0.5
-"""Probability at which a curve begins."""
+COMMONEST, PER_DECADE = 0.5, 3
+"""Probability at which a curve begins, and its points for each decade."""
 NEGLIGIBLE = 1e-15
 """Probability of failing, or of holding, below which no sample is drawn."""
 DOUBTFUL = 0.02
@@ -259,7 +258,7 @@ def _by_tail(state: LimitState, stress: float, tail: Tail, target_cv: float) -> 
                 " be low; compare with algorithm='subset'"
             )
     elif tail.complete:
-        doubts += exact_doubts(state, last.around(stress), stress, probability)
+        doubts += exact_doubts(state, tail.repetitions[-1].around(stress), stress, probability)
     else:
         there = tail.probability(tail.reached), tail.cv(tail.reached)
         interval = 0.0, lognormal_interval(*there)[1]
@@ -368,8 +367,9 @@ def design_stress(
             interval = tail.stress_interval(probability, cv, lowest)
             doubts += imprecise(cv, target_cv, tail.spent)
             if tail.algorithm == "subset":
-                near = tail.repetitions[-1].around(stress)
-                doubts += exact_doubts(state, near, stress, probability)
+                doubts += exact_doubts(
+                    state, tail.repetitions[-1].around(stress), stress, probability
+                )
         else:  # the tail ends at its lowest sample
             cv, stress = math.inf, tail.extent[0] if math.isfinite(tail.extent[0]) else math.nan
             interval = (lowest, stress) if stress > lowest else state.bounds
@@ -387,7 +387,6 @@ def failure_curve(
     *,
     method: MethodObject,
     smallest: Probability = 1e-9,
-    points_per_decade: Annotated[Count, Field(le=1000)] = 3,
     target_cv: TargetCv = 0.3,
     seed: Number = 0,
     max_evaluations: Budget | None = None,
@@ -395,14 +394,12 @@ def failure_curve(
     workers: Count | None = None,
     progress: Progress = True,
 ) -> xr.Dataset:
-    """Estimate P(onset < s) from one half down to a smallest probability.
+    """Estimate P(onset < s) from one half down to a smallest probability, thrice a decade.
 
     Parameters
     ----------
     smallest : float
         Smallest probability of the curve.
-    points_per_decade : int
-        Number of stresses per decade of probability.
     target_cv : float
         Coefficient of variation to reach at the smallest probability; it is lower elsewhere.
     problem, random, seed, workers, progress
@@ -447,8 +444,7 @@ def failure_curve(
         )
         if tail.complete:
             stress = tail.quantile(smallest)
-            near = tail.repetitions[-1].around(stress)
-            doubts = exact_doubts(state, near, stress, smallest)
+            doubts = exact_doubts(state, tail.repetitions[-1].around(stress), stress, smallest)
         else:
             doubts = [f"{tail.short_of(f'P = {smallest:g}')}; the curve ends there"]
             smallest = tail.probability(tail.reached)
@@ -456,7 +452,7 @@ def failure_curve(
         warn_accuracy(text)
     lowest, pressure = state.bounds[0], experiment.pressure
     decades = max(np.log10(COMMONEST / smallest), 0.0)
-    count = int(np.ceil(decades * points_per_decade)) + 1
+    count = int(np.ceil(decades * PER_DECADE)) + 1
     rows = []
     for chance in (COMMONEST * 10.0 ** -np.linspace(0.0, decades, count)).tolist():
         stress = tail.quantile(chance)

@@ -1,8 +1,8 @@
-"""Subset simulation: a rare event as a chain of less rare ones, sampled by preconditioned walks.
+"""Subset simulation of any function of standard normal draws.
 
-Works on any function of standard normal draws. Level after level keeps the lowest tenth of its
-samples and grows them back to full number by Metropolis steps z' = sqrt(1 - b^2) z + b w, which
-leave the normal distribution as it is and are rejected where they leave the level.
+Level after level keeps the lowest tenth of its samples and grows them back to full number by
+Metropolis steps z' = sqrt(1 - b^2) z + b w, which leave the normal distribution as it is and are
+rejected where they leave the level.
 """
 
 import math
@@ -49,8 +49,7 @@ class Population(NamedTuple):
 class Descent(NamedTuple):
     """A finished repetition: populations from all samples down to the rarest.
 
-    Below the threshold lies the share of the last population that would go on: the failures, if the
-    repetition is complete, that is if it reached the threshold or the requested probability.
+    It is complete if it reached the threshold or the requested probability.
     """
 
     samples: int  # N, of the first level and, within a few, of each other
@@ -116,8 +115,7 @@ def grow(
 ) -> tuple[Array, Array, float, float]:
     """Return states and values of chains, the given ones first, acceptance and last step size.
 
-    All chains move together, one call of the function a step; the step size follows the
-    acceptance over all chains, ever more slowly.
+    All chains move together; the step size follows their acceptance, ever more slowly.
     """
     chains, dimension = draws.shape
     states, found = np.empty((steps, chains, dimension)), np.empty((steps, chains))

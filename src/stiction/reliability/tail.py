@@ -138,9 +138,9 @@ def repeat_until_precise(
             return done or [one]
         done = [*(earlier.light() for earlier in done), one]
         cv = judge(done)
-        meter.note = f"repetition {len(done)}, c.o.v. {cv:.2g} (target {target_cv:g})"
         if cv <= target_cv:
             break
+        meter.note = f"repetition {len(done)}, c.o.v. {cv:.2g} (target {target_cv:g})"
         total = sum(each.samples for each in done)
         price = sum(each.evaluations for each in done) / total
         wanted = MARGIN * total * (cv / target_cv) ** 2 - total if math.isfinite(cv) else total

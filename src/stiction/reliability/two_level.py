@@ -2,14 +2,12 @@
 
 With L the guide's stress and E the exact one, for any ceiling b,
 
-    P(E < s) = P(L < b) P(E < s | L < b) / P(L < b | E < s),
+    P(E < s) = P(L < b) P(E < s | L < b) / P(L < b | E < s).
 
-whatever L is. Where L follows E closely the last factor is near one and the middle one is not
-small, so that a few hundred exact evaluations replace thousands.
-
-The last factor is measured by walks that start from failures with L < b. Failures that L misses
-and that no short walk reaches are never found: whether L ranks samples as E does has to be
-known from elsewhere (`stiction.reliability.tail`).
+Where L follows E closely the last factor is near one and the middle one is not small, so that a
+few hundred exact evaluations replace thousands. The last factor is measured by walks that start
+from failures with L < b. Failures that L misses and that no short walk reaches are never found:
+`stiction.reliability.tail` compares beforehand how L and E rank samples.
 """
 
 import math
@@ -34,10 +32,9 @@ MARGIN = 2.5
 
 
 class Bridge(NamedTuple):
-    """One repetition over both levels.
+    """One repetition over both levels, complete if the exact limit state was evaluated.
 
-    It is complete if the exact limit state was evaluated. If that found no failure, the estimate is
-    zero: leaving it out of a mean would favour repetitions that found one.
+    Without a failure the estimate is zero: leaving it out would favour those that found one.
     """
 
     samples: int  # exact evaluations for the middle factor
@@ -83,13 +80,11 @@ class Bridge(NamedTuple):
 def _covered(
     states: Array, guide: Function, ceiling: float, families: NDArray[np.int64], samples: int
 ) -> tuple[float, float]:
-    """Return P(L < b | E < s) from walkers in the failure set, and its relative variance.
-
-    Walkers of one ancestor are alike: each family is one observation.
-    """
+    """Return P(L < b | E < s) from walkers in the failure set, and its relative variance."""
     walkers = families.size
     covered = (guide(states) < ceiling).reshape(-1, walkers)
     last = max(float(covered.mean()), 1.0 / samples)
+    # Walkers of one ancestor are alike: each family is one observation.
     _, group = np.unique(families, return_inverse=True)
     sums = np.bincount(group, weights=covered.mean(axis=0) - last)
     return last, float(np.sum(sums * sums)) / (walkers * last) ** 2

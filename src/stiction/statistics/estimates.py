@@ -1,12 +1,4 @@
-"""Estimates with standard errors: means, standard deviations and quantiles of samples.
-
-Also the mean of few expensive results with the help of ever more inexpensive ones, as
-control variates. Sample i is the same whatever the method. The expensive result of samples
-0 .. n - 1 is Y, those of ever less expensive methods X_1 of 0 .. N_1 - 1, X_2 of 0 .. N_2
-- 1 and so on, n <= N_1 <= N_2 ... What a method gets right about the next more expensive
-one is averaged over all of its own samples, what it gets wrong over those of the latter
-only (Peherstorfer, Willcox and Gunzburger, 2016).
-"""
+"""Estimates with standard errors: means, standard deviations and quantiles of samples."""
 
 from __future__ import annotations
 
@@ -29,14 +21,7 @@ Share: TypeAlias = Annotated[Real, Field(gt=0.0, lt=1.0)]
 
 @dataclass(frozen=True)
 class Estimate:
-    """An estimated number and its standard error.
-
-    Attributes
-    ----------
-    value : float
-    error : float
-        Standard error; zero if exact.
-    """
+    """An estimated number and its standard error, zero if exact."""
 
     value: float
     error: float = 0.0
@@ -51,7 +36,7 @@ class Estimate:
 
 
 def as_sample(values: Any, fewest: int = 2) -> Array:
-    """Return independent, finite values, at least `fewest`, as a flat array."""
+    """Return finite values, at least `fewest`, as a flat array."""
     array = check("values", values, Numbers).ravel()
     if array.size < fewest:
         raise InputError(f"values: at least {fewest} are needed, got {array.size}")
@@ -75,23 +60,18 @@ def standard_deviation(values: Any) -> Estimate:
     """
     sample = as_sample(values)
     s = float(sample.std(ddof=1))
-    if s == 0.0:
-        return Estimate(0.0, 0.0)
     fourth = float(np.mean((sample - sample.mean()) ** 4))
-    return Estimate(s, math.sqrt(max(fourth - s**4, 0.0) / sample.size) / (2.0 * s))
+    error = math.sqrt(max(fourth - s**4, 0.0) / sample.size)
+    return Estimate(s, error / (2.0 * s) if s else 0.0)
 
 
 @dataclass(frozen=True)
 class Combined:
-    """A mean from all methods: `estimate` with its `value` and standard `error`.
-
-    `plain_error` is the standard error of the expensive results by themselves, `freedom`
-    the number of degrees of freedom of the error.
-    """
+    """A mean from all methods, with the standard error of the expensive results by themselves."""
 
     estimate: Estimate
     plain_error: float
-    freedom: int
+    freedom: int  # of the error of the estimate
 
     @property
     def saving(self) -> float:
@@ -108,6 +88,8 @@ def combined_mean(expensive: Any, *inexpensive: Any) -> Combined:
     """Estimate the mean of few expensive results, with many inexpensive ones as controls.
 
     The results may be onsets by `Rupture`, `Equilibrium` and `LocalCriterion` with one seed.
+    What a method gets right about the next more expensive one is averaged over all of its own
+    samples, what it gets wrong over those of the latter only (Peherstorfer et al., 2016).
 
     Parameters
     ----------
@@ -143,11 +125,9 @@ def combined_mean(expensive: Any, *inexpensive: Any) -> Combined:
 
 
 def _telescoped(results: Array, chain: Sequence[Array]) -> tuple[float, float]:
-    """Return the mean of `results` and its variance.
+    """Return mean_n(Y - a X) + a E[X] and its variance, Var(Y - a X)/n + a^2 Var(E[X]).
 
-    mean_n(Y - a X) + a E[X], a = Cov(X, Y)/Var(X), with E[X] from the rest of the chain in
-    the same way; variance Var(Y - a X)/n + a^2 Var(E[X]): for this a the two terms do not
-    covary.
+    E[X] is from the rest of the chain. For a = Cov(X, Y)/Var(X) the two terms do not covary.
     """
     if not chain:
         return float(results.mean()), float(results.var(ddof=1)) / results.size

@@ -80,7 +80,7 @@ def nucleation_statistics(problem: Problem, strength: RandomField) -> Nucleation
     """
     scale, load, initial = stationary(problem, strength)
     rate = problem.uniform_rate
-    assert rate is not None
+    assert rate is not None  # others are not stationary
     (window,) = windows_of(problem, rate, stretches=(1.0,))
     power = strength_spectrum(problem, strength) * np.abs(window.spectrum) ** 2
     mean, variance = scale * strength.mean, (scale * strength.standard_deviation) ** 2
@@ -101,17 +101,16 @@ def strength_spectrum(problem: Problem, strength: RandomField) -> Array:
 
 
 def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, float]:
-    """Return the unit of the strength (Pa), load profile and initial stress of a uniform problem.
+    """Return the unit of the strength (Pa), load profile and initial stress, all uniform.
 
-    The unit of friction coefficients is the normal pressure. An `InputError` if the
-    nucleation stress is not stationary.
+    The unit of friction coefficients is the normal pressure.
     """
     check_law(problem)
     load, initial = problem.load_profile, problem.load.initial_stress
     pressure = 1.0 if strength.of is None else problem.load.normal_pressure
     varying = {
-        "load.profile: varies along the interface": np.ptp(load) > 0.0,
-        "load.initial_stress: varies along the interface": np.ptp(initial) > 0.0,
+        "load.profile: varies": np.ptp(load) > 0.0,
+        "load.initial_stress: varies": np.ptp(initial) > 0.0,
         "load.normal_pressure: varies, and strength is in coefficients": (
             pressure is not None and np.ptp(pressure) > 0.0
         ),
@@ -120,11 +119,8 @@ def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, f
             problem.uniform_rate is None
         ),
     }
-    problems = [
-        f"{what}, so the nucleation stress is not stationary; sample it with st.monte_carlo instead"
-        for what, varies in varying.items()
-        if varies
-    ]
+    why = "so the nucleation stress is not stationary; sample it with st.monte_carlo instead"
+    problems = [f"{what}, {why}" for what, varies in varying.items() if varies]
     if pressure is None:
         problems.append("load.normal_pressure: is missing, and strength is in coefficients")
     if problems:

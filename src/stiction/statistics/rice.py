@@ -1,9 +1,4 @@
-"""Distribution of the critical stress from crossing rates: the minimum of a stationary process.
-
-On a plane dips take the place of crossings: the expected Euler characteristic of what lies
-below a level is the expected number of its parts less that of their holes, of which there
-are none at low levels (Adler, 1981). Low dips come as a Poisson process.
-"""
+"""Distribution of the critical stress from crossing rates: the minimum of a stationary process."""
 
 import math
 from collections.abc import Iterator
@@ -103,8 +98,9 @@ def rice_distribution(
     there crossings of the level x come as a Poisson process at the rate nu (Rice, 1945;
     Cramer and Leadbetter, 1967). S and nu are pooled from sampled profiles of the
     nucleation stress, every position of which counts; so a few hundred profiles determine
-    the lower tail as well as many more minima would. On a plane P(tau_cr > x) ~
-    exp(-chi(x)), with chi the expected number of dips below x in the nucleation stress.
+    the lower tail as well as many more minima would. On a plane P(tau_cr > x) ~ exp(-chi(x)),
+    with chi the expected Euler characteristic of what lies below x: the number of dips, as low
+    ones have no holes (Adler, 1981).
 
     Parameters
     ----------
@@ -127,6 +123,8 @@ def rice_distribution(
     >>> bool(found.quantile(0.05) < found.quantile(0.5))
     True
     """
+    from scipy.signal import resample  # slow to import
+
     unit, load, initial = stationary(problem, strength)
     if stress is not None and not (
         stress.ndim == 1 and stress.size and (np.diff(stress) > 0).all()
@@ -144,7 +142,7 @@ def rice_distribution(
             count = min(together, profiles - first)
             tau_p = unit * strength.sample(interface, samples=count, seed=seed, first=first)
             tau = initial + load * nucleation_stress(problem, tau_p)
-            yield tau if factor == 1 else _refined(tau, points)
+            yield tau if factor == 1 else resample(tau, points, axis=1)
 
     levels = stress
     if levels is None:
@@ -187,11 +185,10 @@ def _count_dips(
     below: NDArray[np.int64],
     reached: NDArray[np.int64],
 ) -> None:
-    """Steps whose cumulative sums count dips and nodes of some planes at or below each level.
+    """Steps whose cumulative sums count dips, nodes and samples at or below each level.
 
     `level` is the number of the first level at or above the value of each node. `dips` is
-    the Euler characteristic, nodes less edges plus faces of the periodic grid; `below` and
-    `reached` are nodes, and samples with a node.
+    the Euler characteristic, nodes less edges plus faces of the periodic grid.
     """
     samples, nx, ny = level.shape
     for sample in range(samples):
@@ -211,14 +208,6 @@ def _count_dips(
         reached[lowest] += 1
 
 
-def _refined(rows: Array, points: int) -> Array:
-    """Rows evaluated at more points, by their trigonometric interpolant."""
-    spectrum = np.fft.rfft(rows, axis=1)
-    spectrum[:, -1] *= 0.5  # the highest wave of an even grid stands for both of its signs
-    result: Array = np.fft.irfft(spectrum, points, axis=1) * (points / rows.shape[1])
-    return result
-
-
 @jit
 def _count_crossings(
     rows: Array, levels: Array, crossings: NDArray[np.int64], below: NDArray[np.int64]
@@ -229,8 +218,7 @@ def _count_crossings(
         stop = np.searchsorted(levels, before)
         for i in range(rows.shape[1]):
             now = rows[row, i]
-            # The first level at or above a value; a fall from `before` to `now` crosses those
-            # from that of `now` to that of `before`, exclusive.
+            # A fall crosses the levels from the first one at or above its end to that of its start.
             start = np.searchsorted(levels, now)
             below[start] += 1
             if now < before:
