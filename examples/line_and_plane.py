@@ -17,7 +17,6 @@ from line_and_plane_figures import NAMES, draw
 from scipy.stats import rankdata
 
 import stiction as st
-from stiction.equilibrium.solver import first_instabilities, make_program
 from stiction.statistics.estimates import Estimate, mean
 
 RATIOS = (0.25, 0.5, 1.0, 2.0)
@@ -144,7 +143,6 @@ def far_lowering(case: Case, data: xr.Dataset) -> list[Estimate]:
     """
     problem = case.problem
     places, length = problem.interface.coordinates.values(), case.size * NUCLEATION_LENGTH
-    program = make_program(problem)
     found = []
     for ratio in RATIOS:
         at = data.sel(ratio=ratio).isel(sample=slice(NEIGHBOURS))
@@ -158,9 +156,9 @@ def far_lowering(case: Case, data: xr.Dataset) -> list[Estimate]:
             ]
             square = sum(each**2 for each in np.meshgrid(*away, indexing="ij"))
             row[square > (REACH * NUCLEATION_LENGTH) ** 2] = OUT_OF_REACH
-        sample = problem.sample({"strength": tau_p})
-        near = sample.mean_stress(first_instabilities(program, sample))
-        found.append(mean(100.0 * ((near - at.first_instability) / at.local).values))
+        near = st.onset(problem, tau_p, method=st.Equilibrium(), progress=False)
+        rise = near.first_instability.values - at.first_instability
+        found.append(mean(100.0 * (rise / at.local).values))
     return found
 
 

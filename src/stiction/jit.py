@@ -174,12 +174,12 @@ class _Flags(Flags):
         return given
 
 
-class _Compiler(Compiler):
-    """numba's compiler with these options."""
+class _Library(JITCodeLibrary):
+    """Code that LLVM optimises in one pass: numba's first one is there for reference counts."""
 
-    def __init__(self, *arguments: Any) -> None:
-        super().__init__(*arguments)
-        self.state.flags = _Flags(self.state.flags)
+    def _optimize_final_module(self) -> None:
+        manager, builder = self._codegen._module_pass_manager()
+        manager.run(self._final_module, builder)
 
 
 class _Draft(JITCodeLibrary):
@@ -207,14 +207,26 @@ class _Draft(JITCodeLibrary):
         return self.serialize_using_bitcode()
 
 
-class _InsideCompiler(_Compiler):
-    """A compiler of such code."""
+class _Compiler(Compiler):
+    """numba's compiler with these options."""
+
+    library: ClassVar = _Library
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.state.flags = _Flags(self.state.flags)
 
     def define_pipelines(self) -> Any:
         state = self.state
-        state.library = _Draft(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         return super().define_pipelines()
+
+
+class _InsideCompiler(_Compiler):
+    """A compiler of drafts."""
+
+    library = _Draft
 
 
 _OPTIONS: dict[str, Any] = {

@@ -17,9 +17,10 @@ from stiction.equilibrium.cholesky import (
     substitute,
 )
 from stiction.equilibrium.dense import LineProgram
+from stiction.equilibrium.linear_program import certificate
 from stiction.equilibrium.patches import count_patches, main_patch
 from stiction.equilibrium.runaway import block_factor
-from stiction.equilibrium.sample import LINEAR, State, make_sample
+from stiction.equilibrium.sample import LINEAR, make_sample
 from stiction.equilibrium.windows import smallest_window, window_mode
 
 COLUMN = stiffness_column(256, 0.1, 1e9)
@@ -150,7 +151,8 @@ def test_certificate_is_the_distance_of_both_bounds(problem, make_strength):
     sample = program.sample_of(problem.sample(excess), 0)
     load, multiplier = program.bound(sample)
     # Without slip nothing below the weakest node is overstressed; above is the local bound.
-    gap = program.gap(sample, State(0.0, *np.zeros((3, 256))), multiplier)
+    workspace = make_workspace(program.stiffness)
+    gap = certificate(sample, *np.zeros((2, 256)), multiplier, workspace)
     assert gap == pytest.approx(load - excess.min(), rel=1e-9)
 
 
@@ -231,22 +233,11 @@ def humped():
     return problem, field.sample(problem.interface, samples=8, seed=0)
 
 
-def test_sensitivity_where_a_node_that_weakens_more_steeply_is_the_instability(humped):
-    """At the most sensitive node and along a random direction."""
+def test_no_sensitivity_beyond_a_corner_where_a_law_steepens(humped):
     problem, tau_p = humped
-    rng = np.random.default_rng(1)
-    found = exact_onset(problem, tau_p, sensitivity=True)
-    assert np.isnan(found.certificate_gap).sum() >= 3
-    for strength, gradient in zip(tau_p, found.sensitivity.values, strict=True):
-        for change in (np.eye(96)[gradient.argmax()], rng.standard_normal(96)):
-            expected = pytest.approx(gradient @ change, rel=1e-5)
-            assert slope(problem, strength, change) == expected
-
-
-def test_no_sensitivity_where_nodes_weaken_more_steeply_at_once(humped):
-    """Two dips alike: raising one of them leaves the other, lowering it does not."""
-    problem, tau_p = humped
-    half = tau_p[0][::2]
-    with pytest.warns(st.AccuracyWarning, match="1 of 1 samples.*sensitivity is NaN"):
-        found = exact_onset(problem, np.concatenate((half, half)), sensitivity=True)
-    assert np.isnan(found.sensitivity).all()
+    with pytest.warns(st.AccuracyWarning, match="of 8 samples.*sensitivity is NaN"):
+        found = exact_onset(problem, tau_p, sensitivity=True)
+    proved = np.isfinite(found.certificate_gap.values)
+    assert (~proved).sum() >= 3
+    assert np.isnan(found.sensitivity.values[~proved]).all()
+    assert np.isfinite(found.sensitivity.values[proved]).all()

@@ -1,5 +1,7 @@
 """Equilibrium against other algorithms: HiGHS, path following, transforms, relaxation."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from oracles import by_relaxation, largest_load, symbol_of
@@ -40,7 +42,7 @@ def test_linear_programme_and_path_of_events(problem, make_strength, ratio):
     rows, program = problem.sample(tau_p), LineProgram(problem)
     for row, load in enumerate(loads):
         sample = program.sample_of(rows, row)
-        found = program.next(sample, program.at_rest(sample))
+        found = program.next(sample, replace(program.at_rest(sample), stuck=True))
         assert found.unstable
         assert found.load == pytest.approx(load, rel=1e-11)
 
@@ -224,26 +226,6 @@ def test_flat_stretches_just_above_the_residual(make_strength, above):
     assert onset.arrested_events.max() < 30
 
 
-@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
-def test_estimated_error_is_of_the_size_of_the_error(make_strength):
-    """Against the same fields on a grid eight times as fine."""
-    reference = make_problem(2048)
-    tau_p = make_strength(0.25).sample(reference.interface, samples=40, seed=3)
-    exact = exact_onset(reference, tau_p).first_instability.values
-    for nodes, resolves in ((256, 8.8), (512, 17.7)):
-        problem = make_problem(nodes)
-        in_length = problem.nucleation_length / problem.interface.spacing
-        assert in_length == pytest.approx(resolves, rel=0.01)
-        coarse = tau_p[:, :: 2048 // nodes]
-        onset = exact_onset(problem, coarse, discretization_error=True)
-        error = np.abs(onset.first_instability.values - exact)
-        estimate = onset.discretization_error.values
-        # Measured: 80 and 92 % below the estimate, and 94 and 99 % below twice it; the estimate
-        # is 1.8 and 3.7 times too large in the root mean square.
-        assert np.mean(error <= 2.0 * estimate) > 0.85
-        assert 0.5 < np.sqrt(np.mean(estimate**2) / np.mean(error**2)) < 8.0
-
-
 @pytest.mark.parametrize("high", [1.66e6, 2.66e6])
 def test_sliding_is_proved(problem, make_strength, high):
     """Without any length taken for unstoppable, the same loads and events."""
@@ -253,10 +235,6 @@ def test_sliding_is_proved(problem, make_strength, high):
     # Griffith's length grows with the modulus, of which the test for arrest knows only here.
     program.runs = program.runs._replace(modulus=np.inf)
     rows = problem.sample(tau_p)
-    _, states = program.first(rows, False)
-    proved, events = plain.first_instability.values.copy(), np.zeros(200)
-    for row, state in states.items():
-        path = follow(program, program.sample_of(rows, row), state)
-        proved[row], events[row] = path.last.load, len(path.events)
-    np.testing.assert_array_equal(plain.critical_load, proved)
-    np.testing.assert_array_equal(plain.arrested_events, events)
+    paths = [follow(program, program.sample_of(rows, row)) for row in range(200)]
+    np.testing.assert_array_equal(plain.critical_load, [path.last.load for path in paths])
+    np.testing.assert_array_equal(plain.arrested_events, [len(path.events) for path in paths])

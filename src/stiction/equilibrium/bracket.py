@@ -14,24 +14,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stiction.arrays import Array
-from stiction.elasticity.linear import NEGATIVE, SOLVED, lowest_eigenvector, no_spring
+from stiction.elasticity.linear import NEGATIVE, SOLVED, inner, lowest_eigenvector, no_spring
 from stiction.elasticity.operator import Operator, filtered, make_operator, product
 from stiction.equilibrium.held_equilibrium import equilibrate
-from stiction.jit import jit
-
-
-@jit
-def _lower_bound(
-    operator: Operator, excess: Array, profile: Array, slip: Array, work: Array
-) -> float:
-    """Largest load at which the slip d, which is cut at zero, overloads no node, Pa."""
-    for i in range(slip.size):
-        slip[i] = max(slip[i], 0.0)
-    product(operator, slip, work)
-    load = np.inf
-    for i in range(slip.size):
-        load = min(load, (work[i] + excess[i]) / profile[i])
-    return load
 
 
 def _lifting_field(operator: Operator) -> tuple[Array, Array]:
@@ -51,40 +36,6 @@ def _lifting_field(operator: Operator) -> tuple[Array, Array]:
     image = np.empty_like(lifting)
     product(operator, lifting, image)
     return lifting, -image
-
-
-@jit
-def _upper_bound(
-    operator: Operator,
-    excess: Array,
-    profile: Array,
-    y: Array,
-    lifting: Array,
-    lifted: Array,
-    work: Array,
-) -> float:
-    """Bound by a multiplier, which is first made feasible and normalised to <p, y> = 1; Pa.
-
-    The least multiple of z is added that makes A y <= 0 everywhere; infinite where there is none.
-    """
-    for i in range(y.size):
-        y[i] = max(y[i], 0.0)
-    product(operator, y, work)
-    lift = 0.0
-    for i in range(y.size):
-        if lifted[i] <= 0.0 and work[i] > 0.0:
-            return np.inf
-        if work[i] > lift * lifted[i]:
-            lift = work[i] / lifted[i]
-    load, weight = 0.0, 0.0
-    for i in range(y.size):
-        y[i] += lift * lifting[i]
-        load += excess[i] * y[i]
-        weight += profile[i] * y[i]
-    if not weight > 0.0:
-        return np.inf
-    y *= 1.0 / weight
-    return load / weight
 
 
 @dataclass
@@ -138,20 +89,32 @@ class Bracket:
         return self.magnitude * float(self.profile.mean())
 
     def raise_slip(self, slip: Array) -> None:
-        """Take a slip if it proves a higher lower bound."""
-        trial = slip.copy()
-        load = _lower_bound(self.operator, self.excess, self.profile, trial, self.residual)
+        """Take a slip, cut at zero, if it proves a higher lower bound: it overloads no node."""
+        trial = np.maximum(slip, 0.0)
+        product(self.operator, trial, self.residual)
+        load = float(((self.residual + self.excess) / self.profile).min())
         if load > self.lower:
             self.lower, self.slip = load, trial
 
     def raise_multiplier(self, y: Array) -> float:
-        """Take a multiplier if it proves a lower upper bound, and return its bound."""
-        trial = y.copy()
-        load = _upper_bound(
-            self.operator, self.excess, self.profile, trial, *self.lifting, self.residual
-        )
+        """Take a multiplier if it proves a lower upper bound, and return its bound.
+
+        The least multiple of z is added that makes A y <= 0; the bound is infinite without one.
+        """
+        trial = np.maximum(y, 0.0)
+        product(self.operator, trial, self.residual)
+        lifting, lifted = self.lifting
+        high, liftable = self.residual > 0.0, lifted > 0.0
+        if (high & ~liftable).any():
+            return np.inf
+        if high.any():
+            trial += float((self.residual[high] / lifted[high]).max()) * lifting
+        weight = inner(self.profile, trial)
+        if not weight > 0.0:
+            return np.inf
+        load = inner(self.excess, trial) / weight
         if load < self.upper:
-            self.upper, self.multiplier = load, trial
+            self.upper, self.multiplier = load, trial / weight
         return load
 
 

@@ -3,11 +3,11 @@
 Where very many nodes slip the factor is slower than the transforms of planes, which take over.
 """
 
+import threading
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction.arrays import Array
 from stiction.elasticity.line import (
@@ -16,14 +16,12 @@ from stiction.elasticity.line import (
     make_stiffness,
     stiffness_column,
 )
-from stiction.elasticity.linear import dot
 from stiction.equilibrium.cholesky import Workspace, make_workspace
 from stiction.equilibrium.jump import jump
 from stiction.equilibrium.linear_program import SOLVED, certificate, solve_program
-from stiction.equilibrium.patches import count_patches, main_patch
+from stiction.equilibrium.patches import main_patch
 from stiction.equilibrium.runaway import (
     ARRESTED,
-    SLIDING,
     UNDECIDED,
     Runs,
     block_factor,
@@ -31,25 +29,21 @@ from stiction.equilibrium.runaway import (
     unstoppable_length,
 )
 from stiction.equilibrium.sample import (
-    First,
     Jump,
     Program,
     Sample,
     State,
-    empty_first,
     exceeds,
+    multiplier_of,
     pieces_of,
     present_pieces,
     refused,
-    row_of,
-    sample_of,
 )
 from stiction.equilibrium.stable_path import REACHED, UNSTABLE, advance
 from stiction.equilibrium.transforms import Plane, plane_onset
 from stiction.equilibrium.windows import Windows, exact_window, window_bound, windows_between
 from stiction.errors import InputError
 from stiction.problem import Problem
-from stiction.problem import Sample as Samples
 
 LONGEST_RUN = 2048
 """Nodes up to which the quick test for arrest follows a run."""
@@ -67,8 +61,6 @@ class LineProgram(Program):
     Parameters
     ----------
     problem : Problem
-    every : int
-        Which nodes of the problem are taken: all, or every second one.
 
     Raises
     ------
@@ -79,22 +71,32 @@ class LineProgram(Program):
     widest_gap = 1e-9
     """Certificate gap, as a share of the load, above which there is a warning."""
 
-    def __init__(self, problem: Problem, every: int = 1) -> None:
+    def __init__(self, problem: Problem) -> None:
         if reasons := refused(problem.friction):
             raise InputError(reasons)
         self.problem = problem
         self.pieces = pieces_of(problem.friction)
-        self.nodes = problem.interface.size // every
+        self.nodes = problem.interface.size
         self.modulus, self.extent = problem.effective_modulus, problem.interface.extent
         self.unit = np.pi * self.modulus / self.extent
         self.stiffness, self.runs = _stiffness_and_runs(self.nodes, self.extent, self.modulus)
         rate = problem.friction.weakening_rate
         self.usual_rate = np.nan if rate is None or np.ptp(rate) else float(np.max(rate))
         self.usual = exact_window(self.nodes, self.usual_rate, self.unit)
+        self._own = threading.local()
+
+    @property
+    def _workspace(self) -> Workspace:
+        """The workspace of the thread."""
+        if not hasattr(self._own, "workspace"):
+            self._own.workspace = make_workspace(self.stiffness)
+        space: Workspace = self._own.workspace
+        return space
 
     def _windows(self, rate: Array) -> Windows:
         """Windows of a sample with these weakening rates, Pa/m; `usual` where all are."""
-        if np.all((rate == self.usual_rate) | (rate == 0.0)):
+        usual = rate == self.usual_rate
+        if usual.all() or (usual | (rate == 0.0)).all():
             return self.usual
         moving = rate[rate > 0.0]
         return windows_between(self.nodes, float(moving.min()), float(moving.max()), self.unit)
@@ -109,15 +111,13 @@ class LineProgram(Program):
         sample: Sample,
         cap: float = np.inf,
         state: State | None = None,
-        windows: Windows | None = None,
-        workspace: Workspace | None = None,
     ) -> State | None:
         """Return the critical load of one sample (below `cap`) with its proofs, None if it stalls.
 
         Only the first piece of the friction law counts: `excess` and `rate`. The state is an
         equilibrium at a lower load, if one was found.
         """
-        windows = windows or self._windows(sample.rate)
+        windows = self._windows(sample.rate)
         multiplier, slip, stiff = np.zeros((3, self.nodes))
         bound = window_bound(sample, windows, stiff, multiplier)
         if cap == np.inf and self.nodes > MANY_NODES:
@@ -125,7 +125,7 @@ class LineProgram(Program):
             found = self._by_transforms(sample, state) if weak > MANY_NODES else None
             if found is not None:
                 return found
-        workspace = workspace or make_workspace(self.stiffness)
+        workspace = self._workspace
         workspace.diagonal[:] = self.stiffness.column[0] - sample.rate
         start = np.inf if windows is self.usual else -np.inf
         if state is not None:
@@ -152,70 +152,44 @@ class LineProgram(Program):
         stiff = np.fft.irfft(symbol * np.fft.rfft(found.slip), self.nodes)
         return State(found.lower, found.slip, stiff, multiplier)
 
-    def first(self, rows: Samples, fields: bool) -> tuple[First, dict[int, State | None]]:
-        """Return the first instability of each row, with `fields` also its slip and multiplier.
-
-        Also returns the rows to be followed from there or, with None, from rest, as a corner of
-        the law is reached before; all other rows run away.
-        """
-        first = empty_first(rows.samples, 5, self.nodes)
-        samples = sample_of(rows, self.pieces)
-        alike = self._windows(samples.rate) is self.usual
-        workspace = make_workspace(self.stiffness)
-        states: dict[int, State | None] = {}
-        for row in range(rows.samples):
-            sample = row_of(samples, row)
-            windows = self.usual if alike else self._windows(sample.rate)
-            found = self.programme(sample, windows=windows, workspace=workspace)
-            if found is None or exceeds(sample, found.slip):
-                states[row] = None
-                continue
-            multiplier = found.direction
-            gap = certificate(sample, found.slip, found.stiff, multiplier, workspace)
-            _, length, centre = main_patch(multiplier)
-            spacing, patches = self.runs.spacing, count_patches(found.slip)
-            first.table[row] = found.load, gap, patches, centre * spacing, length * spacing
-            if fields:
-                first.slip[row], first.multiplier[row] = found.slip, multiplier
-            ahead = found.slip.copy()
-            if not self._runs_away(sample, found, ahead, workspace.vectors[2]):
-                states[row] = replace(found, ahead=ahead)
-        return first, states
-
-    def _runs_away(self, sample: Sample, found: State, slip: Array, stiff: Array) -> bool:
-        """Test quickly whether an instability becomes sliding; `stiff` is K times its direction.
-
-        The slip is moved to a lower bound of the next equilibrium.
-        """
-        start, length, _ = main_patch(found.direction)
-        outcome = runs_away(
-            sample, self.runs, found.load, slip, found.stiff, found.direction, stiff,
-            start, length, np.empty((4, self.nodes)),
-        )  # fmt: skip
-        return bool(outcome == SLIDING)
-
     def next(self, sample: Sample, state: State, target: float = np.inf) -> State:
         """Return the next instability, or the state at a load before it.
 
         The programme of the present pieces gives it if no node reaches a further corner before.
-        That is tried neither from rest, where `first` did so, nor after it once failed.
+        That is not tried again after it once failed, but for from rest.
         """
-        stuck = state.stuck
-        if target == np.inf and state.slip.any() and not stuck:
-            piece, strength, rate = present_pieces(sample, state.slip)
-            present = sample._replace(excess=strength, rate=rate)
-            found = self.programme(present, state=state)
-            straight = found is not None and found.load >= state.load
+        rests, stuck = not state.slip.any(), state.stuck
+        if target == np.inf and not stuck:
+            piece, present = None, sample
+            if not rests:
+                piece, strength, rate = present_pieces(sample, state.slip)
+                present = sample._replace(excess=strength, rate=rate)
+            found = self.programme(present, state=None if rests else state)
+            straight = found is not None and (rests or found.load >= state.load)
             if found is not None and straight and not exceeds(sample, found.slip, piece):
+                self._certify(present, found, found.direction)
+                found.ahead = self._workspace.vectors[2, : self.nodes].copy()
                 return found
-            stuck = True
+            stuck = not rests
         slip, stiff, direction = state.slip.copy(), state.stiff.copy(), state.direction.copy()
-        workspace = make_workspace(self.stiffness)
-        load, status = advance(sample, state.load, target, slip, stiff, direction, workspace)
-        return State(
+        load, status = advance(
+            sample, state.load, target, slip, stiff, direction, self._workspace
+        )
+        found = State(
             load, slip, stiff, direction,
             unstable=status == UNSTABLE, known=status in (UNSTABLE, REACHED), stuck=stuck,
         )  # fmt: skip
+        # No multiplier bounds the load from above where a law steepens.
+        found.certified = found.unstable and not self.pieces.steepens
+        if found.certified:
+            _, strength, rate = present_pieces(sample, slip)
+            present = sample._replace(excess=strength, rate=rate)
+            self._certify(present, found, multiplier_of(sample, found))
+        return found
+
+    def _certify(self, present: Sample, found: State, multiplier: Array) -> None:
+        """Write the distance of the bounds of an instability; K y is left in the workspace."""
+        found.gap = certificate(present, found.slip, found.stiff, multiplier, self._workspace)
 
     def at(self, sample: Sample, state: State, load: float, fresh: bool) -> State | None:
         """Return the equilibrium at a load from a state below, None if it is not found."""
@@ -230,59 +204,24 @@ class LineProgram(Program):
 
     def jump(self, sample: Sample, found: State) -> Jump:
         """Let an unstable state jump to another equilibrium, or to sliding."""
-        slip, stiff = found.slip.copy(), found.stiff.copy()
-        outcome = UNDECIDED
-        if found.ahead is not None:
-            slip = found.ahead
-        elif self._runs_away(sample, found, slip, self._stiffness_times(found.direction)):
-            outcome = SLIDING
+        slip, stiff, direction = found.slip.copy(), found.stiff.copy(), found.direction
+        start, length, _ = main_patch(direction)
+        pushed = self._stiffness_times(direction) if found.ahead is None else found.ahead
+        outcome = runs_away(
+            sample, self.runs, found.load, slip, stiff, direction, pushed, start, length,
+            np.empty((4, self.nodes)),
+        )  # fmt: skip
         if outcome == UNDECIDED:
             griffith = MARGIN * unstoppable_length(sample, found.load, self.runs)
-            spaces = make_workspace(self.stiffness), make_workspace(self.stiffness)
-            outcome = jump(sample, found.load, slip, stiff, griffith, *spaces)
-        before, after = (present_pieces(sample, each).piece for each in (found.slip, slip))
-        if outcome == ARRESTED and not np.any(after > before):
-            # Round-off: only nodes that pass a corner can stop an instability.
-            outcome = UNDECIDED
-        state = State(found.load, slip, stiff, found.direction, stuck=found.stuck)
+            other = make_workspace(self.stiffness)
+            outcome = jump(sample, found.load, slip, stiff, griffith, self._workspace, other)
+        if outcome == ARRESTED:
+            before, after = (present_pieces(sample, each).piece for each in (found.slip, slip))
+            if not np.any(after > before):
+                # Round-off: only nodes that pass a corner can stop an instability.
+                outcome = UNDECIDED
+        state = State(found.load, slip, stiff, direction, stuck=found.stuck)
         return Jump(outcome == ARRESTED, outcome != UNDECIDED, state)
-
-    def gap(self, sample: Sample, state: State, multiplier: Array) -> float:
-        """Return the distance of the bounds of an instability (Pa); NaN where a law steepens.
-
-        Then no multiplier bounds the load from above.
-        """
-        if self.pieces.steepens:
-            return np.nan
-        _, strength, rate = present_pieces(sample, state.slip)
-        present = sample._replace(excess=strength, rate=rate)
-        workspace = make_workspace(self.stiffness)
-        return float(certificate(present, state.slip, state.stiff, multiplier, workspace))
-
-    def corner_sensitivity(
-        self, sample: Sample, slip: Array, piece: NDArray[np.int64], corners: NDArray[np.int64]
-    ) -> Array:
-        """Return the derivative by the peak strengths of the load at which a node is at a corner.
-
-        Up to there A d = tau_0 p - q on the slipping nodes, with q the start of their pieces, and
-        the slip of node j is u_j (tau_p - tau_r)/W; with z = A^-1 e_j that is z (tau_0 p - q).
-        NaN where several nodes reach a corner at once: the derivatives of either side differ.
-        """
-        derivative = np.zeros(slip.size)
-        if corners.size > 1:
-            derivative[:] = np.nan
-            return derivative
-        pieces, node = sample.pieces, int(corners[0])
-        before = piece.copy()
-        before[node] -= 1
-        inside = np.flatnonzero(slip > 0.0)
-        matrix = self.stiffness.column[np.abs(inside[:, None] - inside)]
-        matrix[np.diag_indices(inside.size)] -= (pieces.slopes[before] * sample.rate)[inside]
-        z = np.linalg.solve(matrix, (inside == node).astype(np.float64))
-        share = np.where(sample.critical > 0.0, pieces.starts[before], 1.0)
-        derivative[inside] = z * share[inside]
-        derivative[node] += pieces.ends[before[node]] * pieces.first / sample.rate[node]
-        return derivative / dot(z, sample.profile[inside], inside.size)
 
     def stress_released(self, state: State) -> Array:
         """Return the stress that the slip takes off the interface, K d, Pa."""

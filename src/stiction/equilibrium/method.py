@@ -41,9 +41,6 @@ ON_NODES = {
     "slip": Variable("m", "slip at the first instability"),
     "sensitivity": Variable("1", "sensitivity of the first instability to the strength there"),
 }
-DISCRETIZATION_ERROR = Variable(
-    "Pa", "estimated error of the first instability due to the node spacing"
-)
 
 
 @model(kw_only=True)
@@ -66,12 +63,9 @@ class Equilibrium:
     ----------
     sensitivity : bool
         Also return d first_instability / d tau_p at every node, at fixed weakening rates. NaN
-        where several nodes begin to weaken more steeply at once: there is no derivative.
+        where a law steepens and a node passes a corner before the first instability.
     slip : bool
         Also return the slip at the first instability.
-    discretization_error : bool
-        Also return an estimate of the error of `first_instability` that is due to the grid, at
-        about a third more time: see `docs/equilibrium.md`. Nodes must be a multiple of four.
     events : int
         Also return this number of arrested events of each sample over 'event', NaN where
         there are fewer. They form a sequence: stress and slip continue from one to the
@@ -108,7 +102,6 @@ class Equilibrium:
 
     sensitivity: Flag = False
     slip: Flag = False
-    discretization_error: Flag = False
     events: Number = 0
     gap: Gap = 1e-6
     type: Literal["equilibrium"] = "equilibrium"
@@ -150,19 +143,11 @@ class Equilibrium:
         for name, variable in ON_NODES.items():
             if getattr(self, name):
                 variables[name] = along(interface, variable)
-        if self.discretization_error:
-            variables["discretization_error"] = DISCRETIZATION_ERROR
         return variables
 
     def prepare(self, problem: Problem) -> Callable[[Samples], dict[str, NDArray[Any]]]:
-        """Return a solver for samples of this problem.
-
-        Raises
-        ------
-        InputError
-            If the number of nodes is not a multiple of four for `discretization_error`.
-        """
-        return Solver(
-            problem, sensitivity=self.sensitivity, slip=self.slip,
-            discretization_error=self.discretization_error, events=self.events, gap=self.gap,
-        )  # fmt: skip
+        """Return a solver for samples of this problem."""
+        options = {
+            name: getattr(self, name) for name in ("sensitivity", "slip", "events", "gap")
+        }
+        return Solver(problem, **options)

@@ -71,6 +71,12 @@ def main_patch(field: Array) -> tuple[int, int, float]:
     return start, length, centre - n if centre >= n else centre
 
 
+def line_patch(field: Array, spacing: float) -> Patch:
+    """Return the measures of the run of `main_patch`."""
+    _, length, centre = main_patch(field)
+    return Patch((centre * spacing,), (length * spacing,), length * spacing)
+
+
 def labelled_patches(mask: Mask) -> tuple[NDArray[np.int64], int]:
     """Return the label of each node's patch, from 1 (0: none), and the number of patches."""
     pieces, count = label(mask)
@@ -125,11 +131,11 @@ def largest_patch(
     """
     above = weight > share * weight.max()
     if weight.ndim == 1:
-        start, length, place = main_patch(np.where(above, weight, 0.0))
-        extent = length * spacings[0]
+        above = np.where(above, weight, 0.0)
+        start, length, _ = main_patch(above)
         inside = np.zeros(weight.size, dtype=np.bool_)
         inside[(start + np.arange(length)) % weight.size] = True
-        return inside, Patch((place * spacings[0],), (extent,), extent)
+        return inside, line_patch(above, spacings[0])
     numbers, _ = labelled_patches(above)
     inside = numbers == numbers.flat[int(np.argmax(weight))]
     return inside, patch_of(inside, weight, spacings)

@@ -6,9 +6,7 @@ import numpy as np
 import xarray as xr
 
 from stiction.arrays import Array
-from stiction.equilibrium.sample import LOAD as LOAD_COLUMN
 from stiction.equilibrium.solver import (
-    Event,
     event_table,
     event_variables,
     follow,
@@ -105,12 +103,8 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
     check_memory("loads", 16.0 * given.size * interface.size)
     program = make_program(problem, GAP)
     sample = program.sample_of(rows, 0)
-    first, states = program.first(rows, False)
-    passed: list[Event] = []
-    end, known = float(first.table[0, LOAD_COLUMN]), True
-    if 0 in states:  # otherwise it runs away at its first instability
-        whole = follow(program, sample, states[0])
-        passed, end, known = whole.events, whole.last.load, whole.known
+    whole = follow(program, sample)
+    passed, end, known = whole.events, whole.last.load, whole.known
     slip, stress = np.full((2, given.size, interface.size), np.nan)
     at = np.array([event.before.load for event in passed])
     events = (at[None, :] < given[:, None]).sum(axis=1)

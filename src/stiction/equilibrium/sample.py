@@ -12,13 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.arrays import Array
+from stiction.elasticity.linear import inner
 from stiction.friction import FrictionLaw
 from stiction.friction.parameters import Linear, Polygon
-from stiction.jit import jit
+from stiction.jit import jit, jit_inside
 from stiction.problem import Sample as Samples
 
-TOGETHER = 1e-9
-"""Share of the slip at a corner within which nodes reach their corners at once."""
 FLAT = 1e-11
 """Share of the mean strength by which a node must weaken to count as weakening. A smaller fall
 is within the round-off of K d; an instability of such nodes adds no slip and never ends."""
@@ -123,26 +122,6 @@ def row_of(samples: Sample, row: int) -> Sample:
     return Sample(excess[row], residual[row], profile, rate[row], critical[row], pieces)
 
 
-LOAD, GAP, PATCHES, POSITION, LENGTH = range(5)
-
-
-class First(NamedTuple):
-    """First instabilities of many samples.
-
-    The variables that `Equilibrium` returns, (samples, columns), more columns on planes; on
-    request, slip d (m) and multiplier, (samples, nodes).
-    """
-
-    table: Array
-    slip: Array
-    multiplier: Array
-
-
-def empty_first(samples: int, columns: int, nodes: int) -> First:
-    """Return space for the first instabilities; what is never written takes no memory."""
-    return First(np.empty((samples, columns)), *np.empty((2, samples, nodes)))
-
-
 class Present(NamedTuple):
     """The piece on which each node is, its value at zero slip (Pa), and its slope (Pa/m)."""
 
@@ -155,18 +134,18 @@ class Present(NamedTuple):
 class State:
     """An equilibrium on the path of one sample, by default one at which it is unstable.
 
-    Load tau_0 (Pa), slip d (m), K d (Pa; of lines only), and the direction in which it is unstable;
-    `upper`, a load without equilibrium (Pa) where one is known, and whether that is proved.
-    `unstable` is true if the path is unstable there, `known` if it could be followed so far,
-    `stuck` if the programme failed to find the next instability before; `ahead` is what was
-    found so far of the equilibrium to which the instability leads.
+    Load tau_0 (Pa), slip d (m), K d (Pa; of lines only), the direction in which it is unstable,
+    and the distance to a load without equilibrium (Pa), NaN where none is known.
+    `certified` is true if that is proved, `unstable` if the path is unstable there, `known` if it
+    could be followed so far, `stuck` if the programme failed to find the next instability before.
+    `ahead` is what is known of the jump: on lines K times the direction, on planes where it ends.
     """
 
     load: float
     slip: Array
     stiff: Array
     direction: Array
-    upper: float = np.nan
+    gap: float = np.nan
     certified: bool = True
     unstable: bool = True
     known: bool = True
@@ -187,6 +166,15 @@ class Program:
         """Return the state in which the first node is about to slip."""
         load = float((sample.excess / sample.profile).min())
         return State(load, *np.zeros((3, sample.excess.size)))
+
+
+def multiplier_of(sample: Sample, state: State) -> Array:
+    """Return the multiplier y of an instability, <p, y> = 1: the direction, normalised.
+
+    Where `ahead` is known it is normalised already.
+    """
+    y = state.direction
+    return y if state.ahead is not None else y / max(inner(y, sample.profile), 1e-300)
 
 
 class Jump(NamedTuple):
@@ -225,22 +213,7 @@ def exceeds(sample: Sample, slip: Array, piece: NDArray[np.int64] | None = None)
     return bool(beyond.any()) and bool((beyond & (sample.critical > 0.0)).any())
 
 
-def steep_corners(sample: Sample, slip: Array) -> NDArray[np.int64]:
-    """Return the nodes that are at a corner beyond which they weaken more steeply."""
-    pieces = sample.pieces
-    corners = pieces.ends * sample.critical[:, None]
-    near = np.abs(slip[:, None] - corners) <= TOGETHER * corners
-    steeper = np.diff(pieces.slopes) > 0.0
-    found: NDArray[np.int64] = np.flatnonzero(
-        (near & steeper).any(axis=1) & (sample.critical > 0.0)
-    )
-    return found
-
-
-# Optimised on their own, as LLVM puts these small functions into loops only then.
-
-
-@jit
+@jit_inside
 def piece_at(pieces: Pieces, critical: float, slip: float) -> int:
     """The piece on which a node of this d_c is after a slip."""
     piece = 0
@@ -251,14 +224,14 @@ def piece_at(pieces: Pieces, critical: float, slip: float) -> int:
     return piece
 
 
-@jit
+@jit_inside
 def start_of(sample: Sample, i: int, piece: int) -> float:
     """Value of a piece of node i at zero slip, Pa: tau_p on the first, tau_r on the last."""
     share = sample.pieces.starts[piece]
     return share * sample.excess[i] + (1.0 - share) * sample.residual[i]
 
 
-@jit
+@jit_inside
 def strength_at(sample: Sample, slip: Array, i: int) -> float:
     """Strength less initial stress of node i after some slip, Pa."""
     piece = piece_at(sample.pieces, sample.critical[i], slip[i])
@@ -282,7 +255,7 @@ def step_to_corner(sample: Sample, slip: Array, direction: Array, longest: float
     return step
 
 
-@jit
+@jit_inside
 def unsupported(sample: Sample, load: float, slip: Array) -> bool:
     """Whether the whole interface, at its present strengths, cannot carry the load."""
     balance = 0.0

@@ -1,6 +1,5 @@
 """The solver of the equilibrium method: samples in, onsets out, on lines and planes."""
 
-import itertools
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeAlias
 
@@ -8,24 +7,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.arrays import Array
-from stiction.elasticity.linear import inner
 from stiction.equilibrium.dense import LineProgram
-from stiction.equilibrium.patches import Patch, critical_patch, largest_patch, patches_of
+from stiction.equilibrium.patches import (
+    Patch,
+    critical_patch,
+    largest_patch,
+    line_patch,
+    patches_of,
+)
 from stiction.equilibrium.sample import (
-    GAP,
-    LENGTH,
-    LOAD,
-    PATCHES,
-    POSITION,
-    First,
     Sample,
     State,
+    multiplier_of,
     present_pieces,
     residual_nodes,
-    steep_corners,
+    row_of,
+    sample_of,
 )
 from stiction.equilibrium.transforms import PlaneProgram
-from stiction.errors import InputError, warn_accuracy
+from stiction.errors import warn_accuracy
 from stiction.interface import Interface
 from stiction.problem import Problem
 from stiction.problem import Sample as Samples
@@ -39,8 +39,6 @@ ROUGHLY = {
     " quarter of it, by 3 and 9 % if it is a tenth",
     2: "single onsets are off by 0.15 % at 9 nodes along x and 6 along y, by 0.5 % at 6 and 4",
 }
-SHARE = 0.5
-"""Estimated error, in per cent of the onset, above which there is a warning."""
 EVENT_CORE = 1e-3
 """Share of the largest added slip above which a node belongs to the patch of an event."""
 
@@ -112,14 +110,13 @@ class Path:
     known: bool = True
 
 
-def follow(program: Program, sample: Sample, found: State | None = None) -> Path:
-    """Follow a sample from its first instability, or from rest, to global sliding.
+def follow(program: Program, sample: Sample) -> Path:
+    """Follow a sample from rest to global sliding.
 
     Arrest is overdamped: the patch stops at the least equilibrium of the same load. Inertia may
     carry it through.
     """
-    if found is None:
-        found = program.next(sample, program.at_rest(sample))
+    found = program.next(sample, program.at_rest(sample))
     first: State | None = None
     events: list[Event] = []
     known = found.known
@@ -143,11 +140,10 @@ def listed(numbers: NDArray[np.int64], most: int = 5) -> str:
     return f"sample{'s' * (numbers.size > 1)} {shown}{more}"
 
 
-def make_program(problem: Problem, gap: float = 1e-6, every: int = 1) -> Program:
-    """Return the programme that finds equilibria on all nodes of a problem, or every second."""
-    if problem.interface.is_plane:
-        return PlaneProgram(problem, gap, every)
-    return LineProgram(problem, every)
+def make_program(problem: Problem, gap: float = 1e-6) -> Program:
+    """Return the programme that finds equilibria of a problem."""
+    plane = problem.interface.is_plane
+    return PlaneProgram(problem, gap) if plane else LineProgram(problem)
 
 
 class Solver:
@@ -162,135 +158,87 @@ class Solver:
         *,
         sensitivity: bool = False,
         slip: bool = False,
-        discretization_error: bool = False,
         events: int = 0,
         gap: float = 1e-6,
     ) -> None:
         self.problem = problem
         self.program = make_program(problem, gap)
         self.sensitivity, self.slip, self.events = sensitivity, slip, events
-        self.coarse: Program | None = None
-        if discretization_error:
-            _check_multiple_of_four(problem)
-            self.coarse = make_program(problem, gap, every=2)
 
     def __call__(self, rows: Samples) -> dict[str, NDArray[Any]]:
         """Return the onset of each sample; see `Equilibrium`."""
-        if self.coarse is None:
-            cost = ROUGHLY[len(self.problem.interface.shape)]
-            how = "Equilibrium(discretization_error=True) estimates it"
-            self.problem.warn_if_coarse(rows, FINE, f"{cost}; {how}")
-        first, states = self.program.first(rows, self.slip or self.sensitivity)
-        interface = self.problem.interface
-        places = slice(POSITION, POSITION + len(interface.shape))
-        load, sliding = first.table[:, LOAD].copy(), first.table[:, places].copy()
-        arrested = np.zeros(rows.samples, dtype=np.int64)
-        reached, unproved, lost = np.zeros((3, rows.samples), dtype=np.bool_)
-        events = self._no_events(rows.samples)
-        for row, state in states.items():
-            sample = self.program.sample_of(rows, row)
+        self.problem.warn_if_coarse(rows, FINE, ROUGHLY[len(self.problem.interface.shape)])
+        samples, table, known = sample_of(rows, self.program.pieces), [], []
+        for row in range(rows.samples):
+            sample = row_of(samples, row)
             try:
-                path = follow(self.program, sample, state)
+                path = follow(self.program, sample)
             except Exception as error:
                 error.add_note(
                     f"in sample {row} of the {rows.samples} that were solved together"
                 )
                 raise
-            if state is None:
-                self._describe(first, row, sample, path.first)
-                unproved[row] = not path.first.certified or np.isnan(first.table[row, GAP])
-            last = path.last
-            load[row], lost[row], arrested[row] = last.load, not path.known, len(path.events)
-            reached[row] = residual_nodes(sample, last.slip).any()
-            sliding[row] = first.table[row, places]
-            if last.direction.any():
-                sliding[row] = self._patch(last.direction).centre
-            table = event_table(self.problem, rows, row, path.events[: self.events])
-            for name, column in events.items():
-                column[row, : len(table[name])] = table[name]
-        at_first, gap = first.table[:, LOAD], first.table[:, GAP]
-        self._warn(gap, at_first, unproved, lost)
-        values = {
-            "critical_load": load,
-            "critical_stress": rows.mean_stress(load),
-            "first_instability": rows.mean_stress(at_first),
-            "certificate_gap": gap * rows.load_profile.mean(),
-            "critical_position": first.table[:, places],
-            "sliding_position": sliding,
-            "slip_patches": first.table[:, PATCHES].astype(np.int64),
-            "arrested_events": arrested,
-            "residual_reached": reached,
-        } | events
-        if interface.is_plane:
-            values["critical_patch_extent"] = first.table[:, 5:7]
-            values["critical_patch_area"] = first.table[:, 7]
-            values["certified"] = ~unproved
-        else:
-            values["critical_patch_length"] = first.table[:, LENGTH]
-            for name in ("critical_position", "sliding_position"):
-                values[name] = values[name][:, 0]
-        if self.slip:
-            values["slip"] = first.slip.reshape(rows.strength.shape)
+            known.append(path.known)
+            table.append(self._values(rows, row, sample, path))
+        values = {name: np.array([each[name] for each in table]) for name in table[0]}
+        at_first, proved = values["first_instability"], values.pop("certified")
+        self._warn(values["certificate_gap"], at_first, ~proved, ~np.array(known))
+        values["critical_stress"] = rows.mean_stress(values["critical_load"])
+        values["first_instability"] = rows.mean_stress(at_first)
+        values["certificate_gap"] *= rows.load_profile.mean()
+        if self.problem.interface.is_plane:
+            values["certified"] = proved
         if self.sensitivity:
-            sensitivity = first.multiplier * rows.load_profile.mean()
-            values["sensitivity"] = sensitivity.reshape(rows.strength.shape)
-            _warn_if_lost(sensitivity)
-        if self.coarse is not None:
-            values["discretization_error"] = self._discretization_error(
-                rows, values["first_instability"]
-            )
+            _warn_if_lost(values["sensitivity"])
         return values
 
-    def _no_events(self, samples: int) -> dict[str, Array]:
-        """Return NaN for each variable of each of the events that are kept."""
-        if not self.events:
-            return {}
-        return {
-            name: np.full((samples, self.events, *(2,) * (len(variable.dims) - 1)), np.nan)
-            for name, variable in event_variables(self.problem.interface).items()
+    def _values(self, rows: Samples, row: int, sample: Sample, path: Path) -> dict[str, Any]:
+        """Return the variables of one sample, the first instability as a load."""
+        interface, shape = self.problem.interface, rows.strength[row].shape
+        first, last = path.first, path.last
+        y = multiplier_of(sample, first)
+        patch = self._patch(y)
+        # On lines a programme knows what is ahead, and passes no corner.
+        straight = last is first and first.ahead is not None and not interface.is_plane
+        slides = patch
+        if last is not first and last.direction.any():
+            slides = self._patch(last.direction)
+        values: dict[str, Any] = {
+            "critical_load": last.load,
+            "first_instability": first.load,
+            "certificate_gap": first.gap,
+            "critical_position": patch.centre,
+            "sliding_position": slides.centre,
+            "slip_patches": patches_of(first.slip.reshape(interface.shape)),
+            "arrested_events": len(path.events),
+            "residual_reached": not straight and bool(residual_nodes(sample, last.slip).any()),
+            "certified": first.certified,
         }
+        if interface.is_plane:
+            values["critical_patch_extent"] = patch.extents
+            values["critical_patch_area"] = patch.area
+        else:
+            values["critical_patch_length"] = patch.area
+            values["critical_position"], values["sliding_position"] = (
+                *patch.centre, *slides.centre,
+            )  # fmt: skip
+        if self.slip:
+            values["slip"] = first.slip.reshape(shape)
+        if self.sensitivity:
+            derivative = _sensitivity(sample, first, y) * rows.load_profile.mean()
+            values["sensitivity"] = derivative.reshape(shape)
+        if self.events:
+            events = event_table(self.problem, rows, row, path.events[: self.events])
+            for name, column in events.items():
+                values[name] = np.full((self.events, *column.shape[1:]), np.nan)
+                values[name][: len(column)] = column
+        return values
 
     def _patch(self, direction: Array) -> Patch:
         interface = self.problem.interface
+        if not interface.is_plane:
+            return line_patch(direction, interface.spacings[0])
         return critical_patch(direction.reshape(interface.shape), interface.spacings)[1]
-
-    def _describe(self, first: First, row: int, sample: Sample, state: State) -> None:
-        """Write the variables of a first instability that was found by following the path."""
-        y = state.direction / max(inner(state.direction, sample.profile), 1e-300)
-        patch = self._patch(y)
-        gap = self.program.gap(sample, state, y)
-        patches = patches_of(state.slip.reshape(self.problem.interface.shape))
-        known = (state.load, gap, patches, *patch.centre, *patch.extents, patch.area)
-        first.table[row, LOAD:] = known[: first.table.shape[1] - LOAD]
-        if self.slip:
-            first.slip[row] = state.slip
-        if self.sensitivity:
-            first.multiplier[row] = _sensitivity(self.program, sample, state, y)
-
-    def _discretization_error(self, rows: Samples, onset: Array) -> Array:
-        """Estimate the size of the error of each onset that is due to the node spacing, Pa.
-
-        The same profiles are solved on every second node. The onset converges with the square of
-        the spacing, so that the error is a third of the difference to a grid twice as coarse. Its
-        sign is random on random profiles: the root mean square of all is taken.
-        """
-        assert self.coarse is not None
-        others = []
-        for offset in itertools.product((0, 1), repeat=len(rows.shape)):
-            nodes: Any = (..., *(slice(first, None, 2) for first in offset))
-            part = Samples(*(given[nodes] for given in rows))
-            others.append(part.mean_stress(first_instabilities(self.coarse, part)))
-        error: Array = (
-            np.sqrt(np.mean([(other - onset) ** 2 for other in others], axis=0)) / 3.0
-        )
-        percent = 100.0 * error / np.abs(onset)
-        if np.any(percent > SHARE):
-            warn_accuracy(
-                "the node spacing changes the first instability by an estimated"
-                f" {np.sqrt(np.mean(percent**2)):.2g} % (root mean square of {onset.size}"
-                f" samples, at most {percent.max():.2g} %); take more nodes"
-            )
-        return error
 
     def _warn(
         self, gap: Array, load: Array, unproved: NDArray[np.bool_], lost: NDArray[np.bool_]
@@ -320,51 +268,24 @@ class Solver:
             )
 
 
-def first_instabilities(program: Program, rows: Samples) -> Array:
-    """Return the loads of the first instabilities alone, tau_0, Pa."""
-    first, states = program.first(rows, False)
-    load = first.table[:, LOAD].copy()
-    for row, state in states.items():
-        if state is None:
-            sample = program.sample_of(rows, row)
-            found = program.next(sample, program.at_rest(sample))
-            load[row] = (
-                found if found.certified else follow(program, sample, found).first
-            ).load
-    return load
-
-
-def _check_multiple_of_four(problem: Problem) -> None:
-    """Raise `InputError` if taking every second node leaves an odd number of nodes."""
-    shape = problem.interface.shape
-    if any(nodes % 4 for nodes in shape):
-        given, enough = (" x ".join(map(str, n)) for n in (shape, [n + -n % 4 for n in shape]))
-        raise InputError(
-            f"interface.nodes: must be a multiple of four for discretization_error, got {given};"
-            f" take {enough}"
-        )
-
-
-def _sensitivity(program: Program, sample: Sample, state: State, y: Array) -> Array:
+def _sensitivity(sample: Sample, state: State, y: Array) -> Array:
     """Derivative of the load of an instability by the peak strengths, from its multiplier.
 
-    NaN where nodes begin to weaken more steeply at that load, several at once or on a plane.
+    NaN where a node passed a corner beyond which it weakens more steeply.
     """
-    piece = present_pieces(sample, state.slip).piece
-    if isinstance(program, PlaneProgram):
-        if sample.pieces.steepens and not state.certified:
-            return np.full(y.size, np.nan)
-    elif (corners := steep_corners(sample, state.slip)).size:
-        return program.corner_sensitivity(sample, state.slip, piece, corners)
+    pieces = sample.pieces
+    if pieces.steepens and not state.certified:
+        return np.full(y.size, np.nan)
     # A piece starts from share tau_p + (1 - share) tau_r; the share of the last piece is 0.
-    return y * np.where(sample.critical > 0.0, sample.pieces.starts[piece], 1.0)
+    piece = present_pieces(sample, state.slip).piece
+    return y * np.where(sample.critical > 0.0, pieces.starts[piece], 1.0)
 
 
 def _warn_if_lost(sensitivity: Array) -> None:
     """Warn where a first instability has no derivative."""
-    lost = int(np.isnan(sensitivity).any(axis=1).sum())
+    lost = int(np.isnan(sensitivity).reshape(len(sensitivity), -1).any(axis=1).sum())
     if lost:
         warn_accuracy(
-            f"nodes begin to weaken more steeply in {lost} of {len(sensitivity)} samples:"
-            " their first instability has no known derivative, so sensitivity is NaN"
+            f"nodes pass a corner in {lost} of {len(sensitivity)} samples of a law that steepens"
+            " there: their first instability has no known derivative, so sensitivity is NaN"
         )

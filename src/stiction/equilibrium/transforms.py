@@ -22,19 +22,16 @@ from stiction.equilibrium.relaxation import (
     least_equilibrium,
 )
 from stiction.equilibrium.sample import (
-    First,
     Jump,
     Program,
     Sample,
     State,
-    empty_first,
     exceeds,
     pieces_of,
     present_pieces,
 )
 from stiction.equilibrium.turning_point import close
 from stiction.problem import Problem
-from stiction.problem import Sample as Samples
 
 COARSEST = 8.0
 """Least ratio of the largest K(k) to W on a coarse grid: about six nodes in h_n."""
@@ -173,25 +170,16 @@ class PlaneProgram(Program):
     problem : Problem
     gap : float
         Relative distance of the bounds at which to stop.
-    every : int
-        Which nodes of the problem are taken along x and y: all, or every second one.
     """
 
-    def __init__(self, problem: Problem, gap: float = 1e-6, every: int = 1) -> None:
+    def __init__(self, problem: Problem, gap: float = 1e-6) -> None:
         x, y = problem.interface.lengths
         solid = problem.solid
         self.plane = Plane((x, y), solid.shear_modulus, solid.poisson_ratio)
-        nx, ny = problem.interface.shape
-        self.shape = (nx // every, ny // every)
+        self.shape = problem.interface.shape
         self.pieces = pieces_of(problem.friction)._replace(at_corner=AT_CORNER)
         self.requested = gap
         self.widest_gap = 1.01 * gap  # round-off
-
-    def first(self, rows: Samples, fields: bool) -> tuple[First, dict[int, State | None]]:
-        """Return an empty table, and the rows that are to be followed from rest: all of them."""
-        return empty_first(rows.samples, 8, rows.strength[0].size), dict.fromkeys(
-            range(rows.samples)
-        )
 
     def _operator(self, sample: Sample) -> Operator:
         return make_operator(
@@ -220,7 +208,8 @@ class PlaneProgram(Program):
             return self._step_on(sample, state)
         slip = np.maximum(found.slip.reshape(-1), state.slip)
         return State(
-            found.lower, slip, state.stiff, found.multiplier.reshape(-1), upper=found.upper,
+            found.lower, slip, state.stiff, found.multiplier.reshape(-1),
+            gap=found.upper - found.lower,
             certified=not present_pieces(sample, state.slip).piece[sample.critical > 0.0].any(),
         )  # fmt: skip
 
@@ -244,13 +233,11 @@ class PlaneProgram(Program):
         beyond = load + step
         ahead = least_equilibrium(operator, sample, beyond, slip, 0.1 * gap)
         direction = _direction(operator, sample, slip, ahead.slip)
-        return State(
-            load, slip, state.stiff, direction, upper=beyond, certified=False, ahead=ahead
-        )
+        return State(load, slip, state.stiff, direction, gap=step, certified=False, ahead=ahead)
 
     def jump(self, sample: Sample, found: State) -> Jump:
         """Let an unstable state jump to another equilibrium, or to sliding."""
-        beyond, ahead = found.upper, found.ahead
+        beyond, ahead = found.load + found.gap, found.ahead
         if ahead is None:
             beyond += self.requested * abs(beyond)
             ahead = least_equilibrium(
@@ -271,10 +258,6 @@ class PlaneProgram(Program):
         if found.status != BALANCED:
             return None
         return State(load, found.slip, state.stiff, state.direction, unstable=False)
-
-    def gap(self, sample: Sample, state: State, multiplier: Array) -> float:
-        """Return the distance of the bounds of an instability, Pa."""
-        return state.upper - state.load
 
     def stress_released(self, state: State) -> Array:
         """Return the stress that the slip takes off the interface, K d, Pa."""

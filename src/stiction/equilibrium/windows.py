@@ -76,11 +76,7 @@ def narrowest(nodes: int, widths: Sequence[int], guess: int, rate: float) -> int
 
 
 def smallest_window(nodes: int, rate: float) -> int | None:
-    """Fewest nodes that are unstable by themselves at a weakening rate, or None.
-
-    None also if the window would be wider than `WIDEST`: the uniform field then starts the
-    programme, whose result is the same.
-    """
+    """Fewest nodes that are unstable by themselves at a weakening rate; None beyond `WIDEST`."""
     widest = min(nodes - 1, WIDEST)
     width = estimated_width(nodes, rate)
     if width > 1.2 * widest:
