@@ -18,6 +18,7 @@ _BASE = {
     "m meter metre meters metres": Unit(1.0, _LENGTH),
     "s second seconds": Unit(1.0, (0, 0, 1)),
     "N newton newtons": Unit(1.0, (1, 1, -2)),
+    "J joule joules": Unit(1.0, (1, 2, -2)),
     "Pa pascal pascals": Unit(1.0, _STRESS),
     "bar": Unit(1e5, _STRESS),
     "g": Unit(1e-3, (1, 0, 0)),
