@@ -35,7 +35,7 @@ def speed(ratio: float, nodes: int = 4096) -> tuple[np.ndarray, np.ndarray]:
         method=st.Rupture(load=([0.0, 1.0], [load, load]), implicit=False),
         save=st.Save([], every=500),
     )
-    found = rupture_speed(run["arrival_time"].values, [spacing], [problem.nucleation_length])
+    found = rupture_speed(run["arrival_time"].values, spacing, problem.nucleation_length)
     right = slice(nodes // 2, nodes // 2 + int(0.425 * nodes))
     return x[right] / problem.nucleation_length, found[right] / SOLID.rayleigh_wave_speed
 
