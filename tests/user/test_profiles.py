@@ -60,7 +60,6 @@ ORDERS = {
     "transposed": labelled().expand_dims("sample", axis=1),
     "a series": labelled(STRENGTH[::-1], X[::-1]).to_series(),
     "a series without places": labelled().to_series().reset_index(drop=True),
-    "a column": STRENGTH[:, np.newaxis],
     "its first node twice": labelled(np.r_[STRENGTH, STRENGTH[0]], np.r_[X, 0.1]),
 }
 
