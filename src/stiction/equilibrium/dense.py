@@ -152,25 +152,28 @@ class LineProgram(Program):
         stiff = np.fft.irfft(symbol * np.fft.rfft(found.slip), self.nodes)
         return State(found.lower, found.slip, stiff, multiplier)
 
-    def next(self, sample: Sample, state: State, target: float = np.inf) -> State:
-        """Return the next instability, or the state at a load before it.
+    def next(
+        self, sample: Sample, state: State | None = None, target: float = np.inf
+    ) -> State:
+        """Return the next instability from a state or from rest, or the state at a load before it.
 
         The programme of the present pieces gives it if no node reaches a further corner before.
         That is not tried again after it once failed, but for from rest.
         """
-        rests, stuck = not state.slip.any(), state.stuck
+        stuck = state is not None and state.stuck
         if target == np.inf and not stuck:
             piece, present = None, sample
-            if not rests:
+            if state is not None:
                 piece, strength, rate = present_pieces(sample, state.slip)
                 present = sample._replace(excess=strength, rate=rate)
-            found = self.programme(present, state=None if rests else state)
-            straight = found is not None and (rests or found.load >= state.load)
+            found = self.programme(present, state=state)
+            straight = found is not None and (state is None or found.load >= state.load)
             if found is not None and straight and not exceeds(sample, found.slip, piece):
                 self._certify(present, found, found.direction)
                 found.ahead = self._workspace.vectors[2, : self.nodes].copy()
                 return found
-            stuck = not rests
+            stuck = state is not None
+        state = state or self.at_rest(sample)
         slip, stiff, direction = state.slip.copy(), state.stiff.copy(), state.direction.copy()
         load, status = advance(
             sample, state.load, target, slip, stiff, direction, self._workspace
@@ -204,7 +207,7 @@ class LineProgram(Program):
 
     def jump(self, sample: Sample, found: State) -> Jump:
         """Let an unstable state jump to another equilibrium, or to sliding."""
-        slip, stiff, direction = found.slip.copy(), found.stiff.copy(), found.direction
+        slip, stiff, direction = found.slip.copy(), found.stiff, found.direction
         start, length, _ = main_patch(direction)
         pushed = self._stiffness_times(direction) if found.ahead is None else found.ahead
         outcome = runs_away(
@@ -213,7 +216,7 @@ class LineProgram(Program):
         )  # fmt: skip
         if outcome == UNDECIDED:
             griffith = MARGIN * unstoppable_length(sample, found.load, self.runs)
-            other = make_workspace(self.stiffness)
+            other, stiff = make_workspace(self.stiffness), stiff.copy()
             outcome = jump(sample, found.load, slip, stiff, griffith, self._workspace, other)
         if outcome == ARRESTED:
             before, after = (present_pieces(sample, each).piece for each in (found.slip, slip))

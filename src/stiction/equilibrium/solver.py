@@ -116,7 +116,7 @@ def follow(program: Program, sample: Sample) -> Path:
     Arrest is overdamped: the patch stops at the least equilibrium of the same load. Inertia may
     carry it through.
     """
-    found = program.next(sample, program.at_rest(sample))
+    found = program.next(sample)
     first: State | None = None
     events: list[Event] = []
     known = found.known

@@ -201,8 +201,9 @@ class PlaneProgram(Program):
             return None
         return found
 
-    def next(self, sample: Sample, state: State) -> State:
-        """Return the next instability on the path from a stable state."""
+    def next(self, sample: Sample, state: State | None = None) -> State:
+        """Return the next instability on the path from a stable state or from rest."""
+        state = state or self.at_rest(sample)
         found = self.programme(sample, state.slip)
         if found is None:
             return self._step_on(sample, state)
