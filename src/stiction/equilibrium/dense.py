@@ -152,9 +152,7 @@ class LineProgram(Program):
         stiff = np.fft.irfft(symbol * np.fft.rfft(found.slip), self.nodes)
         return State(found.lower, found.slip, stiff, multiplier)
 
-    def next(
-        self, sample: Sample, state: State | None = None, target: float = np.inf
-    ) -> State:
+    def next(self, sample: Sample, state: State | None = None, target: float = np.inf) -> State:
         """Return the next instability from a state or from rest, or the state at a load before it.
 
         The programme of the present pieces gives it if no node reaches a further corner before.
