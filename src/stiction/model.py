@@ -31,6 +31,7 @@ from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown
+from stiction.progress import Show
 
 T = TypeVar("T")
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -136,6 +137,20 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
+def _flag(value: Any) -> bool:
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError("must be True or False")
+    return bool(value)
+
+
+def _show(value: Any) -> Any:
+    if callable(value) and not isinstance(value, type):
+        return value
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError("must be True, False or a function of (done, total)")
+    return bool(value)
+
+
 def _names(value: Any) -> tuple[str, ...]:
     names = tuple(value) if isinstance(value, list | tuple | set | frozenset) else (value,)
     if not all(isinstance(name, str) for name in names):
@@ -189,8 +204,8 @@ Profile: TypeAlias = Annotated[
 ]
 OptionalProfile: Any = Profile | None
 """A number, or a read-only array of shape (nodes,); or None for 'not given'."""
-Flag: TypeAlias = Annotated[bool, Field(strict=True)]
-Progress: TypeAlias = Flag | Callable[[int, int], None]
+Flag: TypeAlias = Annotated[bool, BeforeValidator(_flag)]
+Progress: TypeAlias = Annotated[Show, BeforeValidator(_show)]
 """True, False, or a function of (done, total)."""
 Text: TypeAlias = Annotated[str, Field(strict=True, min_length=0)]
 """Text in valid UTF-8; pydantic looks at it only if its length is limited."""

@@ -54,6 +54,8 @@ def loaded(profile):
 
 
 test_numbers = refusals({
+    "low: must be greater than": lambda: st.Gamma(mean=1e6, cv=0.2, low=-1e300),
+    "slip: must be True or False": lambda: st.Equilibrium(slip=1),
     "density ... number ... '1170'": lambda: solid(density="1170"),
     "length ... True": lambda: st.Interface(length=True, nodes=64),
     "length ... finite": lambda: st.Interface(length=10**400, nodes=64),
@@ -75,8 +77,8 @@ test_numbers = refusals({
     ),
     "correlation_length ... 0.000000000000001": lambda: st.PowerLawSpectrum(5e-324),
     "power_kept ... less than 1": lambda: st.ExponentialSpectrum(1.0, power_kept=1.0),
-    "slip ... valid boolean ... '1'": lambda: st.Equilibrium(slip="1"),
-    "arrest ... valid boolean ... 'no'":
+    "slip ... must be True or False ... '1'": lambda: st.Equilibrium(slip="1"),
+    "arrest ... must be True or False ... 'no'":
         lambda: st.theory.griffith_length(PROBLEM, 1e6, 1.0, arrest="no"),
     "seed ... -1 ... >= 0": lambda: make_strength().sample(LINE, seed=-1),
     "seed ... whole ... '1'":
@@ -101,7 +103,8 @@ test_names_and_choices = refusals({
     "unknown 'sigma' ... valid: s, loc, scale":
         lambda: make_strength(marginal={"type": "lognorm", "sigma": 0.3}),
     "did you mean 'edge'": lambda: st.Load(profile={"type": "egde", "excess": 1.0}),
-    "progress ... boolean or callable ... 3": lambda: monte_carlo(progress=3),
+    "progress ... a function of (done, total) ... int": lambda: monte_carlo(progress=int),
+    "progress ... a function of (done, total) ... 3": lambda: monte_carlo(progress=3),
     "keep ... 'initial_stress' ... valid: strength":
         lambda: monte_carlo(keep=("initial_stress",)),
     "sweep ... unknown 'type' ... valid: problem":

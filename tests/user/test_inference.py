@@ -48,6 +48,21 @@ def posterior():
     return infer(prior=PRIOR, samples=1000, load_cell_error=5e3)
 
 
+def test_peaks_out_of_reach_of_the_prior():
+    """Below the least strength, but not those that are only rare."""
+    correlation = {"correlation_length": (0.3 * H_N, 3.0 * H_N)}
+    impossible = np.append(PEAKS, 0.64e6)
+    refuses("1 of 31 are out of reach ... 640000", lambda: infer(impossible, prior=correlation))
+    less_exact = partial(infer, impossible, prior=correlation, load_cell_error=2e3)
+    refuses("1 of 31 are out of reach ... 652000 to", less_exact)
+    between = {"strength": st.Lognormal(mean=1.0, cv=0.5)}
+    lots = st.RandomInterface(strength=STRENGTH, between=between)
+    rare = np.append(PEAKS, 4.0 * PEAKS.mean())
+    assert infer(rare, random=lots, prior={"marginal.low": (0.5e6, 0.7e6)}).names == (
+        "marginal.low",
+    )
+
+
 def test_what_a_posterior_says(posterior):
     assert posterior.names == tuple(PRIOR)
     low, high = posterior.interval("marginal.low")

@@ -142,7 +142,9 @@ def test_every_sample_is_in_one_part_and_parts_are_alike(points, samples, of):
     assert max(sizes) - min(sizes) <= max(1, points * samples // (8 * of))
 
 
-@pytest.mark.parametrize("value", ["0/3", "4/3", "3", "a/b", (1, 0), 1.5])
+@pytest.mark.parametrize(
+    "value", ["0/3", "4/3", "3", "a/b", "1/ 2", (1, 0), (1.5, 2), (True, 2), 1.5]
+)
 def test_what_is_no_part_is_refused(value):
     refuses("part: must be", lambda: make_study().run(out="none", part=value))
 

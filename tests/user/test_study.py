@@ -199,6 +199,16 @@ def test_a_swept_key_needs_no_value_of_its_own():
     assert study.random.strength.spectrum.correlation_length == 4e-3
 
 
+def test_ranges_have_the_type_and_unit_of_their_key():
+    nodes = {"start": 256, "stop": 512, "count": 2}
+    found = swept(
+        {"problem.interface.nodes": nodes}, {"random.strength.marginal.low": [1e5, 2e5]}
+    )
+    axes = found.axes
+    assert axes["nodes"]["nodes"][0].dtype == np.int64
+    assert axes["low"]["low"][1].units == "Pa"
+
+
 def test_a_correlation_coefficient_is_swept():
     """The strength has the same draws at every coefficient; the coordinate is a pure number."""
     residual = {

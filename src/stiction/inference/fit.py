@@ -32,6 +32,7 @@ from stiction.variables import QUANTITIES
 MARGINALS = ("lognormal", "weibull", "gamma", "beta")
 ENOUGH_LENGTHS = 10.0
 """Correlation lengths below which a record constrains no parameter well."""
+FIXED = {"exponent": ", as in spectrum={'type': 'power_law', 'exponent': 4}"}
 FAR = 0.01
 """p-value below which a family does not fit."""
 ADVICE = {
@@ -392,7 +393,7 @@ def _doubts(found: Estimate, p_values: Mapping[str, float], failed: int) -> list
         )
     doubts += [
         f"{name} {value:.3g} lies at an end of the searched range: the data do not determine it;"
-        f" fix its value, as in spectrum={{'type': 'power_law', 'exponent': 4}}"
+        f" fix its value{FIXED.get(name, '')}"
         for name, value in found.setting.spectrum.at_end(found.model).items()
     ]
     doubts += [

@@ -14,7 +14,7 @@ from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import LimitState, no_single_length
 from stiction.errors import InputError
-from stiction.inference.density import Densities, log_likelihoods, tabulate, to_v
+from stiction.inference.density import ERRORS, Densities, log_likelihoods, tabulate, to_v
 from stiction.inference.prior import Prior
 from stiction.inference.scaling import Scaling, find_scaling
 from stiction.interface import Interface
@@ -31,8 +31,6 @@ ALIKE = 0.8
 """Correlation of the onsets by two methods above which one helps the other."""
 SPECIMEN = 2**20
 """Samples of a specimen of another length begin at multiples of this."""
-TRIED = 200
-"""Peaks that are predicted at each corner of the prior."""
 BEYOND = 2.0
 """Spreads beyond the extremes of these at which a peak is out of reach."""
 
@@ -215,20 +213,25 @@ class Likelihood:
 
     def refusals(self) -> list[str]:
         """Return messages on peaks that no parameters in the prior can produce."""
-        texts = []
-        ends = np.array(list(itertools.product(*zip(self.low, self.high, strict=True))))
-        for number, peaks in enumerate(self.peaks):
-            found = self.predicted(number, np.repeat(ends, TRIED, axis=0), 0)
-            rows = found.reshape(-1, TRIED)
-            room = BEYOND * rows.std(axis=1)
-            least, most = rows.min(axis=1) - room, rows.max(axis=1) + room
+        texts, keys = [], list(self.scaling.keys)
+        nodes = nodes_of(self.axes, self.scaling.reference)
+        ends = self.prior.theta(np.stack([self.low, self.high])).T[keys]
+        points = np.concatenate([nodes] * 2 ** len(keys))
+        points[:, keys] = np.repeat(list(itertools.product(*ends)), len(nodes), axis=0)
+        shift, stretch = self.scaling.of(points)
+        for onsets, known, peaks in zip(self.onsets, self.densities, self.peaks, strict=True):
+            room = BEYOND * onsets.std(axis=1)
+            lowest = np.maximum(onsets.min(axis=1) - room, known.bound)
+            highest = onsets.max(axis=1) + room
+            least = shift + stretch * np.tile(lowest, 2 ** len(keys)) - ERRORS * self.error
+            most = shift + stretch * np.tile(highest, 2 ** len(keys)) + ERRORS * self.error
             low, high = float(least.min()), float(most.max())
             far = (peaks < low) | (peaks > high)
             places = [
                 ", ".join(
                     f"{n} = {v:.6g}" for n, v in zip(self.prior.names, point, strict=True)
                 )
-                for point in self.prior.theta(ends[[least.argmin(), most.argmax()]])
+                for point in points[[least.argmin(), most.argmax()]]
             ]
             for value in peaks[far][:1]:
                 side = "below" if value < low else "above"

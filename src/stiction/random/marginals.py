@@ -76,7 +76,7 @@ class _ByMoments(Marginal):
 
     mean: Annotated[Positive, Field(gt=1e-18, lt=1e18)]
     cv: Annotated[Positive, Field(gt=1e-9)]
-    low: Real = 0.0
+    low: Annotated[Real, Field(gt=-1e18, lt=1e18)] = 0.0
     family: ClassVar[Any] = None
 
     @model_validator(mode="after")

@@ -15,7 +15,7 @@ from stiction.ensemble.batches import Failure, Table
 from stiction.ensemble.dataset import Gathered
 from stiction.ensemble.store import Store
 from stiction.errors import warn_user
-from stiction.model import FilePath, brief, check
+from stiction.model import FilePath, brief, check, is_whole
 from stiction.random.synthesis import BLOCK
 from stiction.study.export import export
 
@@ -27,16 +27,17 @@ FEWEST_BLOCKS = 8
 
 
 def _part(value: Any) -> tuple[int, int]:
-    try:
-        number, of = map(int, value.split("/") if isinstance(value, str) else value)
-    except (TypeError, ValueError):
-        number = of = 0
-    if not 1 <= number <= of:
-        raise ValueError(
-            "must be a part and the number of parts, such as 3/100 (in Python also (3, 100)), from"
-            " 1/100 to 100/100"
-        )
-    return number, of
+    pair: Any = value
+    if isinstance(value, str):
+        pair = [int(text) if text.isdecimal() else text for text in value.split("/")]
+    if isinstance(pair, tuple | list) and len(pair) == 2 and all(is_whole(n, 1) for n in pair):
+        number, of = map(int, pair)
+        if number <= of:
+            return number, of
+    raise ValueError(
+        "must be a part and the number of parts, such as 3/100 (in Python also (3, 100)), from"
+        " 1/100 to 100/100"
+    )
 
 
 AnyPart: TypeAlias = Annotated[Any, BeforeValidator(_part)]

@@ -191,7 +191,9 @@ class Study(_Parts):
     def axes(self) -> GridAxes:
         """The axes of the sweep as dimensions of the result."""
         taken = {*variables_in(self.experiments), "sample", "x", "y"}
-        return grid_axes(self.sweep, taken)
+        fields = self.experiments[0].random.properties.items()
+        coefficients = [name for name, field in fields if field.of]
+        return grid_axes(self.sweep, taken, coefficients)
 
     @property
     def attributes(self) -> dict[str, Any]:

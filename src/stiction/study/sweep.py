@@ -26,6 +26,8 @@ _UNITS = {name: variable.units for name, variable in PROFILES.items()} | {
     "density": "kg m-3",
     "loading_rate": "Pa s-1",
 }
+_OF_THE_FIELD = ("mean", "low", "high", "loc", "scale")
+"""Parameters of a marginal in the unit of its field."""
 
 Axis: TypeAlias = dict[str, list[Any]]
 """Keys that vary together, each with one value for each step."""
@@ -65,7 +67,11 @@ class Range:
 def _values(key: str, given: Any) -> list[Any]:
     if isinstance(given, Mapping):
         with prefixed(key):
-            return Range(**given).values()
+            values = Range(**given).values()
+        whole = all(isinstance(given[end], numbers.Integral) for end in ("start", "stop"))
+        if whole and all(value.is_integer() for value in values):  # such as numbers of nodes
+            return [int(value) for value in values]
+        return values
     if isinstance(given, np.ndarray):
         given = given.tolist()
     if not isinstance(given, list | tuple) or not given:
@@ -185,7 +191,16 @@ def _text(value: Any) -> str:
     return str(kind) if kind else describe(value)
 
 
-def grid_axes(axes: Sequence[Axis], taken: Collection[str]) -> GridAxes:
+def _unit(parts: Sequence[str], coefficients: Collection[str]) -> str:
+    """Return the unit of the values of a key, given by its parts."""
+    if "marginal" in parts and parts[-1] in _OF_THE_FIELD:
+        return "1" if parts[1] in coefficients else _UNITS.get(parts[1], "1")
+    return _UNITS.get(parts[-1], "1")
+
+
+def grid_axes(
+    axes: Sequence[Axis], taken: Collection[str], coefficients: Collection[str]
+) -> GridAxes:
     """Return the axes as dimensions of a result, named by the ends of their keys."""
     names = _short_names([key for axis in axes for key in axis], taken)
     result: dict[str, Coordinates] = {}
@@ -195,7 +210,7 @@ def grid_axes(axes: Sequence[Axis], taken: Collection[str]) -> GridAxes:
         for key, values in axis.items():
             labels, parts = _labels(values), key.split(".")
             number = labels.dtype.kind in "if" and "correlation" not in parts
-            unit = _UNITS.get(parts[-1], "1") if number else "1"
+            unit = _unit(parts, coefficients) if number else "1"
             own[names[key]] = (labels, Variable(unit, key, (dim,)))
     return result
 
