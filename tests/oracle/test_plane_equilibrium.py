@@ -74,14 +74,15 @@ def test_bounds_and_multiplier_equal_the_linear_programme(seed, wavenumbers):
     assert error < 1e-6 * multiplier.max()
 
 
-def test_lowest_eigenvector_equals_a_dense_one():
+@pytest.mark.parametrize("size", [1.0, 1e-170])  # of the guess; the square of the other is zero
+def test_lowest_eigenvector_equals_a_dense_one(size):
     shape = (20, 16)
     symbol = Plane((3.0 * LENGTH, 2.0 * LENGTH), 1e9, 0.33).symbol(shape)
     inside = noise(4.0, 0, shape) < 0.5
     matrix = dense(symbol, shape) - RATE * np.eye(inside.size)
     nodes = np.flatnonzero(inside)
     values, vectors = eigh(matrix[np.ix_(nodes, nodes)], subset_by_index=[0, 0])
-    vector = inside.astype(float)
+    vector = size * inside
     given = make_operator(symbol, RATE, shape), inside.reshape(-1), vector.reshape(-1)
     value, _ = lowest_eigenvector(*given, 1e-10 * RATE, 500)
     assert value == pytest.approx(values[0], rel=1e-10, abs=1e-10 * RATE)

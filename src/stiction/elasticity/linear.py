@@ -6,6 +6,7 @@ negative curvature, so that states on and beyond the turning point of the load c
 for. The preconditioner is 1/(K(k) + W/2), cut too.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -179,7 +180,9 @@ def lowest_eigenvector(
     basis = np.empty((3, nodes))  # the vector, the preconditioned residual, the last direction
     images = np.empty((3, nodes))
     moved = np.empty(nodes)
-    set_scaled(basis[0], 1.0, vector)
+    # A guess may be so small that its norm underflows: a power of two changes no digit.
+    exponent = math.frexp(largest_inside(vector, inside))[1]
+    set_scaled(basis[0], math.ldexp(1.0, min(-exponent, 1000)), vector)
     restrict(basis[0], inside)
     set_scaled(basis[0], 1.0 / np.sqrt(inner(basis[0], basis[0])), basis[0])
     product(operator, basis[0], images[0])
