@@ -216,9 +216,8 @@ def kernel_sum(mode: str, eta: float, tolerance: float = 1e-6) -> ExponentialSum
     kernel = _read(path)
     if kernel is None:
         kernel = fit_exponentials(mode, eta, tolerance)
-        with contextlib.suppress(
-            StoreError
-        ):  # where nothing can be written, it stays in memory
+        # Where nothing can be written, it stays in memory.
+        with contextlib.suppress(StoreError):
             write_arrays(path, vars(kernel))
     return kernel
 
