@@ -48,7 +48,6 @@ def reference():
 def small_chunks(monkeypatch):
     """Chunks of a few samples at once."""
     monkeypatch.setattr(store, "SAVE_SECONDS", 0.0)
-    monkeypatch.setattr(store, "SAVE_SHARE", 0.0)
     monkeypatch.setattr(
         batches, "piece_size", lambda experiment, span, *rest: min(7, span.samples)
     )

@@ -128,7 +128,7 @@ def test_interrupted_from_outside(runs, study, number):
         command, stderr=subprocess.PIPE, text=True, env=environment
     ) as process:
         deadline = time.monotonic() + 120.0
-        while not list(Path("run/chunks").glob("*.npz")):
+        while not Path("run/study.json").exists():
             assert time.monotonic() < deadline
             time.sleep(0.05)
         process.send_signal(number)
@@ -230,7 +230,7 @@ MISTAKES = {
     "run missing.toml --out run": (2, "missing.toml"),
     "run study.toml --out run --workers 0": (2, "--workers"),
     "run study.toml --out run --part 3/2": (2, "--part"),
-    "run study.toml --out study.toml": (1, "is a file"),
+    "run study.toml --out study.toml": (1, "File exists"),
     f"run study.toml --out {LONG}": (2, "error: "),
     "run study.toml --out not-utf8-\udcff": (2, "error: "),
     f"check {LONG}.toml": (2, "error: "),

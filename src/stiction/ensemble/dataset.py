@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.ensemble.batches import NUMBER, POINT, Failure, Table
-from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.experiment import Ensemble, Experiment
 from stiction.model import check_memory
 from stiction.results import to_dataset
 from stiction.variables import SAMPLE, Variable
@@ -19,7 +19,6 @@ from stiction.variables import SAMPLE, Variable
 if TYPE_CHECKING:
     import xarray as xr
 
-FAILED = "failed_samples"
 Coordinates: TypeAlias = dict[str, tuple[NDArray[Any], Variable]]
 """Values and variables of coordinates by name."""
 GridAxes: TypeAlias = Mapping[str, Coordinates]
@@ -50,27 +49,29 @@ class Gathered:
     def __init__(
         self,
         points: Sequence[Experiment],
-        samples: int,
-        first: int = 0,
+        ensemble: Ensemble,
         only: Sequence[str] | None = None,
     ) -> None:
         if only is None:
             largest = max(one.sample_bytes for one in distinct(points, "problem", "method"))
-            check_memory("samples", largest * len(points) * samples)
-        self.points, self.first, self._only = points, first, only
-        self.done = np.zeros((len(points), samples), dtype=np.bool_)
+            check_memory("samples", largest * len(points) * ensemble.samples)
+        self.points, self.first, self._only = points, ensemble.first, only
+        self.done = np.zeros((len(points), ensemble.samples), dtype=np.bool_)
+        self.tables, self.seconds = 0, 0.0  # of one core
+        self.versions: dict[str, None] = {}  # of the packages that computed the samples
         self._failures: dict[tuple[int, int], Failure] = {}
         self._arrays: dict[str, NDArray[Any]] = {}  # floats, NaN where nothing is
         self._types: dict[str, np.dtype[Any]] = {}
 
     def add(self, table: Table) -> None:
         """Put the rows of a table in their places; those of other samples are left out."""
-        samples = self.done.shape[1]
+        self.tables, self.seconds = self.tables + 1, self.seconds + table.seconds
+        self.versions[table.versions] = None
         for failure in table.failures:
-            if 0 <= failure.sample - self.first < samples:
+            if failure.sample - self.first < self.done.shape[1]:
                 self._failures[failure.point, failure.sample - self.first] = failure
         point, sample = table.rows[POINT], table.rows[NUMBER] - self.first
-        inside = (sample >= 0) & (sample < samples)
+        inside = sample < self.done.shape[1]
         where = point[inside], sample[inside]
         self.done[where] = True
         for name in {*(table.rows.dtype.names or ())} - {POINT, NUMBER}:
@@ -106,12 +107,11 @@ class Gathered:
         coordinates: Coordinates = {}
         for own in axes.values():
             coordinates |= own
-        samples = self.first + np.arange(self.done.shape[1])
-        coordinates["sample"] = (samples, SAMPLE)
+        coordinates["sample"] = self.first + np.arange(self.done.shape[1]), SAMPLE
         attributes, failed = dict(attributes), self.failed
         made, total = int(self.done.sum()), self.done.size
         if failed:
-            attributes[FAILED] = [list(failure) for failure in failed]
+            attributes["failed_samples"] = failed
         if made + len(failed) < total:
             attributes["cut_short"] = f"{made} of {total} samples are done"
         interface = self.points[0].problem.interface

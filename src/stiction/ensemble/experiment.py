@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from typing import Annotated, Any, TypeAlias
 
 import numpy as np
@@ -150,14 +151,11 @@ class Experiment:
         # A rough field has hundreds of draws for each node.
         return min(size, max(1, MOST_NUMBERS // max(interface.size, self.dimension)))
 
-    def batches(self, first: int, count: int, size: int = 0) -> Iterator[tuple[int, int]]:
+    def batches(self, first: int, count: int, size: int = 0) -> list[tuple[int, int]]:
         """Cut samples first .. first + count - 1 into (first, count), at multiples of a size."""
-        size = size or self.batch
-        start, end = first, first + count
-        while start < end:
-            stop = min(end, (start // size + 1) * size)
-            yield start, stop - start
-            start = stop
+        size, end = size or self.batch, first + count
+        edges = [first, *range(first - first % size + size, end, size), end]
+        return [(start, stop - start) for start, stop in pairwise(edges)]
 
 
 @lru_cache(maxsize=8)

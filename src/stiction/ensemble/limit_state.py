@@ -113,17 +113,14 @@ class LimitState:
             return 0.0, math.inf
         chance = negligible / (8 * problem.interface.size)  # eight random factors, at each node
         low, high = support_in_stress(problem, random, "strength", chance)
-        profile = np.asarray(problem.load_profile, dtype=np.float64)
-        least: Any = np.asarray(problem.load.initial_stress, dtype=np.float64)
+        profile = np.broadcast_to(problem.load_profile, problem.interface.shape)
+        least: Any = problem.load.initial_stress
         most: Any = least
         if "initial_stress" in random.names:
             least, most = support_in_stress(problem, random, "initial_stress", chance)
-        lowest_load = float(np.min((low - most) / profile))
-        shape = problem.interface.shape
-        mean = float(np.mean(np.broadcast_to(profile, shape)))
         # The mean of the initial stress is itself random where it is a field: take its lowest.
-        initial = float(np.mean(np.broadcast_to(least, shape)))
-        low = initial + lowest_load * mean
+        initial = np.mean(np.broadcast_to(least, profile.shape))
+        low = float(initial + np.min((low - most) / profile) * np.mean(profile))
         if self._random_pressure:
             ends = support_in_stress(problem, random, "normal_pressure", chance)
             ratios = [self.experiment.pressure / end for end in ends]

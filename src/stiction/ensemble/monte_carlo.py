@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from stiction.ensemble.batches import missing_spans, solve_spans, usable_cores
-from stiction.ensemble.dataset import FAILED, Gathered, GridAxes, distinct
+from stiction.ensemble.batches import missing_spans, solve_spans, usable_cores, versions
+from stiction.ensemble.dataset import Gathered, GridAxes, distinct
 from stiction.ensemble.experiment import AnyRandom, Ensemble, Experiment
 from stiction.ensemble.pilot import pilot_attributes
 from stiction.ensemble.store import Store
@@ -61,15 +61,21 @@ def gather(
     Samples go to the `store` as they are done. `others`, of shape (points, samples), are samples
     that another job computes. For the rest see `monte_carlo`.
     """
-    rows = Gathered(points, ensemble.samples, ensemble.first)
-    for table in store.load() if store else ():
-        rows.add(table)
+    rows = Gathered(points, ensemble)
+    if store:
+        for table in store.chunks():
+            rows.add(table)
+        store.delete_damaged()
+        for other in sorted({*rows.versions} - {versions()}):
+            store.warn(
+                f"was begun with {other}, not {versions()}: samples of the two may differ"
+                " in their last digits"
+            )
     done = others | rows.done
-    spans, solved, lost = missing_spans(done, ensemble.first), bool(rows.done.any()), 0
+    spans, total, lost = missing_spans(done, ensemble.first), int((~done).sum()), 0
     if spans:
         _check_fields(points)
         points[0].prepare()  # here and not in a thread, so that it warns at the caller's line
-    total = int(done.size - done.sum())
     label = " and ".join({one.method.label: None for one in distinct(points, "method")})
     with ExitStack() as stack:
         if store:  # also on Ctrl-C, and when workers are lost: what is done is kept
@@ -81,8 +87,8 @@ def gather(
                 store.add(table)
             rows.add(table)
             meter.advance(table.size)
-            solved, lost = solved or table.rows.size > 0, lost + len(table.failures)
-            if not solved and lost >= min(HOPELESS, total):
+            lost += len(table.failures)
+            if lost >= min(HOPELESS, total) and not rows.done.any():
                 failure = table.failures[0]
                 raise (InputError if failure.input else RunError)(str(failure))
     found = store.pilot if store else None
@@ -96,7 +102,7 @@ def gather(
         more = f"; and {len(failed) - SHOWN} more" if len(failed) > SHOWN else ""
         warn_accuracy(
             f"{len(failed)} of {rows.done.size} samples could not be solved and are NaN (the"
-            f" attribute {FAILED!r} lists them): {some}{more}"
+            f" attribute 'failed_samples' lists them): {some}{more}"
         )
     return result
 

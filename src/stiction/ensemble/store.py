@@ -21,22 +21,22 @@ from typing import Any
 
 import numpy as np
 
-from stiction.ensemble.batches import Failure, Table, versions
+from stiction.ensemble.batches import Failure, Table
 from stiction.ensemble.pilot import ON_A_LINE
 from stiction.errors import StoreError, warn_user
-from stiction.files import PART, UNREADABLE, cannot, write_whole
+from stiction.files import PART, cannot, write_whole
 from stiction.model import describe
 
 FORMAT = 5
 STUDY, PILOT, CHUNKS = "study.json", "pilot.json", "chunks"
 NAME = re.compile(r"[0-9a-f]{32}\.npz")
-SAVE_SECONDS, SAVE_SHARE, SAVE_MOST = 1.0, 0.03, 10.0
-"""A chunk holds the samples of a second, later of 3 % of the whole time, at most ten."""
+SAVE_SECONDS = 10.0
+"""A chunk holds the samples of this time."""
 SAVE_BYTES = 32 * 2**20
 
 
-class Damaged(ValueError):
-    """A stored file is damaged; the message gives the defect."""
+class Damaged(StoreError):
+    """A stored file is missing or damaged; the message gives the defect."""
 
 
 class Store:
@@ -50,13 +50,11 @@ class Store:
         self._mark = digest(json.dumps(_identity(study), sort_keys=True).encode())
         self.damage: dict[str, str] = {}
         self._taken: list[Table] = []
-        self._begun = self._saved = time.monotonic()
+        self._saved = time.monotonic()
 
     @classmethod
     def open(cls, path: Path, study: dict[str, Any]) -> Store:
         """Open a folder for writing: a new one, or one that holds the same study."""
-        if path.exists() and not path.is_dir():
-            raise StoreError(f"{path}: is a file; a run needs a folder")
         try:
             path.mkdir(parents=True, exist_ok=True)
             others = {name for name in os.listdir(path) if not name.endswith(PART)}
@@ -70,18 +68,14 @@ class Store:
         try:
             before = read_study(path)
             _refuse_another(path, study, before)
-        except (FileNotFoundError, Damaged):
+        except Damaged:
             if list(store.chunks()) or STUDY in others:
-                store._warn(
-                    f"{STUDY} is damaged or missing; it is rebuilt from the given study"
-                )
+                store.warn(f"{STUDY} is damaged or missing; it is rebuilt from the given study")
         if before != study:
             if before and before["ensemble"]["samples"] < ON_A_LINE:  # a pilot of fewer samples
                 (path / PILOT).unlink(missing_ok=True)
             _write_json(path / STUDY, study)
         return store
-
-    # -- reading -------------------------------------------------------------------------------
 
     def chunks(self) -> Iterator[Table]:
         """Yield the undamaged chunks; the defects of the others are in `damage`.
@@ -91,55 +85,49 @@ class Store:
         folder, self.damage = self.path / CHUNKS, {}
         try:
             names = sorted(filter(NAME.fullmatch, os.listdir(folder)))
-        except FileNotFoundError:
-            return
         except OSError as error:
             raise cannot("read", folder, error) from error
         for name in names:
             try:
-                study, table = _read_chunk(folder / name)
-            except FileNotFoundError:  # it was damaged, and another process has deleted it
+                data = _read(folder / name)
+            except Damaged:  # it was damaged, and another process has deleted it
                 continue
-            except Damaged as error:
-                self.damage[name] = str(error)
+            if name != f"{digest(data)}.npz":
+                self.damage[name] = "fails its checksum"
                 continue
-            if study != self._mark:
-                raise StoreError(f"{self.path}: {CHUNKS}/{name} belongs to another study")
-            yield table
+            with np.load(io.BytesIO(data), max_header_size=len(data)) as archive:
+                mark, made_by, seconds, failed = json.loads(archive["about"].tobytes())
+                if mark != self._mark:
+                    raise StoreError(f"{folder / name}: belongs to another study")
+                failures = tuple(Failure(*one) for one in failed)
+                yield Table(archive["rows"], failures, seconds, made_by)
 
-    def load(self) -> Iterator[Table]:
-        """Yield all tables; delete damaged chunks, and warn of them and of other versions."""
-        found = set()
-        for table in self.chunks():
-            yield table
-            found.add(table.versions)
-        for other in sorted(found - {versions()}):
-            self._warn(
-                f"was begun with {other}, not {versions()}: samples of the two may differ"
-                " in their last digits"
-            )
+    def delete_damaged(self) -> None:
+        """Delete the damaged chunks that were found, with a warning of each."""
         for name, text in self.damage.items():
-            self._warn(f"{CHUNKS}/{name}: {text}; its samples are computed again")
+            self.warn(f"{CHUNKS}/{name}: {text}; its samples are computed again")
             (self.path / CHUNKS / name).unlink(missing_ok=True)
 
-    def _warn(self, text: str) -> None:
+    def warn(self, text: str) -> None:
+        """Issue a warning about this run."""
         warn_user(f"{self.path}: {text}", UserWarning)
 
     @property
     def pilot(self) -> dict[str, Any] | None:
         """Result of the pilot; None if there was none."""
-        with suppress(FileNotFoundError, Damaged):
+        with suppress(Damaged):
             return read_json(self.path / PILOT)
         return None
 
-    # -- writing -------------------------------------------------------------------------------
+    def note_pilot(self, attributes: Mapping[str, Any]) -> None:
+        """Store the result of the pilot."""
+        _write_json(self.path / PILOT, attributes)
 
     def add(self, table: Table) -> None:
         """Take a table, and store all that were taken if it is time or they are large."""
         self._taken.append(table)
-        now, size = time.monotonic(), sum(table.rows.nbytes for table in self._taken)
-        interval = min(max(SAVE_SECONDS, SAVE_SHARE * (now - self._begun)), SAVE_MOST)
-        if now - self._saved >= interval or size >= SAVE_BYTES:
+        size = sum(table.rows.nbytes for table in self._taken)
+        if time.monotonic() - self._saved >= SAVE_SECONDS or size >= SAVE_BYTES:
             self.save()
 
     def save(self) -> None:
@@ -147,17 +135,15 @@ class Store:
         groups: dict[Any, list[Table]] = {}
         for table in self._taken:
             groups.setdefault((table.rows.dtype, table.versions), []).append(table)
-        for group in groups.values():
-            data = _encode(group, self._mark)
+        for (_, made_by), group in groups.items():
+            seconds = round(sum(table.seconds for table in group), 3)
+            failures = [failure for table in group for failure in table.failures]
+            about = json.dumps([self._mark, made_by, seconds, failures]).encode()
+            rows, file = np.concatenate([table.rows for table in group]), io.BytesIO()
+            np.savez(file, about=np.frombuffer(about, dtype=np.uint8), rows=rows)
+            data = file.getvalue()
             write_whole(self.path / CHUNKS / f"{digest(data)}.npz", data)
         self._taken, self._saved = [], time.monotonic()
-
-    def note_pilot(self, attributes: Mapping[str, Any]) -> None:
-        """Store the result of the pilot."""
-        _write_json(self.path / PILOT, attributes)
-
-
-# -- files ---------------------------------------------------------------------------------------
 
 
 def digest(data: bytes) -> str:
@@ -165,29 +151,14 @@ def digest(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()[:32]
 
 
-def _encode(tables: list[Table], study: str) -> bytes:
-    """Return tables as the bytes of an .npz archive, with a short description as JSON."""
-    seconds = round(sum(table.seconds for table in tables), 3)
-    failures = [failure for table in tables for failure in table.failures]
-    about = json.dumps([study, tables[0].versions, seconds, failures]).encode()
-    rows, file = np.concatenate([table.rows for table in tables]), io.BytesIO()
-    np.savez(file, about=np.frombuffer(about, dtype=np.uint8), rows=rows)
-    return file.getvalue()
-
-
-def _read_chunk(file: Path) -> tuple[str, Table]:
-    """Return the mark of a study and samples of it, or raise `Damaged` or an error of `_read`."""
-    data = _read(file)
-    if file.stem != digest(data):
-        raise Damaged("fails its checksum")
+def _read(file: Path) -> bytes:
+    """Return the content of a file; one that is there but cannot be read may be whole."""
     try:
-        with np.load(io.BytesIO(data), max_header_size=len(data)) as archive:
-            study, made_by, seconds, failed = json.loads(archive["about"].tobytes())
-            failures = tuple(Failure(*one) for one in failed)
-            return study, Table(archive["rows"], failures, seconds, made_by)
-    except (*UNREADABLE, AttributeError, TypeError) as error:
-        # Made by a program that names its files likewise.
-        raise Damaged(f"cannot be read: {error}") from None
+        return file.read_bytes()
+    except FileNotFoundError:
+        raise Damaged(f"{file.parent}: there is no run here") from None
+    except OSError as error:
+        raise cannot("read", file, error) from error
 
 
 def _write_json(file: Path, content: Mapping[str, Any]) -> None:
@@ -198,7 +169,7 @@ def _write_json(file: Path, content: Mapping[str, Any]) -> None:
 
 
 def read_json(file: Path) -> dict[str, Any]:
-    """Return what `_write_json` wrote, or raise `Damaged` or an error of `_read`."""
+    """Return what `_write_json` wrote, or raise a `StoreError`."""
     try:
         body = json.loads(_read(file))
         if body.pop("digest") != digest(json.dumps(body, sort_keys=True).encode()):
@@ -206,29 +177,18 @@ def read_json(file: Path) -> dict[str, Any]:
         if body["format"] == FORMAT:
             return dict(body["content"])
     except (ValueError, KeyError, TypeError, AttributeError):
-        raise Damaged(f"{file}: is damaged") from None
+        raise Damaged(
+            f"{file}: is damaged; run the study again into the folder to repair it"
+        ) from None
     raise StoreError(f"{file}: is of format {body['format']!r}; this version reads {FORMAT}")
 
 
 def read_study(folder: Path) -> dict[str, Any]:
-    """Return the study of a run; for errors see `read_json`."""
+    """Return the study of a run, or raise a `StoreError`."""
     found = read_json(folder / STUDY)
-    if "ensemble" not in found:  # another file of a run in its place
-        raise Damaged(f"{folder / STUDY}: is damaged")
+    if "ensemble" not in found:
+        raise Damaged(f"{folder / STUDY}: is damaged: it is another file of a run")
     return found
-
-
-def _read(file: Path) -> bytes:
-    """Return the content of a file; one that exists but cannot be read is a `StoreError`."""
-    try:
-        return file.read_bytes()
-    except FileNotFoundError:
-        raise
-    except OSError as error:
-        raise cannot("read", file, error) from error
-
-
-# -- which study it is ---------------------------------------------------------------------------
 
 
 def _identity(study: Mapping[str, Any]) -> dict[str, Any]:

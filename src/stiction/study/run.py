@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
-from stiction.ensemble.batches import Failure, Table
+from stiction.ensemble.batches import Failure
 from stiction.ensemble.dataset import Gathered
 from stiction.ensemble.store import Store
-from stiction.errors import warn_user
-from stiction.model import FilePath, brief, check, is_whole
+from stiction.model import FilePath, brief, check
 from stiction.random.synthesis import BLOCK
 from stiction.study.export import export
 
@@ -27,17 +27,13 @@ FEWEST_BLOCKS = 8
 
 
 def _part(value: Any) -> tuple[int, int]:
-    pair: Any = value
-    if isinstance(value, str):
-        pair = [int(text) if text.isdecimal() else text for text in value.split("/")]
-    if isinstance(pair, tuple | list) and len(pair) == 2 and all(is_whole(n, 1) for n in pair):
-        number, of = map(int, pair)
-        if number <= of:
-            return number, of
-    raise ValueError(
-        "must be a part and the number of parts, such as 3/100 (in Python also (3, 100)), from"
-        " 1/100 to 100/100"
-    )
+    found = re.fullmatch(r"(\d+)/(\d+)", value, re.ASCII) if isinstance(value, str) else None
+    number, of = map(int, found.groups()) if found else (0, 0)
+    if not 1 <= number <= of:
+        raise ValueError(
+            "must be a part and the number of parts, such as '3/100', from 1/100 to 100/100"
+        )
+    return number, of
 
 
 AnyPart: TypeAlias = Annotated[Any, BeforeValidator(_part)]
@@ -93,16 +89,16 @@ class StoredRun:
         StoreError
             If a stored file cannot be read.
         """
-        rows, chunks = self._read(only=())
+        rows = self._read(only=())
         return Status(
             samples=rows.done.size,
             done=int(rows.done.sum()),
             done_by_point=rows.done.sum(axis=1),
             failures=tuple(rows.failed),
             damaged=tuple(f"{name}: {text}" for name, text in self._store.damage.items()),
-            chunks=len(chunks),
-            seconds=sum(chunk.seconds for chunk in chunks),
-            versions=tuple(dict.fromkeys(chunk.versions for chunk in chunks)),
+            chunks=rows.tables,
+            seconds=rows.seconds,
+            versions=tuple(rows.versions),
         )
 
     def dataset(self, only: Sequence[str] | None = None) -> xr.Dataset:
@@ -118,22 +114,18 @@ class StoredRun:
         UserWarning
             If a chunk is damaged.
         """
-        rows, _ = self._read(only)
+        rows = self._read(only)
         for name, text in self._store.damage.items():
-            text = f"{self.path}: {name}: {text}; its samples are missing; run the study again"
-            warn_user(text, UserWarning)
+            self._store.warn(f"{name}: {text}; its samples are missing; run the study again")
         return rows.dataset(
             {**self.study.attributes, **(self._store.pilot or {})}, self.study.axes
         )
 
-    def _read(self, only: Sequence[str] | None) -> tuple[Gathered, list[Table]]:
-        """Return everything that is stored, and the chunks without their rows."""
-        ensemble, chunks = self.study.ensemble, []
-        rows = Gathered(self.study.experiments, ensemble.samples, ensemble.first, only)
+    def _read(self, only: Sequence[str] | None) -> Gathered:
+        rows = Gathered(self.study.experiments, self.study.ensemble, only)
         for table in self._store.chunks():
             rows.add(table)
-            chunks.append(table._replace(rows=np.empty(0)))
-        return rows, chunks
+        return rows
 
     def export(self, path: str | Path) -> None:
         """Write `dataset` in the format of its suffix (.nc or .csv), whole or not at all.

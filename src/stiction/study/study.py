@@ -22,7 +22,7 @@ from stiction.ensemble.dataset import GridAxes, variables_in
 from stiction.ensemble.dotted_keys import with_values
 from stiction.ensemble.experiment import Ensemble, Experiment
 from stiction.ensemble.monte_carlo import gather
-from stiction.ensemble.store import Damaged, Store, read_study
+from stiction.ensemble.store import Store, read_study
 from stiction.errors import InputError, StoreError
 from stiction.methods import as_method, methods
 from stiction.model import (
@@ -225,9 +225,9 @@ class Study(_Parts):
             interrupted run, computes failed samples again, and new ones if `samples` was raised.
         workers, executor, progress, pilot
             See `stiction.monte_carlo`.
-        part : (int, int) or str, optional
-            Compute only one of several parts, such as (3, 100) or "3/100", into the same
-            folder as the other parts: for independent jobs.
+        part : str, optional
+            Compute only one of several parts, such as "3/100", into the same folder as the
+            other parts: for independent jobs.
 
         Returns
         -------
@@ -302,13 +302,13 @@ class Study(_Parts):
     @classmethod
     def from_result(cls, result: xr.Dataset) -> Study:
         """Return the study that produced a result."""
-        about = getattr(result, "attrs", {})
-        if "study" not in about:
-            raise InputError("result: must be a dataset with the attribute 'study'")
         try:
-            return cls.from_dict(json.loads(about["study"]))
-        except json.JSONDecodeError as error:
-            raise InputError(f"result: its attribute 'study' is not JSON: {error}") from None
+            given = json.loads(result.attrs["study"])
+        except (AttributeError, KeyError, TypeError, ValueError):
+            raise InputError(
+                "result: must be a dataset with the study, as JSON, in its attribute 'study'"
+            ) from None
+        return cls.from_dict(given)
 
 
 def study_schema() -> dict[str, Any]:
@@ -386,12 +386,7 @@ def open_run(path: Any) -> StoredRun:
         If the folder holds no run, or the run cannot be read.
     """
     place = check("path", path, FilePath)
-    try:
-        study = read_study(place)
-    except FileNotFoundError:
-        raise StoreError(f"{place}: there is no run here") from None
-    except Damaged as error:
-        raise StoreError(f"{error}; run the study again into the folder to repair it") from None
+    study = read_study(place)
     try:
         return StoredRun(Store(place, study), Study.from_dict(study))
     except InputError as error:
