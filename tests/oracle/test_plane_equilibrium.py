@@ -16,9 +16,8 @@ from setups import (
 )
 
 import stiction as st
-from stiction.elasticity.line import stiffness_column
 from stiction.elasticity.linear import lowest_eigenvector
-from stiction.elasticity.operator import make_operator, stiffness_symbol
+from stiction.elasticity.operator import make_operator
 from stiction.equilibrium.relaxation import BALANCED, SLIDING, least_equilibrium
 from stiction.equilibrium.solver import follow
 from stiction.equilibrium.transforms import Plane, PlaneProgram, plane_onset
@@ -158,12 +157,6 @@ def test_path_balances_where_it_slips(wide):
     assert (stress - held).max() < 1e-6 * strength.mean()
     assert path["mean_stress"].values == pytest.approx(path["load"].values, rel=1e-12)
     assert path["stress"].dims == ("load", "x", "y")
-
-
-def test_symbol_of_the_plane_is_the_lines_along_x():
-    column = stiffness_column(32, 0.01, 1e9 / 0.67)
-    symbol = stiffness_symbol((32, 8), (0.01, 0.01), 1e9 / 0.67, 1e9)[:17, 0]
-    assert symbol == pytest.approx(np.fft.rfft(column).real, abs=1e-9 * symbol.max())
 
 
 LAWS = {

@@ -47,14 +47,14 @@ def bounds_of(strength, wavenumbers="lattice", gap=1e-9):
     return found
 
 
-CHANGES = [
-    (lambda s: np.roll(s, (7, -3), (0, 1)), lambda x, y: (x + 7, y - 3)),
-    (lambda s: np.roll(s[::-1], 1, 0), lambda x, y: (-x, y)),
-    (lambda s: np.roll(s[:, ::-1], 1, 1), lambda x, y: (x, -y)),
-]
-
-
-@pytest.mark.parametrize(("change", "move"), CHANGES)
+@pytest.mark.parametrize(
+    ("change", "move"),
+    [
+        (lambda s: np.roll(s, (7, -3), (0, 1)), lambda x, y: (x + 7, y - 3)),
+        (lambda s: np.roll(s[::-1], 1, 0), lambda x, y: (-x, y)),
+        (lambda s: np.roll(s[:, ::-1], 1, 1), lambda x, y: (x, -y)),
+    ],
+)
 def test_translations_and_reflections(change, move):
     strength = strength_of(0)
     first, second = solve(strength), solve(change(strength))
@@ -74,15 +74,6 @@ def test_translations_and_reflections(change, move):
     for name in ("slip", "sensitivity"):
         one, other = first[name].values[0], second[name].values[0]
         assert np.abs(change(one) - other).max() < 1e-3 * one.max()
-
-
-@pytest.mark.parametrize("wavenumbers", ["spectral", "lattice"])
-@pytest.mark.parametrize("change", [change for change, _ in CHANGES])
-def test_translations_and_reflections_keep_the_bounds(change, wavenumbers):
-    strength = rough_strength(0)
-    first, second = (bounds_of(s, wavenumbers) for s in (strength, change(strength)))
-    assert second.upper == pytest.approx(first.upper, rel=1e-9)  # the gap asked for
-    assert np.abs(change(first.slip) - second.slip).max() < 1e-3 * first.slip.max()
 
 
 def test_sensitivity_is_the_gradient_of_the_mean_stress():
@@ -174,16 +165,6 @@ def test_monotone_and_concave_in_the_strength():
     stronger[10:20, 5:15] *= 1.05
     assert bounds_of(stronger).upper >= one * (1.0 - 1e-9)
     assert bounds_of(first + 1e5).upper == pytest.approx(one + 1e5, rel=2e-9)
-
-
-def test_multiplier_is_the_derivative_by_the_strength():
-    strength = rough_strength(4)
-    multiplier = bounds_of(strength, gap=1e-10).multiplier
-    direction = np.random.default_rng(0).standard_normal(SHAPE)
-    direction *= 1e-4 * strength.mean() / np.abs(direction).max()
-    up, down = (bounds_of(strength + d, gap=1e-10).upper for d in (direction, -direction))
-    # Second order: the step changes the slope itself.
-    assert 0.5 * (up - down) == pytest.approx((multiplier * direction).sum(), rel=0.02)
 
 
 def test_local_criterion_is_an_upper_bound_for_every_aspect():

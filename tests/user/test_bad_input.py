@@ -9,17 +9,20 @@ import numpy as np
 import pytest
 import scipy.stats
 from refusals import refusals, refuses
-from setups import SOLID, beta_strength, make_problem
+from setups import LENGTH, LOCAL, RATE, SOLID, beta_strength, make_problem
 
 import stiction as st
+from stiction.criterion.local import excess_of
+from stiction.elasticity.exponential_sum import fit_exponentials
 from stiction.equilibrium.solver import Solver
 from stiction.reliability import subset
+from stiction.statistics import combined_mean, density, quantiles
+from stiction.theory import energy_release_rate, griffith_length, nucleation_statistics
 
-LOCAL = st.LocalCriterion()
 LINE = st.Interface(length=0.1, nodes=256)
 PLANE = st.Interface(length=(0.5, 0.5), nodes=(4096, 4096))
-PROBLEM = make_problem()
-ONE = np.full(256, 1e6)
+PROBLEM, RATIO = make_problem(), make_problem(residual_ratio=0.5)
+ONE, TEN = np.full(256, 1e6), np.arange(10.0)
 
 
 def make_strength(correlation_length=2e-3, **options):
@@ -51,6 +54,29 @@ def monte_carlo(**options):
 
 def loaded(profile):
     return dataclasses.replace(PROBLEM, load=st.Load(profile=profile))
+
+
+def with_barrier(node):
+    return excess_of(
+        PROBLEM.sample(ONE)._replace(strength=np.where(np.arange(256) == node, np.inf, [ONE]))
+    )
+
+
+def on_plane(lengths, weakening_rate=RATE):
+    problem = make_problem((48, 48), lengths, weakening_rate=weakening_rate)
+    return monte_carlo(problem=problem, random=make_strength(1e-3), samples=2)
+
+
+PAIR = ("strength", "residual_strength")
+THREE = {PAIR: 0.9, ("strength", "initial_stress"): 0.9, (PAIR[1], "initial_stress"): -0.9}
+
+
+def several(*names, **options):
+    return st.RandomInterface(**{name: make_strength() for name in names}, **options)
+
+
+def correlated(correlation):
+    return several(*PAIR, "initial_stress", correlation=correlation)
 
 
 test_numbers = refusals({
@@ -152,6 +178,64 @@ test_fields_that_cannot_be = refusals({
     ).profiles(PLANE, samples=10**6),
     "subset ... GiB of memory ... fewer nodes":
         lambda: subset.descend(lambda draws: draws[:, 0], 10**9, rng=None, samples=1000),
+})  # fmt: skip
+
+test_random_interfaces = refusals({
+    "did you mean 'residual_strength'": lambda: correlated({("strength", "residual"): 0.5}),
+    "must be less than or equal to 1, got 1.5": lambda: correlated({PAIR: 1.5}),
+    "correlation: unknown 'critical_slip'":
+        lambda: correlated({("strength", "critical_slip"): 0.5}),
+    "two different properties": lambda: correlated({("strength", "strength"): 0.5}),
+    "must be a valid dictionary": lambda: correlated(0.5),
+    "given twice": lambda: correlated({PAIR: 0.5, PAIR[::-1]: 0.4}),
+    "contradict each other": lambda: correlated(THREE),
+    "at most one of weakening_rate":
+        lambda: several("strength", "weakening_rate", "critical_slip"),
+    "mean must be above low": lambda: st.Lognormal(mean=1e5, cv=0.1, low=2e5),
+    "Weibull.cv: must be greater than 0": lambda: st.Weibull(mean=1e5, cv=-0.1),
+    "these limit the scatter": lambda: st.TruncatedNormal(mean=1e6, cv=0.5, low=0.6e6),
+    "must lie between": lambda: st.TruncatedNormal(mean=1e6, cv=0.1, high=0.5e6),
+    "cv: missing": lambda: make_strength(marginal={"type": "lognormal", "mean": 1.0}),
+    "mean 'weibull'": lambda: make_strength(marginal={"type": "wiebull", "mean": 1.0}),
+    "anisotropy: ... a line has no y; got 2":
+        lambda: make_strength(anisotropy=2.0).sample(LINE),
+    "between: needs several records":
+        lambda: st.fit_field(make_strength().sample(LINE, seed=1)[0], LINE, between=True),
+})  # fmt: skip
+
+test_theory_and_statistics = refusals({
+    "kernel tolerance": lambda: fit_exponentials("II", 1.7, 1e-14),
+    "friction.residual_ratio": lambda: energy_release_rate(RATIO, 1e6, 0.01),  # taken for zero
+    "the ratio times its mean": lambda: griffith_length(RATIO, 1e6, 1.0),
+    "lengths ... 0.1": lambda: energy_release_rate(PROBLEM, 1e6, 0.2),
+    "lengths ... numbers": lambda: energy_release_rate(PROBLEM, 1e6, "all"),
+    "load ... nan": lambda: energy_release_rate(PROBLEM, np.nan, 0.01),
+    "fracture_energy": lambda: griffith_length(PROBLEM, 1e6, -1.0),
+    "load ... finite number or a list": lambda: griffith_length(PROBLEM, [1e6, np.inf], 1.0),
+    "load ... must be numbers": lambda: griffith_length(PROBLEM, "1 MPa", 1.0),
+    "load.profile ... monte_carlo":
+        lambda: nucleation_statistics(loaded(np.linspace(0.9, 1.1, 256)), make_strength()),
+    "profiles":
+        lambda: st.theory.rice_distribution(PROBLEM, make_strength(), profiles=0),
+    "probability": lambda: quantiles(TEN, 1.0),
+    "finite": lambda: quantiles([1.0, np.nan], 0.5),
+    "equal": lambda: density(np.ones(50)),
+    "at least 16": lambda: density(TEN),
+    "below the lower bound": lambda: density(np.linspace(-1, 1, 50), bounds=(0.0, None)),
+    "inexpensive: each ... [10, 3]": lambda: combined_mean(TEN, TEN[:3]),
+    "at least 3 are needed, got 2": lambda: combined_mean(TEN[:2]),
+})  # fmt: skip
+
+test_what_the_local_criterion_cannot_take = refusals({
+    "must be finite everywhere ... st.Rupture": lambda: with_barrier(3),
+    "does not fit on a plane of": lambda: on_plane((1.6 * LENGTH, 4.0 * LENGTH)),
+    "weakening_rate varies": lambda: on_plane(
+        (5.0 * LENGTH, 4.0 * LENGTH), RATE * np.linspace(0.9, 1.0, 48 * 48).reshape(48, 48)
+    ),
+    "not in plane stress": lambda: make_problem((48, 48), (0.02, 0.02), solid=solid(plane="stress")),
+    "swapped: the first axis of a profile is x": lambda: onset(
+        np.full((48, 64), 1e6), problem=make_problem((64, 48), (0.02, 0.014))
+    ),
 })  # fmt: skip
 
 test_profiles_and_loads = refusals({

@@ -7,24 +7,20 @@ import numpy as np
 import pytest
 import ruptures
 from refusals import refusals
-from setups import make_problem
+from setups import LOCAL, exact_onset, make_problem
 
 import stiction as st
-from stiction import AccuracyWarning
 
 NODES = 128
 PROBLEM, TAU_P = ruptures.wavy_line(NODES)
 X = np.arange(NODES) / NODES
 METHOD = st.Rupture(loading_rate=1e7)
 DETOUR = ([0.0, 0.1, 0.2, 0.3], [0.0, 7.75e5, 7.0e5, 9e5])
-OVERSTRESSED = dataclasses.replace(
-    PROBLEM, load=st.Load(initial_stress=np.where(np.abs(X - 0.25) < 0.08, 1.1 * TAU_P, 0.5e6))
-)
 
 
 @pytest.fixture(scope="module")
 def exact():
-    return critical_stress(st.Equilibrium())
+    return exact_onset(PROBLEM, TAU_P).critical_stress.item()
 
 
 def simulate(strength=TAU_P, problem=PROBLEM, save=None, **method):
@@ -33,6 +29,14 @@ def simulate(strength=TAU_P, problem=PROBLEM, save=None, **method):
 
 def critical_stress(method, strength=TAU_P, problem=PROBLEM):
     return st.onset(problem, strength, method=method).critical_stress.item()
+
+
+def stressed(initial):
+    """The problem with an initial stress."""
+    return dataclasses.replace(PROBLEM, load=st.Load(initial_stress=initial))
+
+
+OVERSTRESSED = stressed(np.where(np.abs(X - 0.25) < 0.08, 1.1 * TAU_P, 0.5e6))
 
 
 def barred(height):
@@ -48,7 +52,7 @@ def test_a_barrier_does_not_blind_the_onset(height):
     run = simulate(barred(height), stop="onset")
     assert run.attrs["stopped"] == "onset"
     # Inertia at 1e7 Pa/s: some 1e-4; with tolerances of the mean strength it was 10 times too high.
-    exact = st.onset(PROBLEM, barred(1e7), method=st.Equilibrium()).first_instability.item()
+    exact = exact_onset(PROBLEM, barred(1e7)).first_instability.item()
     assert run.critical_stress.item() == pytest.approx(exact, rel=4e-4)
     # A uniform critical slip makes it weaken the more steeply, which is no matter of resolution.
     problem = dataclasses.replace(PROBLEM, friction=st.LinearWeakening(critical_slip=8e-6))
@@ -73,14 +77,12 @@ def test_waves_of_an_arrested_rupture_are_followed_to_the_end():
     tau_p = np.where(np.abs(np.arange(1024) / 1024 - 0.4) < 0.25, 0.8e6, 6e6)
     end = 0.8e6 / 1e8 + 2.2e-4  # four times the period over c_s
     method = {"loading_rate": 1e8, "stop": "time", "end_time": end}
-    slips = [
-        simulate(tau_p, problem, st.Save([], every=500), implicit=implicit, **method)
-        .mean_slip[-1]
-        .item()
+    one, other = (
+        simulate(tau_p, problem, st.Save([], every=500), implicit=implicit, **method).mean_slip
         for implicit in (True, False)
-    ]
+    )
     # What creep by implicit steps may put wrong before the event: 2e-4 at 1e8 Pa/s.
-    assert slips[0] == pytest.approx(slips[1], rel=4e-4)
+    assert one[-1].item() == pytest.approx(other[-1].item(), rel=4e-4)
 
 
 # -- overstressed patches and pushed-back interfaces ---------------------------------------------
@@ -109,9 +111,8 @@ def test_no_load_is_critical_where_a_patch_breaks_at_the_start():
 
 def test_a_first_instability_at_a_negative_mean_stress_is_that_of_equilibrium():
     pushed = np.abs(X - 0.5) < 0.3
-    load = st.Load(initial_stress=np.where(pushed, -3e6, 0.0))
-    problem, tau_p = dataclasses.replace(PROBLEM, load=load), np.where(pushed, 5e6, TAU_P)
-    expected = st.onset(problem, tau_p, method=st.Equilibrium()).first_instability.item()
+    problem, tau_p = stressed(np.where(pushed, -3e6, 0.0)), np.where(pushed, 5e6, TAU_P)
+    expected = exact_onset(problem, tau_p).first_instability.item()
     run = simulate(tau_p, problem, stop="onset")
     assert run.first_instability.item() == pytest.approx(expected, rel=4e-4)
     assert expected < 0.0
@@ -125,9 +126,8 @@ def test_a_first_instability_at_a_negative_mean_stress_is_that_of_equilibrium():
     ],
 )
 def test_a_stress_below_minus_the_strength_is_said(initial, options):
-    problem = dataclasses.replace(PROBLEM, load=st.Load(initial_stress=initial))
-    with pytest.warns(AccuracyWarning, match="would slip in reverse"):
-        simulate(problem=problem, **options)
+    with pytest.warns(st.AccuracyWarning, match="would slip in reverse"):
+        simulate(problem=stressed(initial), **options)
 
 
 # -- loads that fall, rest or are too much -------------------------------------------------------
@@ -191,7 +191,7 @@ def test_where_a_run_stops_and_what_is_known_then(stop):
 
 
 def test_rates_that_cannot_be_resolved_are_said():
-    with pytest.warns(AccuracyWarning, match="rises by 0.16 of .* use time_step=5e-09"):
+    with pytest.warns(st.AccuracyWarning, match="rises by 0.16 of .* use time_step=5e-09"):
         fast = critical_stress(st.Rupture(loading_rate=1e12))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -211,9 +211,9 @@ test_what_a_rupture_cannot_do_is_refused = refusals({
     "strength: must be finite and above residual": lambda: simulate(strength=np.inf + X),
     # Methods without waves say what they take.
     "strength: must be finite; entry":
-        lambda: critical_stress(st.LocalCriterion(), barred(np.inf)),
+        lambda: critical_stress(LOCAL, barred(np.inf)),
     "above initial_stress ... only st.Rupture()":
-        lambda: critical_stress(st.LocalCriterion(), problem=OVERSTRESSED),
+        lambda: critical_stress(LOCAL, problem=OVERSTRESSED),
 })  # fmt: skip
 
 
@@ -226,9 +226,9 @@ def test_the_place_of_a_slow_onset_is_that_of_equilibrium():
     for ratio in (0.5, 2.0):
         field = st.paper.strength(problem, correlation_ratio=ratio)
         tau_p = field.sample(problem.interface, samples=1, seed=3, first=18)
-        exact = st.onset(problem, tau_p, method=st.Equilibrium())
-        found = st.onset(problem, tau_p, method=st.Rupture(loading_rate=1e3))
-        nodes = (found.critical_position - exact.critical_position) / problem.interface.spacing
+        found = st.onset(problem, tau_p, method=st.Rupture(loading_rate=1e3)).critical_position
+        exact = exact_onset(problem, tau_p).critical_position
+        nodes = (found - exact) / problem.interface.spacing
         # A node, and what the maximum moves while the mean stress falls by 1e-5.
         assert abs((nodes + 256) % 512 - 256) < 2.0
 
@@ -238,10 +238,9 @@ def test_a_negative_poisson_ratio():
     rate = 0.2e12 * solid.effective_modulus() / 1.33e9
     problem = make_problem(NODES, 0.05, solid=solid, weakening_rate=rate)
     slow = st.Rupture(loading_rate=1e5, kernel_tolerance=1e-4)
-    exact, found = (
-        critical_stress(method, problem=problem) for method in (st.Equilibrium(), slow)
-    )
-    assert found == pytest.approx(exact, rel=1e-4)  # by a loose kernel
+    exact = exact_onset(problem, TAU_P).critical_stress.item()
+    # By a loose kernel.
+    assert critical_stress(slow, problem=problem) == pytest.approx(exact, rel=1e-4)
 
 
 def test_one_node_of_no_strength_costs_next_to_nothing():
@@ -250,8 +249,7 @@ def test_one_node_of_no_strength_costs_next_to_nothing():
     weak = TAU_P + 0.3e6
     weak[100] = 0.3e6 * (1 + 1e-5)
     found = critical_stress(dataclasses.replace(METHOD, max_steps=20_000), weak, problem)
-    exact = critical_stress(st.Equilibrium(), weak, problem)
-    assert found == pytest.approx(exact, rel=5e-4)
+    assert found == pytest.approx(exact_onset(problem, weak).critical_stress.item(), rel=5e-4)
 
 
 def test_nodes_below_their_residual_strength():
@@ -259,10 +257,9 @@ def test_nodes_below_their_residual_strength():
     problem = make_problem(512, critical_slip=2e-6, residual_strength=0.95e6)
     x = np.arange(512) / 512
     strength = 1e6 + 1e5 * np.cos(2 * np.pi * x) + 5e4 * np.cos(14 * np.pi * x)
-    with pytest.warns(AccuracyWarning):
-        exact = critical_stress(st.Equilibrium(), strength, problem)
-    explicit = st.Rupture(loading_rate=2e8, implicit=False)
-    found = st.onset(problem, strength, method=explicit)
+    with pytest.warns(st.AccuracyWarning):
+        exact = exact_onset(problem, strength).critical_stress.item()
+    found = simulate(strength, problem, loading_rate=2e8, implicit=False)
     # Of the mean stress on the interface, not of the load, which runs ahead: 2e-5 at this rate.
     assert found.critical_stress.item() == pytest.approx(exact, rel=1e-4)
     # What does not weaken arrives with its own first slip, not when the run begins.
