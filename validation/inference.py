@@ -113,7 +113,7 @@ def ranks(campaigns, tests=TESTS, seed=0, samples=None, points=POINTS, case=None
             )  # fmt: skip
             peaks.append(onsets[0] + case.error * rng.standard_normal(tests))
         likelihood = simulated.of(peaks)
-        grid = grid_of(likelihood, likelihood.low, likelihood.high, points=points)
+        grid = grid_of(likelihood, likelihood.box, points=points)
         draws = grid.draws(DRAWS, i)
         found[i], means[i] = (draws < u).sum(axis=0), draws.mean(axis=0)
     return prior.names, found, truth, means

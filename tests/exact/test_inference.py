@@ -138,8 +138,9 @@ def test_a_load_profile_really_breaks_the_scaling():
 
 def log_densities_at(samples, points, error=0.0, bound=-np.inf):
     found, out = tabulate(samples[None, :], np.array([bound])), np.empty((1, points.size))
-    nodes, weights = np.zeros((1, 1), dtype=np.int64), np.ones((1, 1))
-    log_likelihoods(nodes, weights, np.zeros(1), np.ones(1), error, found, points, out)
+    nodes, weights, same = np.zeros((1, 1), dtype=np.int64), np.ones((1, 1)), [[0.0], [1.0]]
+    of_v = found.between(nodes, weights)
+    log_likelihoods(found.table, nodes, weights, of_v, np.array(same), error, points, out)
     return out[0]
 
 
@@ -211,13 +212,22 @@ def test_grid_against_a_sum_by_hand():
     density /= density.mean()
     held = density[density > 0.0]
     information = np.mean(held * np.log(held))
-    grid = grid_of(likelihood, likelihood.low, likelihood.high)
+    grid = grid_of(likelihood, likelihood.box)
     # The midpoint rule on 512 cells of a smooth function within the zoomed box.
     assert grid.log_evidence == pytest.approx(evidence, abs=1e-3)
     assert grid.information(0) == pytest.approx(information, abs=1e-3)
     draws = grid.draws(20_000, 0)[:, 0]
     exact = np.interp([0.05, 0.5, 0.95], np.cumsum(density) / density.sum(), u)
     assert np.quantile(draws, [0.05, 0.5, 0.95]) == pytest.approx(exact, abs=3e-3)
+
+
+def test_a_prior_that_begins_where_its_density_is_zero():
+    """A length of zero is impossible, and so unlikely that it need not be simulated."""
+    prior = make_prior(
+        PROBLEM, STRENGTH, {"correlation_length": scipy.stats.lognorm(0.4, scale=H_N)}
+    )
+    low, high = prior.ends[:, 0]
+    assert 0.1 * H_N < low < high < 10.0 * H_N
 
 
 def test_draws_of_the_prior_and_back():

@@ -95,8 +95,9 @@ def test_posterior_of_one_parameter(name):
     assert own.std() == pytest.approx(deviation, rel=0.4)
     # The box that was simulated holds it.
     model, u = found.likelihood, found.u[:, 0]
-    margin = 0.05 * (model.high - model.low)[0]
-    for end, side in ((model.low[0], u), (1.0 - model.high[0], 1.0 - u)):
+    low, high = model.box[:, 0]
+    margin = 0.05 * (high - low)
+    for end, side in ((low, u), (1.0 - high, 1.0 - u)):
         assert end == 0.0 or np.mean(side < end + margin) < 2e-3
 
 

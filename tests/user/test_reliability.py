@@ -15,6 +15,7 @@ from refusals import refusals, refuses
 from setups import make_problem
 
 import stiction as st
+from stiction.random.stresses import share_below_residual
 
 LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
 PROBLEM = st.paper.problem(nodes=256)
@@ -333,6 +334,20 @@ def test_some_strength_below_the_residual_strength_is_said_once(what):
     if what != "onset":
         share = 100.0 * field.marginal.distribution.cdf(0.73e6)
         assert f"{share:.3g} % of its marginal, which reaches from 660000 to 1.66e+06" in said
+
+
+@pytest.mark.parametrize("rho", [0.9, -0.6, 1.0])
+def test_a_residual_strength_that_follows_the_strength_seldom_exceeds_it(rho):
+    residual = dataclasses.replace(FIELD, marginal=st.Lognormal(mean=0.7e6, cv=0.15))
+    random = st.RandomInterface(
+        strength=FIELD, residual_strength=residual,
+        correlation={("strength", "residual_strength"): rho},
+    )  # fmt: skip
+    profiles = random.profiles(PROBLEM.interface, samples=4000, seed=1)
+    counted = np.mean(profiles["strength"] <= profiles["residual_strength"])
+    # 4,000 samples of some twenty correlation lengths each.
+    expected = pytest.approx(counted, rel=0.05, abs=1e-3)
+    assert share_below_residual(PROBLEM, random) == expected
 
 
 @pytest.mark.parametrize("units", [(1.0, 1.0), (2e6, 1.0), (1.0, 2e6), (2e6, 2e6)])

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -10,30 +9,19 @@ from scipy.stats import chi2
 from scipy.stats import t as student
 
 from stiction.arrays import Array
+from stiction.inference.whittle import Model
 from stiction.inference.window import Window
-from stiction.interface import Interface
-from stiction.random.random_field import RandomField
 
-SAMPLES = 400
 LARGEST = 9.0
 """Largest variance of the logarithm that is searched."""
 
 
-def variances_within(field: RandomField, windows: Sequence[Window]) -> Array:
-    """Return the variances of the logarithms of record means in samples of the field alone."""
-    known: dict[Window, float] = {}
-    for window in dict.fromkeys(windows):
-        shape: Any = tuple(2 * n for n in window.shape)
-        lengths: Any = tuple(n * h for n, h in zip(shape, window.spacings, strict=True))
-        if len(shape) == 1:
-            (lengths,), (shape,) = lengths, shape
-        interface = Interface(length=lengths, nodes=shape)
-        inside = np.zeros(interface.shape, dtype=np.bool_)
-        inside[tuple(slice(n) for n in window.shape)] = window.measured
-        draws = field.draws(interface, SAMPLES, 0)
-        means = field.profiles(interface, draws)[:, inside].mean(axis=1)
-        known[window] = float(np.log(means).var())
-    return np.array([known[window] for window in windows])
+def variances_within(model: Model, cv: float, windows: Sequence[Window]) -> Array:
+    """Return variances of the logarithms of record means from a field of one `cv`, (records,)."""
+    known = {
+        one: one.variance_of_mean(model.correlation(one)) for one in dict.fromkeys(windows)
+    }
+    return np.log1p([cv**2 * known[window] for window in windows])
 
 
 def scatter_between(

@@ -3,12 +3,12 @@
 No onset is below the least possible strength, and where the correlation length is long many
 are just above it. A kernel density of the onsets would leak below, and find any strength
 possible whose bound is not far above the least peak. So the kernels stand on v = log(onset
-- bound), or on the onset itself where there is no bound (Wand, Marron and Ruppert, 1991).
-Their width is Silverman's (1986, section 3.4.2), and what it adds to the variance is taken
-from the sample (section 6.1.2). Densities are tabulated in units in which v has mean 0 and
-variance 1, where they hardly change from node to node. The error of the load cell is
-integrated over v by the midpoint rule, which converges faster than any power of the step
-once that is below the narrower of error and density.
+- bound) (Wand, Marron and Ruppert, 1991); where there is no bound, on one so far below that
+the logarithm is straight. Their width is Silverman's (1986, section 3.4.2), and what it adds
+to the variance is taken from the sample (section 6.1.2). Densities are tabulated in units in
+which v has mean 0 and variance 1, where they hardly change from node to node. The error of
+the load cell is integrated over v by the midpoint rule, which converges faster than any power
+of the step once that is below the narrower of error and density.
 """
 
 import math
@@ -25,20 +25,30 @@ GROUPS = 256
 """Largest number of groups of neighbouring sorted samples, whose means stand for the sample."""
 REACH = 10.0
 STEP = 0.05
+FAR = 1e5
+"""Distance of a bound, in standard deviations, from onsets that have none."""
 ERRORS, SPREADS = 4.0, 6.0
 """Half range of the integration, in standard deviations of the load cell, and of v."""
 
 
 class Densities(NamedTuple):
-    """Densities of standardised v at nodes: least possible onset (-inf where there is none, Pa),
-    mean and spread of v, (nodes,), and logarithms in steps of `STEP` from -`REACH`, (nodes,
-    steps).
-    """
+    """Densities of standardised v at nodes."""
 
-    bound: Array
-    mean: Array
+    onsets: Array  # (nodes, samples): of the same samples at every node
+    bound: Array  # (nodes,): least possible onset
+    mean: Array  # of v, (nodes,)
     spread: Array
-    table: Array
+    table: Array  # logarithms in steps of `STEP` from -`REACH`, (nodes, steps)
+
+    def standardised(self) -> Array:
+        """Return standardised v of the onsets, (nodes, samples)."""
+        return (to_v(self.onsets, self.bound) - self.mean[:, None]) / self.spread[:, None]
+
+    def between(self, index: NDArray[np.int64], weight: Array) -> Array:
+        """Return bound, mean and spread at points, (3, points), linear between nodes."""
+        values = np.stack([self.bound, self.mean, self.spread])
+        found: Array = np.einsum("pc,kpc->kp", weight, values[:, index])
+        return found
 
 
 def grouped(ordered: Array) -> tuple[Array, Array]:
@@ -60,31 +70,29 @@ def grouped(ordered: Array) -> tuple[Array, Array]:
     return means, share
 
 
-def to_v(peaks: Array, bound: Array) -> Array:
+def to_v(onsets: Array, bound: Array) -> Array:
     """v of onsets (nodes, samples) above the bounds (nodes,)."""
-    if not np.isfinite(bound).all():
-        return peaks
-    above = peaks - bound[:, None]
+    above = onsets - bound[:, None]
     # Round-off may put an onset on its bound.
     return np.log(np.maximum(above, 1e-9 * above.mean(axis=1, keepdims=True)))
 
 
-def tabulate(peaks: Array, bound: Array) -> Densities:
+def tabulate(onsets: Array, bound: Array) -> Densities:
     """Densities of onsets (nodes, samples) that cannot be below `bound` (nodes,)."""
     if not np.isfinite(bound).all():
-        bound = np.full(bound.shape, -np.inf)
-    v = to_v(peaks, bound)
-    nodes, samples = v.shape
+        bound = onsets.mean(axis=1) - FAR * onsets.std(axis=1).max()
+    v = to_v(onsets, bound)
     mean, spread = v.mean(axis=1), v.std(axis=1)
     spread = np.maximum(spread, 1e-12 * np.maximum(np.abs(mean), 1.0))
     z = np.linspace(-REACH, REACH, round(2.0 * REACH / STEP) + 1)
-    width = 1.06 * samples**-0.2  # Silverman's
-    table = np.empty((nodes, z.size))
-    for row, own in zip(table, (v - mean[:, None]) / spread[:, None], strict=True):
+    width = 1.06 * onsets.shape[1] ** -0.2  # Silverman's
+    found = Densities(onsets, bound, mean, spread, np.empty((mean.size, z.size)))
+    for row, own in zip(found.table, found.standardised(), strict=True):
         centres, share = grouped(np.sort(own))
         away = (z[:, None] - math.sqrt(1.0 - width**2) * centres) / width
         row[:] = logsumexp(-0.5 * away**2, axis=1, b=share)
-    return Densities(bound, mean, spread, table - math.log(width * math.sqrt(2.0 * math.pi)))
+        row -= math.log(width * math.sqrt(2.0 * math.pi))
+    return found
 
 
 @jit
@@ -96,20 +104,10 @@ def _interpolated(table: Array, index: NDArray[np.int64], weight: Array, z: floa
     t = at - k
     value = 0.0
     for c in range(index.size):
-        if weight[c] != 0.0:
-            row = table[index[c]]
-            value += weight[c] * (row[k] + t * (row[k + 1] - row[k]))
+        row = table[index[c]]
+        value += weight[c] * (row[k] + t * (row[k + 1] - row[k]))
     beyond = abs(z) - abs(inside)
     return value - 50.0 * beyond * (beyond + 1.0)
-
-
-@jit
-def _blend(values: Array, index: NDArray[np.int64], weight: Array) -> float:
-    total = 0.0
-    for c in range(index.size):
-        if weight[c] != 0.0:
-            total += weight[c] * values[index[c]]
-    return total
 
 
 @jit
@@ -126,11 +124,8 @@ def _with_error(
     `of_v` are its bound, mean and spread.
     """
     bound, mean, spread = of_v
-    bounded = bound > -np.inf
-    low, high = y - ERRORS * error, y + ERRORS * error
-    if bounded:
-        high = math.log(max(y, bound) + ERRORS * error - bound)
-        low = math.log(low - bound) if low > bound else -np.inf
+    low, high = y - ERRORS * error - bound, max(y, bound) + ERRORS * error - bound
+    low, high = math.log(low) if low > 0.0 else -np.inf, math.log(high)
     first, last = max(low, mean - SPREADS * spread), min(high, mean + SPREADS * spread)
     if first >= last:  # all that the error reaches is far out
         first, last = max(low, high - 2.0 * SPREADS * spread), high
@@ -139,7 +134,7 @@ def _with_error(
     top, total = -np.inf, 0.0
     for k in range(count):
         v = first + (k + 0.5) * step
-        away = (y - (bound + math.exp(v) if bounded else v)) / error
+        away = (y - bound - math.exp(v)) / error
         value = _interpolated(table, near, share, (v - mean) / spread) - 0.5 * away * away
         if value > top:
             total = total * math.exp(top - value) + 1.0
@@ -151,36 +146,31 @@ def _with_error(
 
 @jit
 def log_likelihoods(
+    table: Array,
     index: NDArray[np.int64],
     weight: Array,
-    shift: Array,
-    stretch: Array,
+    of_v: Array,
+    scales: Array,
     error: float,
-    densities: Densities,
     peaks: Array,
     out: Array,
 ) -> None:
     """Logarithm of the density of each peak at each point, (points, peaks), 1/Pa.
 
-    Bound, mean and spread are linear between nodes, and so is the logarithm of the
-    standardised density.
+    The logarithm of the standardised density is linear between nodes, as `of_v` is, see
+    `Densities.between`. `scales` are shift and stretch at the points, (2, points).
     """
-    table = densities.table
     for i in range(index.shape[0]):
-        near, share = index[i], weight[i]
-        bound = _blend(densities.bound, near, share)
-        mean, spread = (
-            _blend(densities.mean, near, share),
-            _blend(densities.spread, near, share),
-        )
-        bounded, own = bound > -np.inf, error / stretch[i]
+        bound, mean, spread = of_v[0, i], of_v[1, i], of_v[2, i]
+        shift, stretch = scales[0, i], scales[1, i]
         for j in range(peaks.size):
-            y = (peaks[j] - shift[i]) / stretch[i]
+            y = (peaks[j] - shift) / stretch
             value = -np.inf
-            if own > 0.0:
-                value = _with_error(y, own, (bound, mean, spread), table, near, share)
+            if error > 0.0:
+                around = bound, mean, spread
+                value = _with_error(y, error / stretch, around, table, index[i], weight[i])
             elif y > bound:
-                v = math.log(y - bound) if bounded else y
-                value = _interpolated(table, near, share, (v - mean) / spread)
-                value -= math.log(spread) + (v if bounded else 0.0)
-            out[i, j] = value - math.log(stretch[i])
+                v = math.log(y - bound)
+                value = _interpolated(table, index[i], weight[i], (v - mean) / spread)
+                value -= math.log(spread) + v
+            out[i, j] = value - math.log(stretch)

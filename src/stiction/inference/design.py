@@ -107,11 +107,7 @@ def design_of_tests(
         rows = []
         for tests, free in plans:
             kinds = [lengths.index(length) for length in tests]
-            own = replace(
-                simulated,
-                onsets=tuple(simulated.onsets[kind] for kind in kinds),
-                densities=tuple(simulated.densities[kind] for kind in kinds),
-            )
+            own = replace(simulated, densities=[simulated.densities[kind] for kind in kinds])
             rows.append(_expected(own, list(tests.values()), free, repetitions, seed, meter))
     dims = ("design", "parameter")
     variables = {name: Variable("1", text, dims) for name, text in VARIABLES.items()}
@@ -169,10 +165,10 @@ def _expected(
             for kind, count in enumerate(tests)
         ]
         likelihood = simulated.of(peaks)
-        box = simulated.low[free], simulated.high[free]
+        box = simulated.box[:, free]
         given = partial(_given_the_rest, likelihood, truth, free)
         # A posterior may fall between the points of a coarse grid.
-        grid = grid_of(given, *box, POINTS) or grid_of(given, *box, 50 * POINTS)
+        grid = grid_of(given, box, POINTS) or grid_of(given, box, 50 * POINTS)
         if grid is not None:
             gains[row, free] = [grid.information(place) for place in range(len(free))]
         meter.advance()

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-from pydantic import BeforeValidator, Field, ValidationInfo
+from pydantic import BeforeValidator, Field
 
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name, warn_accuracy
@@ -24,7 +24,8 @@ from stiction.inference.records import Record, records_of
 from stiction.inference.whittle import SpectrumFamily, spectrum_of
 from stiction.inference.window import Window
 from stiction.interface import Interface
-from stiction.model import Flag, Number, Progress, at_least, checked, is_finite
+from stiction.load import NotNegative
+from stiction.model import Flag, Number, Positive, Progress, at_least, checked
 from stiction.random.random_field import RandomField
 from stiction.random.spectra import Share
 from stiction.variables import QUANTITIES
@@ -43,18 +44,6 @@ STRESSES = ("mean", "standard_deviation", "noise", "low", "high", "loc", "scale"
 """Parameters in the unit of the field."""
 
 
-def _known(value: Any, info: ValidationInfo) -> float | None:
-    """Return the given number, 1 or 0 for `False`, or None for `True`: it is estimated."""
-    ratio = info.field_name == "anisotropy"
-    if isinstance(value, bool):
-        return None if value else float(ratio)
-    if not is_finite(value) or value < 0.0 or (ratio and value == 0.0):
-        raise ValueError(
-            f"must be True, False or a {'positive number' if ratio else 'number >= 0'}"
-        )
-    return float(value)
-
-
 def _families(given: Any) -> list[Family]:
     """The families of one name or table, or of several."""
     several = given if isinstance(given, list | tuple) else [given]
@@ -64,7 +53,6 @@ def _families(given: Any) -> list[Family]:
 
 
 DEFAULT_TOO = Field(validate_default=True)
-Known = Annotated[Any, BeforeValidator(_known), DEFAULT_TOO]
 Marginals = Annotated[Any, BeforeValidator(_families), DEFAULT_TOO]
 Spectrum = Annotated[Any, BeforeValidator(spectrum_of), DEFAULT_TOO]
 
@@ -163,8 +151,8 @@ def fit_field(
     marginal: Marginals = MARGINALS,
     spectrum: Spectrum = "power_law",
     detrend: Literal[0, 1, 2, 3] = 0,
-    noise: Known = True,
-    anisotropy: Known = False,
+    noise: Flag | NotNegative = True,
+    anisotropy: Flag | Positive = False,
     between: Flag = False,
     quantity: str = "strength",
     bootstrap: at_least(FEWEST) = 200,  # type: ignore[valid-type]
@@ -261,14 +249,15 @@ def fit_field(
     if quantity not in QUANTITIES:
         raise InputError(unknown_name("quantity", quantity, QUANTITIES))
     records = records_of(profiles, interface, quantity)
-    if anisotropy != 1.0 and records[0].values.ndim == 1:
+    ratio = None if anisotropy is True else float(anisotropy or 1.0)
+    if ratio != 1.0 and records[0].values.ndim == 1:
         raise InputError(
             "anisotropy: applies to maps only; the profiles are lines, leave it out"
         )
     spacing = max(max(record.spacings) for record in records)
     longest = max(max(np.multiply(one.values.shape, one.spacings)) for one in records)
-    name, fixed = spectrum
-    family = SpectrumFamily(name, fixed, anisotropy, noise, (spacing, 2.0 * float(longest)))
+    (name, fixed), deviation = spectrum, None if noise is True else float(noise)
+    family = SpectrumFamily(name, fixed, ratio, deviation, (spacing, 2.0 * float(longest)))
     windows, rows = _windowed(records, detrend)
     levels = _levels(rows) if between else np.ones(len(rows))
     rows = [row * levels.mean() / level for row, level in zip(rows, levels, strict=True)]
@@ -281,7 +270,8 @@ def fit_field(
     parameters = dict(found.parameters)
     ends = intervals(repeated, confidence, np.concatenate(rows))
     if between:
-        within = variances_within(found.field(quantity), windows)
+        own_cv = parameters["standard_deviation"] / parameters["mean"]
+        within = variances_within(found.model, own_cv, windows)
         cv, ends["between"], width = scatter_between(np.log(levels), within, confidence)
         for name in {"mean", "marginal.mean"} & parameters.keys():  # of other specimens, too
             ends[name] = parameters[name] * math.exp(-width), parameters[name] * math.exp(width)

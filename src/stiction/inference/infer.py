@@ -1,7 +1,6 @@
 """Parameters of a random interface from the peaks of repeated tests."""
 
-from collections.abc import Callable
-from functools import partial
+import itertools
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,13 @@ from stiction.ensemble.limit_state import no_single_length
 from stiction.ensemble.pilot import compare, doubt
 from stiction.errors import InputError, warn_accuracy
 from stiction.inference.grid import Grid, grid_of
-from stiction.inference.likelihood import Likelihood, experiments_at, make_likelihood
+from stiction.inference.likelihood import (
+    Likelihood,
+    bounds_of,
+    experiments_at,
+    make_likelihood,
+    out_of_reach,
+)
 from stiction.inference.peaks import Peaks, factor_of, make_peaks
 from stiction.inference.posterior import Posterior
 from stiction.inference.prior import Prior, make_prior
@@ -28,10 +33,12 @@ from stiction.random.stresses import mean_in_stress
 DRAWS = 4000
 TOLERABLE = 0.25
 """Monte Carlo error over the posterior's standard deviation above which it is reported."""
+NEVER = 1e-9
+"""Probability of a peak beyond the strengths that are thought possible."""
 WIDEN = 0.1
 """Width of the first posterior that is added to the box of the second on either side."""
 NEAR, HELD = 0.05, 1e-3
-"""Share of the box at either end, and mass of the posterior there above which the box grows."""
+"""Share of the box at either end, and mass of the posterior there that is too much."""
 EDGE, PILED = 0.02, 4.0
 """Share of a prior at its ends, and its multiple at which the posterior piles up there."""
 
@@ -70,7 +77,7 @@ def infer(
         ``"residual_strength.marginal.high"`` or ``"problem.friction.weakening_rate"``.
     method : LocalCriterion, Equilibrium or any other
         The method that finds the onset. For all but the local criterion, that one, if applicable,
-        first finds the relevant part of the prior, which grows until it contains the posterior.
+        first finds the relevant part of the prior; if the posterior reaches its end, all is taken.
     load_cell_error : float
         Standard deviation of the error of a peak, in `unit`; with `Peaks` in Pa, or as a
         coefficient.
@@ -140,20 +147,32 @@ def infer(
             f"load_cell_error: {load_cell_error:g} {unit} is more than the largest peak; it is a"
             " standard deviation in the unit of the peaks"
         )
+    (own,) = experiments_at(parameters, parameters.middle[None], method)
+    own.problem.warn_of_units(mean_in_stress(own.problem, own.random, "strength"))
+    _check_reach(parameters, method, measured, error)
     with Meter("infer", show=progress) as meter:
-        (own,) = experiments_at(parameters, parameters.middle[None], method)
-        own.problem.warn_of_units(mean_in_stress(own.problem, own.random, "strength"))
 
-        def likelihood_of(method: Any, samples: int | None, *box: Array) -> Likelihood:
+        def likelihood_of(method: Any, samples: int | None, box: Array) -> Likelihood:
             return make_likelihood(
-                parameters, *box, method=method, lengths=measured.lengths, error=error,
+                parameters, box, method=method, lengths=measured.lengths, error=error,
                 samples=samples, seed=seed, variable=measured.variable, meter=meter,
             ).of(measured.values)  # fmt: skip
 
-        box = np.zeros(parameters.dimension), np.ones(parameters.dimension)
+        whole = box = parameters.whole
         if method.type != "local_criterion" and not no_single_length(own.problem, own.random):
-            box = _first_box(likelihood_of(LocalCriterion(), None, *box))
-        likelihood, grid = _located(partial(likelihood_of, method, samples), *box)
+            box = _first_box(likelihood_of(LocalCriterion(), None, whole))
+        likelihood = likelihood_of(method, samples, box)
+        grid = grid_of(likelihood, box)
+        if np.any(box != whole) and (grid is None or _reaches_end(grid, box)):
+            likelihood = likelihood_of(method, samples, whole)
+            grid = grid_of(likelihood, whole)
+    if np.all(likelihood.box == whole) and (refused := likelihood.refusals()):
+        raise InputError(refused)
+    if grid is None:
+        raise InputError(
+            "peaks: no point of the prior can produce all of them; widen the prior, or give the"
+            " load-cell error if they are not exact"
+        )
     u = grid.draws(DRAWS, seed)
     theta = parameters.theta(u)
     error = np.sqrt(sum(map(np.size, measured.values)) / likelihood.samples)
@@ -170,51 +189,39 @@ def infer(
     )
 
 
-def _first_box(likelihood: Likelihood) -> tuple[Array, Array]:
-    """Return corners, as u, between which the local criterion finds the posterior.
+def _check_reach(prior: Prior, method: Any, measured: Peaks, error: float) -> None:
+    """Refuse peaks that no method can find anywhere in the prior, such as those in another unit."""
+    points = np.array(list(itertools.product(*prior.ends.T)))
+    problems = []
+    for length, peaks in zip(measured.lengths, measured.values, strict=True):
+        experiments = experiments_at(prior, points, method, length)
+        reach = [bounds_of(own, measured.variable, NEVER) for own in experiments]
+        problems += out_of_reach(prior, points, np.transpose(reach), error, peaks)
+    if problems:
+        raise InputError(problems)
+
+
+def _first_box(likelihood: Likelihood) -> Array:
+    """Return the box in which the local criterion finds the posterior.
 
     All of the prior if it cannot produce the peaks: where nodes reach their residual strength
     before the onset, the other methods may.
     """
-    low, high = likelihood.low, likelihood.high
-    grid = None if likelihood.refusals() else grid_of(likelihood, low, high)
+    grid = None if likelihood.refusals() else grid_of(likelihood, likelihood.box)
     if grid is None:
-        return low, high
-    room = np.maximum(WIDEN * (grid.high - grid.low), 1e-3)
-    return np.maximum(grid.low - room, 0.0), np.minimum(grid.high + room, 1.0)
+        return likelihood.box
+    room = np.maximum(WIDEN * np.diff(grid.box, axis=0), 1e-3)
+    return np.clip(grid.box + room * np.array([[-1.0], [1.0]]), 0.0, 1.0)
 
 
-def _located(
-    likelihood_in: Callable[..., Likelihood], low: Array, high: Array
-) -> tuple[Likelihood, Grid]:
-    """Return the likelihood in a box of the prior that holds the posterior, and the posterior."""
-    while True:
-        likelihood = likelihood_in(low, high)
-        whole = bool(np.all(low == 0.0) and np.all(high == 1.0))
-        if whole and (refused := likelihood.refusals()):
-            raise InputError(refused)
-        grid = grid_of(likelihood, low, high)
-        if whole and grid is None:
-            raise InputError(
-                "peaks: no point of the prior can produce all of them; widen the prior, or give"
-                " the load-cell error if they are not exact"
-            )
-        wider = grown(grid, low, high)
-        if grid is not None and np.array_equal(wider, (low, high)):
-            return likelihood, grid
-        low, high = wider
-
-
-def grown(grid: Grid | None, low: Array, high: Array) -> tuple[Array, Array]:
-    """Return the box, wider by its width on each side where the posterior reaches its end."""
-    width = high - low
-    touched = np.ones((2, low.size), dtype=np.bool_)
-    if grid is not None:
-        ends = low + NEAR * width, high - NEAR * width
-        for i in range(low.size):
-            touched[0, i] = grid.held(i, 0.0, ends[0][i]) > HELD
-            touched[1, i] = grid.held(i, ends[1][i], 1.0) > HELD
-    return np.maximum(low - width * touched[0], 0.0), np.minimum(high + width * touched[1], 1.0)
+def _reaches_end(grid: Grid, box: Array) -> bool:
+    """Whether the posterior reaches an end of the box within the prior."""
+    ends = box + NEAR * (box[1] - box[0]) * np.array([[1.0], [-1.0]])
+    return any(
+        (box[0, i] > 0.0 and grid.held(i, 0.0, low) > HELD)
+        or (box[1, i] < 1.0 and grid.held(i, high, 1.0) > HELD)
+        for i, (low, high) in enumerate(ends.T)
+    )
 
 
 def _notes(likelihood: Likelihood, error: float, u: Array) -> tuple[str, ...]:

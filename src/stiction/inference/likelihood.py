@@ -1,7 +1,7 @@
 """Likelihood of measured peaks: simulated onsets on a grid of parameters, and their densities."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Self
 
@@ -14,7 +14,7 @@ from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import LimitState, no_single_length
 from stiction.errors import InputError
-from stiction.inference.density import ERRORS, Densities, log_likelihoods, tabulate, to_v
+from stiction.inference.density import ERRORS, Densities, log_likelihoods, tabulate
 from stiction.inference.prior import Prior
 from stiction.inference.scaling import Scaling, find_scaling
 from stiction.interface import Interface
@@ -40,18 +40,11 @@ class Axis(NamedTuple):
 
     parameter: int  # its place in the prior
     values: Array  # rising
-    log: bool  # whether to interpolate in the logarithm
-
-    def place(self, theta: Array) -> tuple[NDArray[np.int64], Array]:
-        """Return the node below each value (points,), and the share of the way to the next."""
-        nodes, at = (np.log(self.values), np.log(theta)) if self.log else (self.values, theta)
-        cell = np.clip(np.searchsorted(nodes, at, side="right") - 1, 0, nodes.size - 2)
-        share = (at - nodes[cell]) / (nodes[cell + 1] - nodes[cell])
-        return cell, np.clip(share, 0.0, 1.0)
+    scale: Callable[[Array], Array]  # on which the parameter is interpolated
 
 
-def make_axes(prior: Prior, scaling: Scaling, low: Array, high: Array) -> tuple[Axis, ...]:
-    """Place the nodes of the parameters that need simulation between two corners, as u."""
+def make_axes(prior: Prior, scaling: Scaling, box: Array) -> tuple[Axis, ...]:
+    """Place the nodes of the parameters that need simulation in a box of the prior."""
     simulated = [i for i in range(prior.dimension) if i not in scaling.keys]
     if len(simulated) not in NODES:
         names = ", ".join(prior.names[i] for i in simulated)
@@ -60,10 +53,11 @@ def make_axes(prior: Prior, scaling: Scaling, low: Array, high: Array) -> tuple[
             f" {names}; at most {max(NODES)} are possible: fix the best-known ones"
         )
     axes = []
-    for i, (first, last) in enumerate(prior.theta(np.array([low, high])).T):
-        log = bool(first > 0.0 and last >= LOG * first)
-        space = np.geomspace if log else np.linspace
-        axes.append(Axis(i, space(first, last, NODES[len(simulated)]), log))
+    for i, (first, last) in enumerate(prior.theta(box).T):
+        log = last >= LOG * first > 0.0
+        space: Any = np.geomspace if log else np.linspace
+        nodes = space(first, last, NODES[len(simulated)])
+        axes.append(Axis(i, nodes, np.log if log else np.positive))
     return tuple(axes[i] for i in simulated)
 
 
@@ -79,12 +73,12 @@ def corners(axes: Sequence[Axis], theta: Array) -> tuple[NDArray[np.int64], Arra
     """Return nodes around points (points, parameters) and their weights, (points, 2^axes) each."""
     count = theta.shape[0]
     index, weight = np.zeros((count, 1), dtype=np.int64), np.ones((count, 1))
-    for axis in axes:
-        cell, share = axis.place(theta[:, axis.parameter])
-        index = np.concatenate(
-            [index * axis.values.size + (cell + k)[:, None] for k in (0, 1)], 1
-        )
-        weight = np.concatenate([weight * (1.0 - share)[:, None], weight * share[:, None]], 1)
+    for i, values, scale in axes:
+        at = np.interp(scale(theta[:, i]), scale(values), np.arange(values.size))
+        cell = np.minimum(at.astype(np.int64), values.size - 2)[:, None]
+        share = at[:, None] - cell
+        index = np.concatenate([index * values.size + cell + k for k in (0, 1)], axis=1)
+        weight = np.concatenate([weight * (1.0 - share), weight * share], axis=1)
     return index, weight
 
 
@@ -99,11 +93,11 @@ def experiments_at(
     for theta in thetas:
         problem, random = prior.at(theta)
         own = problem.interface
+        if length is not None and own.is_plane:
+            raise InputError(
+                "peaks: specimen lengths apply to lines only; the interface is a plane"
+            )
         with prior.named(theta):
-            if length is not None and own.is_plane:
-                raise InputError(
-                    "peaks: specimen lengths apply to lines only; the interface is a plane"
-                )
             if length is not None and not np.isclose(length, own.extent, rtol=1e-9):
                 nodes = 2 * max(4, round(0.5 * length / own.spacing))
                 problem = replace(problem, interface=Interface(length, nodes))
@@ -143,34 +137,28 @@ def simulate(
 
 @dataclass(frozen=True, eq=False)
 class Likelihood:
-    """Simulated onsets, and the likelihood of measured peaks that follows from them.
-
-    Onsets and densities are in the unit of the peaks, one of each for every kind of specimen.
-    """
+    """Simulated onsets, in the unit of the peaks, and the likelihood of measured peaks."""
 
     prior: Prior
     method: Any
     scaling: Scaling
     axes: tuple[Axis, ...]  # of the parameters that are simulated
     error: float  # standard deviation of the load cell
-    onsets: tuple[Array, ...]  # (nodes, samples): of the same samples at every node
-    densities: tuple[Densities, ...]
+    densities: Sequence[Densities]  # for every kind of specimen
     samples: float  # independent ones that these are worth
-    low: Array  # corners, as u, between which onsets are simulated
-    high: Array
-    peaks: tuple[Array, ...] = ()
+    box: Array  # (2, parameters): corners, as u, between which onsets are simulated
+    peaks: Sequence[Array] = ()
 
     def of(self, peaks: Sequence[Array]) -> Self:
         """Return the same of other peaks."""
-        return replace(self, peaks=tuple(peaks))
+        return replace(self, peaks=peaks)
 
     def log_densities(self, number: int, theta: Array, peaks: Array) -> Array:
         """Return logarithms of the density of peaks of specimen `number`, (points, peaks)."""
         index, weight = corners(self.axes, theta)
-        shift, stretch = map(np.ascontiguousarray, self.scaling.of(theta))
-        own, out = np.ascontiguousarray(peaks), np.empty((theta.shape[0], peaks.size))
-        densities = self.densities[number]
-        log_likelihoods(index, weight, shift, stretch, self.error, densities, own, out)
+        known, out = self.densities[number], np.empty((theta.shape[0], peaks.size))
+        of_v, scales = known.between(index, weight), self.scaling.of(theta)
+        log_likelihoods(known.table, index, weight, of_v, scales, self.error, peaks, out)
         return out
 
     def parts(self, u: Array) -> Array:
@@ -184,7 +172,7 @@ class Likelihood:
 
         -inf outside the box that was simulated.
         """
-        inside = np.all((u >= self.low) & (u <= self.high), axis=1)
+        inside = np.all((u >= self.box[0]) & (u <= self.box[1]), axis=1)
         result = np.full(u.shape[0], -np.inf)
         if inside.any():
             result[inside] = self.parts(u[inside]).sum(axis=1)
@@ -195,59 +183,55 @@ class Likelihood:
         rng = np.random.default_rng([seed, 1])
         theta = self.prior.theta(u)
         shift, stretch = self.scaling.of(theta)
-        onsets, known = self.onsets[number], self.densities[number]
+        known = self.densities[number]
         index, weight = corners(self.axes, theta)
         corner = (weight.cumsum(axis=1) < rng.random((u.shape[0], 1))).sum(axis=1)
         node = index[np.arange(u.shape[0]), np.minimum(corner, index.shape[1] - 1)]
-        sample = rng.integers(onsets.shape[1], size=u.shape[0])
-        z = (to_v(onsets, known.bound)[node, sample] - known.mean[node]) / known.spread[node]
-
-        def between(values: Array) -> Array:
-            found: Array = np.einsum("pc,pc->p", weight, values[index])
-            return found
-
-        onset = between(known.mean) + between(known.spread) * z
-        if np.isfinite(known.bound).all():
-            onset = between(known.bound) + np.exp(onset)
+        sample = rng.integers(known.onsets.shape[1], size=u.shape[0])
+        bound, mean, spread = known.between(index, weight)
+        onset = bound + np.exp(mean + spread * known.standardised()[node, sample])
         return shift + stretch * onset + self.error * rng.standard_normal(u.shape[0])
 
     def refusals(self) -> list[str]:
         """Return messages on peaks that no parameters in the prior can produce."""
-        texts, keys = [], list(self.scaling.keys)
-        nodes = nodes_of(self.axes, self.scaling.reference)
-        ends = self.prior.theta(np.stack([self.low, self.high])).T[keys]
-        points = np.concatenate([nodes] * 2 ** len(keys))
-        points[:, keys] = np.repeat(list(itertools.product(*ends)), len(nodes), axis=0)
+        ends = self.prior.theta(self.box).T
+        scaled = [Axis(i, ends[i], np.positive) for i in self.scaling.keys]
+        points = nodes_of([*self.axes, *scaled], self.scaling.reference)
         shift, stretch = self.scaling.of(points)
-        for onsets, known, peaks in zip(self.onsets, self.densities, self.peaks, strict=True):
-            room = BEYOND * onsets.std(axis=1)
-            lowest = np.maximum(onsets.min(axis=1) - room, known.bound)
-            highest = onsets.max(axis=1) + room
-            least = shift + stretch * np.tile(lowest, 2 ** len(keys)) - ERRORS * self.error
-            most = shift + stretch * np.tile(highest, 2 ** len(keys)) + ERRORS * self.error
-            low, high = float(least.min()), float(most.max())
-            far = (peaks < low) | (peaks > high)
-            places = [
-                ", ".join(
-                    f"{n} = {v:.6g}" for n, v in zip(self.prior.names, point, strict=True)
-                )
-                for point in points[[least.argmin(), most.argmax()]]
-            ]
-            for value in peaks[far][:1]:
-                side = "below" if value < low else "above"
-                texts.append(
-                    f"peaks: {far.sum()} of {far.size} are out of reach, such as {value:g}, which"
-                    f" lies {side} all that the prior can produce, {low:g} to {high:g} (the lowest"
-                    f" come from {places[0]}, the highest come from {places[1]}); widen the prior,"
-                    " check the unit, or leave out tests of another kind of specimen"
-                )
+        texts = []
+        for known, peaks in zip(self.densities, self.peaks, strict=True):
+            room = BEYOND * known.onsets.std(axis=1)
+            lowest = np.maximum(known.onsets.min(axis=1) - room, known.bound)
+            reach = np.stack([lowest, known.onsets.max(axis=1) + room])
+            reach = shift + stretch * np.repeat(reach, 2 ** len(scaled), axis=1)
+            texts += out_of_reach(self.prior, points, reach, self.error, peaks)
         return texts
+
+
+def out_of_reach(
+    prior: Prior, points: Array, reach: Array, error: float, peaks: Array
+) -> list[str]:
+    """Return a message on peaks outside the `reach` (2, points) of all points of a prior."""
+    low, high = reach[0].min() - ERRORS * error, reach[1].max() + ERRORS * error
+    far = (peaks < low) | (peaks > high)
+    if not far.any():
+        return []
+    value = peaks[far][0]
+    lowest, highest = (
+        ", ".join(f"{n} = {v:.6g}" for n, v in zip(prior.names, point, strict=True))
+        for point in points[[reach[0].argmin(), reach[1].argmax()]]
+    )
+    return [
+        f"peaks: {far.sum()} of {far.size} are out of reach, such as {value:g}, which lies"
+        f" {'below' if value < low else 'above'} all that the prior can produce, {low:g} to"
+        f" {high:g} (the lowest come from {lowest}, the highest come from {highest}); widen the"
+        " prior, check the unit, or leave out tests of another kind of specimen"
+    ]
 
 
 def make_likelihood(
     prior: Prior,
-    low: Array | None = None,
-    high: Array | None = None,
+    box: Array | None = None,
     *,
     method: Any,
     lengths: Sequence[float | None],
@@ -260,18 +244,17 @@ def make_likelihood(
     """Simulate the onsets that the likelihood needs.
 
     `lengths` are those of the specimens, m, None for the problem's own; `variable` is the name
-    of the peaks among the results, with the standard `error` of the load cell. `low` and
-    `high` are corners, as u, of the part of the prior that matters; all of it if left out.
+    of the peaks among the results, with the standard `error` of the load cell. `box` is the
+    part of the prior that matters, (2, parameters) as u; all of it if left out.
     """
-    low = np.zeros(prior.dimension) if low is None else low
-    high = np.ones(prior.dimension) if high is None else high
+    box = prior.whole if box is None else box
     scaling = find_scaling(prior, method, variable)
-    axes = make_axes(prior, scaling, low, high)
+    axes = make_axes(prior, scaling, box)
     thetas = nodes_of(axes, scaling.reference)
     count = samples or SAMPLES.get(method.type, FEW)
     meter.stage("simulated onsets", len(thetas) * len(lengths) * count)
     guided = method.type != "local_criterion" and not no_single_length(*prior.at(prior.middle))
-    worth, onsets, densities = float(count), [], []
+    worth, densities = float(count), []
     for number, length in enumerate(lengths):
         experiments = experiments_at(prior, thetas, method, length)
         for end in (experiments[0], experiments[-1]):
@@ -282,13 +265,9 @@ def make_likelihood(
             others = [own.by(LocalCriterion()) for own in experiments]
             local = simulate(others, samples=max(count, SAMPLES["local_criterion"]), **options)
             found, worth = moved(found, local)
-        bound = np.array([_least_peak(own, variable) for own in experiments])
-        onsets.append(found)
-        densities.append(tabulate(found, bound))
-    return Likelihood(
-        prior, method, scaling, axes, error, tuple(onsets), tuple(densities), worth, low,
-        high,
-    )  # fmt: skip
+        bounds = [bounds_of(own, variable)[0] for own in experiments]
+        densities.append(tabulate(found, np.array(bounds)))
+    return Likelihood(prior, method, scaling, axes, error, densities, worth, box)
 
 
 def moved(few: Array, many: Array) -> tuple[Array, float]:
@@ -308,10 +287,13 @@ def moved(few: Array, many: Array) -> tuple[Array, float]:
     return result, float(1.0 / (alike**2 / many.shape[1] + (1.0 - alike**2) / few.shape[1]))
 
 
-def _least_peak(experiment: Experiment, variable: str) -> float:
-    """Return the least possible peak; -inf where none is known."""
-    bound = LimitState(experiment).bounds[0]
+def bounds_of(
+    experiment: Experiment, variable: str, negligible: float = 0.0
+) -> tuple[float, float]:
+    """Return the least and greatest possible peak, but for a share that is negligible."""
+    low, high = LimitState(experiment).likely_bounds(negligible)
     if variable != "friction_coefficient":
-        return bound
-    random_pressure = "normal_pressure" in experiment.random.names
-    return -np.inf if random_pressure else bound / experiment.pressure
+        return low, high
+    if "normal_pressure" in experiment.random.names:
+        return -np.inf, np.inf
+    return low / experiment.pressure, high / experiment.pressure

@@ -4,6 +4,7 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from stiction.random.random_field import RandomField
 from stiction.random.random_interface import RandomInterface, as_random_interface
 
 TAIL = 1e-4
-"""Probability that is cut from either end of a prior without bounds."""
+"""Probability that is cut from either end of a prior whose density is zero there."""
 MARGINAL = ("mean", "cv", "low", "high", "scale", "alpha", "beta")
 """Parameters of a marginal, whose keys begin with its name."""
 
@@ -52,9 +53,14 @@ class Prior:
         return self.theta(np.full((1, self.dimension), 0.5))[0]
 
     @property
+    def whole(self) -> Array:
+        """The unit cube: its lower and upper corner, (2, parameters)."""
+        return np.repeat([[0.0], [1.0]], self.dimension, axis=1)
+
+    @property
     def ends(self) -> Array:
         """Least and greatest values, (2, parameters)."""
-        return self.theta(np.repeat([[0.0], [1.0]], self.dimension, axis=1))
+        return self.theta(self.whole)
 
     def theta(self, u: Array) -> Array:
         """Return the parameters at `u`, by the inverse distribution functions."""
@@ -98,9 +104,12 @@ def with_parameters(
     return parts["problem"], parts["random"]
 
 
+@lru_cache(maxsize=64)
 def _tails(distribution: Any) -> tuple[float, float]:
-    low, high = distribution.support()
-    return (0.0 if np.isfinite(low) else TAIL), (1.0 if np.isfinite(high) else 1.0 - TAIL)
+    low, high = (
+        TAIL if distribution.pdf(end) == 0.0 else 0.0 for end in distribution.support()
+    )
+    return low, 1.0 - high
 
 
 def full_key(key: str) -> str:

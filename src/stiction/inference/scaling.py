@@ -29,59 +29,45 @@ from stiction.random.marginals import affine_parameters
 
 MARGINAL = "random.strength.marginal."
 PRESSURE = "problem.load.normal_pressure"
+SLOPES = {"low": (1, -1), "high": (0, 1), "loc": (1, 0), "scale": (0, 1), "mean": (0, 1)}
+"""Derivatives of location and scale of a marginal, see `affine_parameters`."""
 
 
 class Scaling(NamedTuple):
     """Parameters that shift and stretch the onset, and how: linear in the parameters."""
 
-    keys: tuple[int, ...]  # their places in the prior
+    keys: list[int]  # their places in the prior
     reference: Array  # (parameters,): where shift is 0 and stretch 1
-    shifts: Array  # in the unit of the peaks: a constant, then one slope for each key
-    stretches: Array  # the same
+    slopes: Array  # (keys, 2): of shift (unit of the peaks) and stretch
 
-    def of(self, theta: Array) -> tuple[Array, Array]:
-        """Return shift (unit of the peaks) and stretch at points (points, parameters)."""
-        own = theta[:, list(self.keys)]
-        shift: Array = self.shifts[0] + own @ self.shifts[1:]
-        stretch: Array = self.stretches[0] + own @ self.stretches[1:]
-        return shift, stretch
+    def of(self, theta: Array) -> Array:
+        """Return shift (unit of the peaks) and stretch at points, (2, points)."""
+        found: Array = (theta - self.reference)[:, self.keys] @ self.slopes
+        return np.ascontiguousarray(found.T) + np.array([[0.0], [1.0]])
 
 
 def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
     """Find the parameters of a prior that scale the onset; `variable` names the peaks."""
     middle = prior.middle
     problem, random = prior.at(middle)
-    none = Scaling((), middle, np.zeros(1), np.ones(1))
+    none = Scaling([], middle, np.zeros((0, 2)))
     field, full = random.strength, [full_key(name) for name in prior.names]
     if not _may_scale(problem, random, method) or PRESSURE in full:
         return none
     names, location, scale = affine_parameters(field.marginal)
-    places = {
-        key.removeprefix(MARGINAL): i for i, key in enumerate(full) if key.startswith(MARGINAL)
-    }
-    if "mean" in names and {"low", "high"} & places.keys():
+    if "mean" in names and {MARGINAL + "low", MARGINAL + "high"} & set(full):
         return none  # a bound of such a marginal changes its shape
-    keys = tuple(i for name, i in places.items() if name in names)
-    shifts, stretches = np.zeros(len(keys) + 1), np.zeros(len(keys) + 1)
-    shifts[0], stretches[0] = location, scale
-    aside = prior.theta(np.full((1, prior.dimension), 0.9))[0]
-    for slope, i in enumerate(keys, 1):
-        theta = np.where(np.arange(prior.dimension) == i, aside, middle)
-        _, moved, stretched = affine_parameters(prior.at(theta)[1].strength.marginal)
-        shifts[slope] = (moved - location) / (aside[i] - middle[i])
-        stretches[slope] = (stretched - scale) / (aside[i] - middle[i])
-        shifts[0] -= shifts[slope] * middle[i]
-        stretches[0] -= stretches[slope] * middle[i]
+    places = {full.index(MARGINAL + name): name for name in names if MARGINAL + name in full}
+    slopes = np.array([SLOPES[name] for name in places.values()], dtype=float).reshape(-1, 2)
     pressure = problem.load.normal_pressure
     varies = field.of is not None and np.ndim(pressure) > 0
-    if (varies or method.type != "local_criterion") and (location or shifts[1:].any()):
+    if (varies or method.type != "local_criterion") and (location or slopes[:, 0].any()):
         return none
-    stretches /= scale
-    shifts -= location * stretches
+    slopes[:, 1] /= scale
+    slopes[:, 0] -= location * slopes[:, 1]
     mean = 1.0 if pressure is None else float(np.mean(pressure))
-    factor = 1.0 if field.of is None else mean
-    factor = factor / mean if variable == "friction_coefficient" else factor
-    return Scaling(keys, middle, factor * shifts, stretches)
+    slopes[:, 0] *= mean ** ((field.of is not None) - (variable == "friction_coefficient"))
+    return Scaling(list(places), middle, slopes)
 
 
 def _may_scale(problem: Any, random: Any, method: Any) -> bool:

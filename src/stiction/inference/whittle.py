@@ -20,7 +20,9 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.polynomial.hermite_e import hermevander
 from scipy.ndimage import uniform_filter
+from scipy.special import factorial
 
 from stiction.arrays import Array
 from stiction.inference.marginal_fit import table_of
@@ -50,6 +52,7 @@ FLOOR = 1e-3
 """Floor as a share of the highest power, averaged over records and neighbours."""
 NEIGHBOURS = 5
 ORDERS = 10
+FACTORIALS = factorial(np.arange(ORDERS + 1))
 REACH, POINTS = 6.0, 121
 SHOWN = ("correlation_length", "exponent", "anisotropy")
 AT_END = 1e-3
@@ -71,14 +74,9 @@ def hermite_shares(marginal: Any) -> Array:
     weight /= weight.sum()
     value = quantile_of_normal(marginal.distribution, z)
     value = value - weight @ value
-    total = float(weight @ value**2)
-    shares = np.zeros(ORDERS + 1)
-    previous, current = np.zeros_like(z), np.ones_like(z)
-    for order in range(1, ORDERS):
-        following = (z * current - np.sqrt(order - 1) * previous) / np.sqrt(order)
-        previous, current = current, following
-        shares[order] = float(weight @ (value * current)) ** 2 / total
-    shares[ORDERS] = max(1.0 - shares.sum(), 0.0)
+    shares = (weight * value) @ hermevander(z, ORDERS)
+    shares = shares**2 / (FACTORIALS * (weight @ value**2))
+    shares[ORDERS] = max(1.0 - shares[:-1].sum(), 0.0)
     result: Array = shares / shares.sum()
     return result
 
@@ -129,10 +127,14 @@ class Model(NamedTuple):
         """Return the variance of z in each mode of a period of a window's grid."""
         return window.power(self.spectrum, self.anisotropy, end_seen=self.end_seen)
 
+    def correlation(self, window: Window) -> Array:
+        """Return the correlation of values without noise, at all lags."""
+        rho = window.correlation(self.power(window))
+        return np.polynomial.polynomial.polyval(rho, self.shares)
+
     def signal(self, window: Window) -> Array:
         """Return the expected periodogram of values of unit variance without noise, (*half)."""
-        rho = window.correlation(self.power(window))
-        return window.expectation(np.polynomial.polynomial.polyval(rho, self.shares))
+        return window.expectation(self.correlation(window))
 
     def expectation(self, window: Window, signal: Array | None = None) -> Array:
         """Return the expected periodogram, (*half), from that without noise if it is there."""

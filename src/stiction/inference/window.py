@@ -147,6 +147,12 @@ class Window:
         total += missed / math.prod(self._period)
         return total
 
+    def variance_of_mean(self, covariance: Array) -> float:
+        """Return the variance of the mean of the measured values from the covariance."""
+        lags = self._spread.shape
+        pairs = fft.irfftn(np.abs(fft.rfftn(self.measured, lags)) ** 2, lags)
+        return float(np.sum(pairs * covariance) / np.sum(self.measured) ** 2)
+
     def correlation(self, power: Array) -> Array:
         """Return the correlation of z at all lags."""
         whole: Array = fft.irfftn(power, self._period) * math.prod(self._period)

@@ -1,9 +1,11 @@
 """Random properties of a problem as stresses: friction coefficients times the normal pressure."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from scipy.special import ndtr, ndtri
 
 from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
@@ -87,7 +89,7 @@ def mean_in_stress(problem: Problem, random: RandomInterface, name: str) -> floa
 def share_below_residual(problem: Problem, random: RandomInterface) -> float:
     """Return the probability that the strength at a point is not above the residual strength.
 
-    Properties are taken as independent.
+    Properties are taken as independent, but for strength and residual strength.
     """
     fields, between = random.properties, random.between or {}
     pressed = coefficients_of(random)
@@ -100,7 +102,13 @@ def share_below_residual(problem: Problem, random: RandomInterface) -> float:
             residual = np.outer(residual, _equally_likely(between[name], PRESSURES) ** power)
         if one_sided and name in pressed:
             residual = np.outer(residual, _pressures(problem, random) ** power)
-    return float(np.mean(fields["strength"].marginal.distribution.cdf(residual)))
+    below = fields["strength"].marginal.distribution.cdf(residual)
+    rho = (random.correlation or {}).get("strength", {}).get("residual_strength", 0.0)
+    if rho:  # given a residual strength, the strength's z is normal with mean rho z
+        z = ndtri((np.arange(QUANTILES) + 0.5) / QUANTILES)[:, None]
+        rest = math.sqrt(max(1.0 - rho**2, 1e-12))
+        below = ndtr((ndtri(below.reshape(QUANTILES, -1)) - rho * z) / rest)
+    return float(np.mean(below))
 
 
 def check_residual(problem: Problem, random: RandomInterface) -> None:
