@@ -7,7 +7,7 @@ import scipy.stats
 from scipy.stats import binom
 
 import stiction as st
-from stiction.inference.between import scatter_between
+from stiction.inference.fit import scatter_between
 from stiction.inference.marginal_fit import family_of
 
 VALUES = st.Lognormal(mean=1e6, cv=0.25, low=0.2e6).distribution.rvs(800, random_state=1)

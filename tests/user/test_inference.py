@@ -121,6 +121,15 @@ def test_equilibrium_after_the_local_criterion():
     assert 0.0 < shift < 0.4 * local.draws["marginal.low"].std()
 
 
+@pytest.mark.parametrize("factor", [1e-6, 1e3])
+def test_peaks_in_another_unit_are_refused_before_anything_is_simulated(factor, monkeypatch):
+    monkeypatch.setattr("stiction.inference.infer.make_likelihood", None)
+    strengths = (STRENGTH, dataclasses.replace(STRENGTH, marginal=st.Weibull(mean=1e6, cv=0.2)))
+    for random, prior in zip(strengths, (LOW, {"marginal.mean": (0.5e6, 2e6)}), strict=True):
+        options = {"random": random, "prior": prior, "method": st.Equilibrium()}
+        refuses("30 of 30 are out of reach ... unit", partial(infer, factor * PEAKS, **options))
+
+
 @pytest.mark.filterwarnings("default::stiction.AccuracyWarning")
 def test_doubts_are_named_where_the_caller_stands():
     with pytest.warns(st.AccuracyWarning, match="upper end of marginal.low, 640000") as caught:

@@ -7,10 +7,12 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import BeforeValidator, Field
+from scipy.optimize import brentq
+from scipy.stats import chi2
+from scipy.stats import t as student
 
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name, warn_accuracy
-from stiction.inference.between import scatter_between, variances_within
 from stiction.inference.bootstrap import (
     FEWEST,
     Estimate,
@@ -21,7 +23,7 @@ from stiction.inference.bootstrap import (
 )
 from stiction.inference.marginal_fit import Family, family_of, mean_log_likelihood
 from stiction.inference.records import Record, records_of
-from stiction.inference.whittle import SpectrumFamily, spectrum_of
+from stiction.inference.whittle import Model, SpectrumFamily, spectrum_of
 from stiction.inference.window import Window
 from stiction.interface import Interface
 from stiction.load import NotNegative
@@ -40,6 +42,8 @@ ADVICE = {
     "marginal": "the values are far from its family; compare families",
     "spectrum": "the periodogram is far from its family; take another spectrum or a higher detrend",
 }
+MOST_SCATTER = 9.0
+"""Largest variance between records of the logarithm that is searched."""
 STRESSES = ("mean", "standard_deviation", "noise", "low", "high", "loc", "scale")
 """Parameters in the unit of the field."""
 
@@ -271,7 +275,7 @@ def fit_field(
     ends = intervals(repeated, confidence, np.concatenate(rows))
     if between:
         own_cv = parameters["standard_deviation"] / parameters["mean"]
-        within = variances_within(found.model, own_cv, windows)
+        within = _variances_within(found.model, own_cv, windows)
         cv, ends["between"], width = scatter_between(np.log(levels), within, confidence)
         for name in {"mean", "marginal.mean"} & parameters.keys():  # of other specimens, too
             ends[name] = parameters[name] * math.exp(-width), parameters[name] * math.exp(width)
@@ -322,6 +326,47 @@ def _levels(rows: Sequence[Array]) -> Array:
             f" {levels.min():g} to {levels.max():g}"
         )
     return levels
+
+
+def _variances_within(model: Model, cv: float, windows: Sequence[Window]) -> Array:
+    """Return variances of the logarithms of record means from a field of one `cv`, (records,)."""
+    known = {
+        one: one.variance_of_mean(model.correlation(one)) for one in dict.fromkeys(windows)
+    }
+    return np.log1p([cv**2 * known[window] for window in windows])
+
+
+def scatter_between(
+    logarithms: Array, within: Array, confidence: float
+) -> tuple[float, tuple[float, float], float]:
+    """Estimate the coefficient of variation of a log-normal factor between records.
+
+    Q(s) = sum (L - m(s))^2/(s + v) is chi-square distributed with one degree of freedom
+    less than records at the true variance s of the logarithms L (Viechtbauer, 2007),
+    whatever their number; the estimate is where Q is as large as that (Paule and Mandel,
+    1982). `within` are the variances v of the logarithms from the field alone, (records,).
+    Returns the coefficient, its interval, and half the width of that of the mean logarithm.
+    """
+    freedom = logarithms.size - 1
+
+    def excess(s: float, level: float) -> float:
+        weight = 1.0 / (s + within)
+        middle = float(weight @ logarithms / weight.sum())
+        return float(weight @ (logarithms - middle) ** 2) - level
+
+    def where(level: float) -> float:
+        if excess(0.0, level) <= 0.0:
+            return 0.0
+        if excess(MOST_SCATTER, level) >= 0.0:
+            return MOST_SCATTER
+        return float(brentq(excess, 0, MOST_SCATTER, args=(level,)))
+
+    tail = 0.5 * (1.0 - confidence)
+    levels = (freedom, chi2.ppf(1.0 - tail, freedom), chi2.ppf(tail, freedom))
+    found, low, high = (where(float(level)) for level in levels)
+    error = float((1.0 / (found + within)).sum() ** -0.5)
+    cv, least, most = (math.sqrt(math.expm1(s)) for s in (found, low, high))
+    return cv, (least, most), float(student.ppf(0.5 + 0.5 * confidence, freedom)) * error
 
 
 def _best(

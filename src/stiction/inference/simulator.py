@@ -1,6 +1,6 @@
 """Peaks of tests as a function of parameters, for other inference codes."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -69,7 +69,14 @@ def simulator(
     (25,)
     """
     interface = as_random_interface(random)
-    _check_names(problem, interface, parameters)
+    unknown: list[str] = []
+    for name in parameters:  # what else may be wrong depends on their values
+        try:
+            with_parameters(problem, interface, (name,), np.ones(1))
+        except InputError as error:
+            unknown += [text for text in error.problems if "unknown" in text]
+    if unknown:
+        raise InputError(unknown)
 
     def simulated(theta: Any, *, first: int = 0) -> Array:
         """Peaks of samples first, first + 1, ... at these parameters, Pa, (samples,)."""
@@ -91,15 +98,3 @@ def simulator(
         return found
 
     return simulated
-
-
-def _check_names(problem: Problem, random: RandomInterface, parameters: Sequence[str]) -> None:
-    """Refuse parameters that do not exist; what else is wrong depends on their values."""
-    unknown: list[str] = []
-    for name in parameters:
-        try:
-            with_parameters(problem, random, (name,), np.ones(1))
-        except InputError as error:
-            unknown += [text for text in error.problems if "unknown" in text]
-    if unknown:
-        raise InputError(unknown)
