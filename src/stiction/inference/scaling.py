@@ -36,13 +36,13 @@ SLOPES = {"low": (1, -1), "high": (0, 1), "loc": (1, 0), "scale": (0, 1), "mean"
 class Scaling(NamedTuple):
     """Parameters that shift and stretch the onset, and how: linear in the parameters."""
 
-    keys: list[int]  # their places in the prior
+    keys: tuple[int, ...]  # their places in the prior
     reference: Array  # (parameters,): where shift is 0 and stretch 1
     slopes: Array  # (keys, 2): of shift (unit of the peaks) and stretch
 
     def of(self, theta: Array) -> Array:
         """Return shift (unit of the peaks) and stretch at points, (2, points)."""
-        found: Array = (theta - self.reference)[:, self.keys] @ self.slopes
+        found: Array = (theta - self.reference)[:, list(self.keys)] @ self.slopes
         return np.ascontiguousarray(found.T) + np.array([[0.0], [1.0]])
 
 
@@ -50,7 +50,7 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
     """Find the parameters of a prior that scale the onset; `variable` names the peaks."""
     middle = prior.middle
     problem, random = prior.at(middle)
-    none = Scaling([], middle, np.zeros((0, 2)))
+    none = Scaling((), middle, np.zeros((0, 2)))
     field, full = random.strength, [full_key(name) for name in prior.names]
     if not _may_scale(problem, random, method) or PRESSURE in full:
         return none
@@ -67,7 +67,7 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
     slopes[:, 0] -= location * slopes[:, 1]
     mean = 1.0 if pressure is None else float(np.mean(pressure))
     slopes[:, 0] *= mean ** ((field.of is not None) - (variable == "friction_coefficient"))
-    return Scaling(list(places), middle, slopes)
+    return Scaling(tuple(places), middle, slopes)
 
 
 def _may_scale(problem: Any, random: Any, method: Any) -> bool:
