@@ -192,7 +192,7 @@ def test_the_likelihood_between_nodes_is_that_of_a_simulation_there():
         theta = prior.theta(np.array([place]))
         direct = onsets(prior, theta, LOCAL, 2000, seed=0)
         exact = log_densities_at(direct[0], peaks, bound=theta[0, 1])
-        found = model.log_densities(0, theta, peaks)[0]
+        found = model.of([peaks]).parts(np.array([place]))[0]
         likely = exact > exact.max() - 3.0
         assert likely.sum() >= 2
         # Linear between nodes; where a test is likely that costs a hundredth of its density.

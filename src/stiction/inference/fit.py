@@ -23,7 +23,7 @@ from stiction.inference.bootstrap import (
 )
 from stiction.inference.marginal_fit import Family, family_of, mean_log_likelihood
 from stiction.inference.records import Record, records_of
-from stiction.inference.whittle import Model, SpectrumFamily, spectrum_of
+from stiction.inference.whittle import SpectrumFamily, spectrum_of
 from stiction.inference.window import Window
 from stiction.interface import Interface
 from stiction.load import NotNegative
@@ -274,8 +274,9 @@ def fit_field(
     parameters = dict(found.parameters)
     ends = intervals(repeated, confidence, np.concatenate(rows))
     if between:
-        own_cv = parameters["standard_deviation"] / parameters["mean"]
-        within = _variances_within(found.model, own_cv, windows)
+        own = (parameters["standard_deviation"] / parameters["mean"]) ** 2
+        shares = [one.variance_of_mean(found.model.correlation(one)) for one in windows]
+        within = np.log1p(np.multiply(own, shares))
         cv, ends["between"], width = scatter_between(np.log(levels), within, confidence)
         for name in {"mean", "marginal.mean"} & parameters.keys():  # of other specimens, too
             ends[name] = parameters[name] * math.exp(-width), parameters[name] * math.exp(width)
@@ -326,14 +327,6 @@ def _levels(rows: Sequence[Array]) -> Array:
             f" {levels.min():g} to {levels.max():g}"
         )
     return levels
-
-
-def _variances_within(model: Model, cv: float, windows: Sequence[Window]) -> Array:
-    """Return variances of the logarithms of record means from a field of one `cv`, (records,)."""
-    known = {
-        one: one.variance_of_mean(model.correlation(one)) for one in dict.fromkeys(windows)
-    }
-    return np.log1p([cv**2 * known[window] for window in windows])
 
 
 def scatter_between(

@@ -153,18 +153,14 @@ class Likelihood:
         """Return the same of other peaks."""
         return replace(self, peaks=peaks)
 
-    def log_densities(self, number: int, theta: Array, peaks: Array) -> Array:
-        """Return logarithms of the density of peaks of specimen `number`, (points, peaks)."""
-        index, weight = corners(self.axes, theta)
-        known, out = self.densities[number], np.empty((theta.shape[0], peaks.size))
-        of_v, scales = known.between(index, weight), self.scaling.of(theta)
-        log_likelihoods(known.table, index, weight, of_v, scales, self.error, peaks, out)
-        return out
-
     def parts(self, u: Array) -> Array:
         """Return logarithms of the likelihood of each test at points u, (points, tests)."""
-        theta = self.prior.theta(u)
-        parts = [self.log_densities(i, theta, peaks) for i, peaks in enumerate(self.peaks)]
+        theta, parts = self.prior.theta(u), []
+        (index, weight), scales = corners(self.axes, theta), self.scaling.of(theta)
+        for known, peaks in zip(self.densities, self.peaks, strict=True):
+            of_v, out = known.between(index, weight), np.empty((u.shape[0], peaks.size))
+            log_likelihoods(known.table, index, weight, of_v, scales, self.error, peaks, out)
+            parts.append(out)
         return np.concatenate(parts, axis=1)
 
     def __call__(self, u: Array) -> Array:
