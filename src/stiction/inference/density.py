@@ -47,8 +47,7 @@ class Densities(NamedTuple):
     def between(self, index: NDArray[np.int64], weight: Array) -> Array:
         """Return bound, mean and spread at points, (3, points), linear between nodes."""
         values = np.stack([self.bound, self.mean, self.spread])
-        found: Array = np.einsum("pc,kpc->kp", weight, values[:, index])
-        return found
+        return np.ascontiguousarray(np.einsum("pc,kpc->kp", weight, values[:, index]))
 
 
 def grouped(ordered: Array) -> tuple[Array, Array]:
