@@ -1,15 +1,14 @@
-"""Relaxation at a fixed load, by transforms: each node stuck or on a piece of its friction law.
+"""Equilibria at a fixed load, by transforms: each node stuck or on a piece of its friction law.
 
-From a slip d whose nodes are all driven forward or balanced, an overdamped interface moves to the
-least equilibrium that is not below d, or there is none and it slides. Two kinds of step, neither
-of which passes that equilibrium (see `jump`, which does the same with dense factors): an elastic
-one, with the strength frozen at its present value; and one with the true states of the nodes, up
-to where the first node reaches the next corner: if none does, it is the equilibrium.
+From an equilibrium at a lower load either the path to this load is certainly stable
+(`stable_equilibrium`), or an overdamped interface moves to the least equilibrium that is not below
+it, or slides (`least_equilibrium`, as `jump` with dense factors).
 """
 
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiction.arrays import Array
 from stiction.elasticity.linear import (
@@ -23,26 +22,32 @@ from stiction.elasticity.linear import (
 )
 from stiction.elasticity.operator import Operator
 from stiction.equilibrium.held_equilibrium import ITERATIONS, equilibrate
-from stiction.equilibrium.sample import (
-    Sample,
-    present_pieces,
-    residual_nodes,
-    step_to_corner,
-)
+from stiction.equilibrium.sample import Sample, present_pieces, residual_nodes, step_to_corner
 
 BALANCED = 0
 SLIDING = 1
 UNDECIDED = 2
 
+NEWTON = 100
+STEPS = 2000
 RELEVANT = 1e-5
 """Share of the largest value below which a node is not part of an unstable direction."""
-STEPS = 2000
 SETTLED = 0.02
-"""Growth of slip in one elastic step, as a share of d_c, below which the true states are tried."""
+"""Growth of slip in one step, as a share of d_c, below which the whole weakening is tried."""
+LEAST_LEFT = 0.02
+"""Least share of the weakening that a step leaves out, if it leaves out any."""
+EASED = 0.7
+"""Factor of that share after a step that succeeded; after one that failed it is doubled."""
 DRAG = 1e-3
-"""Stiffness added to elastic steps, as a share of the largest W."""
-ROUGH = 2e-3
-"""Largest residual stress, as a share of the mean strength, while growth exceeds `SETTLED`."""
+"""Stiffness added to steps that leave out all weakening, as a share of the largest W."""
+ROUGH = 0.05
+"""Largest residual stress of a step, as a share of the weakening left out in the step before."""
+
+
+def _tolerance(sample: Sample, load: float, accuracy: float) -> float:
+    """Residual stress that is allowed, Pa, from its share of the mean strength."""
+    mean = np.abs(sample.excess).mean() + abs(load) * sample.profile.mean()
+    return accuracy * float(mean)
 
 
 def _solve(
@@ -56,6 +61,82 @@ def _solve(
         np.empty_like(slip), np.empty((3, slip.size)), tolerance,
     )  # fmt: skip
     return status, new
+
+
+def _definite(operator: Operator, rate: Array, inside: NDArray[np.bool_]) -> bool:
+    """Whether K - `rate` on some nodes shows no negative curvature as it is solved with."""
+    x, residual = np.zeros(rate.size), np.where(inside, 1.0, 0.0)
+    status, _ = solve_inside(
+        operator._replace(rate=rate), no_spring(rate.size), inside, x, residual,
+        np.empty((3, rate.size)), 1e-4, ITERATIONS,
+    )  # fmt: skip
+    return status == SOLVED
+
+
+def stable_equilibrium(
+    operator: Operator, sample: Sample, load: float, slip: Array, accuracy: float
+) -> Array | None:
+    """Return the equilibrium at a load to which a stable path leads from one at a lower load.
+
+    None if that is not certain. It is if A is positive definite, on the nodes that slip at the
+    end, with the steepest weakening that each passes on the way: then it is at each state on the
+    way, and there is no other equilibrium. Newton's method finds the pieces at the end; if no node
+    comes to weaken more steeply, its first matrix is that A, and it comes from above.
+    """
+    tolerance = _tolerance(sample, load, accuracy)
+    pieces = sample.pieces
+    first = present_pieces(sample, slip).piece
+    new = slip
+    for _ in range(NEWTON):
+        now = present_pieces(sample, new)
+        drive = load * sample.profile - now.strength
+        status, found = _solve(operator, drive, now.rate, new, tolerance)
+        if status != SOLVED:
+            return None
+        new = np.maximum(found, slip)
+        if np.array_equal(present_pieces(sample, new).piece, now.piece):
+            break
+    else:
+        return None
+    if pieces.steepens and not np.array_equal(first, now.piece):
+        piece = np.arange(pieces.slopes.size)[:, None]
+        passed = (first <= piece) & (piece <= now.piece)
+        steepest = np.where(passed, pieces.slopes[:, None], 0.0).max(axis=0) * sample.rate
+        if not _definite(operator, steepest, new > 0.0):
+            return None
+    return new
+
+
+def _bound(
+    operator: Operator, sample: Sample, load: float, slip: Array, share: float, tolerance: float
+) -> tuple[int, Array, bool]:
+    """Equilibrium if nodes weaken by a share of what they do, and no further than to their corner.
+
+    Their strength is nowhere below the true one, so that the slip is a lower bound of the least
+    equilibrium: as the drive is lowered by the residual allowed, a rough one too. Newton's method;
+    the strength is the larger of two lines. Returns the status, the slip, and whether the
+    strengths are the true ones.
+    """
+    now = present_pieces(sample, slip)
+    rate = share * now.rate - (1.0 - share) * DRAG * float(sample.rate.max())
+    start = now.strength - (now.rate - rate) * slip
+    corner = np.append(sample.pieces.ends, 1e300)[now.piece] * sample.critical
+    level = np.where(now.rate > 0.0, now.strength - now.rate * corner, -np.inf)
+    flat = np.zeros(slip.size, dtype=np.bool_)
+    new, spared = slip, tolerance if share < 1.0 else 0.0
+    for _ in range(NEWTON):
+        strength, slope = np.where(flat, level, start), np.where(flat, 0.0, rate)
+        drive = load * sample.profile - strength - spared
+        status, new = _solve(operator, drive, slope, new, tolerance)
+        if status != SOLVED:
+            return status, slip, False
+        beyond = start - rate * new < level
+        if np.array_equal(beyond, flat):
+            passed = present_pieces(sample, new).piece > now.piece
+            onto_other = passed & (now.piece < sample.pieces.ends.size - 1)
+            return SOLVED, np.maximum(new, slip), share == 1.0 and not onto_other.any()
+        flat = beyond
+    return EXHAUSTED, slip, False
 
 
 def _weakening_step(
@@ -99,55 +180,44 @@ class Relaxed(NamedTuple):
 
 
 def least_equilibrium(
-    operator: Operator,
-    sample: Sample,
-    load: float,
-    slip: Array,
-    accuracy: float = 1e-7,
-    only_stable: bool = False,
+    operator: Operator, sample: Sample, load: float, slip: Array, accuracy: float = 1e-7
 ) -> Relaxed:
     """Return the least equilibrium at a load that is not below a given slip.
 
     The slip is zero, or an equilibrium at a lower load, or beyond it along an unstable direction;
-    the accuracy is the largest residual stress as a share of the mean strength. With `only_stable`
-    the result is UNDECIDED where the path to the equilibrium looks unstable.
+    the accuracy is the largest residual stress as a share of the mean strength. Steps with a share
+    of the weakening do not pass it, and are the longer the larger the share; with the whole of it
+    they end there, or A is not positive definite, and slip moves in the unstable direction.
 
     The interface slides once the load exceeds the average strength that is left: stiffness adds
     nothing to the mean. If K has no positive entry off its diagonal, the result is exact up to
     `accuracy`. On planes K has small positive entries there.
     """
-    tolerance = accuracy * float(
-        np.abs(sample.excess).mean() + abs(load) * sample.profile.mean()
-    )
-    # K alone is singular where everything slips; a drag on growth keeps the slip a lower bound.
-    drag = DRAG * float(sample.rate.max())
-    frozen = np.full_like(sample.rate, -drag)
+    tolerance = _tolerance(sample, load, accuracy)
     slip = np.maximum(slip, 0.0)
-    patient = False
+    left = kept = dropped = 0.0
     for _ in range(STEPS):
         now = present_pieces(sample, slip)
         drive = load * sample.profile - now.strength
         if float((drive + now.rate * slip).sum()) > tolerance * slip.size:
             return Relaxed(SLIDING, slip)
-        if not patient:
-            status, new = _solve(operator, drive, now.rate, slip, tolerance)
-            if status == EXHAUSTED or (status == NEGATIVE and only_stable):
-                return Relaxed(UNDECIDED, slip)
-            if status == SOLVED:
-                new = np.maximum(new, slip)
-                if step_to_corner(sample, slip.copy(), new - slip, 1.0) >= 1.0:
-                    return Relaxed(BALANCED, new)
-            slip = _weakening_step(operator, sample, load, slip, tolerance)
-            now = present_pieces(sample, slip)
-        # With the drive lowered by the residual allowed, a rough solution is a lower bound too.
-        rough = max(ROUGH / accuracy, 1.0) * tolerance if patient else tolerance
-        strength = now.strength - now.rate * slip
-        drive = load * sample.profile - (strength + rough - drag * slip)
-        status, new = _solve(operator, drive, frozen, slip, rough)
+        allowed = max(tolerance, ROUGH * left * dropped)
+        status, new, true = _bound(operator, sample, load, slip, 1.0 - left, allowed)
+        if status == NEGATIVE and left < 1.0:
+            if left == 0.0:
+                slip = _weakening_step(operator, sample, load, slip, tolerance)
+            left, kept = min(max(2.0 * left, kept, LEAST_LEFT), 1.0), 0.0
+            continue
         if status != SOLVED:
-            return Relaxed(UNDECIDED, slip)
-        new = np.maximum(new, slip)
+            break
+        if true:
+            return Relaxed(BALANCED, new)
         weakening = ~residual_nodes(sample, new) & (sample.critical > 0.0)
-        patient = bool((new - slip > SETTLED * sample.critical)[weakening].any())
+        growth = np.where(weakening, new - slip, 0.0)
+        dropped = float((now.rate * growth).max())
         slip = new
+        if (growth > SETTLED * sample.critical).any():
+            left *= EASED
+        else:
+            left, kept = 0.0, left
     return Relaxed(UNDECIDED, slip)

@@ -3,8 +3,8 @@
 `plane_onset` also serves long lines.
 
 Between jumps the next instability is a linear programme with the present pieces of the friction
-law, as long as no node reaches a corner before it. Where one does, the path is followed in steps of
-the load by relaxation at fixed load.
+law, as long as no node reaches a corner before it. Where one does, and after a jump, the path is
+followed in steps of the load.
 """
 
 import functools
@@ -20,6 +20,7 @@ from stiction.equilibrium.relaxation import (
     BALANCED,
     UNDECIDED,
     least_equilibrium,
+    stable_equilibrium,
 )
 from stiction.equilibrium.sample import (
     Jump,
@@ -39,7 +40,7 @@ FEWEST = 8
 """Least nodes along x and y on a coarse grid."""
 ROUGH = 1e-4
 """Relative gap on coarse grids."""
-FIRST_STEP = 0.01
+FIRST_STEP = 1e-3
 """Step of the load where the path is followed in steps, as a share of the load."""
 MOVED = 0.02
 """Slip, as a share of d_c, below which a jump is a long step of the stable path and no event."""
@@ -186,49 +187,38 @@ class PlaneProgram(Program):
             self.plane.symbol(self.shape), sample.rate.reshape(self.shape), self.shape
         )
 
-    def programme(self, sample: Sample, slip: Array) -> PlaneOnset | None:
-        """Return the next instability if no further node reaches a corner before it."""
-        now = present_pieces(sample, slip)
-        found = plane_onset(
-            self.plane,
-            now.strength.reshape(self.shape),
-            sample.profile.reshape(self.shape),
-            now.rate.reshape(self.shape),
-            self.requested,
-            slip.reshape(self.shape) if slip.any() else None,
+    def programme(self, sample: Sample) -> PlaneOnset | None:
+        """Return the first instability if no node reaches a corner before it."""
+        excess, profile, rate = (
+            field.reshape(self.shape) for field in (sample.excess, sample.profile, sample.rate)
         )
-        if exceeds(sample, found.slip.reshape(-1), now.piece):
-            return None
-        return found
+        found = plane_onset(self.plane, excess, profile, rate, self.requested)
+        return None if exceeds(sample, found.slip.reshape(-1)) else found
 
     def next(self, sample: Sample, state: State | None = None) -> State:
         """Return the next instability on the path from a stable state or from rest."""
-        state = state or self.at_rest(sample)
-        found = self.programme(sample, state.slip)
+        found = self.programme(sample) if state is None else None
         if found is None:
-            return self._step_on(sample, state)
-        slip = np.maximum(found.slip.reshape(-1), state.slip)
-        return State(
-            found.lower, slip, state.stiff, found.multiplier.reshape(-1),
-            gap=found.upper - found.lower,
-            certified=not present_pieces(sample, state.slip).piece[sample.critical > 0.0].any(),
-        )  # fmt: skip
+            return self._step_on(sample, state or self.at_rest(sample))
+        slip, multiplier = found.slip.reshape(-1), found.multiplier.reshape(-1)
+        gap = found.upper - found.lower
+        return State(found.lower, slip, np.zeros(slip.size), multiplier, gap)
 
     def _step_on(self, sample: Sample, state: State) -> State:
         """Follow the stable path in steps of the load.
 
-        A step is halved if it looks unstable, which a long one may do only because nodes reach a
-        corner in it.
+        A step is shortened if it may be unstable, which a long one may only because nodes begin to
+        slip in it before others reach their corners.
         """
         load, slip, gap = state.load, state.slip, self.requested
         operator = self._operator(sample)
         step = FIRST_STEP * load
         while True:
-            trial = least_equilibrium(operator, sample, load + step, slip, 0.1 * gap, True)
-            if trial.status == BALANCED:
-                load, slip, step = load + step, trial.slip, 1.5 * step
+            there = stable_equilibrium(operator, sample, load + step, slip, 0.1 * gap)
+            if there is not None:
+                load, slip, step = load + step, there, 1.5 * step
             elif step > gap * load:
-                step = max(0.4 * step, 0.7 * gap * load)
+                step = max(0.3 * step, 0.7 * gap * load)
             else:
                 break
         beyond = load + step
