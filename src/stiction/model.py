@@ -101,7 +101,7 @@ def _numbers(value: Any) -> Array:
 def is_unplaced(value: Any) -> bool:
     """Whether a profile has coordinates or units of its own, which its problem resolves."""
     own = ("dims", "to_xarray", "magnitude", "to_value")
-    return isinstance(value, dict) or any(hasattr(value, name) for name in own)
+    return any(hasattr(value, name) for name in own)
 
 
 def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
@@ -112,10 +112,10 @@ def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
     read = (info.context or {}).get("read")
     if isinstance(value, str | Path | dict) and read is not None:
         value = read(value, str(info.field_name))
-    if isinstance(value, str | Path):
+    if isinstance(value, str | Path | dict):
         raise ValueError(
-            "file names belong in a study file; in Python give a number, an array or"
-            " st.read_profile(path)"
+            "files, and tables with the key 'file', belong in a study file; in Python give a"
+            " number, an array or st.read_profile(path)"
         )
     if is_unplaced(value):
         return value
@@ -137,18 +137,16 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
-def _flag(value: Any) -> bool:
+def _flag(value: Any, words: str = "True or False") -> bool:
     if not isinstance(value, bool | np.bool_):
-        raise ValueError("must be True or False")
+        raise ValueError(f"must be {words}")
     return bool(value)
 
 
 def _show(value: Any) -> Any:
     if callable(value) and not isinstance(value, type):
         return value
-    if not isinstance(value, bool | np.bool_):
-        raise ValueError("must be True, False or a function of (done, total)")
-    return bool(value)
+    return _flag(value, "True, False or a function of (done, total)")
 
 
 def _names(value: Any) -> tuple[str, ...]:
@@ -173,19 +171,12 @@ def _path(value: Any) -> Path:
 
 @functools.cache
 def at_least(least: int) -> Any:
-    """Return the annotation of a whole number not below `least`."""
-
-    def read(value: Any) -> int:
-        if not is_whole(value, least):
-            raise ValueError(f"must be a whole number >= {least}")
-        return int(value)
-
-    return Annotated[int, BeforeValidator(read)]
+    """Return the annotation of a whole number not below `least`; 1e4 counts as one."""
+    return Annotated[int, Field(ge=least), BeforeValidator(_count)]
 
 
 Count: TypeAlias = at_least(1)  # type: ignore[valid-type]  # a call makes it
 Number: TypeAlias = at_least(0)  # type: ignore[valid-type]
-"""Whole numbers from 1 and from 0; 1e4 counts as one."""
 Real: TypeAlias = Annotated[float, BeforeValidator(_number), Field(allow_inf_nan=False)]
 Positive: TypeAlias = Annotated[Real, Field(gt=0)]
 Numbers: TypeAlias = Annotated[Any, BeforeValidator(_numbers)]

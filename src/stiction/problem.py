@@ -16,8 +16,8 @@ from stiction.friction import SCALES, Friction, contradictions
 from stiction.friction.parameters import SMALLEST_EIGENVALUE
 from stiction.interface import Interface
 from stiction.load import Load, LoadShape
-from stiction.model import Mode, describe, is_unplaced, model, real_array
-from stiction.profiles.placing import Gaps, describe_gaps, turned
+from stiction.model import Mode, Numbers, check, describe, is_unplaced, model
+from stiction.profiles.placing import Gaps, turned
 from stiction.profiles.reading import at_nodes
 from stiction.solid import Solid
 from stiction.variables import PROFILES
@@ -89,10 +89,8 @@ class Sample(NamedTuple):
 
     def part(self, some: slice) -> Sample:
         """Return some samples of the batch."""
-        return Sample(
-            self.strength[some], self.residual_strength[some], self.weakening_rate[some],
-            self.initial_stress[some], self.load_profile, self.normal_pressure[some],
-        )  # fmt: skip
+        own = {name: rows[some] for name, rows in self._asdict().items() if name in PROFILES}
+        return self._replace(**own)
 
     @property
     def uniform_weakening(self) -> bool:
@@ -184,18 +182,18 @@ class Problem:
         for part in ("friction", "load"):
             owner, placed = getattr(self, part), {}
             for name, value in vars(owner).items():
-                if isinstance(value, np.ndarray) and value.shape != shape:
+                if is_unplaced(value):
+                    try:
+                        value = at_nodes(f"{part}.{name}", value, self.interface)[0]
+                    except InputError as error:
+                        problems += error.problems
+                    placed[name] = value
+                if isinstance(value, np.ndarray) and value.shape not in ((), shape):
                     problems.append(
                         f"{part}.{name}: must have one entry for each of the"
                         f" {' x '.join(map(str, shape))} nodes, got"
                         f" {describe(value)}{turned(value.shape, shape)}"
                     )
-                if is_unplaced(value):
-                    try:
-                        at = at_nodes(f"{part}.{name}", value, self.interface)[0]
-                        placed[name] = np.asarray(at)
-                    except InputError as error:
-                        problems += error.problems
             if placed and not problems:  # frozen for others; validation is not over yet
                 object.__setattr__(self, part, dataclasses.replace(owner, **placed))
         return problems
@@ -346,9 +344,15 @@ class Problem:
         self, profiles: Any, accept: Collection[str] = (), gaps: Gaps = "refuse"
     ) -> tuple[Sample, Any]:
         """Return a sample, and a mask of where all of its profiles were measured, or True."""
+        friction, interface = self.friction, self.interface
         if isinstance(profiles, Sample):
+            if profiles.shape != interface.shape:
+                raise InputError(
+                    f"profiles: the sample has {' x '.join(map(str, profiles.shape))} nodes, the"
+                    f" interface {' x '.join(map(str, interface.shape))}"
+                )
             return profiles, True
-        given, friction, interface = named_profiles(profiles), self.friction, self.interface
+        given = named_profiles(profiles)
         if "strength" not in given:
             raise InputError("strength: missing among the profiles")
         problems: list[str] = []
@@ -444,36 +448,19 @@ def _rows(
     or one number a sample, of shape (samples, 1), is broadcast to all.
     """
     shape = interface.shape
-    column = (samples or 0, *(1 for _ in shape))
-    try:
-        array = real_array(value)
-    except TypeError as error:
-        raise InputError(f"{name}: must be numbers; {error}") from None
-    if array.shape == (samples, 1):
-        array = array.reshape(column)
-    several = array.shape[1:] == shape and samples in (None, len(array)) and array.size > 0
-    broadcast = samples is not None and array.shape in ((), column)
-    if not (array.shape == shape or several or broadcast):
-        nodes = ", ".join(map(str, shape))
-        valid = (
-            f"({nodes}{',' if len(shape) == 1 else ''}) or ({samples or 'samples'}, {nodes})"
-        )
-        valid += "" if samples is None else f", ({samples}, 1) or a number"
+    array, nodes = check(name, value, Numbers), ", ".join(map(str, shape))
+    valid = f"{shape} or ({samples or 'samples'}, {nodes})"
+    if samples is None:
+        fits = array.size > 0 and shape in (array.shape, array.shape[1:])
+    else:
+        valid += f", ({samples}, 1) or a number"
+        column = (samples, *(1 for _ in shape))
+        array = array.reshape(column) if array.shape == (samples, 1) else array
+        fits = array.shape in ((), shape, column, (samples, *shape))
+    if not fits:
         hint = turned(array.shape[-2:], shape)
         raise InputError(f"{name}: must have shape {valid}, got shape {array.shape}{hint}")
-    _check_values(name, array, interface, barriers and name == "strength")
-    if samples is not None:
-        return np.broadcast_to(array, (samples, *shape))
-    return array[None] if array.shape == shape else array
-
-
-def _check_values(name: str, array: Array, interface: Interface, infinite: bool) -> None:
-    missing = np.isnan(array)
-    if missing.any() and array.shape[-len(interface.shape) :] == interface.shape:
-        raise InputError(
-            f"{name}: {describe_gaps(missing, interface)}; pass gaps='fill' to st.onset or"
-            " st.read_profile to fill them"
-        )
+    infinite = barriers and name == "strength"
     bad = ~(np.abs(array) <= LARGEST) & ~(infinite & (array == np.inf))
     if bad.any():
         entry = tuple(np.argwhere(bad)[0].tolist())
@@ -484,16 +471,22 @@ def _check_values(name: str, array: Array, interface: Interface, infinite: bool)
         raise InputError(f"{name}: must be positive, got {least}")
     if name == "residual_strength" and array.min() < 0.0:
         raise InputError(f"{name}: must not be negative, got {least}")
+    if samples is None:
+        return array.reshape(-1, *shape)
+    return np.broadcast_to(array, (samples, *shape))
 
 
 def named_profiles(given: Any) -> dict[str, Any]:
     """Return profiles by name: of a mapping or dataset, or of the strength alone."""
     if isinstance(given, Mapping):  # a Dataset is one too
-        names = [str(name) for name in given]
-        unknown = [name for name in names if name not in PROFILES]
+        unknown = [
+            unknown_name("profiles", str(name), PROFILES)
+            for name in given
+            if name not in PROFILES
+        ]
         if unknown and not hasattr(given, "data_vars"):
-            raise InputError([unknown_name("profiles", name, PROFILES) for name in unknown])
-        return {name: given[name] for name in names if name in PROFILES}
+            raise InputError(unknown)
+        return {name: given[name] for name in given if name in PROFILES}
     return {"strength": given}
 
 

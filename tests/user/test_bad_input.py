@@ -106,10 +106,10 @@ test_numbers = refusals({
     "slip ... must be True or False ... '1'": lambda: st.Equilibrium(slip="1"),
     "arrest ... must be True or False ... 'no'":
         lambda: st.theory.griffith_length(PROBLEM, 1e6, 1.0, arrest="no"),
-    "seed ... -1 ... >= 0": lambda: make_strength().sample(LINE, seed=-1),
+    "seed: must be greater than or equal to 0, got -1": lambda: make_strength().sample(LINE, seed=-1),
     "seed ... whole ... '1'":
         lambda: st.theory.rice_distribution(PROBLEM, make_strength(), seed="1"),
-    "samples ... >= 1 ... 0": lambda: monte_carlo(samples=0),
+    "samples: must be greater than or equal to 1, got 0": lambda: monte_carlo(samples=0),
     "title ... valid string": lambda: make_study(title="\udcff"),
     "events": lambda: st.Equilibrium(events=-1),
 })  # fmt: skip
@@ -248,6 +248,8 @@ test_profiles_and_loads = refusals({
     "strength ... numbers": lambda: onset("strong"),
     "strength: values are missing": lambda: onset(np.full(256, np.nan)),
     "strength ... finite ... 1e+100": lambda: onset(np.full(256, 1e308)),
+    "profiles: the sample has 512 nodes, the interface 256":
+        lambda: onset(make_problem(512).sample(np.full(512, 1e6))),
     "strength ... (0, 256)": lambda: onset(np.ones((0, 256))),
     "strength ... complex128": lambda: onset(np.ones(256) * 1j),
     "strength ... masked": lambda: onset(np.ma.masked_less(np.arange(256.0), 3)),

@@ -146,6 +146,13 @@ def test_every_study_file_is_valid(path):
     assert st.Study.from_dict(study.to_dict()) == study
 
 
+def test_the_schema_has_the_bounds_of_numbers():
+    study = tomllib.loads((ROOT / "examples" / "paper.toml").read_text())
+    study["problem"]["solid"]["density"] = -1.0
+    with pytest.raises(jsonschema.ValidationError, match="-1.0 is less than"):
+        jsonschema.validate(study, study_schema())
+
+
 def test_links_and_paths():
     pattern = r"`((?:examples|validation|benchmarks|tests|docs)/[\w./]+\.\w+)`"
     known = [path.as_posix() for path in (ROOT / "src").rglob("*.py")]

@@ -260,6 +260,7 @@ STRENGTHS = {
     "unknown unit 'V'": labelled(units="V"),
     "cannot be converted to Pa": labelled(units="1"),
     "unknown unit": labelled(units="m/s/s/"),
+    "unknown unit 'MPa999'": labelled(units="MPa999"),
     # Names
     "not clear from (a, b)": SQUARE,
     "strength: has no dimension along": xr.DataArray(STRENGTH, dims="sample"),
@@ -304,6 +305,8 @@ test_what_is_no_profile_is_refused = refusals({
     "clearly the strength ... 'z'": read(labelled().to_dataset(name="z")),
     "value: unknown '1' ... strength, tau_i":
         read(labelled().to_dataset(name="strength").assign(tau_i=labelled()), x=0, value=1),
+    "load.profile: must have one entry for each of the 128 nodes, got an array of shape (2, 128)":
+        problem_with(profile=labelled().expand_dims(sample=2)),
     "not clear from (time)": lambda: make_problem(
         (NODES, NODES), (0.1, 0.1),
         load=st.Load(normal_pressure=xr.DataArray(STRENGTH, dims="time")),
@@ -419,11 +422,12 @@ def test_profiles_in_a_study_file(study, tmp_path):
 @pytest.mark.parametrize(
     ("words", "profile"),
     [
-        ("problem: load.profile: x does not coincide", {"file": "load.csv"}),
+        ("problem: load.profile: ... load.csv: x does not coincide", {"file": "load.csv"}),
         ("did you mean 'interpolate'", {"file": "tau_r.csv", "interpol": True}),
-        ("gaps: must be 'refuse' or 'fill'", {"file": "load.csv", "gaps": "skip"}),
+        ("quantity: is not an option", {"file": "tau_r.csv", "quantity": "height"}),
+        ("gaps: must be 'refuse', 'fill' or", {"file": "load.csv", "gaps": "drop"}),
         ("tau_r.csv: holds no variable", "tau_r.csv"),
-        ("a profile table belongs in a study file", {"values": [1.0, 2.0]}),
+        ("tables with the key 'file'", {"values": [1.0, 2.0]}),
     ],
 )
 def test_profiles_of_a_study_file_that_are_refused(study, tmp_path, words, profile):

@@ -5,17 +5,16 @@ from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
 from stiction.equilibrium.sample import pieces_of, refused
 from stiction.equilibrium.solver import Solver, event_variables
-from stiction.model import Flag, Real, _count, model
+from stiction.model import Flag, Number, Real, model
 from stiction.problem import Problem
 from stiction.problem import Sample as Samples
 from stiction.results import along, onset_variables, position
 from stiction.variables import Variable
 
-Number = Annotated[int, BeforeValidator(_count), Field(ge=0)]
 Gap: TypeAlias = Annotated[Real, Field(ge=1e-10, le=1e-2)]
 
 VARIABLES = {

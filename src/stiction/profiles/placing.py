@@ -198,7 +198,13 @@ def close_gaps(
     missing = np.isnan(values)
     if not missing.any():
         return values, measured
-    text = describe_gaps(missing, interface)
+    rows, holes = values.reshape(-1, *interface.shape), missing.reshape(-1, *interface.shape)
+    row = int(np.argmax(holes.any(axis=interface.axes)))
+    text = (
+        f"values are missing (NaN) at {holes[row].sum()} of {interface.size} nodes"
+        f"{f' of sample {row}' * (len(rows) > 1)}, the first at"
+        f" {interface.describe_node(int(np.argmax(holes[row])))}"
+    )
     how = "smoothly from their rim" if interface.is_plane else "with straight lines"
     if gaps == "refuse":
         raise InputError(
@@ -206,11 +212,11 @@ def close_gaps(
             f" to fill them {how}"
         )
     if gaps == "fill":
-        filled = values.reshape(-1, *interface.shape).copy()
-        for row, hole in zip(filled, missing.reshape(filled.shape), strict=True):
+        rows = rows.copy()
+        for one, hole in zip(rows, holes, strict=True):
             if hole.any():
-                _fill(row, hole, interface.spacings)
-        values = filled.reshape(values.shape)
+                _fill(one, hole, interface.spacings)
+        values = rows.reshape(values.shape)
         doubt = "; check interface.length and the unit of x" if missing.mean() > 0.5 else ""
         warn_accuracy(f"{text}; filled {how}{doubt}")
     return values, ~missing & measured
@@ -242,34 +248,19 @@ def _fill(values: Array, hole: Mask, spacings: tuple[float, ...]) -> None:
     values[hole] = spsolve(matrix.tocsc()[:, own], right)
 
 
-def describe_gaps(missing: Mask, interface: Interface) -> str:
-    """Return 'values are missing (NaN) at 29 of 1024 nodes, the first at x = 0.0112 m'."""
-    maps = missing.reshape(-1, interface.size)
-    row = int(np.argmax(maps.any(axis=1)))
-    of = f" of sample {row}" if len(maps) > 1 else ""
-    return (
-        f"values are missing (NaN) at {maps[row].sum()} of {interface.size} nodes{of}, the first"
-        f" at {interface.describe_node(int(np.argmax(maps[row])))}"
-    )
-
-
 def with_gaps(problem: Any, result: xr.Dataset, measured: Any) -> xr.Dataset:
     """Return a result with the gaps of its profiles, and a mark of patches that reach into one."""
     if np.all(measured):
         return result
     interface, position = problem.interface, result["critical_position"]
     places = position.values.reshape(-1, len(interface.shape))
-    rate = problem.uniform_rate
-    patch = interface.spacings if rate is None else problem.nucleation_lengths(rate)
-    missing = ~measured
-    for axis, (dim, nodes) in enumerate(interface.coordinates.items()):
-        length, spacing = interface.lengths[axis], interface.spacings[axis]
-        apart = nodes - places[:, axis, np.newaxis] + 0.5 * length
-        apart = np.abs(np.mod(apart, length) - 0.5 * length)
-        near = apart < (1.0 - 1e-9) * max(0.5 * patch[axis], spacing)
-        missing = missing & near.reshape(
-            -1, *(nodes.size if dim == d else 1 for d in interface.dims)
-        )
+    rate, spacings, missing = problem.uniform_rate, interface.spacings, ~measured
+    patch = spacings if rate is None else problem.nucleation_lengths(rate)
+    for axis, nodes in enumerate(interface.coordinates.values()):
+        half, reach = 0.5 * interface.lengths[axis], max(0.5 * patch[axis], spacings[axis])
+        apart = np.abs(np.mod(nodes - places[:, axis, None] + half, 2.0 * half) - half)
+        others = [other + 1 for other in range(len(spacings)) if other != axis]
+        missing = missing & np.expand_dims(apart < (1.0 - 1e-9) * reach, others)
     found = missing.any(axis=interface.axes)
     if found.any():
         first = zip(interface.dims, places[int(np.argmax(found))], strict=True)

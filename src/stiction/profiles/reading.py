@@ -6,12 +6,11 @@ or, as a list of points, along 'row', with places (m) as coordinates 'x' and 'y'
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -363,19 +362,13 @@ def at_nodes(
 ) -> tuple[Any, Any]:
     """Return what a caller gave for a quantity, with one value a node, and where it was measured.
 
-    `name` may be a dotted key. Numbers and plain arrays without gaps pass as they are, for whoever
-    checks their shape. The mask is True if nothing is missing.
+    `name` may be a dotted key. Numbers, and arrays of another shape, pass as they are, for whoever
+    checks that. The mask is True if nothing is missing.
     """
-    quantity, interpolate = quantity_of(name), False
+    quantity = quantity_of(name)
     with prefixed(name):
-        if isinstance(value, Mapping) and not is_labelled(value):  # of `profile_in_file`
-            import xarray as xr
-
-            try:
-                value = xr.DataArray.from_dict(dict(value))
-                interpolate, gaps = value.attrs["interpolate"], value.attrs["gaps"]
-            except (ValueError, TypeError, KeyError, AttributeError):
-                raise InputError("a profile table belongs in a study file") from None
+        if isinstance(value, ProfileFile):
+            value = value.to_xarray(interface)
         value = simplified(value, quantity)
         if is_labelled(value):
             array = labelled(value, quantity, interface.dims)
@@ -383,31 +376,35 @@ def at_nodes(
                 if quantity == "strength":
                     raise InputError("has no dimension along the interface; call it 'x'")
                 return array.values[:, np.newaxis], True
-            return place(array, interface, interpolate, gaps)
-        if gaps != "refuse":
-            with suppress(TypeError):  # no numbers: refused with everything else that is wrong
-                array = real_array(value)
-                if array.shape[-len(interface.shape) :] == interface.shape:
-                    return close_gaps(array, True, interface, gaps)
+            return place(array, interface, gaps=gaps)
+        with suppress(TypeError):  # no numbers: refused with everything else that is wrong
+            array = real_array(value)
+            if array.shape[-len(interface.shape) :] == interface.shape:
+                return close_gaps(array, True, interface, gaps)
     return value, True
 
 
-def profile_in_file(given: Any, field: str, folder: str | Path) -> Any:
-    """Return the profile that a study file names for a parameter, its path relative to `folder`.
+class ProfileFile(NamedTuple):
+    """A profile that a study file names: it is read once its interface is known."""
 
-    A dict has `file` and options of `read_profile`. What is returned is a DataArray in plain form,
-    with options of `place` among its attributes.
-    """
+    path: Path
+    options: dict[str, Any]
+
+    def to_xarray(self, interface: Interface | None = None) -> xr.DataArray:
+        """Read the file, and place its values on an interface."""
+        return read_profile(self.path, interface=interface, **self.options)
+
+
+def profile_in_file(given: Any, field: str, folder: Path) -> Any:
+    """Return the profile that a study file names: its path, or `file` and options of the reader."""
     table = dict(given) if isinstance(given, Mapping) else {"file": given}
-    if "file" not in table:  # what this function returned
-        return table
-    path = Path(folder) / check("file", table.pop("file"), FilePath)
-    options = {
-        "interpolate": check("interpolate", table.pop("interpolate", False), Flag),
-        "gaps": check("gaps", table.pop("gaps", "refuse"), Literal["refuse", "fill"]),
-    }
-    found = read_profile(**table | {"source": path, "quantity": quantity_of(field)})
-    return json.loads(json.dumps(found.assign_attrs(options).to_dict()))  # lists, no tuples
+    if "file" not in table:
+        return given
+    path = folder / check("file", table.pop("file"), FilePath)
+    own = sorted(table.keys() & {"source", "quantity", "interface"})
+    if own:
+        raise InputError(f"{own[0]}: is not an option in a study file")
+    return ProfileFile(path, table | {"quantity": quantity_of(field)})
 
 
 def quantity_of(key: str) -> str:

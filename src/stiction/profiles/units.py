@@ -45,7 +45,7 @@ for (_short, _long), _scale in _PREFIXES.items():
             _UNITS[_name] = Unit(_scale * _unit.factor, _unit.powers)
 _COMMON = "m, cm, mm, um, nm, km, in, Pa, kPa, MPa, GPa, bar, psi, ksi, N, kN, s, ms"
 _SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴", "-01234")
-_POWER = re.compile(r"([^\W\d_]+|%|1(?!\d))(?:\^?([+-]?\d+))?$")
+_POWER = re.compile(r"([^\W\d_]+|%|1(?!\d))(?:\^?([+-]?\d))?$")
 
 
 def parse(text: str) -> Unit | None:

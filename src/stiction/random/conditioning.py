@@ -52,10 +52,7 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
     context = info.context or {}
     if "read" in context and not hasattr(value, "dims"):
         value = context["read"](value, context.get("quantity", "strength"))
-    if isinstance(value, dict) and "dims" in value:
-        import xarray as xr
-
-        value = xr.DataArray.from_dict(value)
+        value = value.to_xarray() if hasattr(value, "to_xarray") else value
     if isinstance(value, dict) and "values" in value:
         rows = [value[name] for name in ("x", "y", "values") if name in value]
     else:

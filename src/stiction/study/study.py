@@ -311,13 +311,19 @@ class Study(_Parts):
         return cls.from_dict(given)
 
 
+# pydantic's names of bounds behind a function that reads a value, and those of JSON schema.
+_BOUNDS = {
+    "gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum",
+}  # fmt: skip
+
+
 def study_schema() -> dict[str, Any]:
     """Return the JSON schema of a study file; a sweep may give any key, so none is required."""
 
     def relaxed(table: dict[str, Any]) -> dict[str, Any]:
         if "required" in table:
             table["required"] = [name for name in table["required"] if name == "type"]
-        return table
+        return {_BOUNDS.get(key, key): value for key, value in table.items()}
 
     written = json.dumps(pydantic.TypeAdapter(Study).json_schema())
     found: dict[str, Any] = json.loads(written, object_hook=relaxed)
