@@ -91,7 +91,8 @@ def real_array(value: Any) -> Array:
     return np.ascontiguousarray(given, dtype=np.float64).reshape(given.shape)
 
 
-def _numbers(value: Any) -> Array:
+def as_numbers(value: Any) -> Array:
+    """Return `value` as a float64 array, or raise an `InputError`."""
     try:
         return real_array(value)
     except (TypeError, OverflowError) as error:
@@ -179,7 +180,7 @@ Count: TypeAlias = at_least(1)  # type: ignore[valid-type]  # a call makes it
 Number: TypeAlias = at_least(0)  # type: ignore[valid-type]
 Real: TypeAlias = Annotated[float, BeforeValidator(_number), Field(allow_inf_nan=False)]
 Positive: TypeAlias = Annotated[Real, Field(gt=0)]
-Numbers: TypeAlias = Annotated[Any, BeforeValidator(_numbers)]
+Numbers: TypeAlias = Annotated[Any, BeforeValidator(as_numbers)]
 """Real numbers of any shape, as a float64 array."""
 PROFILE_SCHEMA = [
     {"type": "number"},

@@ -11,12 +11,19 @@ import numpy as np
 from pydantic import model_validator
 
 from stiction.arrays import Array
-from stiction.errors import InputError, UnitWarning, unknown_name, warn_accuracy, warn_user
+from stiction.errors import (
+    InputError,
+    UnitWarning,
+    prefixed,
+    unknown_name,
+    warn_accuracy,
+    warn_user,
+)
 from stiction.friction import SCALES, Friction, contradictions
 from stiction.friction.parameters import SMALLEST_EIGENVALUE
 from stiction.interface import Interface
 from stiction.load import Load, LoadShape
-from stiction.model import Mode, Numbers, check, describe, is_unplaced, model
+from stiction.model import Mode, as_numbers, describe, is_unplaced, model
 from stiction.profiles.placing import Gaps, turned
 from stiction.profiles.reading import at_nodes
 from stiction.solid import Solid
@@ -366,7 +373,8 @@ class Problem:
                 value, known = at_nodes(name, given.get(name, own), interface, gaps)
                 if not np.all(known):
                     measured.append(known.reshape(-1, *interface.shape))
-                return _rows(name, value, interface, samples, "barriers" in accept)
+                with prefixed(name):
+                    return _rows(name, value, interface, samples, "barriers" in accept)
             except InputError as error:
                 problems.extend(error.problems)
                 return np.ones(1)
@@ -442,14 +450,13 @@ class Problem:
 def _rows(
     name: str, value: Any, interface: Interface, samples: int | None, barriers: bool
 ) -> Array:
-    """Return `value` as a (samples, *shape) float64 array, or raise an `InputError` naming it.
+    """Return `value` as a (samples, *shape) float64 array, or raise an `InputError`.
 
     A single profile (*shape) is one sample. Where `samples` is given, a number, a profile
     or one number a sample, of shape (samples, 1), is broadcast to all.
     """
-    shape = interface.shape
-    array, nodes = check(name, value, Numbers), ", ".join(map(str, shape))
-    valid = f"{shape} or ({samples or 'samples'}, {nodes})"
+    shape, array = interface.shape, as_numbers(value)
+    valid = f"{shape} or ({samples or 'samples'}, {', '.join(map(str, shape))})"
     if samples is None:
         fits = array.size > 0 and shape in (array.shape, array.shape[1:])
     else:
@@ -459,18 +466,18 @@ def _rows(
         fits = array.shape in ((), shape, column, (samples, *shape))
     if not fits:
         hint = turned(array.shape[-2:], shape)
-        raise InputError(f"{name}: must have shape {valid}, got shape {array.shape}{hint}")
+        raise InputError(f"must have shape {valid}, got shape {array.shape}{hint}")
     infinite = barriers and name == "strength"
     bad = ~(np.abs(array) <= LARGEST) & ~(infinite & (array == np.inf))
     if bad.any():
         entry = tuple(np.argwhere(bad)[0].tolist())
         given = f"{array[entry]:g} (at most {LARGEST:g})"
-        raise InputError(f"{name}: must be finite; entry {entry} is {given}")
+        raise InputError(f"must be finite; entry {entry} is {given}")
     least = f"{array.min():g} {PROFILES[name].units}"
     if name in SCALES and array.min() <= 0.0:
-        raise InputError(f"{name}: must be positive, got {least}")
+        raise InputError(f"must be positive, got {least}")
     if name == "residual_strength" and array.min() < 0.0:
-        raise InputError(f"{name}: must not be negative, got {least}")
+        raise InputError(f"must not be negative, got {least}")
     if samples is None:
         return array.reshape(-1, *shape)
     return np.broadcast_to(array, (samples, *shape))

@@ -16,7 +16,7 @@ import numpy as np
 
 from stiction.errors import InputError, prefixed, unknown_name
 from stiction.interface import Interface
-from stiction.model import FilePath, Flag, check, checked, describe, real_array
+from stiction.model import FilePath, Flag, as_numbers, check, checked, describe, real_array
 from stiction.profiles.placing import MEASURED, OF_A_PLANE, Gaps, close_gaps, place
 from stiction.profiles.tables import load
 from stiction.profiles.units import factor_to, is_in, parse
@@ -195,10 +195,7 @@ def _in_si(array: Any, what: str, si: str, given: str | None = None) -> Any:
     """Return the values of a DataArray in SI, by its unit or the one that the caller gives."""
     stated = _unit_of(array)
     with prefixed(what, " "):
-        try:
-            values = real_array(_magnitude(array.data, si))
-        except TypeError as error:
-            raise InputError(f"must be numbers; {error}") from None
+        values = as_numbers(_magnitude(array.data, si))
         factor = factor_to(si, given or stated or si)
         known = given and parse(stated)
         if known and not np.isclose(factor_to(si, stated), factor, rtol=1e-12):
