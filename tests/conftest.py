@@ -7,6 +7,7 @@ import os
 import sys
 import tempfile
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -38,10 +39,8 @@ def pytest_addoption(parser):
 @pytest.fixture
 def fuzz(request):
     """How many trials, and the seed that chooses them."""
-    from types import SimpleNamespace
-
-    option = request.config.getoption
-    return SimpleNamespace(count=option("--fuzz-count"), seed=option("--fuzz-seed"))
+    option = request.config.option
+    return SimpleNamespace(count=option.fuzz_count, seed=option.fuzz_seed)
 
 
 def _files():

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
@@ -47,16 +47,13 @@ def dips(problem: st.Problem, field: RandomField, stress: float) -> Array:
     for _ in range(100):
         slope = from_normal(field.marginal, z + 1e-4) - from_normal(field.marginal, z - 1e-4)
         steepest = waves @ (weight * slope).ravel()
-        along += 0.2 * (
-            steepest / np.linalg.norm(steepest) - along
-        )  # whole steps go to and fro
+        # Whole steps go to and fro.
+        along += 0.2 * (steepest / np.linalg.norm(steepest) - along)
         along /= np.linalg.norm(along)
         profile = (along @ waves).reshape(interface.shape)
 
         def excess(length: float, profile: Array = profile) -> float:
-            return (
-                float((weight * from_normal(field.marginal, -length * profile)).sum()) - stress
-            )
+            return np.sum(weight * from_normal(field.marginal, -length * profile)) - stress
 
         index = brentq(excess, 0.0, 40.0, xtol=1e-10)
         z = -index * profile
@@ -67,22 +64,19 @@ def dips(problem: st.Problem, field: RandomField, stress: float) -> Array:
 
 
 def mixture(shifts: Array, samples: int, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Draws of normal densities about the shifts, in several sizes, and their log weights."""
+    """Draws of normal densities about the shifts, in several sizes, and their log weights.
+
+    A weight is the normal density over that of the mixture.
+    """
     draws = rng.standard_normal((samples, shifts.shape[1]))
     size = rng.choice(SIZES, samples)[:, None]
     draws += size * shifts[rng.integers(0, len(shifts), samples)]
-    return draws, log_weights(shifts, draws)
-
-
-def log_weights(shifts: Array, draws: Array) -> Array:
-    """Logarithm of the normal density over the mixture's; densities themselves underflow."""
-    along, square = draws @ shifts.T, (shifts * shifts).sum(axis=1)
+    along, square = draws @ shifts.T, (shifts * shifts).sum(axis=1)  # densities underflow
     parts = [logsumexp(a * along - 0.5 * a * a * square, axis=1) for a in SIZES]
-    return np.log(len(shifts) * len(SIZES)) - logsumexp(parts, axis=0)
+    return draws, np.log(len(shifts) * len(SIZES)) - logsumexp(parts, axis=0)
 
 
-@dataclass(frozen=True)
-class Answer:
+class Answer(NamedTuple):
     """Probability, its coefficient of variation, and how many equal weights it is worth."""
 
     probability: float
@@ -96,13 +90,11 @@ def by_importance(
     stress: float,
     method: st.LocalCriterion,
     cv: float,
-    *,
     seed: int = 0,
-    event: str = "critical_stress",
 ) -> Answer:
     """P(onset < stress) by sampling around the most likely weak spot, until `cv` is reached."""
     shifts = dips(problem, field, stress)
-    state = st.external.limit_state(problem, field, method, event=event)
+    state = st.external.limit_state(problem, field, method)
     rng = np.random.default_rng((seed, 4))
     weights = np.empty(0)
     while True:
@@ -111,5 +103,5 @@ def by_importance(
         mean, error = weights.mean(), weights.std() / math.sqrt(weights.size)
         if mean > 0.0 and error <= cv * mean:
             size = weights.sum() ** 2 / np.sum(weights * weights)
-            return Answer(float(mean), float(error / mean), float(size))
+            return Answer(mean, error / mean, size)
         assert weights.size < 500_000

@@ -144,6 +144,14 @@ def test_first_bound_is_a_bound(problem, make_strength):
         assert np.count_nonzero(y) < 128
 
 
+def test_kernels_are_compiled_for_one_kind_of_array():
+    """The rates of a law are read-only: they made every kernel be compiled a second time."""
+    problem = make_problem(weakening_rate=np.full(256, 0.5e12))
+    rows = problem.sample(np.full(256, 1e6))
+    assert not rows.weakening_rate.flags.writeable
+    assert all(field.flags.writeable for field in LineProgram(problem).sample_of(rows, 0)[:-1])
+
+
 def test_certificate_is_the_distance_of_both_bounds(problem, make_strength):
     """From slip and multiplier that are allowed but not optimal."""
     program = LineProgram(problem)

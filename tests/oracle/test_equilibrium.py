@@ -53,9 +53,8 @@ def test_linear_programme_with_everything_varying(make_strength, mode):
     load = st.Load(profile=1.0 + 0.3 * np.cos(angle), initial_stress=1e5 * np.sin(2 * angle))
     rate = 0.4e12 * (1.0 + 0.6 * np.sin(3 * angle))
     problem = make_problem(load=load, mode=mode, weakening_rate=rate)
-    ours = assert_first(
-        problem, make_strength(0.5).sample(problem.interface, samples=3, seed=8)
-    )
+    tau_p = make_strength(0.5).sample(problem.interface, samples=3, seed=8)
+    ours = assert_first(problem, tau_p)
     assert np.all(ours.certificate_gap < 1e-9 * ours.critical_load)
     # The mean stress differs from the load factor here.
     mean = load.initial_stress.mean() + ours.critical_load * load.profile.mean()

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from importance import by_importance, longer
+from checks import assert_mean, standard_error
+from importance import by_importance, longer, mixture
 from setups import EXACT, LOCAL, ensemble
 
 import stiction as st
-from stiction.statistics.rice import rice_distribution
 
 PROBLEM = st.paper.problem(nodes=256)
 SYSTEM = PROBLEM, st.paper.strength(PROBLEM, 0.5)
@@ -27,6 +27,17 @@ def assert_agree(one, other):
     """Within four joint standard errors of their logarithms."""
     error = math.hypot(one.cv, other.cv)
     assert abs(math.log(one.probability / other.probability)) < 4.0 * error
+
+
+def test_weights_make_the_mixture_of_importance_sampling_normal_again():
+    """E[w h] over the mixture is E[h] over the normal density, for h that the mixture covers."""
+    shifts = np.zeros((3, 40))
+    shifts[:, :6] = (1.0, 0.5, 0.5, -0.5, 0.2, 0.1), (0.5, 1.0, 0.5, 0.5, 0, 0), (0.1,) * 6
+    draws, logs = mixture(shifts, 200_000, np.random.default_rng(2))
+    weights = np.exp(logs)
+    for found in (weights, weights * draws[:, 0] ** 2):
+        assert_mean(found, 1.0, errors=4.0)
+        assert standard_error(found) < 0.02
 
 
 # P is about 1e-2, of four times the length 5e-2, and 1e-3 and 1e-4.
@@ -87,7 +98,7 @@ def test_rice_formula_against_plain_monte_carlo():
     found = ensemble(*SYSTEM, 3000, seed=1)["critical_stress"].values
     chances, allowed = (0.03, 0.1, 0.5), (0.4, 0.25, 0.12)
     stresses = np.quantile(found, chances)
-    rice = rice_distribution(*SYSTEM, profiles=3000, stress=stresses).probability
+    rice = st.theory.rice_distribution(*SYSTEM, profiles=3000, stress=stresses).probability
     # 5 to 8 % low at the median; binomial errors of 10 and 18 % twice over in the tail.
     for probability, chance, error in zip(rice, chances, allowed, strict=True):
         assert probability == pytest.approx(chance, rel=error)

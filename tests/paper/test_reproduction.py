@@ -1,7 +1,10 @@
 """The paper, recomputed: rules, claims, and the quick pipeline from the command to the page."""
 
 import ast
+import contextlib
 import csv
+import dataclasses
+import io
 import re
 import subprocess
 import sys
@@ -11,15 +14,13 @@ import numpy as np
 import pytest
 
 import stiction as st
+from reproduction import claims, modulus, rules, runner, statements_onset, statements_rupture
+from reproduction import numbers_with_errors as estimates
+from reproduction.__main__ import main
+from reproduction.numbers_with_errors import Number
+from reproduction.rules import Verdict
 
 ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT))
-
-from reproduction import claims, modulus, rules, statements_onset, statements_rupture  # noqa: E402
-from reproduction import numbers_with_errors as estimates  # noqa: E402
-from reproduction.numbers_with_errors import Number  # noqa: E402
-from reproduction.rules import Verdict  # noqa: E402
-
 CLAIMS = [
     claim
     for groups in (statements_onset.GROUPS, statements_rupture.GROUPS, {"": modulus.CLAIMS})
@@ -118,17 +119,22 @@ def test_paired_changes_know_their_error():
     assert spreads.mean() == pytest.approx(0.1, abs=1e-3)
 
 
-def command(*arguments):
-    script = [sys.executable, str(ROOT / "reproduction"), *arguments]
-    return subprocess.run(script, capture_output=True, text=True, timeout=600, check=False)
+FEWER = dataclasses.replace(runner.QUICK, readings=60, trend=60, what_if=16)
+
+
+def quick(out, *more):
+    """Run the quick form with fewer samples where tests ask for no number; what it prints."""
+    said = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(said):
+        patch.setattr(runner, "QUICK", FEWER)
+        main(["--quick", "--out", str(out), *more])
+    return said.getvalue()
 
 
 @pytest.fixture(scope="module")
 def pipeline(tmp_path_factory):
     out = tmp_path_factory.mktemp("paper")
-    result = command("--quick", "--out", str(out))
-    assert result.returncode == 0, result.stderr
-    return out, result.stdout
+    return out, quick(out)
 
 
 def test_the_page_holds_findings_figures_and_claims(pipeline):
@@ -178,8 +184,7 @@ def test_the_table_of_claims_is_tidy_and_the_main_results_stand(pipeline):
 def test_a_second_call_computes_nothing_and_figures_can_be_chosen(pipeline):
     out, _ = pipeline
     before = {path: path.stat().st_mtime_ns for path in (out / "studies").rglob("*.nc")}
-    result = command("--quick", "--out", str(out), "--figures", "5")
-    assert result.returncode == 0, result.stderr
+    quick(out, "--figures", "5")
     after = {path: path.stat().st_mtime_ns for path in (out / "studies").rglob("*.nc")}
     assert after == before
 
@@ -192,7 +197,9 @@ def test_a_second_call_computes_nothing_and_figures_can_be_chosen(pipeline):
     ],
 )
 def test_a_wrong_option_is_refused_before_anything_is_computed(arguments, text, tmp_path):
-    result = command(*arguments, "--out", str(tmp_path / "none"))
+    script = [sys.executable, str(ROOT / "reproduction"), *arguments]
+    script += ["--out", str(tmp_path / "none")]
+    result = subprocess.run(script, capture_output=True, text=True, timeout=600, check=False)
     assert result.returncode == 2
     assert text in result.stderr
     assert not (tmp_path / "none").exists()

@@ -75,9 +75,9 @@ def test_workers_do_not_change_a_bit(arguments, reference, workers):
     "make",
     [
         lambda: ThreadPoolExecutor(3),
-        lambda: ProcessPoolExecutor(2, mp_context=get_context("spawn")),
+        lambda: ProcessPoolExecutor(1, mp_context=get_context("spawn")),
     ],
-    ids=["threads", "spawned processes"],
+    ids=["threads", "a spawned process"],
 )
 def test_executors_do_not_change_a_bit(arguments, reference, make):
     with make() as executor:

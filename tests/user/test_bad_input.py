@@ -232,7 +232,8 @@ test_what_the_local_criterion_cannot_take = refusals({
     "weakening_rate varies": lambda: on_plane(
         (5.0 * LENGTH, 4.0 * LENGTH), RATE * np.linspace(0.9, 1.0, 48 * 48).reshape(48, 48)
     ),
-    "not in plane stress": lambda: make_problem((48, 48), (0.02, 0.02), solid=solid(plane="stress")),
+    "not in plane stress":
+        lambda: make_problem((48, 48), (0.02, 0.02), solid=solid(plane="stress")),
     "swapped: the first axis of a profile is x": lambda: onset(
         np.full((48, 64), 1e6), problem=make_problem((64, 48), (0.02, 0.014))
     ),

@@ -116,7 +116,9 @@ def test_path(tmp_path):
     assert (tmp_path / "equilibrium_path.png").stat().st_size > 10_000
 
 
-def test_scripts_of_validation():
+@pytest.mark.slow
+def test_scripts_of_validation(tmp_path):
+    """What they compute is checked in exact/, oracle/ and paper/."""
     found = load("memory").compute()
     # 4.8e-8 and 1.3e-3 on the page.
     assert found["exponentials, 1e-06"].max() < 1e-6
@@ -124,11 +126,6 @@ def test_scripts_of_validation():
     for slow, fast in load("onset").compute(256, 2, (1e5, 2e7)).values():
         assert np.abs(slow).max() < 5e-6
         assert np.abs(fast).max() < 1e-3
-
-
-@pytest.mark.slow
-def test_remaining_scripts(tmp_path):
-    """What they compute is checked in exact/ and paper/."""
     slip, stress = load("grid").compute((0.25,), (512, 2048), samples=2)[0.25, 512]
     # Largest of six fields on the page: 3.1 % and 0.06 %; a quarter of the dx^2 is left out.
     assert 1e-4 < slip.max() < 0.04

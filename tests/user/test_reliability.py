@@ -12,12 +12,11 @@ import pytest
 import scipy.stats
 import xarray as xr
 from refusals import refusals, refuses
-from setups import make_problem
+from setups import EXACT, LOCAL, exact_onset, local_onset, make_problem, turns
 
 import stiction as st
 from stiction.random.stresses import share_below_residual
 
-LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
 PROBLEM = st.paper.problem(nodes=256)
 FIELD = st.paper.strength(PROBLEM, 0.5)
 SYSTEM = PROBLEM, FIELD
@@ -34,10 +33,8 @@ def design(probability, method=LOCAL, system=SYSTEM, **options):
 def shares(system, stress, samples, seed):
     """Share of plain samples that fail, by the local criterion and by equilibrium."""
     drawn = system[1].sample(system[0].interface, samples=samples, seed=seed)
-    return [
-        np.mean(st.onset(system[0], drawn, method=method).critical_stress.values < stress)
-        for method in (LOCAL, EXACT)
-    ]
+    onsets = local_onset(system[0], drawn), exact_onset(system[0], drawn)
+    return [np.mean(found.critical_stress.values < stress) for found in onsets]
 
 
 @dataclass(frozen=True)
@@ -66,9 +63,7 @@ class Standing:
 
 # -- what is refused -----------------------------------------------------------------------------
 
-VARYING = make_problem(
-    weakening_rate=0.5e12 * (1.0 + 0.1 * np.cos(2.0 * np.pi * np.arange(256) / 256))
-)
+VARYING = make_problem(weakening_rate=0.5e12 * (1.0 + 0.1 * np.cos(turns(256))))
 RUPTURES = Standing("rupture"), st.Rupture(loading_rate=1e9)
 test_a_mistake_is_named = refusals({
     "stress ... method ... target_cv ... max_evaluations":

@@ -103,7 +103,8 @@ def make_sample(
         fall, rate = np.where(constant, 0.0, (fall, rate))
     with np.errstate(invalid="ignore", divide="ignore"):
         critical = np.where(rate > 0.0, pieces.first * fall / rate, 0.0)
-    return Sample(excess, residual, profile, np.ascontiguousarray(rate), critical, pieces)
+    # A copy: of a read-only array, as of a law, each kernel would be compiled a second time.
+    return Sample(excess, residual, profile, rate.copy(), critical, pieces)
 
 
 def sample_of(rows: Samples, pieces: Pieces, row: int | slice = slice(None)) -> Sample:
