@@ -1,9 +1,13 @@
-"""What many tests assert: equal bits, orders of accuracy, means within their standard errors."""
+"""What many tests assert: equal bits, orders of accuracy, means, a process that ends well."""
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from collections.abc import Mapping
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,6 +28,16 @@ def assert_second_order(errors: Any, within: float) -> None:
     """Halving a step divides each error by four."""
     for coarse, fine in pairwise(errors):
         assert coarse / fine == pytest.approx(4.0, abs=within)
+
+
+def python(*arguments: Any, cwd: Path | None = None, code: int = 0, **environment: Any) -> str:
+    """What a process of its own prints, or else complains of; it ends with this code."""
+    command = [sys.executable, *map(str, arguments)]
+    options = {"capture_output": True, "text": True, "timeout": 600, "cwd": cwd}
+    own = os.environ | {name: str(value) for name, value in environment.items()}
+    done = subprocess.run(command, env=own, **options)
+    assert done.returncode == code, done.stdout + done.stderr
+    return done.stdout or done.stderr
 
 
 def standard_error(values: Any) -> float:

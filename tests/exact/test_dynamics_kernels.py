@@ -48,13 +48,6 @@ def test_kernel_equals_its_closed_form(t, mode, eta):
     assert abs(memory_kernel(t, mode, eta) - expected) < 1e-12
 
 
-def test_mode_three_kernel_is_the_integral_of_the_bessel_kernel():
-    t, h = 3.0, 1e-3
-    slope = (memory_kernel(t - h, "III", 1.0) - memory_kernel(t + h, "III", 1.0)) / (2 * h)
-    # Central difference: h^2/6 times a third derivative below 1.
-    assert slope == pytest.approx(float(mpmath.besselj(1, t)) / t, abs=2e-7)
-
-
 @pytest.mark.parametrize("t", [0.5, 3.0, 12.0])
 def test_kernel_equals_high_precision_laplace_inversion(t):
     def transform(s):

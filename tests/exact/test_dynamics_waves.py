@@ -6,6 +6,7 @@ from checks import assert_second_order
 from oracles import from_laplace, mode_three_stiffness, mode_two_stiffness
 from ruptures import stepped
 from scipy.special import j0, j1
+from setups import make_problem
 
 import stiction as st
 from stiction.elasticity.exponential_sum import kernel_sum
@@ -53,12 +54,11 @@ def test_stress_inside_a_growing_crack_is_minus_the_drop(mode, speed, short):
 
 def released(steps, end, mode="II"):
     """Amplitude of a slip cos(kx) on an interface without friction law, at c_s k t = end."""
-    interface = st.Interface(length=0.1, nodes=32)
     # Everything has slipped beyond d_c and slides on at the residual strength.
-    friction = st.LinearWeakening(weakening_rate=1e9, residual_strength=1e6)
-    problem = st.Problem(SOLID, interface, friction, mode=mode)
-    k = interface.wavenumbers[2]
-    slip = 1e-3 + 1e-6 * np.cos(k * interface.x)
+    friction = {"weakening_rate": 1e9, "residual_strength": 1e6}
+    problem = make_problem(32, solid=SOLID, mode=mode, **friction)
+    k = problem.interface.wavenumbers[2]
+    slip = 1e-3 + 1e-6 * np.cos(k * problem.interface.x)
     time = end / (k * SOLID.shear_wave_speed)
     _, state = stepped(problem, np.full(32, 1.001e6), 2e6, time, steps, slip)
     return state.slip_hat[2].real / 16.0 / 1e-6

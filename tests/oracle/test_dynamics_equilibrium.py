@@ -105,16 +105,15 @@ def test_an_arrested_event_is_the_one_that_equilibrium_finds():
 def test_arrested_events_are_those_of_equilibrium_whatever_the_rate(rate):
     """Waves that circle after an event make the mean stress fall dozens of times: no events."""
     solid = st.Solid(shear_modulus=2e9, poisson_ratio=0.2, density=1500.0)
-    interface, modulus = st.Interface(length=0.08, nodes=256), solid.effective_modulus()
-    weakening = 2.0 * 0.5788869 * modulus / (0.16 * interface.length)
-    friction = st.LinearWeakening(weakening_rate=weakening, residual_ratio=0.6)
-    problem = st.Problem(solid, interface, friction)
+    length, modulus = 0.08, solid.effective_modulus()
+    law = {"weakening_rate": 2.0 * 0.5788869 * modulus / (0.16 * length), "residual_ratio": 0.6}
+    problem = make_problem(solid=solid, length=length, **law)
     spectrum = st.SquaredExponentialSpectrum(correlation_length=0.01)
     field = st.RandomField(st.Lognormal(mean=2.04e6, cv=0.2), spectrum, mean_mode=True)
-    tau_p = field.sample(interface, samples=6, seed=5)[[0, 3]]
+    tau_p = field.sample(problem.interface, samples=6, seed=5)[[0, 3]]
     # Equilibrium counts jumps of any size; these slip as much as dynamics can tell from creep.
-    unit = 0.4 * tau_p.mean() * interface.length / modulus
-    whole = solid.shear_modulus * interface.length
+    unit = 0.4 * tau_p.mean() * length / modulus
+    whole = solid.shear_modulus * length
     moments = [st.equilibrium_path(problem, one, [0.0]).event_moment.values for one in tau_p]
     expected = [int(np.sum(moment / whole > 5e-3 * unit)) for moment in moments]
     found = rupture(problem, tau_p, rate)

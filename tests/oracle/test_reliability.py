@@ -93,17 +93,6 @@ def test_design_stress_has_the_probability_asked_for(method):
     assert 0.66e6 < low < answer.stress < high
 
 
-def test_rice_formula_against_plain_monte_carlo():
-    """Good below the median; crossings pooled from 3000 profiles, against 3000 others."""
-    found = ensemble(*SYSTEM, 3000, seed=1)["critical_stress"].values
-    chances, allowed = (0.03, 0.1, 0.5), (0.4, 0.25, 0.12)
-    stresses = np.quantile(found, chances)
-    rice = st.theory.rice_distribution(*SYSTEM, profiles=3000, stress=stresses).probability
-    # 5 to 8 % low at the median; binomial errors of 10 and 18 % twice over in the tail.
-    for probability, chance, error in zip(rice, chances, allowed, strict=True):
-        assert probability == pytest.approx(chance, rel=error)
-
-
 @pytest.mark.slow
 def test_against_openturns_subset_sampling():
     """Its block size must not exceed p_0 N: larger blocks report too small an error."""

@@ -6,12 +6,11 @@ import csv
 import dataclasses
 import io
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from checks import python
 
 import stiction as st
 from reproduction import claims, modulus, rules, runner, statements_onset, statements_rupture
@@ -197,9 +196,5 @@ def test_a_second_call_computes_nothing_and_figures_can_be_chosen(pipeline):
     ],
 )
 def test_a_wrong_option_is_refused_before_anything_is_computed(arguments, text, tmp_path):
-    script = [sys.executable, str(ROOT / "reproduction"), *arguments]
-    script += ["--out", str(tmp_path / "none")]
-    result = subprocess.run(script, capture_output=True, text=True, timeout=600, check=False)
-    assert result.returncode == 2
-    assert text in result.stderr
+    assert text in python(ROOT / "reproduction", *arguments, "--out", tmp_path / "none", code=2)
     assert not (tmp_path / "none").exists()

@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
+from checks import assert_same
 from hypothesis import given, settings
 from hypothesis import strategies as some
 from ruptures import radiated_energy, run_of
 from setups import make_problem
 
 import stiction as st
-from stiction.dynamics.method import Rupture
+from stiction import Rupture, simulate_rupture
 from stiction.dynamics.save import read_checkpoint, write_checkpoint
-from stiction.dynamics.simulate import simulate_rupture
 from stiction.dynamics.state import Reason
 
 NODES = 128
@@ -37,11 +37,6 @@ def through_file(path, run, state):
 def fresh_run(profile, method=METHOD):
     run = run_of(PROBLEM, profile, method)
     return run, run.start(run.first_slip())
-
-
-def same(left, right):
-    """Equal bit by bit, including what a checkpoint holds."""
-    return all(a.tobytes() == b.tobytes() for a, b in zip(left, right, strict=True))
 
 
 @settings(max_examples=8, deadline=None)
@@ -88,7 +83,7 @@ def test_restart_at_any_step_is_the_uninterrupted_run(tmp_path):
         run.advance(state, cut)
         state = through_file(path, run, state)
         run.advance(state, 100_000)
-        assert same(state, straight), cut
+        assert_same(state._asdict(), straight._asdict())
 
 
 def test_the_pass_over_the_memory_meets_whole_cache_lines(tmp_path):
@@ -116,7 +111,7 @@ def test_restart_across_a_return_to_implicit_steps(tmp_path):
         state = through_file(tmp_path / "state.npz", run, state)
     run.advance(state, 3)
     assert not straight.explicit
-    assert same(state, straight)
+    assert_same(state._asdict(), straight._asdict())
 
 
 def test_radiated_energy_is_steady_after_arrest():

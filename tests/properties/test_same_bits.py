@@ -1,11 +1,9 @@
 """The same numbers from kernels just compiled, loaded from disk, and partly both."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from checks import python
 
 SOURCES = Path(__file__).parents[2] / "src"
 
@@ -37,12 +35,7 @@ if __name__ == "__main__":
 def marks(folder):
     script = folder / "script.py"
     script.write_text(CODE)
-    places = {"PYTHONPATH": str(SOURCES), "NUMBA_CACHE_DIR": str(folder / "c")}
-    environment = os.environ | places
-    command = [sys.executable, str(script)]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=600)
-    assert done.returncode == 0, done.stderr
-    found = done.stdout.split()
+    found = python(script, PYTHONPATH=SOURCES, NUMBA_CACHE_DIR=folder / "c").split()
     assert len(found) == 6
     return found
 

@@ -2,13 +2,12 @@
 
 import dataclasses
 import re
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
 import numpy as np
 import pydantic
+from checks import python
 from refusals import refuses
 
 import stiction as st
@@ -26,13 +25,7 @@ SOURCES = ROOT / "src" / "stiction"
 
 def test_imports_run_downwards():
     """Those inside functions and under TYPE_CHECKING included."""
-    command = [
-        sys.executable,
-        "-c",
-        "from importlinter.cli import lint_imports_command as f; f()",
-    ]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
+    python("-c", "from importlinter.cli import lint_imports_command as f; f()", cwd=ROOT)
 
 
 def test_the_drawing_is_what_is_held():

@@ -337,8 +337,6 @@ def test_objects_are_frozen_compare_and_hash_by_value():
         a.load.profile[0] = 2.0
 
 
-# -- numbers in another unit than they are taken to be: a warning; harmless forms: none -----------
-
 FIELD = beta_strength(4e-3)
 
 
@@ -406,8 +404,7 @@ def test_more_nodes_than_anybody_has_suggest_a_unit(changes):
     ],
 )
 def test_what_people_study_raises_no_doubt(solid, friction, length, strength):
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", st.UnitWarning)
+    with warnings.catch_warnings(action="error", category=st.UnitWarning):
         h_n = 2 * 0.5789 * solid[0] / (1 - solid[1]) / friction
         interface = st.Interface(length, max(64, 2 * int(4 * length / h_n)))
         system = st.Problem(st.Solid(*solid), interface, st.LinearWeakening(friction))

@@ -2,11 +2,10 @@
 
 import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from checks import python
 
 from stiction import jit
 
@@ -14,22 +13,14 @@ SOURCES = Path(__file__).parents[2] / "src"
 
 
 @pytest.fixture
-def run(tmp_path):
+def run(tmp_path, monkeypatch):
     """Run a module in a process of its own, with a folder for compiled kernels."""
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
 
     def run(code, cache):
         (tmp_path / "own_module.py").write_text(code)
-        environment = os.environ | {
-            "PYTHONPATH": str(SOURCES),
-            "STICTION_CACHE_DIR": str(cache),
-        }
-        environment.pop("NUMBA_CACHE_DIR", None)
-        command = [sys.executable, "-B", "-c", "import own_module"]
-        done = subprocess.run(
-            command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120
-        )
-        assert done.returncode == 0, done.stderr
-        return done.stdout.split("\n")[:-1]
+        places = {"PYTHONPATH": SOURCES, "STICTION_CACHE_DIR": cache}
+        return python("-B", "-c", "import own_module", cwd=tmp_path, **places).splitlines()
 
     return run
 

@@ -41,8 +41,6 @@ def same(found, expected):
     assert found.attrs["stopped"] == expected.attrs["stopped"]
 
 
-# -- mistakes ------------------------------------------------------------------------------------
-
 FALLING = [[0.0, 1e-3, 2e-3, 3e-3], [0.0, 5e5, 4e5, 2e6]]
 test_wrong_options = refusals({
     "loading_rate": {"loading_rate": 0.0},
@@ -105,9 +103,6 @@ def test_a_run_that_blows_up_stops_and_says_where(monkeypatch):
         run = simulate(method=method)
     assert run.attrs["stopped"].startswith("not finite")
     assert np.all(np.isfinite(run["slip"].values))
-
-
-# -- stored runs ---------------------------------------------------------------------------------
 
 
 def test_a_run_in_a_folder_is_the_one_in_memory(held, tmp_path, monkeypatch):
@@ -186,8 +181,7 @@ def test_full_disk_leaves_what_was_written_readable(tmp_path, monkeypatch):
     refuses("file", lambda: simulate(st.Save(to=tmp_path / "file" / "run")), StoreError)
 
 
-# -- what the scalars of a run mean, from its own fields, where everything varies along x ----------
-
+# What the scalars of a run mean, from its own fields, where everything varies along x:
 NODES, LENGTH = 128, 0.05
 SPACING = LENGTH / NODES
 ANGLE = 2 * np.pi * np.arange(NODES) / NODES
@@ -296,8 +290,6 @@ def test_stop_conditions_and_progress(held):
     by_pieces = simulate(method=pieces).critical_stress.item()
     assert by_pieces == pytest.approx(onset.critical_stress.item(), rel=1e-5)
 
-
-# -- the cache of memory kernels -----------------------------------------------------------------
 
 KERNEL = ("III", 1.0, 1e-3)
 

@@ -44,9 +44,6 @@ def barred(height):
     return np.where(np.abs(X - 0.5) < 0.15, height, TAU_P)
 
 
-# -- barriers ------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("height", [1e12, np.inf])
 def test_a_barrier_does_not_blind_the_onset(height):
     run = simulate(barred(height), stop="onset")
@@ -83,9 +80,6 @@ def test_waves_of_an_arrested_rupture_are_followed_to_the_end():
     )
     # What creep by implicit steps may put wrong before the event: 2e-4 at 1e8 Pa/s.
     assert one[-1].item() == pytest.approx(other[-1].item(), rel=4e-4)
-
-
-# -- overstressed patches and pushed-back interfaces ---------------------------------------------
 
 
 def test_an_overstressed_patch_breaks_at_once_and_by_explicit_steps():
@@ -128,9 +122,6 @@ def test_a_first_instability_at_a_negative_mean_stress_is_that_of_equilibrium():
 def test_a_stress_below_minus_the_strength_is_said(initial, options):
     with pytest.warns(st.AccuracyWarning, match="would slip in reverse"):
         simulate(problem=stressed(initial), **options)
-
-
-# -- loads that fall, rest or are too much -------------------------------------------------------
 
 
 @pytest.mark.parametrize("stop", ["sliding", "onset", "rest"])
@@ -193,8 +184,7 @@ def test_where_a_run_stops_and_what_is_known_then(stop):
 def test_rates_that_cannot_be_resolved_are_said():
     with pytest.warns(st.AccuracyWarning, match="rises by 0.16 of .* use time_step=5e-09"):
         fast = critical_stress(st.Rupture(loading_rate=1e12))
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         fine = critical_stress(st.Rupture(loading_rate=1e12, time_step=4.9e-9))
     assert fast == pytest.approx(fine, rel=1e-2)  # the peak is sampled by 18 steps
 
@@ -215,9 +205,6 @@ test_what_a_rupture_cannot_do_is_refused = refusals({
     "above initial_stress ... only st.Rupture()":
         lambda: critical_stress(LOCAL, problem=OVERSTRESSED),
 })  # fmt: skip
-
-
-# -- odd solids and strengths --------------------------------------------------------------------
 
 
 def test_the_place_of_a_slow_onset_is_that_of_equilibrium():

@@ -1,12 +1,11 @@
 """How-tos and other scripts run, the long ones in small, and what they find is right."""
 
 import ast
-import importlib
 import itertools
 import re
 import runpy
-import sys
 from dataclasses import replace
+from importlib import import_module as load
 from pathlib import Path
 
 import numpy as np
@@ -88,15 +87,6 @@ def test_a_how_to(name, monkeypatch, tmp_path, capsys):
 def test_the_tables_list_every_how_to():
     text = (ROOT / "README.md").read_text()
     assert [name for name in HOW_TOS if f"examples/{name}.py" not in text] == []
-
-
-def load(name):
-    """A script as a module."""
-    sys.path[:0] = [str(EXAMPLES), str(ROOT / "validation")]
-    try:
-        return importlib.import_module(name)
-    finally:
-        del sys.path[:2]
 
 
 def test_friction_laws(capsys):

@@ -1,13 +1,12 @@
 """A method of somebody else's package: in `onset`, `monte_carlo`, a study file and a report."""
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import tomli_w
+from checks import python
 from refusals import refuses
 from small_study import small_study
 
@@ -53,10 +52,7 @@ def test_a_method_from_another_package(tmp_path):
     study = small_study(method=method, ensemble={"samples": 64})
     (tmp_path / "study.toml").write_text(tomli_w.dumps(study))
     paths = os.pathsep.join([str(tmp_path), str(Path(st.__file__).parents[1])])
-    env = os.environ | {"PYTHONPATH": paths, "MPLBACKEND": "Agg"}
-    command = [sys.executable, "-c", SCRIPT]
-    done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
+    python("-c", SCRIPT, cwd=tmp_path, PYTHONPATH=paths, MPLBACKEND="Agg")
     (page,) = tmp_path.rglob("*.html")
     assert "weakest window" in page.read_text()
 

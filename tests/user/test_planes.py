@@ -16,8 +16,6 @@ from small_study import lengths, small_study
 import stiction as st
 from stiction.equilibrium import solver, transforms
 
-# -- the exact onset -----------------------------------------------------------------------------
-
 
 def smooth(shape, seed=0):
     return 0.7e6 + 1e6 * smooth_noise(4.0, np.random.default_rng(seed), shape)
@@ -39,8 +37,7 @@ def onset(strength=SAMPLES, plane=PLANE, **options):
 @pytest.fixture(scope="module")
 def found():
     """Two samples with everything that can be asked for; a fine grid, certified: no warning."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         return onset(slip=True, sensitivity=True)
 
 
@@ -143,8 +140,6 @@ def test_labelled_strength_and_the_path_of_a_plane_that_just_slides(found):
     assert path["slip"].dims == ("load", "x", "y")
     assert np.isnan(path["slip"].values[2]).all()
 
-
-# -- studies and commands ------------------------------------------------------------------------
 
 STUDY = small_study(
     nodes=[72, 60],

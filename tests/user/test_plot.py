@@ -1,7 +1,5 @@
 """The public plots: what they draw, on whose axes, in which units, and what they refuse."""
 
-import dataclasses
-
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
@@ -9,16 +7,16 @@ import pytest
 import xarray as xr
 from PIL import Image
 from refusals import refuses
-from setups import make_problem
+from setups import EXACT, LOCAL, exact_onset, local_onset, make_problem
+from small_study import lengths, small_study
 
 import stiction as st
 
 PRESSURE = 5e6
-LOCAL = st.LocalCriterion()
-PLAIN = st.paper.problem(nodes=256)
-PROBLEM = dataclasses.replace(PLAIN, load=st.Load(normal_pressure=PRESSURE))
+PROBLEM = make_problem(solid=st.paper.problem().solid, load=st.Load(normal_pressure=PRESSURE))
 FIELD = st.paper.strength(PROBLEM, correlation_ratio=0.5)
 TAU_P = FIELD.sample(PROBLEM.interface, samples=3, seed=1)
+ONE = TAU_P[0]
 
 
 @pytest.fixture(autouse=True)
@@ -37,16 +35,8 @@ def run():
 
 @pytest.fixture(scope="module")
 def swept():
-    return st.Study(
-        problem=PLAIN,
-        random=FIELD,
-        method=LOCAL,
-        ensemble=st.Ensemble(samples=50),
-        sweep=[
-            {"random.strength.spectrum.correlation_length": [1e-3, 2e-3, 4e-3]},
-            {"problem.friction.residual_strength": [0.0, 1e5]},
-        ],
-    ).run()
+    sweep = [*lengths(1e-3, 2e-3, 4e-3), {"problem.friction.residual_strength": [0.0, 1e5]}]
+    return st.Study.from_dict(small_study(ensemble={"samples": 50}, sweep=sweep)).run()
 
 
 def coefficients(axes, scale, limits):
@@ -57,7 +47,7 @@ def coefficients(axes, scale, limits):
 
 def test_an_onset_is_drawn_where_the_result_says():
     """Of the sample asked for, by each method, with coefficients beside the stresses."""
-    results = [st.onset(PROBLEM, TAU_P, method=m) for m in (LOCAL, st.Equilibrium())]
+    results = [st.onset(PROBLEM, TAU_P, method=m) for m in (LOCAL, EXACT)]
     axes = st.plot.onset(results, TAU_P, sample=2)
     marked = [line for line in axes.lines if line.get_marker() != "None"]
     marks = {line.get_label(): line.get_xydata() for line in marked}
@@ -148,17 +138,17 @@ def test_planes():
     problem = make_problem((64, 32), (0.02, 0.01))
     tau_p = st.paper.strength(problem, correlation_ratio=1.0).sample(problem.interface, seed=0)
     assert st.plot.field(problem, tau_p).images
-    local = st.onset(problem, tau_p, method=LOCAL)
+    local = local_onset(problem, tau_p)
     axes = st.plot.onset(local, tau_p)
     place = local.critical_position.values[0] * 1e3
     assert axes.lines[0].get_xydata()[0] == pytest.approx(place)
     assert len(axes.patches) == 9  # the ellipse and its periodic images
-    exact = st.onset(problem, tau_p, method=st.Equilibrium(slip=True, sensitivity=True))
+    exact = exact_onset(problem, tau_p, slip=True, sensitivity=True)
     assert len(st.plot.onset([local, exact], tau_p).collections) == 2  # two outlines
 
 
 def test_what_does_not_fit_is_refused(run, swept):
-    found = st.onset(PROBLEM, TAU_P, method=LOCAL)
+    found = local_onset(PROBLEM, TAU_P)
     one = swept.isel(residual_strength=0, correlation_length=0)
     plot = st.plot
     for words, call in {
@@ -176,6 +166,3 @@ def test_what_does_not_fit_is_refused(run, swept):
         ".gif, got 'film.avi'": lambda: plot.film(run, "film.avi"),
     }.items():
         refuses(words, call)
-
-
-ONE = TAU_P[0]

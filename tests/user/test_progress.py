@@ -1,13 +1,13 @@
 """Progress of long work: what it shows and where, and when its time is over."""
 
 import io
-import subprocess
 import sys
 import threading
 import time
 import types
 
 import pytest
+from checks import python
 
 import stiction as st
 from stiction import progress
@@ -80,7 +80,7 @@ def test_one_of_nested_meters_is_shown(hasty, capsys):
     assert "inner: " in capsys.readouterr().err
     assert threading.active_count() == before
     code = "from stiction.progress import Meter; Meter('left open').__enter__()"
-    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+    python("-c", code)
 
 
 def test_a_function_of_ones_own_gets_the_progress():

@@ -2,12 +2,11 @@
 
 import json
 import re
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
 import pytest
+from checks import python
 
 import stiction as st
 
@@ -26,9 +25,7 @@ def test_the_version_and_its_date_stand_everywhere():
     (date,) = re.findall(heading, (ROOT / "CHANGELOG.md").read_text(), flags=re.MULTILINE)
     assert f"date-released: {date}" in CITATION
     assert CODEMETA["datePublished"] == date
-    command = [sys.executable, "-m", "stiction", "--version"]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert done.stdout == f"stiction {st.__version__}\n"
+    assert python("-m", "stiction", "--version") == f"stiction {st.__version__}\n"
 
 
 def test_the_recipe_needs_what_the_package_needs():
@@ -56,14 +53,6 @@ def test_addresses_agree_once_there_are_any():
     assert CODEMETA.get("codeRepository") == address
 
 
-# -- what a user and an editor see: names, completion, types, a quick import ----------------------
-
-
-def printed(code):
-    command = [sys.executable, "-c", code]
-    return subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
-
-
 def test_every_public_name_is_there_documented_and_completed():
     assert dir(st) == sorted(st.__all__)
     for name in set(st.__all__) - {"__version__"}:
@@ -71,7 +60,7 @@ def test_every_public_name_is_there_documented_and_completed():
     with pytest.raises(AttributeError, match="no attribute 'Rapture'"):
         _ = st.Rapture
     code = "import stiction as st, numpy; st.Solid; print(' '.join(dir(st)))"
-    assert printed(code) == sorted(st.__all__)
+    assert python("-c", code).split() == sorted(st.__all__)
 
 
 def test_no_module_bears_the_name_of_a_public_function():
@@ -83,7 +72,7 @@ def test_no_module_bears_the_name_of_a_public_function():
 
 def test_importing_is_quick_because_nothing_heavy_is_loaded():
     heavy = "{'numpy', 'numba', 'scipy', 'xarray', 'matplotlib'}"
-    assert printed(f"import sys, stiction; print(*{heavy} & set(sys.modules))") == []
+    assert python("-c", f"import sys, stiction; print(*{heavy} & set(sys.modules))") == "\n"
 
 
 CALLS = [
@@ -94,11 +83,7 @@ CALLS = [
     ("problem = st.Problem({}, law)", "solid, interface", "interface, solid"),
     ("method = st.{}()", "Equilibrium", "Equilibrum"),
     ("field = {}", "st.RandomField(beta, st.PowerLawSpectrum(1e-3))", "3"),
-    (
-        "found = st.monte_carlo(problem, field, method=st.LocalCriterion(), samples={})",
-        "9",
-        "{}",
-    ),
+    ("st.monte_carlo(problem, field, method=st.LocalCriterion(), samples={})", "9", "{}"),
     ("run = st.Rupture(loading_rate={})", "2e7", '"fast"'),
 ]
 """Lines, what belongs in them, and a mistake in its place."""
@@ -109,9 +94,8 @@ def test_a_type_checker_finds_every_mistake(tmp_path):
     for name, which in (("right.py", 1), ("wrong.py", 2)):
         lines = [call[0].format(call[which]) for call in CALLS]
         (tmp_path / name).write_text("\n".join(["import stiction as st", *lines]))
-    command = [sys.executable, "-m", "basedpyright", "--level", "error", "--outputjson"]
-    done = subprocess.run([*command, tmp_path], capture_output=True, text=True)
-    found = json.loads(done.stdout)["generalDiagnostics"]
+    options = ["-m", "basedpyright", "--level", "error", "--outputjson"]
+    found = json.loads(python(*options, tmp_path, code=1))["generalDiagnostics"]
     errors = {(Path(d["file"]).name, d["range"]["start"]["line"]) for d in found}
     lines = {i + 1 for i, call in enumerate(CALLS) if call[0] != "field = {}"}
     assert errors == {("wrong.py", line) for line in lines}

@@ -61,8 +61,6 @@ class Standing:
         return solver
 
 
-# -- what is refused -----------------------------------------------------------------------------
-
 VARYING = make_problem(weakening_rate=0.5e12 * (1.0 + 0.1 * np.cos(turns(256))))
 RUPTURES = Standing("rupture"), st.Rupture(loading_rate=1e9)
 test_a_mistake_is_named = refusals({
@@ -90,9 +88,6 @@ def test_the_tail_of_ruptures_is_refused(method):
 def test_probability_must_lie_between_zero_and_one(probability):
     refuses("probability", lambda: design(probability))
     refuses("smallest", lambda: st.failure_curve(*SYSTEM, smallest=probability, method=LOCAL))
-
-
-# -- which algorithm, and how far it goes --------------------------------------------------------
 
 
 def test_a_slow_method_is_counted_from_two_hundred_samples():
@@ -204,8 +199,7 @@ def test_small_runs_whose_states_tie(seed):
 def test_a_stress_in_another_unit_is_answered_without_sampling(stress):
     """A coefficient, MPa, or a force: 37,000 evaluations gave P = 0 without a warning."""
     field = st.RandomField(st.Lognormal(mean=1e6, cv=0.12), FIELD.spectrum)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         found = failure(stress, system=(PROBLEM, field))
     doubted = [w for w in caught if "check the units" in str(w.message)]
     assert len(doubted) == (stress < 2e4)  # a fiftieth of the mean strength
@@ -231,9 +225,6 @@ def test_a_force_as_a_stress_is_answered_at_once(stress, pressed):
         with pytest.warns(st.UnitWarning, match="check the units"):
             found = st.failure_probability(problem, random, **given, method=EXACT)
         assert (found.probability, found.evaluations) == (float(stress > 1e8), 0)
-
-
-# -- the local criterion checked by equilibrium --------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -298,9 +289,6 @@ def test_auto_leaves_a_guide_whose_samples_do_not_fail(joint):
     assert "a poor guide" in found.reason
 
 
-# -- strength that may lie below the residual strength ---------------------------------------------
-
-
 def above(residual, what, field=FIELD, method=LOCAL):
     """Ask for samples, onsets or a probability where there is a residual strength."""
     problem = make_problem(weakening_rate=0.5e12, residual_strength=residual)
@@ -322,8 +310,7 @@ def test_strength_below_the_residual_strength_is_refused(what):
 @pytest.mark.parametrize("what", ["onset", "monte_carlo", "failure_probability"])
 def test_some_strength_below_the_residual_strength_is_said_once(what):
     field = st.paper.strength(PROBLEM, 2.0)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         above(0.73e6, what, field, EXACT)
     (said,) = [str(w.message) for w in caught if "residual" in str(w.message)]
     if what != "onset":
@@ -360,9 +347,6 @@ def test_strengths_in_coefficients_are_compared_as_stresses(units):
     random = st.RandomInterface(strength=strength, residual_strength=residual)
     with pytest.warns(st.AccuracyWarning, match=r"3\.1[23]\d* % of"):
         st.monte_carlo(pressed, random, method=LOCAL, samples=1)
-
-
-# -- the command ---------------------------------------------------------------------------------
 
 
 def test_command_writes_table_data_and_figure(runs, tmp_path):
