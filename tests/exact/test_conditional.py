@@ -82,6 +82,25 @@ def test_mean_and_deviation_are_those_of_dense_kriging(interface, shift, mean_mo
     assert given.quantile(interface, 0.5).shape == interface.shape
 
 
+@pytest.mark.parametrize("rough", [20e3, 100e3])
+def test_values_that_contradict_each_other_are_those_of_dense_kriging_with_a_warning(rough):
+    """A rough surface whose roughness is neither in the field nor in the noise of 2 kPa."""
+    field = st.RandomField(scipy.stats.norm(1e6, 0.2e6), FIELD.spectrum)
+    places = np.random.default_rng(5).uniform(0.0, 0.03, (1, 30))
+    values = scan(LINE, places, field) + rough * np.random.default_rng(6).normal(size=30)
+    z, error = (values - 1e6) / 0.2e6, 0.01
+    across = correlation(field, LINE, LINE.x[None], places)
+    inner = correlation(field, LINE, places, places) + error**2 * np.eye(30)
+    weights = np.linalg.solve(inner, across.T).T
+    deviation = np.sqrt(np.maximum(1.0 - (weights * across).sum(axis=1), 0.0))
+    known = conditioning(given_on(places[0], values, 2e3, field), LINE)
+    found = known.moments(field.modes(LINE).basis(LINE.x[None]))
+    np.testing.assert_allclose(found[0], weights @ z, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(found[1], deviation, rtol=1e-6, atol=1e-6)
+    with pytest.warns(st.AccuracyWarning, match="unlikely for this field"):
+        known.warn()
+
+
 def test_noise_leads_from_the_measured_values_to_the_field_as_it_was():
     places = LINE.x[10:30]
     values = scan(LINE, places[None])

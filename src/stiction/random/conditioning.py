@@ -39,6 +39,8 @@ DOUBTFUL = 5.0  # standard deviations of chi-square beyond which values do not s
 IMPOSSIBLE = 4.0  # errors beyond a bound of the marginal that no measured value has
 FURTHEST = 37.0  # largest z whose tail of the normal distribution is a float
 REACH, NODES = 8.0, 49  # half width of Gaussians, and nodes across them
+CUT = 18.0  # fall of a log density from its peak to the ends that leaves nothing beyond
+NARROWINGS = 6  # of a range that holds a peak, each to two of its intervals at least
 TURNS, SETTLED = 8, 1e-3  # between likelihood and regression; change of z that ends them
 NEGLIGIBLE = 1e-8  # singular value below which a direction of the draws stays as it is
 FLAT, SHARP = 1e-4, 1e-4  # least precision of a measured z; its error that needs no turns
@@ -166,11 +168,30 @@ class Measured(NamedTuple):
         score = _normal_score(law.cdf(edges), law.sf(edges)).clip(-FURTHEST, FURTHEST)
         width = REACH * np.sqrt(variance)
         low, high = np.maximum(score[0], mean - width), np.minimum(score[1], mean + width)
-        low, high = np.where(low < high, (low, high), (mean - width, mean + width))
-        half = np.maximum(0.5 * (high - low), TINY)[:, None]
-        z = 0.5 * (low + high)[:, None] + half * np.linspace(-1.0, 1.0, NODES)
-        off = (z - mean[:, None]) ** 2 / variance[:, None]
-        density = -0.5 * (off + ((value[:, None] - from_normal(self.marginal, z)) / noise) ** 2)
+        overlap = low < high
+        low, high = np.where(overlap, (low, high), (mean - width, mean + width))
+
+        def evaluate() -> tuple[Array, Array, Array]:
+            half = np.maximum(0.5 * (high - low), TINY)[:, None]
+            z = 0.5 * (low + high)[:, None] + half * np.linspace(-1.0, 1.0, NODES)
+            off = (z - mean[:, None]) ** 2 / variance[:, None]
+            miss = (value[:, None] - from_normal(self.marginal, z)) / noise
+            return half, z, -0.5 * (off + miss**2)
+
+        half, z, density = evaluate()
+        # Where a value contradicts the others, their product peaks outside or at an end.
+        apart = ~overlap | (density[:, [0, -1]].max(axis=1) > density.max(axis=1) - CUT)
+        if apart.any():
+            low = np.where(apart, np.minimum(score[0], mean - width), low)
+            high = np.where(apart, np.maximum(score[1], mean + width), high)
+            rows = np.arange(len(z))
+            for _ in range(NARROWINGS):
+                half, z, density = evaluate()
+                near = density > density.max(axis=1, keepdims=True) - 0.5 * REACH**2
+                first, last = near.argmax(axis=1), NODES - 1 - near[:, ::-1].argmax(axis=1)
+                low = np.where(apart, z[rows, np.maximum(first - 1, 0)], low)
+                high = np.where(apart, z[rows, np.minimum(last + 1, NODES - 1)], high)
+            half, z, density = evaluate()
         top = density.max(axis=1, keepdims=True)
         weight = np.exp(density - top)
         total = weight.sum(axis=1)
