@@ -106,7 +106,8 @@ test_numbers = refusals({
     "slip ... must be True or False ... '1'": lambda: st.Equilibrium(slip="1"),
     "arrest ... must be True or False ... 'no'":
         lambda: st.theory.griffith_length(PROBLEM, 1e6, 1.0, arrest="no"),
-    "seed: must be greater than or equal to 0, got -1": lambda: make_strength().sample(LINE, seed=-1),
+    "seed: must be greater than or equal to 0, got -1":
+        lambda: make_strength().sample(LINE, seed=-1),
     "seed ... whole ... '1'":
         lambda: st.theory.rice_distribution(PROBLEM, make_strength(), seed="1"),
     "samples: must be greater than or equal to 1, got 0": lambda: monte_carlo(samples=0),
