@@ -10,7 +10,7 @@ import signal
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -52,10 +52,9 @@ def echo(text: Any = "", *, err: bool = False) -> None:
     typer.echo(safe, err=err)
 
 
-def in_options(text: str, command: Callable[..., Any] | None) -> str:
+def in_options(text: str, command: Callable[..., Any]) -> str:
     """Return a message in the words of a command: ``--gaps fill`` for ``gaps="fill"``."""
-    parameters = {} if command is None else inspect.signature(command, eval_str=True).parameters
-    for name, parameter in parameters.items():
+    for name, parameter in inspect.signature(command, eval_str=True).parameters.items():
         extras = getattr(parameter.annotation, "__metadata__", ())
         if any(isinstance(extra, OptionInfo) for extra in extras):
             option, argument = f"--{name.replace('_', '-')}", rf"(?<![\w.-]){name}"
@@ -83,11 +82,8 @@ def _save_figure(axes: Any, path: Path) -> None:
 
 
 @contextmanager
-def _executor(scheduler: str | None) -> Iterator[Any]:
-    """The executor of a Dask scheduler; None without one."""
-    if scheduler is None:
-        yield None
-        return
+def _executor(scheduler: str) -> Iterator[Any]:
+    """The executor of a Dask scheduler."""
     try:
         from distributed import Client
 
@@ -128,7 +124,7 @@ def run(
     # A batch system's SIGTERM ends a run as Ctrl-C does: what is done is stored.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        with _executor(scheduler) as executor:
+        with nullcontext() if scheduler is None else _executor(scheduler) as executor:
             result = loaded.run(
                 out=out, workers=workers, executor=executor, part=part, pilot=pilot
             )
@@ -228,6 +224,8 @@ def check(study: StudyFile) -> None:
 
 def description(study: Any) -> dict[str, str]:
     """Return a description of a study, in a few lines with titles."""
+    import pandas as pd
+
     from stiction.ensemble.dataset import distinct
 
     points, ensemble = study.experiments, study.ensemble
@@ -241,10 +239,9 @@ def description(study: Any) -> dict[str, str]:
         keys = " with ".join(variable.long_name for _, variable in coordinates.values())
         values = coordinates[dim][0]
         lines[f"axis {number}"] = f"{keys}: {len(values)} values, {values[0]} to {values[-1]}"
-    numbers = [_numbers(point) for point in some]
-    for title, unit in dict.fromkeys(key for found in numbers for key in found):
-        each = [found[title, unit] for found in numbers if (title, unit) in found]
-        ends = dict.fromkeys(f"{value:.5g}" for value in (min(each), max(each)))
+    numbers = pd.DataFrame([_numbers(point) for point in some])
+    for (title, unit), each in numbers.items():
+        ends = dict.fromkeys(f"{value:.5g}" for value in (each.min(), each.max()))
         lines[title] = f"{' to '.join(ends)} {unit}".rstrip()
     return lines
 
@@ -512,16 +509,15 @@ def _options(
     pass
 
 
-_running: list[Callable[..., None]] = []
-"""The command, in whose words warnings are."""
-
-
 def _command(function: Callable[..., None]) -> Callable[..., None]:
-    """Errors in the words of the command line; Ctrl-C ends with exit code 130, as shells expect."""
+    """Messages in the words of the command; Ctrl-C ends with exit code 130, as shells expect."""
+
+    def show(message: Warning | str, *args: Any, **kwargs: Any) -> None:
+        echo(f"warning: {in_options(str(message), function)}", err=True)
 
     @functools.wraps(function)
     def wrapped(*args: Any, **kwargs: Any) -> None:
-        _running.append(function)
+        warnings.showwarning = show
         try:
             function(*args, **kwargs)
         except InputError as error:
@@ -537,17 +533,12 @@ for _function in (run, check, status, export, report, schema, onset, rupture, re
     app.command()(_command(_function))
 
 
-def _show_warning(message: Warning | str, *args: Any, **kwargs: Any) -> None:
-    echo(f"warning: {in_options(str(message), _running[-1] if _running else None)}", err=True)
-
-
 def main() -> None:
     """Run the command line: invalid input and a full disk give a message, not a traceback.
 
     The exit code is 2 for invalid input and 1 for failures of the run.
     """
     logging.basicConfig(format="%(message)s", level=logging.WARNING, stream=sys.stderr)
-    warnings.showwarning = _show_warning
     try:
         try:
             app(standalone_mode=True)
@@ -558,13 +549,9 @@ def main() -> None:
             echo(f"error: {text}", err=True)
         sys.exit(2)
     except (RunError, TimeoutError, MemoryError, OSError) as error:
-        _end(str(error) or "not enough memory")
-
-
-def _end(text: str) -> None:
-    echo(f"error: {text}", err=True)
-    try:
-        sys.stdout.flush()
-    except OSError:  # to a full disk: the interpreter would try again at its end
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    sys.exit(1)
+        echo(f"error: {str(error) or 'not enough memory'}", err=True)
+        try:
+            sys.stdout.flush()
+        except OSError:  # to a full disk: the interpreter would try again at its end
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)

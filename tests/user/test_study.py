@@ -180,6 +180,13 @@ def test_ranges(key, span, values):
     assert [point.values[key] for point in points] == pytest.approx(values, rel=1e-14)
 
 
+def test_keys_named_as_the_ends_of_a_range():
+    """An unquoted key of TOML is a table: here one with `start`, which is no range."""
+    rupture = {"type": "rupture", "loading_rate": 1e8}
+    points = swept({"method": {"start": ["rest", "equilibrium"]}}, method=rupture).experiments
+    assert [point.method.start for point in points] == ["rest", "equilibrium"]
+
+
 def test_whole_tables_are_values_too():
     marginals = [STUDY["random"]["strength"]["marginal"], LOGNORMAL]
     study = swept({"random.strength.marginal": marginals})
@@ -207,6 +214,16 @@ def test_ranges_have_the_type_and_unit_of_their_key():
     axes = found.axes
     assert axes["nodes"]["nodes"][0].dtype == np.int64
     assert axes["low"]["low"][1].units == "Pa"
+    load = {"profile": {"type": "edge", "excess": 1.0, "decay": 0.01}}
+    held = {"type": "rupture", "loading_rate": 1e8}
+    axes = swept(
+        {"problem.load.profile.decay": [0.01, 0.02]},
+        {"problem.load.profile.excess": [1.0, 2.0]},
+        {"method.end_time": [1e-3, 2e-3]},
+        problem__load=load, method=held,
+    ).axes  # fmt: skip
+    units = [axes[name][name][1].units for name in ("decay", "excess", "end_time")]
+    assert units == ["m", "1", "s"]
 
 
 def test_a_correlation_coefficient_is_swept():

@@ -8,9 +8,6 @@ from stiction.errors import InputError, unknown_name
 from stiction.model import describe, keys_of
 from stiction.random.marginals import ScipyMarginal
 
-MAPPINGS = ("correlation", "between")
-"""Tables of `RandomInterface` whose keys are names of properties."""
-
 
 def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
     """Return a copy of a model object with dotted keys replaced, all of them at once.
@@ -36,9 +33,8 @@ def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
     if unknown:
         raise InputError([unknown_name(path or "sweep", name, names) for name in unknown])
     for name, below in inside.items():
-        part = owner.get(name, {}) if table else getattr(owner, names[name])
-        part = {} if part is None and name in MAPPINGS else part
-        changes[name] = with_values(part, below, begin + name)
+        part = owner.get(name) if table else getattr(owner, names[name])
+        changes[name] = with_values({} if part is None else part, below, begin + name)
     if table:
         return {**owner, **changes}
     try:

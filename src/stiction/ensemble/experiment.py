@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Annotated, Any, TypeAlias
 
 import numpy as np
@@ -151,16 +151,14 @@ class Experiment:
         # A rough field has hundreds of draws for each node.
         return min(size, max(1, MOST_NUMBERS // max(interface.size, self.dimension)))
 
-    def batches(self, first: int, count: int, size: int = 0) -> list[tuple[int, int]]:
+    def batches(self, first: int, count: int, size: int = 0) -> Iterator[tuple[int, int]]:
         """Cut samples first .. first + count - 1 into (first, count), at multiples of a size."""
         size, end = size or self.batch, first + count
-        edges = [first, *range(first - first % size + size, end, size), end]
-        return [(start, stop - start) for start, stop in pairwise(edges)]
+        edges = chain((first,), range(first - first % size + size, end, size), (end,))
+        return ((start, stop - start) for start, stop in pairwise(edges))
 
 
-@lru_cache(maxsize=8)
-def _solver(problem: Problem, method: Any) -> Solver:
-    return prepared(problem, method)
+_solver = lru_cache(maxsize=8)(prepared)
 
 
 @model(kw_only=True)

@@ -65,15 +65,14 @@ class LimitState:
 
     def __call__(self, draws: Array) -> Array:
         """Return the stress at onset, Pa, of finite draws (samples, dimension) or (dimension,)."""
-        given = check("draws", draws, Numbers)
+        given, experiment = check("draws", draws, Numbers), self.experiment
         if given.ndim not in (1, 2) or given.shape[-1] != self.dimension:
             raise InputError(
                 f"draws: must have shape (samples, {self.dimension}), got {describe(given)}"
             )
         if not np.isfinite(given).all():
             raise InputError("draws: must be finite")
-        rows, lowest = np.atleast_2d(given), self.bounds[0]
-        experiment = self.experiment
+        rows = np.atleast_2d(given)
         pace = max(experiment.method.seconds_per_sample(experiment.problem), 1e-9)
         size = max(int(SHORTEST / pace), -(-len(rows) // self.workers))
         size = max(1, min(size, experiment.batch))
@@ -82,7 +81,7 @@ class LimitState:
             found = self._stress(rows)
         else:
             found = np.concatenate(in_threads(self._stress, parts, self.workers))
-        found = np.maximum(found, lowest)  # rounding may leave a stress slightly below
+        found = np.maximum(found, self.bounds[0])  # rounding may leave a stress slightly below
         return found if given.ndim == 2 else found[0]
 
     def _stress(self, draws: Array) -> Array:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from stiction.ensemble.batches import missing_spans, solve_spans, usable_cores, versions
 from stiction.ensemble.dataset import Gathered, GridAxes, distinct
 from stiction.ensemble.experiment import AnyRandom, Ensemble, Experiment
-from stiction.ensemble.pilot import pilot_attributes
+from stiction.ensemble.pilot import compare, doubt
 from stiction.ensemble.store import Store
 from stiction.errors import InputError, RunError, collect_warnings, warn_accuracy, warn_user
 from stiction.methods import MethodObject, study_attributes
@@ -93,7 +93,10 @@ def gather(
                 raise (InputError if failure.input else RunError)(str(failure))
     found = store.pilot if store else None
     if found is None and pilot:
-        found = pilot_attributes(points, ensemble, show=progress is True)
+        found = compare(points, ensemble.first, ensemble.samples, progress is True)
+        where = " at the worst point of the sweep" if len(points) > 1 else ""
+        if text := doubt(found, where):
+            warn_accuracy(text)
         if store:
             store.note_pilot(found)
     result = rows.dataset({**attributes, **(found or {})}, axes)

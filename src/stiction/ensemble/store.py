@@ -46,7 +46,7 @@ class Store:
     """
 
     def __init__(self, path: Path, study: dict[str, Any]) -> None:
-        self.path, self.study = path, study
+        self.path = path
         self._mark = digest(json.dumps(_identity(study), sort_keys=True).encode())
         self.damage: dict[str, str] = {}
         self._taken: list[Table] = []

@@ -230,8 +230,7 @@ def _notes(likelihood: Likelihood, error: float, u: Array) -> tuple[str, ...]:
     notes = _piled_up(prior, u)
     middle = prior.theta(u.mean(axis=0, keepdims=True))
     (experiment,) = experiments_at(prior, middle, likelihood.method)
-    pilot = compare(experiment)
-    if pilot and (text := doubt(pilot)):
+    if text := doubt(compare([experiment])):
         notes.append(text)
     if error > TOLERABLE:
         notes.append(

@@ -50,20 +50,16 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 
-def _method(value: Any) -> Any:
-    return value if isinstance(value, dict) else as_method(value)
-
-
 AnyMethod: Any = Annotated[
     functools.reduce(operator.or_, methods().values()),
     Field(discriminator="type"),
-    BeforeValidator(_method),
+    BeforeValidator(lambda given: given if isinstance(given, dict) else as_method(given)),
 ]
 """Any registered method; in a study file ``type`` selects it."""
 
 
-def _interface(value: Any) -> Any:
-    return as_random_interface(value) if isinstance(value, RandomField) else value
+def _interface(given: Any) -> Any:
+    return as_random_interface(given) if isinstance(given, RandomField) else given
 
 
 AnyRandom: Any = Annotated[RandomInterface, BeforeValidator(_interface)]
@@ -296,8 +292,8 @@ class Study(_Parts):
     @classmethod
     def from_toml(cls, path: str | Path) -> Study:
         """Read a study from a TOML file."""
-        file = Path(check("path", path, FilePath))
-        return cls.from_dict(_read_toml(file), folder=file.parent)
+        file = check("path", path, FilePath)
+        return _read(cls, _read_toml(file), file.parent)
 
     @classmethod
     def from_result(cls, result: xr.Dataset) -> Study:

@@ -22,12 +22,16 @@ _TABLES = ("problem", "random", "method", "ensemble")
 _UNITS = {name: variable.units for name, variable in PROFILES.items()} | {
     "length": "m",
     "correlation_length": "m",
+    "decay": "m",
     "shear_modulus": "Pa",
+    "youngs_modulus": "Pa",
     "density": "kg m-3",
     "loading_rate": "Pa s-1",
+    "end_time": "s",
+    "time_step": "s",
 }
-_OF_THE_FIELD = ("mean", "low", "high", "loc", "scale")
-"""Parameters of a marginal in the unit of its field."""
+_OF_THE_FIELD = ("mean", "low", "high", "loc", "scale", "noise")
+"""Parameters of a marginal, and of what was measured, in the unit of their field."""
 
 Axis: TypeAlias = dict[str, list[Any]]
 """Keys that vary together, each with one value for each step."""
@@ -55,13 +59,12 @@ class Range:
 
     def values(self) -> list[float]:
         """Return the values."""
-        if self.spacing == "linear":
-            return np.linspace(self.start, self.stop, self.count).tolist()
-        if min(self.start, self.stop) <= 0.0:
+        if self.spacing == "log" and min(self.start, self.stop) <= 0.0:
             raise InputError(
                 f"a log range needs positive ends, got {self.start:g} and {self.stop:g}"
             )
-        return np.geomspace(self.start, self.stop, self.count).tolist()
+        between = np.geomspace if self.spacing == "log" else np.linspace
+        return between(self.start, self.stop, self.count).tolist()
 
 
 def _values(key: str, given: Any) -> list[Any]:
@@ -99,16 +102,13 @@ def _flat(given: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """Dotted keys of a table: TOML reads an unquoted ``a.b = 1`` as nested tables."""
     result: dict[str, Any] = {}
     for key, value in given.items():
-        if isinstance(value, Mapping) and not {"start", "stop", "count"} & set(value):
-            result |= _flat(value, f"{prefix}{key}.")
-        else:
+        inner = value if isinstance(value, Mapping) else {}
+        lists = [one for one in inner.values() if isinstance(one, list | tuple | np.ndarray)]
+        if lists or (inner and not {"start", "stop", "count"} & set(inner)):
+            result |= _flat(inner, f"{prefix}{key}.")
+        else:  # values, or a range of them
             result[f"{prefix}{key}"] = value
     return result
-
-
-def size_of(axis: Axis) -> int:
-    """Return the number of steps of an axis."""
-    return len(next(iter(axis.values())))
 
 
 def read_axes(given: Any) -> list[Axis]:
@@ -130,7 +130,7 @@ def read_axes(given: Any) -> list[Axis]:
             problems[unknown_name(key, table, _TABLES)] = None
         elif len(inside) > 1:
             problems[f"{key}: is swept twice, by {' and '.join(inside)}"] = None
-    points = math.prod(map(size_of, axes))
+    points = math.prod(len(next(iter(axis.values()))) for axis in axes)
     if points > MOST_POINTS:
         problems[f"makes {points} points, at most {MOST_POINTS} are allowed"] = None
     if problems:
@@ -193,7 +193,7 @@ def _text(value: Any) -> str:
 
 def _unit(parts: Sequence[str], coefficients: Collection[str]) -> str:
     """Return the unit of the values of a key, given by its parts."""
-    if "marginal" in parts and parts[-1] in _OF_THE_FIELD:
+    if {"marginal", "given"} & {*parts} and parts[-1] in _OF_THE_FIELD:
         return "1" if parts[1] in coefficients else _UNITS.get(parts[1], "1")
     return _UNITS.get(parts[-1], "1")
 
