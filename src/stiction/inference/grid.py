@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import entropy
 
 from stiction.arrays import Array
 
@@ -30,18 +31,10 @@ class Grid:
         result: Array = self.mass.sum(axis=others)
         return result
 
-    def held(self, axis: int, low: float, high: float) -> float:
-        """Return the mass between two values of one parameter, as u."""
-        mass, (first, last) = self.marginal(axis), self.box[:, axis]
-        centres = first + (last - first) * (np.arange(mass.size) + 0.5) / mass.size
-        return float(mass[(centres > low) & (centres < high)].sum())
-
     def information(self, axis: int) -> float:
         """Return the divergence of the marginal of one parameter from its prior, nats."""
         mass = self.marginal(axis)
-        prior = np.ptp(self.box[:, axis]) / mass.size
-        held = mass > 0.0
-        return float(np.sum(mass[held] * np.log(mass[held] / prior)))
+        return float(np.log(mass.size / np.ptp(self.box[:, axis])) - entropy(mass))
 
     def draws(self, count: int, seed: int) -> Array:
         """Draw from the posterior as u, (count, parameters), uniform within the cells."""

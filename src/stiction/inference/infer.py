@@ -10,7 +10,7 @@ from stiction.criterion.local import LocalCriterion
 from stiction.ensemble.limit_state import no_single_length
 from stiction.ensemble.pilot import compare, doubt
 from stiction.errors import InputError, warn_accuracy
-from stiction.inference.grid import Grid, grid_of
+from stiction.inference.grid import grid_of
 from stiction.inference.likelihood import (
     Likelihood,
     bounds_of,
@@ -77,7 +77,7 @@ def infer(
         ``"residual_strength.marginal.high"`` or ``"problem.friction.weakening_rate"``.
     method : LocalCriterion, Equilibrium or any other
         The method that finds the onset. For all but the local criterion, that one, if applicable,
-        first finds the relevant part of the prior; if the posterior reaches its end, all is taken.
+        first finds the relevant part of the prior; a posterior that reaches its end takes all.
     load_cell_error : float
         Standard deviation of the error of a peak, in `unit`; with `Peaks` in Pa, or as a
         coefficient.
@@ -163,7 +163,9 @@ def infer(
             box = _first_box(likelihood_of(LocalCriterion(), None, whole))
         likelihood = likelihood_of(method, samples, box)
         grid = grid_of(likelihood, box)
-        if np.any(box != whole) and (grid is None or _reaches_end(grid, box)):
+        if np.any(box != whole) and (
+            grid is None or _reaches_end(grid.draws(DRAWS, seed), box)
+        ):
             likelihood = likelihood_of(method, samples, whole)
             grid = grid_of(likelihood, whole)
     if np.all(likelihood.box == whole) and (refused := likelihood.refusals()):
@@ -214,14 +216,11 @@ def _first_box(likelihood: Likelihood) -> Array:
     return np.clip(grid.box + room * np.array([[-1.0], [1.0]]), 0.0, 1.0)
 
 
-def _reaches_end(grid: Grid, box: Array) -> bool:
-    """Whether the posterior reaches an end of the box within the prior."""
-    ends = box + NEAR * (box[1] - box[0]) * np.array([[1.0], [-1.0]])
-    return any(
-        (box[0, i] > 0.0 and grid.held(i, 0.0, low) > HELD)
-        or (box[1, i] < 1.0 and grid.held(i, high, 1.0) > HELD)
-        for i, (low, high) in enumerate(ends.T)
-    )
+def _reaches_end(u: Array, box: Array) -> bool:
+    """Whether draws of the posterior (draws, parameters) reach an end of the box in the prior."""
+    room = NEAR * np.ptp(box, axis=0)
+    held = np.stack([np.mean(u < box[0] + room, axis=0), np.mean(u > box[1] - room, axis=0)])
+    return bool(np.any((held > HELD) & (box != [[0.0], [1.0]])))
 
 
 def _notes(likelihood: Likelihood, error: float, u: Array) -> tuple[str, ...]:

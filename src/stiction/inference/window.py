@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
+from scipy.signal.windows import tukey
 
 from stiction.arrays import Array
 
@@ -57,7 +58,7 @@ class Window:
         )
         # Orthonormal polynomials of the trend, (points, terms).
         self.basis = _polynomials(measured, degree)
-        tapers = np.ix_(*map(_taper, self.shape))
+        tapers = np.ix_(*[tukey(2 * n + 1, TAPERED)[1::2] for n in self.shape])  # nowhere zero
         self.taper = np.prod(np.broadcast_arrays(measured, *tapers), axis=0)
         self.taper /= np.sqrt(np.sum(self.taper**2))
         lags = tuple(2 * n for n in self.shape)
@@ -176,14 +177,6 @@ def _polynomials(measured: NDArray[np.bool_], degree: int) -> Array:
     ]
     basis: Array = np.linalg.qr(np.stack([term[measured] for term in terms], axis=1))[0]
     return basis
-
-
-def _taper(n: int) -> Array:
-    """A cosine (Tukey) taper that is nowhere zero."""
-    place = (np.arange(n) + 0.5) / n
-    edge = np.minimum(np.minimum(place, 1.0 - place) / (0.5 * TAPERED), 1.0)
-    result: Array = np.sin(0.5 * np.pi * edge) ** 2
-    return result
 
 
 def _fade(k: Array, end: float) -> Array:
