@@ -94,7 +94,7 @@ def fields():
     for ratio in RATIOS:
         strength = field(ratio * problem.nucleation_length)
         ours = timed(lambda s=strength: s.sample(problem.interface, samples=512, seed=0)) / 512
-        draws = strength.draws(problem.interface, 16, seed=0)
+        draws = st.RandomInterface(strength=strength).draws(problem.interface, 16, seed=0)
         sigma = strength.modes(problem.interface).sigma[1:]
         phase = 2 * np.pi * np.outer(np.arange(1, sigma.size + 1), np.arange(1024) / 1024)
 

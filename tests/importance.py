@@ -18,8 +18,8 @@ from scipy.special import logsumexp
 import stiction as st
 from stiction.arrays import Array
 from stiction.criterion.windows import windows_of
+from stiction.random.fields import RandomField
 from stiction.random.mapping import from_normal
-from stiction.random.random_field import RandomField
 
 SIZES = (1.0, 1.15)
 """Shifts in units of the dips: the failures lie a little beyond them."""
@@ -42,7 +42,7 @@ def dips(problem: st.Problem, field: RandomField, stress: float) -> Array:
     windows = windows_of(problem, float(np.max(np.asarray(problem.friction.weakening_rate))))
     weight = windows[len(windows) // 2].weight
     unit = np.eye(field.modes(interface).dimension)
-    waves = field.gaussian(interface, unit).reshape(len(unit), -1)  # z of each draw alone
+    waves = field.modes(interface).gaussian(unit).reshape(len(unit), -1)  # z of each draw alone
     z, along = np.zeros(interface.shape), np.zeros(len(unit))
     for _ in range(100):
         slope = from_normal(field.marginal, z + 1e-4) - from_normal(field.marginal, z - 1e-4)

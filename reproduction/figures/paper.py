@@ -237,9 +237,7 @@ def figure_5(d: Data):
     law = setting.MARGINAL.distribution.pdf(s) * MEAN
     upper[1].plot(law, s / MEAN, color=INK)
     for ratio in RATIOS:
-        field = setting.strength(ratio)
-        draws = field.draws(PROBLEM.interface, 1, 0)  # one draw, as in the paper's (a) and (b)
-        tau_p = field.profiles(PROBLEM.interface, draws)
+        tau_p = setting.strength(ratio).sample(PROBLEM.interface)  # of the same draws for each
         upper[0].plot(x, tau_p[0] / MEAN, **common.line(ratio), lw=0.9, label=f"{ratio:g}")
         lower[0].plot(
             x,

@@ -31,13 +31,13 @@ from stiction.load import Load as Load
 from stiction.methods import onset as onset
 from stiction.problem import Problem as Problem
 from stiction.profiles.reading import read_profile as read_profile
+from stiction.random.fields import RandomField as RandomField
+from stiction.random.fields import RandomInterface as RandomInterface
 from stiction.random.marginals import Beta as Beta
 from stiction.random.marginals import Gamma as Gamma
 from stiction.random.marginals import Lognormal as Lognormal
 from stiction.random.marginals import TruncatedNormal as TruncatedNormal
 from stiction.random.marginals import Weibull as Weibull
-from stiction.random.random_field import RandomField as RandomField
-from stiction.random.random_interface import RandomInterface as RandomInterface
 from stiction.random.spectra import CustomSpectrum as CustomSpectrum
 from stiction.random.spectra import ExponentialSpectrum as ExponentialSpectrum
 from stiction.random.spectra import PowerLawSpectrum as PowerLawSpectrum

@@ -9,9 +9,8 @@ from scipy.stats import kstest
 from setups import beta_strength, ensemble, make_problem
 
 import stiction as st
+from stiction.random.fields import _conditioned
 from stiction.random.mapping import from_normal
-from stiction.random.random_field import conditioning
-from stiction.random.random_interface import _conditioned
 
 LINE = st.Interface(length=0.05, nodes=64)
 PLANE = st.Interface(length=(0.02, 0.01), nodes=(16, 8))
@@ -24,7 +23,8 @@ FACTOR = st.Lognormal(mean=1.0, cv=0.1)
 def scan(interface, places, field=FIELD):
     """Values of one sample at places (dimensions, points), between the nodes by its own waves."""
     phi = field.modes(interface).basis(places)
-    return from_normal(field.marginal, phi @ field.draws(interface, 1, 7)[0])
+    draws = st.RandomInterface(strength=field).draws(interface, 1, seed=7)
+    return from_normal(field.marginal, phi @ draws[0])
 
 
 def all_of(coordinates):
@@ -70,13 +70,14 @@ def test_mean_and_deviation_are_those_of_dense_kriging(interface, shift, mean_mo
     inner = correlation(field, interface, places, places) + error**2 * np.eye(values.size)
     weights = np.linalg.solve(inner, across.T).T
     covariance = correlation(field, interface, grid, grid) - weights @ across.T
-    known = conditioning(given, interface)
+    random = st.RandomInterface(strength=given)
+    ((_, known),) = _conditioned(random, interface)
     mean, deviation = known.moments(field.modes(interface).basis(grid))
     np.testing.assert_allclose(mean, weights @ z, atol=1e-10)  # round-off of the dense solution
     np.testing.assert_allclose(deviation**2, np.diag(covariance), atol=1e-10)
     # 20,000 samples: an entry of a covariance scatters by 0.01, the largest of 16,384 by 4.5 of it.
-    draws = known.draws(field.draws(interface, 20_000, 1))
-    sampled = field.gaussian(interface, draws).reshape(20_000, -1)
+    draws = known.draws(random.draws(interface, 20_000, seed=1))
+    sampled = field.modes(interface).gaussian(draws).reshape(20_000, -1)
     np.testing.assert_allclose(sampled.mean(axis=0), mean, atol=5.0 / 20_000**0.5)
     np.testing.assert_allclose(np.cov(sampled.T), covariance, atol=0.05)
     assert given.quantile(interface, 0.5).shape == interface.shape

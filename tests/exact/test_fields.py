@@ -117,7 +117,8 @@ def test_gaussian_field_is_the_sum_of_its_modes_on_any_grid(make_strength, nodes
     """The grid of 64 nodes resolves 32 modes of the field's 289."""
     strength = make_strength(0.25, mean_mode=mean_mode)
     interface = st.Interface(length=0.1, nodes=nodes)
-    modes, draws = strength.modes(interface), strength.draws(interface, 3, seed=5)
+    modes = strength.modes(interface)
+    draws = st.RandomInterface(strength=strength).draws(interface, 3, seed=5)
     assert modes.count == 289
     a0, pairs = (draws[:, :1], draws[:, 1:]) if mean_mode else (np.zeros((3, 1)), draws)
     phase = 2.0 * np.pi * np.outer(np.arange(1, 290), interface.x) / interface.length
@@ -127,7 +128,7 @@ def test_gaussian_field_is_the_sum_of_its_modes_on_any_grid(make_strength, nodes
         + (pairs[:, 1::2] * modes.sigma[1:]) @ np.sin(phase)
     )
     # Round-off of a sum of 578 terms of size one.
-    np.testing.assert_allclose(strength.gaussian(interface, draws), direct, atol=1e-12)
+    np.testing.assert_allclose(modes.gaussian(draws), direct, atol=1e-12)
     assert np.sum(modes.sigma**2) == pytest.approx(1.0, rel=1e-14)
 
 
@@ -170,7 +171,9 @@ def test_finer_grids_extend_the_field():
 
 def test_the_same_modes_have_the_same_draws_whatever_the_spectrum(make_strength):
     fields = make_strength(2.0), make_strength(0.25), make_strength(2.0, mean_mode=True)
-    a, b, with_mean = (field.draws(LINE, 5, seed=1, first=250) for field in fields)
+    a, b, with_mean = (
+        st.RandomInterface(strength=field).draws(LINE, 5, seed=1, first=250) for field in fields
+    )
     assert a.shape[1] < b.shape[1]
     np.testing.assert_array_equal(a, b[:, : a.shape[1]])
     np.testing.assert_array_equal(with_mean[:, 1:], a)
@@ -187,7 +190,7 @@ def test_with_the_mean_mode_only_the_field_is_constant(make_strength):
 def test_draws_are_defined_by_seed_block_and_mode():
     """The promise of reproducibility, spelled out with numpy alone."""
     field = field_of(scipy.stats.norm(), 0.05)
-    found = field.draws(LINE, 1, seed=7, first=300)[0]
+    found = st.RandomInterface(strength=field).draws(LINE, 1, seed=7, first=300)[0]
     key = np.random.SeedSequence(entropy=7, spawn_key=(0, 1))  # sample 300 lies in block 1
     block = np.random.Generator(np.random.PCG64DXSM(key)).standard_normal((12, 256))
     np.testing.assert_array_equal(found, block[2:, 300 - 256])

@@ -33,7 +33,8 @@ def test_field_is_the_sum_of_all_modes_in_the_ellipse_on_any_grid(shape, mean_mo
     """Waves that a grid does not resolve, and those of Nyquist, included."""
     field = beta_strength(0.05, mean_mode=mean_mode, anisotropy=1.7)
     plane = st.Interface(length=(0.4, 0.3), nodes=shape)
-    modes, draws = field.modes(plane), field.draws(plane, 2, seed=3)
+    modes = field.modes(plane)
+    draws = st.RandomInterface(strength=field).draws(plane, 2, seed=3)
     numbers = [tuple(pair) for pair in modes.numbers[:, 1:].T.tolist()]
     cutoff = 2.5 * 2.0 * np.pi / 0.05 * (1.0 + 1e-12)  # (20, 0) lies on it
     wanted = {
@@ -53,7 +54,7 @@ def test_field_is_the_sum_of_all_modes_in_the_ellipse_on_any_grid(shape, mean_mo
         a, b = z[:, mean_mode + 2 * j], z[:, mean_mode + 2 * j + 1]
         direct += modes.sigma[j + 1] * (a * np.cos(phase) + b * np.sin(phase))
     # Round-off of a sum of 548 terms.
-    np.testing.assert_allclose(field.gaussian(plane, draws), direct, atol=1e-12)
+    np.testing.assert_allclose(modes.gaussian(draws), direct, atol=1e-12)
     assert np.sum(modes.sigma**2) == pytest.approx(1.0, rel=1e-13)
 
 
@@ -130,7 +131,8 @@ def test_a_mode_keeps_its_draws_whatever_the_spectrum():
     ]
     known = {}
     for field in fields:
-        modes, draws = field.modes(plane), field.draws(plane, 1, seed=2)[0]
+        modes = field.modes(plane)
+        draws = st.RandomInterface(strength=field).draws(plane, 1, seed=2)[0]
         pairs = draws[int(field.mean_mode) :].reshape(-1, 2)
         for number, pair in zip(modes.numbers[:, 1:].T.tolist(), pairs, strict=True):
             assert known.setdefault(tuple(number), tuple(pair)) == tuple(pair)

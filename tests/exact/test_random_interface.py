@@ -7,7 +7,7 @@ import pytest
 from setups import exact_onset, make_problem
 
 import stiction as st
-from stiction.random.random_interface import lower_factor
+from stiction.random.fields import lower_factor
 
 LINE = st.Interface(length=0.1, nodes=256)
 
@@ -72,7 +72,7 @@ def test_modes_beyond_a_short_spectrum_are_drawn_for_the_longer_one(make_strengt
     """Two spectra of different lengths under full correlation share their draws mode by mode."""
     short, long = make_strength(0.5), make_strength(4.0)
     found = tied(long, short).profiles(LINE, samples=2, seed=4)["residual_strength"]
-    assert np.array_equal(found, short.profiles(LINE, short.draws(LINE, 2, 4)))
+    assert np.array_equal(found, short.sample(LINE, samples=2, seed=4))
 
 
 def test_fracture_energy_and_critical_slip_as_random_properties(make_strength):

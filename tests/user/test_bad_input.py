@@ -29,6 +29,10 @@ def make_strength(correlation_length=2e-3, **options):
     return dataclasses.replace(beta_strength(correlation_length), **options)
 
 
+def of_draws(draws):
+    return st.RandomInterface(strength=make_strength()).from_draws(LINE, draws)
+
+
 def make_study(**options):
     given = {"method": LOCAL, "ensemble": st.Ensemble(samples=2)} | options
     return st.Study(problem=PROBLEM, random=make_strength(), **given)
@@ -170,8 +174,8 @@ test_fields_that_cannot_be = refusals({
     "max_wavenumber=...": lambda: make_strength(spectrum=np.cos),
     "no mode is left ... 0.1 m": lambda: make_strength(1.0).sample(LINE),
     "25000000 modes ... units": lambda: make_strength(1e-8).sample(LINE),
-    "draws ... (1, 3)": lambda: make_strength().profiles(LINE, np.zeros((1, 3))),
-    "draws ... finite": lambda: make_strength().profiles(LINE, np.full((1, 250), np.nan)),
+    "draws ... (samples, 250) ... (1, 251)": lambda: of_draws(np.zeros((1, 251))),
+    "draws ... finite": lambda: of_draws(np.full((1, 250), np.nan)),
     # More memory than there is
     "samples: this takes ... GiB": lambda: make_strength().sample(LINE, samples=10**400),
     "this takes ... GiB of memory": lambda: st.RandomInterface(

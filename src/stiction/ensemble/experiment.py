@@ -18,8 +18,7 @@ from stiction.errors import InputError, UnitWarning, unknown_name, warn_user
 from stiction.methods import Solver, Values, batch_size, prepared, variables_of
 from stiction.model import Count, Names, Number, model
 from stiction.problem import Problem, refusals
-from stiction.random.random_field import RandomField
-from stiction.random.random_interface import RandomInterface, as_random_interface
+from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 from stiction.random.stresses import (
     check_pressure,
     check_residual,

@@ -17,8 +17,7 @@ from stiction.methods import MethodObject
 from stiction.model import Count, Numbers, check, checked, describe
 from stiction.problem import Problem
 from stiction.progress import SILENT, Meter
-from stiction.random.random_field import RandomField
-from stiction.random.random_interface import RandomInterface
+from stiction.random.fields import RandomField, RandomInterface
 from stiction.random.stresses import support_in_stress
 
 Event = Literal["critical_stress", "first_instability"]

@@ -24,8 +24,8 @@ from stiction.inference.whittle import (
 )
 from stiction.inference.window import Window
 from stiction.progress import Meter, Show
+from stiction.random.fields import RandomField
 from stiction.random.mapping import from_normal
-from stiction.random.random_field import RandomField
 
 FEWEST = 20
 """Number of repetitions that determine a tail of errors."""

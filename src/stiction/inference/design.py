@@ -18,8 +18,7 @@ from stiction.methods import MethodObject
 from stiction.model import Names, Progress, at_least, check, checked, is_whole
 from stiction.problem import Problem
 from stiction.progress import Meter
-from stiction.random.random_field import RandomField
-from stiction.random.random_interface import RandomInterface
+from stiction.random.fields import RandomField, RandomInterface
 from stiction.results import to_dataset
 from stiction.variables import Variable
 

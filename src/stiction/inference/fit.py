@@ -28,7 +28,7 @@ from stiction.inference.window import Window
 from stiction.interface import Interface
 from stiction.load import NotNegative
 from stiction.model import Flag, Number, Positive, Progress, at_least, checked
-from stiction.random.random_field import RandomField
+from stiction.random.fields import RandomField
 from stiction.random.spectra import Share
 from stiction.variables import QUANTITIES
 

@@ -26,8 +26,7 @@ from stiction.methods import MethodObject
 from stiction.model import Progress, at_least, checked
 from stiction.problem import Problem
 from stiction.progress import Meter
-from stiction.random.random_field import RandomField
-from stiction.random.random_interface import RandomInterface
+from stiction.random.fields import RandomField, RandomInterface
 from stiction.random.stresses import mean_in_stress
 
 DRAWS = 4000

@@ -14,7 +14,7 @@ from stiction.inference.peaks import Peaks
 from stiction.inference.prior import Prior
 from stiction.model import Numbers, check, checked
 from stiction.problem import Problem
-from stiction.random.random_interface import RandomInterface
+from stiction.random.fields import RandomInterface
 from stiction.random.spectra import Share
 
 

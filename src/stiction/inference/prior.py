@@ -15,8 +15,7 @@ from stiction.ensemble.dotted_keys import with_values
 from stiction.errors import InputError, prefixed
 from stiction.model import describe, is_finite
 from stiction.problem import Problem
-from stiction.random.random_field import RandomField
-from stiction.random.random_interface import RandomInterface, as_random_interface
+from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 
 TAIL = 1e-4
 """Probability that is cut from either end of a prior whose density is zero there."""

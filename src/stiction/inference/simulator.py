@@ -14,8 +14,7 @@ from stiction.load import NotNegative
 from stiction.methods import MethodObject
 from stiction.model import Names, Numbers, at_least, check, checked, describe
 from stiction.problem import Problem
-from stiction.random.random_field import RandomField
-from stiction.random.random_interface import RandomInterface, as_random_interface
+from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 
 
 @checked

@@ -12,7 +12,7 @@ from stiction.model import check
 from stiction.plot.axes import add_friction_scale, on_axes, unit_for, with_unit
 from stiction.plot.style import INK, PAGE, color, series
 from stiction.problem import Problem
-from stiction.random.random_field import RandomField
+from stiction.random.fields import RandomField
 from stiction.variables import PROFILES
 
 MOST_LINES = 6

@@ -10,7 +10,7 @@ from scipy.special import ndtr, ndtri
 from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.problem import Problem
-from stiction.random.random_interface import RandomInterface
+from stiction.random.fields import RandomInterface
 
 # Shares of the strength at or below the residual strength that give a warning, or an error.
 WORTH_SAYING, MOST = 1e-6, 0.5

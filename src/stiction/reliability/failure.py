@@ -14,8 +14,7 @@ from stiction.methods import MethodObject, label, study_attributes
 from stiction.model import Count, Number, Positive, Progress, Real, checked
 from stiction.problem import Problem
 from stiction.progress import Meter
-from stiction.random.random_field import RandomField
-from stiction.random.random_interface import RandomInterface
+from stiction.random.fields import RandomField, RandomInterface
 from stiction.random.stresses import mean_in_stress
 from stiction.reliability.answer import (
     Budget,

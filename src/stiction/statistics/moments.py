@@ -11,7 +11,7 @@ from stiction.criterion.windows import windows_of
 from stiction.errors import InputError
 from stiction.model import checked
 from stiction.problem import Problem
-from stiction.random.random_field import RandomField
+from stiction.random.fields import RandomField
 
 
 @dataclass(frozen=True)

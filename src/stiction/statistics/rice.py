@@ -15,7 +15,7 @@ from stiction.errors import InputError
 from stiction.jit import jit
 from stiction.model import Count, Number, Numbers, brief, checked
 from stiction.problem import Problem
-from stiction.random.random_field import RandomField
+from stiction.random.fields import RandomField
 from stiction.statistics.moments import stationary
 
 LEVELS = 1024

@@ -39,8 +39,7 @@ from stiction.model import (
 )
 from stiction.problem import Problem
 from stiction.profiles.reading import profile_in_file
-from stiction.random.random_field import RandomField
-from stiction.random.random_interface import RandomInterface, as_random_interface
+from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 from stiction.study.run import AnyPart, StoredRun, samples_of_part
 from stiction.study.sweep import Point, Sweep, grid_axes, with_first_values
 

@@ -1,25 +1,40 @@
-"""The random interface: everything that is random along it, and how it is correlated."""
+"""Random fields, and the random interface: everything that is random along an interface."""
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from collections.abc import Mapping
 from functools import cached_property, lru_cache, reduce
 from itertools import chain
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+from scipy.optimize import brentq
+from scipy.special import ndtri
 
 from stiction.arrays import Array
-from stiction.errors import InputError, unknown_name
+from stiction.errors import InputError, unknown_name, warn_accuracy
 from stiction.friction import SCALES
 from stiction.interface import Interface
-from stiction.model import Number, Real, check_memory, checked, describe, model
-from stiction.random.conditioning import Conditioning
-from stiction.random.mapping import from_normal
+from stiction.model import (
+    Flag,
+    Number,
+    Numbers,
+    Positive,
+    Real,
+    check_memory,
+    checked,
+    describe,
+    model,
+)
+from stiction.random.conditioning import Conditioning, Conditions, Measured
+from stiction.random.mapping import correlation_of_mapped, from_normal, hermite_coefficients
 from stiction.random.marginals import AnyMarginal
-from stiction.random.random_field import RandomField
+from stiction.random.modes import Modes, make_modes
+from stiction.random.spectra import Share, Spectrum, lag_of_correlation
 from stiction.random.synthesis import BLOCK, Stream, block_of
 from stiction.variables import PROFILES
 
@@ -27,6 +42,204 @@ NAMES = tuple(PROFILES)
 COEFFICIENTS = ("strength", "residual_strength", "initial_stress")  # or stresses
 BETWEEN = 1000  # number of the stream of draws of the first property's factor
 DEFINITE = 1e-12  # round-off of eigenvalues of a correlation matrix
+# Limits of warnings: shares of the variance that the grid or the mean mode would hold, and the
+# error of a correlation.
+LOST, WITHOUT_MEAN, UNCERTAIN = 1e-4, 0.075, 0.01
+
+
+@model
+class RandomField:
+    """Stationary, periodic, non-Gaussian random field F^-1(Phi(z(x))).
+
+    Parameters
+    ----------
+    marginal : Beta, ..., or frozen continuous scipy.stats distribution
+        Distribution F of the field at a point.
+    spectrum : PowerLawSpectrum, ..., CustomSpectrum
+        Power spectral density of the Gaussian field z.
+    mean_mode : bool
+        Whether z has the mode k = 0. Without it, as in Albertini et al. (2020), every
+        sample has the same mean of z, which is harmless only if the correlation length is
+        short compared with the interface.
+    anisotropy : float, optional
+        On a plane, the correlation length along y over that along x, which is that of the
+        spectrum; 1 if left out.
+    of : {"friction_coefficient"}, optional
+        The field holds friction coefficients. The strength (or the other stress that the
+        field represents) is their product with the normal pressure.
+    conditions : Conditions, optional
+        Measured values, as set by `given`; in a study file the table ``given``.
+
+    Notes
+    -----
+    On a plane, a line along x has the correlation of the field on a line, except that
+    truncation removes slightly more power. Translation process after Grigoriu (1995), spectral
+    representation after Shinozuka and Deodatis (1991); Albertini et al. (2020), Eqs. 2 to 7.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> field = st.RandomField(
+    ...     marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
+    ...     spectrum=st.PowerLawSpectrum(correlation_length=2e-3),
+    ... )
+    >>> field.sample(st.Interface(length=0.1, nodes=512), samples=3, seed=1).shape
+    (3, 512)
+    """
+
+    marginal: AnyMarginal
+    spectrum: Spectrum
+    mean_mode: Flag = False
+    anisotropy: Positive | None = None
+    of: Literal["friction_coefficient"] | None = None
+    conditions: Annotated[Conditions | None, Field(alias="given")] = None
+
+    @property
+    def mean(self) -> float:
+        """Mean of the field, in its own unit (Pa for strength)."""
+        return float(self.marginal.distribution.mean())
+
+    @property
+    def standard_deviation(self) -> float:
+        """Standard deviation of the field, in its own unit."""
+        return float(self.marginal.distribution.std())
+
+    @checked
+    def modes(self, interface: Interface) -> Modes:
+        """Return the modes of this field on an interface; an `InputError` if there are none."""
+        if self.anisotropy is not None and not interface.is_plane:
+            raise InputError(
+                "anisotropy: is a ratio of correlation lengths along y and x, and a line has no y;"
+                f" got {self.anisotropy:g}, leave it out"
+            )
+        return make_modes(self.spectrum, self.mean_mode, self.anisotropy or 1.0, interface)
+
+    @checked
+    def given(self, profile: Any, *, noise: Positive) -> RandomField:
+        """Return the field conditioned on measured values: fixed there, random elsewhere.
+
+        Its samples use the draws of this field, and tend to its samples as the noise grows.
+
+        Parameters
+        ----------
+        profile : xarray.DataArray over x (m), on a plane over x and y
+            Measured values, in the unit of the field, at any places, such as
+            ``st.read_profile("scan.csv")``; NaN where nothing was measured.
+        noise : float
+            Standard deviation of the error of a value, in the same unit, positive.
+
+        Examples
+        --------
+        >>> import stiction as st
+        >>> import xarray as xr
+        >>> problem = st.paper.problem(nodes=256)
+        >>> strength = st.paper.strength(problem, correlation_ratio=1.0)
+        >>> scan = xr.DataArray([0.8e6, 0.9e6], {"x": [0.01, 0.02]}, "x")
+        >>> given = strength.given(scan, noise=10e3)
+        >>> tau_p = given.sample(problem.interface, samples=200, seed=0)
+        >>> bool(abs(tau_p.mean(axis=0)[26] - 0.8e6) < 50e3)
+        True
+        """
+        if self.conditions is not None:
+            raise InputError("profile: the field already has one; join both into one")
+        known: Any = {"profile": profile, "noise": noise}
+        return dataclasses.replace(self, conditions=known)
+
+    @checked
+    def quantile(self, interface: Interface, probability: Share) -> Array:
+        """Return the quantile of the field at each node, given the measured values, (*shape)."""
+        mean, deviation = np.zeros(interface.size), np.ones(interface.size)
+        if self.conditions is not None:
+            grid = np.meshgrid(*interface.coordinates.values(), indexing="ij")
+            phi = self.modes(interface).basis(np.array([row.ravel() for row in grid]))
+            [(_, known)] = _conditioned(self._alone, interface)
+            mean, deviation = known.moments(phi)
+        found = from_normal(self.marginal, mean + float(ndtri(probability)) * deviation)
+        return found.reshape(interface.shape)
+
+    def sample(
+        self, interface: Interface, *, samples: int = 1, seed: int = 0, first: int = 0
+    ) -> Array:
+        """Sample profiles, (samples, *shape), in the field's unit; i depends on (seed, i) only.
+
+        Warns
+        -----
+        AccuracyWarning
+            If the grid is too coarse for the spectrum, or the interface is short compared
+            with the correlation length and the field has no mean mode.
+        """
+        self._alone.warn_if_inaccurate(interface)
+        profiles = self._alone.profiles(interface, samples=samples, seed=seed, first=first)
+        return profiles["strength"]
+
+    @cached_property
+    def _alone(self) -> RandomInterface:
+        """The interface whose only random property this is."""
+        return RandomInterface(strength=self)
+
+    def warn_if_inaccurate(self, interface: Interface) -> None:
+        """Warn if the grid is too coarse for the spectrum or the interface too short."""
+        modes = self.modes(interface)
+        lost = modes.unresolved
+        if lost > LOST:
+            nodes = " x ".join(map(str, interface.shape))
+            enough = " x ".join(map(str, 2 * np.abs(modes.numbers).max(axis=1)))
+            warn_accuracy(
+                f"the grid of {nodes} nodes is coarser than the spectrum: values at the nodes"
+                f" are exact, but {100.0 * lost:.2g} % of the variance lies at wavelengths that the"
+                f" grid does not resolve (interface.nodes >= {enough} resolves all)"
+            )
+        if self.mean_mode:
+            return
+        with_mean = make_modes(self.spectrum, True, self.anisotropy or 1.0, interface)
+        share = float(with_mean.sigma[0] ** 2)
+        if share > WITHOUT_MEAN:
+            warn_accuracy(
+                "the field has no mean mode, which on so short an interface would hold"
+                f" {100.0 * share:.2g} % of the variance: all samples have nearly the same mean;"
+                " RandomField(mean_mode=True) lets it vary"
+            )
+
+    @checked
+    def correlation(
+        self, interface: Interface, *, of: Literal["strength", "z"] = "strength"
+    ) -> Array:
+        """Compute the correlation at the lags ``interface.coordinates``, (*shape), periodic.
+
+        It is that of the mapped field (Hermite expansion; Grigoriu, 1995) or of z. An
+        `AccuracyWarning` gives its error if the tails of the marginal are too heavy.
+        """
+        modes = self.modes(interface)
+        # The field whose amplitudes are its own standard deviations.
+        draws = np.zeros((1, modes.dimension))
+        start = int(self.mean_mode)
+        draws[0, :start], draws[0, start::2] = modes.sigma[0], modes.sigma[1:]
+        rho = modes.gaussian(draws)[0]
+        return rho if of == "z" else correlation_of_mapped(rho, self._map_coefficients())
+
+    def _map_coefficients(self) -> Array:
+        coefficients = hermite_coefficients(self.marginal)
+        # The last coefficient stands for what the expansion leaves out.
+        error = float(coefficients[-1] ** 2 / np.sum(coefficients[1:] ** 2))
+        if error > UNCERTAIN:
+            warn_accuracy(
+                f"the correlation of the strength is uncertain by up to {error:.2g}: the tails of"
+                " its marginal are too heavy, or its jumps too sharp, for the expansion"
+            )
+        return coefficients
+
+    def efolding_length(self) -> float:
+        """Return the distance (m) at which the correlation of the field first falls to 1/e.
+
+        It is that on a line, on a plane along x; the one of z is `spectrum.efolding_length`.
+        """
+        coefficients = self._map_coefficients()
+
+        def excess(rho: float) -> float:
+            return float(correlation_of_mapped(np.array(rho), coefficients)) - math.exp(-1.0)
+
+        # The correlation of the mapped field is monotone in that of z.
+        return lag_of_correlation(self.spectrum, brentq(excess, 0.0, 1.0, xtol=1e-16))
 
 
 def _pairs(value: Any) -> Any:
@@ -210,8 +423,16 @@ class RandomInterface:
         parts = [stream.draw(seed, first, samples) for stream in _layout(self, interface)]
         return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
-    def from_draws(self, interface: Interface, draws: Array) -> dict[str, Array]:
+    @checked
+    def from_draws(self, interface: Interface, draws: Numbers) -> dict[str, Array]:
         """Map draws (samples, dimension) to profiles by name, (samples, *shape) each."""
+        dimension = self.dimension(interface)
+        if draws.ndim != 2 or draws.shape[1] != dimension:
+            raise InputError(
+                f"draws: must have shape (samples, {dimension}), got shape {draws.shape}"
+            )
+        if not np.isfinite(draws).all():
+            raise InputError("draws: must be finite")
         for columns, known in _conditioned(self, interface):
             draws = draws.copy()
             draws[:, columns] = known.draws(draws[:, columns])
@@ -221,7 +442,7 @@ class RandomInterface:
         for (name, field), stream, row in rows:
             mixed = sum(row[j] * independent[j] for j in np.flatnonzero(row))
             own = np.take(mixed, stream.own, axis=1)
-            found[name] = from_normal(field.marginal, field.gaussian(interface, own))
+            found[name] = from_normal(field.marginal, field.modes(interface).gaussian(own))
         factors = zip((self.between or {}).items(), independent[len(found) :], strict=True)
         for (name, marginal), u in factors:
             found[name] *= from_normal(marginal, u).reshape(-1, *(1 for _ in interface.shape))
@@ -278,16 +499,19 @@ def _conditioned(
         members, measured, factors = np.flatnonzero(group), [], []
         of_group = np.concatenate([columns[j] for j in members])
         for i in members:
-            if fields[i].conditions is None:
+            name, given = random.names[i], fields[i].conditions
+            if given is None:
                 continue
-            name = random.names[i]
             if name in between:
                 factors.append(name)
-            one = fields[i].measured(interface, between.get(name))
-            phi = np.zeros((len(one.phi), random.dimension(interface)))
+            given.check(fields[i].marginal, interface, between.get(name))
+            own = fields[i].modes(interface).basis(given.places)
+            phi = np.zeros((len(own), random.dimension(interface)))
             for j in np.flatnonzero(factor[i]):
-                phi[:, columns[j][streams[i].own]] = factor[i, j] * one.phi
-            measured.append(one._replace(phi=phi[:, of_group]))
+                phi[:, columns[j][streams[i].own]] = factor[i, j] * own
+            measured.append(
+                Measured(given, fields[i].marginal, phi[:, of_group], between.get(name))
+            )
         if len(factors) > 1:
             raise InputError(
                 f"between: {' and '.join(factors)} are correlated, were measured and have factors;"
