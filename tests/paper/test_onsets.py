@@ -60,7 +60,7 @@ def test_figures_of_planes_of_eight_nucleation_lengths(
         found = plane_onset(plane, strength, one, RATE * one)
         assert found.closed
         loads.append(found.lower)
-        least = least_average(interface, windows, strength[None], one).load[0]
+        least = least_average(interface, windows, strength[None], one)[0][0]
         over.append(least / found.lower - 1.0)
         share.append((found.slip > 0.0).mean())
     # Three standard errors of the difference of the two means; shares have their own deviations.

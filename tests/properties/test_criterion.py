@@ -122,7 +122,8 @@ def test_variance_of_the_nucleation_stress_of_a_plane_is_that_of_theory(mean_mod
     theory = st.theory.nucleation_statistics(PLANE, field)
     middle = windows_of(PLANE, RATE, stretches=(1.0,))
     strength = field.sample(PLANE.interface, samples=400, seed=2)
-    tau_n = np.array(list(averages(PLANE.interface, middle, strength, np.ones((48, 48)))))
+    each = averages(PLANE.interface, middle, strength, np.ones((48, 48)))
+    tau_n = np.array([next(windows) for windows in each])
     assert_mean(((tau_n - theory.mean) ** 2).mean(axis=(1, 2)), theory.variance, errors=4.0)
     assert_mean(tau_n.mean(axis=(1, 2)), theory.mean, errors=4.0)
 

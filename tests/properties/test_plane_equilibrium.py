@@ -168,11 +168,11 @@ def test_local_criterion_is_an_upper_bound_for_every_aspect():
     for seed in range(4):
         strength = rough_strength(seed)
         exact = bounds_of(strength, gap=1e-6)
-        local = least_average(interface, windows, strength[None], ONE).load[0]
+        local = least_average(interface, windows, strength[None], ONE)[0][0]
         assert exact.lower <= local < 1.2 * exact.upper
         uneven = 1.0 + 0.2 * rough_strength(seed + 10) / 1e6
         found = plane_onset(plane, strength, uneven, RATE * ONE, 1e-6)
-        assert least_average(interface, windows, strength[None], uneven).load[0] >= found.lower
+        assert least_average(interface, windows, strength[None], uneven)[0][0] >= found.lower
 
 
 def test_path_is_the_slip_at_onset_just_below_it():

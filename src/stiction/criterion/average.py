@@ -1,7 +1,6 @@
 """The average of strength over load with the weights of critical patches, and where it is least."""
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,18 +16,10 @@ STENCIL = 10
 _FIT = np.linalg.inv(np.vander(np.arange(STENCIL) - 0.5 * (STENCIL - 1), increasing=True))
 
 
-class Least(NamedTuple):
-    """Least averages (Pa), their places in nodes, and the numbers of their windows."""
-
-    load: Array
-    place: Array
-    window: NDArray[np.int64]
-
-
 def averages(
     interface: Interface, windows: Sequence[Window], excess: Array, profile: Array
-) -> Iterator[Array]:
-    """Yield <s, y>/<p, y> of each sample over each window y, centred at every node, (*shape).
+) -> Iterator[Iterator[Array]]:
+    """Yield for each sample <s, y>/<p, y> over each window y, centred at every node, (*shape).
 
     Strength less initial stress s (Pa) is of shape (samples, *shape), the load profile p (*shape).
     """
@@ -36,17 +27,18 @@ def averages(
     scales = [interface.inverse_transform(load * (one.spectrum / one.total)) for one in windows]
     for strength in excess:
         waves = interface.transform(strength)
-        for window, scale in zip(windows, scales, strict=True):
-            yield interface.inverse_transform(waves * window.spectrum) / scale
+        each = zip(windows, scales, strict=True)
+        yield (interface.inverse_transform(waves * y.spectrum) / scale for y, scale in each)
 
 
 def least_average(
     interface: Interface, windows: Sequence[Window], excess: Array, profile: Array
-) -> Least:
+) -> tuple[Array, Array, NDArray[np.int64]]:
     """Find the least average of each sample over places and windows, see `averages`.
 
-    On a line the minimum is taken between the nodes. On a plane the load is that of a node, which
-    is exact for the discrete problem, and only the place lies between the nodes.
+    Returned are the averages (Pa), their places in nodes, and the numbers of their windows. On a
+    line the minimum is taken between the nodes. On a plane the load is that of a node, which is
+    exact for the discrete problem, and only the place lies between the nodes.
     """
     count = len(excess)
     load, place, chosen = np.full(count, np.inf), np.zeros(count), np.zeros(count, np.int64)
@@ -56,15 +48,15 @@ def least_average(
         _filter(profile, multiplier / multiplier[0], axis, spectrum, scale)
         reach = int(np.ceil(0.5 * windows[0].extents[0] / interface.spacing)) + 2
         _minimum_of_rows(excess, profile, scale, multiplier, reach, axis, spectrum, load, place)
-        return Least(load, place, chosen)
+        return load, place, chosen
     place = np.zeros((count, 2))
-    for number, average in enumerate(averages(interface, windows, excess, profile)):
-        i, window = divmod(number, len(windows))
-        # The weights keep to this bound; only the rounding of the transforms may not.
-        least = max(average.min(), np.min(excess[i] / profile))
-        if least < load[i]:
-            load[i], place[i], chosen[i] = least, _between_nodes(average), window
-    return Least(load, place, chosen)
+    for i, each in enumerate(averages(interface, windows, excess, profile)):
+        bound = np.min(excess[i] / profile)  # the rounding of the transforms may not keep to it
+        for window, average in enumerate(each):
+            least = max(average.min(), bound)
+            if least < load[i]:
+                load[i], place[i], chosen[i] = least, _between_nodes(average), window
+    return load, place, chosen
 
 
 def _between_nodes(average: Array) -> Array:

@@ -1,6 +1,6 @@
 """The critical slip-rate profile of a line (Uenishi and Rice, 2003) as a weight on its nodes.
 
-With g(cos t) = sum over odd m of b_m sin(m t) on [-1, 1], of unit integral.
+On [-1, 1] it is g(cos t) = sum over odd m of b_m sin(m t), of unit integral: b_m = 2 a_m/pi.
 """
 
 from functools import lru_cache
@@ -12,7 +12,7 @@ from scipy.special import jv
 
 from stiction.arrays import Array
 
-TERMS = 40  # of the eigenfunction
+TERMS = 40  # of the eigenfunction, whose transform is within 2e-7 of the limit of many
 EDGE = 16  # nodes at either end of a patch that are fitted; samples of g are exact further in
 SMOOTH = 2.0  # |k| h_n/2 above which the fit counts less, as the fourth power
 
@@ -40,19 +40,11 @@ def eigenvalue_and_vector(terms: int = TERMS) -> tuple[float, Array]:
     return float(1.0 / inverse[-1]), vector
 
 
-def sine_coefficients() -> Array:
-    """Return b_1, b_2, ...; the integral of sin(m t) sin t over [0, pi] is pi/2 for m = 1, else 0.
-
-    With 40 terms the transform of g is within 2e-7 of the limit of many terms.
-    """
-    return eigenvalue_and_vector()[1] * (2.0 / np.pi)
-
-
 def weight(s: Array) -> Array:
     """Return g(s), zero for |s| > 1."""
     inside = np.abs(s) <= 1.0
     t = np.arccos(np.where(inside, s, 0.0))
-    sine = sine_coefficients()
+    sine = eigenvalue_and_vector()[1] * (2.0 / np.pi)
     m = np.arange(1, sine.size + 1)
     value: Array = np.tensordot(sine, np.sin(np.multiply.outer(m, t)), axes=1)
     return np.where(inside, value, 0.0)
@@ -64,7 +56,7 @@ def multiplier(z: Array) -> Array:
     The integral of sin(m t) cos(z cos t) sin t over [0, pi] is
     pi m (-1)^((m-1)/2) J_m(z)/z for odd m.
     """
-    z, sine = np.asarray(z, dtype=np.float64), sine_coefficients()
+    z, sine = np.asarray(z, dtype=np.float64), eigenvalue_and_vector()[1] * (2.0 / np.pi)
     m = np.arange(1, sine.size + 1, 2)
     factor = np.pi * sine[m - 1] * m * (-1.0) ** ((m - 1) // 2)
     safe = np.where(z == 0.0, 1.0, z)

@@ -1,7 +1,6 @@
 """The local criterion: the weakest patch, each patch by itself."""
 
 from collections.abc import Callable, Iterator, Mapping
-from itertools import islice
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -105,28 +104,27 @@ class LocalCriterion:
         def solve(sample: Sample) -> dict[str, Array]:
             _warn_if_coarse(problem, sample)
             excess, profile = excess_of(sample), sample.load_profile
-            found: dict[str, Array] = {}
+            load, patch = np.empty(len(excess)), np.empty((len(excess), 4))
+            place = np.empty((len(excess), 2) if interface.is_plane else len(excess))
             for windows, same in _by_rate(problem, sample):
                 some = excess if same.size == len(excess) else excess[same]
-                load, place, chosen = least_average(interface, windows, some, profile)
-                values = {
-                    "critical_load": load,
-                    "critical_position": place * interface.spacings,
-                }
+                load[same], place[same], chosen = least_average(
+                    interface, windows, some, profile
+                )
                 if interface.is_plane:
-                    one = [(one.aspect, one.extents, one.area) for one in windows]
-                    each = zip(OWN_VARIABLES, zip(*one, strict=True), strict=True)
-                    values |= {name: np.array(numbers)[chosen] for name, numbers in each}
-                for name, part in values.items():
-                    whole = found.setdefault(name, np.empty((len(excess), *part.shape[1:])))
-                    whole[same] = part
-            load = found.pop("critical_load")
+                    patches = [(one.aspect, *one.extents, one.area) for one in windows]
+                    patch[same] = np.array(patches)[chosen]
             stress = sample.mean_stress(load)
-            return {
+            found = {
                 "critical_load": load,
                 "critical_stress": stress,
                 "first_instability": stress.copy(),
-            } | found
+                "critical_position": place * interface.spacings,
+            }
+            if interface.is_plane:
+                own = patch[:, 0], patch[:, 1:3], patch[:, 3]
+                found |= zip(OWN_VARIABLES, own, strict=True)
+            return found
 
         return solve
 
@@ -231,8 +229,8 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     if others:
         raise InputError("weakening_rate: differs between samples; pass them one by one")
     excess, profile = excess_of(sample), sample.load_profile
-    each = averages(interface, windows, excess, profile)
-    result = np.array([np.minimum.reduce(list(islice(each, len(windows)))) for _ in excess])
+    several = averages(interface, windows, excess, profile)
+    result = np.array([np.minimum.reduce(list(each)) for each in several])
     # The weights keep to these bounds, the rounding of the transforms does not.
     ratio = windows[0].total * (excess / profile)
     low, high = (end(axis=sample.axes, keepdims=True) for end in (ratio.min, ratio.max))
