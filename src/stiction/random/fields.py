@@ -210,11 +210,8 @@ class RandomField:
         `AccuracyWarning` gives its error if the tails of the marginal are too heavy.
         """
         modes = self.modes(interface)
-        # The field whose amplitudes are its own standard deviations.
-        draws = np.zeros((1, modes.dimension))
-        start = int(self.mean_mode)
-        draws[0, :start], draws[0, start::2] = modes.sigma[0], modes.sigma[1:]
-        rho = modes.gaussian(draws)[0]
+        origin = np.zeros((len(interface.shape), 1))
+        rho = modes.gaussian(modes.basis(origin))[0]  # of z everywhere with z there
         return rho if of == "z" else correlation_of_mapped(rho, self._map_coefficients())
 
     def _map_coefficients(self) -> Array:

@@ -29,11 +29,6 @@ class Modes:
     has_mean: bool
 
     @property
-    def count(self) -> int:
-        """J, the number of modes without the mean; on a line the highest."""
-        return self.ranks.size
-
-    @property
     def dimension(self) -> int:
         """Number of standard normal draws a sample."""
         return 2 * self.ranks.size + int(self.has_mean)
