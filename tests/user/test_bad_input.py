@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 import scipy.stats
+import xarray as xr
 from refusals import refusals, refuses
 from setups import LENGTH, LOCAL, RATE, SOLID, beta_strength, make_problem
 
@@ -181,6 +182,10 @@ test_fields_that_cannot_be = refusals({
     "this takes ... GiB of memory": lambda: st.RandomInterface(
         strength=make_strength()
     ).profiles(PLANE, samples=10**6),
+    "strength.given.profile: this takes ... GiB of memory ... fewer places":
+        lambda: make_strength(5e-6).given(
+            xr.DataArray(ONE.repeat(400), {"x": np.linspace(0.0, 0.1, 256 * 400)}, "x"), noise=1e3
+        ).sample(LINE),
     "subset ... GiB of memory ... fewer nodes":
         lambda: subset.descend(lambda draws: draws[:, 0], 10**9, rng=None, samples=1000),
 })  # fmt: skip

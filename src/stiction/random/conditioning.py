@@ -29,7 +29,7 @@ from scipy.special import ndtri
 from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.interface import Interface
-from stiction.model import PROFILE_SCHEMA, Numbers, Positive, check, check_memory, model
+from stiction.model import PROFILE_SCHEMA, Numbers, Positive, check, model
 from stiction.profiles.placing import MEASURED
 from stiction.profiles.units import parse
 from stiction.random.mapping import from_normal, quantile_of_normal
@@ -226,7 +226,6 @@ class Conditioning:
     def __init__(self, measured: Sequence[Measured]) -> None:
         self.measured = measured
         self.phi = np.concatenate([one.phi for one in measured])
-        check_memory("given.profile", 24.0 * self.phi.size, "give fewer places")
         self.grid: Array | None = None
         others = alone = np.zeros(len(self.phi)), np.ones(len(self.phi))
         middle, moves = 0.0, np.zeros((1, len(self.phi)))

@@ -502,6 +502,8 @@ def _conditioned(
             if name in between:
                 factors.append(name)
             given.check(fields[i].marginal, interface, between.get(name))
+            size = given.values.size * random.dimension(interface)
+            check_memory(f"{name}.given.profile", 24.0 * size, "give fewer places")
             own = fields[i].modes(interface).basis(given.places)
             phi = np.zeros((len(own), random.dimension(interface)))
             for j in np.flatnonzero(factor[i]):
