@@ -415,15 +415,17 @@ class RandomInterface:
         Draw j of a property of sample i depends on (seed, property, i, j) only. Returned are
         (samples, dimension): each property in the order of `names`, then those of `between`.
         """
-        each = self.dimension(interface) + len(self.names) * interface.size
+        streams = _layout(self, interface)
+        each = streams[-1].columns.stop + len(self.names) * interface.size
         check_memory("samples", 8.0 * min(samples, 2**62) * each)
-        parts = [stream.draw(seed, first, samples) for stream in _layout(self, interface)]
+        parts = [stream.draw(seed, first, samples) for stream in streams]
         return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
     @checked
     def from_draws(self, interface: Interface, draws: Numbers) -> dict[str, Array]:
         """Map draws (samples, dimension) to profiles by name, (samples, *shape) each."""
-        dimension = self.dimension(interface)
+        streams = _layout(self, interface)
+        dimension = streams[-1].columns.stop
         if draws.ndim != 2 or draws.shape[1] != dimension:
             raise InputError(
                 f"draws: must have shape (samples, {dimension}), got shape {draws.shape}"
@@ -433,7 +435,7 @@ class RandomInterface:
         for columns, known in _conditioned(self, interface):
             draws = draws.copy()
             draws[:, columns] = known.draws(draws[:, columns])
-        streams, found = _layout(self, interface), {}
+        found: dict[str, Array] = {}
         independent = [draws[:, stream.columns] for stream in streams]
         rows = zip(self.properties.items(), streams, lower_factor(self.matrix), strict=False)
         for (name, field), stream, row in rows:
