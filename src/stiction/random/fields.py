@@ -439,8 +439,13 @@ class RandomInterface:
         independent = [draws[:, stream.columns] for stream in streams]
         rows = zip(self.properties.items(), streams, lower_factor(self.matrix), strict=False)
         for (name, field), stream, row in rows:
-            mixed = sum(row[j] * independent[j] for j in np.flatnonzero(row))
-            own = np.take(mixed, stream.own, axis=1)
+            each = [(row[j], independent[j]) for j in np.flatnonzero(row)]
+            mixed = reduce(
+                np.add, (part if share == 1.0 else share * part for share, part in each)
+            )
+            own = np.require(
+                mixed[:, stream.own], requirements=["C", "W"]
+            )  # a copy only if need be
             found[name] = from_normal(field.marginal, field.modes(interface).gaussian(own))
         factors = zip((self.between or {}).items(), independent[len(found) :], strict=True)
         for (name, marginal), u in factors:
@@ -473,7 +478,8 @@ def _layout(random: RandomInterface, interface: Interface) -> list[Stream]:
         columns = slice(start, start + 2 * ranks.size + int(mean_mode))
         places = np.searchsorted(ranks, field.modes(interface).ranks)
         pairs = int(mean_mode) + 2 * places[:, None] + np.arange(2)
-        own = np.concatenate((np.arange(int(field.mean_mode)), pairs.ravel()))
+        own: Any = np.concatenate((np.arange(int(field.mean_mode)), pairs.ravel()))
+        own = slice(None) if own.size == columns.stop - start else own
         found.append(Stream(NAMES.index(name), block, ranks, mean_mode, columns, own))
         start = columns.stop
     none = np.arange(0)
