@@ -439,13 +439,8 @@ class RandomInterface:
         independent = [draws[:, stream.columns] for stream in streams]
         rows = zip(self.properties.items(), streams, lower_factor(self.matrix), strict=False)
         for (name, field), stream, row in rows:
-            each = [(row[j], independent[j]) for j in np.flatnonzero(row)]
-            mixed = reduce(
-                np.add, (part if share == 1.0 else share * part for share, part in each)
-            )
-            own = np.require(
-                mixed[:, stream.own], requirements=["C", "W"]
-            )  # a copy only if need be
+            mixed = reduce(np.add, (row[j] * independent[j] for j in np.flatnonzero(row)))
+            own = np.ascontiguousarray(mixed[:, stream.own])
             found[name] = from_normal(field.marginal, field.modes(interface).gaussian(own))
         factors = zip((self.between or {}).items(), independent[len(found) :], strict=True)
         for (name, marginal), u in factors:
