@@ -32,6 +32,11 @@ def all_of(coordinates):
     return np.array([row.ravel() for row in np.meshgrid(*coordinates.values(), indexing="ij")])
 
 
+def conditioning(given, interface):
+    ((_, known),) = _conditioned(st.RandomInterface(strength=given), interface)
+    return known
+
+
 def given_on(x, values, noise, field=FIELD):
     return field.given(xr.DataArray(values, {"x": x}, "x"), noise=noise)
 
@@ -70,13 +75,12 @@ def test_mean_and_deviation_are_those_of_dense_kriging(interface, shift, mean_mo
     inner = correlation(field, interface, places, places) + error**2 * np.eye(values.size)
     weights = np.linalg.solve(inner, across.T).T
     covariance = correlation(field, interface, grid, grid) - weights @ across.T
-    random = st.RandomInterface(strength=given)
-    ((_, known),) = _conditioned(random, interface)
+    known = conditioning(given, interface)
     mean, deviation = known.moments(field.modes(interface).basis(grid))
     np.testing.assert_allclose(mean, weights @ z, atol=1e-10)  # round-off of the dense solution
     np.testing.assert_allclose(deviation**2, np.diag(covariance), atol=1e-10)
     # 20,000 samples: an entry of a covariance scatters by 0.01, the largest of 16,384 by 4.5 of it.
-    draws = known.draws(random.draws(interface, 20_000, seed=1))
+    draws = known.draws(st.RandomInterface(strength=field).draws(interface, 20_000, seed=1))
     sampled = field.modes(interface).gaussian(draws).reshape(20_000, -1)
     np.testing.assert_allclose(sampled.mean(axis=0), mean, atol=5.0 / 20_000**0.5)
     np.testing.assert_allclose(np.cov(sampled.T), covariance, atol=0.05)
