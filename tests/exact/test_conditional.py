@@ -175,6 +175,17 @@ def test_a_factor_changes_no_other_draw_and_is_constant_along_each_specimen():
     assert random.dimension(LINE) == plain.dimension(LINE) + 1
 
 
+def test_a_factor_so_small_that_scipy_has_no_quantile_for_the_values():
+    """Of this beta distribution it is NaN from z = 30 on."""
+    marginal = st.Beta(alpha=3.02, beta=2.82, low=0.5e6, high=2e6)
+    field, places = st.RandomField(marginal, FIELD.spectrum), LINE.x[:20]
+    values = scan(LINE, places[None], field)
+    given = given_on(places, values, 20e3, field)
+    random = st.RandomInterface(strength=given, between={"strength": FACTOR})
+    found = strengths(random, 200, 0)[:, :20].mean(axis=0)
+    assert np.abs(found - values).max() < 20e3  # an error of a value, of 200 samples
+
+
 def test_a_scan_tells_of_the_factor_of_its_specimen():
     """Ranks of the true factors in their posteriors are uniform over 50 specimens."""
     factor, noise = st.Lognormal(mean=1.0, cv=0.15), 10e3

@@ -176,7 +176,9 @@ class Measured(NamedTuple):
             z = 0.5 * (low + high)[:, None] + half * np.linspace(-1.0, 1.0, NODES)
             off = (z - mean[:, None]) ** 2 / variance[:, None]
             miss = (value[:, None] - from_normal(self.marginal, z)) / noise
-            return half, z, -0.5 * (off + miss**2)
+            density = -0.5 * (off + miss**2)
+            # Far out in the tail scipy may have no quantile.
+            return half, z, np.where(np.isnan(density), -np.inf, density)
 
         half, z, density = evaluate()
         # Where a value contradicts the others, their product peaks outside or at an end.
