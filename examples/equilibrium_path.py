@@ -11,9 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure
 
 import stiction as st
-from stiction.plot.style import ACCENT, COLUMN, new_figure, paper_style
+from stiction.plot.style import ACCENT, COLUMN, paper_style
 
 
 def compute(nodes: int = 1024, sample: int = 0) -> tuple[np.ndarray, xr.Dataset, xr.Dataset]:
@@ -34,7 +35,7 @@ def draw(folder: Path, tau_p: np.ndarray, onset: xr.Dataset, path: xr.Dataset) -
     """Slip over position and load; strength, stress and sensitivity over position."""
     x = path.x.values * 1e3
     with paper_style():
-        figure = new_figure(COLUMN * 2.0, 4.2)
+        figure = Figure(figsize=(COLUMN * 2.0, 4.2))
         upper, lower = figure.subplots(2, 1, sharex=True)
         slip = np.ma.masked_less_equal(path.slip.values * 1e6, 0.0)
         colours = upper.pcolormesh(x, path["load"].values / 1e6, slip, shading="nearest")

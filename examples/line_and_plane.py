@@ -220,10 +220,10 @@ def size_effect(small: xr.Dataset, large: xr.Dataset) -> dict[str, list[Estimate
     rows: dict[str, list[Estimate]] = defaultdict(list)
     for name, column in (("exact", "first_instability"), ("local", "local")):
         for before, after in zip(small[column].values, large[column].values, strict=True):
-            share_of_mean = 100.0 / float(before.mean())
+            before, after = (100.0 * each / before.mean() for each in (before, after))
             link = bootstrap(lambda v: v.mean() - weakest_link(v), before)
-            rows[name].append((mean(before) - mean(after)).scaled(share_of_mean))
-            rows[f"{name}, weakest of four"].append(link.scaled(share_of_mean))
+            rows[name].append(mean(before) - mean(after))
+            rows[f"{name}, weakest of four"].append(link)
     return rows
 
 

@@ -17,7 +17,6 @@ from stiction.plot.style import (
     PAGE,
     QUIET,
     color,
-    new_figure,
     panel,
     paper_style,
     series,
@@ -70,7 +69,7 @@ def save(figure: Figure, path: Path) -> None:
 
 def interaction(ratios: Any, lowered: dict, parts: dict) -> Figure:
     """Distributions of the lowering on the large line and plane; means of all cases."""
-    figure = new_figure(PAGE, 3.1)
+    figure = Figure(figsize=(PAGE, 3.1))
     panels = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.05))
     for axes, name, letter in zip(panels, ("line, large", "plane, large"), "ab", strict=False):
         for i, ratio in enumerate(ratios):
@@ -108,7 +107,7 @@ def _against_ratio(axes: Axes, ratios: Any, cases: dict[str, list]) -> None:
 
 def summary(ratios: Any, parts: dict, effects: dict) -> Figure:
     """What slips, ranks, arrest and size effect against the correlation length."""
-    figure = new_figure(PAGE, 4.6)
+    figure = Figure(figsize=(PAGE, 4.6))
     panels = figure.subplots(2, 2)
     for axes, key, label, letter in (
         (panels[0, 0], "slipping", "slips at first instability (%)", "a"),
@@ -140,7 +139,7 @@ def summary(ratios: Any, parts: dict, effects: dict) -> Figure:
 
 def patches(shown: dict) -> Figure:
     """Strength of one plane and one line, and what slips at the first instability."""
-    figure = new_figure(PAGE, 3.9)
+    figure = Figure(figsize=(PAGE, 3.9))
     left, right = figure.subfigures(1, 2, width_ratios=(1.0, 1.05))
     _plane(left, *shown["plane, large"])
     _line(right, *shown["line, large"])

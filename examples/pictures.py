@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import stiction as st
-from stiction.plot.style import INK, PAGE, PALE, QUIET, color, new_figure, paper_style
+from stiction.plot.style import INK, PAGE, PALE, QUIET, color, paper_style
 
 RATIOS = (0.25, 0.5, 1.0, 2.0)
 PIXELS = 1400
@@ -54,7 +54,7 @@ def monte_carlo(
     """Strength and nucleation stress of the same draws, and the densities behind them."""
     x = problem.interface.x / problem.interface.length
     with paper_style():
-        figure = new_figure(PAGE, 3.9)
+        figure = Figure(figsize=(PAGE, 3.9))
         grid = figure.add_gridspec(2, 3, width_ratios=(2.6, 0.75, 1.35))
         above = figure.add_subplot(grid[0, 0])
         below = figure.add_subplot(grid[1, 0], sharex=above, sharey=above)
@@ -106,7 +106,7 @@ def _density(axes: Axes, values: Any, index: int) -> None:
 def rupture(run: xr.Dataset, problem: st.Problem) -> Figure:
     """Slip rate in space and time."""
     with paper_style():
-        figure = new_figure(PAGE, 3.4)
+        figure = Figure(figsize=(PAGE, 3.4))
         st.plot.rupture(run, problem=problem, ax=figure.subplots())
     return figure
 

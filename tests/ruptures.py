@@ -34,7 +34,12 @@ def simulate(problem: Any, strength: Any, save: Any = None, **method: Any) -> An
 def run_of(problem: Any, strength: Any, method: Any, **options: Any) -> Any:
     """A run of one sample that has not begun."""
     rows = problem.sample(strength, **options)
-    return make_run(method, problem.friction, method.medium(problem), rows, 0)
+    return make_run(method, method.medium(problem), rows, 0)
+
+
+def with_step(method: Any, problem: Any, step: float) -> Any:
+    """The method with an explicit step, s."""
+    return dataclasses.replace(method, courant=step / method.medium(problem).largest_step)
 
 
 def stepped(
@@ -42,19 +47,18 @@ def stepped(
 ) -> Any:
     """A run of so many explicit steps at a constant load from t = 0 to `end`, and its state."""
     method = st.Rupture(
-        load=([0.0, 1.0], [load, load]), stop="time", end_time=1.0, implicit=False,
-        time_step=end / steps,
-    )  # fmt: skip
+        load=([0.0, 1.0], [load, load]), stop="time", end_time=1.0, implicit=False
+    )
+    method = with_step(method, problem, end / steps)
     run = run_of(problem, strength, method, accept=("overstress",))
     state = run.start(0.0, slip)
     run.advance(state, steps)
     return run, state
 
 
-def radiated_energy(problem: Any, run: Any, state: Any) -> float:
+def radiated_energy(run: Any, state: Any) -> float:
     """Energy that has gone off as waves, J/m or J."""
-    found = energy_balance(problem.friction, run.setting.nodes, run.medium.grid, state)
-    return found["radiated_energy"]
+    return energy_balance(run, state)["radiated_energy"]
 
 
 def dip(interface: st.Interface, centre: Any, radius: float) -> Any:

@@ -6,12 +6,14 @@ Run: python validation/energy.py [folder for the figure]
 """
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import stiction as st
-from stiction.plot.style import PAGE, new_figure, panel, paper_style, series
+from stiction.plot.style import PAGE, panel, paper_style, series
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0, plane="strain")
 LOAD = 7.5e5
@@ -23,15 +25,11 @@ def rupture(steps: int, barrier: float = 1e6, end: float = 40e-6):
     friction = st.LinearWeakening(weakening_rate=2e11, residual_strength=2e5)
     problem = st.Problem(SOLID, interface, friction)
     strength = barrier - (barrier - 6.5e5) * np.exp(-(((interface.x - 0.05) / 0.012) ** 4))
-    return st.simulate_rupture(
-        problem,
-        strength,
-        method=st.Rupture(
-            load=([0.0, 1.0], [LOAD, LOAD]), implicit=False, time_step=end / steps,
-            stop="time", end_time=end,
-        ),
-        save=st.Save([], every=max(1, steps // 250)),
-    )  # fmt: skip
+    load = ([0.0, 1.0], [LOAD, LOAD])
+    method = st.Rupture(load=load, implicit=False, stop="time", end_time=end)
+    method = replace(method, courant=end / steps / method.medium(problem).largest_step)
+    save = st.Save([], every=max(1, steps // 250))
+    return st.simulate_rupture(problem, strength, method=method, save=save)
 
 
 def compute() -> list[tuple[int, float]]:
@@ -47,7 +45,7 @@ def compute() -> list[tuple[int, float]]:
 def draw(folder: Path) -> None:
     """Shares of the work over time, of a rupture that runs and of one that is arrested."""
     with paper_style():
-        figure = new_figure(PAGE, 2.6)
+        figure = Figure(figsize=(PAGE, 2.6))
         runs = (rupture(800), rupture(4000, barrier=4e6, end=200e-6))
         names = ("work", "fracture_energy", "strain_energy", "radiated_energy")
         for letter, axes, run in zip("ab", figure.subplots(1, 2), runs, strict=True):

@@ -8,10 +8,11 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from stiction.elasticity.exponential_sum import kernel_sum
 from stiction.elasticity.memory_kernels import memory_kernel
-from stiction.plot.style import PAGE, new_figure, panel, paper_style, series
+from stiction.plot.style import PAGE, panel, paper_style, series
 
 PAPER = np.sqrt(2.0 / 0.67)  # c_d/c_s in plane stress at nu = 0.33
 SOLIDS = {
@@ -39,7 +40,7 @@ def compute() -> dict[tuple[str, float], tuple[int, float]]:
 def draw(folder: Path) -> None:
     """Kernels of both modes, and the error of the sums over the times they must serve."""
     with paper_style():
-        figure = new_figure(PAGE, 2.6)
+        figure = Figure(figsize=(PAGE, 2.6))
         left, right = figure.subplots(1, 2)
         t = np.linspace(0.0, 25.0, 800)
         left.plot(t, memory_kernel(t, "II", PAPER), label=r"mode II, $\nu=0.33$", **series(0))

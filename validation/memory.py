@@ -6,13 +6,15 @@ Run: python validation/memory.py [folder for the figure]
 """
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import stiction as st
 from stiction.elasticity.memory_kernels import arc_quadrature
-from stiction.plot.style import COLUMN, new_figure, paper_style, series
+from stiction.plot.style import COLUMN, paper_style, series
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
 NODES, STEPS, LOADING = 128, 1200, 3e9
@@ -27,9 +29,10 @@ def by_exponentials(tolerance: float) -> tuple[np.ndarray, np.ndarray]:
     """Times and slip at every step."""
     step = 0.37 * PROBLEM.interface.spacing / SOLID.shear_wave_speed
     method = st.Rupture(
-        loading_rate=LOADING, implicit=False, kernel_tolerance=tolerance, time_step=step,
+        loading_rate=LOADING, implicit=False, kernel_tolerance=tolerance,
         stop="time", end_time=TAU_P.min() / LOADING + STEPS * step,
     )  # fmt: skip
+    method = replace(method, courant=step / method.medium(PROBLEM).largest_step)
     run = st.simulate_rupture(PROBLEM, TAU_P, method=method, save=st.Save(["slip"], every=1))
     return run["time"].values, run["slip"].values
 
@@ -81,7 +84,7 @@ def compute() -> dict[str, np.ndarray]:
 def draw(folder: Path, found: dict[str, np.ndarray]) -> None:
     """Differences over the steps."""
     with paper_style():
-        figure = new_figure(COLUMN * 1.2, 2.8)
+        figure = Figure(figsize=(COLUMN * 1.2, 2.8))
         axes = figure.subplots()
         for i, (name, error) in enumerate(found.items()):
             axes.semilogy(np.maximum(error, 1e-16), label=name, **series(i))

@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import stiction as st
-from stiction.plot.style import COLUMN, new_figure, paper_style, series
+from stiction.plot.style import COLUMN, paper_style, series
 
 RATES = (1e3, 1e4, 1e5, 1e6, 2e7, 1e8, 1e9)
 
@@ -42,7 +43,7 @@ def compute(
 def draw(folder: Path, found: dict[float, np.ndarray]) -> None:
     """Difference over loading rate."""
     with paper_style():
-        figure = new_figure(COLUMN * 1.2, 2.8)
+        figure = Figure(figsize=(COLUMN * 1.2, 2.8))
         axes = figure.subplots()
         for i, (ratio, difference) in enumerate(found.items()):
             style = series(i, marker=True)

@@ -10,10 +10,11 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import stiction as st
 from stiction.dynamics.summary import rupture_speed
-from stiction.plot.style import COLUMN, new_figure, paper_style, series
+from stiction.plot.style import COLUMN, paper_style, series
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0, plane="strain")
 RATE, STRENGTH = 1e12, 1e6
@@ -48,7 +49,7 @@ def compute(ratios: tuple[float, ...] = (0.5, 0.8, 1.2, 1.6, 2.0, 3.5)) -> dict[
 def draw(folder: Path, curves: dict[float, tuple]) -> None:
     """Speed over distance."""
     with paper_style():
-        figure = new_figure(COLUMN * 1.3, 3.0)
+        figure = Figure(figsize=(COLUMN * 1.3, 3.0))
         axes = figure.subplots()
         for i, (ratio, (x, found)) in enumerate(curves.items()):
             # Speeds beyond c_d belong to a daughter crack that is born ahead of the front.

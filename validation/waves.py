@@ -5,15 +5,17 @@ Run: python validation/waves.py [folder for the figure]
 """
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import mpmath
 import numpy as np
+from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 import stiction as st
 from stiction.dynamics.method import make_run
-from stiction.plot.style import PAGE, new_figure, panel, paper_style, series
+from stiction.plot.style import PAGE, panel, paper_style, series
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
 ETA = SOLID.wave_speed_ratio
@@ -42,12 +44,11 @@ def simulated(steps: int) -> tuple[np.ndarray, np.ndarray]:
     """Times (in 1/(k c_s)) and a/a_0 of an explicit run; everything slides at its residual."""
     friction = st.LinearWeakening(weakening_rate=1e9, residual_strength=1e6)
     problem = st.Problem(SOLID, INTERFACE, friction)
-    method = st.Rupture(
-        load=([0.0, 1.0], [2e6, 2e6]), implicit=False, time_step=END * UNIT / steps,
-        stop="time", end_time=END * UNIT,
-    )  # fmt: skip
+    load = ([0.0, 1.0], [2e6, 2e6])
+    method = st.Rupture(load=load, implicit=False, stop="time", end_time=END * UNIT)
+    method = replace(method, courant=END * UNIT / steps / method.medium(problem).largest_step)
     rows = problem.sample(np.full(INTERFACE.nodes, 1.001e6), accept=method.accepts)
-    run = make_run(method, problem.friction, method.medium(problem), rows, 0)
+    run = make_run(method, method.medium(problem), rows, 0)
     state = run.start(0.0, 1e-3 + 1e-6 * np.cos(K * INTERFACE.x))
     times, slips = [0.0], [state.slip.copy()]
     for _ in range(steps):
@@ -67,7 +68,7 @@ def compute() -> list[tuple[int, float]]:
 def draw(folder: Path, errors: list[tuple[int, float]]) -> None:
     """Amplitude over time, and its error over the step."""
     with paper_style():
-        figure = new_figure(PAGE, 2.6)
+        figure = Figure(figsize=(PAGE, 2.6))
         left, right = figure.subplots(1, 2)
         t, a = simulated(200)
         left.plot(t, a, label="200 steps", **series(0))

@@ -72,10 +72,11 @@ def _show_some(texts: Sequence[Any], prefix: str, *, err: bool = False) -> None:
 
 
 def _save_figure(axes: Any, path: Path) -> None:
-    from stiction.plot.style import save_figure
+    from stiction.files import write_whole
 
-    for suffix in (".png", ".pdf"):
-        save_figure(axes.figure, path.with_suffix(suffix))
+    for suffix in ("png", "pdf"):
+        save = functools.partial(axes.figure.savefig, format=suffix, dpi=220)
+        write_whole(path.with_suffix(f".{suffix}"), save)
 
 
 # -- studies and runs ----------------------------------------------------------------------------

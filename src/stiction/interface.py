@@ -176,17 +176,15 @@ class Interface:
         return vectors[0] if len(vectors) == 1 else np.hypot(*vectors)
 
     @property
-    def in_plane_share(self) -> Array | None:
+    def in_plane_share(self) -> Array:
         """Share of mode II, (kx/k)², at each wave vector of a plane; the rest is mode III.
 
-        The constant mode counts as mode II. None on a line, where the problem sets the mode.
+        The constant mode counts as mode II. One on a line, where the problem sets the mode.
         """
-        if not self.is_plane:
-            return None
         k = self.wavenumbers
-        k[0, 0] = 1.0
+        k.flat[0] = 1.0
         share: Array = (self.wave_vectors[0] / k) ** 2
-        share[0, 0] = 1.0
+        share.flat[0] = 1.0
         return share
 
     def transform(self, profiles: Array) -> Array:

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
 from stiction.errors import InputError
-from stiction.model import Progress, checked, to_plain
+from stiction.model import Progress, checked, is_finite
 from stiction.problem import Problem, Sample, refusals
 from stiction.profiles.placing import with_gaps
 from stiction.progress import Meter
-from stiction.results import to_dataset
+from stiction.results import study_attributes, to_dataset
 from stiction.variables import (
     DIRECTION,
     FRICTION_COEFFICIENT,
@@ -118,14 +118,6 @@ MethodObject: TypeAlias = Annotated[Any, BeforeValidator(as_method)]
 """Annotation of an argument that is a method; see `stiction.model.checked`."""
 
 
-def study_attributes(**parts: Any) -> dict[str, Any]:
-    """Return the problem, the method, ... by name in plain form, or why they have none."""
-    try:
-        return {"study": {name: to_plain(part) for name, part in parts.items()}}
-    except InputError as error:
-        return {"study_incomplete": str(error)}
-
-
 def prepared(problem: Problem, method: Method) -> Solver:
     """Return the solver of a method, which checks its values and adds friction coefficients."""
     solver = method.prepare(problem)
@@ -164,9 +156,20 @@ def _check_values(
             )
 
 
+def seconds_per_sample(problem: Problem, method: Method) -> float:
+    """Return about how long a sample takes, s, at least a nanosecond; refuse what is no time."""
+    seconds = method.seconds_per_sample(problem)
+    if not (is_finite(seconds) and seconds >= 0.0):
+        raise InputError(
+            f"method: seconds_per_sample of {method.label} must return a number of seconds, zero"
+            f" or more, got {seconds!r}"
+        )
+    return max(float(seconds), 1e-9)
+
+
 def batch_size(problem: Problem, method: Method) -> int:
     """Return how many samples to solve at once: half a second of work, at most 512."""
-    return max(1, min(MOST, int(TICK / max(method.seconds_per_sample(problem), 1e-9))))
+    return max(1, min(MOST, int(TICK / seconds_per_sample(problem, method))))
 
 
 def variables_of(

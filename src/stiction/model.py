@@ -346,7 +346,7 @@ def _comparable(value: Any) -> Any:
         return str(value.to_dict())
     if isinstance(value, dict):
         return tuple((key, _comparable(value[key])) for key in sorted(value))
-    return tuple(map(_comparable, value)) if isinstance(value, list) else value
+    return tuple(map(_comparable, value)) if isinstance(value, list | tuple) else value
 
 
 def _fields(self: Any) -> tuple[Any, ...]:

@@ -343,7 +343,8 @@ class Problem:
         Notes
         -----
         A node whose strength is not above its residual strength does not weaken: its strength is
-        constant. An `AccuracyWarning` gives the share of such nodes.
+        constant. An `AccuracyWarning` gives the share of such nodes, and that of nodes where the
+        initial stress is below minus the strength.
         """
         return self.placed_sample(profiles, accept)[0]
 
@@ -406,6 +407,11 @@ class Problem:
                     f"strength is not above residual_strength at {100.0 * constant.mean():.2g}"
                     " % of the nodes; these do not weaken: their strength is constant"
                 )
+        if initial.min() < 0.0 and (reversed_at := initial < -strength).any():
+            warn_accuracy(
+                f"initial_stress is below minus the strength at {100.0 * reversed_at.mean():.2g} %"
+                " of the nodes; they would slip in reverse, which is not modelled, and are held"
+            )
         load_shape = np.array(np.broadcast_to(self.load_profile, interface.shape), dtype=float)
         sample = Sample(strength, residual, rates, initial, load_shape, pressure)
         self._check_resolution(sample.steepest_rate)

@@ -20,7 +20,7 @@ from stiction import __version__, plot
 from stiction.errors import InputError
 from stiction.files import write_whole
 from stiction.plot.axes import scaled, shown_quantity
-from stiction.plot.style import PAGE, new_figure, panel, paper_style
+from stiction.plot.style import PAGE, panel, paper_style
 from stiction.statistics.estimates import mean, quantiles, standard_deviation
 from stiction.study.run import StoredRun
 from stiction.variables import DIRECTION
@@ -134,7 +134,7 @@ def add_figures(page: Page, result: xr.Dataset, dims: list[str]) -> None:
             densities(first, along),
             f"Densities of the {what} and of the critical position{_where(first, others)}.",
         )
-        figure = new_figure(0.75 * PAGE, 3.2)
+        figure = Figure(figsize=(0.75 * PAGE, 3.2))
         plot.quantiles(part, along=along, ax=figure.subplots())
         page.figure(
             figure,
@@ -163,7 +163,7 @@ def densities(result: xr.Dataset, along: str | None) -> Figure:
         parts += [place.sel({DIRECTION: direction}) for direction in result[DIRECTION].values]
     else:
         parts.append(result[["critical_position"]])
-    figure = new_figure(PAGE, 2.6 if along is None else 3.0)
+    figure = Figure(figsize=(PAGE, 2.6 if along is None else 3.0))
     panels = figure.subplots(1, len(parts))
     for letter, axes, part in zip("abc", panels, parts, strict=False):
         (name,) = part.data_vars

@@ -12,11 +12,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction import __version__
+from stiction.errors import InputError
 from stiction.interface import Interface
+from stiction.model import to_plain
 from stiction.variables import DIRECTION, ONSET_VARIABLES, Variable
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+def study_attributes(**parts: Any) -> dict[str, Any]:
+    """Return the problem, the method, ... by name in plain form, or why they have none."""
+    try:
+        return {"study": {name: to_plain(part) for name, part in parts.items()}}
+    except InputError as error:
+        return {"study_incomplete": str(error)}
 
 
 def along(interface: Interface, variable: Variable) -> Variable:

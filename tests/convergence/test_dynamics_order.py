@@ -15,7 +15,7 @@ def rupture(nodes, steps):
     problem = make_problem(nodes, solid=QUARTER, **friction)
     strength = 1e6 - 0.35e6 * dip(problem.interface, 0.05, 0.012)
     run, state = stepped(problem, strength, 7.5e5, 40e-6, steps)
-    return state, radiated_energy(problem, run, state)
+    return state, radiated_energy(run, state)
 
 
 def test_slip_and_radiated_energy_converge_with_second_order_in_time():

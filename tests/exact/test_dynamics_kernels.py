@@ -6,7 +6,7 @@ import pytest
 from oracles import from_laplace, mode_two_stiffness
 
 from stiction.elasticity.exponential_sum import fit_exponentials, kernel_sum
-from stiction.elasticity.memory_kernels import memory_kernel, static_stiffness, symbol
+from stiction.elasticity.memory_kernels import memory_kernel, static_stiffness
 
 ETA = np.sqrt(2.0 / 0.67)
 """c_d/c_s in plane stress at nu = 0.33."""
@@ -55,15 +55,6 @@ def test_kernel_equals_high_precision_laplace_inversion(t):
 
     expected = from_laplace(transform, t, degree=80)
     assert abs(memory_kernel(t, "II", ETA) - expected) < 1e-12
-
-
-def test_symbol_has_its_limits():
-    # D - s = O(1/s) at high frequency, static stiffness at low frequency.
-    assert abs(symbol(1e4, "II", ETA) - 1e4) < 1e-3
-    for mode in ("II", "III"):
-        static = static_stiffness(mode, ETA)
-        assert symbol(1e-3, mode, ETA).real == pytest.approx(static, rel=1e-5)
-    assert static_stiffness("III", ETA) == 1.0
 
 
 @pytest.mark.parametrize(

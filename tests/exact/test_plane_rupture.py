@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from checks import assert_second_order
 from oracles import from_laplace, mode_three_stiffness, mode_two_stiffness
-from ruptures import stepped
+from ruptures import stepped, with_step
 from setups import QUARTER, RATE, make_problem
 
 import stiction as st
@@ -35,10 +35,12 @@ def test_fields_along_one_axis_are_those_of_the_line(mode, rate):
     on_plane = np.array(np.broadcast_to(np.expand_dims(tau_p, still), shape))
     method = st.Rupture(loading_rate=rate)
     step = min(method.medium(problem).step for problem in (line, plane))
-    method = dataclasses.replace(method, time_step=step)
-    options = {"method": method, "progress": False, "save": st.Save(every=1)}
-    one = simulate_rupture(line, tau_p, **options)
-    two = simulate_rupture(plane, on_plane, **options)
+    one, two = (
+        simulate_rupture(
+            problem, profile, method=with_step(method, problem, step), save=st.Save(every=1)
+        )
+        for problem, profile in ((line, tau_p), (plane, on_plane))
+    )
     assert int(one.explicit_steps) > 100
     assert (int(one.implicit_steps) > 50) == (rate < 1e8)
     assert one.sizes["time"] == two.sizes["time"]

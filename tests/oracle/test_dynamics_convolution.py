@@ -24,7 +24,7 @@ def direct_convolution(run, start, steps):
     slip, rate = np.zeros(n), start.rate.copy()
     past = np.zeros((steps, pace.size), dtype=complex)
     for i in range(steps):
-        load = run.history[1][1] * (start.now["time"] + (i + 1) * h)
+        load = run.setting.load.values[1] * (start.now["time"] + (i + 1) * h)
         lag = np.einsum("mk,mk->k", weights[1 : i + 1], past[:i][::-1])
 
         def moved(mean, lag=lag, load=load, slip=slip):

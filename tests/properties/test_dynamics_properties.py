@@ -120,15 +120,15 @@ def test_radiated_energy_is_steady_after_arrest():
         run.advance(state, 20)
     # Hold the load: from here on nothing slips, and what was radiated stays radiated.
     held = float(state.now["load"])
-    run.history[0][:] = [0.0, 1e9]
-    run.history[1][:] = [held, held * (1.0 + 1e-15)]
+    run.setting.load.at[:] = [0.0, 1e9]
+    run.setting.load.values[:] = [held, held * (1.0 + 1e-15)]
     thresholds = run.setting.thresholds._replace(explicit_only=True, calm_count=10**9)
     run.setting = run.setting._replace(thresholds=thresholds)
     run.advance(state, 3000)
-    middle = radiated_energy(PROBLEM, run, state)
+    middle = radiated_energy(run, state)
     run.advance(state, 3000)
     assert middle > 0.0
-    assert radiated_energy(PROBLEM, run, state) == pytest.approx(middle, rel=1e-6)
+    assert radiated_energy(run, state) == pytest.approx(middle, rel=1e-6)
     assert state.rate.max() == 0.0
 
 

@@ -57,7 +57,7 @@ def test_a_restart_is_the_same_run_to_the_bit(whole, steps, tmp_path):
 def ruptured(steps):
     """Slip and radiated energy at a constant load that breaks the weak spot and runs on."""
     run, state = stepped(BREAKING_PLANE, BREAKING_STRENGTH, 7.5e5, 2.4e-5, steps)
-    return state.slip, radiated_energy(BREAKING_PLANE, run, state)
+    return state.slip, radiated_energy(run, state)
 
 
 def test_slip_and_energy_converge_with_second_order_in_time():

@@ -279,7 +279,7 @@ test_profiles_and_loads = refusals({
     "negative": lambda: path([-1.0, 1e5]),
     "finite": lambda: path([np.nan]),
     "one-dimensional": lambda: path([]),
-    "array of numbers": lambda: path("many"),
+    "loads: must be numbers": lambda: path("many"),
     "complex": lambda: path([1e5 + 1j]),
     # What a method does not take
     "interface.nodes ... at least 4 ... 64 ... >= 116": lambda: make_problem(64),
@@ -325,7 +325,9 @@ def test_fields_and_grids_that_are_doubted(recwarn):
 def test_errors_of_equilibrium_are_warned_of():
     no = np.zeros(2, dtype=bool)
     with pytest.warns(st.AccuracyWarning, match="did not close to 1e-09 of it in 1 of 2"):
-        Solver(PROBLEM)._warn(np.array([1e-6, np.nan]), np.full(2, 1e6), no, no)
+        Solver(PROBLEM, st.Equilibrium())._warn(
+            np.array([1e-6, np.nan]), np.full(2, 1e6), no, no
+        )
 
 
 def test_no_samples_are_an_empty_array():

@@ -75,14 +75,11 @@ test_what_cannot_be_simulated = refusals({
 }, simulate)  # fmt: skip
 
 
-def test_unstable_time_step_is_refused_with_the_limit():
+def test_the_largest_stable_step_is_known():
     limit = METHOD.medium(PROBLEM).largest_step
     # 0.42 dx/c_s at this solid; the limit is found by bisection to 0.1 %.
     expected = 0.416 * PROBLEM.interface.spacing / STRESS.shear_wave_speed
     assert limit == pytest.approx(expected, rel=5e-3)
-    above, below = (Rupture(loading_rate=1e7, time_step=x * limit) for x in (1.01, 0.99))
-    refuses(f"stability limit {limit:.6g} s", lambda: above.prepare(PROBLEM))
-    below.prepare(PROBLEM)
 
 
 @pytest.mark.parametrize(

@@ -117,11 +117,31 @@ def test_a_first_instability_at_a_negative_mean_stress_is_that_of_equilibrium():
     [
         (0.0, {"load": ([0.0, 0.08, 0.1], [0.0, 7.62e5, -2e6])}),
         (np.where(X > 0.9, -2e6, 0.0), {"stop": "onset"}),
+        # Unloaded after it has slid: the strength is zero then.
+        (0.0, {"load": ([0.0, 0.1, 0.11], [0.0, 8e5, 3e5]), "stop": "time", "end_time": 0.11}),
     ],
 )
-def test_a_stress_below_minus_the_strength_is_said(initial, options):
+def test_slip_that_would_reverse_is_said(initial, options):
     with pytest.warns(st.AccuracyWarning, match="would slip in reverse"):
         simulate(problem=stressed(initial), **options)
+
+
+@pytest.mark.parametrize("method", [st.LocalCriterion(), st.Equilibrium()])
+def test_an_initial_stress_below_minus_the_strength_is_said(method):
+    problem = stressed(np.where(X > 0.9, -2e6, 0.0))
+    with pytest.warns(st.AccuracyWarning, match="initial_stress is below .* at 9.4 % of the"):
+        critical_stress(method, problem=problem)
+
+
+def test_an_ensemble_takes_a_load_history():
+    strength = st.paper.strength(PROBLEM, correlation_ratio=2.0)
+    load = st.Rupture(load=([0.0, 1.0], [0.0, 1e8]), stop="onset")
+    rate = st.Rupture(loading_rate=1e8, start="rest", stop="onset")
+    one, other = (
+        st.monte_carlo(PROBLEM, strength, method=method, samples=2, seed=0).critical_stress
+        for method in (load, rate)
+    )
+    np.testing.assert_array_equal(one, other)
 
 
 @pytest.mark.parametrize("stop", ["sliding", "onset", "rest"])
@@ -182,10 +202,10 @@ def test_where_a_run_stops_and_what_is_known_then(stop):
 
 
 def test_rates_that_cannot_be_resolved_are_said():
-    with pytest.warns(st.AccuracyWarning, match="rises by 0.16 of .* use time_step=5e-09"):
+    with pytest.warns(st.AccuracyWarning, match="rises by 0.16 of .* use courant=0.028"):
         fast = critical_stress(st.Rupture(loading_rate=1e12))
     with warnings.catch_warnings(action="error"):
-        fine = critical_stress(st.Rupture(loading_rate=1e12, time_step=4.9e-9))
+        fine = critical_stress(st.Rupture(loading_rate=1e12, courant=0.0275))
     assert fast == pytest.approx(fine, rel=1e-2)  # the peak is sampled by 18 steps
 
 

@@ -62,14 +62,14 @@ class Broken:
 
     type, label = "broken", "broken"
 
-    def __init__(self, change, promise=()):
-        self.change, self.promise = change, promise
+    def __init__(self, change, promise=(), seconds=1e-6):
+        self.change, self.promise, self.seconds = change, promise, seconds
 
     def variables(self, problem):
         return onset_variables(problem.interface) | dict(self.promise)
 
     def seconds_per_sample(self, problem):
-        return 1e-6
+        return self.seconds
 
     def supports(self, problem):
         return []
@@ -92,3 +92,12 @@ def test_a_solver_that_breaks_its_promise_is_refused(words):
     strength = 1e6 + np.arange(256.0) * np.ones((3, 1))
     problem = st.paper.problem(nodes=256)
     refuses(words, lambda: st.onset(problem, strength, method=BROKEN[words]))
+
+
+@pytest.mark.parametrize("seconds", [np.nan, -1.0, "fast"])
+def test_a_time_that_is_none_is_refused(seconds):
+    problem, method = st.paper.problem(nodes=256), Broken({}, seconds=seconds)
+    strength = st.paper.strength(problem, correlation_ratio=2.0)
+    words = "method: seconds_per_sample of broken must return a number of seconds"
+    refuses(words, lambda: st.onset(problem, np.full((3, 256), 1e6), method=method))
+    refuses(words, lambda: st.failure_probability(problem, strength, 0.7e6, method=method))

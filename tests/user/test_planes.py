@@ -107,7 +107,6 @@ test_refusals = refusals({
     "x and y are swapped": lambda: onset(STRENGTH.T),
     "x does not coincide with the 72 nodes": lambda: onset(labelled(900.0)),
     "one sample": lambda: st.equilibrium_path(PLANE, SAMPLES, [1e5]),
-    "time_step: ... above the stability limit": lambda: rupture(time_step=1e-6),
     "mode II needs nu <= 0.49": lambda: st.Rupture(loading_rate=1e8).prepare(
         make_problem((72, 64), (0.0208, 0.0156), solid=STIFF)
     ),

@@ -4,7 +4,6 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-import xarray as xr
 from PIL import Image
 from refusals import refuses
 from setups import EXACT, LOCAL, exact_onset, local_onset, make_problem
@@ -160,7 +159,9 @@ def test_what_does_not_fit_is_refused(run, swept):
         "has no slip_patches; it holds": lambda: plot.monte_carlo(one, quantity="slip_patches"),
         "result.isel(": lambda: plot.monte_carlo(swept),
         "one or two parameters, got none": lambda: plot.quantiles(one),
-        "holds no failing profile": lambda: plot.weak_spots(xr.Dataset()),
+        "holds no failing profile": lambda: plot.weak_spots(
+            st.failure_probability(PROBLEM, FIELD, stress=0.5e6, method=LOCAL)
+        ),
         "give problem=": lambda: plot.rupture(run.drop_attrs()),
         "has no slip_rate": lambda: plot.rupture(run.drop_vars("slip_rate")),
         ".gif, got 'film.avi'": lambda: plot.film(run, "film.avi"),

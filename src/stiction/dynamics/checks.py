@@ -3,12 +3,13 @@
 import numpy as np
 
 from stiction.dynamics.integrator import Run
-from stiction.dynamics.loading import load_at
+from stiction.dynamics.loading import value_at
 from stiction.dynamics.state import Reason, State
 from stiction.errors import InputError, warn_accuracy
 from stiction.problem import FEWEST_NODES, Problem, Sample
 
-_COARSE, _COARSEST = 5e-3, 0.2  # load in one explicit step, in units of the stress scale
+# In units of the stress scale: load in one explicit step, and stress below minus the strength.
+_COARSE, _COARSEST, _REVERSED = 5e-3, 0.2, 1e-3
 
 
 def warn_if_coarse(problem: Problem, rows: Sample) -> None:
@@ -25,16 +26,24 @@ def warn_if_coarse(problem: Problem, rows: Sample) -> None:
     )
 
 
-def warn_if_unresolved(problem: Problem, run: Run, state: State) -> None:
-    """Warn where nodes have slipped that weaken too steeply for the grid, such as barriers."""
-    rates, interface = run.setting.nodes.weakening, problem.interface
-    steepest = problem.nucleation_lengths(1.0)[-1] / (FEWEST_NODES * interface.spacing)
+def warn_of_slip(run: Run, state: State) -> None:
+    """Warn of nodes that weaken too steeply for the grid, such as barriers, and of reversal."""
+    rates, interface, now = run.setting.nodes.weakening, run.medium.interface, state.now
+    steepest = run.medium.problem.nucleation_lengths(1.0)[-1] / (
+        FEWEST_NODES * interface.spacing
+    )
     steep = np.flatnonzero((state.slip > 0.0) & (rates > steepest))
     if steep.size:
         warn_accuracy(
             f"{steep.size} nodes slipped, the first at {interface.describe_node(steep[0])}, "
             f"where the strength falls by up to {rates[steep].max():.3g} Pa/m, too steeply for this"
             " grid; take more nodes, or infinite strength for barriers that never break"
+        )
+    if now["least"] < -_REVERSED * now["scale"]:
+        warn_accuracy(
+            f"the stress fell below minus the strength, by {-now['least']:.3g} Pa at "
+            f"{interface.describe_node(int(now['least_node']))}: what would slip in reverse there, "
+            "which is not modelled, was kept at rest; change the sign of the load, or unload less"
         )
 
 
@@ -46,7 +55,7 @@ def at_first_slip(run: Run) -> State:
             f"loading_rate: the first slip would come after {time:.3g} s, too late to resolve "
             f"steps of {step:.2g} s; load faster (the onset no longer depends on the rate)"
         )
-    scale = run.scale_at(float(load_at(*run.history, time)))
+    scale = run.scale_at(float(value_at(run.setting.load, time)))
     if not scale > 0.0:
         raise InputError(
             "initial_stress: too far from the strength for any scale of stress between them; "
@@ -54,34 +63,16 @@ def at_first_slip(run: Run) -> State:
         )
     rise = run.slope(time) * step / scale
     if rise > _COARSE:
+        courant = step / run.medium.largest_step * _COARSE / rise
         text = (
             f"loading_rate: in one explicit step of {step:.3g} s the load rises by {rise:.2g} of "
-            f"the stress scale, {scale:.3g} Pa; use time_step={step * _COARSE / rise:.2g} or less,"
-            " or load more slowly"
+            f"the stress scale, {scale:.3g} Pa; use courant={courant:.2g} or less, or load more"
+            " slowly"
         )
         if rise > _COARSEST:
             raise InputError(text)
         warn_accuracy(f"{text} (the onset is sampled coarsely)")
-    _warn_of_reverse(run, time)
     return run.start(time)
-
-
-def _warn_of_reverse(run: Run, first_slip: float) -> None:
-    """Warn if the load may take the stress below minus the strength, which falls by slip."""
-    times, values = run.history
-    nodes, lowest = run.setting.nodes, float(values.min())
-    later = values[times > first_slip].min(initial=0.0)
-    below = lowest * nodes.profile + nodes.initial < -nodes.strength
-    if later < 0.0:
-        below |= later * nodes.profile + nodes.initial < -nodes.residual
-    at = np.flatnonzero(below)
-    if at.size:
-        warn_accuracy(
-            f"the stress falls below minus the strength at {at.size} nodes, the first at "
-            f"{run.medium.interface.describe_node(at[0])}, where tau_0 = {lowest:.6g} Pa: they "
-            "would slip in reverse, which is not modelled, and are kept at rest; change the sign "
-            "of the load, or keep it above minus the strength"
-        )
 
 
 def check_finite(run: Run, state: State, reason: int) -> None:

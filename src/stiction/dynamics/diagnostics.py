@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stiction.arrays import Array
-from stiction.dynamics.loading import load_at
+from stiction.dynamics.loading import value_at
 from stiction.dynamics.state import RECORD, History, Nodes, Setting, State
 from stiction.jit import jit_inside
 
@@ -18,21 +18,17 @@ _COLUMNS = len(RECORD)
 
 
 class Step(NamedTuple):
-    """A step that was taken: where it led, its sums over the nodes and its fastest node."""
+    """A step that was taken: its end, its size, the work of the load, and Z <V> at the end."""
 
     time: float
     size: float
     load: float
     work: float
     radiated: float
-    mean_slip: float
-    slid: int
-    top: float
-    node: int
 
 
 def stress_scale(nodes: Nodes) -> History:
-    """Return the stress scale as a function of the load: (loads, scales), Pa, straight in between.
+    """Return the stress scale as a function of the load, both Pa.
 
     It is the mean over nodes of tau_p - tau_r, no node counting for more than `REACH` times
     tau_0 p + tau_i - tau_r, the drop that the load provides there. Where strengths are alike it
@@ -50,7 +46,7 @@ def stress_scale(nodes: Nodes) -> History:
     # The last slope goes on beyond the last load; one more load makes it visible.
     loads = np.append(loads, loads[-1] + max(1.0, abs(loads[-1])))
     scales = np.concatenate([[0.0], np.cumsum(np.cumsum(bends) * np.diff(loads))])
-    return loads, scales
+    return History(loads, scales)
 
 
 @jit_inside
@@ -65,7 +61,7 @@ def end_event(now: Any, unstable_rate: float, mean_stress: float, radiated: floa
 
 
 @jit_inside
-def observe(now: Any, unstable_rate: float, mean_stress: float, step: Step) -> Any:
+def observe(now: Any, unstable_rate: float, mean_stress: float, step: Step, node: int) -> Any:
     """Update peaks and events with the state after a step; return the fall of the mean stress, Pa.
 
     The fall counts from the last local maximum, and only as far as waves carry it away: where the
@@ -73,49 +69,70 @@ def observe(now: Any, unstable_rate: float, mean_stress: float, step: Step) -> A
     and ends when the mean stress rises above that maximum again or everything creeps. It was an
     arrested instability if a node slipped faster than `unstable_rate`; waves of an earlier one are
     slower. At slow loading all creeping patches are about equally slow at the maximum itself, so
-    that the place of the onset is read just after it.
+    that the place of the onset, the fastest node, is read just after it.
     """
     now.mean_stress = mean_stress
     if mean_stress > now.peak_stress:
         now.peak_stress, now.peak_time, now.peak_load = mean_stress, step.time, step.load
-        now.peak_node = step.node
+        now.peak_node = node
     fall = min(now.local_stress - mean_stress, step.radiated - now.local_radiated)
     if now.peak_stress - mean_stress < _PEAK_WIDTH * now.scale and fall > 0.0:
-        now.peak_node = step.node
+        now.peak_node = node
     if now.in_event:
-        now.event_rate = max(now.event_rate, step.top)
+        now.event_rate = max(now.event_rate, now.top_rate)
         if mean_stress > now.local_stress:
             end_event(now, unstable_rate, mean_stress, step.radiated)
     elif mean_stress > now.local_stress:
         now.local_stress, now.local_radiated = mean_stress, step.radiated
     elif fall > EVENT_DROP * now.scale:
-        now.in_event, now.event_rate = 1, step.top
+        now.in_event, now.event_rate = 1, now.top_rate
         if now.first_stress == -np.inf:
             now.first_stress = now.local_stress
     return fall
 
 
 @jit_inside
-def arrived(slip: float, threshold: float, increment: float, time: float, size: float) -> Any:
-    """Return when the slip passed a threshold in a step that ends at `time` beyond it, s."""
-    return time - size * min(1.0, (slip - threshold) / max(increment, 1e-300))
+def finish_step(
+    state: State,
+    setting: Setting,
+    step: Step,
+    increments: Array,
+    strength: Array,
+    record: Array,
+    row: int,
+) -> Any:
+    """Update diagnostics, arrivals, and the record if there is one; return the fall of the stress.
 
-
-@jit_inside
-def finish_step(state: State, setting: Setting, record: Array, row: int, step: Step) -> Any:
-    """Update the diagnostics, and the record if there is one; return the fall of the stress, Pa."""
-    now = state.diagnostics[0]
+    `increments` are those of slip in the step (m), `strength` is that after it (Pa), at the nodes.
+    """
+    now, slip, rate, stress = state.diagnostics[0], state.slip, state.rate, state.stress
+    critical, arrival, half = setting.nodes.critical, state.arrival, setting.thresholds.arrival
+    top, node, slid, slip_sum = -1.0, 0, 0, 0.0
+    least, least_node = now.least, now.least_node
+    for i in range(slip.size):
+        if rate[i] > top:
+            top, node = rate[i], i
+        if stress[i] + strength[i] < least:
+            least, least_node = stress[i] + strength[i], i
+        if slip[i] >= critical[i]:
+            slid += 1
+        # d_c = 0 where nothing weakens: there the first slip counts.
+        if np.isnan(arrival[i]) and slip[i] > 0.0 and slip[i] >= half * critical[i]:
+            beyond = (slip[i] - half * critical[i]) / max(increments[i], 1e-300)
+            arrival[i] = step.time - step.size * min(1.0, beyond)
+        slip_sum += slip[i]
     mean_stress = setting.mean_initial + step.load * setting.mean_profile - step.radiated
     now.time, now.load = step.time, step.load
-    now.top_rate, now.slid = step.top, step.slid
+    now.top_rate, now.slid = top, slid
+    now.least, now.least_node = least, least_node
     now.work += step.work
-    now.scale = max(now.scale, load_at(setting.scale_loads, setting.scales, step.load))
-    fall = observe(now, setting.thresholds.unstable_rate, mean_stress, step)
-    if step.slid >= setting.thresholds.breakable and now.kinetic_stress == -np.inf:
+    now.scale = max(now.scale, value_at(setting.scale, step.load))
+    fall = observe(now, setting.thresholds.unstable_rate, mean_stress, step, node)
+    if slid >= setting.thresholds.breakable and now.kinetic_stress == -np.inf:
         now.kinetic_stress = mean_stress
     if record.shape[0] > 0:
         record[row, 0], record[row, 1], record[row, 2] = step.time, step.load, mean_stress
-        record[row, 3], record[row, 4] = step.mean_slip, step.top
+        record[row, 3], record[row, 4] = slip_sum / slip.size, top
         record[row, 5], record[row, 6] = step.size, now.work
         for s in range(setting.stations.size):
             node, column = setting.stations[s], _COLUMNS + 3 * s

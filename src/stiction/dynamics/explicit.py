@@ -9,11 +9,10 @@ from stiction.dynamics.diagnostics import (
     EVENT_DROP,
     STEADY_STRESS,
     Step,
-    arrived,
     end_event,
     finish_step,
 )
-from stiction.dynamics.loading import load_at
+from stiction.dynamics.loading import value_at
 from stiction.dynamics.memory import advance_memory, pack
 from stiction.dynamics.state import (
     ExplicitTables,
@@ -67,13 +66,17 @@ def _predict(
 def _correct(
     state: State, setting: Setting, tables: ExplicitTables, load: float, impedance: float
 ) -> Any:
-    """Slip, stress and, in `tables.predicted`, rate after the step: (work, sum of V, slid)."""
+    """Slip, rate and stress after the step; return (work, sum of V).
+
+    `tables.transfer` then holds the strength, and `tables.predicted` what the mean of the rates
+    before and after slips.
+    """
     nodes, law, step = setting.nodes, setting.law, tables.step
     slip, rate, stress = state.slip, state.rate, state.stress
     transfer, predicted = tables.transfer, tables.predicted
     strength, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
-    critical, profile, initial = nodes.critical, nodes.profile, nodes.initial
-    work, total, slid = 0.0, 0.0, 0
+    profile, initial = nodes.profile, nodes.initial
+    work, total = 0.0, 0.0
     mean_load = 0.5 * (load + state.diagnostics[0].load)
     for i in range(slip.size):
         increment = 0.5 * step * (rate[i] + predicted[i])
@@ -82,49 +85,25 @@ def _correct(
         stuck = transfer[i] + load * profile[i] + initial[i]
         v = max(stuck - limit, 0.0) / impedance
         work += increment * (mean_load * profile[i] + initial[i])
-        predicted[i] = v
-        stress[i] = stuck - impedance * v
+        predicted[i] = 0.5 * step * (rate[i] + v)
+        transfer[i], slip[i], rate[i], stress[i] = limit, next_slip, v, stuck - impedance * v
         total += v
-        slip[i] = next_slip
-        if next_slip >= critical[i]:
-            slid += 1
-    return work, total, slid
+    return work, total
 
 
 @jit_inside
-def _arrive(
-    state: State, critical: Array, half: float, tables: ExplicitTables, time: float
-) -> Any:
-    """Take over the new rate; return (largest rate, its node, sum of the slip)."""
-    slip, rate, arrival = state.slip, state.rate, state.arrival
-    predicted, step = tables.predicted, tables.step
-    top, node, slip_sum = -1.0, 0, 0.0
-    for i in range(slip.size):
-        if predicted[i] > top:
-            top, node = predicted[i], i
-        # d_c = 0 where nothing weakens: there the first slip counts.
-        if np.isnan(arrival[i]) and slip[i] > 0.0 and slip[i] >= half * critical[i]:
-            increment = 0.5 * step * (rate[i] + predicted[i])
-            arrival[i] = arrived(slip[i], half * critical[i], increment, time, step)
-        slip_sum += slip[i]
-        rate[i] = predicted[i]
-    return top, node, slip_sum
-
-
-@jit_inside
-def _calm(now: Any, thresholds: Thresholds, step: Step, impedance: float, rise: float) -> Any:
+def _calm(now: Any, thresholds: Thresholds, step: float, impedance: float, rise: float) -> Any:
     """Count calm steps; return whether there were enough of them in a row.
 
     Waves make slip rates come and go; creep is slow, or as fast as it was.
     """
-    scale, before = now.scale, now.calm_rate
-    slow = _CALM_STRESS * scale / impedance + thresholds.calm_slip * rise / step.size
-    quiet = step.top < slow
-    steady = 0.5 * before <= step.top <= 2.0 * before
-    if quiet or (steady and step.top < STEADY_STRESS * scale / impedance):
+    scale, before, top = now.scale, now.calm_rate, now.top_rate
+    quiet = top < _CALM_STRESS * scale / impedance + thresholds.calm_slip * rise / step
+    steady = 0.5 * before <= top <= 2.0 * before
+    if quiet or (steady and top < STEADY_STRESS * scale / impedance):
         now.calm_steps += 1
     else:
-        now.calm_steps, now.calm_rate = 0, step.top
+        now.calm_steps, now.calm_rate = 0, top
     return now.calm_steps >= thresholds.calm_count
 
 
@@ -145,11 +124,10 @@ def explicit_steps(
     n, impedance, step = state.slip.size, grid.impedance, tables.step
     now, thresholds = state.diagnostics[0], setting.thresholds
     rate_hat, slip_hat = tables.rate_hat, state.slip_hat
-    half = thresholds.arrival
     taken, reason = ZERO, Reason.DONE  # one way out: each costs as much to compile as the rest
     while taken < count and reason == Reason.DONE:
         time = now.time + step
-        load = load_at(setting.load_times, setting.load_values, time)
+        load = value_at(setting.load, time)
         forward(grid.transform, state.rate, rate_hat)
         _transfer(grid, slip_hat, state.memory_sum, tables)
         _predict(state, setting, tables, load, impedance)
@@ -157,16 +135,15 @@ def explicit_steps(
         for q in range(rate_hat.size):
             rate_hat[q] = 0.5 * (rate_hat[q] + tables.shared[q])
         _transfer(grid, slip_hat, state.memory_sum, tables)
-        work, total, slid = _correct(state, setting, tables, load, impedance)
+        work, total = _correct(state, setting, tables, load, impedance)
         if not np.isfinite(total):
             for i in range(n):
-                if not np.isfinite(tables.predicted[i]):
+                if not np.isfinite(state.rate[i]):
                     now.bad_node = i
                     break
             now.time = time
             reason = Reason.NOT_FINITE
             break
-        top, node, slip_sum = _arrive(state, setting.nodes.critical, half, tables, time)
         for q in range(rate_hat.size):
             slip_hat[q] += step * rate_hat[q]
         pack(grid.offset, rate_hat, tables.packed)
@@ -174,17 +151,18 @@ def explicit_steps(
             state.memory, tables.table, tables.packed, state.memory_sum,
             grid.poles.size, grid.multiplicity,
         )  # fmt: skip
-        rise = abs(load - now.load)
+        rise, radiated = abs(load - now.load), impedance * total / n
         now.explicit_steps += 1
-        radiated = impedance * total / n
-        done = Step(time, step, load, work * grid.cell, radiated, slip_sum / n, slid, top, node)
-        fall = finish_step(state, setting, record, taken, done)
+        done = Step(time, step, load, work * grid.cell, radiated)
+        fall = finish_step(
+            state, setting, done, tables.predicted, tables.transfer, record, taken
+        )
         taken += 1
-        if slid >= thresholds.slid_stop:
+        if now.slid >= thresholds.slid_stop:
             reason = Reason.ALL_SLID
         elif thresholds.event_stop and fall > EVENT_DROP * now.scale:
             reason = Reason.DROPPED
-        elif _calm(now, thresholds, done, impedance, rise):
+        elif _calm(now, thresholds, step, impedance, rise):
             end_event(now, thresholds.unstable_rate, now.mean_stress, radiated)
             if thresholds.rest_stop and now.first_stress > -np.inf:
                 reason = Reason.AT_REST

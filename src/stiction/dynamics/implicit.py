@@ -10,10 +10,9 @@ from stiction.dynamics.diagnostics import (
     EVENT_DROP,
     STEADY_STRESS,
     Step,
-    arrived,
     finish_step,
 )
-from stiction.dynamics.loading import load_at
+from stiction.dynamics.loading import value_at
 from stiction.dynamics.memory import advance_with_ramp, fading_memory, tabulate
 from stiction.dynamics.state import (
     Grid,
@@ -58,7 +57,7 @@ def _choose_size(now: Any, setting: Setting, step: float) -> Any:
     smallest = thresholds.smallest_step
     small = thresholds.load_step * now.scale
     while True:
-        rise = load_at(setting.load_times, setting.load_values, time + size) - now.load
+        rise = value_at(setting.load, time + size) - now.load
         if size <= smallest or abs(rise) <= small:
             break
         size /= np.sqrt(2.0)
@@ -166,9 +165,9 @@ def _accept(
     attempt: _Attempt,
     radiated: float,
 ) -> Any:
-    """Take the step in place and return it."""
+    """Take the step in place and return it; `tables.driving` then holds the strength."""
     size, ratio, rise, load = attempt.size, attempt.ratio, attempt.rise, attempt.load
-    nodes, u, transfer = setting.nodes, tables.increment, tables.trial_stress
+    law, nodes, u, transfer = setting.law, setting.nodes, tables.increment, tables.trial_stress
     rate_hat, past_hat, transfer_hat = tables.rate_hat, tables.past_hat, tables.work
     stiffness, entry, slip_hat = grid.stiffness, grid.entry, state.slip_hat
     forward(grid.transform, u, rate_hat)
@@ -188,26 +187,18 @@ def _accept(
         transfer_hat[q] = complex(real, imaginary)
     backward(grid.transform, transfer_hat, transfer)
     slip, rate, past, stress = state.slip, state.rate, state.past, state.stress
-    critical, profile, initial = nodes.critical, nodes.profile, nodes.initial
-    half = setting.thresholds.arrival
+    strength, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
+    profile, initial, limit = nodes.profile, nodes.initial, tables.driving
     mean_load = 0.5 * (load + state.diagnostics[0].load)
-    work, slid, slip_sum, top, node = 0.0, 0, 0.0, -1.0, 0
+    work = 0.0
     for i in range(u.size):
         work += u[i] * (mean_load * profile[i] + initial[i])
         slip[i] += u[i]
         rate[i] = max(u[i] / size * (1.0 + ratio) - ratio * past[i], 0.0)
         past[i] = u[i] / size
         stress[i] = transfer[i] + load * profile[i] + initial[i] - grid.impedance * rate[i]
-        slip_sum += slip[i]
-        if slip[i] >= critical[i]:
-            slid += 1
-        if rate[i] > top:
-            top, node = rate[i], i
-        if np.isnan(state.arrival[i]) and slip[i] > 0.0 and slip[i] >= half * critical[i]:
-            state.arrival[i] = arrived(slip[i], half * critical[i], u[i], attempt.time, size)
-    mean_slip = slip_sum / u.size
-    work *= grid.cell
-    return Step(attempt.time, size, load, work, radiated, mean_slip, slid, top, node)
+        limit[i] = strength_at(law, strength[i], residual[i], weakening[i], slip[i])
+    return Step(attempt.time, size, load, work * grid.cell, radiated)
 
 
 @jit_inside
@@ -253,7 +244,7 @@ def implicit_steps(
         past_step = now.past_step
         ratio = size / (size + past_step) if past_step > 0.0 else 0.0
         time = now.time + size
-        load = load_at(setting.load_times, setting.load_values, time)
+        load = value_at(setting.load, time)
         attempt = _Attempt(size, time, load, ratio, 2.0 * ratio / size)
         accuracy = _assemble(state, grid, setting, tables, attempt)
         near = accuracy if thresholds.curved else 0.0
@@ -277,11 +268,11 @@ def implicit_steps(
         done = _accept(state, grid, setting, tables, attempt, radiated)
         now.implicit_steps += 1
         now.past_step, now.radiated = size, radiated
-        fall = finish_step(state, setting, record, taken, done)
+        fall = finish_step(state, setting, done, u, tables.driving, record, taken)
         taken += 1
         if not clipped:
             step = _next_size(thresholds.slip_step, size, largest, growing)
-        if done.slid >= thresholds.slid_stop:
+        if now.slid >= thresholds.slid_stop:
             reason = Reason.ALL_SLID
         elif thresholds.event_stop and fall > EVENT_DROP * now.scale:
             reason = Reason.DROPPED

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from stiction.dynamics.explicit import explicit_steps
 from stiction.dynamics.implicit import LARGEST_STEP, implicit_steps
-from stiction.dynamics.loading import first_reach, load_at
+from stiction.dynamics.loading import first_reach, value_at
 from stiction.dynamics.medium import Medium
 from stiction.dynamics.memory import (
     empty_memory,
@@ -22,14 +22,12 @@ from stiction.dynamics.state import (
     RECORD,
     ExplicitTables,
     Floats,
-    History,
     ImplicitTables,
     Reason,
     Setting,
     State,
 )
 from stiction.friction.kernels import strengths
-from stiction.friction.laws import FrictionLaw
 
 _OVERSTRESSED = 1e-6  # stress scales above the strength beyond which slip begins with waves
 _NO_SLIP = 1e-9  # Z V below which nothing slips, in units of the stress scale
@@ -48,7 +46,6 @@ class Run:
     """One interface under one load history: what does not change in a run, and tables of steps."""
 
     medium: Medium
-    friction: FrictionLaw
     setting: Setting
     stop: str  # as `Rupture.stop`
     steepest_rate: float  # largest, Pa/m, at which a node that may break weakens at any slip
@@ -57,11 +54,6 @@ class Run:
     least_load: float
     # Tables of the last kind of step only: they are large, and one kind at a time is enough.
     tables: ExplicitTables | ImplicitTables | None = None
-
-    @property
-    def history(self) -> History:
-        """Times (s) and values (Pa) of the load."""
-        return self.setting.load_times, self.setting.load_values
 
     def elastic_stress(self, slip_hat: NDArray[np.complex128], load: float) -> Floats:
         """Return the static stress of a slip at a load, Pa: what an interface at rest carries."""
@@ -79,8 +71,7 @@ class Run:
 
     def scale_at(self, load: float) -> float:
         """Stress scale of a load, Pa, at least that of the least that can run away."""
-        setting = self.setting
-        return float(load_at(setting.scale_loads, setting.scales, max(load, self.least_load)))
+        return float(value_at(self.setting.scale, max(load, self.least_load)))
 
     @property
     def first_load(self) -> float:
@@ -90,11 +81,11 @@ class Run:
 
     def first_slip(self) -> float:
         """Return when the first node reaches its strength, s."""
-        return first_reach(self.history, self.first_load)
+        return first_reach(self.setting.load, self.first_load)
 
     def slope(self, time: float) -> float:
         """Return the size of the loading rate just after a time, Pa/s."""
-        times, values = self.history
+        times, values = self.setting.load
         i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, times.size - 2))
         return float(abs(values[i + 1] - values[i]) / (times[i + 1] - times[i]))
 
@@ -108,7 +99,7 @@ class Run:
         given = np.zeros(interface.size) if slip is None else slip
         delta = np.array(given, dtype=np.float64).ravel()
         memory, memory_sum = empty_memory(self.medium.grid)
-        load = float(load_at(*self.history, time))
+        load = float(value_at(self.setting.load, time))
         slip_hat = interface.transform(delta.reshape(interface.shape)).ravel()
         stress = self.elastic_stress(slip_hat, load)
         limit = self.strength_after(delta)
@@ -125,6 +116,8 @@ class Run:
         now["peak_node"] = int(np.argmax(stress - limit))
         now["first_stress"] = now["kinetic_stress"] = -np.inf  # not yet
         now["bad_node"] = -1
+        now["least_node"] = place = int(np.argmin(stress + limit))
+        now["least"] = (stress + limit)[place]
         now["top_rate"] = rate.max()
         now["slid"] = np.count_nonzero(delta >= nodes.critical)
         scale = max(0.0, self.scale_at(load))
@@ -159,7 +152,7 @@ class Run:
             return _ENDINGS[reason]
         if self.ended(state):
             return "time"
-        times, values = self.history
+        times, values = self.setting.load
         resting = (  # the load, beyond its last piece, never rises again, and nothing slips
             not state.explicit
             and state.now["time"] >= times[-1]
@@ -204,8 +197,7 @@ class Run:
         left = self.setting.thresholds.end_time - state.now["time"]
         if left < count * medium.step:
             count = min(count, max(1, int(np.ceil(left / medium.step - 1e-6))))
-        taken, reason = explicit_steps(count, state, medium.grid, self.setting, tables, record)
-        return int(taken), int(reason)
+        return explicit_steps(count, state, medium.grid, self.setting, tables, record)
 
     def _implicit(self, state: State, count: int, record: Floats) -> tuple[int, int]:
         size, grid = float(state.phase[1]), self.medium.grid
@@ -215,7 +207,7 @@ class Run:
         taken, state.phase[1], reason = implicit_steps(
             count, size, state, grid, self.setting, self.tables, record
         )
-        return int(taken), int(reason)
+        return taken, reason
 
     def _explicit_tables(self) -> ExplicitTables:
         if not isinstance(self.tables, ExplicitTables):

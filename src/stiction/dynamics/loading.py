@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 
-from stiction.arrays import Array
 from stiction.dynamics.state import Floats, History
 from stiction.errors import InputError
 from stiction.jit import jit
@@ -12,8 +11,9 @@ from stiction.model import real_array
 
 
 @jit
-def load_at(times: Array, values: Array, t: float) -> Any:
-    """Piecewise linear load history, continued beyond its last point with its last slope."""
+def value_at(history: History, t: float) -> Any:
+    """Value of a piecewise linear function."""
+    times, values = history
     low, high = 0, times.size - 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -27,9 +27,8 @@ def load_at(times: Array, values: Array, t: float) -> Any:
 
 def turning_times(history: History) -> Floats:
     """Return the times at which the load begins to fall or to rise again, s."""
-    times, values = history
-    rising = np.sign(np.diff(values))
-    turned: Floats = times[1:-1][rising[1:] != rising[:-1]]
+    rising = np.sign(np.diff(history.values))
+    turned: Floats = history.at[1:-1][rising[1:] != rising[:-1]]
     return turned
 
 
@@ -48,7 +47,7 @@ def load_history(load: Any) -> History:
         raise InputError("times and values must be finite")
     if times[0] != 0.0 or np.any(np.diff(times) <= 0.0):
         raise InputError("times must begin at 0 s and increase")
-    return times, values
+    return History(times, values)
 
 
 def first_reach(history: History, target: float) -> float:

@@ -25,14 +25,17 @@ _GROWTH = 1e-5  # growth of a wave in a step; a rupture takes thousands
 class Medium:
     """Elastic half-spaces on a grid, with a fixed explicit step. Read-only, shared by threads."""
 
-    interface: Interface
+    problem: Problem
     grid: Grid
     step: float  # explicit time step, s
     largest_step: float  # limit of stability of the explicit step, s
-    shear_modulus: float  # G, Pa
-    effective_modulus: float  # G*, Pa
     # Kept for a line; on a plane it would leave no room for tables of implicit steps.
     step_table: tuple[Floats, Floats] | None
+
+    @property
+    def interface(self) -> Interface:
+        """The interface of the problem."""
+        return self.problem.interface
 
     @property
     def impedance(self) -> float:
@@ -40,10 +43,8 @@ class Medium:
         return self.grid.impedance
 
 
-def prepare_medium(
-    problem: Problem, tolerance: float, courant: float, time_step: float | None
-) -> Medium:
-    """Return tables for a problem; refuse a time step above the stability limit."""
+def prepare_medium(problem: Problem, tolerance: float, courant: float) -> Medium:
+    """Return tables for a problem; refuse a solid or a tolerance that no step is stable for."""
     solid, interface, mode = problem.solid, problem.interface, problem.mode
     if mode == "II" and not SMALLEST_RATIO <= solid.wave_speed_ratio <= LARGEST_RATIO:
         valid = "nu <= 0.49" if solid.plane == "strain" else "nu >= -0.99"
@@ -52,30 +53,24 @@ def prepare_medium(
             f"got {solid.poisson_ratio}"
         )
     eta, speed = solid.wave_speed_ratio, solid.shear_wave_speed
-    modes = ("II", "III") if interface.is_plane else (mode,)
-    kernels = [kernel_sum(each, eta, tolerance) for each in modes]
-    check_memory(
-        "interface.nodes",
-        bytes_needed(interface, sum(kernel.poles.size for kernel in kernels)),
-        "take fewer nodes, or a larger kernel_tolerance",
-    )
-    limit = largest_step(modes, eta, tolerance, interface.spacings) / speed
+    names = ("II", "III") if interface.is_plane else (mode,)
+    kernels = [kernel_sum(name, eta, tolerance) for name in names]
+    # At its largest a run takes implicit steps: memory variables and tables, on a line those of
+    # explicit steps too, and forty arrays of nodes.
+    modes, pairs = interface.wavenumbers.size, sum(kernel.poles.size for kernel in kernels)
+    tables = 6 * modes / 2 if interface.is_plane else 10 * modes
+    size = 8.0 * (pairs * (4 * modes + tables) + 40 * interface.size)
+    check_memory("interface.nodes", size, "take fewer nodes, or a larger kernel_tolerance")
+    limit = largest_step(names, eta, tolerance, interface.spacings) / speed
     if limit == 0.0:
         error = max(kernel.error for kernel in kernels)
         raise InputError(
             f"kernel_tolerance: with an error of {error:.2g} in the memory kernel waves grow"
             f" at any time step; got {tolerance:g}, use {STEADY_TOLERANCE:g} or less"
         )
-    step = courant * limit if time_step is None else time_step
-    if step > limit:
-        raise InputError(
-            f"time_step: {step:.6g} s is above the stability limit {limit:.6g} s of this grid "
-            f"and solid; use at most {0.9 * limit:.6g} s"
-        )
-    grid = _grid(problem, kernels)
+    grid, step = _grid(problem, kernels), courant * limit
     table = None if interface.is_plane else step_table(grid, step)
-    moduli = solid.shear_modulus, problem.effective_modulus
-    return Medium(interface, grid, step, limit, *moduli, table)
+    return Medium(problem, grid, step, limit, table)
 
 
 def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:
@@ -85,15 +80,11 @@ def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:
     1995): K = (k/2)(G* a + G b), and the memory is (G k/2)[a C_II + b C_III] * V.
     """
     solid, interface = problem.solid, problem.interface
-    k = interface.wavenumbers
+    k, share = interface.wavenumbers, interface.in_plane_share
     entry, offset, multiplicity = offsets(k.shape)
-    share = interface.in_plane_share
-    if share is None:
-        modulus, wavenumbers, own = problem.effective_modulus * k, k[1:], np.ones(k.size - 1)
-    else:
-        modulus = (problem.effective_modulus * share + solid.shear_modulus * (1.0 - share)) * k
-        quarter = slice(0, interface.shape[0] // 2 + 1)  # kx >= 0
-        wavenumbers, own = k[quarter].ravel(), share[quarter].ravel()
+    modulus = (problem.effective_modulus * share + solid.shear_modulus * (1.0 - share)) * k
+    # Modes with entries in the tables: on a plane kx >= 0, on a line k > 0.
+    own = slice(0, interface.shape[0] // 2 + 1) if interface.is_plane else slice(1, None)
     return Grid(
         transform=make_transform(interface.shape),
         impedance=solid.shear_modulus / (2.0 * solid.shear_wave_speed),
@@ -102,22 +93,12 @@ def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:
         entry=entry,
         offset=offset,
         multiplicity=multiplicity,
-        frequency=wavenumbers * solid.shear_wave_speed,
-        mode_two=own,
+        frequency=k[own].ravel() * solid.shear_wave_speed,
+        mode_two=share[own].ravel(),
         poles=np.concatenate([kernel.poles for kernel in kernels]),
         weights=np.concatenate([kernel.weights for kernel in kernels]),
         split=kernels[0].poles.size,
     )
-
-
-def bytes_needed(interface: Interface, pairs: int) -> float:
-    """Memory of one run at its largest, while it takes implicit steps; without frames.
-
-    Memory variables and tables, on a line those of explicit steps too, and forty arrays of nodes.
-    """
-    modes = interface.wavenumbers.size
-    tables = 6 * modes / 2 if interface.is_plane else 10 * modes
-    return 8.0 * (pairs * (4 * modes + tables) + 40 * interface.size)
 
 
 @functools.lru_cache(maxsize=64)

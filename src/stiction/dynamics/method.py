@@ -14,17 +14,16 @@ from stiction.dynamics.checks import (
     at_first_slip,
     check_finite,
     warn_if_coarse,
-    warn_if_unresolved,
+    warn_of_slip,
 )
 from stiction.dynamics.diagnostics import stress_scale
 from stiction.dynamics.integrator import Run
 from stiction.dynamics.loading import load_history, turning_times
 from stiction.dynamics.medium import Medium, prepare_medium
 from stiction.dynamics.slow_start import slow_start, static_setting
-from stiction.dynamics.state import Nodes, Setting, State, Thresholds
+from stiction.dynamics.state import History, Nodes, Setting, State, Thresholds
 from stiction.dynamics.summary import scalars, summary
 from stiction.errors import InputError
-from stiction.friction.laws import FrictionLaw
 from stiction.friction.parameters import SMALLEST_EIGENVALUE
 from stiction.model import Count, Flag, Positive, Real, model
 from stiction.problem import Problem, Sample, steepest_rate
@@ -74,8 +73,6 @@ class Rupture:
         (35). From about 1e-3 on, waves may grow at any time step, which raises an error.
     courant : float
         Explicit time step in units of the stability limit, in (0, 1].
-    time_step : float, optional
-        Explicit time step, s, instead of `courant`.
     slip_step : float
         Slip of any weakening node in one implicit step, in units of its d_c.
     load_step : float
@@ -107,7 +104,7 @@ class Rupture:
     Raises
     ------
     InputError
-        If an option is out of range; from `prepare` if the time step is unstable.
+        If an option is out of range.
 
     Notes
     -----
@@ -131,8 +128,9 @@ class Rupture:
     stress and stress drop are NaN unless it slides.
 
     Slip never reverses: a node whose slip rate would become negative sticks, keeps its
-    weakened strength, and slips again only when the stress reaches it. Boundary integral in
-    Fourier space: Breitenfeld and Geubelle (1998).
+    weakened strength, and slips again only when the stress reaches it; a warning gives the
+    place if the stress fell below minus the strength. Boundary integral in Fourier space:
+    Breitenfeld and Geubelle (1998).
     """
 
     loading_rate: Positive | None = None
@@ -140,7 +138,6 @@ class Rupture:
     load: LoadHistory = None
     kernel_tolerance: Positive = 1e-6
     courant: Fraction = 0.9
-    time_step: Positive | None = None
     slip_step: Fraction = 0.02
     load_step: Fraction = 1e-3
     implicit: Flag = True
@@ -183,7 +180,7 @@ class Rupture:
 
     def medium(self, problem: Problem) -> Medium:
         """Return kernel and tables for a problem."""
-        return prepare_medium(problem, self.kernel_tolerance, self.courant, self.time_step)
+        return prepare_medium(problem, self.kernel_tolerance, self.courant)
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, NDArray[Any]]]:
         """Return a solver for samples of this problem, with its kernel fitted once."""
@@ -195,16 +192,16 @@ class Rupture:
             warn_if_coarse(problem, rows)
             found = []
             for i in range(rows.samples):
-                run = make_run(self, problem.friction, medium, rows, i)
+                run = make_run(self, medium, rows, i)
                 start = slow_start(static, run, rows, i, rate) if static and rate else None
-                found.append(self._one(problem, run, start))
+                found.append(self._one(run, start))
             return {
                 name: np.array([one[name] for one in found]) for name in self.variables(problem)
             }
 
         return solve
 
-    def _one(self, problem: Problem, run: Run, state: State | None) -> dict[str, Any]:
+    def _one(self, run: Run, state: State | None) -> dict[str, Any]:
         rest = at_first_slip(run)
         state = rest if state is None else state
         ended, reason = run.follow(state, self.max_steps)
@@ -215,8 +212,8 @@ class Rupture:
                 f"{state.now['slid']} nodes to their residual strength, but not to stop="
                 f"{self.stop!r}; raise max_steps or the loading rate, or stop at 'onset' or 'rest'"
             )
-        warn_if_unresolved(problem, run, state)
-        found = summary(problem, run, state)
+        warn_of_slip(run, state)
+        found = summary(run, state)
         if self.stop == "onset":
             found |= {name: np.full(np.shape(found[name]), np.nan) for name in _LATER}
         return found
@@ -224,7 +221,6 @@ class Rupture:
 
 def make_run(
     method: Rupture,
-    friction: FrictionLaw,
     medium: Medium,
     rows: Sample,
     sample: int,
@@ -233,7 +229,7 @@ def make_run(
     """Return the run of one sample, which records what happens at some nodes."""
     strength, residual = rows.strength[sample], rows.residual_strength[sample]
     weakening, initial = rows.weakening_rate[sample], rows.initial_stress[sample]
-    finite = np.isfinite(strength)
+    friction, finite = medium.problem.friction, np.isfinite(strength)
     with np.errstate(over="ignore"):
         critical = friction.reach * friction.critical_slip_of(strength - residual, weakening)
     if not np.all(np.isfinite(critical[finite])):
@@ -247,29 +243,26 @@ def make_run(
     steepest *= friction.steepest_slope / friction.initial_slope
     history = method.load
     if history is None:
-        history = np.array([0.0, 1.0]), np.array([0.0, method.loading_rate])
-    scale_loads, scales = stress_scale(nodes)
+        history = History(np.array([0.0, 1.0]), np.array([0.0, method.loading_rate]))
     setting = Setting(
         law=friction.parameters,
         nodes=nodes,
         mean_profile=float(nodes.profile.mean()),
         mean_initial=float(nodes.initial.mean()),
-        load_times=history[0],
-        load_values=history[1],
+        load=history,
         turning_times=turning_times(history),
-        scale_loads=scale_loads,
-        scales=scales,
-        thresholds=_thresholds(method, friction, medium, nodes),
+        scale=stress_scale(nodes),
+        thresholds=_thresholds(method, medium, nodes),
         stations=np.empty(0, dtype=np.int64) if stations is None else stations,
     )
     least = _least_load(medium, nodes, steepest)
-    return Run(medium, friction, setting, method.stop, steepest, least)
+    return Run(medium, setting, method.stop, steepest, least)
 
 
 def _least_load(medium: Medium, nodes: Nodes, steepest: float) -> float:
     """Return the mean load, Pa, at which the weakest nodes of half a nucleation length slip."""
-    interface = medium.interface
-    moduli = (medium.effective_modulus, medium.shear_modulus)[: len(interface.shape)]
+    interface, solid = medium.interface, medium.problem.solid
+    moduli = (medium.problem.effective_modulus, solid.shear_modulus)[: len(interface.shape)]
     # Of a line, or on a plane along x times along y.
     half = float(np.prod([SMALLEST_EIGENVALUE * modulus / steepest for modulus in moduli]))
     weakens = np.isfinite(nodes.strength) & (nodes.critical > 0.0)
@@ -278,15 +271,13 @@ def _least_load(medium: Medium, nodes: Nodes, steepest: float) -> float:
     return float(np.partition(loads, weakest - 1)[:weakest].mean())
 
 
-def _thresholds(
-    method: Rupture, friction: FrictionLaw, medium: Medium, nodes: Nodes
-) -> Thresholds:
+def _thresholds(method: Rupture, medium: Medium, nodes: Nodes) -> Thresholds:
     """When steps change or end.
 
     Calm: for as long as shear waves need to cross the interface, nothing slips faster than a crack
     of half its length does when the load alone drives it, or nothing faster than before.
     """
-    finite = np.isfinite(nodes.strength)
+    friction, finite = medium.problem.friction, np.isfinite(nodes.strength)
     frequency = medium.grid.frequency
     crossing = 2.0 * np.pi / frequency[frequency > 0.0].min() / medium.step
     typical = float(np.median((nodes.strength - nodes.residual)[finite]))
@@ -298,7 +289,7 @@ def _thresholds(
         rest_stop=method.stop == "rest",
         end_time=np.inf if method.end_time is None else method.end_time,
         breakable=breakable,
-        calm_slip=max(medium.interface.lengths) / medium.effective_modulus,
+        calm_slip=max(medium.interface.lengths) / medium.problem.effective_modulus,
         calm_count=max(_CALM_STEPS, int(np.ceil(crossing))),
         slip_step=method.slip_step,
         load_step=method.load_step,

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
 from stiction.dynamics.integrator import Run
-from stiction.dynamics.state import RECORD, Floats, State
-from stiction.dynamics.summary import energy_balance, per_area
+from stiction.dynamics.state import DIAGNOSTICS, RECORD, Floats, State
+from stiction.dynamics.summary import energy_balance, per_area, seismic_moment
 from stiction.errors import InputError, unknown_name
 from stiction.files import UNREADABLE, read_arrays, write_arrays, write_whole
 from stiction.interface import Interface
@@ -165,10 +165,10 @@ class Recorder:
             "mean_slip": float(state.slip.mean()),
             "top_slip_rate": float(state.rate.max()),
             "weakened_fraction": float(now["slid"]) / state.slip.size,
-            "seismic_moment": medium.shear_modulus * float(state.slip.sum()) * medium.grid.cell,
+            "seismic_moment": seismic_moment(run, state),
         }
         with np.errstate(over="ignore"):  # just before a run becomes non-finite
-            frame |= energy_balance(run.friction, run.setting.nodes, medium.grid, state)
+            frame |= energy_balance(run, state)
         fields = {
             "slip": state.slip,
             "slip_rate": state.rate,
@@ -253,10 +253,11 @@ def _digest(run: Run, others: str) -> str:
     medium, setting = run.medium, run.setting
     grid = medium.grid
     slips = np.linspace(0.0, 5.0, 101)  # where laws are compared, in units of d_c
-    law = np.concatenate([run.friction.fraction(slips), *map(np.ravel, setting.law)])
-    digest = hashlib.sha256(repr([medium.interface, float(medium.step), others]).encode())
+    law = np.concatenate([medium.problem.friction.fraction(slips), *map(np.ravel, setting.law)])
+    about = [medium.interface, float(medium.step), others, DIAGNOSTICS]
+    digest = hashlib.sha256(repr(about).encode())
     for values in (
-        *setting.nodes, law, *run.history, np.array(setting.thresholds, float),
+        *setting.nodes, law, *setting.load, np.array(setting.thresholds, float),
         grid.impedance, grid.stiffness, grid.poles, grid.weights,
     ):  # fmt: skip
         digest.update(np.ascontiguousarray(values).tobytes())
@@ -316,13 +317,14 @@ def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset
             parts.append(data.drop_vars(unwanted, errors="ignore").load())
     if not parts:
         raise InputError(f"folder: {str(folder)!r} holds no frames of a rupture")
-    framed = xr.concat(
-        [part.drop_dims("step") for part in parts], dim="time",
-        data_vars="minimal", coords="minimal", compat="override", join="override",
-    )  # fmt: skip
-    names = [name for name in parts[0] if "step" in parts[0][name].dims]
-    steps = [part[names].drop_vars(["x", "y", "time"], errors="ignore") for part in parts]
-    framed = framed.merge(xr.concat(steps, dim="step", join="override"))
+
+    def joined(dim: str, other: str) -> xr.Dataset:
+        return xr.concat(
+            [part.drop_dims(other) for part in parts], dim=dim,
+            data_vars="minimal", coords="minimal", compat="override", join="override",
+        )  # fmt: skip
+
+    framed = joined("time", "step").merge(joined("step", "time"))
     framed.attrs = parts[-1].attrs
     if (folder / _SUMMARY).exists():
         with xr.open_dataset(folder / _SUMMARY, engine="netcdf4") as whole:

@@ -11,7 +11,7 @@ from stiction.dynamics.checks import (
     at_first_slip,
     check_finite,
     warn_if_coarse,
-    warn_if_unresolved,
+    warn_of_slip,
 )
 from stiction.dynamics.integrator import Run
 from stiction.dynamics.method import Rupture, make_run
@@ -19,11 +19,11 @@ from stiction.dynamics.save import SCALARS, Recorder, Save, open_rupture
 from stiction.dynamics.state import State
 from stiction.dynamics.summary import summary
 from stiction.errors import InputError, warn_accuracy
-from stiction.model import Progress, checked, to_plain
+from stiction.model import Progress, checked
 from stiction.problem import Problem, refusals
 from stiction.profiles.placing import with_gaps
 from stiction.progress import Meter
-from stiction.results import along, to_dataset
+from stiction.results import along, study_attributes, to_dataset
 from stiction.variables import Variable
 
 if TYPE_CHECKING:
@@ -99,14 +99,15 @@ def simulate_rupture(
     stations = save.nodes(problem.interface)
     problem.warn_of_units(rows.mean_strength, float(rows.residual_strength.mean()))
     warn_if_coarse(problem, rows)
-    run = make_run(method, problem.friction, method.medium(problem), rows, 0, stations)
+    run = make_run(method, method.medium(problem), rows, 0, stations)
     state = at_first_slip(run)
     if run.ended(state):
         raise InputError(
             f"end_time: {method.end_time:g} s is not after the start of the run, t = "
             f"{state.now['time']:.6g} s (first slip)"
         )
-    recorder = Recorder(run, save, _attributes(problem, method))
+    attributes = study_attributes(problem=problem, method=method)
+    recorder = Recorder(run, save, attributes | {"stopped": "running"})
     if recorder.begin(state) and save.to is not None:
         return with_gaps(problem, open_rupture(save.to, fields=()), measured)
     if state.steps == 0:
@@ -114,22 +115,13 @@ def simulate_rupture(
     with Meter("rupture", show=progress, unit="steps") as meter:
         stopped = _follow(run, state, recorder, method.max_steps, meter)
     recorder.attributes["stopped"] = stopped
-    warn_if_unresolved(problem, run, state)
+    warn_of_slip(run, state)
     recorder.flush(state, stopped)
     dataset = recorder.take() if save.to is None else open_rupture(save.to, fields=())
     dataset.attrs["stopped"] = stopped
-    result = _complete(dataset, problem, method, run, state)
+    result = _complete(dataset, method, run, state)
     recorder.finish(result, stopped)
     return with_gaps(problem, result, measured)
-
-
-def _attributes(problem: Problem, method: Rupture) -> dict[str, Any]:
-    """Return the attributes of the result; a user-defined friction law has no plain form."""
-    try:
-        study: dict[str, Any] = {"problem": to_plain(problem), "method": to_plain(method)}
-    except InputError as error:
-        return {"study_incomplete": str(error), "stopped": "running"}
-    return {"study": study, "stopped": "running"}
 
 
 def _follow(run: Run, state: State, recorder: Recorder, most: int, meter: Meter) -> str:
@@ -156,11 +148,9 @@ def _follow(run: Run, state: State, recorder: Recorder, most: int, meter: Meter)
     return "max_steps"
 
 
-def _complete(
-    dataset: xr.Dataset, problem: Problem, method: Rupture, run: Run, state: State
-) -> xr.Dataset:
+def _complete(dataset: xr.Dataset, method: Rupture, run: Run, state: State) -> xr.Dataset:
     """Add the variables of the whole run."""
-    interface = problem.interface
+    problem, interface = run.medium.problem, run.medium.interface
     variables = {name: along(interface, variable) for name, variable in _ALONG.items()}
     for name, variable in method.variables(problem).items():
         variables[name] = replace(variable, dims=variable.dims[1:])  # without 'sample'
@@ -169,7 +159,7 @@ def _complete(
         "arrival_time": state.arrival.reshape(interface.shape),
     }
     with np.errstate(over="ignore", invalid="ignore"):  # after a run that became non-finite
-        found |= summary(problem, run, state)
+        found |= summary(run, state)
     # Energies and moment are already there over 'time'; their last value is the total.
     new = {name: value for name, value in found.items() if name not in SCALARS}
     return dataset.merge(to_dataset(new, variables, {}, {}, interface))

@@ -105,6 +105,6 @@ def _at(
     now["mean_stress"] = now["peak_stress"] = now["local_stress"] = stress.mean()
     now["local_radiated"] = now["radiated"] = radiated
     # The slow path has radiated nothing: that is the work that was done on it.
-    now["work"] -= energy_balance(run.friction, nodes, grid, state)["radiated_energy"]
+    now["work"] -= energy_balance(run, state)["radiated_energy"]
     now["start_error"] = missed.max(initial=0.0)
     return state

@@ -16,8 +16,14 @@ from stiction.elasticity.operator import Transform
 Ints = NDArray[np.int64]
 Spectrum = NDArray[np.complex128]
 Floats = NDArray[np.float64]
-History = tuple[Floats, Floats]
-"""Times (s) and values of a piecewise linear function."""
+
+
+class History(NamedTuple):
+    """A piecewise linear function, continued beyond its last point with its last slope."""
+
+    at: Floats  # times, s, or loads, Pa; rising
+    values: Floats
+
 
 Reason = IntEnum(
     "Reason", "DONE ALL_SLID TO_EXPLICIT TO_IMPLICIT NOT_FINITE DROPPED AT_REST", start=0
@@ -56,6 +62,8 @@ DIAGNOSTICS = np.dtype(
         ("scale", "f8"),  # stress scale of the largest load so far
         ("start_load", "f8"),  # where the run began, and what that may cost
         ("start_error", "f8"),
+        ("least", "f8"),  # smallest sum of stress and strength so far, and where
+        ("least_node", "i8"),
     ]
 )
 """Diagnostics of every step: one record, which compiled steps and checkpoints share."""
@@ -115,11 +123,9 @@ class Setting(NamedTuple):
     nodes: Nodes
     mean_profile: float  # <p>
     mean_initial: float  # <tau_i>, Pa
-    load_times: Array  # load history, s and Pa
-    load_values: Array
+    load: History  # tau_0(t)
     turning_times: Array  # when the load begins to fall or to rise again, s
-    scale_loads: Array  # stress scale against the load, Pa
-    scales: Array
+    scale: History  # stress scale against the load, Pa
     thresholds: Thresholds
     stations: Ints  # nodes whose slip, slip rate and stress the record of steps holds
 

@@ -7,10 +7,8 @@ from typing import Any
 import numpy as np
 
 from stiction.dynamics.integrator import Run
-from stiction.dynamics.state import Floats, Grid, Nodes, State
-from stiction.friction.laws import FrictionLaw
+from stiction.dynamics.state import Floats, State
 from stiction.interface import Interface
-from stiction.problem import Problem
 from stiction.results import position
 from stiction.variables import Variable
 
@@ -54,15 +52,20 @@ def scalars(interface: Interface) -> dict[str, Variable]:
     return found
 
 
-def energy_balance(
-    friction: FrictionLaw, nodes: Nodes, grid: Grid, state: State
-) -> dict[str, float]:
+def seismic_moment(run: Run, state: State) -> float:
+    """Return the moment of the slip, N; on a plane N m."""
+    medium = run.medium
+    return medium.problem.solid.shear_modulus * float(state.slip.sum()) * medium.grid.cell
+
+
+def energy_balance(run: Run, state: State) -> dict[str, float]:
     """Return strain, fracture and radiated energy, J/m; on a plane J.
 
     The static strain energy is the sum over modes of K(k)|delta_k|²/2. Waves carry away the work
     less friction less strain energy. The stress equals the strength wherever there is slip rate, so
     that the work of friction follows from the slip alone.
     """
+    nodes, grid, friction = run.setting.nodes, run.medium.grid, run.medium.problem.friction
     drop = np.where(np.isfinite(nodes.strength), nodes.strength - nodes.residual, 0.0)
     fracture = friction.dissipated(state.slip, drop, nodes.weakening)
     share = np.full(grid.transform.half, 2.0)  # a mode and its conjugate, which is left out
@@ -78,17 +81,14 @@ def energy_balance(
 
 
 def _axis_speeds(
-    problem: Problem,
-    run: Run,
-    state: State,
-    lengths: float,
-    statistic: Callable[[Floats], Any],
+    run: Run, state: State, lengths: float, statistic: Callable[[Floats], Any]
 ) -> list[float]:
     """A statistic of the front's speed along each axis, on the lines through its origin.
 
     Speeds are means over `lengths` times the shortest h_n along the axis.
     """
-    interface, nucleation = problem.interface, problem.nucleation_lengths(run.steepest_rate)
+    interface = run.medium.interface
+    nucleation = run.medium.problem.nucleation_lengths(run.steepest_rate)
     arrival = state.arrival.reshape(interface.shape)
     began = np.unravel_index(int(state.now["peak_node"]), interface.shape)
     found = []
@@ -118,15 +118,15 @@ def _critical_load(run: Run, now: Any) -> float:
     return load if carried and unstable else np.nan
 
 
-def summary(problem: Problem, run: Run, state: State) -> dict[str, Any]:
+def summary(run: Run, state: State) -> dict[str, Any]:
     """Return the scalars of a finished run."""
-    medium, interface, now = run.medium, run.medium.interface, state.now
+    interface, now = run.medium.interface, state.now
     peak, first, kinetic = (
         float(now[name]) for name in ("peak_stress", "first_stress", "kinetic_stress")
     )
     kinetic = kinetic if np.isfinite(kinetic) else np.nan
     node = np.unravel_index(int(now["peak_node"]), interface.shape)
-    spent = energy_balance(run.friction, run.setting.nodes, medium.grid, state)
+    spent = energy_balance(run, state)
     found: dict[str, Any] = {
         "critical_load": _critical_load(run, now),
         "critical_stress": peak,
@@ -136,12 +136,12 @@ def summary(problem: Problem, run: Run, state: State) -> dict[str, Any]:
         "onset_time": float(now["peak_time"]),
         "kinetic_stress": kinetic,
         "stress_drop": peak - kinetic,
-        "seismic_moment": medium.shear_modulus * float(state.slip.sum()) * interface.cell,
+        "seismic_moment": seismic_moment(run, state),
         "radiated_energy": spent["radiated_energy"],
         "fracture_energy": spent["fracture_energy"],
         "arrested_events": int(now["arrested"]),
-        "rupture_speed": _axis_speeds(problem, run, state, 2.0, np.max),
-        "median_rupture_speed": _axis_speeds(problem, run, state, 0.5, np.median),
+        "rupture_speed": _axis_speeds(run, state, 2.0, np.max),
+        "median_rupture_speed": _axis_speeds(run, state, 0.5, np.median),
         "start_load": float(now["start_load"]),
         "start_error": float(now["start_error"]),
         "implicit_steps": int(now["implicit_steps"]),

@@ -13,7 +13,6 @@ import dataclasses
 import hashlib
 import itertools
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -213,18 +212,12 @@ def kernel_sum(mode: str, eta: float, tolerance: float = 1e-6) -> ExponentialSum
     eta = 1.0 if mode == "III" else float(eta)
     text = f"{_FORMAT} {mode} {eta.hex()} {float(tolerance).hex()} {T_MAX.hex()}"
     path = cache_folder() / f"kernel-{hashlib.sha256(text.encode()).hexdigest()[:20]}.npz"
-    kernel = _read(path)
-    if kernel is None:
-        kernel = fit_exponentials(mode, eta, tolerance)
-        # Where nothing can be written, it stays in memory.
-        with contextlib.suppress(StoreError):
-            write_arrays(path, vars(kernel))
-    return kernel
-
-
-def _read(path: Path) -> ExponentialSum | None:
-    try:
+    with contextlib.suppress(
+        *UNREADABLE
+    ):  # not there, or damaged: it is built and written again
         data = read_arrays(path)
         return ExponentialSum(data["poles"], data["weights"], float(data["error"]))
-    except UNREADABLE:
-        return None  # not there, or damaged: it is built and written again
+    kernel = fit_exponentials(mode, eta, tolerance)
+    with contextlib.suppress(StoreError):  # where nothing can be written, it stays in memory
+        write_arrays(path, vars(kernel))
+    return kernel

@@ -6,10 +6,14 @@ the interface between two identical half-spaces is (velocity form, Breitenfeld a
 
     F(k, t) = -(G*|k|/2) D(k, t) + (G|k|/2) int_0^t C(|k| c_s t') V(k, t - t') dt'.
 
-Everything follows from the Laplace symbol D(s): its inverse transform is taken along arcs
-in Re s < 0 that join the branch points, where the integrand is smooth and decays, so that
-one set of nodes is accurate for every T. The closed forms by Bessel functions cancel badly
-beyond T of 7.
+Everything follows from the Laplace symbol D(s) of the traction per slip, in units of G|k|/2
+with s in units of |k| c_s (Geubelle and Rice 1995): in mode III sqrt(1 + s^2), in mode II
+
+    [(2 + s^2)^2 - 4 sqrt(1 + s^2) sqrt(1 + s^2/eta^2)] / (s^2 sqrt(1 + s^2)), eta = c_d/c_s.
+
+Its inverse transform is taken along arcs in Re s < 0 that join the branch points, where the
+integrand is smooth and decays, so that one set of nodes is accurate for every T. The closed
+forms by Bessel functions cancel badly beyond T of 7.
 """
 
 import numpy as np
@@ -17,25 +21,9 @@ from numpy.typing import ArrayLike, NDArray
 
 _STEP = 0.025  # of the tanh-sinh rule; at 0.05 the kernel is off by 6e-11 at T = 1e5
 _RANGE = (
-    4.4  # the outermost node lies 1e-55 from the branch point, its weight underflows any sum
+    4.4  # the outermost node lies 1e-55 from the branch point: its weight underflows any sum
 )
 _CHUNK = 2048
-
-
-def symbol(s: ArrayLike, mode: str, eta: float) -> NDArray[np.complex128]:
-    """Laplace symbol D(s) of the traction per slip, in units of G|k|/2; s in units of |k| c_s.
-
-    Mode II: [(2 + s^2)^2 - 4 sqrt(1 + s^2) sqrt(1 + s^2/eta^2)] / (s^2 sqrt(1 + s^2)), eta
-    = c_d/c_s; mode III: sqrt(1 + s^2). Both are s + O(1/s) for large s (radiation damping)
-    and reach the static stiffness G*/G at s = 0 (Geubelle and Rice 1995, in Laplace space).
-    Cuts run from the branch points +-i and +-i eta straight to the left.
-    """
-    z = np.asarray(s, dtype=np.complex128)
-    shear = np.sqrt(z - 1j) * np.sqrt(z + 1j)
-    if mode == "III":
-        return shear
-    pressure = np.sqrt(z - 1j * eta) * np.sqrt(z + 1j * eta) / eta
-    return ((2.0 + z * z) ** 2 - 4.0 * shear * pressure) / (z * z * shear)
 
 
 def static_stiffness(mode: str, eta: float) -> float:

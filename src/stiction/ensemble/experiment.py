@@ -15,7 +15,14 @@ from pydantic import Field
 
 from stiction.arrays import Array
 from stiction.errors import InputError, UnitWarning, unknown_name, warn_user
-from stiction.methods import Solver, Values, batch_size, prepared, variables_of
+from stiction.methods import (
+    Solver,
+    Values,
+    batch_size,
+    prepared,
+    seconds_per_sample,
+    variables_of,
+)
 from stiction.model import Count, Names, Number, model
 from stiction.problem import Problem, refusals
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
@@ -94,6 +101,11 @@ class Experiment:
         """Size of `results` for one sample, in bytes."""
         nodes = self.problem.interface.size
         return 8.0 * sum(nodes if one.wide else 1 for one in self.variables.values())
+
+    @property
+    def seconds(self) -> float:
+        """About how long the method takes for a sample on one core, s."""
+        return seconds_per_sample(self.problem, self.method)
 
     @property
     def pressure(self) -> float:

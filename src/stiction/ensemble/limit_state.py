@@ -72,8 +72,7 @@ class LimitState:
         if not np.isfinite(given).all():
             raise InputError("draws: must be finite")
         rows = np.atleast_2d(given)
-        pace = max(experiment.method.seconds_per_sample(experiment.problem), 1e-9)
-        size = max(int(SHORTEST / pace), -(-len(rows) // self.workers))
+        size = max(int(SHORTEST / experiment.seconds), -(-len(rows) // self.workers))
         size = max(1, min(size, experiment.batch))
         parts = np.split(rows, range(size, len(rows), size))
         if len(parts) == 1:

@@ -16,10 +16,11 @@ from stiction.ensemble.experiment import AnyRandom, Ensemble, Experiment
 from stiction.ensemble.pilot import compare, doubt
 from stiction.ensemble.store import Store
 from stiction.errors import InputError, RunError, collect_warnings, warn_accuracy, warn_user
-from stiction.methods import MethodObject, study_attributes
+from stiction.methods import MethodObject
 from stiction.model import Count, Flag, Names, Number, Progress, checked
 from stiction.problem import Problem
 from stiction.progress import Meter, Show
+from stiction.results import study_attributes
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -105,23 +105,16 @@ class Equilibrium:
     gap: Gap = 1e-6
     type: Literal["equilibrium"] = "equilibrium"
     first_stage: ClassVar[str] = "local_criterion"
-
-    @property
-    def label(self) -> str:
-        """Name in figures and tables."""
-        return "equilibrium"
+    label: ClassVar[str] = "equilibrium"
 
     def seconds_per_sample(self, problem: Problem) -> float:
         """Return the approximate time of a sample on one core, s."""
         interface = problem.interface
         if interface.is_plane:
             return 1e-5 * interface.size
-        corners = (
-            1.0
-            if problem.friction.linear
-            else 9.0 * pieces_of(problem.friction).ends.size ** 0.5
-        )
-        return 3e-4 * corners * (interface.size / 1024) ** 1.5
+        linear, corners = problem.friction.linear, pieces_of(problem.friction).ends.size
+        more = 1.0 if linear else 9.0 * corners**0.5
+        return 3e-4 * more * (interface.size / 1024) ** 1.5
 
     def supports(self, problem: Problem) -> list[str]:
         """Return the reasons why it cannot solve a problem; none if it can."""
@@ -146,7 +139,4 @@ class Equilibrium:
 
     def prepare(self, problem: Problem) -> Callable[[Samples], dict[str, NDArray[Any]]]:
         """Return a solver for samples of this problem."""
-        options = {
-            name: getattr(self, name) for name in ("sensitivity", "slip", "events", "gap")
-        }
-        return Solver(problem, **options)
+        return Solver(problem, self)

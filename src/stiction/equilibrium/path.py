@@ -13,9 +13,9 @@ from stiction.equilibrium.solver import (
     make_program,
 )
 from stiction.errors import InputError, warn_accuracy
-from stiction.model import check, check_memory, real_array, to_plain
+from stiction.model import Numbers, check, check_memory
 from stiction.problem import Problem
-from stiction.results import along, to_dataset
+from stiction.results import along, study_attributes, to_dataset
 from stiction.variables import Variable
 
 LOAD = Variable("Pa", "load factor tau_0", ("load",))
@@ -32,10 +32,7 @@ GAP = 1e-6
 
 
 def _check_loads(loads: Any) -> Array:
-    try:
-        given = np.atleast_1d(real_array(loads))
-    except TypeError as error:
-        raise InputError(f"loads: must be an array of numbers (Pa); {error}") from None
+    given = np.atleast_1d(check("loads", loads, Numbers))
     if given.ndim != 1 or given.size == 0 or not np.all(np.isfinite(given)):
         raise InputError(
             f"loads: must be a one-dimensional array of finite numbers, got shape {given.shape}"
@@ -138,5 +135,5 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
     variables = VARIABLES | event_variables(interface)
     variables |= {name: along(interface, VARIABLES[name]) for name in ("slip", "stress")}
     coordinates = {"load": (given, LOAD), "event": (np.arange(len(passed)), EVENT)}
-    attributes = {"study": {"problem": to_plain(problem)}}
+    attributes = study_attributes(problem=problem)
     return to_dataset(values, variables, coordinates, attributes, interface)

@@ -147,23 +147,11 @@ def make_program(problem: Problem, gap: float = 1e-6) -> Program:
 
 
 class Solver:
-    """Solves samples of a problem; safe to call from several threads.
+    """Solves samples of a problem with options of `Equilibrium`; safe in several threads."""
 
-    Its options are those of `Equilibrium`.
-    """
-
-    def __init__(
-        self,
-        problem: Problem,
-        *,
-        sensitivity: bool = False,
-        slip: bool = False,
-        events: int = 0,
-        gap: float = 1e-6,
-    ) -> None:
-        self.problem = problem
-        self.program = make_program(problem, gap)
-        self.sensitivity, self.slip, self.events = sensitivity, slip, events
+    def __init__(self, problem: Problem, options: Any) -> None:
+        self.problem, self.options = problem, options
+        self.program = make_program(problem, options.gap)
 
     def __call__(self, rows: Samples) -> dict[str, NDArray[Any]]:
         """Return the onset of each sample; see `Equilibrium`."""
@@ -188,7 +176,7 @@ class Solver:
         values["certificate_gap"] *= rows.load_profile.mean()
         if self.problem.interface.is_plane:
             values["certified"] = proved
-        if self.sensitivity:
+        if self.options.sensitivity:
             _warn_if_lost(values["sensitivity"])
         return values
 
@@ -222,15 +210,15 @@ class Solver:
             values["critical_position"], values["sliding_position"] = (
                 *patch.centre, *slides.centre,
             )  # fmt: skip
-        if self.slip:
+        if self.options.slip:
             values["slip"] = first.slip.reshape(shape)
-        if self.sensitivity:
+        if self.options.sensitivity:
             derivative = _sensitivity(sample, first, y) * rows.load_profile.mean()
             values["sensitivity"] = derivative.reshape(shape)
-        if self.events:
-            events = event_table(self.problem, rows, row, path.events[: self.events])
+        if most := self.options.events:
+            events = event_table(self.problem, rows, row, path.events[:most])
             for name, column in events.items():
-                values[name] = np.full((self.events, *column.shape[1:]), np.nan)
+                values[name] = np.full((most, *column.shape[1:]), np.nan)
                 values[name][: len(column)] = column
         return values
 

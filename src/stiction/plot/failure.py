@@ -19,7 +19,7 @@ from stiction.plot.axes import (
 )
 from stiction.plot.style import ACCENT, COLUMN, INK, PALE, QUIET
 from stiction.problem import Problem
-from stiction.reliability.answer import FailureProbability, bounded
+from stiction.reliability.answer import Answer, bounded
 
 NEAR = 4.0
 """Nucleation lengths on either side of a weak spot that are drawn."""
@@ -88,18 +88,16 @@ def failure_curve(
     return axes
 
 
+@checked
 def weak_spots(
-    found: FailureProbability | xr.Dataset,
-    *,
-    problem: Problem | None = None,
-    ax: Axes | None = None,
+    found: Answer, *, problem: Problem | None = None, ax: Axes | None = None
 ) -> Axes:
     """Draw failing lines, each shifted so that sliding begins in the middle, and their mean.
 
     Parameters
     ----------
-    found : FailureProbability or Dataset
-        From `failure_probability`, or its `failing_profiles`.
+    found : Answer
+        From `failure_probability`.
     problem : Problem, optional
         Needed only if the profiles do not hold it; gives the nucleation length.
     ax : matplotlib.axes.Axes, optional
@@ -116,10 +114,9 @@ def weak_spots(
         If no failing profile was kept, the interface is a plane, or there is no single nucleation
         length.
     """
-    failing = found.failing_profiles if isinstance(found, FailureProbability) else found
-    if isinstance(failing, xr.Dataset) and not failing:
+    failing = found.failing_profiles
+    if not failing:
         raise InputError("found: holds no failing profile")
-    need(failing, "strength", "critical_position")
     problem = problem_of(failing, problem)
     interface, length = problem.interface, problem.nucleation_length
     if interface.is_plane:
@@ -136,8 +133,7 @@ def weak_spots(
         axes.axvspan(-0.5, 0.5, color=PALE, linewidth=0.0)
         axes.plot(s, shown.T, color=QUIET, linewidth=0.4, alpha=0.7)
         axes.plot(s, shown.mean(axis=0), color=INK, label="mean of these")
-        if isinstance(found, FailureProbability):
-            axes.axhline(found.stress * factor, color=ACCENT, linewidth=0.9, label="demand")
+        axes.axhline(found.stress * factor, color=ACCENT, linewidth=0.9, label="demand")
         axes.set_xlabel(r"$(x - x_{\mathrm{cr}})/h_n$")
         axes.set_ylabel(f"peak strength ({unit})")
         axes.set_xlim(-NEAR, NEAR)

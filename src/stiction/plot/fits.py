@@ -22,7 +22,6 @@ from stiction.plot.style import (
     PALE,
     QUIET,
     color,
-    new_figure,
     panel,
     paper_style,
 )
@@ -64,7 +63,7 @@ def fit(found: FieldFit) -> Figure:
         for _ in range(SHOWN)
     ]
     with paper_style():
-        figure = new_figure(PAGE, 5.4)
+        figure = Figure(figsize=(PAGE, 5.4))
         panels = figure.subplots(2, 2).ravel()
         _histogram(panels[0], found)
         _quantiles(panels[1], found)
@@ -189,7 +188,7 @@ def posterior(found: Posterior) -> Figure:
         labels.append(with_unit(name, unit))
     ends = [np.quantile(values, [0.002, 0.998]) for values in before]
     with paper_style():
-        figure = new_figure(size + 3.2, size)
+        figure = Figure(figsize=(size + 3.2, size))
         parts: Any = figure.subfigures(1, 2, width_ratios=[size, 3.2])
         panels = parts[0].subplots(count, count, squeeze=False)
         for i, j in np.ndindex(count, count):

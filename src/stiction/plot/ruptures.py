@@ -17,7 +17,7 @@ from stiction.errors import InputError
 from stiction.model import FilePath, at_least, check
 from stiction.plot.axes import need, on_axes, problem_of, unit_for, with_unit
 from stiction.plot.fields import draw_map, map_height, name_line
-from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, new_figure, paper_style
+from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, paper_style
 from stiction.problem import Problem
 from stiction.progress import Meter, Show
 
@@ -26,6 +26,8 @@ Moving = list[tuple[Any, str, Any]]
 """What moves in a figure: an artist, the name of its data, and these for each frame of the run."""
 
 COLORS = "inferno_r"
+FRAME_TIME = 50
+"""Milliseconds that a film shows each frame."""
 DECADES = 7.0
 """Of slip rate below the largest that are drawn."""
 BEFORE = 0.11
@@ -75,7 +77,6 @@ def film(
     path: str | Path,
     *,
     frames: int = 160,
-    fps: int = 20,
     progress: Show = True,
 ) -> Path:
     """Write a film of a rupture: stress and slip rate.
@@ -89,8 +90,6 @@ def film(
     frames : int
         Maximum number of frames, evenly spaced over those of the run, which lie closer in time
         as the interface accelerates.
-    fps : int
-        Frames per second.
     progress : bool or callable
         As in `stiction.monte_carlo`.
 
@@ -105,7 +104,6 @@ def film(
     """
     need(run, "slip_rate", "shear_stress", "peak_strength", hint=KEEP)
     check("frames", frames, at_least(1))
-    check("fps", fps, at_least(1))
     target = check("path", path, FilePath)
     if target.suffix != ".gif":
         raise InputError(f"path: must end in .gif, got {target.name!r}")
@@ -129,7 +127,7 @@ def film(
             images.append(frame.quantize(128, Image.Quantize.FASTOCTREE, dither=still))
             meter.advance()
         images[0].save(
-            target, save_all=True, append_images=images[1:], duration=round(1000 / fps), loop=0
+            target, save_all=True, append_images=images[1:], duration=FRAME_TIME, loop=0
         )
     return target
 
@@ -216,7 +214,7 @@ def _line_film(run: xr.Dataset) -> tuple[Figure, Moving]:
     strength, stress = strength * factor, run["shear_stress"].values * factor
     top = max(float(run["slip_rate"].max()), 1e-12)
     rate = np.maximum(run["slip_rate"].values, 1e-10 * top)
-    figure = new_figure(PAGE * 0.9, 3.8)
+    figure = Figure(figsize=(PAGE * 0.9, 3.8))
     above, below = figure.subplots(2, 1, sharex=True)
     above.plot(x, strength, color=PALE, linewidth=1.0, label=r"$\tau_p$")
     (line,) = above.plot(x, stress[0], color=INK, label=r"$\tau$")
@@ -239,7 +237,7 @@ def _plane_film(run: xr.Dataset) -> tuple[Figure, Moving]:
     factor, unit = unit_for("Pa", stress)
     stress = stress * factor
     low, high = np.quantile(stress, [0.001, 0.999])
-    figure = new_figure(PAGE * 1.15, 3.4)
+    figure = Figure(figsize=(PAGE * 1.15, 3.4))
     left, right = figure.subplots(1, 2, sharey=True)
     slip = draw_map(left, interface, rate[0], "slip rate (m/s)", norm=norm, cmap=COLORS)
     text, ends = f"shear stress ({unit})", {"vmin": low, "vmax": high}

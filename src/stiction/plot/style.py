@@ -1,16 +1,11 @@
 """One style for every figure: column widths of a journal, and lines distinct in grey."""
 
-import io
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import matplotlib
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure, SubFigure
-
-from stiction.files import write_whole
 
 COLUMN = 3.375
 PAGE = 6.75
@@ -61,19 +56,6 @@ def paper_style() -> Iterator[None]:
     """Set fonts, widths and ticks of a printed page for the figures drawn inside."""
     with matplotlib.rc_context(_RC):
         yield
-
-
-def save_figure(figure: Figure | SubFigure, path: Path) -> None:
-    """Write a figure, whole or not at all."""
-    data = io.BytesIO()
-    root: Any = figure.figure  # of a part of a figure the whole
-    root.savefig(data, format=path.suffix[1:], dpi=_RC["savefig.dpi"])
-    write_whole(path, data.getvalue())
-
-
-def new_figure(width: float, height: float) -> Figure:
-    """An empty figure, inches, that belongs to no window and needs no closing."""
-    return Figure(figsize=(width, height))
 
 
 def series(index: int, *, marker: bool = False) -> dict[str, Any]:

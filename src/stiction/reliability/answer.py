@@ -41,9 +41,9 @@ class Answer:
     Attributes
     ----------
     stress, probability : float
-        Pa, and the probability of an onset below it.
+        Pa, and the probability of an onset below it; one is given, the other estimated.
     interval : tuple of float
-        95 % confidence interval of the result.
+        95 % confidence interval of the one that is estimated.
     cv : float
         Coefficient of variation of the probability: estimated standard error over the estimate;
         infinite without a failure, zero if exact.
@@ -57,6 +57,12 @@ class Answer:
         Reasons not to trust the answer; empty if there are none.
     normal_pressure, friction_coefficient : float
         Mean pressure, Pa, and `stress` over it; NaN without a normal pressure.
+    failing_profiles : xarray.Dataset
+        From `failure_probability`: some samples of the failure set over ('sample', 'x'), drawn
+        with its distribution: `strength` (and what else is random), `critical_stress`,
+        `critical_position`, ...
+    of_stress : bool
+        Whether the stress is estimated, as by `design_stress`, or the probability.
     """
 
     stress: float
@@ -70,6 +76,8 @@ class Answer:
     reason: str
     warnings: tuple[str, ...]
     normal_pressure: float
+    failing_profiles: xr.Dataset = field(default_factory=xr.Dataset, repr=False)
+    of_stress: bool = False
 
     @classmethod
     def of(cls, state: LimitState, *, doubts: Sequence[str] = (), **values: Any) -> Self:
@@ -91,45 +99,19 @@ class Answer:
         """`stress` less `lower_bound`, Pa."""
         return self.stress - self.lower_bound
 
-    def _described(self, result: str) -> str:
+    def __str__(self) -> str:
+        low, high = self.interval
+        if self.of_stress:
+            result = f"{self.stress / 1e6:.7g} MPa (95 %: {low / 1e6:.7g} to {high / 1e6:.7g})"
+            result += f" at P = {self.probability:g}"
+        else:
+            result = f"P = {self.probability:.3g} (95 %: {low:.3g} to {high:.3g},"
+            result += f" c.o.v. {self.cv:.2g}) below {self.stress / 1e6:.6g} MPa"
         if math.isfinite(self.normal_pressure):
             result += f" (friction coefficient {self.friction_coefficient:.4g})"
         if bounded(self.lower_bound):
             result += f", {self.stress_above_bound / 1e3:.4g} kPa above the bound"
         return f"{result}; {self.algorithm}, {self.evaluations} evaluations"
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class FailureProbability(Answer):
-    """Probability that an interface slides below a stress, with its error; see also `Answer`.
-
-    Attributes
-    ----------
-    failing_profiles : xarray.Dataset
-        Some samples of the failure set over ('sample', 'x'), drawn with its distribution:
-        `strength` (and what else is random), `critical_stress`, `critical_position`, ...
-    """
-
-    failing_profiles: xr.Dataset = field(default_factory=xr.Dataset, repr=False)
-
-    def __str__(self) -> str:
-        low, high = self.interval
-        return self._described(
-            f"P = {self.probability:.3g} (95 %: {low:.3g} to {high:.3g},"
-            f" c.o.v. {self.cv:.2g}) below {self.stress / 1e6:.6g} MPa"
-        )
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class DesignStress(Answer):
-    """The stress below which an interface slides with a given probability; see `Answer`."""
-
-    def __str__(self) -> str:
-        low, high = self.interval
-        return self._described(
-            f"{self.stress / 1e6:.7g} MPa (95 %: {low / 1e6:.7g} to {high / 1e6:.7g})"
-            f" at P = {self.probability:g}"
-        )
 
 
 def prepare(
@@ -156,14 +138,12 @@ def prepare(
     if problems:
         raise InputError(problems)
     experiment.check_fields()
-    seconds = max(1e-9, float(experiment.method.seconds_per_sample(experiment.problem)))
-    return state, max_evaluations or int(min(MOST, max(FEWEST, SECONDS / seconds)))
+    return state, max_evaluations or int(min(MOST, max(FEWEST, SECONDS / experiment.seconds)))
 
 
 def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
     """Return the reason why chains of samples take too long by this method; None if allowed."""
-    seconds = CHAIN * experiment.method.seconds_per_sample(experiment.problem)
-    kind = experiment.method.type
+    seconds, kind = CHAIN * experiment.seconds, experiment.method.type
     if (seconds <= PATIENCE and kind != "rupture") or (max_evaluations or 0) >= CHAIN:
         return None
     return (
@@ -204,8 +184,8 @@ def exact_doubts(
     exact, (draws, values) = exact_counterpart(state.experiment), near
     if exact is None or not values.size:
         return []
-    (few, most), cost = CHECKED, exact.method.seconds_per_sample(exact.problem)
-    chosen = distinct(values, int(min(max(few, 10.0 / cost), most)), np.random.default_rng(0))
+    count = int(np.clip(10.0 / exact.seconds, *CHECKED))
+    chosen = distinct(values, count, np.random.default_rng(0))
     state.meter.note = "checking by equilibrium"
     with collect_warnings():
         below = replace(state, experiment=exact)(draws[chosen]) < stress

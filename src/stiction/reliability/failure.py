@@ -10,16 +10,15 @@ from stiction.arrays import Array
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import Event, LimitState
 from stiction.errors import InputError, UnitWarning, warn_accuracy, warn_user
-from stiction.methods import MethodObject, label, study_attributes
+from stiction.methods import MethodObject, label
 from stiction.model import Count, Number, Positive, Progress, Real, checked
 from stiction.problem import Problem
 from stiction.progress import Meter
 from stiction.random.fields import RandomField, RandomInterface
 from stiction.random.stresses import mean_in_stress
 from stiction.reliability.answer import (
+    Answer,
     Budget,
-    DesignStress,
-    FailureProbability,
     Probability,
     TargetCv,
     distinct,
@@ -31,7 +30,7 @@ from stiction.reliability.answer import (
 from stiction.reliability.counting import count_failures
 from stiction.reliability.tail import Tail, sample_tail
 from stiction.reliability.uncertainty import generator, lognormal_interval
-from stiction.results import along, to_dataset
+from stiction.results import along, study_attributes, to_dataset
 from stiction.variables import ONSET_VARIABLES, PROFILES, Variable
 
 PILOT = 1_000
@@ -82,7 +81,7 @@ def failure_probability(
     event: Event = "critical_stress",
     workers: Count | None = None,
     progress: Progress = True,
-) -> FailureProbability:
+) -> Answer:
     """Estimate the probability that an interface of random strength slides below a stress.
 
     Parameters
@@ -115,7 +114,7 @@ def failure_probability(
 
     Returns
     -------
-    FailureProbability
+    Answer
         With `probability`, `cv`, `interval` (95 %), `evaluations` and more.
 
     Raises
@@ -164,7 +163,7 @@ def failure_probability(
     with meter:
         if not likely[0] < stress < likely[1]:
             found = _certain(state, stress, likely)
-            return FailureProbability.of(state, stress=stress, **found)
+            return Answer.of(state, stress=stress, **found)
         reason, pilot, least = "as requested", None, min(PILOT, max(budget // 5, 50))
         if algorithm == "auto" and (slow := too_slow(experiment, max_evaluations)):
             algorithm, reason = "plain", slow
@@ -186,7 +185,7 @@ def failure_probability(
                 stress=stress, reason=reason, pilot=pilot,
             )  # fmt: skip
             found = _by_tail(state, stress, tail, target_cv)
-    return FailureProbability.of(state, stress=stress, **found)
+    return Answer.of(state, stress=stress, **found)
 
 
 def _certain(state: LimitState, stress: float, likely: tuple[float, float]) -> dict[str, Any]:
@@ -299,7 +298,7 @@ def design_stress(
     event: Event = "critical_stress",
     workers: Count | None = None,
     progress: Progress = True,
-) -> DesignStress:
+) -> Answer:
     """Estimate the stress below which the interface slides with a given probability.
 
     This is a quantile of the onset stress, from one set of repetitions of subset simulation.
@@ -320,7 +319,7 @@ def design_stress(
 
     Returns
     -------
-    DesignStress
+    Answer
         With `stress` and its 95 % `interval`, Pa.
 
     Raises
@@ -373,9 +372,9 @@ def design_stress(
             cv, stress = math.inf, tail.extent[0] if math.isfinite(tail.extent[0]) else math.nan
             interval = (lowest, stress) if stress > lowest else state.bounds
             doubts.append(tail.short_of(f"P = {probability:g}"))
-    return DesignStress.of(
+    return Answer.of(
         state, stress=stress, probability=probability, cv=cv, interval=interval,
-        doubts=doubts, **tail.attributes,
+        of_stress=True, doubts=doubts, **tail.attributes,
     )  # fmt: skip
 
 

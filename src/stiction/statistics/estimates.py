@@ -5,18 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import scipy.stats
-from pydantic import Field
 from scipy.special import stdtrit
 
 from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.model import Numbers, Real, brief, check, checked
-
-Share: TypeAlias = Annotated[Real, Field(gt=0.0, lt=1.0)]
+from stiction.model import Numbers, brief, check, checked
 
 
 @dataclass(frozen=True)
@@ -29,10 +26,6 @@ class Estimate:
     def __sub__(self, other: Estimate | float) -> Estimate:
         other = other if isinstance(other, Estimate) else Estimate(other)
         return Estimate(self.value - other.value, math.hypot(self.error, other.error))
-
-    def scaled(self, factor: float) -> Estimate:
-        """Return the estimate of a multiple."""
-        return Estimate(self.value * factor, self.error * abs(factor))
 
 
 def as_sample(values: Any, fewest: int = 2) -> Array:
@@ -78,9 +71,9 @@ class Combined:
         """How many times as many expensive results alone would have the same error."""
         return (self.plain_error / self.estimate.error) ** 2
 
-    def interval(self, confidence: float = 0.95) -> tuple[float, float]:
-        """Return the confidence interval by Student's distribution, in the unit of the values."""
-        half = float(stdtrit(self.freedom, 0.5 + 0.5 * confidence)) * self.estimate.error
+    def interval(self) -> tuple[float, float]:
+        """Return the 95 % interval by Student's distribution, in the unit of the values."""
+        half = float(stdtrit(self.freedom, 0.975)) * self.estimate.error
         return self.estimate.value - half, self.estimate.value + half
 
 
@@ -150,23 +143,20 @@ class Quantiles:
     value : (m,) array
         The sample quantiles, in the unit of the values.
     lower, upper : (m,) arrays
-        Ends of the confidence interval of each; infinite where the sample is too small to
+        Ends of the 95 % confidence interval of each; infinite where the sample is too small to
         bound that quantile.
-    confidence : float
-        Coverage of each interval, at least.
     """
 
     probability: Array
     value: Array
     lower: Array
     upper: Array
-    confidence: float
 
     __repr__ = brief
 
 
 @checked
-def quantiles(values: Any, probability: Numbers, *, confidence: Share = 0.95) -> Quantiles:
+def quantiles(values: Any, probability: Numbers) -> Quantiles:
     """Estimate quantiles of independent values, with distribution-free confidence intervals.
 
     Parameters
@@ -175,13 +165,11 @@ def quantiles(values: Any, probability: Numbers, *, confidence: Share = 0.95) ->
         For example the critical stress of a Monte Carlo ensemble, Pa.
     probability : float or (m,) array
         Between 0 and 1, exclusive.
-    confidence : float
-        Coverage of each interval, in (0, 1).
 
     Notes
     -----
     The number of values below the p-quantile is binomial (N, p); the interval runs between
-    the order statistics whose ranks contain it with the given confidence (David and
+    the order statistics whose ranks contain it with a probability of 95 % (David and
     Nagaraja, 2003, Sec. 7.1). The coverage is exact for continuous distributions, rounded
     up to whole ranks.
 
@@ -197,11 +185,11 @@ def quantiles(values: Any, probability: Numbers, *, confidence: Share = 0.95) ->
     p = np.atleast_1d(probability)
     if (wrong := p[~((p > 0.0) & (p < 1.0))]).size:
         raise InputError(f"probability: must be between 0 and 1, exclusive, got {wrong[0]:g}")
-    n, tail = ordered.size, 0.5 * (1.0 - confidence)
+    n, tail = ordered.size, 0.025
     # Rank r is a lower end if fewer than r values lie below the quantile with probability <= tail.
     low = scipy.stats.binom.ppf(tail, n, p).astype(int)  # P(B <= low - 1) < tail <= P(B <= low)
     high = scipy.stats.binom.isf(tail, n, p).astype(int) + 1  # P(B >= high) <= tail
     padded = np.concatenate(([-np.inf], ordered, [np.inf]))
     value = np.quantile(ordered, p, method="median_unbiased")
     lower, upper = padded[np.clip(low, 0, n + 1)], padded[np.clip(high, 0, n + 1)]
-    return Quantiles(p, value, lower, upper, confidence)
+    return Quantiles(p, value, lower, upper)

@@ -1,6 +1,5 @@
 """Exact mean and variance of the nucleation stress."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,11 +29,6 @@ class NucleationStatistics:
     variance: float
     strength_mean: float
     strength_variance: float
-
-    @property
-    def standard_deviation(self) -> float:
-        """Square root of the variance, Pa."""
-        return math.sqrt(self.variance)
 
     @property
     def variance_ratio(self) -> float:

@@ -28,7 +28,6 @@ _UNITS = {name: variable.units for name, variable in PROFILES.items()} | {
     "density": "kg m-3",
     "loading_rate": "Pa s-1",
     "end_time": "s",
-    "time_step": "s",
 }
 _OF_THE_FIELD = ("mean", "low", "high", "loc", "scale", "noise")
 """Parameters of a marginal, and of what was measured, in the unit of their field."""
