@@ -55,13 +55,12 @@ AnyMethod: Any = Annotated[
     BeforeValidator(lambda given: given if isinstance(given, dict) else as_method(given)),
 ]
 """Any registered method; in a study file ``type`` selects it."""
-
-
-def _interface(given: Any) -> Any:
-    return as_random_interface(given) if isinstance(given, RandomField) else given
-
-
-AnyRandom: Any = Annotated[RandomInterface, BeforeValidator(_interface)]
+AnyRandom: Any = Annotated[
+    RandomInterface,
+    BeforeValidator(
+        lambda given: as_random_interface(given) if isinstance(given, RandomField) else given
+    ),
+]
 """A random interface; a field alone becomes one."""
 
 
@@ -236,15 +235,13 @@ class Study(_Parts):
         StoreError
             If `out` cannot be used.
         """
-        store: Store | None = None
         others: Any = False
         if part is not None:
             if out is None:
                 raise InputError("part: needs out=, the folder in which the parts are stored")
             others = ~samples_of_part(part, len(self.experiments), self.ensemble.samples)
             pilot = pilot and part[0] == 1
-        if out is not None:
-            store = Store.open(out, self.to_dict())
+        store = None if out is None else Store.open(out, self.to_dict())
         return gather(
             self.experiments,
             self.ensemble,
