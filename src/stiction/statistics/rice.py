@@ -21,7 +21,7 @@ from stiction.statistics.moments import stationary
 LEVELS = 1024
 BATCH = 256
 TRUSTED_PROBABILITY = 0.1
-FEWEST_CROSSINGS = 10
+FEWEST_PROFILES = 10
 MOST_BELOW = 0.04
 MOST_DIPS = 1.1
 MOST_NODES = 1 << 22
@@ -45,13 +45,14 @@ class RiceDistribution:
     point_survival : (m,) array
         P(the stress at a point exceeds x).
     relative_error : (m,) array
-        Sampling error of the crossing rate, one over the root of the number of crossings.
+        Sampling error of the crossing rate: one over the root of the number of profiles that
+        reach down to the level, as the crossings of one profile come in clusters.
     trusted : (m,) array of bool
-        Where the approximation itself is good to about 5 %: P <= 0.1, at least 10 crossings
-        or dips, and on a line `1 - point_survival` is at most 4 % of P, since P is too high
-        by up to (1 - point_survival)/P if xi_0 is not short compared with the interface. On
-        a plane there are at most 1.1 dips for each sample that has any. Above P = 0.1 P is
-        too low, on a line by 4 to 9 % at the median.
+        Where the approximation itself is good to about 5 %: P <= 0.1, at least 10 profiles
+        that reach the level, and on a line `1 - point_survival` is at most 4 % of P, since P
+        is too high by up to (1 - point_survival)/P if xi_0 is not short compared with the
+        interface. On a plane there are at most 1.1 dips for each sample that has any. Above
+        P = 0.1 P is too low, on a line by 4 to 9 % at the median.
     profiles : int
         Number of sampled profiles.
     """
@@ -152,13 +153,13 @@ def rice_distribution(
         if plane:
             _count_dips(np.searchsorted(levels, tau), crossings, below, reached)
         else:
-            _count_crossings(tau, levels, crossings, below)
-    seen = np.cumsum(crossings)[:-1]
+            _count_crossings(tau, levels, crossings, below, reached)
+    seen, samples = np.cumsum(crossings)[:-1], np.cumsum(reached)[:-1]
     survival = 1.0 - np.cumsum(below)[:-1] / (profiles * points)
     if plane:
         # High up, holes outnumber parts; but an interface is below a level if any node is.
         chance = np.maximum(-np.expm1(-np.maximum(seen, 0) / profiles), 1.0 - survival)
-        good = seen <= MOST_DIPS * np.cumsum(reached)[:-1]
+        good = seen <= MOST_DIPS * samples
     else:
         with np.errstate(divide="ignore", invalid="ignore"):
             exponent = np.where(survival > 0.0, seen / profiles / survival, np.inf)
@@ -170,8 +171,8 @@ def rice_distribution(
         probability=chance,
         crossing_rate=seen / (profiles * interface.extent),
         point_survival=survival,
-        relative_error=1.0 / np.sqrt(np.maximum(seen, 1)),
-        trusted=(chance <= TRUSTED_PROBABILITY) & (seen >= FEWEST_CROSSINGS) & good,
+        relative_error=1.0 / np.sqrt(np.maximum(samples, 1)),
+        trusted=(chance <= TRUSTED_PROBABILITY) & (samples >= FEWEST_PROFILES) & good,
         profiles=profiles,
     )
 
@@ -216,10 +217,15 @@ def _refined(rows: Array, points: int) -> Array:
 
 @jit
 def _count_crossings(
-    rows: Array, levels: Array, crossings: NDArray[np.int64], below: NDArray[np.int64]
+    rows: Array,
+    levels: Array,
+    crossings: NDArray[np.int64],
+    below: NDArray[np.int64],
+    reached: NDArray[np.int64],
 ) -> None:
-    """Steps whose cumulative sums count down-crossings of, and nodes at or below, each level."""
+    """Steps whose cumulative sums count down-crossings of each level, and nodes and rows below."""
     for row in range(rows.shape[0]):
+        lowest = levels.size
         before = rows[row, rows.shape[1] - 1]
         stop = np.searchsorted(levels, before)
         for i in range(rows.shape[1]):
@@ -227,7 +233,9 @@ def _count_crossings(
             # A fall crosses the levels from the first one at or above its end to that of its start.
             start = np.searchsorted(levels, now)
             below[start] += 1
+            lowest = min(lowest, start)
             if now < before:
                 crossings[start] += 1
                 crossings[stop] -= 1
             before, stop = now, start
+        reached[lowest] += 1
