@@ -355,10 +355,8 @@ class Problem:
         friction, interface = self.friction, self.interface
         if isinstance(profiles, Sample):
             if profiles.shape != interface.shape:
-                raise InputError(
-                    f"profiles: the sample has {' x '.join(map(str, profiles.shape))} nodes, the"
-                    f" interface {' x '.join(map(str, interface.shape))}"
-                )
+                given = f"has shape {profiles.shape}, the interface {interface.shape}"
+                raise InputError(f"profiles: the sample {given}")
             return profiles, True
         given = named_profiles(profiles)
         if "strength" not in given:

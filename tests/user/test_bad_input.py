@@ -259,7 +259,7 @@ test_profiles_and_loads = refusals({
     "strength ... numbers": lambda: onset("strong"),
     "strength: values are missing": lambda: onset(np.full(256, np.nan)),
     "strength ... finite ... 1e+100": lambda: onset(np.full(256, 1e308)),
-    "profiles: the sample has 512 nodes, the interface 256":
+    "profiles: the sample has shape (512,), the interface (256,)":
         lambda: onset(make_problem(512).sample(np.full(512, 1e6))),
     "strength ... (0, 256)": lambda: onset(np.ones((0, 256))),
     "strength ... complex128": lambda: onset(np.ones(256) * 1j),
