@@ -191,7 +191,8 @@ class Problem:
             for name, value in vars(owner).items():
                 if is_unplaced(value):
                     try:
-                        value = at_nodes(f"{part}.{name}", value, self.interface)[0]
+                        at, _ = at_nodes(f"{part}.{name}", value, self.interface)
+                        value = np.asarray(at)  # of a pandas object too
                     except InputError as error:
                         problems += error.problems
                     placed[name] = value

@@ -307,6 +307,8 @@ test_what_is_no_profile_is_refused = refusals({
         read(labelled().to_dataset(name="strength").assign(tau_i=labelled()), x=0, value=1),
     "load.profile: must have one entry for each of the 128 nodes, got an array of shape (2, 128)":
         problem_with(profile=labelled().expand_dims(sample=2)),
+    "load.initial_stress: must have one entry ... an array of shape (128, 2)":
+        problem_with(initial_stress=labelled().to_dataframe("tau_i").reset_index()),
     "not clear from (time)": lambda: make_problem(
         (NODES, NODES), (0.1, 0.1),
         load=st.Load(normal_pressure=xr.DataArray(STRENGTH, dims="time")),
