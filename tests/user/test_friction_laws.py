@@ -46,7 +46,7 @@ test_what_a_law_does_not_allow_is_refused = refusals({
     "strength does not fall linearly": lambda: st.failure_probability(
         with_law(DUAL), FIELD, 0.7e6, method=EXACT, algorithm="two_level"
     ),
-    "pieces: must be a whole number >= 2, got 1":
+    "pieces: must be greater than or equal to 2, got 1":
         lambda: st.PiecewiseWeakening.from_law(EXPONENTIAL, 1),
     "law: must be a FrictionLaw, got": lambda: st.PiecewiseWeakening.from_law("exponential", 4),
     "friction: must be a friction law such as ... got 0.2": lambda: with_law(0.2),
