@@ -356,8 +356,8 @@ class Problem:
         friction, interface = self.friction, self.interface
         if isinstance(profiles, Sample):
             if profiles.shape != interface.shape:
-                given = f"has shape {profiles.shape}, the interface {interface.shape}"
-                raise InputError(f"profiles: the sample {given}")
+                shapes = f"shape {profiles.shape}, the interface {interface.shape}"
+                raise InputError(f"profiles: the sample has {shapes}")
             return profiles, True
         given = named_profiles(profiles)
         if "strength" not in given:
