@@ -37,7 +37,7 @@ NEVER = 1e-9
 WIDEN = 0.1
 """Width of the first posterior that is added to the box of the second on either side."""
 NEAR, HELD = 0.05, 1e-3
-"""Share of the box at either end, and mass of the posterior there that is too much."""
+"""Share of the box at either end, and mass of the posterior there above which the box grows."""
 EDGE, PILED = 0.02, 4.0
 """Share of a prior at its ends, and its multiple at which the posterior piles up there."""
 
@@ -76,7 +76,7 @@ def infer(
         ``"residual_strength.marginal.high"`` or ``"problem.friction.weakening_rate"``.
     method : LocalCriterion, Equilibrium or any other
         The method that finds the onset. For all but the local criterion, that one, if applicable,
-        first finds the relevant part of the prior; a posterior that reaches its end takes all.
+        first finds the relevant part of the prior, which grows until it contains the posterior.
     load_cell_error : float
         Standard deviation of the error of a peak, in `unit`; with `Peaks` in Pa, or as a
         coefficient.
@@ -160,13 +160,13 @@ def infer(
         whole = box = parameters.whole
         if method.type != "local_criterion" and not no_single_length(own.problem, own.random):
             box = _first_box(likelihood_of(LocalCriterion(), None, whole))
-        likelihood = likelihood_of(method, samples, box)
-        grid = grid_of(likelihood, box)
-        if np.any(box != whole) and (
-            grid is None or _reaches_end(grid.draws(DRAWS, seed), box)
-        ):
-            likelihood = likelihood_of(method, samples, whole)
-            grid = grid_of(likelihood, whole)
+        while True:
+            likelihood = likelihood_of(method, samples, box)
+            grid = grid_of(likelihood, box)
+            wider = _grown(box, None if grid is None else grid.draws(DRAWS, seed))
+            if np.array_equal(wider, box):
+                break
+            box = wider
     if np.all(likelihood.box == whole) and (refused := likelihood.refusals()):
         raise InputError(refused)
     if grid is None:
@@ -215,11 +215,13 @@ def _first_box(likelihood: Likelihood) -> Array:
     return np.clip(grid.box + room * np.array([[-1.0], [1.0]]), 0.0, 1.0)
 
 
-def _reaches_end(u: Array, box: Array) -> bool:
-    """Whether draws of the posterior (draws, parameters) reach an end of the box in the prior."""
-    room = NEAR * np.ptp(box, axis=0)
-    held = np.stack([np.mean(u < box[0] + room, axis=0), np.mean(u > box[1] - room, axis=0)])
-    return bool(np.any((held > HELD) & (box != [[0.0], [1.0]])))
+def _grown(box: Array, u: Array | None) -> Array:
+    """Return the box, wider by its width where draws (draws, parameters) reach its end."""
+    width, touched = np.ptp(box, axis=0), np.ones(box.shape, dtype=np.bool_)
+    if u is not None:
+        low, high = box[0] + NEAR * width, box[1] - NEAR * width
+        touched = np.stack([np.mean(u < low, axis=0), np.mean(u > high, axis=0)]) > HELD
+    return np.clip(box + width * touched * np.array([[-1.0], [1.0]]), 0.0, 1.0)
 
 
 def _notes(likelihood: Likelihood, error: float, u: Array) -> tuple[str, ...]:
