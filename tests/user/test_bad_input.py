@@ -107,6 +107,16 @@ test_numbers = refusals({
         slip=np.array(0.5), strength=[0.5, 0.0], critical_slip=1e-6
     ),
     "correlation_length ... 0.000000000000001": lambda: st.PowerLawSpectrum(5e-324),
+    "truncation: must be greater than ... 1e-308":
+        lambda: st.PowerLawSpectrum(1.0, truncation=1e-308),
+    "truncation: must be less than ... 1e+308":
+        lambda: st.ExponentialSpectrum(1.0, truncation=1e308),
+    "power_kept: must be greater than 0.000001":
+        lambda: st.ExponentialSpectrum(1.0, power_kept=1e-12),
+    "max_wavenumber: must be less than":
+        lambda: st.CustomSpectrum(function=np.exp, max_wavenumber=1e307),
+    "high: must be less than ... 1e+308":
+        lambda: st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1e308),
     "power_kept ... less than 1": lambda: st.ExponentialSpectrum(1.0, power_kept=1.0),
     "slip ... must be True or False ... '1'": lambda: st.Equilibrium(slip="1"),
     "arrest ... must be True or False ... 'no'":

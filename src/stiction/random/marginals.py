@@ -21,6 +21,8 @@ from stiction.errors import InputError, UnitWarning, unknown_name, warn_user
 from stiction.kinds import OneOf, from_table
 from stiction.model import Positive, Real, check, model
 
+Bound: TypeAlias = Annotated[Real, Field(gt=-1e18, lt=1e18)]
+
 
 class Marginal(ABC):
     """Base class of marginals."""
@@ -53,8 +55,8 @@ class Beta(Marginal):
 
     alpha: Positive
     beta: Positive
-    low: Real
-    high: Real
+    low: Bound
+    high: Bound
     type: Literal["beta"] = "beta"
 
     @model_validator(mode="after")
@@ -76,7 +78,7 @@ class _ByMoments(Marginal):
 
     mean: Annotated[Positive, Field(gt=1e-18, lt=1e18)]
     cv: Annotated[Positive, Field(gt=1e-9)]
-    low: Annotated[Real, Field(gt=-1e18, lt=1e18)] = 0.0
+    low: Bound = 0.0
     family: ClassVar[Any] = None
 
     @model_validator(mode="after")

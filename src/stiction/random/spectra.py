@@ -28,6 +28,9 @@ from stiction.kinds import OneOf, from_table
 from stiction.model import Positive, Real, describe, model
 
 Share: TypeAlias = Annotated[Real, Field(gt=0, lt=1)]
+Span: TypeAlias = Annotated[Positive, Field(gt=1e-15, lt=1e15)]
+"""A length or wavenumber, or a ratio of two, of which powers neither underflow nor overflow."""
+Kept: TypeAlias = Annotated[Share, Field(gt=1e-6)]
 ACCURACY, LARGEST_ERROR = 1e-12, 1e-6  # errors of integrals: aimed at, and accepted
 
 
@@ -124,9 +127,9 @@ class ScaledSpectrum(SpectralDensity):
     One of your own has `density`, `power_within` and its inverse `quantile`.
     """
 
-    correlation_length: Annotated[Positive, Field(gt=1e-15, lt=1e15)]
-    truncation: Positive | None = dataclasses.field(default=None, kw_only=True)
-    power_kept: Share | None = dataclasses.field(default=None, kw_only=True)
+    correlation_length: Span
+    truncation: Span | None = dataclasses.field(default=None, kw_only=True)
+    power_kept: Kept | None = dataclasses.field(default=None, kw_only=True)
     default_power: ClassVar[float] = 0.9997
     """Share of the power retained by truncation if nothing is given."""
 
@@ -301,7 +304,7 @@ class CustomSpectrum(SpectralDensity):
     function: Annotated[
         Callable[[Any], Any], PlainSerializer(_refuse_to_write), WithJsonSchema({"not": {}})
     ]
-    max_wavenumber: Positive
+    max_wavenumber: Span
     type: Literal["custom"] = "custom"
 
     @model_validator(mode="after")
