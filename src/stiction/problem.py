@@ -296,7 +296,8 @@ class Problem:
             length = self.nucleation_lengths(highest_rate)[int(np.argmin(resolution))]
             raise InputError(
                 f"interface.nodes: the nucleation length {length:.3g} m spans"
-                f" {min(resolution):.2g} nodes; at least {FEWEST_NODES} are needed, that is"
+                f" {min(*resolution, FEWEST_NODES - 0.01):.3g} nodes; at least"
+                f" {FEWEST_NODES} are needed, that is"
                 f" interface.nodes >= {self._finer(resolution, FEWEST_NODES)}, got"
                 f" {' x '.join(map(str, self.interface.shape))}; if that is far off, check the"
                 " units of all lengths, moduli and strengths"

@@ -197,3 +197,15 @@ def test_tiny_and_negative_loads_close_as_well():
     for shift in (exact, 1.2 * exact):
         found = bounds_of(strength - shift, gap=1e-7)
         assert found.upper == pytest.approx(exact - shift, abs=1e-6 * exact)
+
+
+@pytest.mark.filterwarnings("ignore::stiction.UnitWarning")  # of a mean strength beyond G
+def test_barriers_that_never_slip_do_not_count():
+    """However strong they are: the accuracy is a share of the load, not of their strength."""
+    law = st.LinearWeakening(weakening_rate=RATE, residual_ratio=0.5)
+    problem = make_problem(SHAPE, (5.0 * LENGTH, 4.0 * LENGTH), friction=law)
+    strength, first = rough_strength(6), []
+    for barrier in (1e8, 1e13):
+        strength[:, 20:] = barrier
+        first.append(exact_onset(problem, strength, events=2)["first_instability"].item())
+    assert first[1] == pytest.approx(first[0], rel=2e-6)

@@ -447,3 +447,13 @@ def test_representations_fit_on_a_screen():
     assert len(repr(system)) < 600
     assert "<256 array, 1e+06 to 2e+06>" in repr(system)
     assert len(repr(st.statistics.density(np.random.default_rng(0).random(1000)))) < 300
+
+
+def test_fewer_nodes_than_are_needed_are_not_rounded_to_them():
+    rate = 2.0 * 0.57888694185 * (1e9 / 0.7) / 3.999e-3
+    with pytest.raises(st.InputError, match=r"spans 3\.99 nodes; at least 4 are needed"):
+        st.Problem(
+            st.Solid(1e9, 0.3, 1200.0),
+            st.Interface(0.064, 64),
+            st.LinearWeakening(weakening_rate=rate),
+        )

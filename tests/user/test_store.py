@@ -462,3 +462,15 @@ def test_an_mpi_pool(tmp_path):
     command = ["mpiexec", "-n", "3", sys.executable, "-m", "mpi4py.futures", "script.py"]
     subprocess.run(command, cwd=tmp_path, env=os.environ | open_mpi, timeout=300, check=True)
     assert st.open_run(tmp_path / "run").dataset().identical(SMALL.run(workers=1))
+
+
+def test_samples_solved_one_by_one_warn_once():
+    """Where some are refused: here their nucleation length spans fewer than four nodes."""
+    law = st.LinearWeakening(critical_slip=5.93e-6, residual_strength=0.1e6)
+    problem = st.Problem(st.Solid(1e9, 0.3, 1200.0), st.Interface(0.064, 64), law)
+    random = st.RandomField(st.Lognormal(mean=1.2e6, cv=0.35), st.PowerLawSpectrum(0.01))
+    with pytest.warns(st.AccuracyWarning) as caught:
+        st.monte_carlo(problem, random, method=st.Equilibrium(), samples=20, progress=False)
+    texts = [str(warning.message) for warning in caught]
+    assert sum("are recommended" in text for text in texts) == 1, texts
+    assert sum("could not be solved" in text for text in texts) == 1, texts

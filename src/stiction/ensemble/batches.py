@@ -1,6 +1,7 @@
 """Samples computed in batches, by threads or any executor: the same numbers from each."""
 
 import os
+import re
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Mapping, Sequence
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from stiction import __version__
 from stiction.arrays import one_blas_thread
 from stiction.ensemble.experiment import Experiment
-from stiction.errors import InputError, WorkerError, collect_warnings, warn_user
+from stiction.errors import InputError, Warned, WorkerError, collect_warnings, warn_user
 from stiction.random.synthesis import BLOCK, block_of
 
 POINT, NUMBER = "_point", "_sample"
@@ -27,6 +28,8 @@ SECONDS = 0.5
 """Duration of a piece of work."""
 MOST_BYTES = 16 * 2**20
 """Largest size of the values of a piece of work."""
+FIGURES = re.compile(r"[\d.]+(e[-+]?\d+)?")
+"""Numbers in a warning, which differ between samples."""
 TICK = 1.0
 """Seconds after which workers are counted again; Windows lets nothing interrupt a longer wait."""
 
@@ -110,12 +113,13 @@ def solve_span(experiment: Experiment, span: Span) -> Table:
     begin = time.perf_counter()
     parts: list[NDArray[Any]] = []
     failures: list[Failure] = []
+    alike: dict[str, Warned] = {}
     waiting = deque(experiment.batches(span.first, span.samples))
     while waiting:
         first, count = waiting.popleft()
         try:
             # The number of BLAS threads changes last bits, and the kernels are the parallel part.
-            with one_blas_thread():
+            with one_blas_thread(), collect_warnings() as caught:
                 parts.append(_rows(span.point, first, experiment.results(first, count)))
         except Exception as error:
             if count > 1:  # find the sample that failed
@@ -125,6 +129,11 @@ def solve_span(experiment: Experiment, span: Span) -> Table:
             text = str(error) if known else f"{type(error).__name__}: {error}"
             text = text.replace("\n", " / ")
             failures.append(Failure(span.point, first, experiment.seed, text, known))
+            continue
+        for text, category in caught:  # once of samples that are solved one by one
+            alike.setdefault(text if count > 1 else FIGURES.sub("", text), (text, category))
+    for text, category in alike.values():
+        warn_user(text, category)
     rows = np.concatenate(parts or [_rows(span.point, 0, {})])
     return Table(rows, tuple(failures), time.perf_counter() - begin, versions())
 

@@ -45,8 +45,12 @@ ROUGH = 0.05
 
 
 def _tolerance(sample: Sample, load: float, accuracy: float) -> float:
-    """Residual stress that is allowed, Pa, from its share of the mean strength."""
-    mean = np.abs(sample.excess).mean() + abs(load) * sample.profile.mean()
+    """Residual stress that is allowed, Pa, from its share of the mean strength or load.
+
+    Strength beyond the load, such as that of barriers, does not count.
+    """
+    applied = abs(load) * sample.profile
+    mean = np.minimum(np.abs(sample.excess), applied).mean() + applied.mean()
     return accuracy * float(mean)
 
 
@@ -185,9 +189,9 @@ def least_equilibrium(
     """Return the least equilibrium at a load that is not below a given slip.
 
     The slip is zero, or an equilibrium at a lower load, or beyond it along an unstable direction;
-    the accuracy is the largest residual stress as a share of the mean strength. Steps with a share
-    of the weakening do not pass it, and are the longer the larger the share; with the whole of it
-    they end there, or A is not positive definite, and slip moves in the unstable direction.
+    the accuracy is the largest residual stress as a share of the mean strength or load. Steps with
+    a share of the weakening do not pass it, and are the longer the larger the share; with the whole
+    of it they end there, or A is not positive definite, and slip moves in the unstable direction.
 
     The interface slides once the load exceeds the average strength that is left: stiffness adds
     nothing to the mean. If K has no positive entry off its diagonal, the result is exact up to
