@@ -11,16 +11,7 @@ from matplotlib.patches import Patch
 from PIL import Image
 
 from stiction.equilibrium.patches import critical_patch
-from stiction.plot.style import (
-    ACCENT,
-    INK,
-    PAGE,
-    QUIET,
-    color,
-    panel,
-    paper_style,
-    series,
-)
+from stiction.plot.style import ACCENT, INK, PAGE, QUIET, color, panel, paper_style, series
 
 LEAST = 1e-3
 """Lowering in per cent from which on it is drawn: below, the grid of the line decides."""
