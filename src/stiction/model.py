@@ -340,6 +340,8 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
 
 def _comparable(value: Any) -> Any:
     """Return what stands for a value where objects are compared and hashed."""
+    if value is None or isinstance(value, str | float):
+        return value  # most are, and hashes stand in many calls
     if isinstance(value, np.ndarray):
         return value.shape, (value + 0.0).tobytes()  # zeros of both signs are equal
     if hasattr(value, "identical"):  # labelled arrays

@@ -221,11 +221,17 @@ def test_grid_against_a_sum_by_hand():
     assert np.quantile(draws, [0.05, 0.5, 0.95]) == pytest.approx(exact, abs=3e-3)
 
 
-def test_a_prior_that_begins_where_its_density_is_zero():
+@pytest.mark.parametrize(
+    "distribution",
+    [
+        scipy.stats.lognorm(0.4, scale=H_N),
+        scipy.stats.gamma(9.0, scale=H_N / 9.0),  # scipy has no density at its infinite end
+        scipy.stats.weibull_min(6.0, scale=H_N),
+    ],
+)
+def test_a_prior_that_begins_where_its_density_is_zero(distribution):
     """A length of zero is impossible, and so unlikely that it need not be simulated."""
-    prior = make_prior(
-        PROBLEM, STRENGTH, {"correlation_length": scipy.stats.lognorm(0.4, scale=H_N)}
-    )
+    prior = make_prior(PROBLEM, STRENGTH, {"correlation_length": distribution})
     low, high = prior.ends[:, 0]
     assert 0.1 * H_N < low < high < 10.0 * H_N
 

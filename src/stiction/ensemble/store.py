@@ -63,7 +63,7 @@ class Store:
                 raise StoreError(f"{path}: holds other files ({some}); choose a new folder")
             (path / CHUNKS).mkdir(exist_ok=True)
         except OSError as error:
-            raise cannot("written", path, error) from error
+            raise cannot("written as a folder", path, error) from error
         store, before = cls(path, study), None
         try:
             before = read_study(path)

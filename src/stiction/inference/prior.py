@@ -106,7 +106,8 @@ def with_parameters(
 @lru_cache(maxsize=64)
 def _tails(distribution: Any) -> tuple[float, float]:
     low, high = (
-        TAIL if distribution.pdf(end) == 0.0 else 0.0 for end in distribution.support()
+        0.0 if np.isfinite(end) and distribution.pdf(end) > 0.0 else TAIL
+        for end in distribution.support()
     )
     return low, 1.0 - high
 
