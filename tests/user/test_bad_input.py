@@ -457,3 +457,9 @@ def test_fewer_nodes_than_are_needed_are_not_rounded_to_them():
             st.Interface(0.064, 64),
             st.LinearWeakening(weakening_rate=rate),
         )
+
+
+def test_gaps_name_the_calls_that_fill_them():
+    strength = np.where(np.arange(256) == 5, np.nan, 1e6)
+    with pytest.raises(st.InputError, match=r"gaps='fill' to st\.onset or st\.read_profile"):
+        st.equilibrium_path(make_problem(), strength, [1e5])

@@ -209,7 +209,7 @@ def close_gaps(
     if gaps == "refuse":
         raise InputError(
             f"{text}; give them, make interface.length that of the record, or pass gaps='fill'"
-            f" to fill them {how}"
+            f" to st.onset or st.read_profile, which fills them {how}"
         )
     if gaps == "fill":
         rows = rows.copy()
