@@ -187,13 +187,16 @@ class Measured(NamedTuple):
             low = np.where(apart, np.minimum(score[0], mean - width), low)
             high = np.where(apart, np.maximum(score[1], mean + width), high)
             rows = np.arange(len(z))
+            half, z, density = evaluate()
             for _ in range(NARROWINGS):
-                half, z, density = evaluate()
                 near = density > density.max(axis=1, keepdims=True) - 0.5 * REACH**2
                 first, last = near.argmax(axis=1), NODES - 1 - near[:, ::-1].argmax(axis=1)
-                low = np.where(apart, z[rows, np.maximum(first - 1, 0)], low)
-                high = np.where(apart, z[rows, np.minimum(last + 1, NODES - 1)], high)
-            half, z, density = evaluate()
+                first, last = np.maximum(first - 1, 0), np.minimum(last + 1, NODES - 1)
+                if not (2 * (last - first) < NODES)[apart].any():  # fine enough
+                    break
+                low = np.where(apart, z[rows, first], low)
+                high = np.where(apart, z[rows, last], high)
+                half, z, density = evaluate()
         top = density.max(axis=1, keepdims=True)
         weight = np.exp(density - top)
         total = weight.sum(axis=1)
