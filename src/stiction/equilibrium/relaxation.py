@@ -22,7 +22,13 @@ from stiction.elasticity.linear import (
 )
 from stiction.elasticity.operator import Operator
 from stiction.equilibrium.held_equilibrium import ITERATIONS, equilibrate
-from stiction.equilibrium.sample import Sample, present_pieces, residual_nodes, step_to_corner
+from stiction.equilibrium.sample import (
+    Present,
+    Sample,
+    present_pieces,
+    residual_nodes,
+    step_to_corner,
+)
 
 BALANCED = 0
 SLIDING = 1
@@ -89,22 +95,22 @@ def stable_equilibrium(
     """
     tolerance = _tolerance(sample, load, accuracy)
     pieces = sample.pieces
-    first = present_pieces(sample, slip).piece
+    first = now = present_pieces(sample, slip)
     new = slip
     for _ in range(NEWTON):
-        now = present_pieces(sample, new)
         drive = load * sample.profile - now.strength
         status, found = _solve(operator, drive, now.rate, new, tolerance)
         if status != SOLVED:
             return None
         new = np.maximum(found, slip)
-        if np.array_equal(present_pieces(sample, new).piece, now.piece):
+        before, now = now, present_pieces(sample, new)
+        if np.array_equal(before.piece, now.piece):
             break
     else:
         return None
-    if pieces.steepens and not np.array_equal(first, now.piece):
+    if pieces.steepens and not np.array_equal(first.piece, now.piece):
         piece = np.arange(pieces.slopes.size)[:, None]
-        passed = (first <= piece) & (piece <= now.piece)
+        passed = (first.piece <= piece) & (piece <= now.piece)
         steepest = np.where(passed, pieces.slopes[:, None], 0.0).max(axis=0) * sample.rate
         if not _definite(operator, steepest, new > 0.0):
             return None
@@ -112,7 +118,13 @@ def stable_equilibrium(
 
 
 def _bound(
-    operator: Operator, sample: Sample, load: float, slip: Array, share: float, tolerance: float
+    operator: Operator,
+    sample: Sample,
+    load: float,
+    slip: Array,
+    now: Present,
+    share: float,
+    tolerance: float,
 ) -> tuple[int, Array, bool]:
     """Equilibrium if nodes weaken by a share of what they do, and no further than to their corner.
 
@@ -121,7 +133,6 @@ def _bound(
     the strength is the larger of two lines. Returns the status, the slip, and whether the
     strengths are the true ones.
     """
-    now = present_pieces(sample, slip)
     rate = share * now.rate - (1.0 - share) * DRAG * float(sample.rate.max())
     start = now.strength - (now.rate - rate) * slip
     corner = np.append(sample.pieces.ends, 1e300)[now.piece] * sample.critical
@@ -206,7 +217,7 @@ def least_equilibrium(
         if float((drive + now.rate * slip).sum()) > tolerance * slip.size:
             return Relaxed(SLIDING, slip)
         allowed = max(tolerance, ROUGH * left * dropped)
-        status, new, true = _bound(operator, sample, load, slip, 1.0 - left, allowed)
+        status, new, true = _bound(operator, sample, load, slip, now, 1.0 - left, allowed)
         if status == NEGATIVE and left < 1.0:
             if left == 0.0:
                 slip = _weakening_step(operator, sample, load, slip, tolerance)
