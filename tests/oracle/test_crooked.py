@@ -1,0 +1,117 @@
+"""Onsets where nothing is symmetric, against a linear programme and a sum over the patch."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from crooked import (
+    LINE,
+    LINE_GAP,
+    LINE_STRENGTH,
+    PLANE,
+    PLANE_GAP,
+    PLANE_STRENGTH,
+    as_measured,
+    write_table,
+)
+from oracles import angle_rule, largest_load
+from setups import exact_onset, local_onset
+
+import stiction as st
+from stiction.criterion.eigenfunction import weight
+
+BOTH = pytest.mark.parametrize(
+    ("problem", "strength", "gap"),
+    [(LINE, LINE_STRENGTH, LINE_GAP), (PLANE, PLANE_STRENGTH, PLANE_GAP)],
+    ids=["line", "plane"],
+)
+
+
+def apart(one, other, length):
+    """Distance round the period."""
+    return abs((one - other + 0.5 * length) % length - 0.5 * length)
+
+
+def interpolated(field, shares):
+    """A periodic field on a line at shares of a spacing, by its trigonometric interpolant."""
+    waves = np.fft.rfft(field) / field.size
+    waves[1:-1] *= 2.0
+    turns = 2.0 * np.pi * np.arange(waves.size)[:, None] * np.ravel(shares) / field.size
+    return (waves[:, None] * np.exp(1j * turns)).real.sum(axis=0).reshape(np.shape(shares))
+
+
+@BOTH
+def test_first_instability_of_the_linear_programme(problem, strength, gap):
+    """Load, mean stress, coefficient, and a critical patch across the seam."""
+    load, slip, _ = largest_load(problem, strength)  # good to 4e-7
+    found = exact_onset(problem, strength)
+    assert found.critical_load.item() == pytest.approx(load, rel=1e-6)
+    given = problem.load
+    stress = np.mean(given.initial_stress) + load * np.mean(given.profile)
+    assert found.critical_stress.item() == pytest.approx(stress, rel=1e-6)
+    coefficient = stress / np.mean(given.normal_pressure)
+    assert found.friction_coefficient.item() == pytest.approx(coefficient, rel=1e-6)
+    slips = np.reshape(slip > 1e-3 * slip.max(), strength.shape)
+    for axis in range(slips.ndim):
+        along = slips.any(axis=tuple({*range(slips.ndim)} - {axis}))
+        assert along[0]
+        assert along[-1]
+        assert not along.all()
+
+
+def test_nucleation_stress_is_the_least_weighted_mean_over_a_patch():
+    """Brute force: patches at all nodes, then at hundredths of a node about the least."""
+    s, measure = angle_rule(60)
+    half = 0.5 * LINE.nucleation_length / LINE.interface.spacing
+    weights = weight(s) * measure
+
+    def stress(centre):
+        points = centre[:, None] + half * s
+        excess = interpolated(LINE_STRENGTH - LINE.load.initial_stress, points) @ weights
+        return excess / (interpolated(LINE.load.profile, points) @ weights)
+
+    centre = stress(np.arange(96.0)).argmin() + np.linspace(-1.0, 1.0, 201)
+    ratio = stress(centre)
+    found = local_onset(LINE, LINE_STRENGTH)
+    # The error of the weights on 16 nodes is below 1e-5 of smooth fields (tests/exact).
+    assert found.critical_load.item() == pytest.approx(ratio.min(), rel=1e-5)
+    place = centre[ratio.argmin()] * LINE.interface.spacing
+    assert apart(found.critical_position.item(), place, 0.037) < 0.05 * LINE.interface.spacing
+
+
+@BOTH
+def test_what_is_measured_elsewhere_in_other_units_lands_on_its_nodes(
+    problem, strength, gap, tmp_path
+):
+    """As an array and as a table, rolled, in mm and MPa; and a gap across the seam."""
+    for source in (
+        as_measured(problem.interface, strength),
+        write_table(tmp_path / "scan.csv", as_measured(problem.interface, strength)),
+    ):
+        read = st.read_profile(source, interface=problem.interface)
+        np.testing.assert_allclose(read.values, strength, rtol=1e-9)
+    holes = as_measured(problem.interface, np.where(gap, np.nan, strength))
+    filled = st.read_profile(holes, interface=problem.interface, gaps="fill")
+    np.testing.assert_array_equal(filled.measured.values, ~gap)
+    np.testing.assert_allclose(filled.values[~gap], strength[~gap], rtol=1e-12)
+    # Filled from the rim, the weak place across the seam is hidden.
+    assert np.all(filled.values[gap] > strength[gap])
+
+
+def test_moving_the_origin_moves_places_only():
+    """Everything along x, rolled by 30 nodes."""
+    moved = {
+        name: np.roll(getattr(LINE.load, name), 30)
+        for name in ("profile", "initial_stress", "normal_pressure")
+    }
+    friction = dataclasses.replace(
+        LINE.friction, residual_strength=np.roll(LINE.friction.residual_strength, 30)
+    )
+    other = dataclasses.replace(LINE, load=st.Load(**moved), friction=friction)
+    for onset in (local_onset, exact_onset):
+        here, there = onset(LINE, LINE_STRENGTH), onset(other, np.roll(LINE_STRENGTH, 30))
+        for name in ("critical_load", "critical_stress", "friction_coefficient"):
+            assert there[name].item() == pytest.approx(here[name].item(), rel=1e-9)
+        for name in {"critical_position", "sliding_position"} & set(here):
+            place = (here[name].item() + 30 * LINE.interface.spacing) % 0.037
+            assert apart(there[name].item(), place, 0.037) < 1e-6
