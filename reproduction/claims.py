@@ -39,6 +39,10 @@ class Series:
         return self.label + (" at xi_0/h_n = " if over_ratios else ": ") + ", ".join(parts)
 
 
+class LeftOut(KeyError):
+    """A study is not computed with the reader's own parameters."""
+
+
 class Data:
     """The studies by name, as futures, with short ways to their numbers."""
 
@@ -49,6 +53,8 @@ class Data:
         return name in self.studies
 
     def __getitem__(self, name: str) -> xr.Dataset:
+        if name not in self.studies:
+            raise LeftOut(name)
         return self.studies[name].result()
 
     def at(self, study: str, name: str, ratio: float) -> np.ndarray:
@@ -108,9 +114,12 @@ class Finding:
     verdict: Verdict = Verdict.OPEN
 
 
-def judge(claim: Claim, data: Data) -> Finding:
-    """Compute the numbers of a claim and apply its rule."""
-    judged, beside = claim.measure(data)
+def judge(claim: Claim, data: Data) -> Finding | None:
+    """Compute the numbers of a claim and apply its rule; None if a study is left out."""
+    try:
+        judged, beside = claim.measure(data)
+    except LeftOut:
+        return None
     verdict = claim.rule([[number for _, number in series.rows] for series in judged])
     return Finding(claim, judged, beside, verdict)
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from enum import Enum
-from itertools import pairwise
+from itertools import combinations
 
 from reproduction.numbers_with_errors import Number
 
@@ -81,14 +81,15 @@ def printed(digits: str) -> Rule:
 def _monotonic(sign: float, word: str) -> Rule:
     def judge(series: Sequence[Numbers]) -> Verdict:
         row = [number * sign for number in series[0]]
-        whole = _range(row[-1] - row[0])
-        steps = [_range(right - left) for left, right in pairwise(row)]
-        wrong = any(right < 0.0 for _, right in steps)
-        if whole[0] > 0.0:
-            return Verdict.CORRECTED if wrong else Verdict.HOLDS
-        return Verdict.FAILS if whole[1] < 0.0 or wrong else Verdict.OPEN
+        least, most = _range(row[-1] - row[0])
+        rises = [later - earlier for earlier, later in combinations(row, 2)]
+        wrong = any(_range(rise)[1] < 0.0 for rise in rises)
+        doubtful = any(rise.value < -rise.error for rise in rises)
+        if least <= 0.0:
+            return Verdict.FAILS if most < 0.0 or wrong else Verdict.OPEN
+        return Verdict.CORRECTED if wrong else Verdict.OPEN if doubtful else Verdict.HOLDS
 
-    return Rule(f"{word} from the first to the last, with no step the other way", judge)
+    return Rule(f"{word} from the first to the last, and the other way between no two", judge)
 
 
 def falling() -> Rule:

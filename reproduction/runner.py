@@ -16,7 +16,7 @@ from pathlib import Path
 import xarray as xr
 
 import stiction as st
-from reproduction import setting
+from reproduction import PARAMETERS, setting
 
 with contextlib.suppress(ImportError):  # xarray would import it in several threads at once
     import dask.base  # noqa: F401
@@ -149,7 +149,7 @@ def kept(**inputs):
         def study(run: Runner) -> xr.Dataset:
             values = {name: choose(run.size) for name, choose in inputs.items()}
             source = inspect.getsource(function)
-            mark = _digest([run.seed, st.__version__, source, values])
+            mark = _digest([run.seed, st.__version__, source, values, PARAMETERS])
             place = run.folder / f"{function.__name__}-{mark}.nc"
             with run.locks[place]:
                 found = None if place.exists() else function(run, **values)

@@ -6,24 +6,44 @@ from pathlib import Path
 import numpy as np
 
 import stiction as st
+from reproduction import PARAMETERS
 
 RATIOS = (0.25, 0.5, 1.0, 2.0)
 """xi_0/h_n of the paper's Monte Carlo study."""
 SIMULATED = (0.25, 0.5, 2.0)
 """xi_0/h_n at which the paper ran 20 simulations each."""
 
-PROBLEM = st.paper.problem()
+NAMES = ("shear_modulus", "poisson_ratio", "density", "length", "nodes", "weakening_rate",
+         "alpha", "beta", "low", "high")  # fmt: skip
+"""Parameters that a reader may replace, in SI units; the last four are those of the strength."""
+if _unknown := sorted(set(PARAMETERS) - set(NAMES)):
+    raise st.InputError(f"unknown {_unknown[0]!r} (valid: {', '.join(NAMES)})")
+
+
+def _replaced(part):
+    """Return a part of the paper's problem with the parameters that replace its own."""
+    names = {field.name for field in dataclasses.fields(part)} & set(PARAMETERS)
+    return dataclasses.replace(part, **{name: PARAMETERS[name] for name in names})
+
+
+def _problem(plane: str = "stress"):
+    problem = st.paper.problem(plane=plane)
+    parts = {name: getattr(problem, name) for name in ("solid", "interface", "friction")}
+    return dataclasses.replace(problem, **{k: _replaced(part) for k, part in parts.items()})
+
+
+PROBLEM = _problem()
 H = PROBLEM.nucleation_length
 """Nucleation length h_n in plane stress, m."""
 L = PROBLEM.interface.extent
 G_STAR = PROBLEM.effective_modulus
-W = 0.5e12
+W = PROBLEM.uniform_rate
 """Weakening rate, Pa/m."""
-STRAIN = st.paper.problem(plane="strain")
+STRAIN = _problem("strain")
 """The same with the printed modulus, G/(1 - nu), which belongs to plane strain."""
 PRINTED_H = STRAIN.nucleation_length
 
-MARGINAL = st.paper.strength(PROBLEM).marginal
+MARGINAL = _replaced(st.paper.strength(PROBLEM).marginal)
 LOW, HIGH = MARGINAL.low, MARGINAL.high
 MEAN = MARGINAL.distribution.mean()
 DEVIATION = MARGINAL.distribution.std()

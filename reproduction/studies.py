@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 import stiction as st
-from reproduction import setting
+from reproduction import PARAMETERS, setting
 from reproduction.runner import Runner, Size, along, kept
 from reproduction.setting import MEAN, PROBLEM, RATIOS, SIMULATED, STRAIN, H, strength
 
@@ -616,7 +616,7 @@ def jobs(size: Size):
     """Yield the name, the progress line and the function of every study."""
     for study in (*STUDIES, dynamic) if size.dynamic else STUDIES:
         yield study.__name__, study.__doc__.partition(".")[0], study
-    for name in WHAT_IFS:
+    for name in () if PARAMETERS else WHAT_IFS:  # which state parameters of their own
         text = f"What if: {name.replace('_', ' ')}"
         yield name, text, functools.partial(what_if, name=name)
         if name in ARRESTS:

@@ -42,6 +42,11 @@ HIGH, LOW = rules.above(1.0), rules.below(1.0)
         (rules.falling(), {HOLDS: [3, 2, 1], CORRECTED: [3, 4, 1], FAILS: [1, 2, 3]}),
         (rules.falling(), {OPEN: [1, 1.1], FAILS: [1, 2, 1]}),
         (rules.rising(), {HOLDS: [1, 2, 3], CORRECTED: [1, 0, 3], FAILS: [3, 2]}),
+        # No two neighbours differ by three errors, but others do:
+        (
+            rules.rising(),
+            {CORRECTED: [0, 3, 2.7, 2.4, 4], OPEN: [0, 3, 2.7, 4], HOLDS: [0, 3, 2.9, 4]},
+        ),
         (rules.graded(rules.above(2.0), HIGH), {HOLDS: [3], CORRECTED: [1.5], FAILS: [0]}),
         (rules.graded(rules.above(2.0), HIGH), {OPEN: [1.1]}),
         (rules.never(0.5), {HOLDS: [0.0, 0.0], CORRECTED: [0.0, 0.1], FAILS: [0.0, 0.9]}),
@@ -171,6 +176,12 @@ def test_the_table_of_claims_is_tidy_and_the_main_results_stand(pipeline):
     assert list(means) == [0.25, 0.5, 1.0, 2.0]
     assert means[0.25] == pytest.approx(0.772, abs=0.01)
     assert means[2.0] == pytest.approx(0.692, abs=0.01)
+    # The rule, the summary and the note of the headline trend agree.
+    spread = [Number(float(row["value"]), float(row["error"])) for row in rows
+              if row["claim"] == "variability" and row["judged"] == "True"]  # fmt: skip
+    short = " ".join((out / "report.html").read_text(encoding="utf-8").split())
+    assert rules.rising()([spread]).value == verdicts["variability"] != HOLDS.value
+    assert re.search(rf"correlation length (is )?{verdicts['variability']}: as median", short)
     for name in (
         "lower-friction", "good-prediction", "interaction-suffices", "neighbours-lower",
     ):  # fmt: skip
@@ -188,13 +199,33 @@ def test_a_second_call_computes_nothing_and_figures_can_be_chosen(pipeline):
     assert after == before
 
 
+OWN = "length = 0.15\nnodes = 1536\nweakening_rate = 0.4e12\nhigh = 1.8e6\n"
+
+
+@pytest.mark.slow
+def test_samples_and_parameters_of_ones_own(tmp_path):
+    (tmp_path / "my.toml").write_text(OWN)
+    call = ("--quick", "--samples", "100", "--parameters", tmp_path / "my.toml")
+    assert "figure 13" in python(ROOT / "reproduction", *call, "--out", tmp_path / "out")
+    page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    for text in ("length = 0.15, nodes = 1536", "in 400 of 400 samples", "1.8 MPa; mean 1.04"):
+        assert text in " ".join(page.split()), text
+    assert "Figure 14." not in page
+
+
 @pytest.mark.parametrize(
-    ("arguments", "text"),
+    ("arguments", "own", "text"),
     [
-        (("--figures", "17"), "there are figures 1 to 16, not 17"),
-        (("--quick", "--full"), "not allowed"),
+        (("--figures", "17"), OWN, "there are figures 1 to 16, not 17"),
+        (("--figures", "1,14"), OWN, "14 shows what-ifs"),
+        (("--quick", "--full"), OWN, "not allowed"),
+        (("--samples", "20"), OWN, "must be 100 or more, got 20"),
+        ((), "lenght = 0.15", "my.toml: unknown 'lenght' (valid: shear_modulus,"),
+        ((), "low = 2e6", "high"),
     ],
 )
-def test_a_wrong_option_is_refused_before_anything_is_computed(arguments, text, tmp_path):
+def test_a_wrong_option_is_refused_before_anything_is_computed(arguments, own, text, tmp_path):
+    (tmp_path / "my.toml").write_text(own)
+    arguments = (*arguments, "--parameters", tmp_path / "my.toml")
     assert text in python(ROOT / "reproduction", *arguments, "--out", tmp_path / "none", code=2)
     assert not (tmp_path / "none").exists()
