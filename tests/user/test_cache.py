@@ -1,24 +1,28 @@
-"""Compiled kernels: a folder for each state of the sources, and no need of one."""
+"""Compiled kernels: a folder for each state of the sources, and no need of one; plain numba."""
 
 import os
 import shutil
+import sys
 from pathlib import Path
 
+import numba
 import pytest
 from checks import python
 
-from stiction import jit
+from stiction import jit, jit_internals, kernel_folder
 
 SOURCES = Path(__file__).parents[2] / "src"
+WITHOUT = 'import sys\nsys.modules["stiction.jit_internals"] = None\n'
+"""As if the file with numba's private parts had been deleted."""
 
 
-@pytest.fixture
-def run(tmp_path, monkeypatch):
+@pytest.fixture(params=["", WITHOUT], ids=["internals", "plain"])
+def run(tmp_path, monkeypatch, request):
     """Run a module in a process of its own, with a folder for compiled kernels."""
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
 
     def run(code, cache):
-        (tmp_path / "own_module.py").write_text(code)
+        (tmp_path / "own_module.py").write_text(request.param + code)
         places = {"PYTHONPATH": SOURCES, "STICTION_CACHE_DIR": cache}
         return python("-B", "-c", "import own_module", cwd=tmp_path, **places).splitlines()
 
@@ -29,10 +33,11 @@ def test_an_edited_kernel_is_another_folder_for_those_who_call_it(tmp_path, monk
     """numba looks at the kernel's own file only; the kernels here call those of other files."""
     copy = tmp_path / "stiction"
     shutil.copytree(SOURCES / "stiction", copy)
-    monkeypatch.setattr(jit, "__file__", str(copy / "jit.py"))
-    monkeypatch.setattr(jit, "_KEPT", "")
-    monkeypatch.setattr(jit, "_kernel_sources", jit._kernel_sources.__wrapped__)
-    find = jit._folder.__wrapped__
+    monkeypatch.setattr(kernel_folder, "__file__", str(copy / "kernel_folder.py"))
+    monkeypatch.setattr(kernel_folder, "KEPT", "")
+    sources = kernel_folder._kernel_sources.__wrapped__
+    monkeypatch.setattr(kernel_folder, "_kernel_sources", sources)
+    find = kernel_folder.kernel_folder.__wrapped__
     monkeypatch.setenv("STICTION_CACHE_DIR", str(tmp_path / "cache"))
     folders = []
     for edited in (None, "errors.py", "dynamics/explicit.py", "friction/__init__.py"):
@@ -40,7 +45,7 @@ def test_an_edited_kernel_is_another_folder_for_those_who_call_it(tmp_path, monk
             with (copy / edited).open("a") as file:
                 file.write("\n# edited\n")
         folders.append(
-            [find(f"stiction.{m}") for m in ("dynamics.explicit", "random.synthesis")]
+            [find(f"stiction.{m}", "own") for m in ("dynamics.explicit", "random.synthesis")]
         )
     before, message, own, law = folders
     assert before[0].parent == tmp_path / "cache" / "compiled"
@@ -83,3 +88,68 @@ def test_a_law_from_elsewhere_leaves_nothing_in_the_cache(tmp_path, run):
     assert run(edited, cache) == ["[6. 6. 6.]", "[0.5 0.5 0.5]"]
     assert list(cache.rglob("*.nbc"))
     assert b"own_module" not in b"".join(path.read_bytes() for path in cache.rglob("*.nbi"))
+
+
+BITS = """
+import gc
+import numba, numpy as np
+from numba.core import event
+before = numba.config.CACHE_DIR
+import stiction as st
+from stiction.elasticity.linear import inner
+from stiction.friction import kernels
+
+x = np.random.default_rng(7).lognormal(sigma=2.0, size=203)
+law = st.PiecewiseWeakening(slip=[0.3, 1.0], strength=[0.4, 0.0], weakening_rate=1.3).parameters
+print(inner(x, x[::-1].copy()).hex())
+print(kernels.strengths(law, x, 0.1 * x, 1.0 + x, 0.3 * x).tobytes().hex())
+
+class Collects(event.Listener):
+    found = []
+    def on_start(self, event):
+        self.found.append(gc.isenabled())
+    on_end = on_start
+
+event.register("numba:compile", Collects())
+print(numba.njit(lambda y: y + 1.5)(x[0]).hex(), Collects.found)
+assert numba.config.CACHE_DIR == before
+"""
+
+
+def test_plain_numba_gives_the_same_bits_and_user_code_is_left_alone(tmp_path):
+    """A numba that lacks a private part is plain numba to us; so is one that was not tried."""
+    places = {"PYTHONPATH": SOURCES, "NUMBA_CACHE_DIR": tmp_path}
+    own, plain = (python("-c", start + BITS, **places) for start in ("", WITHOUT))
+    assert own == plain
+    assert "[True, True]" in own  # garbage collection, during compilations that are not ours
+
+
+def imported():
+    """Import the file with numba's private parts again, as a module of its own."""
+    exec(Path(jit_internals.__file__).read_text(), {"__name__": "stiction.jit_internals"})
+
+
+@pytest.mark.parametrize("owner", jit_internals.PARTS)
+def test_a_numba_without_a_private_part_is_noticed_at_once(monkeypatch, owner):
+    """The import fails, and `jit` does without; later it would fail at the first kernel."""
+    imported()
+    with monkeypatch.context() as patch:
+        patch.delattr(sys.modules[owner.__module__], owner.__name__)
+        with pytest.raises(ImportError):
+            imported()
+    for name in jit_internals.PARTS[owner].split():
+        with monkeypatch.context() as patch:
+            for holder in (one for one in owner.__mro__ if name in vars(one)):
+                patch.delattr(holder, name)
+            with pytest.raises(ImportError, match=f"{owner.__name__} lacks {name}"):
+                imported()
+
+
+def test_a_newer_numba_is_plain_numba(monkeypatch):
+    assert jit.internals is not None, "test with the new numba and raise jit_internals.NEWEST"
+    newer = numba.version_info._replace(short=(99, 0))
+    monkeypatch.setattr(numba, "version_info", newer)
+    with pytest.raises(ImportError, match="not tried"):
+        imported()
+    monkeypatch.setattr(jit, "_Guard", None)  # its cache cannot be guarded: nothing is kept
+    assert jit._plain(lambda x: 2.0 * x)(4.0) == 8.0
