@@ -9,10 +9,10 @@ import numba
 import pytest
 from checks import python
 
-from stiction import jit, jit_internals, kernel_folder
+from stiction.jit import decorators, folder, internals
 
 SOURCES = Path(__file__).parents[2] / "src"
-WITHOUT = 'import sys\nsys.modules["stiction.jit_internals"] = None\n'
+WITHOUT = 'import sys\nsys.modules["stiction.jit.internals"] = None\n'
 """As if the file with numba's private parts had been deleted."""
 
 
@@ -33,11 +33,11 @@ def test_an_edited_kernel_is_another_folder_for_those_who_call_it(tmp_path, monk
     """numba looks at the kernel's own file only; the kernels here call those of other files."""
     copy = tmp_path / "stiction"
     shutil.copytree(SOURCES / "stiction", copy)
-    monkeypatch.setattr(kernel_folder, "__file__", str(copy / "kernel_folder.py"))
-    monkeypatch.setattr(kernel_folder, "KEPT", "")
-    sources = kernel_folder._kernel_sources.__wrapped__
-    monkeypatch.setattr(kernel_folder, "_kernel_sources", sources)
-    find = kernel_folder.kernel_folder.__wrapped__
+    monkeypatch.setattr(folder, "__file__", str(copy / "jit" / "folder.py"))
+    monkeypatch.setattr(folder, "KEPT", "")
+    sources = folder._kernel_sources.__wrapped__
+    monkeypatch.setattr(folder, "_kernel_sources", sources)
+    find = folder.kernel_folder.__wrapped__
     monkeypatch.setenv("STICTION_CACHE_DIR", str(tmp_path / "cache"))
     folders = []
     for edited in (None, "errors.py", "dynamics/explicit.py", "friction/__init__.py"):
@@ -126,10 +126,10 @@ def test_plain_numba_gives_the_same_bits_and_user_code_is_left_alone(tmp_path):
 
 def imported():
     """Import the file with numba's private parts again, as a module of its own."""
-    exec(Path(jit_internals.__file__).read_text(), {"__name__": "stiction.jit_internals"})
+    exec(Path(internals.__file__).read_text(), {"__name__": "stiction.jit.internals"})
 
 
-@pytest.mark.parametrize("owner", jit_internals.PARTS)
+@pytest.mark.parametrize("owner", internals.PARTS)
 def test_a_numba_without_a_private_part_is_noticed_at_once(monkeypatch, owner):
     """The import fails, and `jit` does without; later it would fail at the first kernel."""
     imported()
@@ -137,7 +137,7 @@ def test_a_numba_without_a_private_part_is_noticed_at_once(monkeypatch, owner):
         patch.delattr(sys.modules[owner.__module__], owner.__name__)
         with pytest.raises(ImportError):
             imported()
-    for name in jit_internals.PARTS[owner].split():
+    for name in internals.PARTS[owner].split():
         with monkeypatch.context() as patch:
             for holder in (one for one in owner.__mro__ if name in vars(one)):
                 patch.delattr(holder, name)
@@ -146,10 +146,14 @@ def test_a_numba_without_a_private_part_is_noticed_at_once(monkeypatch, owner):
 
 
 def test_a_newer_numba_is_plain_numba(monkeypatch):
-    assert jit.internals is not None, "test with the new numba and raise jit_internals.NEWEST"
+    assert decorators.internals is not None, (
+        "test with the new numba and raise internals.NEWEST"
+    )
     newer = numba.version_info._replace(short=(99, 0))
     monkeypatch.setattr(numba, "version_info", newer)
     with pytest.raises(ImportError, match="not tried"):
         imported()
-    monkeypatch.setattr(jit, "_Guard", None)  # its cache cannot be guarded: nothing is kept
-    assert jit._plain(lambda x: 2.0 * x)(4.0) == 8.0
+    monkeypatch.setattr(
+        decorators, "_Guard", None
+    )  # its cache cannot be guarded: nothing is kept
+    assert decorators._plain(lambda x: 2.0 * x)(4.0) == 8.0

@@ -1,7 +1,8 @@
 """numba's private parts: kernels compiled in half the time, and kept by the text of their files.
 
 This file may be deleted. Without it, or where it cannot be imported, as with a numba newer than the
-newest that was tried, `jit.py` compiles the same kernels with plain `numba.njit`, to the same bits.
+newest that was tried, `decorators.py` compiles the kernels with plain `numba.njit`, to the same
+bits.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLoca
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.compiler import Compiler, CompileResult, Flags
 
-from stiction.kernel_folder import kernel_folder
+from stiction.jit.folder import kernel_folder
 
 OLDEST, NEWEST = (0, 62), (0, 68)
 """Versions of numba with which the tests ran."""
@@ -29,7 +30,7 @@ PARTS: dict[type, str] = {
     JITCodeLibrary: "_optimize_final_module _finalize_final_module _finalize_dynamic_globals"
     " enable_object_caching serialize_using_bitcode serialize_using_object_code",
 }
-"""What is used of numba's classes; without it `jit` makes do with plain numba."""
+"""What is used of numba's classes; without it `decorators.py` makes do with plain numba."""
 if not OLDEST <= numba.version_info.short <= NEWEST:
     raise ImportError(f"numba {numba.__version__} was not tried")
 for owner, names in PARTS.items():

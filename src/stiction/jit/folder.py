@@ -12,7 +12,6 @@ from stiction.files import cache_folder, private_folder
 KEPT = numba.config.CACHE_DIR
 """Folder that the user chose by NUMBA_CACHE_DIR, or ''."""
 _IMPORT = re.compile(rb"^\s*(?:from|import) (stiction[\w.]*)(?: import (\w+))?", re.MULTILINE)
-_DECORATORS = ("jit", "jit_internals", "kernel_folder")
 
 
 @cache
@@ -22,11 +21,11 @@ def _kernel_sources() -> dict[str, bytes]:
     Files that refuse input hold no part of a kernel, unless they hold one themselves: an edited
     message recompiles nothing.
     """
-    package = Path(__file__).parent
+    package = Path(__file__).parents[1]
     found = {}
     for path in sorted(package.rglob("*.py")):
         text = path.read_bytes()
-        own = b"stiction.jit import" in text or path.stem in _DECORATORS
+        own = b"stiction.jit import" in text or path.parent.name == "jit"
         if own or b"InputError" not in text:
             name = ".".join(path.relative_to(package.parent).with_suffix("").parts)
             found[name.removesuffix(".__init__")] = text

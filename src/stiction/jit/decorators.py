@@ -11,11 +11,11 @@ from typing import Any, TypeVar
 import numba
 import numpy as np
 
-from stiction.kernel_folder import kernel_folder
+from stiction.jit.folder import kernel_folder
 
 internals: Any = None
 with contextlib.suppress(Exception):  # it was deleted, or numba is not one that was tried
-    import stiction.jit_internals as internals
+    import stiction.jit.internals as internals
 
 logger = logging.getLogger("stiction")
 
