@@ -1,0 +1,254 @@
+"""Response of two identical blocks to slip between them and to the drive that pushes them.
+
+Blocks of length L and height H are mirror images at the interface, free at their ends and driven in
+opposite directions, so that slip d changes no normal stress. Per unit depth, with the force F of
+the drive on one block (N/m), its travel U (m), the nodes' distance dx and the mean stress F/L,
+
+    tau = (F/L) q - K d,    U = F/C + (dx/(2 L)) sum q d    (Betti's theorem).
+
+K is that of a given force; a uniform slip is free of stress. It is put together from the closed
+form for two free ends (`free_end`) and a correction for the top and for the ends seeing each other.
+The correction is smooth, so that few points of the interface give it to many digits, one field of a
+block (`rectangle`) each. Mode III has closed forms throughout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+from scipy.fft import idct
+
+from stiction.arrays import Array, one_blas_thread
+from stiction.elasticity.free_end import (
+    image_slip,
+    lattice_symbol,
+    point_slip,
+    push,
+    stiffness_between_ends,
+    turned,
+)
+from stiction.elasticity.rectangle import Goursat, Rectangle, total
+
+Side: TypeAlias = Literal["left", "right"]
+
+POINTS = 24
+"""Points of the interface of a square block for which the correction is computed."""
+NEGLIGIBLE = 40.0
+"""Exponent beyond which terms of the series of mode III are round-off."""
+
+
+class Pushes(NamedTuple):
+    """Uniform traction on a side, over a width (m) around a height (m) above the interface.
+
+    From both sides each block is pushed at one end and pulled at the other, by half of the force.
+    """
+
+    sides: tuple[Side, ...]
+    height: float
+    width: float
+
+
+class BlockResponse(NamedTuple):
+    """What a method needs of two blocks; nodes at (i + 1/2) dx.
+
+    Attributes
+    ----------
+    stiffness : (n, n) array
+        K under a given force of the drive, Pa/m; symmetric, its rows sum to zero.
+    shear : (n,) array
+        q, shear stress of the drive over its mean.
+    drive_stiffness : float
+        C, force of the drive per unit depth over the travel of one block without slip, Pa.
+    """
+
+    stiffness: Array
+    shear: Array
+    drive_stiffness: float
+
+
+@lru_cache(maxsize=8)
+def block_response(
+    length: float,
+    nodes: int,
+    height: float,
+    modulus: float,
+    kappa: float | None,
+    pushes: Pushes | None,
+) -> BlockResponse:
+    """Return the response of two blocks to slip and to their drive.
+
+    Parameters
+    ----------
+    length, nodes, height : float, int, float
+        L (m), number of nodes, H (m).
+    modulus : float
+        Shear modulus G, Pa.
+    kappa : float or None
+        Kolosov's constant, 3 - 4 nu in plane strain and (3 - nu)/(1 + nu) in plane stress; None
+        for mode III.
+    pushes : Pushes or None
+        The drive; None for a platen that is glued to the top and moves along the interface. The
+        top of a block that is pushed lies on rollers (in mode III it is free).
+    """
+    with one_blas_thread():
+        if kappa is None:
+            return _anti_plane(length, nodes, height, modulus, pushes)
+        return _in_plane(length, nodes, height, modulus, kappa, pushes)
+
+
+def _in_plane(
+    length: float,
+    nodes: int,
+    height: float,
+    modulus: float,
+    kappa: float,
+    pushes: Pushes | None,
+) -> BlockResponse:
+    spacing = length / nodes
+    x = (np.arange(nodes) + 0.5) * spacing
+    block = Rectangle(length, height, kappa, glued=pushes is None)
+    effective = 4.0 * modulus / (kappa + 1.0)
+    stiffness = stiffness_between_ends(nodes, spacing, effective)
+    stiffness += spacing * _correction(block, effective, x)
+    if pushes is None:
+        none = np.zeros((block.left.size, 1))
+        moved = np.full((block.top.size, 1), 2.0 * modulus)
+        traction = block.face(block.fit(none, none, moved, 0.0 * moved), x).imag[:, 0]
+        drive = spacing * traction.sum()
+        stiffness -= 0.5 * spacing * np.outer(traction, traction) / drive
+        shear = traction * length / drive
+    else:
+        shear, compliance = _pushed(block, pushes, x)
+        drive = 2.0 * modulus / compliance
+    # What discretisation leaves of the stress of a uniform slip, 1e-7 of the diagonal.
+    stiffness[np.diag_indices(nodes)] -= stiffness.sum(axis=1)
+    return BlockResponse(stiffness, shear / shear.mean(), float(drive))
+
+
+def _correction(block: Rectangle, effective: float, x: Array) -> Array:
+    """Return what a finite block adds to K of two ends that do not feel each other, Pa/m².
+
+    For slip at Gauss points the field that clears its sides and its top; polynomials between them.
+    """
+    length = block.length
+    count = round(POINTS * max(1.0, length / (2.0 * block.height)))
+    gauss, weights = np.polynomial.legendre.leggauss(count)
+    places = 0.5 * length * (1.0 + gauss)
+
+    def first(z: Array) -> Goursat:
+        return image_slip(places, z, effective)
+
+    def second(z: Array) -> Goursat:
+        return turned(image_slip(length - places, length - z, effective), length)
+
+    left, right, top = (z[:, None] for z in (block.left, block.right, block.top))
+    above = total(point_slip(places, top, effective), first(top), second(top))
+    fitted = block.fit(
+        -second(left).side(left),
+        -first(right).side(right),
+        -above.displacement(top, block.kappa),
+        -above.face(top).imag,
+    )
+    kernel = -block.face(fitted, places).imag
+    # Barycentric weights of the Gauss points (Wang and Xiang 2012).
+    share = (-1.0) ** np.arange(count) * np.sqrt((1.0 - gauss**2) * weights)
+    terms = share / (x[:, None] - places)
+    between = terms / terms.sum(axis=1, keepdims=True)
+    correction: Array = between @ (0.5 * (kernel + kernel.T)) @ between.T
+    return correction
+
+
+def _pushed(block: Rectangle, pushes: Pushes, x: Array) -> tuple[Array, float]:
+    """Return the shear stress of a force of 1 N/m and 2 G times the travel, of a pushed block."""
+    length = block.length
+    low, high = pushes.height - 0.5 * pushes.width, pushes.height + 0.5 * pushes.width
+    right, top = block.right[:, None], block.top[:, None]
+    at_top = push(low, high, top)
+    fitted = block.fit(
+        np.zeros((block.left.size, 1)),
+        -push(low, high, right).side(right),
+        -at_top.displacement(top, block.kappa),
+        -at_top.face(top).imag,
+    )
+
+    def stress(x: Array) -> Array:
+        found: Array = block.face(fitted, x)[:, 0] + push(low, high, x + 0j).face(x)
+        return found.imag
+
+    def travel(end: float) -> float:
+        gauss, weights = np.polynomial.legendre.leggauss(64)
+        z = end + 1j * (pushes.height + 0.5 * pushes.width * gauss)
+        moved = block.field(fitted, z).displacement(z[:, None], block.kappa)[:, 0]
+        return float(
+            0.5 * weights @ (moved + push(low, high, z).displacement(z, block.kappa)).real
+        )
+
+    return _of_sides(pushes, stress, x, length, travel(0.0), travel(length))
+
+
+def _of_sides(
+    pushes: Pushes,
+    stress: Callable[[Array], Array],
+    x: Array,
+    length: float,
+    near: float,
+    far: float,
+) -> tuple[Array, float]:
+    """Return stress and travel of a drive from those of a force at the left end.
+
+    `near` and `far` are the displacements where the force acts and at the same place of the other
+    end.
+    """
+    if len(pushes.sides) == 2:
+        return 0.5 * (stress(x) + stress(length - x)), 0.5 * (near + far)
+    return stress(x if pushes.sides[0] == "left" else length - x), near
+
+
+def glued_pressure(length: float, nodes: int, height: float, kappa: float) -> Array:
+    """Return pressure over its mean, (n,), between blocks whose tops are glued to rigid platens."""
+    x = (np.arange(nodes) + 0.5) * length / nodes
+    block = Rectangle(length, height, kappa, glued=True, pressed=True)
+    none = np.zeros((block.left.size, 1))
+    moved = np.full((block.top.size, 1), -1j)
+    with one_blas_thread():
+        pressure = -block.face(block.fit(none, none, moved, 0.0 * moved.real), x).real[:, 0]
+    scaled: Array = pressure / pressure.mean()
+    return scaled
+
+
+def _anti_plane(
+    length: float, nodes: int, height: float, modulus: float, pushes: Pushes | None
+) -> BlockResponse:
+    """Return the response in mode III: cosines on the interface, sines on the sides.
+
+    K has the symbol (G/2) k coth(k H) below a platen, which is free of k = 0 under a given force,
+    and (G/2) k tanh(k H) below a free top.
+    """
+    spacing = length / nodes
+    k = np.pi / length * np.arange(1, nodes)
+    finite = k * (1.0 / np.tanh(k * height) if pushes is None else np.tanh(k * height))
+    symbol = np.append(0.0, lattice_symbol(k * spacing) / spacing + finite - k)
+    cosines = idct(np.eye(nodes), norm="ortho", axis=0)
+    stiffness = (cosines * (0.5 * modulus * symbol)) @ cosines.T
+    x = (np.arange(nodes) + 0.5) * spacing
+    if pushes is None:
+        return BlockResponse(stiffness, np.ones(nodes), modulus * length / height)
+    terms = int(NEGLIGIBLE * height / (np.pi * x[0])) + 1
+    k = (np.arange(terms) + 0.5) * np.pi / height
+    low, high = pushes.height - 0.5 * pushes.width, pushes.height + 0.5 * pushes.width
+    share = (np.cos(k * low) - np.cos(k * high)) / (k * pushes.width)  # mean of sin k y
+    once = -np.expm1(-2.0 * k * length)
+
+    def stress(x: Array) -> Array:
+        waves = np.exp(-k * x[:, None]) + np.exp(-k * (2.0 * length - x[:, None]))
+        found: Array = waves @ (2.0 / height * share / once)
+        return found
+
+    series = 2.0 / height * share**2 / (k * once)
+    near = float(series @ (1.0 + np.exp(-2.0 * k * length)))
+    far = float(series @ (2.0 * np.exp(-k * length)))
+    shear, travel = _of_sides(pushes, stress, x, length, near, far)
+    return BlockResponse(stiffness, shear / shear.mean(), modulus / travel)

@@ -1,0 +1,101 @@
+"""Closed forms and limits of the response of finite blocks."""
+
+import numpy as np
+import pytest
+
+from stiction.elasticity.blocks import Pushes, block_response, glued_pressure
+from stiction.elasticity.free_end import lattice_entries, lattice_symbol
+
+KAPPA = (3.0 - 0.35) / (1.0 + 0.35)  # plane stress, nu = 0.35
+MODULUS = 1.3e9  # Pa
+EFFECTIVE = 4.0 * MODULUS / (KAPPA + 1.0)
+
+
+def test_the_entries_of_the_lattice_have_its_symbol():
+    entries = lattice_entries(4001)
+    for angle in (0.07, 0.9, np.pi):
+        series = entries[0] + 2.0 * np.cos(angle * np.arange(1, 4001)) @ entries[1:]
+        assert series == pytest.approx(
+            lattice_symbol(np.array(angle)), abs=1e-4
+        )  # tail 2/(pi n)
+    assert np.all(entries[1:] < 0.0)
+
+
+@pytest.mark.parametrize(("kappa", "published"), [(KAPPA, 0.445), (None, 0.579)])
+def test_the_smallest_unstable_patch_at_a_free_end(kappa, published):
+    """a W/G* in the limit of many nodes: half of the middle's in mode III, less in mode II."""
+    nodes, modulus = 1200, EFFECTIVE if kappa else MODULUS
+    response = block_response(3.0, nodes, 3.0, MODULUS, kappa, None)
+    lengths = {}
+    for members in (15, 30):
+        least = np.linalg.eigvalsh(response.stiffness[:members, :members])[0]
+        lengths[members] = members * 3.0 / nodes * least / modulus
+    assert 2.0 * lengths[30] - lengths[15] == pytest.approx(published, rel=1e-3)
+
+
+@pytest.mark.parametrize("kappa", [KAPPA, 3.0 - 4.0 * 0.45, None])
+@pytest.mark.parametrize("pushes", [None, Pushes(("right",), 0.03, 0.02)])
+def test_a_uniform_slip_is_free_and_stiffness_is_symmetric(kappa, pushes):
+    stiffness, shear, drive = block_response(0.1, 96, 0.07, MODULUS, kappa, pushes)
+    scale = stiffness[0, 0]
+    assert np.abs(stiffness.sum(axis=1)).max() < 1e-12 * scale
+    assert np.abs(stiffness - stiffness.T).max() < 1e-12 * scale
+    assert np.linalg.eigvalsh(stiffness)[1] > 0.0
+    assert shear.mean() == pytest.approx(1.0, rel=1e-12)
+    # A push from the other side is the mirror image.
+    if pushes:
+        other = block_response(0.1, 96, 0.07, MODULUS, kappa, Pushes(("left",), 0.03, 0.02))
+        np.testing.assert_allclose(other.shear[::-1], shear, rtol=1e-9)
+        both = block_response(
+            0.1, 96, 0.07, MODULUS, kappa, Pushes(("left", "right"), 0.03, 0.02)
+        )
+        np.testing.assert_allclose(both.shear, 0.5 * (shear + shear[::-1]), rtol=1e-9)
+        # A force of half at each end does half the work of a force at one, and half of its share
+        # at the other: between half and all of the compliance.
+        assert drive < both.drive_stiffness < 2.0 * drive
+
+
+def test_a_clamped_strip_in_mode_three():
+    """K(x) = -pi G/(8 H²)/sinh²(pi x/2H) below a platen that is held."""
+    length, height, nodes = 1.0, 0.11, 1000
+    dx = length / nodes
+    stiffness, shear, drive = block_response(length, nodes, height, MODULUS, None, None)
+    held = stiffness + 0.5 * dx * drive / length**2 * np.outer(shear, shear)
+    away = np.array([0.05, 0.1, 0.2])
+    kernel = -np.pi * MODULUS / (8.0 * height**2) / np.sinh(0.5 * np.pi * away / height) ** 2
+    steps = np.rint(away / dx).astype(int)
+    np.testing.assert_allclose(held[500, 500 + steps] / dx, kernel, rtol=1e-3)
+
+
+def test_far_from_the_ends_of_a_high_block_it_is_a_half_space():
+    length, nodes = 1.0, 800
+    stiffness, *_ = block_response(length, nodes, 1.4, MODULUS, KAPPA, None)
+    steps = np.arange(3, 12)
+    kernel = 0.5 * EFFECTIVE * nodes / length * lattice_entries(12)[3:]
+    # What the ends add, some (G*/2 pi)(10/L²), counts 2e-3 of this at twelve nodes.
+    np.testing.assert_allclose(stiffness[400, 400 + steps], kernel, rtol=3e-3)
+
+
+def test_figures_of_a_platen_and_of_glued_pressing():
+    """Of a block twice as long as high, nu = .35, plane stress; by finite elements, to 1e-3."""
+    length, height, nodes = 0.1, 0.05, 512
+    _, shear, drive = block_response(length, nodes, height, MODULUS, KAPPA, None)
+    eighth = 0.5 * (shear[63] + shear[64])
+    assert eighth == pytest.approx(0.6756, rel=1e-3)
+    assert shear[256] == pytest.approx(1.4655, rel=1e-3)
+    assert drive * height / (MODULUS * length) == pytest.approx(0.6666, rel=1e-3)
+    pressure = glued_pressure(length, nodes, height, KAPPA)
+    assert pressure[0] == pytest.approx(0.88, abs=0.005)
+    assert pressure[256] == pytest.approx(1.05, abs=0.005)
+
+
+def test_a_push_in_mode_three_carries_its_force_and_decays():
+    """Laplace's equation in the block by a sum of sines; far away the least one is left."""
+    height = 0.04
+    _, shear, _ = block_response(
+        0.2, 400, height, MODULUS, None, Pushes(("left",), 0.015, 0.01)
+    )
+    k, dx = 0.5 * np.pi / height, 0.2 / 400
+    cosh = np.cosh(k * (0.2 - (np.array([200, 240]) + 0.5) * dx))
+    assert shear[200] / shear[240] == pytest.approx(cosh[0] / cosh[1], rel=1e-3)
+    assert shear[0] > 3.0
