@@ -11,6 +11,7 @@ import numpy as np
 from stiction.arrays import Array
 from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.errors import InputError
+from stiction.inference.between import as_of_one, levels_of, scatter_between
 from stiction.inference.marginal_fit import Family, distance
 from stiction.inference.whittle import (
     RANGES,
@@ -44,6 +45,10 @@ SAME = 1e-3
 """Distance within which an interval is uninformative, as a share of an end of a range."""
 
 
+ROUNDS = 2
+"""In each, the error of the field's share in the scatter of means falls to that share of it."""
+
+
 @dataclass(frozen=True, eq=False)
 class Setting:
     """Families to fit, and a window for each record (equal windows are shared)."""
@@ -51,6 +56,7 @@ class Setting:
     windows: tuple[Window, ...]
     marginal: Family
     spectrum: SpectrumFamily
+    between: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,15 +69,20 @@ class Estimate:
     distance: float  # Kolmogorov's, between values and marginal
     roughness: float  # mean square of log(periodogram/expectation), both averaged over bands
     noise: tuple[float, float]  # its variance, which may be negative, and the error of that
+    between: float = 0.0  # coefficient of variation of the factor between specimens
 
     @cached_property
     def parameters(self) -> dict[str, float]:
         """All estimated parameters, and what follows from them, by name."""
         spectrum = self.model.spectrum
-        lags = spectrum.correlation_length * LAGS
-        correlation = spectrum.untruncated_correlation(lags)
+        if self.model.end_seen or not hasattr(spectrum, "untruncated_correlation"):
+            efolding = spectrum.efolding_length
+        else:
+            lags = spectrum.correlation_length * LAGS
+            correlation = spectrum.untruncated_correlation(lags)
+            efolding = float(np.interp(-math.exp(-1.0), -correlation, lags))
         values = {
-            "efolding_length": float(np.interp(-math.exp(-1.0), -correlation, lags)),
+            "efolding_length": efolding,
             "mean": float(self.marginal.distribution.mean()),
             "standard_deviation": float(self.marginal.distribution.std()),
         }
@@ -97,16 +108,48 @@ class Estimate:
         power = {window: self.model.power(window) for window in dict.fromkeys(windows)}
         rows = []
         for window in windows:
-            z = window.sample(power[window], rng)
-            noise = self.model.noise * rng.standard_normal(z.size)
-            rows.append(window.without_trend(from_normal(self.marginal, z) + noise))
-        return rows
+            field = from_normal(self.marginal, window.sample(power[window], rng))
+            noise = self.model.noise * rng.standard_normal(field.size)
+            rows.append(window.without_trend(field + noise))
+        if not self.between:
+            return rows
+        scatter = math.sqrt(math.log1p(self.between**2)) * rng.standard_normal(len(rows))
+        return [row * factor for row, factor in zip(rows, np.exp(scatter), strict=True)]
+
+    @property
+    def within(self) -> Array:
+        """Variance of the logarithm of the mean of each record from the field alone."""
+        windows = self.setting.windows
+        shares = {w: w.variance_of_mean(self.model.correlation(w)) for w in set(windows)}
+        own = self.parameters["standard_deviation"] / self.parameters["mean"]
+        result: Array = np.log1p(own**2 * np.array([shares[window] for window in windows]))
+        return result
+
+    def as_of_one(self, rows: Sequence[Array]) -> list[Array]:
+        """Return records without the scatter between specimens, if that is estimated."""
+        return as_of_one(rows, self.within) if self.setting.between else list(rows)
 
 
 def estimate(
     rows: Sequence[Array], setting: Setting, start: Estimate | None = None
 ) -> Estimate:
     """Fit measured values (points,) of each record, without trend; from a start if there is one.
+
+    Records of several specimens are scaled by what the fit itself finds of the field's own share
+    in the scatter of their means, in a few rounds.
+    """
+    if not setting.between:
+        return _estimate(rows, setting, start)
+    equal = as_of_one(rows, np.zeros(len(rows)))
+    found = start or _estimate(equal, setting, None)
+    for _ in range(ROUNDS):
+        found = _estimate(found.as_of_one(rows), setting, found)
+    between, *_ = scatter_between(np.log(levels_of(rows)), found.within, 0.5)
+    return replace(found, between=between)
+
+
+def _estimate(rows: Sequence[Array], setting: Setting, start: Estimate | None) -> Estimate:
+    """Fit records of one field.
 
     The noise is found with the marginal of the values, which it widens; then both are fitted again.
     """

@@ -7,12 +7,11 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import BeforeValidator, Field
-from scipy.optimize import brentq
-from scipy.stats import chi2
 from scipy.stats import t as student
 
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name, warn_accuracy
+from stiction.inference.between import levels_of, scatter_between
 from stiction.inference.bootstrap import (
     FEWEST,
     Estimate,
@@ -42,8 +41,6 @@ ADVICE = {
     "marginal": "the values are far from its family; compare families",
     "spectrum": "the periodogram is far from its family; take another spectrum or a higher detrend",
 }
-MOST_SCATTER = 9.0
-"""Largest variance between records of the logarithm that is searched."""
 STRESSES = ("mean", "standard_deviation", "noise", "low", "high", "loc", "scale")
 """Parameters in the unit of the field."""
 
@@ -98,8 +95,8 @@ class FieldFit:
     families : dict of str to Goodness
         Quality of every requested family of marginals.
     p_values : dict of str to float
-        Shares of the repetitions that are as far from their own marginal, and spectrum, as
-        the data are from the fitted ones (Barnard's test); small if a family does not fit.
+        Probability of records as far from their own marginal, and spectrum, as the data are
+        from the fitted ones, from the repetitions; small if a family does not fit.
     lengths_held : float
         Correlation lengths (on a plane, areas) that the records hold together.
     missing : (int, int)
@@ -185,7 +182,8 @@ def fit_field(
         the lower bound of the others is 0 unless it is given.
     spectrum : str or dict
         'power_law', 'squared_exponential' or 'exponential'; a table fixes parameters, such
-        as ``{"type": "power_law", "exponent": 4.0}`` or ``"power_kept": 0.999``.
+        as ``{"type": "power_law", "exponent": 4.0}``. Its end is seen in the record only if
+        ``"truncation"`` or ``"power_kept"`` is given; the field has the usual one otherwise.
     detrend : int
         Degree of the polynomial trend that is removed, 0 to 3. The mean is always kept.
     noise : bool or float
@@ -263,9 +261,8 @@ def fit_field(
     (name, fixed), deviation = spectrum, None if noise is True else float(noise)
     family = SpectrumFamily(name, fixed, ratio, deviation, (spacing, 2.0 * float(longest)))
     windows, rows = _windowed(records, detrend)
-    levels = _levels(rows) if between else np.ones(len(rows))
-    rows = [row * levels.mean() / level for row, level in zip(rows, levels, strict=True)]
-    found, compared = _best([Setting(windows, one, family) for one in marginal], rows)
+    found, compared = _best([Setting(windows, one, family, between) for one in marginal], rows)
+    measured, rows = rows, found.as_of_one(rows)
     repeated = bootstrapped(found, bootstrap, confidence, seed, progress)
     tests = {"marginal": "distance", "spectrum": "roughness"}
     p_values = {name: _p_value(of, *repeated[0]) for name, of in tests.items()}
@@ -274,10 +271,9 @@ def fit_field(
     parameters = dict(found.parameters)
     ends = intervals(repeated, confidence, np.concatenate(rows))
     if between:
-        own = (parameters["standard_deviation"] / parameters["mean"]) ** 2
-        shares = [one.variance_of_mean(found.model.correlation(one)) for one in windows]
-        within = np.log1p(np.multiply(own, shares))
-        cv, ends["between"], width = scatter_between(np.log(levels), within, confidence)
+        cv, ends["between"], width = scatter_between(
+            np.log(levels_of(measured)), found.within, confidence
+        )
         for name in {"mean", "marginal.mean"} & parameters.keys():  # of other specimens, too
             ends[name] = parameters[name] * math.exp(-width), parameters[name] * math.exp(width)
         parameters["between"] = cv
@@ -318,65 +314,21 @@ def _windowed(records: Sequence[Record], degree: int) -> tuple[tuple[Window, ...
     return tuple(windows), rows
 
 
-def _levels(rows: Sequence[Array]) -> Array:
-    """Means of records of different specimens, (records,)."""
-    levels = np.array([row.mean() for row in rows])
-    if len(rows) < 2 or levels.min() <= 0.0:
-        raise InputError(
-            f"between: needs several records of positive mean, got {len(rows)} with means from"
-            f" {levels.min():g} to {levels.max():g}"
-        )
-    return levels
-
-
-def scatter_between(
-    logarithms: Array, within: Array, confidence: float
-) -> tuple[float, tuple[float, float], float]:
-    """Estimate the coefficient of variation of a log-normal factor between records.
-
-    Q(s) = sum (L - m(s))^2/(s + v) is chi-square distributed with one degree of freedom
-    less than records at the true variance s of the logarithms L (Viechtbauer, 2007),
-    whatever their number; the estimate is where Q is as large as that (Paule and Mandel,
-    1982). `within` are the variances v of the logarithms from the field alone, (records,).
-    Returns the coefficient, its interval, and half the width of that of the mean logarithm.
-    """
-    freedom = logarithms.size - 1
-
-    def excess(s: float, level: float) -> float:
-        weight = 1.0 / (s + within)
-        middle = float(weight @ logarithms / weight.sum())
-        return float(weight @ (logarithms - middle) ** 2) - level
-
-    def where(level: float) -> float:
-        if excess(0.0, level) <= 0.0:
-            return 0.0
-        if excess(MOST_SCATTER, level) >= 0.0:
-            return MOST_SCATTER
-        return float(brentq(excess, 0, MOST_SCATTER, args=(level,)))
-
-    tail = 0.5 * (1.0 - confidence)
-    levels = (freedom, chi2.ppf(1.0 - tail, freedom), chi2.ppf(tail, freedom))
-    found, low, high = (where(float(level)) for level in levels)
-    error = float((1.0 / (found + within)).sum() ** -0.5)
-    cv, least, most = (math.sqrt(math.expm1(s)) for s in (found, low, high))
-    return cv, (least, most), float(student.ppf(0.5 + 0.5 * confidence, freedom)) * error
-
-
 def _best(
     settings: Sequence[Setting], rows: Sequence[Array]
 ) -> tuple[Estimate, dict[str, Goodness]]:
     """The family that describes the values best, and how well each does."""
-    values = np.concatenate(rows)
     fitted: list[tuple[float, Estimate]] = []
     problems: list[str] = []
     for setting in settings:
         try:
             if setting.spectrum.noise == 0.0:
-                setting.marginal.check(values)
+                setting.marginal.check(np.concatenate(rows))
             found = estimate(rows, setting)
         except InputError as error:
             problems += error.problems
             continue
+        values = np.concatenate(found.as_of_one(rows))
         independent = min(_lengths_held(found), values.size)
         score = independent * mean_log_likelihood(found.marginal, values, found.model.noise)
         fitted.append((score - len(setting.marginal.parameters(found.marginal)), found))
@@ -399,9 +351,10 @@ def _lengths_held(found: Estimate) -> float:
 
 
 def _p_value(name: str, truth: Estimate, fits: Sequence[Estimate]) -> float:
-    """P-value of data from their model (Barnard's test; Davison and Hinkley, 1997)."""
-    own = getattr(truth, name)
-    return (sum(getattr(one, name) >= own for one in fits) + 1) / (len(fits) + 1)
+    """P-value of data from their model: logarithms of distances are about normal."""
+    own, others = math.log(getattr(truth, name)), np.log([getattr(one, name) for one in fits])
+    away = (own - others.mean()) / (others.std(ddof=1) * math.sqrt(1.0 + 1.0 / others.size))
+    return float(student.sf(away, others.size - 1))
 
 
 def _doubts(found: Estimate, p_values: Mapping[str, float], failed: int) -> list[str]:

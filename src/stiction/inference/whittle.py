@@ -200,10 +200,9 @@ class SpectrumFamily:
         noise = found.pop("noise_share", known)
         options = self.fixed | found
         end_given = not {"truncation", "power_kept"}.isdisjoint(options)
-        spectrum = SPECTRA[self.name]
-        if not end_given:
-            options["power_kept"] = spectrum.default_power
-        return Model(spectrum(**options), anisotropy, noise, variance, shares, end_given)
+        return Model(
+            SPECTRA[self.name](**options), anisotropy, noise, variance, shares, end_given
+        )
 
     def vector(self, values: Sequence[float]) -> Array:
         """Return free parameters on the scale of the search."""
@@ -251,12 +250,16 @@ class Whittle(NamedTuple):
         windows = [one.window for one in self.observed]
         power = sum(float(np.sum(one.window.weights * one.average)) for one in self.observed)
         best, most = np.zeros(0), -math.inf
+        signals, shape = [], None
         for values in itertools.product(*[tried[name] for name in self.family.free]):
             at = self.family.vector(values)
             model = self.family.model(at, self.shares)
-            expected = [model.expectation(window) for window in windows]
-            pairs = zip(windows, expected, strict=True)
-            scale = power / sum(float(np.sum(window.weights * e)) for window, e in pairs)
+            if shape != (shape := (model.spectrum, model.anisotropy)):
+                signals = [model.signal(window) for window in windows]
+            pairs = list(zip(windows, signals, strict=True))
+            expected = [model.expectation(window, signal) for window, signal in pairs]
+            totals = zip(windows, expected, strict=True)
+            scale = power / sum(float(np.sum(window.weights * e)) for window, e in totals)
             value = self.of([scale * e for e in expected])
             if value > most:
                 best, most = at, value

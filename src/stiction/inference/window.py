@@ -14,7 +14,7 @@ trend as well).
 
 import itertools
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,15 +29,22 @@ EXACT = {1: 16, 2: 2}
 """Wave numbers up to which the expectation includes the trend; the taper hides it beyond."""
 ROOM = {1: 4, 2: 2}
 """Period of the grid on which a correlation is computed, in lengths of the record."""
-EDGE = 0.2
-"""Share of the truncation over which a spectrum is faded out: a sharper end would be taken for a
-precise measure of the correlation length, which it is in simulations only."""
+EDGE = 2.0
+"""Modes of a period over which a spectrum fades out at its end: a sharper end would move in steps
+along with the correlation length."""
 LEFT_OUT = 1e-4
 """Share of the variance above the end of a spectrum that is not truncated."""
 FOLDS = 6
 """Multiples of the sampling wavenumber that are folded back one by one."""
-NEAR, FEW = 1, 65
-"""Multiples on a line that need all wavenumbers, and number of wavenumbers of the others."""
+NEAR, FEW = 1, {1: 65, 2: 33}
+"""Multiples that need all wavenumbers, and number of wavenumbers in a direction of the others."""
+
+
+class Edge(NamedTuple):
+    """Wavenumber at which a spectrum ends, rad/m, and over how many it fades out."""
+
+    at: float
+    width: float
 
 
 class Window:
@@ -134,8 +141,9 @@ class Window:
         end = min(cutoff, *(s * (f + 0.5) for s, f in zip(sampling, folds, strict=True)))
         axes = [s * fft.fftfreq(n) for s, n in zip(sampling, self._period, strict=True)]
         axes[-1] = sampling[-1] * fft.rfftfreq(self._period[-1])
+        width = EDGE * max(s / n for s, n in zip(sampling, self._period, strict=True))
         folded = _folded_line if dimensions == 1 else _folded_plane
-        total = folded(spectrum, axes, folds, sampling, end)
+        total = folded(spectrum, axes, folds, sampling, Edge(end, width))
         missed = 0.0
         if end < cutoff:
             kept = [spectrum.power_within(k, dimensions) for k in (end, cutoff)]
@@ -179,12 +187,12 @@ def _polynomials(measured: NDArray[np.bool_], degree: int) -> Array:
     return basis
 
 
-def _fade(k: Array, end: float) -> Array:
-    return np.clip((end - k) / (EDGE * end) + 0.5, 0.0, 1.0)
+def _fade(k: Array, end: Edge) -> Array:
+    return np.clip((end.at - k) / end.width + 0.5, 0.0, 1.0)
 
 
 def _folded_line(
-    spectrum: Any, axes: list[Array], folds: list[int], sampling: list[float], end: float
+    spectrum: Any, axes: list[Array], folds: list[int], sampling: list[float], end: Edge
 ) -> Array:
     """The density at all wavenumbers that look alike on the grid, added up."""
 
@@ -197,20 +205,26 @@ def _folded_line(
     line = added(axes[0], np.arange(-near, near + 1))
     if folds[0] > near:  # smooth by then
         far = np.arange(near + 1, folds[0] + 1)
-        few = np.linspace(0.0, axes[0][-1], FEW)
+        few = np.linspace(0.0, axes[0][-1], FEW[1])
         line += np.interp(axes[0], few, added(few, np.concatenate([-far, far])))
     return line
 
 
 def _folded_plane(
-    spectrum: Any, axes: list[Array], folds: list[int], sampling: list[float], end: float
+    spectrum: Any, axes: list[Array], folds: list[int], sampling: list[float], end: Edge
 ) -> Array:
     """The same for a plane."""
-    found = np.zeros((axes[0].size, axes[1].size))
+    few = [np.linspace(axis.min(), axis.max(), FEW[2]) for axis in axes]
+    near, far = np.zeros((axes[0].size, axes[1].size)), np.zeros((FEW[2], FEW[2]))
     for p in range(-folds[0], folds[0] + 1):
         for q in range(-folds[1], folds[1] + 1):
-            kx, ky = axes[0] + p * sampling[0], axes[1] + q * sampling[1]
-            if math.hypot(np.abs(kx).min(), np.abs(ky).min()) <= (1.0 + EDGE) * end:
-                k = np.hypot(kx[:, None], ky[None, :])
-                found += spectrum.density(k, 2) * _fade(k, end)
-    return found
+            is_near = max(abs(p), abs(q)) <= NEAR
+            total, at = (near, axes) if is_near else (far, few)
+            kx, ky = at[0] + p * sampling[0], at[1] + q * sampling[1]
+            k = np.hypot(kx[:, None], ky[None, :])
+            if k.min() <= end.at + end.width:
+                total += spectrum.density(k, 2) * _fade(k, end)
+    rows = np.stack([np.interp(axes[1], few[1], row) for row in far])
+    columns = [np.interp(axes[0], few[0], column) for column in rows.T]
+    result: Array = near + np.stack(columns, axis=1)
+    return result
