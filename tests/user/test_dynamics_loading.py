@@ -141,7 +141,8 @@ def test_an_ensemble_takes_a_load_history():
         st.monte_carlo(PROBLEM, strength, method=method, samples=2, seed=0).critical_stress
         for method in (load, rate)
     )
-    np.testing.assert_array_equal(one, other)
+    # Rounded otherwise, a load may tip the size of a step.
+    np.testing.assert_allclose(one, other, rtol=1e-5)
 
 
 @pytest.mark.parametrize("stop", ["sliding", "onset", "rest"])
