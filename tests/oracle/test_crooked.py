@@ -19,6 +19,8 @@ from setups import exact_onset, local_onset
 
 import stiction as st
 from stiction.criterion.eigenfunction import weight
+from stiction.criterion.local import beyond_residual
+from stiction.theory import energy_release_rate, griffith_length
 
 BOTH = pytest.mark.parametrize(
     ("problem", "strength", "gap"),
@@ -115,3 +117,54 @@ def test_moving_the_origin_moves_places_only():
         for name in {"critical_position", "sliding_position"} & set(here):
             place = (here[name].item() + 30 * LINE.interface.spacing) % 0.037
             assert apart(there[name].item(), place, 0.037) < 1e-6
+
+
+def tips(load, whole, centre):
+    """G of a row of cracks at both tips by the textbook's weights (Tada, Paris and Irwin)."""
+    s, measure = angle_rule(4000)
+    half, line = 0.5 * whole, LINE.interface
+    drop = LINE.load.initial_stress + load * LINE.load.profile - LINE.friction.residual_strength
+    drop = np.interp(centre + half * s, line.x, drop, period=line.length)
+
+    def sine(x):
+        return np.sin(np.pi * x / line.length)
+
+    factors = [
+        np.sqrt(2.0 / (line.length * sine(whole)))
+        * half
+        * np.sum(drop * measure * np.sqrt(sine(half + x) / sine(half - x)))
+        for x in (-half * s, half * s)
+    ]
+    return np.array([k * abs(k) for k in factors]) / (2.0 * LINE.effective_modulus)
+
+
+def test_cracks_across_the_seam_under_an_uneven_load():
+    for whole in (0.001, 0.006, 0.02, 0.034):
+        found = energy_release_rate(LINE, 4e5, whole, centre=0.0362)[0]
+        # The corners of the drop at nodes: quadrature with 512 points is good to 1e-4.
+        np.testing.assert_allclose(found, tips(4e5, whole, 0.0362), rtol=1e-4)
+    # The weaker tip decides: about 33 mm it starts, and is stopped across the seam.
+    lengths = np.linspace(1e-4, 0.0369, 800)
+    above = np.array([tips(1.5e5, one, 0.033).min() > 8e-3 for one in lengths])
+    first = int(above.argmax())
+    last = first + int(above[first:].argmin())
+    for arrest, end in ((False, first), (True, last)):
+        found = griffith_length(LINE, 1.5e5, 8e-3, centre=0.033, arrest=arrest)
+        assert found == pytest.approx(lengths[end] - 23e-6, abs=26e-6)
+
+
+def test_estimate_of_what_the_residual_strength_takes_has_no_unit_of_load():
+    """Twice the profile halves the load, and nothing else."""
+    residual = LINE.friction.residual_strength + 3.8e5
+    friction = dataclasses.replace(LINE.friction, residual_strength=residual)
+    twice = dataclasses.replace(LINE.load, profile=2.0 * LINE.load.profile)
+    estimates = []
+    for load in (LINE.load, twice):
+        problem = dataclasses.replace(LINE, friction=friction, load=load)
+        found = local_onset(problem, LINE_STRENGTH)
+        estimates.append(beyond_residual(problem, problem.sample(LINE_STRENGTH), dict(found)))
+    (reached, missing), (again, same) = estimates
+    assert reached.all()
+    assert again.all()
+    assert missing > 0.0
+    assert same == pytest.approx(missing, rel=1e-9)

@@ -12,6 +12,7 @@ from setups import make_problem
 from small_study import small_study
 
 import stiction as st
+from stiction.profiles.units import parse
 
 NODES = 128
 LINE = st.Interface(length=0.1, nodes=NODES)
@@ -126,6 +127,25 @@ def test_everything_beside_the_strength_is_read_alike():
     dataset = labelled().to_dataset(name="tau_p").assign(tau_i=labelled(STRENGTH / 2))
     assert found({"strength": dataset}) == found(STRENGTH)
     assert "unit" not in st.read_profile(labelled(STRENGTH / 1e6, unit="MPa")).attrs
+
+
+@pytest.mark.parametrize(
+    ("text", "factor", "powers"),
+    [
+        ("kPa/mm/s", 1e6, (1, -2, -3)),
+        ("N/mm s", 1e3, (1, 0, -1)),  # only what follows the slash at once is divided by
+        ("kN m/cm^2", 1e7, (1, 0, -2)),
+        ("1/s", 1.0, (0, 0, -1)),
+        ("mJ mm⁻²", 1e3, (1, 0, -2)),
+        ("%", 0.01, (0, 0, 0)),
+        ("MPa·um", 1.0, (1, 0, -2)),
+        ("N**2/m**3", 1.0, (2, -1, -4)),
+    ],
+)
+def test_powers_and_slashes_of_units(text, factor, powers):
+    unit = parse(text)
+    assert unit.factor == pytest.approx(factor, rel=1e-14)
+    assert unit.powers == powers
 
 
 MM, INCH, KSI = 1e3, 1.0 / 0.0254, 1.0 / 6894757.293168

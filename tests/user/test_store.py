@@ -22,6 +22,7 @@ from setups import make_problem
 from small_study import lengths, small_study
 
 import stiction as st
+from stiction import files
 from stiction.ensemble import batches, store
 from stiction.ensemble.batches import Span, solve_spans
 from stiction.ensemble.experiment import Experiment
@@ -474,3 +475,20 @@ def test_samples_solved_one_by_one_warn_once():
     texts = [str(warning.message) for warning in caught]
     assert sum("are recommended" in text for text in texts) == 1, texts
     assert sum("could not be solved" in text for text in texts) == 1, texts
+
+
+def test_a_file_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch):
+    """So that a loss of power leaves the old file or the new one: synced, then renamed."""
+    done, path = [], tmp_path / "kept.npz"
+    for name in ("fsync", "replace"):
+        real = getattr(os, name)
+
+        def noted(*given, name=name, real=real):
+            done.append((name, path.exists()))
+            return real(*given)
+
+        monkeypatch.setattr(os, name, noted)
+    files.write_arrays(path, {"a": [1.0]})
+    assert done[:2] == [("fsync", False), ("replace", False)]
+    assert done[2:] in ([("fsync", True)], [])  # Windows opens no folders
+    assert files.read_arrays(path)["a"].tolist() == [1.0]

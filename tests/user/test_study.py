@@ -214,6 +214,17 @@ def test_ranges_have_the_type_and_unit_of_their_key():
     axes = found.axes
     assert axes["nodes"]["nodes"][0].dtype == np.int64
     assert axes["low"]["low"][1].units == "Pa"
+    # Of a field of coefficients they are coefficients, its lengths still lengths.
+    plain = small_study()["random"]["strength"]
+    beta = plain["marginal"] | {"low": 0.3, "high": 0.6}
+    axes = swept(
+        {"random.strength.marginal.low": [0.2, 0.3]},
+        *lengths(4e-3, 6e-3),
+        problem__load={"normal_pressure": 2e6},
+        random__strength=plain | {"marginal": beta, "of": "friction_coefficient"},
+    ).axes
+    units = [axes[name][name][1].units for name in ("low", "correlation_length")]
+    assert units == ["1", "m"]
     load = {"profile": {"type": "edge", "excess": 1.0, "decay": 0.01}}
     held = {"type": "rupture", "loading_rate": 1e8}
     axes = swept(
