@@ -56,7 +56,7 @@ def tests_near(target: str) -> list[str]:
 def fails(tree: Path, tests: list[str], seconds: float) -> str:
     """The first test that fails in a copy, or nothing; what hangs is noticed too."""
     options = ["-x", "-q", "-n", "0", "-p", "no:cacheprovider", "--durations=0", "--tb=no"]
-    own = {"PYTHONPATH": str(tree / "src"), "MPLBACKEND": "Agg"}
+    own = {"PYTHONPATH": str(tree / "src"), "TMPDIR": str(tree.parent), "MPLBACKEND": "Agg"}
     command = [sys.executable, "-m", "pytest", *options, *tests]
     try:
         done = subprocess.run(
