@@ -9,6 +9,7 @@ import stiction as st
 from stiction.criterion.average import least_average
 from stiction.criterion.windows import ellipse_window
 from stiction.elasticity.operator import make_operator
+from stiction.equilibrium import transforms
 from stiction.equilibrium.relaxation import BALANCED, SLIDING, least_equilibrium
 from stiction.equilibrium.transforms import Plane, plane_onset
 
@@ -76,21 +77,48 @@ def test_translations_and_reflections(change, move):
         assert np.abs(change(one) - other).max() < 1e-3 * one.max()
 
 
-def test_sensitivity_is_the_gradient_of_the_mean_stress():
+LAWS = {
+    "straight": {},
+    "residual": {"residual_strength": 6.2e5},
+    "corner": {"slip": [0.25, 1.0], "strength": [0.6, 0.0]},
+    "both": {"slip": [0.25, 1.0], "strength": [0.6, 0.0], "residual_strength": 4.5e5},
+}
+
+
+def crooked(name):
     load = st.Load(profile=1.0 + 0.3 * smooth(6), initial_stress=1e5 * smooth(7))
-    rate = RATE * (0.9 + 0.1 * smooth(5))
-    problem = make_problem(NODES, LENGTHS, load=load, weakening_rate=rate)
-    strength, direction = strength_of(1), smooth(8, 1.0) - 0.3
-    found = solve(strength, problem, gap=1e-10)["sensitivity"].values[0]
-    ends = np.array([strength + direction, strength - direction])
-    up, down = first_of(ends, problem=problem, gap=1e-10)
-    # A step of 1e-6 of the strength, since with longer ones nodes join; loads are known to 1e-10,
-    # and to better where, as here, it is the same bound that decides.
-    assert 0.5 * (up - down) == pytest.approx((found * direction).sum(), rel=1e-5)
-    weighted = (found * load.profile).sum()
-    assert weighted == pytest.approx(load.profile.mean(), rel=1e-12)
-    uniform = solve(strength_of(2))["sensitivity"]
-    assert uniform.sum().item() == pytest.approx(1.0, abs=1e-12)
+    options = {"weakening_rate": RATE * (0.9 + 0.1 * smooth(5)), **LAWS[name]}
+    law = st.PiecewiseWeakening if "slip" in options else st.LinearWeakening
+    return make_problem(NODES, LENGTHS, load=load, friction=law(**options))
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_sensitivity_is_the_gradient_of_the_mean_stress(name):
+    problem, strength = crooked(name), strength_of(3)
+    rough = np.random.default_rng(9).standard_normal((3, *NODES))
+    directions = 10.0 * np.array([smooth(8, 1.0) - 0.3, *rough])
+    found = exact_onset(problem, strength, gap=1e-4, sensitivity=True)  # of wide bounds too
+    assert found["certified"].item() == (name == "straight")
+    gradient = found["sensitivity"].values[0]
+    # Steps of 1e-5 of the strength, since with longer ones other nodes join. Bounds are 1e-10
+    # apart, 1e-4 of a step of the onset at most.
+    ends = np.concatenate((strength + directions, strength - directions))
+    up, down = first_of(ends, problem=problem, gap=1e-10).reshape(2, -1)
+    expected, error = (gradient * directions).sum((1, 2)), 1e-4 * np.linalg.norm(gradient)
+    np.testing.assert_allclose(0.5 * (up - down), expected, rtol=0, atol=error)
+    if name == "straight":
+        weight = problem.load.profile
+        assert (gradient * weight).sum() == pytest.approx(weight.mean(), rel=1e-12)
+
+
+def test_no_sensitivity_where_the_turning_point_is_not_found(monkeypatch):
+    monkeypatch.setattr(transforms, "follow_to_turn", lambda *_: None)
+    for name in ("straight", "both"):
+        problem = crooked(name)
+        with pytest.warns(st.AccuracyWarning, match="in 1 of 1 samples, so sensitivity is NaN"):
+            found = exact_onset(problem, strength_of(3), sensitivity=True)
+        assert np.isnan(found["sensitivity"].values).all()
+        assert found["critical_patch_area"].item() > 0.0
 
 
 def test_loads_scale_and_shift_with_the_strength():

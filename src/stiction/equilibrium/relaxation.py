@@ -50,7 +50,7 @@ ROUGH = 0.05
 """Largest residual stress of a step, as a share of the weakening left out in the step before."""
 
 
-def _tolerance(sample: Sample, load: float, accuracy: float) -> float:
+def residual_tolerance(sample: Sample, load: float, accuracy: float) -> float:
     """Residual stress that is allowed, Pa, from its share of the mean strength or load.
 
     Strength beyond the load, such as that of barriers, does not count.
@@ -60,7 +60,7 @@ def _tolerance(sample: Sample, load: float, accuracy: float) -> float:
     return accuracy * float(mean)
 
 
-def _solve(
+def slip_under(
     operator: Operator, drive: Array, rate: Array, slip: Array, tolerance: float
 ) -> tuple[int, Array]:
     """Equilibrium for given strengths at zero slip and rates; status and slip."""
@@ -93,13 +93,13 @@ def stable_equilibrium(
     way, and there is no other equilibrium. Newton's method finds the pieces at the end; if no node
     comes to weaken more steeply, its first matrix is that A, and it comes from above.
     """
-    tolerance = _tolerance(sample, load, accuracy)
+    tolerance = residual_tolerance(sample, load, accuracy)
     pieces = sample.pieces
     first = now = present_pieces(sample, slip)
     new = slip
     for _ in range(NEWTON):
         drive = load * sample.profile - now.strength
-        status, found = _solve(operator, drive, now.rate, new, tolerance)
+        status, found = slip_under(operator, drive, now.rate, new, tolerance)
         if status != SOLVED:
             return None
         new = np.maximum(found, slip)
@@ -142,7 +142,7 @@ def _bound(
     for _ in range(NEWTON):
         strength, slope = np.where(flat, level, start), np.where(flat, 0.0, rate)
         drive = load * sample.profile - strength - spared
-        status, new = _solve(operator, drive, slope, new, tolerance)
+        status, new = slip_under(operator, drive, slope, new, tolerance)
         if status != SOLVED:
             return status, slip, False
         beyond = start - rate * new < level
@@ -208,7 +208,7 @@ def least_equilibrium(
     nothing to the mean. If K has no positive entry off its diagonal, the result is exact up to
     `accuracy`. On planes K has small positive entries there.
     """
-    tolerance = _tolerance(sample, load, accuracy)
+    tolerance = residual_tolerance(sample, load, accuracy)
     slip = np.maximum(slip, 0.0)
     left = kept = dropped = 0.0
     for _ in range(STEPS):

@@ -139,7 +139,7 @@ class State:
     and the distance to a load without equilibrium (Pa), NaN where none is known.
     `certified` is true if that is proved, `unstable` if the path is unstable there, `known` if it
     could be followed so far, `stuck` if the programme failed to find the next instability before.
-    `ahead` is what is known of the jump: on lines K times the direction, on planes where it ends.
+    `ahead` is what is known beyond: on lines K times the direction, on planes the turn of the path.
     """
 
     load: float
@@ -167,6 +167,10 @@ class Program:
         """Return the state in which the first node is about to slip."""
         load = float((sample.excess / sample.profile).min())
         return State(load, *np.zeros((3, sample.excess.size)))
+
+    def at_turn(self, sample: Sample, state: State) -> State:
+        """Return an instability with its exact direction, as it is on lines."""
+        return state
 
 
 def multiplier_of(sample: Sample, state: State) -> Array:

@@ -213,7 +213,8 @@ class Solver:
         if self.options.slip:
             values["slip"] = first.slip.reshape(shape)
         if self.options.sensitivity:
-            derivative = _sensitivity(sample, first, y) * rows.load_profile.mean()
+            turn = self.program.at_turn(sample, first)
+            derivative = _sensitivity(sample, turn) * rows.load_profile.mean()
             values["sensitivity"] = derivative.reshape(shape)
         if most := self.options.events:
             events = event_table(self.problem, rows, row, path.events[:most])
@@ -256,12 +257,12 @@ class Solver:
             )
 
 
-def _sensitivity(sample: Sample, state: State, y: Array) -> Array:
+def _sensitivity(sample: Sample, state: State) -> Array:
     """Derivative of the load of an instability by the peak strengths, from its multiplier.
 
     NaN where a node passed a corner beyond which it weakens more steeply.
     """
-    pieces = sample.pieces
+    pieces, y = sample.pieces, multiplier_of(sample, state)
     if pieces.steepens and not state.certified:
         return np.full(y.size, np.nan)
     # A piece starts from share tau_p + (1 - share) tau_r; the share of the last piece is 0.
@@ -274,6 +275,7 @@ def _warn_if_lost(sensitivity: Array) -> None:
     lost = int(np.isnan(sensitivity).reshape(len(sensitivity), -1).any(axis=1).sum())
     if lost:
         warn_accuracy(
-            f"nodes pass a corner in {lost} of {len(sensitivity)} samples of a law that steepens"
-            " there: their first instability has no known derivative, so sensitivity is NaN"
+            f"the first instability has no known derivative in {lost} of {len(sensitivity)}"
+            " samples, so sensitivity is NaN: nodes pass a corner from which their law falls more"
+            " steeply, or the turning point was not resolved"
         )

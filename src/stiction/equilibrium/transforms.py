@@ -8,14 +8,15 @@ followed in steps of the load.
 """
 
 import functools
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from stiction.arrays import Array
-from stiction.elasticity.linear import inner, lowest_eigenvector
 from stiction.elasticity.operator import Operator, make_operator, stiffness_symbol
 from stiction.equilibrium.bracket import Bracket, bisect, make_bracket
+from stiction.equilibrium.fold import Turn, follow_to_turn
 from stiction.equilibrium.relaxation import (
     BALANCED,
     UNDECIDED,
@@ -29,7 +30,6 @@ from stiction.equilibrium.sample import (
     State,
     exceeds,
     pieces_of,
-    present_pieces,
 )
 from stiction.equilibrium.turning_point import close
 from stiction.problem import Problem
@@ -40,11 +40,12 @@ FEWEST = 8
 """Least nodes along x and y on a coarse grid."""
 ROUGH = 1e-4
 """Relative gap on coarse grids."""
+RETREATS = (0.0, 1e-5, 1e-4)
+"""Shares of the load below its lower bound from which a path is followed to its turn."""
 FIRST_STEP = 1e-3
 """Step of the load where the path is followed in steps, as a share of the load."""
 MOVED = 0.02
 """Slip, as a share of d_c, below which a jump is a long step of the stable path and no event."""
-DIRECTION_ITERATIONS = 300
 AT_CORNER = 1.0 - 1e-9
 """Share of the slip at a corner above which a node counts as beyond it."""
 ACCURACY = 1e-7
@@ -213,27 +214,48 @@ class PlaneProgram(Program):
         load, slip, gap = state.load, state.slip, self.requested
         operator = self._operator(sample)
         step = FIRST_STEP * load
+        passed = [(load, slip)]
         while True:
             there = stable_equilibrium(operator, sample, load + step, slip, 0.1 * gap)
-            if there is not None:
-                load, slip, step = load + step, there, 1.5 * step
-            elif step > gap * load:
+            if there is None and step > gap * load:
                 step = max(0.3 * step, 0.7 * gap * load)
-            else:
-                break
-        beyond = load + step
-        ahead = least_equilibrium(operator, sample, beyond, slip, 0.1 * gap)
-        direction = _direction(operator, sample, slip, ahead.slip)
-        return State(load, slip, state.stiff, direction, gap=step, certified=False, ahead=ahead)
+                continue
+            beyond = load + step
+            if there is None:
+                # A rough slip may be beyond the turn: then from one step before, and so on.
+                starts = reversed(passed)
+                turns = (follow_to_turn(operator, sample, a, beyond, d) for a, d in starts)
+                turn = next((one for one in turns if one is not None), None)
+                if turn is None:
+                    direction = slip - passed[0][1]
+                    return State(load, slip, state.stiff, direction, step, certified=False)
+                if turn.direction.any():
+                    return _turned(turn, state, beyond, certified=False)
+                there = turn.slip
+            load, slip, step = beyond, there, 1.5 * step
+            passed = [*passed[-3:], (load, slip)]
+
+    def at_turn(self, sample: Sample, state: State) -> State:
+        """Return an instability with the direction in which the path turns, NaN if not found."""
+        if state.ahead is not None or state.gap == 0.0:
+            return state
+        operator, beyond = self._operator(sample), state.load + 2.0 * state.gap
+        slip = state.slip
+        for retreat in RETREATS if state.certified else ():
+            load = state.load - retreat * abs(state.load)
+            turn = follow_to_turn(operator, sample, load, beyond, slip)
+            if turn is not None and turn.direction.any():
+                return _turned(turn, state, beyond, certified=True)
+            slip = np.zeros(slip.size)  # that which proves the bound may be beyond the turn
+        return replace(state, direction=np.full(slip.size, np.nan))
 
     def jump(self, sample: Sample, found: State) -> Jump:
         """Let an unstable state jump to another equilibrium, or to sliding."""
-        beyond, ahead = found.load + found.gap, found.ahead
-        if ahead is None:
-            beyond += self.requested * abs(beyond)
-            ahead = least_equilibrium(
-                self._operator(sample), sample, beyond, found.slip, 0.1 * self.requested
-            )
+        beyond = found.load + found.gap
+        beyond += self.requested * abs(beyond)
+        ahead = least_equilibrium(
+            self._operator(sample), sample, beyond, found.slip, 0.1 * self.requested
+        )
         arrested = ahead.status == BALANCED
         weakens = sample.critical > 0.0
         moved = ahead.slip - found.slip > MOVED * sample.critical
@@ -258,15 +280,7 @@ class PlaneProgram(Program):
         return released
 
 
-def _direction(operator: Operator, sample: Sample, slip: Array, after: Array) -> Array:
-    """Direction of instability at the end of a stable path: y of the nearly zero eigenvalue."""
-    growth = np.maximum(after - slip, 0.0)
-    inside = slip > 0.0
-    vector = np.where(inside, growth, 0.0)
-    if vector.any():
-        frozen = operator._replace(rate=present_pieces(sample, slip).rate)
-        tolerance = 1e-6 * float(sample.rate.max())
-        lowest_eigenvector(frozen, inside, vector, tolerance, DIRECTION_ITERATIONS)
-        growth = np.maximum(vector, 0.0)
-    y: Array = growth / inner(sample.profile, growth)
-    return y
+def _turned(turn: Turn, state: State, beyond: float, certified: bool) -> State:
+    """Return the instability at a turn; the path does not reach the load `beyond`."""
+    gap = beyond - turn.load
+    return State(turn.load, turn.slip, state.stiff, turn.direction, gap, certified, ahead=turn)
