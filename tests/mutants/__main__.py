@@ -33,6 +33,7 @@ NEAREST = {
     "equilibrium": "crooked equilibrium plane_equilibrium planes plane_gaps friction_laws",
     "friction": "friction_laws friction_coefficients crooked dynamics_properties",
     "inference": "inference* fit_* profiles",
+    "jit": "cache architecture own_method",
     "plot": "plot planes inference examples",
     "problem": "bad_input crooked criterion equilibrium profiles friction_coefficients",
     "profiles": "profiles plane_gaps crooked fit_field",

@@ -39,6 +39,19 @@ def test_the_recipe_needs_what_the_package_needs():
     assert META["scripts"]["stiction"] in RECIPE
 
 
+def test_the_lowest_versions_that_are_tested_are_those_that_are_promised():
+    extras = META["optional-dependencies"]
+    needed = {
+        *META["dependencies"],
+        *extras["distributed"],
+        *extras["inference"],
+        *extras["test"],
+    }
+    promised = {re.sub(r">=([\d.]+).*", r"==\1", one) for one in needed}
+    lines = (ROOT / "tests" / "lowest.txt").read_text().splitlines()
+    assert {line for line in lines if not line.startswith("#")} == promised
+
+
 def test_pythons_are_those_that_the_workflow_runs():
     named = re.findall(r"Python :: (3\.\d+)", "\n".join(META["classifiers"]))
     workflow = (ROOT / ".github" / "workflows" / "ci.yml").read_text()
