@@ -1,5 +1,7 @@
 """Fields of which a part was measured, and factors between specimens, against closed forms."""
 
+import warnings
+
 import numpy as np
 import pytest
 import scipy.stats
@@ -116,6 +118,77 @@ def test_noise_leads_from_the_measured_values_to_the_field_as_it_was():
     np.testing.assert_allclose(vague.sample(LINE, samples=50, seed=1), free, rtol=1e-2)
     whole = some.sample(LINE, samples=50, seed=1)
     assert np.array_equal(whole[17:20], some.sample(LINE, samples=3, seed=1, first=17))
+
+
+LOGNORMAL, BETA = st.Lognormal(mean=1e6, cv=1.0), FIELD.marginal
+SKEWED = {  # marginal, places, values, noise, values at each place
+    "one": (LOGNORMAL, [0.011], [3e6], 1e6, 1),
+    "three": (LOGNORMAL, [0.011, 0.0137, 0.0171], [3e6, 2e6, 1.4e6], 1e6, 1),
+    "at a bound": (BETA, [0.011, 0.0131], [0.65e6, 0.67e6], 20e3, 1),
+    "many with a great error": (st.Lognormal(mean=1e6, cv=0.25), [0.011], [0.9e6], 2.5e6, 300),
+}
+
+
+@pytest.mark.parametrize("case", SKEWED)
+@pytest.mark.filterwarnings("ignore::stiction.UnitWarning")
+def test_posteriors_of_skewed_values_beyond_two_moments(case):
+    """Mean, scatter and lower tail are those of the field's own draws, weighted."""
+    marginal, x, values, noise, times = SKEWED[case]
+    field = st.RandomField(marginal, st.PowerLawSpectrum(7e-3), mean_mode=True)
+    given = given_on(np.repeat(x, times), np.repeat(values, times), noise, field)
+    phi = field.modes(LINE).basis(np.array([x]))
+    known, free = conditioning(given, LINE), field.modes(LINE).dimension
+    draws = np.random.default_rng(1).standard_normal((40_000, free))
+    found = from_normal(marginal, known.draws(draws) @ phi.T)
+    z = np.random.default_rng(2).standard_normal((600_000, len(x)))
+    prior = from_normal(marginal, z @ np.linalg.cholesky(phi @ phi.T).T)
+    weight = np.exp(-0.5 * times * (((prior - values) / noise) ** 2).sum(axis=1))
+    weight /= weight.sum()
+    mean = weight @ prior
+    spread = np.sqrt(weight @ (prior - mean) ** 2)
+    # 40,000 samples, and 14,000 of the prior that count at least: three standard errors.
+    np.testing.assert_allclose(found.mean(axis=0), mean, atol=0.03 * spread.min())
+    np.testing.assert_allclose(found.std(axis=0), spread, rtol=0.03)
+    for one, other in zip(found.T, prior.T, strict=True):
+        below = weight @ (other < np.quantile(one, 0.01))
+        assert below == pytest.approx(0.01, abs=0.003)
+    everywhere = known.draws(draws[:8000]) @ field.modes(LINE).basis(LINE.x[None]).T
+    level = given.quantile(LINE, 0.05)
+    assert np.mean(from_normal(marginal, everywhere) < level) == pytest.approx(0.05, abs=0.004)
+    with warnings.catch_warnings():  # neither unlikely nor approximate
+        warnings.simplefilter("error")
+        known.warn()
+
+
+def test_values_with_an_endless_error_move_no_sample():
+    places = np.random.default_rng(0).uniform(0.0, 0.05, 3000)
+    values = scan(LINE, places[None])
+    vague = given_on(places, values, 1e9)
+    moved = vague.sample(LINE, samples=50, seed=1) - FIELD.sample(LINE, samples=50, seed=1)
+    # By linear regression with the slope at most, 3,000 (sd/noise)^2 sds.
+    assert np.abs(moved).max() < 3000 * (0.4e6 / 1e9) ** 2 * 1e6
+
+
+def test_values_drawn_from_the_field_are_not_unlikely():
+    """A skewed marginal with a noise of two standard deviations, and one with two bounds, five."""
+    for marginal, noise in ((st.Lognormal(mean=1e6, cv=0.25), 0.5e6), (BETA, 0.9e6)):
+        field = st.RandomField(marginal, FIELD.spectrum)
+        places = np.random.default_rng(4).uniform(0.0, 0.05, 300)
+        values = scan(LINE, places[None], field)
+        values += noise * np.random.default_rng(5).standard_normal(300)
+        known = conditioning(given_on(places, values, noise, field), LINE)
+        assert abs(known.misfit - 300) < 4.0 * 600**0.5  # chi-square of 300 values
+
+
+@pytest.mark.filterwarnings("ignore::stiction.UnitWarning")
+def test_what_remains_of_skewed_likelihoods_is_measured_and_warned_of():
+    field = st.RandomField(LOGNORMAL, st.PowerLawSpectrum(2e-3), mean_mode=True)
+    places = np.linspace(0.0, 0.05, 200)
+    values = scan(LINE, places[None], field)
+    values += 2e6 * np.random.default_rng(5).standard_normal(200)
+    given = given_on(places, values, 2e6, field)
+    with pytest.warns(st.AccuracyWarning, match=r"off by up to about 0\.\d+ of its standard"):
+        given.sample(LINE)
 
 
 def test_conditional_probabilities_average_to_the_unconditional_one():

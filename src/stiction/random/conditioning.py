@@ -13,8 +13,8 @@ measured.
 
 Values are measured of the marginal and not of z. Their likelihood, a function of z at each
 place, is replaced by the Gaussian of the same mean and variance, in turns with the
-regression (expectation propagation; Minka, 2001), which holds near bounds of the marginal,
-too.
+regression (expectation propagation; Minka, 2001). Where that is not enough, draws are mapped
+before the regression (`stiction.random.transport`).
 """
 
 from collections.abc import Sequence
@@ -22,8 +22,9 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import pydantic
+from numpy.typing import NDArray
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
-from scipy.linalg import svd
+from scipy.linalg import eigh, svd
 from scipy.special import ndtri
 
 from stiction.arrays import Array
@@ -34,8 +35,11 @@ from stiction.profiles.placing import MEASURED
 from stiction.profiles.units import parse
 from stiction.random.mapping import from_normal, quantile_of_normal
 from stiction.random.synthesis import condition
+from stiction.random.transport import Ratio, make_transport, transport
 
 DOUBTFUL = 5.0  # standard deviations of chi-square beyond which values do not suit a field
+UNCERTAIN = 0.1  # of a standard deviation of z, by which a posterior may be off
+PROBES = 1024  # samples by which quantiles beyond the Gaussian are found
 IMPOSSIBLE = 4.0  # errors beyond a bound of the marginal that no measured value has
 FURTHEST = 37.0  # largest z whose tail of the normal distribution is a float
 REACH, NODES = 8.0, 49  # half width of Gaussians, and nodes across them
@@ -43,8 +47,9 @@ CUT = 18.0  # fall of a log density from its peak to the ends that leaves nothin
 NARROWINGS = 6  # of a range that holds a peak, each to two of its intervals at least
 TURNS, SETTLED = 8, 1e-3  # between likelihood and regression; change of z that ends them
 NEGLIGIBLE = 1e-8  # singular value below which a direction of the draws stays as it is
+FAINT, LEAST = 1e-10, -0.9  # precisions: of places, as scaled; of all, less that of the prior
 FLAT, SHARP = 1e-4, 1e-4  # least precision of a measured z; its error that needs no turns
-TINY = 1e-12  # least variance
+TINY, LOWEST = 1e-12, -1e9  # least variance, and least logarithm of a likelihood
 
 
 def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
@@ -153,15 +158,27 @@ class Measured(NamedTuple):
     phi: Array
     factor: Any = None
 
+    def logarithm(self, u: float, at: NDArray[np.int64], z: Array) -> Array:
+        """Return the log likelihood of places `at` at z (places, ...); -inf without a quantile."""
+        factor = self.scale(u)
+        value = self.conditions.values[at].reshape(-1, *(1 for _ in z.shape[1:])) / factor
+        miss = (value - from_normal(self.marginal, z)) * (factor / self.conditions.noise)
+        # Far out in the tail scipy may have no quantile.
+        return np.where(np.isnan(miss), -np.inf, -0.5 * miss**2)
+
+    def scale(self, u: float) -> float:
+        """Return the factor between specimens at its draw u; 1 without one."""
+        if self.factor is None:
+            return 1.0
+        return float(quantile_of_normal(self.factor.distribution, np.array(u)))
+
     def gaussian(self, u: float, mean: Array, variance: Array) -> tuple[Array, Array, float]:
         """Replace the likelihood of z at each place by a Gaussian, given z from all else.
 
-        `u` is the draw of the factor. Returned are values of z and their precisions, (points,),
-        and the logarithm of the factor of the product of all, with unit maxima.
+        `u` is the draw of the factor. Returned are precisions p, which may be negative, and p z,
+        (points,), and the logarithm of the factor of the product of all exp(p z x - p x^2/2).
         """
-        factor, law = 1.0, self.marginal.distribution
-        if self.factor is not None:
-            factor = float(quantile_of_normal(self.factor.distribution, np.array(u)))
+        factor, law = self.scale(u), self.marginal.distribution
         noise, value = self.conditions.noise / factor, self.conditions.values / factor
         # Where the likelihood and z from all else overlap.
         edges = value + REACH * noise * np.array([[-1.0], [1.0]])
@@ -175,10 +192,7 @@ class Measured(NamedTuple):
             half = np.maximum(0.5 * (high - low), TINY)[:, None]
             z = 0.5 * (low + high)[:, None] + half * np.linspace(-1.0, 1.0, NODES)
             off = (z - mean[:, None]) ** 2 / variance[:, None]
-            miss = (value[:, None] - from_normal(self.marginal, z)) / noise
-            density = -0.5 * (off + miss**2)
-            # Far out in the tail scipy may have no quantile.
-            return half, z, np.where(np.isnan(density), -np.inf, density)
+            return half, z, self.logarithm(u, np.arange(len(z)), z) - 0.5 * off
 
         half, z, density = evaluate()
         # Where a value contradicts the others, their product peaks outside or at an end.
@@ -203,12 +217,11 @@ class Measured(NamedTuple):
         centre = (weight * z).sum(axis=1) / total
         spread = (weight * (z - centre[:, None]) ** 2).sum(axis=1) / total
         spread = np.maximum(spread, (half[:, 0] / NODES) ** 2)
-        precision = np.maximum(1.0 / spread - 1.0 / variance, FLAT)
-        found = mean + (centre - mean) * (1.0 + 1.0 / (precision * variance))
-        whole = variance + 1.0 / precision
-        scale = np.log(total * half[:, 0]) + top[:, 0]
-        scale += 0.5 * (np.log(whole * precision) + (found - mean) ** 2 / whole)
-        return found, precision, float(scale.sum())
+        precision = 1.0 / spread - 1.0 / variance
+        weighted = centre / spread - mean / variance
+        scale = np.log(total * half[:, 0] / np.sqrt(spread)) + top[:, 0]
+        scale += 0.5 * (mean**2 / variance - centre**2 / spread)
+        return weighted, precision, float(scale.sum())
 
 
 def _normal_score(below: Array, above: Array) -> Array:
@@ -232,67 +245,103 @@ class Conditioning:
         self.measured = measured
         self.phi = np.concatenate([one.phi for one in measured])
         self.grid: Array | None = None
+        self.data = np.zeros((1, 0))
         others = alone = np.zeros(len(self.phi)), np.ones(len(self.phi))
-        middle, moves = 0.0, np.zeros((1, len(self.phi)))
+        self.middle, moves = 0.0, np.zeros((1, len(self.phi)))
         if any(one.factor is not None for one in measured):
-            middle, moves = self._tabulate(alone)
+            moves = self._tabulate(alone)
+        weighted, precision, _ = self._gaussian(self.middle, others)
         for _ in range(TURNS):
-            z, precision, _ = self._gaussian(middle, others)
-            self._regress(z, precision)
-            before, others = others, self._others(z, precision)
+            weighted, precision = self._regress(weighted, precision)
+            before, others = others, self._others(weighted, precision)
             if np.abs(others[0] - before[0]).max() < SETTLED:
                 break
-        self.data = (z + moves) @ self.left
+            weighted, precision, _ = self._gaussian(self.middle, others)
+        along, share = self.phi @ self.right, np.sqrt(1.0 + self.power)
+        middle = along @ (self.data[0] / share**2)
+        ratio = self._ratio(weighted, precision, middle)
+        self.found, self.left_over = make_transport(ratio, middle, along / share)
+        self.directions = np.ascontiguousarray(self.found.basis @ self.right.T)
+        self.misfit = self._misfit(middle)
+        self.data = (weighted + precision * moves) @ self.left
 
     def _gaussian(self, u: float, others: tuple[Array, Array]) -> tuple[Array, Array, float]:
         """Gaussians that stand for the measured values, given z from all others."""
         ends = np.cumsum([len(one.phi) for one in self.measured])[:-1]
         each = zip(self.measured, *(np.split(part, ends) for part in others), strict=True)
-        z, precision, scale = zip(
+        weighted, precision, scale = zip(
             *(one.gaussian(u, *given) for one, *given in each), strict=True
         )
-        return np.concatenate(z), np.concatenate(precision), sum(scale)
+        return np.concatenate(weighted), np.concatenate(precision), sum(scale)
 
-    def _regress(self, z: Array, precision: Array) -> None:
-        root = np.sqrt(precision)
+    def _ratio(self, weighted: Array, precision: Array, middle: Array) -> Ratio:
+        """Logarithm of the likelihood over the Gaussian that stands for it, by place and z."""
+
+        def found(at: NDArray[np.int64], z: Array) -> Array:
+            out, shape, begin = np.empty(z.shape), (-1, *(1 for _ in z.shape[1:])), 0
+            for one in self.measured:
+                here = (at >= begin) & (at < begin + len(one.phi))
+                out[here] = one.logarithm(self.middle, at[here] - begin, z[here])
+                begin += len(one.phi)
+            off = z - middle[at].reshape(shape)
+            slope = (weighted - precision * middle)[at].reshape(shape)
+            gaussian: Array = off * (slope - 0.5 * precision[at].reshape(shape) * off)
+            return np.maximum(out, LOWEST) - gaussian
+
+        return found
+
+    def _misfit(self, middle: Array) -> float:
+        """Squared misfit of values and of draws at the middle of the posterior."""
+        fit = self._ratio(np.zeros_like(middle), np.zeros_like(middle), middle)
+        lost = -2.0 * float(fit(np.arange(middle.size), middle).sum())
+        draws = self.data[0] / (1.0 + self.power)
+        return lost + float(draws @ draws)
+
+    def _regress(self, weighted: Array, precision: Array) -> tuple[Array, Array]:
+        """Find the posterior of the draws; return what was given, tempered if there is none."""
+        root = np.sqrt(np.maximum(np.abs(precision), FAINT))
         left, values, right = svd(self.phi * root[:, None], full_matrices=False)
         kept = values > NEGLIGIBLE
-        self.left, self.values = root[:, None] * left[:, kept], values[kept]
-        self.right = np.ascontiguousarray(right[kept].T)
-        self.data = (z @ self.left)[None, :]
-        self.precision = precision
-        self.chi_square = self._chi_square(z, 1.0)
+        left, values, right = left[:, kept] * values[kept], values[kept], right[kept].T
+        power, sign = values**2, precision / root**2
+        if (sign < 1.0).any():
+            power, turn = eigh(left.T * sign @ left)
+            left, right = left @ turn, right @ turn
+            if power.size and power[0] < LEAST:
+                share = 0.5 * LEAST / power[0]
+                return self._regress(share * weighted, share * precision)
+        self.left, self.power = left / root[:, None], power
+        self.right = np.ascontiguousarray(right)
+        self.data = (weighted @ self.left)[None, :]
+        return weighted, precision
 
-    def _chi_square(self, z: Array, ratio: float) -> float:
-        """z^T (C + S)^-1 z with errors `ratio` times those of the regression."""
-        power = (self.values / ratio) ** 2
-        left = (z @ self.left) / ratio
-        return float(self.precision @ z**2 / ratio**2 - power / (1.0 + power) @ left**2)
-
-    def _others(self, z: Array, precision: Array) -> tuple[Array, Array]:
+    def _others(self, weighted: Array, precision: Array) -> tuple[Array, Array]:
         """Mean and variance of z at each place from what was measured at all others."""
         mean, deviation = self.moments(self.phi)
-        least = 1.0 / (self.phi**2).sum(axis=1)
+        least = 0.5 / (self.phi**2).sum(axis=1)
         rest = np.maximum(deviation**-2 - precision, least)
         # Over so small an error the map is linear, and the difference would be round-off.
         sharp = deviation < SHARP
-        found = (mean / deviation**2 - precision * z) / rest
+        found = (mean / deviation**2 - weighted) / rest
         return np.where(sharp, 0.0, found), np.where(sharp, 1.0, 1.0 / rest)
 
-    def _tabulate(self, alone: tuple[Array, Array]) -> tuple[float, Array]:
-        """Find the posterior of u; return its mean, and how values of z move along the grid."""
+    def _tabulate(self, alone: tuple[Array, Array]) -> Array:
+        """Find the posterior of u and its mean; return how z moves along the grid."""
         middle, spread = 0.0, 1.0
         for _ in range(3):
             grid = middle + spread * np.linspace(-REACH, REACH, NODES)
             grid = np.clip(grid, -FURTHEST, FURTHEST)
-            z, precision, _ = self._gaussian(middle, alone)
-            self._regress(z, precision)
+            weighted, precision, _ = self._gaussian(middle, alone)
+            precision = np.maximum(precision, FLAT)
+            self._regress(weighted, precision)
             values = [self._gaussian(u, alone) for u in grid]
             density = -0.5 * grid**2
-            for i, (here, errors, scale) in enumerate(values):
-                ratio = float(np.exp(0.5 * np.log(precision / errors).mean()))
-                volume = np.log1p((self.values / ratio) ** 2).sum()
-                density[i] += scale - 0.5 * (volume + self._chi_square(here, ratio))
+            for i, (here, own, scale) in enumerate(values):
+                own = np.maximum(own, FLAT)
+                z, ratio = here / own, float(np.exp(np.log(own / precision).mean()))
+                power, data = ratio * self.power, ratio * (precision * z) @ self.left
+                chi_square = ratio * precision @ z**2 - data / (1.0 + power) @ data
+                density[i] += scale + 0.5 * (own @ z**2 - chi_square - np.log1p(power).sum())
             weight = np.exp(density - density.max())
             weight /= weight.sum()
             middle = float(weight @ grid)
@@ -301,8 +350,11 @@ class Conditioning:
         score = _normal_score(np.cumsum(mass)[:-1], np.cumsum(mass[::-1])[-2::-1])
         usable = np.isfinite(score)
         self.grid, self.score, self.quantile = grid, score[usable], grid[1:-1][usable]
-        now = self._gaussian(middle, alone)[0]
-        return middle, np.array([here for here, _, _ in values]) - now
+        self.middle = middle
+        # By as much as z itself moves, where there is one.
+        now, errors, _ = self._gaussian(middle, alone)
+        each = [here / np.maximum(own, FLAT) for here, own, _ in values]
+        return np.array(each) - now / np.maximum(errors, FLAT)
 
     def draws(self, draws: Array) -> Array:
         """Return conditioned draws (samples, dimension), a factor between specimens in the last."""
@@ -310,26 +362,48 @@ class Conditioning:
         if self.grid is not None:
             u = out[:, -1] = np.interp(out[:, -1], self.score, self.quantile)
             data = np.stack([np.interp(u, self.grid, row) for row in data.T], axis=1)
-        share = 1.0 + self.values**2
-        transposed = np.ascontiguousarray(self.right.T)
-        offsets = np.ascontiguousarray(data * (self.values / share))
-        condition(self.right, transposed, offsets, share**-0.5 - 1.0, out)
+        if len(self.directions):
+            transport(*self.found._replace(basis=self.directions), out, np.zeros(len(out)))
+        return self._regressed(out, data)
+
+    def _regressed(self, out: Array, data: Array) -> Array:
+        share, transposed = 1.0 + self.power, np.ascontiguousarray(self.right.T)
+        condition(self.right, transposed, data / share, share**-0.5 - 1.0, out)
         return out
 
     def moments(self, phi: Array) -> tuple[Array, Array]:
-        """Return mean and standard deviation of z = phi @ draws, (points,) each."""
-        along = phi @ self.right
-        share = self.values**2 / (1.0 + self.values**2)
+        """Return mean and standard deviation of z = phi @ draws by the regression, (points,)."""
+        along, share = phi @ self.right, 1.0 + self.power
         free = (phi**2).sum(axis=1) - (along**2).sum(axis=1)
-        variance = along**2 @ (1.0 - share) + np.where(free > TINY, free, 0.0)
-        return along @ (share / self.values * self.data[0]), np.sqrt(variance)
+        variance = along**2 @ (1.0 / share) + np.where(free > TINY, free, 0.0)
+        return along @ (self.data[0] / share), np.sqrt(variance)
+
+    def quantile_at(self, phi: Array, probability: float) -> Array:
+        """Return the quantile of z = phi @ draws, (points,); beyond the regression, by samples."""
+        mean, deviation = self.moments(phi)
+        found = mean + float(ndtri(probability)) * deviation
+        if len(self.directions):
+            draws = np.random.default_rng(0).standard_normal((PROBES, phi.shape[1]))
+            pair = [self.draws(draws), self._regressed(draws.copy(), self.data)]
+            for i, row in enumerate(phi):  # the difference scatters less than either
+                ends = [np.quantile(one @ row, probability) for one in pair]
+                found[i] += ends[0] - ends[1]
+        return found
 
     def warn(self) -> None:
         """Warn of measured values that do not suit the field."""
         points = len(self.phi)
-        if self.chi_square > points + DOUBTFUL * np.sqrt(2.0 * points):
+        if self.misfit > points + DOUBTFUL * np.sqrt(2.0 * points):
             warn_accuracy(
                 f"given: the measured values are unlikely for this field (chi-square"
-                f" {self.chi_square:.4g} for {points} values): check its marginal, its correlation"
+                f" {self.misfit:.4g} for {points} values): check its marginal, its correlation"
                 " length and the noise"
+            )
+        if max(self.left_over) > UNCERTAIN:
+            mean, deviation = self.left_over
+            warn_accuracy(
+                f"given: the field is approximate where it was measured: its mean is off by up to"
+                f" about {mean:.2g} of its standard deviation, and that by up to about"
+                f" {100.0 * deviation:.2g} %; average values at neighbouring places, with their"
+                " smaller noise"
             )

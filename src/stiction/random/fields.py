@@ -148,14 +148,13 @@ class RandomField:
     @checked
     def quantile(self, interface: Interface, probability: Share) -> Array:
         """Return the quantile of the field at each node, given the measured values, (*shape)."""
-        mean, deviation = np.zeros(interface.size), np.ones(interface.size)
+        z = np.full(interface.size, float(ndtri(probability)))
         if self.conditions is not None:
             grid = np.meshgrid(*interface.coordinates.values(), indexing="ij")
             phi = self.modes(interface).basis(np.array([row.ravel() for row in grid]))
             [(_, known)] = _conditioned(self._alone, interface)
-            mean, deviation = known.moments(phi)
-        found = from_normal(self.marginal, mean + float(ndtri(probability)) * deviation)
-        return found.reshape(interface.shape)
+            z = known.quantile_at(phi, probability)
+        return from_normal(self.marginal, z).reshape(interface.shape)
 
     def sample(
         self, interface: Interface, *, samples: int = 1, seed: int = 0, first: int = 0
