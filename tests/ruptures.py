@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-from setups import QUARTER, SOLID, make_problem
+from setups import QUARTER, SOLID, make_problem, turns
 
 import stiction as st
 from stiction.dynamics.method import make_run
@@ -77,3 +77,17 @@ BREAKING_STRENGTH = (
     - 1e5 * dip(BREAKING_PLANE.interface, (0.03, 0.02), 0.007)
 )
 """A plane that breaks from the weaker one of two dips."""
+
+_ANGLE = turns(128)
+CROOKED = make_problem(
+    128,
+    0.05,
+    solid=STRESS,
+    weakening_rate=0.2e12 + 2e10 * np.sin(_ANGLE),
+    residual_strength=3e5 + 5e4 * np.cos(_ANGLE),
+    load=st.Load(
+        profile=1.2 + 0.2 * np.cos(_ANGLE), initial_stress=5e4 + 3e4 * np.sin(2 * _ANGLE)
+    ),
+)
+CROOKED_STRENGTH = 1.3e6 - 2e5 * np.cos(_ANGLE) + 5e4 * np.sin(5 * _ANGLE)
+"""A line on which everything varies, under a load of a mean other than one."""

@@ -61,7 +61,7 @@ def test_a_run_from_an_equilibrium_finds_the_same_onset():
     run = run_of(PROBLEM, strength, method)
     state = run.start(exact * (1.0 - 1e-6) / 1e5, slip * (1.0 - 1e-9))
     assert run.follow(state, method.max_steps)[0] == "onset"
-    assert float(state.now["peak_stress"]) == pytest.approx(exact, rel=CLOSE)
+    assert float(state.now["onset_stress"]) == pytest.approx(exact, rel=CLOSE)
     assert int(state.now["implicit_steps"]) > 0
 
 

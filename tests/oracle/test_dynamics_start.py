@@ -106,7 +106,7 @@ def test_the_estimate_bounds_the_error_and_grows_towards_the_onset(monkeypatch):
             state = slow_start(setting, run, PROBLEM.sample(strength), 0, 2e7)
             estimates.append(state.now["start_error"])
             run.advance(state, 10_000)
-            error = abs(state.now["peak_stress"] - exact)
+            error = abs(state.now["onset_stress"] - exact)
             assert error < max(estimates[-1], 3e-5 * state.now["scale"])
         assert np.all(np.diff(estimates) > 0.0)
 

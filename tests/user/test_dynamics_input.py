@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from refusals import refusals, refuses
-from ruptures import STRESS, wavy_line
+from ruptures import CROOKED, CROOKED_STRENGTH, STRESS, wavy_line
 from setups import make_problem
 
 import stiction as st
@@ -41,7 +41,6 @@ def same(found, expected):
     assert found.attrs["stopped"] == expected.attrs["stopped"]
 
 
-FALLING = [[0.0, 1e-3, 2e-3, 3e-3], [0.0, 5e5, 4e5, 2e6]]
 test_wrong_options = refusals({
     "loading_rate": {"loading_rate": 0.0},
     "did you mean 'loading_rate'": {"loading_rat": 1e7},
@@ -67,9 +66,9 @@ test_what_cannot_be_simulated = refusals({
     "progress": {"progress": 3},
     "Rupture": {"method": st.LocalCriterion()},
     "one sample at a time": {"profiles": np.stack([PROFILE] * 2)},
-    "not after the start": {"method": Rupture(loading_rate=1e8, end_time=1e-9)},
-    "goes down at t = 0.001": {"method": Rupture(load=FALLING)},
-    "first slip needs": {"method": Rupture(load=([0.0, 1.0], [1e5, 1e5]))},
+    "does not reach the first slip ... or end_time":
+        {"method": Rupture(loading_rate=1e8, end_time=1e-9)},
+    "first slip, tau_0 = 758853 Pa": {"method": Rupture(load=([0.0, 1.0], [1e5, 1e5]))},
     "above residual_strength at one node or more":
         {"problem": make_problem(128, critical_slip=2e-6, residual_strength=2e6)},
 }, simulate)  # fmt: skip
@@ -119,11 +118,15 @@ def test_a_run_in_a_folder_is_the_one_in_memory(held, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("every", [25, 40])
 def test_a_run_cut_short_goes_on_to_the_same_numbers(tmp_path, monkeypatch, every):
-    """Wherever it was cut; between frames that lie far apart, steps are stored as well."""
+    """Wherever it was cut or ended; between frames far apart, steps are stored as well."""
     monkeypatch.setattr(save_module, "FRAMES", 4)
     monkeypatch.setattr(save_module, "_MOST_STEPS", 70)
     kept = {"every": every, "to": tmp_path / "run"}
     whole = simulate(st.Save(**(kept | {"to": None})))
+    # Between two frames of the whole run.
+    part = simulate(st.Save(**kept), method=dataclasses.replace(METHOD, max_steps=113))
+    assert part.attrs["stopped"] == "max_steps"
+    assert open_rupture(tmp_path / "run").sizes["step"] == 113
     for most in (150, 40):
 
         def cut(done, _, most=most):
@@ -178,31 +181,17 @@ def test_full_disk_leaves_what_was_written_readable(tmp_path, monkeypatch):
     refuses("file", lambda: simulate(st.Save(to=tmp_path / "file" / "run")), StoreError)
 
 
-# What the scalars of a run mean, from its own fields, where everything varies along x:
-NODES, LENGTH = 128, 0.05
-SPACING = LENGTH / NODES
-ANGLE = 2 * np.pi * np.arange(NODES) / NODES
-VARIED = make_problem(
-    NODES,
-    LENGTH,
-    solid=STRESS,
-    weakening_rate=0.2e12 + 2e10 * np.sin(ANGLE),
-    residual_strength=3e5 + 5e4 * np.cos(ANGLE),
-    load=st.Load(
-        profile=1.2 + 0.2 * np.cos(ANGLE), initial_stress=5e4 + 3e4 * np.sin(2 * ANGLE)
-    ),
-)
-TAU_P = 1.3e6 - 2e5 * np.cos(ANGLE) + 5e4 * np.sin(5 * ANGLE)
-
-
+# What the scalars of a run mean, from its own fields, where everything varies along x.
 @pytest.fixture(scope="module")
 def run():
     save = st.Save(["slip", "shear_stress", "strength"], every=1)
-    return simulate(save, problem=VARIED, profiles=TAU_P, method=Rupture(loading_rate=1e7))
+    return simulate(
+        save, problem=CROOKED, profiles=CROOKED_STRENGTH, method=Rupture(loading_rate=1e7)
+    )
 
 
 def test_loads(run):
-    profile, initial = VARIED.load.profile.mean(), VARIED.load.initial_stress.mean()
+    profile, initial = CROOKED.load.profile.mean(), CROOKED.load.initial_stress.mean()
     critical = run.critical_stress.item()
     assert critical == run.step_mean_stress.values.max()
     assert run.critical_load.item() == pytest.approx((critical - initial) / profile, rel=1e-12)
@@ -214,25 +203,29 @@ def test_loads(run):
 
 def test_moment_and_energies(run):
     slip, stress = run.slip.values, run.shear_stress.values
-    assert run.seismic_moment.values == pytest.approx(1e9 * slip.sum(axis=1) * SPACING)
-    excess = TAU_P - VARIED.friction.residual_strength
-    gamma = excess**2 / (2 * VARIED.friction.weakening_rate)
-    assert run.fracture_energy.values[-1] == pytest.approx(gamma.sum() * SPACING)
+    assert run.seismic_moment.values == pytest.approx(
+        1e9 * slip.sum(axis=1) * CROOKED.interface.spacing
+    )
+    excess = CROOKED_STRENGTH - CROOKED.friction.residual_strength
+    gamma = excess**2 / (2 * CROOKED.friction.weakening_rate)
+    assert run.fracture_energy.values[-1] == pytest.approx(
+        gamma.sum() * CROOKED.interface.spacing
+    )
     # Friction and work as integrals over the stored steps, by the trapezoidal rule.
     increments = np.diff(slip, axis=0)
-    friction = np.sum(0.5 * (stress[1:] + stress[:-1]) * increments) * SPACING
+    friction = np.sum(0.5 * (stress[1:] + stress[:-1]) * increments) * CROOKED.interface.spacing
     load = run["load"].values
     mean_load = 0.5 * (load[1:] + load[:-1])[:, None]
-    work = np.sum((mean_load * VARIED.load.profile + VARIED.load.initial_stress) * increments)
-    symbol = 0.5 * VARIED.effective_modulus * VARIED.interface.wavenumbers
-    pull = np.fft.irfft(symbol * np.fft.rfft(slip[-1]), NODES)
-    strain = 0.5 * np.sum(pull * slip[-1]) * SPACING
-    assert run.work.values[-1] == pytest.approx(work * SPACING, rel=1e-10)
+    work = np.sum((mean_load * CROOKED.load.profile + CROOKED.load.initial_stress) * increments)
+    symbol = 0.5 * CROOKED.effective_modulus * CROOKED.interface.wavenumbers
+    pull = np.fft.irfft(symbol * np.fft.rfft(slip[-1]), 128)
+    strain = 0.5 * np.sum(pull * slip[-1]) * CROOKED.interface.spacing
+    assert run.work.values[-1] == pytest.approx(work * CROOKED.interface.spacing, rel=1e-10)
     assert run.strain_energy.values[-1] == pytest.approx(strain, rel=1e-10)
     # d_c is passed within a step: 1e-3 of friction is seen.
-    radiated = work * SPACING - friction - strain
+    radiated = work * CROOKED.interface.spacing - friction - strain
     assert run.radiated_energy.values[-1] == pytest.approx(radiated, rel=1e-2)
-    found = st.onset(VARIED, TAU_P, method=Rupture(loading_rate=1e7, start="rest"))
+    found = st.onset(CROOKED, CROOKED_STRENGTH, method=Rupture(loading_rate=1e7, start="rest"))
     for name in ("radiated_energy", "fracture_energy", "seismic_moment"):
         assert found[name].item() == pytest.approx(run[name].values[-1], rel=1e-12)
 
@@ -248,19 +241,19 @@ def test_front_speed_is_that_of_a_front_and_not_where_fronts_meet():
 
 
 def test_a_folder_with_another_run_is_refused(tmp_path):
-    given = {"problem": VARIED, "profiles": TAU_P}
+    given = {"problem": CROOKED, "profiles": CROOKED_STRENGTH}
     given["method"] = Rupture(loading_rate=1e7, stop="onset")
     save = st.Save(to=tmp_path / "run")
     simulate(save, **given)
-    load, friction = VARIED.load, VARIED.friction
+    load, friction = CROOKED.load, CROOKED.friction
     for change in (
         {"load": dataclasses.replace(load, profile=1.2)},
         {"load": dataclasses.replace(load, initial_stress=5e4)},
         {"friction": dataclasses.replace(friction, residual_strength=3e5)},
     ):
-        other = {"problem": dataclasses.replace(VARIED, **change)}
+        other = {"problem": dataclasses.replace(CROOKED, **change)}
         refuses("holds another run", partial(simulate, save, **given | other))
-    for other in ({"profiles": TAU_P + 1.0}, {"method": Rupture(loading_rate=2e7)}):
+    for other in ({"profiles": CROOKED_STRENGTH + 1.0}, {"method": Rupture(loading_rate=2e7)}):
         refuses("holds another run", partial(simulate, save, **given | other))
 
 

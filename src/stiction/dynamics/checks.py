@@ -1,5 +1,7 @@
 """Refusals and warnings of a run: coarse grids, rates of loading, loads that reverse."""
 
+from typing import Any
+
 import numpy as np
 
 from stiction.dynamics.integrator import Run
@@ -29,9 +31,8 @@ def warn_if_coarse(problem: Problem, rows: Sample) -> None:
 def warn_of_slip(run: Run, state: State) -> None:
     """Warn of nodes that weaken too steeply for the grid, such as barriers, and of reversal."""
     rates, interface, now = run.setting.nodes.weakening, run.medium.interface, state.now
-    steepest = run.medium.problem.nucleation_lengths(1.0)[-1] / (
-        FEWEST_NODES * interface.spacing
-    )
+    shortest = FEWEST_NODES * interface.spacing
+    steepest = run.medium.problem.nucleation_lengths(1.0)[-1] / shortest
     steep = np.flatnonzero((state.slip > 0.0) & (rates > steepest))
     if steep.size:
         warn_accuracy(
@@ -47,9 +48,11 @@ def warn_of_slip(run: Run, state: State) -> None:
         )
 
 
-def at_first_slip(run: Run) -> State:
-    """Return the state of rest at first slip; refuse or warn of loads that cannot be followed."""
+def at_first_slip(run: Run) -> State | None:
+    """Return the state of rest at first slip, None if none comes; refuse or warn of loads."""
     time, step = run.first_slip(), run.medium.step
+    if not time < run.setting.thresholds.end_time:
+        return None
     if np.spacing(time) > 0.01 * step:
         raise InputError(
             f"loading_rate: the first slip would come after {time:.3g} s, too late to resolve "
@@ -73,6 +76,17 @@ def at_first_slip(run: Run) -> State:
             raise InputError(text)
         warn_accuracy(f"{text} (the onset is sampled coarsely)")
     return run.start(time)
+
+
+def warn_of_survival(stop: str, results: list[Any]) -> None:
+    """Warn of interfaces that did not slide, or become unstable, before their run ended."""
+    name = "kinetic_stress" if stop == "sliding" else "first_instability"
+    if any(np.isnan(one[name]) for one in results):
+        what = "slide" if stop == "sliding" else "become unstable"
+        warn_accuracy(
+            f"load: an interface did not {what} before its run ended: what did not happen is NaN,"
+            " and failure_probability counts it as survived"
+        )
 
 
 def check_finite(run: Run, state: State, reason: int) -> None:

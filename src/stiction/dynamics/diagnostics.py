@@ -6,7 +6,7 @@ import numpy as np
 
 from stiction.arrays import Array
 from stiction.dynamics.loading import value_at
-from stiction.dynamics.state import RECORD, History, Nodes, Setting, State
+from stiction.dynamics.state import History, Nodes, Record, Setting, State, Thresholds
 from stiction.jit import jit_inside
 
 REACH = 3.0  # a node counts with at most so many times the stress drop that the load provides
@@ -14,7 +14,6 @@ REACH = 3.0  # a node counts with at most so many times the stress drop that the
 EVENT_DROP = 1e-4  # fall of the mean stress that begins an event
 STEADY_STRESS = 1e-2  # Z V of creep whose waves implicit steps may smear
 _PEAK_WIDTH = 1e-5  # distance below its maximum at which the mean stress counts as at it
-_COLUMNS = len(RECORD)
 
 
 class Step(NamedTuple):
@@ -50,44 +49,62 @@ def stress_scale(nodes: Nodes) -> History:
 
 
 @jit_inside
-def end_event(now: Any, unstable_rate: float, mean_stress: float, radiated: float) -> None:
+def _at_maximum(now: Any, radiated: float) -> None:
+    """Take the present mean stress for its last maximum."""
+    now.local_stress, now.local_radiated = now.mean_stress, radiated
+    now.local_time, now.local_load, now.local_node = now.time, now.load, now.top_node
+
+
+@jit_inside
+def _begin(now: Any) -> None:
+    """Keep where an instability began: at the last maximum of the mean stress."""
+    if now.first_stress == -np.inf:
+        now.first_stress = now.local_stress
+    if now.local_stress > now.onset_stress:
+        now.onset_stress, now.onset_time = now.local_stress, now.local_time
+        now.onset_load, now.onset_node = now.local_load, now.local_node
+
+
+@jit_inside
+def end_event(now: Any, unstable_rate: float, radiated: float) -> None:
     """End an event that is under way: the mean stress is as high as before, or all is calm."""
     if now.in_event:
         now.in_event = 0
         # After global sliding there is nothing left to arrest.
         if now.kinetic_stress == -np.inf and now.event_rate > unstable_rate:
             now.arrested += 1
-        now.local_stress, now.local_radiated = mean_stress, radiated
+        _at_maximum(now, radiated)
 
 
 @jit_inside
-def observe(now: Any, unstable_rate: float, mean_stress: float, step: Step, node: int) -> Any:
-    """Update peaks and events with the state after a step; return the fall of the mean stress, Pa.
+def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
+    """Update events with the state after a step; return the fall of the mean stress, Pa.
 
-    The fall counts from the last local maximum, and only as far as waves carry it away: where the
-    load itself goes down, nothing has become unstable. An event begins when it exceeds EVENT_DROP
-    and ends when the mean stress rises above that maximum again or everything creeps. It was an
-    arrested instability if a node slipped faster than `unstable_rate`; waves of an earlier one are
-    slower. At slow loading all creeping patches are about equally slow at the maximum itself, so
-    that the place of the onset, the fastest node, is read just after it.
+    An instability is slip that the load does not drive: waves lower the mean stress by EVENT_DROP
+    below its last maximum, where it began; a fall of the load itself does not count. Before a start
+    above the strength the maximum is the stress without slip. No instability is a maximum that no
+    such fall follows, be it the largest load or the stress that returns when slip dies. It ends
+    when the mean stress rises above that maximum again or everything creeps, and was arrested if
+    a node slipped faster than `unstable_rate`; waves of an earlier one are slower. What slides as
+    a whole has become unstable at the last maximum. At slow loading all creeping patches are about
+    equally slow there, so that the place of the onset, the fastest node, is read just after it.
     """
-    now.mean_stress = mean_stress
-    if mean_stress > now.peak_stress:
-        now.peak_stress, now.peak_time, now.peak_load = mean_stress, step.time, step.load
-        now.peak_node = node
-    fall = min(now.local_stress - mean_stress, step.radiated - now.local_radiated)
-    if now.peak_stress - mean_stress < _PEAK_WIDTH * now.scale and fall > 0.0:
-        now.peak_node = node
+    fall = min(now.local_stress - now.mean_stress, radiated - now.local_radiated)
+    if now.local_stress - now.mean_stress < _PEAK_WIDTH * now.scale and fall > 0.0:
+        now.local_node = now.top_node
     if now.in_event:
-        now.event_rate = max(now.event_rate, now.top_rate)
-        if mean_stress > now.local_stress:
-            end_event(now, unstable_rate, mean_stress, step.radiated)
-    elif mean_stress > now.local_stress:
-        now.local_stress, now.local_radiated = mean_stress, step.radiated
-    elif fall > EVENT_DROP * now.scale:
-        now.in_event, now.event_rate = 1, now.top_rate
-        if now.first_stress == -np.inf:
-            now.first_stress = now.local_stress
+        now.event_rate = max(now.event_rate, now.top_slip_rate)
+        if now.mean_stress > now.local_stress:
+            end_event(now, thresholds.unstable_rate, radiated)
+    elif now.mean_stress > now.local_stress:
+        _at_maximum(now, radiated)
+    elif fall > EVENT_DROP * now.scale and now.kinetic_stress == -np.inf:
+        now.in_event, now.event_rate = 1, now.top_slip_rate
+        _begin(now)
+    if now.slid >= thresholds.breakable and now.kinetic_stress == -np.inf:
+        now.kinetic_stress = now.mean_stress
+        if not now.in_event:
+            _begin(now)
     return fall
 
 
@@ -98,7 +115,7 @@ def finish_step(
     step: Step,
     increments: Array,
     strength: Array,
-    record: Array,
+    record: Record,
     row: int,
 ) -> Any:
     """Update diagnostics, arrivals, and the record if there is one; return the fall of the stress.
@@ -122,21 +139,16 @@ def finish_step(
             arrival[i] = step.time - step.size * min(1.0, beyond)
         slip_sum += slip[i]
     mean_stress = setting.mean_initial + step.load * setting.mean_profile - step.radiated
-    now.time, now.load = step.time, step.load
-    now.top_rate, now.slid = top, slid
+    now.time, now.size, now.load = step.time, step.size, step.load
+    now.mean_stress, now.top_slip_rate, now.top_node, now.slid = mean_stress, top, node, slid
     now.least, now.least_node = least, least_node
     now.work += step.work
+    now.mean_slip = slip_sum / slip.size
     now.scale = max(now.scale, value_at(setting.scale, step.load))
-    fall = observe(now, setting.thresholds.unstable_rate, mean_stress, step, node)
-    if slid >= setting.thresholds.breakable and now.kinetic_stress == -np.inf:
-        now.kinetic_stress = mean_stress
-    if record.shape[0] > 0:
-        record[row, 0], record[row, 1], record[row, 2] = step.time, step.load, mean_stress
-        record[row, 3], record[row, 4] = slip_sum / slip.size, top
-        record[row, 5], record[row, 6] = step.size, now.work
+    fall = observe(now, setting.thresholds, step.radiated)
+    if record.steps.size > 0:
+        record.steps[row] = now
         for s in range(setting.stations.size):
-            node, column = setting.stations[s], _COLUMNS + 3 * s
-            record[row, column] = state.slip[node]
-            record[row, column + 1] = state.rate[node]
-            record[row, column + 2] = state.stress[node]
+            node, one = setting.stations[s], record.stations[row, s]
+            one.slip, one.slip_rate, one.shear_stress = slip[node], rate[node], stress[node]
     return fall

@@ -18,6 +18,7 @@ from stiction.dynamics.state import (
     ExplicitTables,
     Grid,
     Reason,
+    Record,
     Setting,
     State,
     Thresholds,
@@ -97,7 +98,7 @@ def _calm(now: Any, thresholds: Thresholds, step: float, impedance: float, rise:
 
     Waves make slip rates come and go; creep is slow, or as fast as it was.
     """
-    scale, before, top = now.scale, now.calm_rate, now.top_rate
+    scale, before, top = now.scale, now.calm_rate, now.top_slip_rate
     quiet = top < _CALM_STRESS * scale / impedance + thresholds.calm_slip * rise / step
     steady = 0.5 * before <= top <= 2.0 * before
     if quiet or (steady and top < STEADY_STRESS * scale / impedance):
@@ -114,12 +115,11 @@ def explicit_steps(
     grid: Grid,
     setting: Setting,
     tables: ExplicitTables,
-    record: Array,
+    record: Record,
 ) -> Any:
     """Take up to `count` explicit steps in place; return (steps taken, reason).
 
-    `state.memory` holds psi/B. `record`, (>= count, columns), or with no rows to keep nothing, has
-    three more columns for each station: slip, slip rate and stress.
+    `state.memory` holds psi/B. `record` has at least `count` rows, or none to keep nothing.
     """
     n, impedance, step = state.slip.size, grid.impedance, tables.step
     now, thresholds = state.diagnostics[0], setting.thresholds
@@ -153,17 +153,15 @@ def explicit_steps(
         )  # fmt: skip
         rise, radiated = abs(load - now.load), impedance * total / n
         now.explicit_steps += 1
-        done = Step(time, step, load, work * grid.cell, radiated)
-        fall = finish_step(
-            state, setting, done, tables.predicted, tables.transfer, record, taken
-        )
+        done, limit = Step(time, step, load, work * grid.cell, radiated), tables.transfer
+        fall = finish_step(state, setting, done, tables.predicted, limit, record, taken)
         taken += 1
         if now.slid >= thresholds.slid_stop:
             reason = Reason.ALL_SLID
         elif thresholds.event_stop and fall > EVENT_DROP * now.scale:
             reason = Reason.DROPPED
         elif _calm(now, thresholds, step, impedance, rise):
-            end_event(now, thresholds.unstable_rate, now.mean_stress, radiated)
+            end_event(now, thresholds.unstable_rate, radiated)
             if thresholds.rest_stop and now.first_stress > -np.inf:
                 reason = Reason.AT_REST
             elif not thresholds.explicit_only:

@@ -6,18 +6,14 @@ import numpy as np
 
 from stiction.arrays import Array
 from stiction.dynamics.complementarity import solve_increment
-from stiction.dynamics.diagnostics import (
-    EVENT_DROP,
-    STEADY_STRESS,
-    Step,
-    finish_step,
-)
+from stiction.dynamics.diagnostics import EVENT_DROP, STEADY_STRESS, Step, finish_step
 from stiction.dynamics.loading import value_at
 from stiction.dynamics.memory import advance_with_ramp, fading_memory, tabulate
 from stiction.dynamics.state import (
     Grid,
     ImplicitTables,
     Reason,
+    Record,
     Setting,
     State,
     Thresholds,
@@ -222,7 +218,7 @@ def implicit_steps(
     grid: Grid,
     setting: Setting,
     tables: ImplicitTables,
-    record: Array,
+    record: Record,
 ) -> Any:
     """Take up to `count` accepted implicit steps in place; return (steps, next size, reason).
 

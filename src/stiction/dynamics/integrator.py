@@ -19,11 +19,12 @@ from stiction.dynamics.memory import (
 )
 from stiction.dynamics.state import (
     DIAGNOSTICS,
-    RECORD,
+    STATION,
     ExplicitTables,
     Floats,
     ImplicitTables,
     Reason,
+    Record,
     Setting,
     State,
 )
@@ -38,7 +39,7 @@ _ENDINGS: dict[int, str] = {
     Reason.DROPPED: "onset",
     Reason.AT_REST: "rest",
 }
-NOTHING = np.empty((0, len(RECORD)))
+NOTHING = Record(np.empty(0, DIAGNOSTICS), np.empty((0, 0), STATION))
 
 
 @dataclasses.dataclass(eq=False)
@@ -95,7 +96,7 @@ class Run:
         Where the stress is above the strength by more than round-off, explicit steps come first.
         """
         interface, impedance = self.medium.interface, self.medium.impedance
-        nodes, thresholds = self.setting.nodes, self.setting.thresholds
+        setting, nodes, thresholds = self.setting, self.setting.nodes, self.setting.thresholds
         given = np.zeros(interface.size) if slip is None else slip
         delta = np.array(given, dtype=np.float64).ravel()
         memory, memory_sum = empty_memory(self.medium.grid)
@@ -103,22 +104,27 @@ class Run:
         slip_hat = interface.transform(delta.reshape(interface.shape)).ravel()
         stress = self.elastic_stress(slip_hat, load)
         limit = self.strength_after(delta)
-        rate = np.maximum(stress - limit, 0.0) / impedance
+        excess = stress - limit
+        rate = np.maximum(excess, 0.0) / impedance
         # A node that has just reached its strength has not begun to slip: drop round-off.
         rate[rate * impedance < 1e-12 * nodes.strength] = 0.0
         stress = stress - impedance * rate
         diagnostics = np.zeros(1, DIAGNOSTICS)
         now = diagnostics[0]
-        now["time"] = now["peak_time"] = time
-        now["load"] = now["peak_load"] = now["start_load"] = load
-        now["mean_stress"] = now["peak_stress"] = now["local_stress"] = stress.mean()
-        now["local_radiated"] = impedance * rate.mean()
-        now["peak_node"] = int(np.argmax(stress - limit))
-        now["first_stress"] = now["kinetic_stress"] = -np.inf  # not yet
+        now["time"] = now["local_time"] = time
+        now["load"] = now["local_load"] = now["start_load"] = load
+        # Before anything slips: nothing is radiated.
+        now["local_stress"] = setting.mean_initial + load * setting.mean_profile
+        now["mean_stress"] = stress.mean()
+        now["local_node"] = now["top_node"] = int(np.argmax(excess))
+        now["first_stress"] = now["onset_stress"] = now["kinetic_stress"] = -np.inf  # not yet
+        now["onset_time"] = now["onset_load"] = np.nan
         now["bad_node"] = -1
-        now["least_node"] = place = int(np.argmin(stress + limit))
-        now["least"] = (stress + limit)[place]
-        now["top_rate"] = rate.max()
+        times, values = setting.load
+        lowest = min(load, values[times <= time].min()) if slip is None else load
+        left = stress + limit - (load - lowest) * nodes.profile  # at rest, at the lowest load
+        now["least"], now["least_node"] = left.min(), int(np.argmin(left))
+        now["top_slip_rate"], now["mean_slip"] = rate.max(), delta.mean()
         now["slid"] = np.count_nonzero(delta >= nodes.critical)
         scale = max(0.0, self.scale_at(load))
         now["scale"] = scale
@@ -172,7 +178,7 @@ class Run:
             word = self.ending(state, reason)
         return word, reason
 
-    def advance(self, state: State, count: int, record: Floats = NOTHING) -> tuple[int, int]:
+    def advance(self, state: State, count: int, record: Record = NOTHING) -> tuple[int, int]:
         """Take up to `count` steps in place; return (steps taken, why it returned).
 
         The reason is DONE after `count` steps or at the end time, else ALL_SLID, DROPPED, AT_REST
@@ -180,7 +186,7 @@ class Run:
         """
         taken = 0
         while taken < count:
-            part = record[taken:] if record.shape[0] else NOTHING
+            part = Record(*(rows[taken:] for rows in record))
             steps = self._explicit if state.explicit else self._implicit
             more, reason = steps(state, count - taken, part)
             taken += more
@@ -192,14 +198,14 @@ class Run:
                 return taken, reason
         return taken, Reason.DONE
 
-    def _explicit(self, state: State, count: int, record: Floats) -> tuple[int, int]:
+    def _explicit(self, state: State, count: int, record: Record) -> tuple[int, int]:
         medium, tables = self.medium, self._explicit_tables()
         left = self.setting.thresholds.end_time - state.now["time"]
         if left < count * medium.step:
             count = min(count, max(1, int(np.ceil(left / medium.step - 1e-6))))
         return explicit_steps(count, state, medium.grid, self.setting, tables, record)
 
-    def _implicit(self, state: State, count: int, record: Floats) -> tuple[int, int]:
+    def _implicit(self, state: State, count: int, record: Record) -> tuple[int, int]:
         size, grid = float(state.phase[1]), self.medium.grid
         if not isinstance(self.tables, ImplicitTables):
             self.tables = None  # release the others before these are made

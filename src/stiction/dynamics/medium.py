@@ -121,7 +121,7 @@ def largest_step(
     def wave(a: float, b: float) -> tuple[float, ExponentialSum, float]:
         kx, ky = a * np.pi / spacings[0], b * np.pi / spacings[1]
         share = float(kx**2 / (kx**2 + ky**2))
-        kernel = _mixed(kernels[0], kernels[1], share)
+        kernel = _mixed(kernels, share)
         return float(np.hypot(kx, ky)), kernel, share * static + 1.0 - share
 
     corners = [wave(1.0, 0.0), wave(1.0, 1.0), wave(0.0, 1.0)]
@@ -172,12 +172,8 @@ def _largest(kernel: ExponentialSum, stiffness: float) -> float:
     return low
 
 
-def _mixed(
-    in_plane: ExponentialSum, anti_plane: ExponentialSum, share: float
-) -> ExponentialSum:
+def _mixed(kernels: list[ExponentialSum], share: float) -> ExponentialSum:
     """The kernel of a wave vector on a plane, whose share of mode II is (kx/k)²."""
-    return ExponentialSum(
-        np.concatenate([in_plane.poles, anti_plane.poles]),
-        np.concatenate([share * in_plane.weights, (1.0 - share) * anti_plane.weights]),
-        max(in_plane.error, anti_plane.error),
-    )
+    weights = share * kernels[0].weights, (1.0 - share) * kernels[1].weights
+    poles = np.concatenate([kernel.poles for kernel in kernels])
+    return ExponentialSum(poles, np.concatenate(weights), max(one.error for one in kernels))

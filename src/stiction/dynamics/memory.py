@@ -15,14 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.arrays import Array
-from stiction.dynamics.state import (
-    ExplicitTables,
-    Floats,
-    Grid,
-    ImplicitTables,
-    Ints,
-    Spectrum,
-)
+from stiction.dynamics.state import ExplicitTables, Floats, Grid, ImplicitTables, Ints, Spectrum
 from stiction.jit import jit_inside
 
 LANES = 64

@@ -10,12 +10,7 @@ import pydantic
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
 
-from stiction.dynamics.checks import (
-    at_first_slip,
-    check_finite,
-    warn_if_coarse,
-    warn_of_slip,
-)
+from stiction.dynamics import checks
 from stiction.dynamics.diagnostics import stress_scale
 from stiction.dynamics.integrator import Run
 from stiction.dynamics.loading import load_history, turning_times
@@ -87,7 +82,7 @@ class Rupture:
         Time at which a run ends at the latest, s, but for a part of the last explicit step.
     load : (times, values), optional
         Samples of tau_0(t), Pa, from t = 0 s, instead of a constant rate, with linear
-        interpolation; the last slope continues. It must not fall before the first slip.
+        interpolation; the last slope continues.
     arrival : float
         Share of tau_p - tau_r that a node has lost when the front arrives there, in (0, 1]:
         0.5 is the middle of the cohesive zone, 1e-3 its tip.
@@ -108,24 +103,26 @@ class Rupture:
 
     Notes
     -----
-    `critical_stress` is the largest mean shear stress on the interface, `critical_load` the
-    load factor that carries it statically (nan where nothing became unstable, or where an
-    overstressed patch slipped at the start and the mean stress was never as high again),
-    `applied_load` the one applied at that moment, somewhat higher; the difference is
-    radiated. An instability begins when the mean stress has fallen by 1e-4 of the stress
-    scale below its last maximum, not counting any fall of the load itself. `arrested_events`
-    counts those in which a node slips so fast that Z V exceeds 7.5 % of the median of tau_p -
-    tau_r before the mean stress is as high again or all is calm. `Equilibrium` also counts
-    jumps too small to reach that slip rate. The stress scale is the mean over nodes of tau_p -
-    tau_r, where each node counts for at most three times the drop tau_0 p + tau_i - tau_r at
-    the largest load so far, so that unbroken barriers do not count. `kinetic_stress` and the
+    An instability is slip that the load does not drive. It begins at a maximum of the mean
+    shear stress after which waves lower it by 1e-4 of the stress scale, not counting any fall
+    of the load itself; at the start where the stress is above the strength.
+    `first_instability` is the mean stress at which the first one begins. The highest one has
+    `onset_time`, `critical_position`, `applied_load` (the load factor then) and, if the
+    interface slides, `critical_stress` and `critical_load`, the load factor that carries that
+    stress statically; what waves radiate is the difference. NaN is what did not happen, with a
+    warning, and an overstressed start has no `critical_load`.
+
+    `arrested_events` counts instabilities in which a node slips so fast that Z V exceeds 7.5 %
+    of the median of tau_p - tau_r before the mean stress is as high again or all is calm.
+    `Equilibrium` also counts jumps too small for that. The stress scale is the mean over nodes
+    of tau_p - tau_r, or of three times the drop tau_0 p + tau_i - tau_r at the largest load so
+    far where that is less, so that unbroken barriers do not count. `kinetic_stress` and the
     energies are those of the first step after which every node that can break is at its
     residual strength; radiated energy and moment grow by about 2 % in that step.
 
-    With "onset", what is not final is NaN: kinetic stress, stress drop, moment, energies,
-    rupture speeds and arrested events; critical values are those of the first maximum of the
-    mean stress. With "rest" they are those of the largest mean stress so far, and kinetic
-    stress and stress drop are NaN unless it slides.
+    With "onset" and "rest", critical values are those of the highest instability, which need
+    not end in sliding, and with "onset" what is not final is NaN: kinetic stress, stress drop,
+    moment, energies, rupture speeds and arrested events.
 
     Slip never reverses: a node whose slip rate would become negative sticks, keeps its
     weakened strength, and slips again only when the stress reaches it; a warning gives the
@@ -189,12 +186,13 @@ class Rupture:
         static = static_setting(problem) if from_equilibrium else None
 
         def solve(rows: Sample) -> dict[str, NDArray[Any]]:
-            warn_if_coarse(problem, rows)
+            checks.warn_if_coarse(problem, rows)
             found = []
             for i in range(rows.samples):
                 run = make_run(self, medium, rows, i)
                 start = slow_start(static, run, rows, i, rate) if static and rate else None
                 found.append(self._one(run, start))
+            checks.warn_of_survival(self.stop, found)
             return {
                 name: np.array([one[name] for one in found]) for name in self.variables(problem)
             }
@@ -202,21 +200,27 @@ class Rupture:
         return solve
 
     def _one(self, run: Run, state: State | None) -> dict[str, Any]:
-        rest = at_first_slip(run)
-        state = rest if state is None else state
+        rest = checks.at_first_slip(run)
+        if rest is None:  # nothing slips: what it came to is at the end of the load
+            state = run.start(min(run.setting.load.at[-1], run.setting.thresholds.end_time))
+        else:
+            state = rest if state is None else state
+            self._follow(run, state)
+        checks.warn_of_slip(run, state)
+        found = summary(run, state)
+        if self.stop == "onset":
+            found |= {name: np.full(np.shape(found[name]), np.nan) for name in _LATER}
+        return found
+
+    def _follow(self, run: Run, state: State) -> None:
         ended, reason = run.follow(state, self.max_steps)
-        check_finite(run, state, reason)
+        checks.check_finite(run, state, reason)
         if ended is None:
             raise InputError(
                 f"max_steps: {self.max_steps} steps led to tau_0 = {state.now['load']:.6g} Pa, and "
                 f"{state.now['slid']} nodes to their residual strength, but not to stop="
                 f"{self.stop!r}; raise max_steps or the loading rate, or stop at 'onset' or 'rest'"
             )
-        warn_of_slip(run, state)
-        found = summary(run, state)
-        if self.stop == "onset":
-            found |= {name: np.full(np.shape(found[name]), np.nan) for name in _LATER}
-        return found
 
 
 def make_run(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
 from stiction.dynamics.integrator import Run
-from stiction.dynamics.state import DIAGNOSTICS, RECORD, Floats, State
+from stiction.dynamics.state import DIAGNOSTICS, STATION, Floats, Record, State
 from stiction.dynamics.summary import energy_balance, per_area, seismic_moment
 from stiction.errors import InputError, unknown_name
 from stiction.files import UNREADABLE, read_arrays, write_arrays, write_whole
@@ -55,7 +55,7 @@ SCALARS = _over(
     fracture_energy=("J/m", "energy dissipated above the residual"),
     radiated_energy=("J/m", "work minus dissipated and strain energy"),
 )
-STEPS = _over(  # in the order of RECORD
+STEPS = _over(  # DIAGNOSTICS of these names
     "step",
     step_time=("s", "time after each step"),
     step_load=("Pa", "load factor tau_0 after each step"),
@@ -65,7 +65,7 @@ STEPS = _over(  # in the order of RECORD
     step_size=("s", "size of each step"),
     step_work=("J/m", "work of the load up to each step"),
 )
-STATIONS = _over(  # in the order of a station's columns
+STATIONS = _over(  # as in STATION
     "step",
     "station",
     station_slip=("m", "slip at a station after each step"),
@@ -143,18 +143,22 @@ class Recorder:
         self.run, self.save, self.attributes = run, save, attributes
         interface = run.medium.interface
         self._others = repr([save.fields, save.stations])  # on which a folder depends, too
-        self._columns = len(RECORD) + len(STATIONS) * len(save.stations)
-        self._record = np.empty((save.every, self._columns))
+        rows, stations = save.every, len(save.stations)
+        self._record = Record(np.empty(rows, DIAGNOSTICS), np.empty((rows, stations), STATION))
+        self._columns = {name: self._record.steps[name.removeprefix("step_")] for name in STEPS}
+        for name in STATIONS if stations else ():
+            self._columns[name] = self._record.stations[name.removeprefix("station_")]
         self._frames: list[dict[str, Any]] = []
-        self._steps: list[Floats] = []
+        self._steps: list[dict[str, Floats]] = []
         over = {name: along(interface, what) for name, what in FIELDS.items()}
         over |= SCALARS | STEPS | STATIONS
         self.variables = {name: per_area(interface, what) for name, what in over.items()}
 
     def advance(self, state: State, count: int) -> tuple[int, int]:
         """Take up to `count` steps and record them; return (steps taken, why it returned)."""
-        taken, reason = self.run.advance(state, count, self._record[:count])
-        self._steps.append(self._record[:taken].copy())
+        rows = Record(*(part[:count] for part in self._record))
+        taken, reason = self.run.advance(state, count, rows)
+        self._steps.append({name: one[:taken].copy() for name, one in self._columns.items()})
         return taken, reason
 
     def add(self, state: State) -> None:
@@ -186,14 +190,12 @@ class Recorder:
         data = {name: np.array([frame[name] for frame in self._frames]) for name in names}
         shape = len(self._frames), *interface.shape  # also if there are none
         data |= {name: data[name].reshape(shape) for name in save.fields}
-        record = np.concatenate([np.empty((0, self._columns)), *self._steps])
-        data |= {name: record[:, i].copy() for i, name in enumerate(STEPS)}
+        for name, column in self._columns.items():
+            data[name] = np.concatenate([column[:0], *(one[name] for one in self._steps)])
         self._frames, self._steps = [], []
         coordinates = {"time": (data.pop("time"), TIME)}
         coordinates |= {dim: coordinate(interface, dim) for dim in interface.dims}
         if save.stations:
-            own = record[:, len(RECORD) :].reshape(-1, len(save.stations), len(STATIONS))
-            data |= {name: own[..., i].copy() for i, name in enumerate(STATIONS)}
             label = Variable("", "name of a station", ("station",))
             coordinates["station"] = (np.array(list(save.stations), dtype=str), label)
             index = np.unravel_index(self.run.setting.stations, interface.shape)
@@ -226,15 +228,17 @@ class Recorder:
                 path.unlink()
         return False
 
-    def flush(self, state: State, stopped: str | None = None) -> None:
-        """Write what was gathered, if there is enough or the run has stopped, and the state."""
-        folder = self.save.to
-        steps = sum(record.size for record in self._steps) // len(RECORD)
+    def flush(self, state: State, *, at_once: bool = False, last: bool = False) -> None:
+        """Write what was gathered, if there is enough or at once, and the state to resume from.
+
+        That is not the last one: a run that goes on may have no frame where `max_steps` ended it.
+        """
+        folder, steps = self.save.to, sum(one["step_time"].size for one in self._steps)
         full = len(self._frames) >= FRAMES or steps >= _MOST_STEPS
-        if folder is None or not (full or (stopped and (self._frames or steps))):
+        if folder is None or not (full or ((at_once or last) and self._frames)):
             return
         _write(folder / f"frames-{state.steps:012d}.nc", self.take())
-        if stopped in (None, "max_steps"):  # at its end a run would take another step
+        if not last:
             write_checkpoint(folder / _CHECKPOINT, self.run, state, self._others)
 
     def finish(self, dataset: xr.Dataset, stopped: str) -> None:

@@ -7,12 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stiction.dynamics.checks import (
-    at_first_slip,
-    check_finite,
-    warn_if_coarse,
-    warn_of_slip,
-)
+from stiction.dynamics import checks
 from stiction.dynamics.integrator import Run
 from stiction.dynamics.method import Rupture, make_run
 from stiction.dynamics.save import SCALARS, Recorder, Save, open_rupture
@@ -98,13 +93,13 @@ def simulate_rupture(
         raise InputError(f"profiles: one sample at a time, got {rows.samples}")
     stations = save.nodes(problem.interface)
     problem.warn_of_units(rows.mean_strength, float(rows.residual_strength.mean()))
-    warn_if_coarse(problem, rows)
+    checks.warn_if_coarse(problem, rows)
     run = make_run(method, method.medium(problem), rows, 0, stations)
-    state = at_first_slip(run)
-    if run.ended(state):
+    state = checks.at_first_slip(run)
+    if state is None:
         raise InputError(
-            f"end_time: {method.end_time:g} s is not after the start of the run, t = "
-            f"{state.now['time']:.6g} s (first slip)"
+            f"load: does not reach the first slip, tau_0 = {run.first_load:.6g} Pa, before the run"
+            " ends; raise the load, Load.initial_stress where slip should begin, or end_time"
         )
     attributes = study_attributes(problem=problem, method=method)
     recorder = Recorder(run, save, attributes | {"stopped": "running"})
@@ -115,11 +110,13 @@ def simulate_rupture(
     with Meter("rupture", show=progress, unit="steps") as meter:
         stopped = _follow(run, state, recorder, method.max_steps, meter)
     recorder.attributes["stopped"] = stopped
-    warn_of_slip(run, state)
-    recorder.flush(state, stopped)
+    checks.warn_of_slip(run, state)
+    recorder.flush(state, last=True)
     dataset = recorder.take() if save.to is None else open_rupture(save.to, fields=())
     dataset.attrs["stopped"] = stopped
     result = _complete(dataset, method, run, state)
+    if stopped in ("rest", "time"):
+        checks.warn_of_survival(method.stop, [result])
     recorder.finish(result, stopped)
     return with_gaps(problem, result, measured)
 
@@ -129,9 +126,11 @@ def _follow(run: Run, state: State, recorder: Recorder, most: int, meter: Meter)
     every = recorder.save.every
     while state.steps < most:
         count = every if state.explicit else max(1, every // 10)
+        if state.steps + count >= most:
+            recorder.flush(state, at_once=True)
         taken, reason = recorder.advance(state, min(count, most - state.steps))
         try:
-            check_finite(run, state, reason)
+            checks.check_finite(run, state, reason)
         except FloatingPointError as error:
             warn_accuracy(str(error))
             return f"not finite: {error}"

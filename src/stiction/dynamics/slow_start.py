@@ -101,8 +101,8 @@ def _at(
     state.rate[:], state.past[:], state.stress[:] = slip_rate, mean_rate, stress
     state.phase[0] = 0.0
     now = state.now
-    now["past_step"], now["top_rate"] = interval, slip_rate.max()
-    now["mean_stress"] = now["peak_stress"] = now["local_stress"] = stress.mean()
+    now["past_step"], now["top_slip_rate"] = interval, slip_rate.max()
+    now["mean_stress"] = now["local_stress"] = stress.mean()
     now["local_radiated"] = now["radiated"] = radiated
     # The slow path has radiated nothing: that is the work that was done on it.
     now["work"] -= energy_balance(run, state)["radiated_energy"]

@@ -30,27 +30,30 @@ Reason = IntEnum(
 )
 """Reasons why a compiled loop of steps returned."""
 
-RECORD = ("time", "load", "mean_stress", "mean_slip", "top_slip_rate", "size", "work")
-"""Columns of the record of every step; each station adds slip, slip rate and stress."""
-
 DIAGNOSTICS = np.dtype(
     [
         ("time", "f8"),  # s
+        ("size", "f8"),  # of the last step, s
         ("load", "f8"),  # tau_0, Pa
         ("work", "f8"),  # of the load on the slip, J/m
+        ("mean_slip", "f8"),  # m
         ("mean_stress", "f8"),  # Pa, as all stresses here
-        ("peak_stress", "f8"),  # largest mean stress so far, and when, at what load and where
-        ("peak_time", "f8"),
-        ("peak_load", "f8"),
-        ("peak_node", "i8"),
-        ("local_stress", "f8"),  # last local maximum of the mean stress
-        ("local_radiated", "f8"),  # Z <V> there
-        ("in_event", "i8"),  # whether the mean stress has fallen from there by EVENT_DROP
+        ("local_stress", "f8"),  # last maximum of the mean stress, and there
+        ("local_radiated", "f8"),  # Z <V>, time, load and the fastest node
+        ("local_time", "f8"),
+        ("local_load", "f8"),
+        ("local_node", "i8"),
+        ("in_event", "i8"),  # whether an instability has begun there
         ("event_rate", "f8"),  # largest slip rate since then, m/s
         ("first_stress", "f8"),  # mean stress at the first instability; -inf before
+        ("onset_stress", "f8"),  # that of the highest one; -inf before
+        ("onset_time", "f8"),
+        ("onset_load", "f8"),
+        ("onset_node", "i8"),
         ("arrested", "i8"),  # instabilities that have stopped
         ("kinetic_stress", "f8"),  # mean stress when all that can break had broken; -inf before
-        ("top_rate", "f8"),  # largest slip rate, m/s
+        ("top_slip_rate", "f8"),  # largest slip rate, m/s, and where
+        ("top_node", "i8"),
         ("slid", "i8"),  # nodes at the residual strength
         ("bad_node", "i8"),  # first node whose slip rate became non-finite; -1 if none
         ("past_step", "f8"),  # of the last implicit step; 0 before the first one
@@ -67,6 +70,16 @@ DIAGNOSTICS = np.dtype(
     ]
 )
 """Diagnostics of every step: one record, which compiled steps and checkpoints share."""
+
+STATION = np.dtype([("slip", "f8"), ("slip_rate", "f8"), ("shear_stress", "f8")])
+"""Slip (m), slip rate (m/s) and stress (Pa) of a node."""
+
+
+class Record(NamedTuple):
+    """What is kept of every step; with no rows, nothing."""
+
+    steps: NDArray[Any]  # (steps,) array of DIAGNOSTICS
+    stations: NDArray[Any]  # (steps, stations) array of STATION
 
 
 class Thresholds(NamedTuple):
@@ -127,7 +140,7 @@ class Setting(NamedTuple):
     turning_times: Array  # when the load begins to fall or to rise again, s
     scale: History  # stress scale against the load, Pa
     thresholds: Thresholds
-    stations: Ints  # nodes whose slip, slip rate and stress the record of steps holds
+    stations: Ints  # nodes that `Record.stations` holds
 
 
 class State(NamedTuple):

@@ -13,22 +13,18 @@ from stiction.results import position
 from stiction.variables import Variable
 
 _SCALARS: dict[str, Variable] = {
-    "applied_load": Variable("Pa", "load factor applied at the largest mean stress"),
-    "onset_time": Variable("s", "time from zero load to the largest mean stress"),
+    "applied_load": Variable("Pa", "load factor applied at the onset"),
+    "onset_time": Variable("s", "time from zero load to the onset"),
     "kinetic_stress": Variable("Pa", "mean stress when every node that can break has broken"),
     "stress_drop": Variable("Pa", "critical stress minus kinetic stress"),
     "seismic_moment": Variable("N", "seismic moment per length, G times the integral of slip"),
     "radiated_energy": Variable("J/m", "energy radiated up to the end of the run"),
     "fracture_energy": Variable("J/m", "energy dissipated above the residual strength"),
-    "arrested_events": Variable(
-        "1", "instabilities that stopped before the whole interface slid"
-    ),
+    "arrested_events": Variable("1", "instabilities that stopped before global sliding"),
     "rupture_speed": Variable("m/s", "largest apparent speed of the front over 2 h_n"),
     "median_rupture_speed": Variable("m/s", "median apparent speed of the front over h_n/2"),
     "start_load": Variable("Pa", "load factor at which the simulation began"),
-    "start_error": Variable(
-        "Pa", "estimated error of the first instability due to the start; 0 from rest"
-    ),
+    "start_error": Variable("Pa", "estimated error of the onset due to the start; 0 from rest"),
     "implicit_steps": Variable("1", "implicit steps taken"),
     "explicit_steps": Variable("1", "explicit steps taken"),
 }
@@ -90,12 +86,11 @@ def _axis_speeds(
     interface = run.medium.interface
     nucleation = run.medium.problem.nucleation_lengths(run.steepest_rate)
     arrival = state.arrival.reshape(interface.shape)
-    began = np.unravel_index(int(state.now["peak_node"]), interface.shape)
+    began = np.unravel_index(int(state.now["onset_node"]), interface.shape)
     found = []
     for axis, spacing in enumerate(interface.spacings):
-        window = min(
-            max(lengths * nucleation[axis], 8.0 * spacing), 0.25 * interface.lengths[axis]
-        )
+        window = max(lengths * nucleation[axis], 8.0 * spacing)
+        window = min(window, 0.25 * interface.lengths[axis])
         through = tuple(slice(None) if i == axis else node for i, node in enumerate(began))
         speeds = rupture_speed(arrival[through], spacing, window)
         speeds = speeds[np.isfinite(speeds)]
@@ -103,39 +98,35 @@ def _axis_speeds(
     return found
 
 
-def _critical_load(run: Run, now: Any) -> float:
-    """Return the load that carries the largest mean stress.
-
-    It is nan where nothing became unstable, or where the largest mean stress is that of an
-    overstressed start: no load carries it.
-    """
+def _critical_load(run: Run, now: Any, stress: float) -> float:
+    """Return the load that carries the critical stress, Pa; nan if an overstressed start has it."""
     nodes, margin = run.setting.nodes, 1e-6 * now["scale"]
-    load = (float(now["peak_stress"]) - run.setting.mean_initial) / run.setting.mean_profile
+    load = (stress - run.setting.mean_initial) / run.setting.mean_profile
     began = now["start_load"] * nodes.profile + nodes.initial
     overstressed = bool(np.any(began - nodes.strength > margin))
-    carried = not overstressed or load > now["start_load"] + margin
-    unstable = max(now["first_stress"], now["kinetic_stress"]) > -np.inf
-    return load if carried and unstable else np.nan
+    return load if not overstressed or load > now["start_load"] + margin else np.nan
 
 
 def summary(run: Run, state: State) -> dict[str, Any]:
-    """Return the scalars of a finished run."""
+    """Return the scalars of a finished run; NaN is what did not happen."""
     interface, now = run.medium.interface, state.now
-    peak, first, kinetic = (
-        float(now[name]) for name in ("peak_stress", "first_stress", "kinetic_stress")
+    onset, first, kinetic = (
+        float(now[name]) if np.isfinite(now[name]) else np.nan
+        for name in ("onset_stress", "first_stress", "kinetic_stress")
     )
-    kinetic = kinetic if np.isfinite(kinetic) else np.nan
-    node = np.unravel_index(int(now["peak_node"]), interface.shape)
+    # A run that goes on until the interface slides, or to its end time, may see it survive.
+    critical = np.nan if np.isnan(kinetic) and run.stop in ("sliding", "time") else onset
+    node = np.unravel_index(int(now["onset_node"]), interface.shape)
     spent = energy_balance(run, state)
     found: dict[str, Any] = {
-        "critical_load": _critical_load(run, now),
-        "critical_stress": peak,
-        "first_instability": first if np.isfinite(first) else peak,
+        "critical_load": _critical_load(run, now, critical),
+        "critical_stress": critical,
+        "first_instability": first,
         "critical_position": [i * h for i, h in zip(node, interface.spacings, strict=True)],
-        "applied_load": float(now["peak_load"]),
-        "onset_time": float(now["peak_time"]),
+        "applied_load": float(now["onset_load"]),
+        "onset_time": float(now["onset_time"]),
         "kinetic_stress": kinetic,
-        "stress_drop": peak - kinetic,
+        "stress_drop": critical - kinetic,
         "seismic_moment": seismic_moment(run, state),
         "radiated_energy": spent["radiated_energy"],
         "fracture_energy": spent["fracture_energy"],
@@ -149,7 +140,8 @@ def summary(run: Run, state: State) -> dict[str, Any]:
     }
     for name in ("critical_position", "rupture_speed", "median_rupture_speed"):
         # A number on a line; one along x and one along y on a plane.
-        found[name] = np.array(found[name]) if interface.is_plane else found[name][0]
+        along = np.where(np.isnan(onset), np.nan, found[name])
+        found[name] = along if interface.is_plane else along[0]
     return found
 
 

@@ -50,9 +50,10 @@ def rupture(run: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None 
     Returns
     -------
     matplotlib.axes.Axes
-        A dot marks the onset, where time is zero. On a line, time begins shortly before it,
-        and points that slip seven decades slower than the fastest one are white. On a
-        plane, the front is drawn at equal intervals of time on a map of the strength.
+        A dot marks the onset, where time is zero, if anything became unstable. On a line, time
+        begins shortly before it, and points that slip seven decades slower than the fastest one
+        are white. On a plane, the front is drawn at equal intervals of time on a map of the
+        strength.
 
     Raises
     ------
@@ -132,12 +133,12 @@ def film(
     return target
 
 
-def _since_onset(run: xr.Dataset) -> tuple[Array, str]:
-    """Return the times of the frames, s, and their name: from the onset, if there is one."""
+def _since_onset(run: xr.Dataset, times: str = "time") -> tuple[Array, str]:
+    """Return times of a run, s, and from when they count: from the onset, if there is one."""
     onset = float(run["onset_time"])
     if np.isfinite(onset):
-        return run["time"].values - onset, "time since the onset"
-    return run["time"].values, "time"
+        return run[times].values - onset, " since the onset"
+    return run[times].values, ""
 
 
 def _rates(rate: Array, decades: float) -> tuple[Any, LogNorm]:
@@ -155,7 +156,7 @@ def _strength(run: xr.Dataset) -> tuple[Array, float, str]:
 
 def _draw_space_time(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
     interface = problem.interface
-    (since, name), (rate, norm) = _since_onset(run), _rates(run["slip_rate"].values, DECADES)
+    (since, begin), (rate, norm) = _since_onset(run), _rates(run["slip_rate"].values, DECADES)
     near = since >= -BEFORE * interface.extent / problem.solid.shear_wave_speed
     if near.sum() > 2:
         since, rate = since[near], rate[near]
@@ -166,10 +167,10 @@ def _draw_space_time(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
     mesh = axes.pcolormesh(
         along * length, edges * factor, rate, norm=norm, cmap=COLORS, rasterized=True
     )
-    if name != "time":
+    if begin:
         place = float(run["critical_position"]) * length
         axes.plot([place], [0.0], "o", color=INK, markersize=3.5, clip_on=False, zorder=5)
-    name_line(axes, interface, with_unit(name, unit))
+    name_line(axes, interface, with_unit(f"time{begin}", unit))
     axes.figure.colorbar(mesh, ax=axes, extend="min", label="slip rate (m/s)")
 
 
@@ -177,7 +178,7 @@ def _draw_front(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
     interface, (strength, factor, unit) = problem.interface, _strength(run)
     text = rf"strength $\tau_p$ ({unit})"
     draw_map(axes, interface, strength * factor, text, cmap="Greys")
-    since = run["arrival_time"].values - float(run["onset_time"])
+    since, begin = _since_onset(run, "arrival_time")
     scale, time_unit = unit_for("s", since)
     latest = scale * float(np.nanmax(since, initial=0.0))
     length, _ = unit_for("m", interface.lengths)
@@ -188,7 +189,7 @@ def _draw_front(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
             x, y, scale * since.T, levels=levels, cmap="viridis", linewidths=0.9
         )
         bar = ScalarMappable(lines.norm, lines.cmap)
-        text = f"front ({time_unit} since the onset)"
+        text = f"front ({time_unit}{begin})"
         axes.figure.colorbar(bar, ax=axes, label=text, shrink=0.8)
     place = length * run["critical_position"].values
     axes.plot(*place, "o", color=ACCENT, markersize=4.0, markeredgecolor="white")
@@ -196,13 +197,13 @@ def _draw_front(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
 
 def _clock(axes: Axes, run: xr.Dataset) -> tuple[Any, str, list[str]]:
     """Return a line of text above axes, with time and mean stress."""
-    since, _ = _since_onset(run)
+    since, begin = _since_onset(run)
     late = since[since > 0.0]
     factor, unit = unit_for("s", late if late.size else since)
     stress, stress_unit = unit_for("Pa", run["mean_stress"].values)
     mean = (run["mean_stress"].values * stress).round(3) + 0.0  # no minus before a zero
     texts = [
-        f"{time:,.1f} {unit} since the onset,  mean stress {one:.3f} {stress_unit}"
+        f"{time:,.1f} {unit}{begin},  mean stress {one:.3f} {stress_unit}"
         for time, one in zip(factor * since, mean, strict=True)
     ]
     return axes.text(0.0, 1.04, " ", transform=axes.transAxes, color=QUIET), "text", texts

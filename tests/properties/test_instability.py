@@ -1,0 +1,194 @@
+"""What counts as an instability of a rupture, and what is known where there was none."""
+
+import re
+import warnings
+
+import numpy as np
+import pytest
+from ruptures import BREAKING_PLANE, CROOKED, CROOKED_STRENGTH, dip
+from setups import QUARTER as SOLID
+from setups import beta_strength, ensemble, exact_onset, make_problem
+
+import stiction as st
+
+X = CROOKED.interface.x
+OF_ONSET = (
+    "critical_load", "critical_stress", "first_instability", "critical_position", "applied_load",
+    "onset_time", "kinetic_stress", "stress_drop", "rupture_speed", "median_rupture_speed",
+)  # fmt: skip
+SURVIVED = "load: an interface did not .* and failure_probability counts it as survived"
+
+
+@pytest.fixture(scope="module")
+def exact():
+    return exact_onset(CROOKED, CROOKED_STRENGTH)
+
+
+def held(top, rate=2e7, back=1.0, **options):
+    """A load that rises to `top`, holds, and then goes to a share of it."""
+    end = top / rate
+    values = [0.0, top, top, back * top, back * top]
+    return st.Rupture(load=(end * np.array([0.0, 1.0, 1.5, 2.0, 3.0]), values), **options)
+
+
+def simulate(method, strength=CROOKED_STRENGTH, problem=CROOKED, **save):
+    return st.simulate_rupture(
+        problem, strength, method=method, save=st.Save(**save), progress=False
+    )
+
+
+@pytest.mark.parametrize("stop", ["sliding", "onset", "rest", "time"])
+@pytest.mark.parametrize(("share", "back"), [(0.9, 1.0), (0.985, 1.0), (0.999, 0.3)])
+def test_below_the_onset_nothing_is_unstable(exact, share, back, stop):
+    """The first slip is at 0.973 of the onset."""
+    load = share * exact.critical_load.item()
+    method = held(load, back=back, stop=stop, end_time=1.0 if stop == "time" else None)
+    with pytest.warns(st.AccuracyWarning, match=SURVIVED) as caught:
+        found = st.onset(CROOKED, CROOKED_STRENGTH, method=method)
+    assert len(caught) == 1
+    for name in OF_ONSET:
+        assert np.isnan(found[name].item()), name
+    if stop != "onset":
+        assert found.arrested_events.item() == 0
+        assert (found.seismic_moment.item() > 0.0) == (share > 0.973)
+
+
+@pytest.mark.parametrize("rate", [2e5, 2e7])
+def test_above_it_the_onset_is_that_of_equilibrium_however_the_load_goes_on(exact, rate):
+    """At 2e7 Pa/s inertia lifts it by some 1e-4."""
+    top, close = 1.003 * exact.critical_load.item(), 1e-5 if rate < 1e6 else 3e-4
+    straight = st.onset(CROOKED, CROOKED_STRENGTH, method=st.Rupture(loading_rate=rate))
+    for back in (1.0, 0.3):
+        with warnings.catch_warnings(action="error"):
+            method = held(top, rate, back, end_time=3.0 * top / rate)
+            found = st.onset(CROOKED, CROOKED_STRENGTH, method=method)
+        for name in ("critical_stress", "first_instability"):
+            assert found[name].item() == pytest.approx(exact[name].item(), rel=close)
+            assert found[name].item() == pytest.approx(straight[name].item(), rel=2e-5)
+        assert found.onset_time.item() == pytest.approx(straight.onset_time.item(), rel=2e-5)
+        assert found.critical_position.item() == straight.critical_position.item()
+
+
+def test_what_the_load_does_before_the_first_slip_does_not_matter():
+    """But where it pushes back beyond the strength a warning says so."""
+    straight = simulate(st.Rupture(loading_rate=1e8))
+    times = np.array([0.0, 3e-3, 5e-3, 2e-2])
+    for lowest, text in ((-2e5, None), (-9e5, "reverse")):
+        load = (times, [0.0, 6e5, lowest, lowest + 1.5e6])
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            found = simulate(st.Rupture(load=load))
+        assert [text in str(one.message) for one in caught] == [True] * (text is not None)
+        assert found.critical_stress.item() == pytest.approx(
+            straight.critical_stress.item(), rel=1e-5
+        )
+
+
+def test_an_arrested_instability_is_no_sliding():
+    """Held above the first one, the interface survives whatever stress it carried."""
+    weak = np.abs(X / 0.05 - 0.37) < 0.15
+    strength = np.where(weak, CROOKED_STRENGTH - 5e5, CROOKED_STRENGTH + 1e6)
+    first = exact_onset(CROOKED, strength)
+    assert first.arrested_events.item() >= 1
+    top = 0.5 * (first.first_instability.item() + first.critical_stress.item())
+    method = held((top - CROOKED.load.initial_stress.mean()) / 1.2, 1e7)
+    with pytest.warns(st.AccuracyWarning, match="did not slide before its run ended"):
+        found = st.onset(CROOKED, strength, method=method)
+    assert found.first_instability.item() == pytest.approx(
+        first.first_instability.item(), rel=5e-4
+    )
+    assert weak[round(found.critical_position.item() / CROOKED.interface.spacing)]
+    assert found.arrested_events.item() >= 1
+    for name in ("critical_stress", "critical_load", "kinetic_stress", "stress_drop"):
+        assert np.isnan(found[name].item()), name
+
+
+def test_an_ensemble_counts_what_survived():
+    """Held at a load between those of many onsets; the weakest nodes of some do not even slip."""
+    problem = make_problem(
+        128, 0.1, solid=SOLID, weakening_rate=1.2e11, residual_strength=2e5,
+        load=st.Load(profile=1.0 + 0.3 * dip(st.Interface(0.1, 128), 0.03, 0.02)),
+    )  # fmt: skip
+    field = beta_strength(1.5e-2, mean_mode=True)
+    exact = ensemble(problem, field, 50, method=st.Equilibrium())
+    top = float(np.sort(exact.critical_load)[28:30].mean())
+    method = held(top)
+    with pytest.warns(st.AccuracyWarning, match=SURVIVED):
+        found = ensemble(problem, field, 50, method=method)
+    failed = exact.critical_load.values <= top
+    assert np.array_equal(np.isfinite(found.critical_stress), failed)
+    first_slip = (field.sample(problem.interface, samples=50) / problem.load.profile).min(
+        axis=1
+    )
+    assert 0 < np.sum(first_slip > top) < np.sum(~failed)
+    stress = 1.001 * top * problem.load_profile.mean()
+    with pytest.warns(st.AccuracyWarning, match=SURVIVED):
+        answer = st.failure_probability(
+            problem, field, stress, method=method, algorithm="plain", target_cv=0.5,
+            max_evaluations=250, progress=False,
+        )  # fmt: skip
+    assert answer.evaluations == 50
+    assert answer.probability == pytest.approx(failed.mean())
+
+
+@pytest.fixture(scope="module", params=[(0, 0.004), (1, 0.012)], ids=["rough", "smooth"])
+def fault(request):
+    """A fault of random friction in an unbreakable plane; a patch off its middle breaks at once."""
+    seed, length = request.param
+    plane = BREAKING_PLANE.interface
+    x, y = np.meshgrid(*plane.coordinates.values(), indexing="ij")
+    inside = (np.abs(x - 0.017) < 0.014) & (np.abs(y - 0.016) < 0.009)
+    patch = (np.abs(x - 0.012) < 0.0045) & (np.abs(y - 0.013) < 0.004)
+    field = beta_strength(length, 1e6, 1.1e6, mean_mode=True)
+    strength = field.sample(plane, samples=1, seed=seed)[0]
+    initial = np.where(patch, 1.005 * strength, 7e5)
+    problem = make_problem(
+        plane.shape, plane.lengths, solid=SOLID, critical_slip=2e-6, residual_strength=4e5,
+        load=st.Load(initial_stress=initial),
+    )  # fmt: skip
+    method = st.Rupture(load=([0.0, 1.0], [0.0, 0.0]), stop="time", end_time=3e-4)
+    with warnings.catch_warnings(action="ignore"):
+        run = simulate(method, np.where(inside, strength, np.inf), problem, every=4)
+    return run, initial, patch, inside
+
+
+def test_a_fault_becomes_unstable_where_and_when_its_patch_breaks(fault):
+    """Not when slip dies and the mean stress returns."""
+    run, initial, patch, inside = fault
+    late = run.top_slip_rate[-1].item() / run.top_slip_rate.max().item()
+    assert late < 1e-3
+    assert run.mean_stress[-1].item() > run.mean_stress[0].item()
+    assert np.isfinite(run.arrival_time.values[inside]).mean() > 0.9
+    assert run.onset_time.item() == run.applied_load.item() == 0.0
+    assert run.first_instability.item() == initial.mean()
+    node = np.round(run.critical_position / BREAKING_PLANE.interface.spacings).astype(int)
+    assert patch[tuple(node.values)]
+    assert np.isnan(run.critical_load.item())
+
+
+def test_its_picture_has_a_front_and_its_film_a_clock(fault):
+    run, *_ = fault
+    axes = st.plot.rupture(run)
+    assert len(axes.collections) == 1
+    assert axes.figure.axes[-1].get_ylabel() == "front (µs since the onset)"
+    levels = axes.collections[0].levels
+    assert 0.0 < levels[0] < levels[-1] < 1e6 * np.nanmax(run.arrival_time)
+    (_, _, texts) = film_clock(run)
+    assert texts[0].startswith("0.0 µs since the onset")
+    found = [float(re.match(r"[\d.,]+", text)[0].replace(",", "")) for text in texts]
+    assert found == pytest.approx(1e6 * run.time.values, abs=0.06)
+
+
+def film_clock(run):
+    from stiction.plot.ruptures import _clock
+
+    return _clock(st.plot.rupture(run), run)
+
+
+def test_pictures_of_a_run_without_an_onset_count_from_zero_load(exact):
+    with pytest.warns(st.AccuracyWarning, match=SURVIVED):
+        run = simulate(held(0.985 * exact.critical_load.item(), stop="rest"))
+    axes = st.plot.rupture(run)
+    assert axes.get_ylabel() == "time (ms)"
+    assert not axes.lines
+    assert re.match(r"[\d.]+ ms,  mean stress", film_clock(run)[2][0])
