@@ -115,20 +115,6 @@ def test_cosine_strength_has_its_minimum_between_the_nodes(problem):
     assert min(beyond, 0.1 / mode - beyond) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_load_profile_and_initial_stress():
-    """tau_0 = <g, tau_p - tau_i>/<g, p>; the mean stress adds <tau_i>."""
-    initial = 1e5 * np.cos(turns(256)) + 2e5
-    load = st.Load(profile=np.full(256, 2.0), initial_stress=initial, normal_pressure=5e6)
-    problem = make_problem(load=load)
-    result = first_onset(problem, np.full(256, 1e6))
-    load_factor = (1e6 - 2e5 - 1e5 * multiplier_of(problem)[1]) / 2.0
-    stress = 2.0 * load_factor + 2e5
-    assert result["critical_load"] == pytest.approx(load_factor, rel=1e-12)
-    assert result["critical_position"] == pytest.approx(0.0, abs=1e-8)
-    assert result["critical_stress"] == pytest.approx(stress, rel=1e-12)
-    assert result["friction_coefficient"] == pytest.approx(stress / 5e6, rel=1e-12)
-
-
 def test_moduli_and_speeds():
     """Plane stress: G (1 + nu), plane strain: G/(1 - nu), mode III: G."""
     for plane, factor in (("stress", 1.33), ("strain", 1.0 / 0.67)):

@@ -15,7 +15,7 @@ from setups import LENGTH, LOCAL, RATE, SOLID, beta_strength, make_problem
 import stiction as st
 from stiction.criterion.local import excess_of
 from stiction.elasticity.exponential_sum import fit_exponentials
-from stiction.equilibrium.solver import Solver
+from stiction.equilibrium.solver import Solver, follow
 from stiction.reliability import subset
 from stiction.statistics import combined_mean, density, quantiles
 from stiction.theory import energy_release_rate, griffith_length, nucleation_statistics
@@ -338,6 +338,36 @@ def test_errors_of_equilibrium_are_warned_of():
         Solver(PROBLEM, st.Equilibrium())._warn(
             np.array([1e-6, np.nan]), np.full(2, 1e6), no, no
         )
+
+
+def test_nothing_is_said_where_nothing_is_in_doubt():
+    """Eighteen nodes in h_n, a spectrum that the grid resolves, a mean mode, stresses in Pa."""
+    load = st.Load(initial_stress=1e4, normal_pressure=2e6)
+    problem, field = make_problem(512, load=load), make_strength(2.0 * LENGTH, mean_mode=True)
+    line = problem.interface
+    place = ("x", 1e3 * line.x, {"units": "mm"})
+    profile = field.sample(line, seed=3)[0]
+    measured = xr.DataArray(profile, {"x": place}, "x", attrs={"units": "Pa"})
+    with warnings.catch_warnings(action="error"):
+        for method in (
+            LOCAL,
+            st.Equilibrium(sensitivity=True),
+            st.Rupture(loading_rate=1e7, stop="onset"),
+        ):
+            onset(measured, method, problem)
+        st.equilibrium_path(problem, profile, [0.5e6, 2e6])
+        for random in (field, field.given(measured[::16], noise=2e4)):
+            monte_carlo(problem=problem, random=random, samples=8)
+        st.failure_probability(problem, field, 0.8e6, method=LOCAL, target_cv=0.3)
+        st.failure_curve(problem, field, method=LOCAL, smallest=1e-2)
+
+
+def test_a_path_whose_end_is_not_known_is_said(monkeypatch):
+    ends = "stiction.equilibrium.path.follow"
+    monkeypatch.setattr(ends, lambda *given: dataclasses.replace(follow(*given), known=False))
+    path([1e5])
+    with pytest.warns(st.AccuracyWarning, match="no equilibrium was found beyond 900000 Pa"):
+        path([1e5, 2e6])
 
 
 def test_no_samples_are_an_empty_array():

@@ -90,6 +90,15 @@ def test_a_coarse_grid_warns_with_the_error_to_expect(nodes, text):
         METHOD.prepare(problem)(problem.sample(profile))
 
 
+def test_a_barrier_that_slips_where_the_grid_does_not_resolve_it_is_said():
+    problem = dataclasses.replace(PROBLEM, friction=st.LinearWeakening(critical_slip=4e-6))
+    barred = np.where(np.arange(PROFILE.size) == 20, 15.0 * PROFILE, PROFILE)
+    with pytest.warns(
+        st.AccuracyWarning, match="1 nodes slipped, the first at x = .*too steep"
+    ):
+        simulate(problem=problem, profiles=barred)
+
+
 def test_a_run_that_blows_up_stops_and_says_where(monkeypatch):
     monkeypatch.setattr("stiction.dynamics.medium.largest_step", lambda *_: 0.02)
     method = Rupture(loading_rate=1e8, implicit=False, stop="time", end_time=10.0)
