@@ -10,7 +10,7 @@ import signal
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -37,6 +37,13 @@ RUPTURE = (
 StudyFile = Annotated[Path, Argument(metavar="STUDY.toml", help="See `stiction schema`.")]
 RunPath = Annotated[Path, Argument(metavar="RUN", help="Folder of a run.")]
 Workers = Annotated[int | None, Option(help="Threads; all cores by default.", min=1)]
+Scheduler = Annotated[
+    str | None,
+    Option(metavar="ADDRESS", help="Address of a Dask scheduler, such as tcp://host:8786."),
+]
+Part = Annotated[
+    str | None, Option(metavar="K/N", help="Compute the K-th of N parts, into one folder RUN.")
+]
 LOADING_RATE = 2e7
 """Pa/s, of a rupture if the method of the study is another one."""
 
@@ -83,8 +90,22 @@ def _save_figure(axes: Any, path: Path) -> None:
 
 
 @contextmanager
-def _executor(scheduler: str) -> Iterator[Any]:
-    """The executor of a Dask scheduler."""
+def _resumable(out: Path) -> Iterator[None]:
+    """Let an interruption end a run as Ctrl-C does: what is done is stored."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # of a batch system
+    try:
+        yield
+    except KeyboardInterrupt:
+        echo(f"interrupted: what is done is in {out}; rerun the command to resume", err=True)
+        raise typer.Exit(130) from None
+
+
+@contextmanager
+def _executor(scheduler: str | None) -> Iterator[Any]:
+    """The executor of a Dask scheduler; None without one."""
+    if scheduler is None:
+        yield None
+        return
     try:
         from distributed import Client
 
@@ -99,14 +120,8 @@ def run(
     study: StudyFile,
     out: Annotated[Path, Option(metavar="RUN", help="Folder in which samples are stored.")],
     workers: Workers = None,
-    scheduler: Annotated[
-        str | None,
-        Option(metavar="ADDRESS", help="Address of a Dask scheduler, such as tcp://host:8786."),
-    ] = None,
-    part: Annotated[
-        str | None,
-        Option(metavar="K/N", help="Compute the K-th of N parts, into one folder RUN."),
-    ] = None,
+    scheduler: Scheduler = None,
+    part: Part = None,
     pilot: Annotated[bool, Option(help="Compare some samples with the exact onset.")] = True,
 ) -> None:
     """Run the study in a file, or the missing part of it.
@@ -122,16 +137,8 @@ def run(
     from stiction.study.study import Study, open_run
 
     loaded = Study.from_toml(study)
-    # A batch system's SIGTERM ends a run as Ctrl-C does: what is done is stored.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        with nullcontext() if scheduler is None else _executor(scheduler) as executor:
-            result = loaded.run(
-                out=out, workers=workers, executor=executor, part=part, pilot=pilot
-            )
-    except KeyboardInterrupt:
-        echo(f"interrupted: samples so far are in {out}; rerun the command to resume", err=True)
-        raise typer.Exit(130) from None
+    with _resumable(out), _executor(scheduler) as executor:
+        result = loaded.run(out=out, workers=workers, executor=executor, part=part, pilot=pilot)
     dims = list(loaded.axes)
     for name in ("critical_stress", "friction_coefficient"):
         if name in result:
@@ -149,7 +156,12 @@ def run(
         raise typer.Exit(1)
 
 
-def status(run: RunPath) -> None:
+def status(
+    run: RunPath,
+    parts: Annotated[
+        int | None, Option(metavar="N", help="Name those of N parts that are missing.", min=1)
+    ] = None,
+) -> None:
     """Show the completed, failed and damaged parts of a run."""
     from stiction.study.study import open_run
 
@@ -158,19 +170,23 @@ def status(run: RunPath) -> None:
     each = study.ensemble.samples
     echo(f"{run}: {' '.join(study.title.split())}".removesuffix(": "))
     share = 100.0 * state.done / state.samples
-    echo(f"  samples   {state.done} of {state.samples} ({share:.1f} %)")
-    echo(f"  chunks    {state.chunks}")
-    echo(f"  computed  {duration(state.seconds)} of one core")
+    echo(f"  {stored.counted:11s} {state.done} of {state.samples} ({share:.1f} %)")
+    echo(f"  chunks      {state.chunks}")
+    echo(f"  computed    {duration(state.seconds)} of one core")
     counts = zip(study.points, state.done_by_point, strict=True)
     behind = [f"{one}: {done} of {each}" for one, done in counts if done < each]
     _show_some(behind if study.sweep else [], "  ")
-    _show_some(state.damaged, "  damaged   ")
+    if parts is not None:
+        missing = stored.missing_parts(parts)
+        names = ", ".join(f"{k}/{parts}" for k in missing)
+        echo(f"  missing     {f'parts {names}' if names else f'none of {parts} parts'}")
+    _show_some(state.damaged, "  damaged     ")
     if state.damaged:
         echo("  run the study again to repair this")
     else:
-        echo("  verified  all stored chunks match their checksums")
+        echo("  verified    all stored chunks match their checksums")
     if state.failures:
-        echo(f"  failed    {len(state.failures)}; `stiction run` computes them again:")
+        echo(f"  failed      {len(state.failures)}; `stiction run` computes them again:")
         _show_some(state.failures, "    ")
 
 
@@ -188,7 +204,9 @@ def export(
     stored = open_run(run)
     stored.export(out)
     state = stored.status()
-    echo(f"{state.done} of {state.samples} samples written to {out}; the others are NaN")
+    echo(
+        f"{state.done} of {state.samples} {stored.counted} written to {out}; the others are NaN"
+    )
 
 
 def report(
@@ -439,49 +457,39 @@ def _summary(result: Any) -> str:
 
 def reliability(
     study: StudyFile,
-    out: Annotated[Path, Option(help="Folder of the results.")] = Path("stiction-reliability"),
+    out: Annotated[Path, Option(metavar="RUN", help="Folder in which repetitions are stored.")],
     smallest: Annotated[float, Option(help="Smallest probability of the curve.")] = 1e-9,
-    target_cv: Annotated[float, Option(help="Coefficient of variation at `smallest`.")] = 0.3,
+    repetitions: Annotated[int, Option(help="Independent repetitions.", min=1)] = 8,
     workers: Workers = None,
-    max_evaluations: Annotated[
-        int | None, Option(help="Largest number of samples.", min=1)
-    ] = None,
+    scheduler: Scheduler = None,
+    part: Part = None,
 ) -> None:
     """Compute the failure probability of a study's interface, decade by decade.
 
-    Problem, strength, method and seed come from the study file; its number of samples is not
-    used. The command prints the curve and writes `failure_curve.csv`, `failure_curve.nc` and a
-    figure (PNG and PDF) into a folder. The stress is the mean shear stress on the interface;
-    failure means that the interface as a whole slides below it.
+    Problem, strength, method, seed and sweep come from the study file; its number of samples is
+    not used. The stress is the mean shear stress on the interface; failure means that the
+    interface as a whole slides below it. Rerunning the command resumes an interrupted run, and
+    computes more if there are to be more repetitions. `stiction export` writes the curve as a
+    table, `stiction report` a page with its figure.
     """
-    from stiction import plot
-    from stiction.reliability.failure import failure_curve
-    from stiction.study.export import write_result
-    from stiction.study.study import Study
+    from stiction.study.export import table_of
+    from stiction.study.study import Study, open_run
 
     loaded = Study.from_toml(study)
-    if loaded.sweep:
-        raise InputError(
-            "sweep: `stiction reliability` takes one interface; set the values of one"
-            f" point in {study} and remove [[sweep]]"
+    with _resumable(out), _executor(scheduler) as executor:
+        curve = loaded.failure_curve(
+            out=out,
+            repetitions=repetitions,
+            smallest=smallest,
+            workers=workers,
+            executor=executor,
+            part=part,
         )
-    out.mkdir(parents=True, exist_ok=True)
-    curve = failure_curve(
-        loaded.problem,
-        loaded.random,
-        method=loaded.method,
-        seed=loaded.ensemble.seed,
-        smallest=smallest,
-        target_cv=target_cv,
-        workers=workers,
-        max_evaluations=max_evaluations,
+    echo(table_of(curve).to_string(index=False, float_format="{:.7g}".format, max_rows=200))
+    state = open_run(out).status()
+    echo(
+        f"part {part}: " * bool(part) + f"{state.done} of {state.samples} repetitions in {out}"
     )
-    write_result(curve, out / "failure_curve.nc")
-    table = curve.reset_coords().to_dataframe()
-    table.to_csv(out / "failure_curve.csv", index=False)
-    _save_figure(plot.failure_curve(curve), out / "failure_curve")
-    echo(table.to_string(index=False, float_format="{:.7g}".format))
-    echo(f"written to {out}")
 
 
 # -- the program ---------------------------------------------------------------------------------

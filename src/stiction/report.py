@@ -22,6 +22,8 @@ from stiction.files import write_whole
 from stiction.plot.axes import scaled, shown_quantity
 from stiction.plot.style import PAGE, panel, paper_style
 from stiction.statistics.estimates import mean, quantiles, standard_deviation
+from stiction.study.export import table_of
+from stiction.study.failure import StoredCurves
 from stiction.study.run import StoredRun
 from stiction.variables import DIRECTION
 
@@ -85,23 +87,21 @@ def write_report(run: StoredRun, path: Path) -> None:
     state = run.status()
     if not state.done:
         raise InputError(f"{run.path}: no sample is stored yet")
-    names = [
-        "critical_stress",
-        "first_instability",
-        "friction_coefficient",
-        "critical_position",
-    ]
-    result = run.dataset(only=[*names, "arrested_events"])
-    axes = run.study.axes
-    dims = list(axes)
-    page = Page(run.study.title or "Onset of sliding: a Monte Carlo study")
+    what = (
+        "Failure probability"
+        if isinstance(run, StoredCurves)
+        else "Onset of sliding: a Monte Carlo study"
+    )
+    page = Page(run.study.title or what)
     methods = " and ".join(dict.fromkeys(plan.method.label for plan in run.study.experiments))
-    page.text(f"{state.done:,} of {state.samples:,} samples by {methods}.")
+    page.text(f"{state.done:,} of {state.samples:,} {run.counted} by {methods}.")
     if not state.complete:
         page.text("The run is not complete.", warning=True)
     with paper_style():
-        add_figures(page, result, dims)
-    add_tables(page, result, dims, [name for own in axes.values() for name in own])
+        if isinstance(run, StoredCurves):
+            add_curves(page, run)
+        else:
+            add_samples(page, run)
     if state.failures:
         rows = [[str(failure)] for failure in state.failures[:MOST_ROWS]]
         page.table(f"Samples that failed ({len(state.failures):,})", ["sample"], rows)
@@ -114,6 +114,34 @@ def write_report(run: StoredRun, path: Path) -> None:
         f" {__version__}, Python {platform.python_version()}, {packages}."
     )
     write_whole(path, page.html().encode())
+
+
+def add_samples(page: Page, run: StoredRun) -> None:
+    """Add the figures and the tables of samples."""
+    names = [
+        "critical_stress",
+        "first_instability",
+        "friction_coefficient",
+        "critical_position",
+    ]
+    result, axes = run.dataset(only=[*names, "arrested_events"]), run.study.axes
+    add_figures(page, result, list(axes))
+    add_tables(page, result, list(axes), [name for own in axes.values() for name in own])
+
+
+def add_curves(page: Page, run: StoredCurves) -> None:
+    """Add a figure and a table of the failure curve at each point of a sweep."""
+    for point, curve in zip(run.study.points, run.curves(), strict=True):
+        where = f" at {point}" if point.values else ""
+        if np.isnan(curve["stress"]).all():
+            page.text(f"No repetition is stored{where}.", warning=True)
+            continue
+        if point.number < MOST_FIGURES:
+            figure = Figure(figsize=(0.75 * PAGE, 3.2))
+            plot.failure_curve(curve, ax=figure.subplots())
+            page.figure(figure, f"Probability of an onset below a stress{where}.")
+        frame = table_of(curve)
+        page.table(f"Failure probability{where}", list(frame.columns), frame.values.tolist())
 
 
 def add_figures(page: Page, result: xr.Dataset, dims: list[str]) -> None:

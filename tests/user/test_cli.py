@@ -242,7 +242,7 @@ MISTAKES = {
     "onset study.toml --strength p.npy --method local": (2, "local_criterion"),
     "rupture study.toml --out study.toml": (1, "File exists"),
     "rupture study.toml --sample -1": (2, "--sample"),
-    "reliability study.toml": (2, "takes one interface"),
+    "reliability study.toml": (2, "--out"),
     "nothing": (2, "nothing"),
 }
 

@@ -10,7 +10,6 @@ from functools import partial
 import numpy as np
 import pytest
 import scipy.stats
-import xarray as xr
 from refusals import refusals, refuses
 from setups import EXACT, LOCAL, exact_onset, local_onset, make_problem, turns
 
@@ -347,16 +346,3 @@ def test_strengths_in_coefficients_are_compared_as_stresses(units):
     random = st.RandomInterface(strength=strength, residual_strength=residual)
     with pytest.warns(st.AccuracyWarning, match=r"3\.1[23]\d* % of"):
         st.monte_carlo(pressed, random, method=LOCAL, samples=1)
-
-
-def test_command_writes_table_data_and_figure(runs, tmp_path):
-    study, out = tmp_path / "study.toml", tmp_path / "out"
-    ensemble = st.Ensemble(samples=10, seed=3)
-    st.Study(problem=PROBLEM, random=FIELD, method=LOCAL, ensemble=ensemble).to_toml(study)
-    runs(f"reliability {study} --out {out} --smallest 1e-3", "probability")
-    assert {"failure_curve.png", "failure_curve.pdf"} <= {path.name for path in out.iterdir()}
-    with xr.open_dataset(out / "failure_curve.nc") as curve:
-        assert curve["stress"].attrs["units"] == "Pa"
-        assert curve.attrs["lower_bound"] == 0.66e6
-        again = st.failure_curve(*SYSTEM, method=LOCAL, smallest=1e-3, seed=3)
-        np.testing.assert_array_equal(curve["probability"], again["probability"])

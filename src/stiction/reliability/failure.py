@@ -1,6 +1,7 @@
 """Failure probability, design stress and the curve of both: counting, or the tail of the onset."""
 
 import math
+from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -448,11 +449,28 @@ def failure_curve(
             smallest = tail.probability(tail.reached)
     for text in doubts:
         warn_accuracy(text)
-    lowest, pressure = state.bounds[0], experiment.pressure
+    attributes = study_attributes(problem=problem, random=experiment.random, method=method) | {
+        "seed": seed,
+        "evaluations": tail.spent,
+    }
+    return curve_of(tail, state, chances(smallest), attributes)
+
+
+def chances(smallest: float) -> Array:
+    """Return the probabilities of a curve, (points,)."""
     decades = max(np.log10(COMMONEST / smallest), 0.0)
     count = int(np.ceil(decades * PER_DECADE)) + 1
+    found: Array = COMMONEST * 10.0 ** -np.linspace(0.0, decades, count)
+    return found
+
+
+def curve_of(
+    tail: Tail, state: LimitState, wanted: Array, attributes: Mapping[str, Any]
+) -> xr.Dataset:
+    """Return the curve of a tail at these probabilities, labelled."""
+    lowest, pressure = state.bounds[0], state.experiment.pressure
     rows = []
-    for chance in (COMMONEST * 10.0 ** -np.linspace(0.0, decades, count)).tolist():
+    for chance in wanted.tolist():
         stress = tail.quantile(chance)
         found, cv = tail.probability(stress), tail.cv(stress)
         ends = lognormal_interval(found, cv)
@@ -461,11 +479,9 @@ def failure_curve(
     values: dict[str, Any] = dict(zip(CURVE, np.array(rows).T, strict=True))
     if not np.isfinite(pressure):
         del values["friction_coefficient"]
-    attributes = study_attributes(problem=problem, random=experiment.random, method=method) | {
+    about = {
         "lower_bound": lowest,
-        "event": event,
-        "seed": seed,
-        "evaluations": tail.spent,
-        "method": method.type,
+        "event": state.event,
+        "method": state.experiment.method.type,
     }
-    return to_dataset(values, CURVE, {}, attributes)
+    return to_dataset(values, CURVE, {}, {**attributes, **about})

@@ -76,7 +76,11 @@ class StoredRun:
     ----------
     path : Path
     study : Study
+    counted : str
+        What is stored: samples, or repetitions of failure curves.
     """
+
+    counted = "samples"
 
     def __init__(self, store: Store, study: Any) -> None:
         self.path, self.study, self._store = store.path, study, store
@@ -89,7 +93,7 @@ class StoredRun:
         StoreError
             If a stored file cannot be read.
         """
-        rows = self._read(only=())
+        rows: Any = self._read(only=())
         return Status(
             samples=rows.done.size,
             done=int(rows.done.sum()),
@@ -121,7 +125,13 @@ class StoredRun:
             {**self.study.attributes, **(self._store.pilot or {})}, self.study.axes
         )
 
-    def _read(self, only: Sequence[str] | None) -> Gathered:
+    def missing_parts(self, parts: int) -> list[int]:
+        """Return which of so many parts, numbered from 1, are not complete."""
+        done = self._read(only=()).done
+        mine = (samples_of_part((k, parts), *done.shape) for k in range(1, parts + 1))
+        return [k for k, own in enumerate(mine, start=1) if not done[own].all()]
+
+    def _read(self, only: Sequence[str] | None) -> Any:
         rows = Gathered(self.study.experiments, self.study.ensemble, only)
         for table in self._store.chunks():
             rows.add(table)

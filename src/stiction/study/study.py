@@ -21,6 +21,7 @@ from stiction.dynamics.save import Save
 from stiction.ensemble.dataset import GridAxes, variables_in
 from stiction.ensemble.dotted_keys import with_values
 from stiction.ensemble.experiment import Ensemble, Experiment
+from stiction.ensemble.limit_state import Event
 from stiction.ensemble.monte_carlo import gather
 from stiction.ensemble.store import Store, read_study
 from stiction.errors import InputError, StoreError
@@ -40,6 +41,7 @@ from stiction.model import (
 from stiction.problem import Problem
 from stiction.profiles.reading import profile_in_file
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
+from stiction.reliability.answer import Probability
 from stiction.study.run import AnyPart, StoredRun, samples_of_part
 from stiction.study.sweep import Point, Sweep, grid_axes, with_first_values
 
@@ -255,6 +257,62 @@ class Study(_Parts):
             pilot=pilot,
         )
 
+    @checked
+    def failure_curve(
+        self,
+        *,
+        out: FilePath,
+        repetitions: Count = 8,
+        smallest: Probability = 1e-9,
+        event: Event = "critical_stress",
+        workers: Count | None = None,
+        executor: Executor | None = None,
+        progress: Progress = True,
+        part: AnyPart | None = None,
+    ) -> xr.Dataset:
+        """Estimate failure probabilities at every point of the sweep, or the part that is missing.
+
+        Repetition i of subset simulation, with 2,000 samples a level, depends on (seed, i) only.
+        The number of samples of the study is not used.
+
+        Parameters
+        ----------
+        out : path
+            Folder in which repetitions are stored as they are done. The same call resumes an
+            interrupted run, and computes more if `repetitions` was raised.
+        repetitions : int
+            Eight give a coefficient of variation of about 0.2 at 1e-9, 32 half of it.
+        smallest, event
+            As in `stiction.failure_curve`.
+        workers, executor, progress, part
+            As in `run`; parts and executors share repetitions.
+
+        Returns
+        -------
+        xarray.Dataset
+            As from `stiction.failure_curve`, from all repetitions that are stored; over the
+            sweep's axes too, with `lower_bound` (Pa). NaN where none is stored.
+
+        Raises
+        ------
+        InputError, StoreError, RunError
+            As `run`, and if a method is `Rupture`, whose failures can only be counted.
+        """
+        from stiction.study.failure import compute
+
+        settings = {"smallest": smallest, "event": event}
+        found = compute(
+            self,
+            settings,
+            out=out,
+            repetitions=repetitions,
+            workers=workers,
+            executor=executor,
+            progress=progress,
+            part=part,
+        )
+        return found.dataset()
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain dictionaries, lists and numbers, as in TOML.
 
@@ -383,10 +441,14 @@ def open_run(path: Any) -> StoredRun:
     StoreError
         If the folder holds no run, or the run cannot be read.
     """
+    from stiction.study.failure import CURVES, StoredCurves
+
     place = check("path", path, FilePath)
     study = read_study(place)
+    store, settings = Store(place, study), study.pop(CURVES, None)
     try:
-        return StoredRun(Store(place, study), Study.from_dict(study))
+        found = Study.from_dict(study)
+        return StoredCurves(store, found, settings) if settings else StoredRun(store, found)
     except InputError as error:
         raise StoreError(
             f"{place}: this version of stiction cannot read its study, which another version wrote:"

@@ -1,0 +1,203 @@
+"""Failure curves as runs on disk: repetitions of subset simulation in the store of a study."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor, as_completed
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stiction.ensemble.batches import Table, usable_cores
+from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.limit_state import LimitState
+from stiction.ensemble.pilot import exact_counterpart
+from stiction.ensemble.store import Store
+from stiction.errors import InputError, warn_accuracy
+from stiction.progress import SILENT, Meter, Show
+from stiction.reliability.answer import exact_doubts
+from stiction.reliability.failure import chances, curve_of
+from stiction.reliability.repetitions import repetition, repetitions_in, table_of
+from stiction.reliability.subset import Descent
+from stiction.reliability.tail import Tail
+from stiction.results import to_dataset
+from stiction.study.run import StoredRun, samples_of_part
+from stiction.variables import Variable
+
+CURVES = "failure_curve"
+"""Key of the settings of a run of failure curves: its smallest probability and its event."""
+BOUND = "stress below which no interface slides"
+
+
+class Repetitions:
+    """The repetitions of all points of a study that are there, in memory."""
+
+    def __init__(self, points: int, repetitions: int) -> None:
+        self.done = np.zeros((points, repetitions), dtype=np.bool_)
+        self.failed: list[Any] = []  # none does
+        self.tables, self.seconds = 0, 0.0  # of one core
+        self.versions: dict[str, None] = {}
+        self._found: dict[tuple[int, int], Descent] = {}
+
+    def add(self, table: Table) -> None:
+        """Take the repetitions of a table."""
+        self.tables, self.seconds = self.tables + 1, self.seconds + table.seconds
+        self.versions[table.versions] = None
+        for point, number, found in repetitions_in(table.rows):
+            self._found[point, number] = found
+            self.done[point, number] = True
+
+    def tail(self, point: int) -> Tail | None:
+        """Return the tail of a point from all of its repetitions; None without any."""
+        numbers = np.flatnonzero(self.done[point]).tolist()
+        found = [self._found[point, number] for number in numbers]
+        return Tail(found, spent=sum(one.evaluations for one in found)) if found else None
+
+
+class StoredCurves(StoredRun):
+    """A run of failure curves on disk, for reading; see `stiction.open_run`."""
+
+    counted = "repetitions"
+
+    def __init__(self, store: Store, study: Any, settings: Mapping[str, Any]) -> None:
+        super().__init__(store, study)
+        self.settings = settings
+
+    def dataset(self, only: Sequence[str] | None = None) -> xr.Dataset:
+        """Return the curves from all stored repetitions, over the axes of a sweep and 'point'.
+
+        As from `stiction.failure_curve`; NaN at points of the sweep without a repetition.
+        """
+        found, axes = self.curves(), self.study.axes
+        dims, shape = tuple(axes), tuple(len(axes[dim][dim][0]) for dim in axes)
+        result = found[0]
+        if axes:
+            bounds = xr.DataArray([one.attrs["lower_bound"] for one in found], dims="_")
+            result = xr.concat(found, "_", combine_attrs="drop_conflicts")
+            result["lower_bound"] = bounds.assign_attrs(units="Pa", long_name=BOUND)
+            values, variables = {}, {}
+            for name, one in result.items():
+                values[str(name)] = one.values.reshape(shape + one.shape[1:])
+                about = one.attrs["units"], one.attrs["long_name"]
+                variables[str(name)] = Variable(*about, (*dims, *map(str, one.dims[1:])))
+            coordinates = {name: one for own in axes.values() for name, one in own.items()}
+            result = to_dataset(values, variables, coordinates, result.attrs)
+        return result[list(only)] if only else result
+
+    def curves(self) -> list[xr.Dataset]:
+        """Return the curve of each point of the sweep, NaN without a repetition."""
+        rows, wanted = self._read(), chances(self.settings["smallest"])
+        found: list[xr.Dataset | None] = []
+        for point, experiment in enumerate(self.study.experiments):
+            if (tail := rows.tail(point)) is None:
+                found.append(None)
+                continue
+            attributes = {"seed": experiment.seed, "evaluations": tail.spent}
+            attributes |= {"repetitions": len(tail.repetitions)} | self.study.attributes
+            found.append(curve_of(tail, _state(experiment, self.settings), wanted, attributes))
+        some = next((one for one in found if one is not None), None)
+        if some is None:
+            raise InputError(f"{self.path}: no repetition is stored yet")
+        empty = some.where(False).assign_attrs(lower_bound=np.nan)
+        return [empty if one is None else one for one in found]
+
+    def _read(self, only: Sequence[str] | None = None) -> Any:
+        rows = Repetitions(len(self.study.experiments), self.study.ensemble.samples)
+        for table in self._store.chunks():
+            rows.add(table)
+        return rows
+
+
+def _state(
+    experiment: Experiment, settings: Mapping[str, Any], workers: int = 1, meter: Meter = SILENT
+) -> LimitState:
+    return LimitState(experiment, settings["event"], False, workers, meter)
+
+
+def _solve(
+    experiment: Experiment, settings: Mapping[str, Any], point: int, number: int
+) -> Table:
+    return table_of(_state(experiment, settings), point, number, settings["smallest"])
+
+
+def compute(
+    study: Any,
+    settings: Mapping[str, Any],
+    *,
+    out: Path,
+    repetitions: int,
+    workers: int | None,
+    executor: Executor | None,
+    progress: Show,
+    part: tuple[int, int] | None,
+) -> StoredCurves:
+    """Compute the repetitions of a study that are not stored, or a part of them."""
+    points = study.experiments
+    if any(point.method.type == "rupture" for point in points):
+        raise InputError(
+            "method: failures by rupture are counted, not sampled by levels; use st.Equilibrium()"
+            " or st.LocalCriterion(), or failure_probability(..., algorithm='plain')"
+        )
+    plain = study.to_dict()
+    plain["ensemble"] = plain["ensemble"] | {"samples": repetitions}
+    plain[CURVES] = dict(settings)
+    store = Store.open(out, plain)
+    rows = Repetitions(len(points), repetitions)
+    for table in store.chunks():
+        rows.add(table)
+    store.delete_damaged()
+    wanted = ~rows.done
+    if part is not None:
+        wanted &= samples_of_part(part, *wanted.shape)
+    jobs = [(point, number) for number, point in np.argwhere(wanted.T).tolist()]
+    meter = Meter("failure curve", len(jobs), progress, unit="repetitions")
+    with ExitStack() as stack:
+        stack.callback(store.save)  # also on Ctrl-C
+        stack.enter_context(meter)
+        for table in _tables(points, settings, jobs, workers or usable_cores(), executor):
+            store.add(table)
+            meter.advance(1)
+    if store.pilot is None and (part is None or part[0] == 1):
+        doubts = dict.fromkeys(text for point in points for text in _doubts(point, settings))
+        for text in doubts:
+            warn_accuracy(text)
+        store.note_pilot({"doubts": list(doubts)})
+    return StoredCurves(
+        store, replace(study, ensemble=replace(study.ensemble, samples=repetitions)), settings
+    )
+
+
+def _tables(
+    points: Sequence[Experiment],
+    settings: Mapping[str, Any],
+    jobs: Sequence[tuple[int, int]],
+    workers: int,
+    executor: Executor | None,
+) -> Iterator[Table]:
+    """Yield repetitions as they are done: one after the other, or all by an executor."""
+    if executor is None:
+        for point, number in jobs:
+            state = _state(points[point], settings, workers)
+            yield table_of(state, point, number, settings["smallest"])
+        return
+    running = [executor.submit(_solve, points[p], settings, p, number) for p, number in jobs]
+    try:
+        for future in as_completed(running):
+            yield future.result()
+    finally:
+        for future in running:
+            future.cancel()
+
+
+def _doubts(experiment: Experiment, settings: Mapping[str, Any]) -> list[str]:
+    """Compare the local criterion with equilibrium on samples at the end of the curve."""
+    if exact_counterpart(experiment) is None:
+        return []
+    state, smallest = _state(experiment, settings), settings["smallest"]
+    tail = Tail([repetition(state, 0, smallest)])
+    stress = tail.quantile(smallest)
+    return exact_doubts(state, tail.repetitions[0].around(stress), stress, smallest)
