@@ -348,7 +348,7 @@ def onset(
     """
     import pandas as pd
 
-    from stiction.methods import methods
+    from stiction.methods import METHODS
     from stiction.methods import onset as find
     from stiction.profiles.reading import read_profile
     from stiction.study.export import table_of
@@ -357,8 +357,8 @@ def onset(
 
     setup = read_setup(study)
     problem, own = setup.problem, setup.method
-    if unknown := [name for name in method or () if name not in methods()]:
-        raise InputError([unknown_name("--method", name, methods()) for name in unknown])
+    if unknown := [name for name in method or () if name not in METHODS]:
+        raise InputError([unknown_name("--method", name, METHODS) for name in unknown])
     profile = read_profile(
         strength,
         interface=problem.interface,
@@ -374,10 +374,10 @@ def onset(
     printed = (*ONSET_VARIABLES, "friction_coefficient")
     rows: dict[str, dict[str, float]] = {}
     refused: list[str] = []
-    for name in method or methods():
+    for name in method or METHODS.usable():
         options = {"loading_rate": LOADING_RATE} if name == "rupture" else {}
         try:
-            one = own if own is not None and own.type == name else methods()[name](**options)
+            one = own if own is not None and own.type == name else METHODS[name](**options)
             with Meter(f"onset by {name}"):
                 found = table_of(find(problem, profile, method=one))
             rows[name] = {key: v[0] for key, v in found.items() if key.startswith(printed)}

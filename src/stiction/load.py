@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.interface import Interface
-from stiction.kinds import OneOf, from_table
+from stiction.kinds import Kinds, OneOf, register
 from stiction.model import (
     PROFILE_SCHEMA,
     OptionalProfile,
@@ -29,9 +29,11 @@ class LoadShape(ABC):
     """A load profile given by a formula, scaled to a mean of one: tau_0 is then the mean stress.
 
     To add one, decorate a class that derives from it with `stiction.model.model`, so that
-    its parameters are checked, and with `register`, so that study files accept its `type`.
+    its parameters are checked, and with `stiction.kinds.register`, so that study files accept its
+    `type`.
     """
 
+    family: ClassVar[str] = "loads"
     type: str
 
     @abstractmethod
@@ -50,16 +52,8 @@ class LoadShape(ABC):
         return np.ascontiguousarray(np.broadcast_to(values, interface.shape))
 
 
-Shape = TypeVar("Shape", bound=type[LoadShape])
-
-SHAPES: dict[str, Any] = {}
+LOADS = Kinds("loads")
 """Load shapes of study files by their `type`."""
-
-
-def register(shape: Shape) -> Shape:
-    """Let study files name a load shape by its `type`, wherever its class is imported."""
-    SHAPES[shape.type] = shape
-    return shape
 
 
 def distance(interface: Interface, centre: float) -> Array:
@@ -122,10 +116,7 @@ class EdgeLoad(LoadShape):
 
 
 def _shape(value: Any) -> Any:
-    if isinstance(value, LoadShape):
-        return value
-    table = isinstance(value, dict) and "type" in value
-    return from_table(SHAPES, value) if table else NotImplemented
+    return value if isinstance(value, LoadShape) else NotImplemented
 
 
 @model
@@ -147,7 +138,7 @@ class Load:
     >>> load = st.Load(profile=st.EdgeLoad(excess=2.0, decay=0.01), normal_pressure=5e6)
     """
 
-    profile: Annotated[Profile, OneOf(SHAPES, _shape, PROFILE_SCHEMA)] = 1.0
+    profile: Annotated[Profile, OneOf(LOADS, _shape, PROFILE_SCHEMA)] = 1.0
     initial_stress: Profile = 0.0
     normal_pressure: OptionalProfile = None
 

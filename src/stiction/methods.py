@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import lru_cache
-from importlib import import_module
-from importlib.metadata import entry_points
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, TypeAlias
 
@@ -14,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
 from stiction.errors import InputError
+from stiction.kinds import Kinds
 from stiction.model import Progress, checked, is_finite
 from stiction.problem import Problem, Sample, refusals
 from stiction.profiles.placing import with_gaps
@@ -36,22 +34,20 @@ TICK, MOST = 0.5, 512
 Values = dict[str, NDArray[Any]]
 Solver = Callable[[Sample], Mapping[str, NDArray[Any]]]
 
-ENTRY_POINTS = "stiction.methods"
-"""Group of entry points by which other packages offer methods."""
-
-_OWN = {
+OWN = {
     "local_criterion": "criterion.local:LocalCriterion",
     "equilibrium": "equilibrium.method:Equilibrium",
     "rupture": "dynamics.method:Rupture",
 }
+METHODS = Kinds("methods", OWN)
+"""The classes of methods by their `type`."""
 
 
 class Method(Protocol):
     """Protocol of a method: options, and a solver that follows from them.
 
-    Any frozen dataclass with these members serves `stiction.onset` and `stiction.monte_carlo`. A
-    package that names it under the entry points "stiction.methods" offers it in study files too;
-    its `type` is then a ``Literal`` with a default.
+    Any frozen dataclass with these members serves `stiction.onset` and `stiction.monte_carlo`, and
+    study files too if `stiction.kinds.register` or an entry point makes its `type` known.
     Three more members are optional: `warn_of(problem, sample, values)`, called once with what the
     solver returned; `accepts`, of "barriers" and "overstress" (see `Problem.sample`); and
     `first_stage`, the type of a faster method with similar onsets, by which rare failures are found
@@ -83,22 +79,6 @@ class Method(Protocol):
 
 
 MEMBERS = [name for name in vars(Method) if not name.startswith("_")]
-
-
-@lru_cache(maxsize=1)
-def methods() -> Mapping[str, Any]:
-    """The classes of all methods by their `type`: the package's own, then those of others."""
-    found: dict[str, Any] = {}
-    for name, place in _OWN.items():
-        module, attribute = place.split(":")
-        found[name] = getattr(import_module(f"stiction.{module}"), attribute)
-    for point in entry_points(group=ENTRY_POINTS):
-        if point.name in found:
-            raise InputError(
-                f"{ENTRY_POINTS}: two methods are called {point.name!r}; uninstall one of them"
-            )
-        found[point.name] = point.load()
-    return MappingProxyType(found)
 
 
 def as_method(value: Any) -> Any:

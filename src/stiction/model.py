@@ -210,11 +210,11 @@ Mode: TypeAlias = Literal["II", "III"]
 # -- mistakes ------------------------------------------------------------------------------------
 
 
-class _Inside(InputError):
+class Mistakes(InputError):
     """Mistakes inside a model, as pairs of a path and a text."""
 
     def __init__(self, found: list[tuple[str, str]]) -> None:
-        super().__init__(text for _, text in found)
+        super().__init__(_joined(path, text, by=": ") for path, text in found)
         self.found = found
 
 
@@ -233,7 +233,7 @@ def keys_of(cls: Any) -> dict[str, str]:
     return {(name in known and known[name].alias) or name: name for name in names}
 
 
-def _mistakes(
+def mistakes(
     error: pydantic.ValidationError, valid: Sequence[str], call: bool
 ) -> list[tuple[str, str]]:
     """Return the mistakes that pydantic found in one model or call, each with its path.
@@ -248,13 +248,13 @@ def _mistakes(
         wrong = context.get("error")
         if steps and isinstance(steps[0], int) and steps[0] < len(valid):
             steps[0] = valid[steps[0]]
-        if call or isinstance(wrong, _Inside):
+        if call or isinstance(wrong, Mistakes):
             named = steps[: bool(valid)]
             steps = named + [step for step in steps[len(named) :] if isinstance(step, int)]
         path = ".".join(map(str, steps))
         if isinstance(wrong, InputError):
             pairs = [("", text) for text in wrong.problems]
-            for inner, text in wrong.found if isinstance(wrong, _Inside) else pairs:
+            for inner, text in wrong.found if isinstance(wrong, Mistakes) else pairs:
                 found[_joined(path, inner), text, ""] = [""]
             continue
         text, member = str(wrong), ""
@@ -264,11 +264,6 @@ def _mistakes(
             text, given = "missing", ""
         elif kind in ("unexpected_keyword_argument", "extra_forbidden"):
             path, text, given = "", unknown(path, valid), ""
-        elif kind == "union_tag_invalid":
-            tags = [tag.strip("' ") for tag in context["expected_tags"].split(",")]
-            path, text, given = f"{path}.type", unknown(str(context["tag"]), tags), ""
-        elif kind == "union_tag_not_found":
-            path, text = f"{path}.type", "missing"
         elif wrong is None:
             name = str(context.get("class_name") or context.get("class") or "")
             text, member = "must be ", item["msg"].removeprefix("Input should be ")
@@ -286,7 +281,7 @@ def _joined(*steps: str, by: str = ".") -> str:
 
 def explain(error: pydantic.ValidationError, root: str = "") -> list[str]:
     """List the mistakes that pydantic found, one text each, with its path below `root`."""
-    found = _mistakes(error, (), True)
+    found = mistakes(error, (), True)
     return [_joined(_joined(root, path), text, by=": ") for path, text in found]
 
 
@@ -298,7 +293,7 @@ def _explained(cls: Any, given: Any, handler: Callable[[Any], Any]) -> Any:
     try:
         return handler(given)
     except pydantic.ValidationError as error:
-        raise _Inside(_mistakes(error, list(keys_of(cls)), False)) from None
+        raise Mistakes(mistakes(error, list(keys_of(cls)), False)) from None
 
 
 @typing.overload
@@ -423,7 +418,7 @@ def checked(function: Function) -> Function:
         try:
             return validated(*args, **kwargs)
         except pydantic.ValidationError as error:
-            found = _mistakes(error, names, True)
+            found = mistakes(error, names, True)
             raise InputError(
                 f"{path or function.__name__}: {text}" for path, text in found
             ) from None

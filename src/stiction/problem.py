@@ -207,7 +207,8 @@ class Problem:
         return problems
 
     def _warn_if_short(self, rate: float) -> None:
-        patch, length = self.nucleation_lengths(rate)[0], min(self.interface.lengths)
+        patch = self.nucleation_lengths(rate * self.friction.steepening)[0]
+        length = min(self.interface.lengths)
         if patch >= length:
             warn_user(
                 f"the critical patch (nucleation length {patch:.3g} m) fills the interface"
@@ -260,6 +261,7 @@ class Problem:
     def nucleation_length(self) -> float:
         """h_n = 2 lambda_0 G*/W, m (Uenishi and Rice, 2003), of a uniform weakening rate.
 
+        If the law steepens, W is the steepest rate.
         It raises an `InputError` if the rate varies along the interface or follows from
         other parameters.
         """
@@ -269,7 +271,7 @@ class Problem:
                 " weakening_rate, about (strength - residual_strength)/critical_slip, or use"
                 " st.Equilibrium() or st.Rupture(), which need none"
             )
-        return self.nucleation_lengths(self.uniform_rate)[0]
+        return self.nucleation_lengths(self.uniform_rate * self.friction.steepening)[0]
 
     def nucleation_lengths(self, rate: float) -> tuple[float, ...]:
         """Return h_n of a uniform weakening rate (Pa/m) in each direction, m.
@@ -286,14 +288,14 @@ class Problem:
 
         It returns one number per direction. If the law steepens, the steepest rate counts.
         """
-        steepest = rate * self.friction.steepest_slope / self.friction.initial_slope
-        lengths = zip(self.nucleation_lengths(steepest), self.interface.spacings, strict=True)
-        return tuple(length / spacing for length, spacing in lengths)
+        lengths = self.nucleation_lengths(rate * self.friction.steepening)
+        return tuple(np.divide(lengths, self.interface.spacings).tolist())
 
     def _check_resolution(self, highest_rate: float) -> None:
         resolution = self.nodes_in_nucleation_length(highest_rate)
         if min(resolution) < FEWEST_NODES:
-            length = self.nucleation_lengths(highest_rate)[int(np.argmin(resolution))]
+            steepest = highest_rate * self.friction.steepening
+            length = self.nucleation_lengths(steepest)[int(np.argmin(resolution))]
             raise InputError(
                 f"interface.nodes: the nucleation length {length:.3g} m spans"
                 f" {min(*resolution, FEWEST_NODES - 0.01):.3g} nodes; at least"

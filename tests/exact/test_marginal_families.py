@@ -7,9 +7,10 @@ import pytest
 import scipy.stats
 
 import stiction as st
+from stiction.kinds import register
 from stiction.model import model, to_plain
-from stiction.random.marginals import MARGINALS, Marginal, affine_parameters
-from stiction.random.spectra import SPECTRA, ScaledSpectrum
+from stiction.random.marginals import Marginal, affine_parameters
+from stiction.random.spectra import ScaledSpectrum
 
 SPECTRUM = st.PowerLawSpectrum(correlation_length=2e-3)
 EACH = [
@@ -58,7 +59,8 @@ def test_names_of_scipy_still_mean_scipy():
     assert ours.standard_deviation == pytest.approx(1e6)
 
 
-def test_one_class_and_one_line_add_a_marginal_and_a_spectrum(monkeypatch):
+def test_one_class_and_one_line_add_a_marginal_and_a_spectrum():
+    @register
     @model
     class Triangular(Marginal):
         low: float
@@ -69,6 +71,7 @@ def test_one_class_and_one_line_add_a_marginal_and_a_spectrum(monkeypatch):
         def distribution(self):
             return scipy.stats.triang(0.5, self.low, self.high - self.low)
 
+    @register
     @model
     class Band(ScaledSpectrum):
         type: str = "band"
@@ -82,8 +85,9 @@ def test_one_class_and_one_line_add_a_marginal_and_a_spectrum(monkeypatch):
         def quantile(self, share, dimensions=1):
             return self.scale * share ** (1.0 / dimensions)
 
-    monkeypatch.setitem(MARGINALS, "triangular", Triangular)
-    monkeypatch.setitem(SPECTRA, "band", Band)
+        def untruncated_correlation(self, lag):
+            return np.sinc(np.asarray(lag) * self.scale / np.pi)
+
     table = {
         "marginal": {"type": "triangular", "low": 1e6, "high": 2e6},
         "spectrum": {"type": "band", "correlation_length": 1e-3},

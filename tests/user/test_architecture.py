@@ -1,17 +1,18 @@
 """Imports run downwards as docs/architecture.md draws them, and kernels depend on kernels only."""
 
 import dataclasses
+import os
 import re
 import tomllib
 from pathlib import Path
 
-import numpy as np
-import pydantic
 from checks import python
 from refusals import refuses
 
 import stiction as st
-from stiction.model import to_plain
+from stiction.kinds import register
+from stiction.load import LoadShape
+from stiction.model import model
 
 MIXED = {
     "average.py", "diagnostics.py", "explicit.py", "implicit.py", "loading.py",
@@ -53,23 +54,100 @@ def test_an_edited_message_compiles_no_kernel_anew():
             assert module == "stiction.jit" or "InputError" not in imported, (path, module)
 
 
-def test_the_worked_examples_run(monkeypatch):
-    """A friction law, a load, a spectrum and a marginal of one's own, as the page shows them."""
+def worked_examples(language: str) -> list[str]:
     page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
-    names: dict = {"__name__": __name__}
-    for block in re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL):
-        exec(block, names)
+    return re.findall(rf"```{language}\n(.*?)```", page, flags=re.DOTALL)
+
+
+READ = """
+import sys, numpy as np, stiction as st
+found = st.open_run("found")
+assert found.study == st.Study.from_toml("study.toml") == st.Study.from_dict(found.study.to_dict())
+names = [type(one).__name__ for one in (
+    found.study.problem.friction, found.study.problem.load.profile, found.study.method,
+    found.study.random.strength.marginal, found.study.random.strength.spectrum)]
+assert "my_package" in sys.modules and found.dataset().sizes == {"sample": 8}, names
+own = sys.modules["my_package"]
+assert np.array_equal(own.onset.critical_load, found.dataset().critical_load)
+print(*names)
+"""
+
+
+def test_a_package_adds_one_of_each_kind_as_the_page_shows(tmp_path):
+    """In Python, by entry points in a study file, on the command line, and read back."""
+    (tmp_path / "my_package.py").write_text("\n\n".join(worked_examples("python")))
+    entries, study = worked_examples("toml")
+    (tmp_path / "study.toml").write_text(study)
+    offered = tomllib.loads(entries)["project"]["entry-points"]
+    offered["stiction.laws"]["torn"] = "my_package:NoSuchLaw"
+    write_package(tmp_path, offered)
+    places = {"cwd": tmp_path, "MPLBACKEND": "Agg"}
+    places["PYTHONPATH"] = os.pathsep.join(map(str, (tmp_path, SOURCES.parent)))
+    python("-m", "stiction", "run", "study.toml", "--out", "found", **places)
+    names = "SquareWeakening BumpLoad WeakestNode Triangular BandSpectrum\n"
+    assert python("-c", READ, **places) == names
+    # What cannot be imported is a warning where all are asked for, an error where it is named.
+    words = "'torn' of the package my-package (entry point of stiction.laws) cannot be used"
+    assert f"left out: {words}" in python("-c", SCHEMA, **places)
+    (tmp_path / "study.toml").write_text(study.replace('"square"', '"torn"'))
+    assert words in python("-m", "stiction", "check", "study.toml", code=2, **places)
+
+
+SCHEMA = """
+import sys, warnings
+from stiction.study.study import study_schema
+with warnings.catch_warnings(record=True) as found:
+    warnings.simplefilter("always")
+    text = str(study_schema())
+assert "'const': 'square'" in text and "'const': 'band'" in text and "torn" not in text
+print(*[one.message for one in found])
+"""
+
+
+def write_package(folder: Path, entry_points: dict[str, dict[str, str]]) -> None:
+    """What an installed package leaves beside its modules."""
+    info = folder / "my_package-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-package\nVersion: 1.0\n")
+    lines = [
+        line
+        for group, points in entry_points.items()
+        for line in (f"[{group}]", *(f"{name} = {place}" for name, place in points.items()))
+    ]
+    (info / "entry_points.txt").write_text("\n".join(lines))
+
+
+def test_what_no_file_can_name_is_refused_before_anything_is_computed(tmp_path):
+    @model
+    class Unregistered(LoadShape):
+        type: str = "unregistered"
+
+        def values(self, interface):
+            return 1.0 + 0.1 * interface.x / interface.lengths[0]
+
     base = st.paper.problem(nodes=256)
-    problem = dataclasses.replace(base, friction=names["law"], load=names["load"])
-    sample = problem.sample(names["field"].sample(base.interface, samples=2, seed=0))
-    found = st.onset(problem, sample, method=st.LocalCriterion(), progress=False)
-    assert np.all(np.abs(found.critical_position - 0.05) < 0.02)
-    # The load in study files, and what is refused of it.
-    loaded, bump = dataclasses.replace(base, load=names["load"]), names["BumpLoad"]
-    plain = to_plain(loaded)
-    assert plain["load"]["profile"] == {"type": "bump", "width": 0.02}
-    assert pydantic.TypeAdapter(st.Problem).validate_python(plain) == loaded
-    words = "BumpLoad.width: must be greater than 0"
-    refuses(words, lambda: st.Load(profile={"type": "bump", "width": 0.0}))
-    monkeypatch.setattr(bump, "values", lambda self, interface: interface.x - 0.01)
-    refuses("Bump ... must be positive everywhere", lambda: bump(width=0.01).on(base.interface))
+    problem = dataclasses.replace(base, load=st.Load(profile=Unregistered()))
+    study = st.Study(
+        problem=problem, random=st.paper.strength(base, correlation_ratio=2.0),
+        method=st.LocalCriterion(), ensemble=st.Ensemble(samples=2),
+    )  # fmt: skip
+    words = "Unregistered is a class of your own that study files cannot name"
+    assert words in study.run(progress=False).attrs["study_incomplete"]
+    refuses(words, lambda: study.to_toml(tmp_path / "study.toml"))
+    refuses(words, lambda: study.run(out=tmp_path / "found"))
+    assert list(tmp_path.iterdir()) == []
+    register(Unregistered)
+    assert st.Study.from_dict(study.to_dict()) == study
+    wrong = {"type": "unregistered", "width": 0.0}
+    refuses("profile: unknown 'width' (valid: type)", lambda: st.Load(profile=wrong))
+
+    @model
+    class Another(Unregistered):
+        pass
+
+    refuses("Another: the type 'unregistered' is that of", lambda: register(Another))
+    refuses("needs a field such as type", lambda: register(LoadShape))
+    Another.values = lambda self, interface: interface.x - 0.01
+    refuses("Another must be positive everywhere", lambda: Another().on(base.interface))
+    Another.__abstractmethods__ = frozenset({"values"})
+    refuses("Another: lacks values", lambda: register(Another))

@@ -63,16 +63,15 @@ def test_kernels_need_no_folder(run):
 LAWS = """
 from typing import NamedTuple
 import numpy as np, stiction as st
-from stiction.friction import kernels, register
+from stiction.friction import kernels
 
 class OwnParameters(NamedTuple):
     scale: float
     initial_slope: float = 1.0
 
-def shape(law, u):
-    return law.scale * 1.0, 1.0
+    def f(law, u):
+        return law.scale * 1.0, 1.0
 
-register(OwnParameters, shape)
 ones = np.ones(3)
 linear = st.LinearWeakening(weakening_rate=1.0).parameters
 for law in (OwnParameters(2.0), linear):

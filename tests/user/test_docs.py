@@ -128,7 +128,8 @@ def test_the_tutorials_data_are_what_the_script_makes_and_say_so():
 
 def test_tables_of_study_files():
     """Each is valid TOML; what the page on studies shows of a study makes a valid one."""
-    parsed = [tomllib.loads(block) for page in PAGES for block in blocks(page, "toml")]
+    pages = [page for page in PAGES if page.stem != "architecture"]  # names a reader's package
+    parsed = [tomllib.loads(block) for page in pages for block in blocks(page, "toml")]
     assert len(parsed) >= 5
     whole = tomllib.loads((ROOT / "examples" / "paper.toml").read_text())
     whole["method"] = {"type": "equilibrium"}  # the one that can keep slip and sensitivity

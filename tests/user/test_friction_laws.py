@@ -10,7 +10,7 @@ from refusals import refusals, refuses
 from setups import LENGTH, beta_strength, make_problem
 
 import stiction as st
-from stiction.friction import FrictionLaw, register
+from stiction.friction import FrictionLaw
 from stiction.model import model
 
 LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
@@ -59,8 +59,10 @@ test_what_a_law_does_not_allow_is_refused = refusals({
 @pytest.mark.parametrize("law", [EXPONENTIAL, DUAL])
 @pytest.mark.filterwarnings("default::stiction.AccuracyWarning")
 def test_local_criterion_speaks_of_other_laws(law):
-    with pytest.warns(st.AccuracyWarning, match="weakening rate at zero slip"):
+    with pytest.warns(st.AccuracyWarning, match="weakening rate at zero slip") as found:
         onset(law, method=LOCAL)
+    # Its error was measured for the exponential law only.
+    assert ("at most 3 %" in str(found[0].message)) is (law is EXPONENTIAL)
     with pytest.warns(st.AccuracyWarning, match="weakening rate at zero slip"):
         st.theory.nucleation_stress(with_law(law), TAU_P)
 
@@ -106,8 +108,8 @@ def test_law_in_a_study_file(tmp_path, law):
 def own_law(shape, slip_at, area=np.asarray, slope=1.0, name="initial_slope"):
     """A law as somebody else would write it: f and its slope, its inverse and its integral."""
 
-    parameters_type = namedtuple("Parameters", [name], defaults=[slope])
-    register(parameters_type, shape)
+    fields = namedtuple("Fields", [name], defaults=[slope])
+    parameters_type = type("Parameters", (fields,), {"f": shape, "__slots__": ()})
 
     @model
     class Own(FrictionLaw):
@@ -163,7 +165,7 @@ def test_law_of_ones_own():
     assert found == pytest.approx(expected, rel=1e-12)
     method = dataclasses.replace(RUPTURE, stop="onset")
     run = st.simulate_rupture(with_law(own), TAU_P, method=method, save=st.Save([]))
-    assert "a law of your own" in run.attrs["study_incomplete"]
+    assert "Own is a class of your own" in run.attrs["study_incomplete"]
     refuses("Own has none", lambda: onset(own))
     polygons = [st.PiecewiseWeakening.from_law(law, 32) for law in (own, EXPONENTIAL)]
     assert polygons[0] == polygons[1]
@@ -188,13 +190,44 @@ def test_a_plateau_is_followed_and_its_later_slope_counts():
     refuses("up to 3 times as steeply", lambda: onset(law, method=LOCAL))
 
 
+def test_the_nucleation_length_is_that_of_the_steepest_slope():
+    """A law that hardly falls at first is not one of an interface that slides as a whole."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", st.UnitWarning)
+        law = st.PiecewiseWeakening(
+            slip=[0.5, 1.0], strength=[0.99, 0.0], weakening_rate=0.005e12
+        )
+        late = make_problem(512, 0.05, friction=law)
+    first = dataclasses.replace(late, friction=st.LinearWeakening(weakening_rate=0.5e12))
+    # 1.98 against 0.02: a nucleation length of 99 times the first slope's.
+    length = first.nucleation_length * 0.5e12 / (99.0 * 0.005e12)
+    assert late.nucleation_length == pytest.approx(length, rel=1e-12)
+    nodes = late.nodes_in_nucleation_length(0.005e12)
+    assert nodes == pytest.approx([length / late.interface.spacing], rel=1e-12)
+
+
 def hump(law, u):
     """Rises by a tenth before it falls: no method of the package can follow it."""
-    return np.interp(u, [0.0, 0.2, 1.0], [1.0, 1.1, 0.0]), 1.0
+    return (1.0 - 0.1 * u, 0.1) if u < 0.2 else (1.0 + 0.1 * np.sin(20.0 * u), 0.1)
 
 
 LAWS = {
-    "strength must not rise with slip, as beyond u = 0": (hump, lambda f: 1.0 - 0.8 * f / 1.1),
+    "strength must not rise with slip, as beyond u = 0.2": (
+        hump, lambda f: 1.0 - 0.8 * f / 1.1, np.asarray, 0.1
+    ),
+    "f must fall from zero slip on, got -f'(0) = 0; it sets the weakening rate": (
+        lambda law, u: (0.5 + 0.5 * np.cos(np.pi * u), 0.5 * np.pi * np.sin(np.pi * u)),
+        lambda f: np.arccos(2.0 * f - 1.0) / np.pi, np.asarray, 0.0,
+    ),
+    "the integral of f, area(inf), must be finite, got inf": (
+        lambda law, u: (1.0 / (1.0 + u), (1.0 + u) ** -2),
+        lambda f: 1.0 / f - 1.0 if f else np.inf, np.log1p,
+    ),
+    "numba cannot compile its f ... : Unknown attribute 'nodes' of type": (
+        lambda law, u: (1.0 - min(u, 1.0), TAU_P.nodes), lambda f: 1.0 - f,
+    ),
+    "f and -f' must be finite up to u = 1":
+        (lambda law, u: (1.0 - u, 1.0 / (1.0 - u)), lambda f: 1.0 - f),
     "its parameters need a field initial_slope": (
         plateau, plateau_slip, plateau_area, 1.0, "scale",
     ),

@@ -10,6 +10,7 @@ from stiction.arrays import Array
 from stiction.criterion.average import averages, least_average
 from stiction.criterion.windows import Window, windows_of
 from stiction.errors import InputError, warn_accuracy
+from stiction.friction import ExponentialWeakening
 from stiction.model import checked, model
 from stiction.problem import Problem, Sample, refusals
 from stiction.results import onset_variables, position
@@ -71,11 +72,10 @@ class LocalCriterion:
     def supports(self, problem: Problem) -> list[str]:
         """Return the reasons why it cannot solve a problem; none if it can."""
         friction, reasons = problem.friction, []
-        if friction.steepest_slope > friction.initial_slope:
-            times = friction.steepest_slope / friction.initial_slope
+        if friction.steepening > 1.0:
             reasons.append(
-                f"friction: this law falls up to {times:.3g} times as steeply later as at zero"
-                f" slip, whose weakening rate the local criterion takes{INSTEAD}"
+                f"friction: this law falls up to {friction.steepening:.3g} times as steeply later"
+                f" as at zero slip, whose weakening rate the local criterion takes{INSTEAD}"
             )
         if friction.weakening_rate is not None and problem.uniform_rate is None:
             reasons.append(
@@ -243,11 +243,16 @@ def check_law(problem: Problem) -> None:
     if refused := refusals(problem, LocalCriterion()):
         raise InputError(refused)
     if not problem.friction.linear:
+        measured = ""
+        if isinstance(problem.friction, ExponentialWeakening):
+            measured = (
+                ", by 0.6 % (at most 3 %) at a correlation length of h_n, by 2 % (at most 7 %) at"
+                " one of h_n/4"
+            )
         warn_accuracy(
             "friction: the local criterion takes the weakening rate at zero slip as constant, so"
-            " the onset is later than it predicts: with an exponential law by 0.6 % (at most 3 %)"
-            " at a correlation length of h_n, by 2 % (at most 7 %) at one of h_n/4;"
-            " st.Equilibrium() is exact for piecewise linear laws"
+            f" the onset is later than it predicts{measured}; st.Equilibrium() is exact for"
+            " piecewise linear laws"
         )
 
 

@@ -7,4 +7,3 @@ from stiction.friction.laws import FrictionLaw as FrictionLaw
 from stiction.friction.laws import LinearWeakening as LinearWeakening
 from stiction.friction.laws import PiecewiseWeakening as PiecewiseWeakening
 from stiction.friction.laws import contradictions as contradictions
-from stiction.friction.parameters import register as register

@@ -13,7 +13,7 @@ import numpy as np
 from numba.extending import overload
 
 from stiction.arrays import Array
-from stiction.friction.parameters import SHAPES, Linear
+from stiction.friction.parameters import Linear
 from stiction.jit import jit, jit_allocating
 
 # numba compares the names of arguments with their annotations, so functions by type have none.
@@ -31,6 +31,12 @@ def _line_of(law, peak, residual, rate, slip, ahead):
 
 
 @cache
+def compiled(parameters: Any) -> Any:
+    """Return f and -f' of laws with parameters of a type, compiled."""
+    return jit(parameters.f)
+
+
+@cache
 def _by_type(parameters: type) -> Callable[..., tuple[float, float]]:
     """Return `line_at` for laws with parameters of a type."""
 
@@ -41,7 +47,7 @@ def _by_type(parameters: type) -> Callable[..., tuple[float, float]]:
 
     if parameters is Linear:
         return linear
-    shape = jit(SHAPES[parameters])
+    shape = compiled(parameters)
 
     def line(law, peak, residual, rate, slip, ahead):
         drop, first = peak - residual, law.initial_slope

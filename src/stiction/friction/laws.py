@@ -1,29 +1,32 @@
 """Friction laws: strength that falls with slip from tau_p to tau_r.
 
-To add one, derive from `FrictionLaw`, `register` its function f and add it to `LAWS`; in Python, an
-object of any class that derives from `FrictionLaw` serves.
+To add one, derive from `FrictionLaw`; `register` makes it known to study files.
 """
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
-from pydantic import BeforeValidator, Field, WrapSerializer, WrapValidator, model_validator
+from pydantic import BeforeValidator, model_validator
 
 from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.friction.parameters import SHAPES, Exponential, Linear, Polygon
+from stiction.friction.parameters import Exponential, Linear, Parameters, Polygon
+from stiction.kinds import Kinds, OneOf, register
 from stiction.model import OptionalProfile, Profile, Real, at_least, checked, is_unplaced, model
 
 SCALES = ("weakening_rate", "critical_slip", "fracture_energy")
 """Any one of them sets how fast a law weakens."""
-NEARLY_RESIDUAL = (
-    0.01  # of tau_p - tau_r is left where a law that never ends counts as residual
-)
-SLIPS = 4097  # up to `FrictionLaw.reach`, at which a law of one's own is examined
+NEARLY_RESIDUAL = 0.01
+"""Share of tau_p - tau_r that is left where a law that never ends counts as residual."""
+SLIPS = 4097
+"""Number of slips up to `FrictionLaw.reach` at which a law of one's own is examined."""
+LAWS = Kinds("laws")
+"""The laws of study files by their `type`."""
 _VALID = {
     **dict.fromkeys(SCALES, (lambda value: value > 0.0, "be positive everywhere")),
     "residual_strength": (lambda value: value >= 0.0, "not be negative"),
@@ -35,11 +38,12 @@ _VALID = {
 class FrictionLaw(ABC):
     """Strength tau_f(d) = tau_r + (tau_p - tau_r) f(d/d_c), f falling from 1 to 0.
 
-    A law is the function f, `register`ed for the type of its `parameters`, with its integral and
-    its inverse. The parameters are those of `LinearWeakening`, with
-    W = -f'(0) (tau_p - tau_r)/d_c and Gamma = (tau_p - tau_r) d_c times the integral of f.
+    A law is the function f, with which its `parameters` come, its integral and its inverse. The
+    arguments are those of `LinearWeakening`, with W = -f'(0) (tau_p - tau_r)/d_c and
+    Gamma = (tau_p - tau_r) d_c times the integral of f.
     """
 
+    family: ClassVar[str] = "laws"
     weakening_rate: OptionalProfile = None
     critical_slip: OptionalProfile = None
     residual_strength: Profile = 0.0
@@ -70,8 +74,8 @@ class FrictionLaw(ABC):
 
     @property
     @abstractmethod
-    def parameters(self) -> Any:
-        """Parameters of f for kernels, with `initial_slope`: a NamedTuple type of this law."""
+    def parameters(self) -> Parameters:
+        """What kernels take of the law: a NamedTuple of a type of its own, with f."""
 
     @abstractmethod
     def area(self, u: Any) -> Array:
@@ -83,9 +87,8 @@ class FrictionLaw(ABC):
 
     def fraction(self, u: Any) -> Array:
         """Return f(u) at slips u in units of d_c, any shape."""
-        parameters = self.parameters
-        shape = SHAPES[type(parameters)]
-        return np.vectorize(lambda one: shape(parameters, one)[0], otypes=[float])(u)
+        f = self.parameters.f
+        return np.vectorize(lambda one: f(one)[0], otypes=[float])(u)
 
     @property
     def initial_slope(self) -> float:
@@ -95,12 +98,16 @@ class FrictionLaw(ABC):
     @property
     def steepest_slope(self) -> float:
         """The largest -f'(u); that at zero slip unless another is larger by 0.1 %."""
-        parameters, first = self.parameters, self.initial_slope
-        if isinstance(parameters, Linear | Exponential):
+        first = self.initial_slope
+        if isinstance(self.parameters, Linear | Exponential):
             return first
-        shape = SHAPES[type(parameters)]
-        later = max(float(shape(parameters, u)[1]) for u in np.linspace(0.0, self.reach, SLIPS))
+        later = float(_examined(self)[2].max())
         return later if later > 1.001 * first else first
+
+    @property
+    def steepening(self) -> float:
+        """The steepest slope over the first, at least 1: it decides what is unstable."""
+        return self.steepest_slope / self.initial_slope
 
     @property
     def integral(self) -> float:
@@ -160,6 +167,7 @@ class FrictionLaw(ABC):
         return drop * critical * self.area(u)
 
 
+@register
 @model
 class LinearWeakening(FrictionLaw):
     """Strength that falls linearly with slip: max(tau_p - W d, tau_r).
@@ -197,6 +205,7 @@ class LinearWeakening(FrictionLaw):
         return 1.0 - fraction
 
 
+@register
 @model
 class ExponentialWeakening(FrictionLaw):
     """Strength that decays with slip: tau_r + (tau_p - tau_r) exp(-d/d_c).
@@ -232,6 +241,7 @@ Corners: TypeAlias = Annotated[tuple[Real, ...], BeforeValidator(_listed)]
 Pieces: TypeAlias = at_least(2)  # type: ignore[valid-type]  # a call makes it
 
 
+@register
 @model(kw_only=True)
 class PiecewiseWeakening(FrictionLaw):
     """Strength that falls piecewise linearly with slip, such as dual-scale weakening.
@@ -356,35 +366,60 @@ class PiecewiseWeakening(FrictionLaw):
         )
 
 
-LAWS = {law.type: law for law in (LinearWeakening, ExponentialWeakening, PiecewiseWeakening)}
-"""The laws of study files by their `type`."""
+@lru_cache(maxsize=64)
+def _examined(law: FrictionLaw) -> tuple[Array, Array, Array]:
+    """Slips u up to the reach of a law, and f and -f' there, compiled."""
+    from stiction.friction.kernels import compiled  # numba is imported where it is needed
+
+    parameters = law.parameters
+    f, u = compiled(type(parameters)), np.linspace(0.0, law.reach, SLIPS)
+    values, slopes = np.array([f(parameters, one) for one in u]).T
+    return u, values, slopes
 
 
 def contradictions(law: FrictionLaw) -> list[str]:
-    """Return how a user-defined law rises with slip or contradicts its f."""
-    if type(law) in LAWS.values():
+    """Return what is wrong with a law of one's own: it rises, say, or contradicts its f."""
+    if type(law).__module__.startswith("stiction."):
         return []
-    name, parameters = type(law).__name__, law.parameters
-    if type(parameters) not in SHAPES:
-        return [f"{name}: register its f for the type of its parameters (friction.register)"]
+    name, parameters, end = type(law).__name__, law.parameters, law.slip_at(0.0)
+    if not (hasattr(parameters, "_fields") and hasattr(parameters, "f")):
+        return [f"{name}: its parameters must be a NamedTuple with a method f(self, u)"]
     if not hasattr(parameters, "initial_slope"):
         return [f"{name}: its parameters need a field initial_slope, -f'(0)"]
-    end, reach = law.slip_at(0.0), law.reach
-    if not 0.0 < reach < np.inf:
+    if not 0.0 < law.reach < np.inf:
         return [
             f"{name}: slip_at(0), or slip_at({NEARLY_RESIDUAL}) if that is infinite, must be"
-            f" positive and finite, got {reach:g}"
+            f" positive and finite, got {law.reach:g}"
         ]
-    u, shape = np.linspace(0.0, reach, SLIPS), SHAPES[type(parameters)]
-    f, slope = np.array([shape(parameters, one) for one in u]).T
+    try:
+        u, f, slope = _examined(law)
+    except Exception as error:  # of any kind: the code is another's
+        lines = [line for line in str(error).splitlines() if line.strip()]
+        reason = next((line for line in lines if "pipeline" not in line), type(error).__name__)
+        return [f"{name}: numba cannot compile its f, which must return f and -f': {reason}"]
+    if not np.isfinite([f, slope]).all():
+        return [f"{name}: f and -f' must be finite up to u = {u[-1]:.4g}"]
     if not abs(f[0] - 1.0) <= 1e-9:
         return [f"{name}: f(0) must be 1, got {f[0]:g}"]
+    if not (slope[0] > 0.0 and law.initial_slope > 0.0):
+        return [
+            f"{name}: f must fall from zero slip on, got -f'(0) = {slope[0]:g}; it sets the"
+            " weakening rate"
+        ]
     if (rising := np.flatnonzero(np.diff(f) > 1e-9)).size:
-        return [f"{name}: strength must not rise with slip, as beyond u = {u[rising[0]]:.4g}"]
+        return [
+            f"{name}: strength must not rise with slip, as beyond u = {u[rising[0]]:.4g}; no"
+            " method follows a hump (begin at its top, with tau_p there)"
+        ]
+    if not 0.0 < law.integral < np.inf:
+        return [
+            f"{name}: the integral of f, area(inf), must be finite, got {law.integral:g}; let f"
+            " end at 0"
+        ]
     pairs: dict[str, tuple[Any, Any]] = {
         "initial_slope": (law.initial_slope, slope[0]),
         "the integral of -f'": (np.trapezoid(slope, u), 1.0 - f[-1]),
-        f"area({reach:.3g})": (law.area(reach), np.trapezoid(f, u)),
+        f"area({u[-1]:.3g})": (law.area(u[-1]), np.trapezoid(f, u)),
     }
     for share in (0.5, 0.0 if np.isfinite(end) else NEARLY_RESIDUAL):
         pairs[f"f(slip_at({share:g}))"] = (share, law.fraction(law.slip_at(share)))
@@ -395,37 +430,14 @@ def contradictions(law: FrictionLaw) -> list[str]:
     ]
 
 
-def _law(value: Any, handler: Any) -> Any:
-    if isinstance(value, FrictionLaw):
-        return value
-    if not isinstance(value, dict):
+def _law(value: Any) -> Any:
+    if not isinstance(value, FrictionLaw | dict):
         raise ValueError("must be a friction law such as st.LinearWeakening(critical_slip=...)")
-    return handler({"type": "linear", **value})
-
-
-def _written(value: Any, handler: Any) -> Any:
-    if type(value) not in LAWS.values():
-        raise ValueError(
-            f"friction is {type(value).__name__}, a law of your own; in a study file use"
-            " st.PiecewiseWeakening.from_law(law, pieces=32)"
-        )
-    return handler(value)
-
-
-def _for_editors(schema: dict[str, Any]) -> None:
-    """A table without a type is the linear law."""
-    del schema["discriminator"]
-    linear, *others = schema.pop("oneOf")
-    schema["anyOf"] = [linear, *({"allOf": [law, {"required": ["type"]}]} for law in others)]
+    return NotImplemented if isinstance(value, dict) else value
 
 
 if TYPE_CHECKING:
     Friction: TypeAlias = FrictionLaw
 else:
-    Friction = Annotated[
-        LinearWeakening | ExponentialWeakening | PiecewiseWeakening,
-        Field(discriminator="type", json_schema_extra=_for_editors),
-        WrapValidator(_law),
-        WrapSerializer(_written),
-    ]
+    Friction = Annotated[Any, OneOf(LAWS, _law, default="linear")]
 """Any friction law; in a study file ``type`` selects it (default: linear)."""

@@ -1,7 +1,7 @@
 """Marginal distributions: how strength is distributed at a point.
 
-To add a family, derive from `Marginal`, with a `distribution`, and add it to `MARGINALS`; study
-files take every continuous distribution of `scipy.stats` by its name.
+To add a family, derive from `Marginal`, with a `distribution`, and `register` it; study files
+take every continuous distribution of `scipy.stats` by its name.
 """
 
 import math
@@ -18,7 +18,7 @@ from scipy.optimize import brentq, root
 from scipy.special import gammaln
 
 from stiction.errors import InputError, UnitWarning, unknown_name, warn_user
-from stiction.kinds import OneOf, from_table
+from stiction.kinds import Kinds, OneOf, from_table, register
 from stiction.model import Positive, Real, check, model
 
 Bound: TypeAlias = Annotated[Real, Field(gt=-1e18, lt=1e18)]
@@ -27,6 +27,7 @@ Bound: TypeAlias = Annotated[Real, Field(gt=-1e18, lt=1e18)]
 class Marginal(ABC):
     """Base class of marginals."""
 
+    family: ClassVar[str] = "marginals"
     type: str
 
     @property
@@ -35,6 +36,7 @@ class Marginal(ABC):
         """The same as a frozen `scipy.stats` distribution."""
 
 
+@register
 @model(kw_only=True)
 class Beta(Marginal):
     """Beta distribution on [low, high].
@@ -79,7 +81,7 @@ class _ByMoments(Marginal):
     mean: Annotated[Positive, Field(gt=1e-18, lt=1e18)]
     cv: Annotated[Positive, Field(gt=1e-9)]
     low: Bound = 0.0
-    family: ClassVar[Any] = None
+    of_scipy: ClassVar[Any] = None
 
     @model_validator(mode="after")
     def _has_a_distribution(self) -> Self:
@@ -106,9 +108,10 @@ class _ByMoments(Marginal):
     def distribution(self) -> Any:
         above = self.mean - self.low
         shape, mean_over_scale = self._shape(self.cv * self.mean / above)
-        return self.family(shape, self.low, above / mean_over_scale)
+        return self.of_scipy(shape, self.low, above / mean_over_scale)
 
 
+@register
 @model(kw_only=True)
 class Lognormal(_ByMoments):
     """Lognormal distribution above `low`.
@@ -128,18 +131,19 @@ class Lognormal(_ByMoments):
     """
 
     type: Literal["lognormal"] = "lognormal"
-    family: ClassVar[Any] = scipy.stats.lognorm
+    of_scipy: ClassVar[Any] = scipy.stats.lognorm
 
     def _shape(self, ratio: float) -> tuple[float, float]:
         return math.sqrt(math.log1p(ratio**2)), math.sqrt(1.0 + ratio**2)
 
 
+@register
 @model(kw_only=True)
 class Weibull(_ByMoments):
     """Weibull distribution (of minima) above `low`; parameters as for `Lognormal`."""
 
     type: Literal["weibull"] = "weibull"
-    family: ClassVar[Any] = scipy.stats.weibull_min
+    of_scipy: ClassVar[Any] = scipy.stats.weibull_min
 
     def _shape(self, ratio: float) -> tuple[float, float]:
         if not 1e-3 < ratio < 10.0:
@@ -157,17 +161,19 @@ class Weibull(_ByMoments):
         return shape, math.exp(gammaln(1.0 + 1.0 / shape))
 
 
+@register
 @model(kw_only=True)
 class Gamma(_ByMoments):
     """Gamma distribution above `low`; parameters as for `Lognormal`."""
 
     type: Literal["gamma"] = "gamma"
-    family: ClassVar[Any] = scipy.stats.gamma
+    of_scipy: ClassVar[Any] = scipy.stats.gamma
 
     def _shape(self, ratio: float) -> tuple[float, float]:
         return ratio**-2, ratio**-2
 
 
+@register
 @model(kw_only=True)
 class TruncatedNormal(_ByMoments):
     """Normal distribution truncated at `low` and `high`.
@@ -267,9 +273,7 @@ def affine_parameters(marginal: Any) -> tuple[tuple[str, ...], float, float]:
     return (), 0.0, 1.0
 
 
-MARGINALS: dict[str, Any] = {
-    kind.type: kind for kind in (Beta, Lognormal, Weibull, Gamma, TruncatedNormal)
-}
+MARGINALS = Kinds("marginals")
 """Families by their names in study files; 'beta' and 'gamma' also take scipy's parameters."""
 
 

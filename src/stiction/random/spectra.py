@@ -3,7 +3,7 @@
 On a plane the field is isotropic, and a line cut through it has the correlation of the field
 on a line: to the power of 1 + k^2 is added (D - 1)/2 in D dimensions, and a Gaussian keeps its
 form. Samples have the truncated spectrum, and so correlations and lengths are those of it. To
-add a spectrum, derive from `ScaledSpectrum` and add it to `SPECTRA`.
+add a spectrum, derive from `ScaledSpectrum` and `register` it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from scipy.special import betainc, betaincinv, gammainc, gammainccinv, gammaln, 
 
 from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.kinds import OneOf, from_table
+from stiction.kinds import Kinds, OneOf, from_table, register
 from stiction.model import Positive, Real, describe, model
 
 Share: TypeAlias = Annotated[Real, Field(gt=0, lt=1)]
@@ -36,6 +36,8 @@ ACCURACY, LARGEST_ERROR = 1e-12, 1e-6  # errors of integrals: aimed at, and acce
 
 class SpectralDensity(ABC):
     """Base class of spectra; `dimensions` is 1 on a line and 2 on a plane, both infinite."""
+
+    family: ClassVar[str] = "spectra"
 
     @abstractmethod
     def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
@@ -124,7 +126,8 @@ def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
 class ScaledSpectrum(SpectralDensity):
     """Base class of spectra with one length: g depends on k times it only.
 
-    One of your own has `density`, `power_within` and its inverse `quantile`.
+    One of your own has `density`, `power_within` and its inverse `quantile`, and the
+    `untruncated_correlation`, by which `stiction.fit_field` finds the correlation length.
     """
 
     correlation_length: Span
@@ -146,6 +149,10 @@ class ScaledSpectrum(SpectralDensity):
     @abstractmethod
     def quantile(self, share: float, dimensions: int = 1) -> float:
         """Return the wavenumber (rad/m) below which a share of the power lies."""
+
+    @abstractmethod
+    def untruncated_correlation(self, lag: Array) -> Array:
+        """Return the correlation of z at `lag` (m), any shape, without truncation, on a line."""
 
     @property
     def scale(self) -> float:
@@ -188,6 +195,7 @@ class _PowerOfWavenumber(ScaledSpectrum):
         return self.scale * math.sqrt((1.0 - rest) / rest)
 
 
+@register
 @model
 class PowerLawSpectrum(_PowerOfWavenumber):
     """g(k) ~ (k^2 + lambda^2)^-exponent, lambda = 2 pi/correlation_length.
@@ -241,6 +249,7 @@ class PowerLawSpectrum(_PowerOfWavenumber):
         return np.where(np.isfinite(log_value) & (a > 0.0), np.exp(log_value), 1.0)
 
 
+@register
 @model
 class SquaredExponentialSpectrum(ScaledSpectrum):
     """Correlation exp(-(x/xi_0)^2): g(k) ~ exp(-(k xi_0/2)^2).
@@ -271,6 +280,7 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
         return np.asarray(np.exp(-((lag / self.correlation_length) ** 2)))
 
 
+@register
 @model
 class ExponentialSpectrum(_PowerOfWavenumber):
     """Correlation exp(-|x|/xi_0): g(k) ~ 1/(1 + (k xi_0)^2). A rough field.
@@ -328,10 +338,7 @@ class CustomSpectrum(SpectralDensity):
         return self.max_wavenumber
 
 
-SPECTRA: dict[str, Any] = {
-    kind.type: kind
-    for kind in (PowerLawSpectrum, SquaredExponentialSpectrum, ExponentialSpectrum)
-}
+SPECTRA = Kinds("spectra")
 """Spectra by their names in study files."""
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from stiction.arrays import Array
 from stiction.ensemble.limit_state import LimitState, no_single_length
-from stiction.methods import methods
+from stiction.methods import METHODS
 from stiction.progress import SILENT, Meter
 from stiction.reliability.subset import descend
 from stiction.reliability.two_level import bridge
@@ -183,7 +183,7 @@ def sample_tail(
     """
     guide, auto, seed = None, algorithm == "auto", state.experiment.seed
     if algorithm == "two_level" or (auto and two_levels_refused(state) is None):
-        guide = state.by(methods()[state.experiment.method.first_stage]())
+        guide = state.by(METHODS[state.experiment.method.first_stage]())
     if auto and guide and pilot is None:
         draws = state.draws(seed, 0, min(PILOT, budget // 5))
         pilot = draws, state(draws)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import functools
 import itertools
 import json
-import operator
 import tomllib
 from collections.abc import Mapping
 from concurrent.futures import Executor
@@ -15,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import pydantic
 import tomli_w
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, model_validator
 
 from stiction.dynamics.save import Save
 from stiction.ensemble.dataset import GridAxes, variables_in
@@ -25,7 +23,8 @@ from stiction.ensemble.limit_state import Event
 from stiction.ensemble.monte_carlo import gather
 from stiction.ensemble.store import Store, read_study
 from stiction.errors import InputError, StoreError
-from stiction.methods import as_method, methods
+from stiction.kinds import OneOf
+from stiction.methods import METHODS, as_method
 from stiction.model import (
     Count,
     FilePath,
@@ -52,9 +51,10 @@ T = TypeVar("T")
 
 
 AnyMethod: Any = Annotated[
-    functools.reduce(operator.or_, methods().values()),
-    Field(discriminator="type"),
-    BeforeValidator(lambda given: given if isinstance(given, dict) else as_method(given)),
+    Any,
+    OneOf(
+        METHODS, lambda given: NotImplemented if isinstance(given, dict) else as_method(given)
+    ),
 ]
 """Any registered method; in a study file ``type`` selects it."""
 AnyRandom: Any = Annotated[
@@ -451,6 +451,6 @@ def open_run(path: Any) -> StoredRun:
         return StoredCurves(store, found, settings) if settings else StoredRun(store, found)
     except InputError as error:
         raise StoreError(
-            f"{place}: this version of stiction cannot read its study, which another version wrote:"
-            f" {'; '.join(error.problems)}"
+            f"{place}: its study cannot be read by this installation (if classes of your own are"
+            f" named, import their module first): {'; '.join(error.problems)}"
         ) from None
