@@ -12,10 +12,10 @@ from pydantic import BeforeValidator, model_validator
 
 from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.model import _count, _number, model
+from stiction.model import as_count, as_number, model
 
-FEWEST = 8
-MOST = 2**24
+FEWEST, MOST = 8, 2**24
+"""Nodes in each direction, and in all."""
 SHORTEST = 1e-30
 """Spacing of nodes, m, below which squares and ratios leave the range of numbers."""
 
@@ -32,15 +32,15 @@ def _one_or_two(value: Any, read: Callable[[Any], Any]) -> Any:
 
 
 def _length(value: Any) -> float:
-    if not 0.0 < _number(value) < math.inf:
+    if not 0.0 < as_number(value) < math.inf:
         raise ValueError("must be positive and finite")
-    return _number(value)
+    return as_number(value)
 
 
 def _node_count(value: Any) -> int:
-    if _count(value) < FEWEST or _count(value) % 2:
+    if as_count(value) < FEWEST or as_count(value) % 2:
         raise ValueError(f"must be even and at least {FEWEST}")
-    return _count(value)
+    return as_count(value)
 
 
 _lengths = BeforeValidator(partial(_one_or_two, read=_length))

@@ -71,9 +71,7 @@ class Kinds(Mapping[str, Any]):
         return self._registered[name]
 
     def __contains__(self, name: object) -> bool:
-        return any(name in known for known in (self._own, self._registered)) or (
-            name in self._offered
-        )
+        return name in self._own or name in self._registered or name in self._offered
 
     def _load(self, name: str, points: Sequence[EntryPoint]) -> None:
         try:

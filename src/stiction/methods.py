@@ -79,6 +79,7 @@ class Method(Protocol):
 
 
 MEMBERS = [name for name in vars(Method) if not name.startswith("_")]
+"""What every method has."""
 
 
 def as_method(value: Any) -> Any:

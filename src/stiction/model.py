@@ -40,7 +40,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 # -- kinds of values -----------------------------------------------------------------------------
 
 
-def _number(value: Any) -> float:
+def as_number(value: Any) -> float:
     """A number of any library, but no text and no truth value, which pydantic would convert."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
@@ -52,7 +52,7 @@ def _number(value: Any) -> float:
         raise ValueError("must be finite") from None
 
 
-def _count(value: Any) -> int:
+def as_count(value: Any) -> int:
     """A whole number of any library; 1e4 counts as one."""
     if isinstance(value, numbers.Integral) and not isinstance(value, bool):
         return int(value)
@@ -64,7 +64,7 @@ def _count(value: Any) -> int:
 def is_whole(value: Any, least: int) -> bool:
     """Whether a value is a whole number (1e4 too), and not less than `least`."""
     try:
-        return _count(value) >= least
+        return as_count(value) >= least
     except ValueError:
         return False
 
@@ -72,7 +72,7 @@ def is_whole(value: Any, least: int) -> bool:
 def is_finite(value: Any) -> bool:
     """Whether a value is a finite number, and neither text nor a truth value."""
     try:
-        return math.isfinite(_number(value))
+        return math.isfinite(as_number(value))
     except ValueError:
         return False
 
@@ -120,8 +120,10 @@ def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
         )
     if is_unplaced(value):
         return value
-    if is_finite(value):
-        return _number(value)
+    if isinstance(value, numbers.Real) or is_finite(value):
+        if not is_finite(as_number(value)):
+            raise ValueError("must be finite")
+        return as_number(value)
     try:
         array = np.array(real_array(value))
     except TypeError as error:
@@ -173,12 +175,12 @@ def _path(value: Any) -> Path:
 @functools.cache
 def at_least(least: int) -> Any:
     """Return the annotation of a whole number not below `least`; 1e4 counts as one."""
-    return Annotated[int, Field(ge=least), BeforeValidator(_count)]
+    return Annotated[int, Field(ge=least), BeforeValidator(as_count)]
 
 
 Count: TypeAlias = at_least(1)  # type: ignore[valid-type]  # a call makes it
 Number: TypeAlias = at_least(0)  # type: ignore[valid-type]
-Real: TypeAlias = Annotated[float, BeforeValidator(_number), Field(allow_inf_nan=False)]
+Real: TypeAlias = Annotated[float, BeforeValidator(as_number), Field(allow_inf_nan=False)]
 Positive: TypeAlias = Annotated[Real, Field(gt=0)]
 Numbers: TypeAlias = Annotated[Any, BeforeValidator(as_numbers)]
 """Real numbers of any shape, as a float64 array."""

@@ -30,6 +30,7 @@ from stiction.solid import Solid
 from stiction.variables import PROFILES
 
 FEWEST_NODES = 4
+"""Nodes in a nucleation length."""
 LARGEST = 1e100
 """Of a profile, in SI units; sums and products of larger numbers overflow."""
 RIGIDITY = (1e-8, 1.0)

@@ -378,7 +378,7 @@ class RandomInterface:
 
     @cached_property
     def properties(self) -> dict[str, RandomField]:
-        """The random properties by name, in the order of `stiction.results.PROFILES`."""
+        """The random properties by name, in the order of `stiction.variables.PROFILES`."""
         return {name: getattr(self, name) for name in NAMES if getattr(self, name) is not None}
 
     @property
