@@ -386,6 +386,9 @@ def first_use():
 def main(names):
     """Run the named cases."""
     warnings.simplefilter("ignore")
+    if {"-h", "--help"} & {*names}:
+        print(__doc__)
+        names = []
     unknown = [name for name in names if name not in CASES and name != "all"]
     if not names or unknown:
         for name, function in CASES.items():

@@ -8,7 +8,10 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-import mpmath
+try:
+    import mpmath
+except ImportError:
+    raise SystemExit("validation/waves.py needs mpmath: pip install mpmath") from None
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter

@@ -66,9 +66,14 @@ def in_options(text: str, command: Callable[..., Any]) -> str:
         if any(isinstance(extra, OptionInfo) for extra in extras):
             option, argument = f"--{name.replace('_', '-')}", rf"(?<![\w.-]){name}"
             text = re.sub(rf"{argument}=(True\b|\.\.\.)", option, text)
-            text = re.sub(rf"{argument}=[\"']?([^\s\"',;)]*)[\"']?", rf"{option} \1", text)
+            value = r"[\"']?([^\s\"',;)]*)[\"']?(?: to st\.\w+(?: or st\.\w+)*)?"
+            text = re.sub(rf"{argument}={value}", rf"{option} \1", text)
             text = re.sub(rf"^{name}(?=:| must)", option, text)
-    return text
+    return re.sub(r"st\.(LocalCriterion|Equilibrium|Rupture)\([^)]*\)", _method, text)
+
+
+def _method(match: re.Match[str]) -> str:
+    return f"the method {re.sub('(?<!^)(?=[A-Z])', '_', match[1]).lower()}"
 
 
 def _show_some(texts: Sequence[Any], prefix: str, *, err: bool = False) -> None:
@@ -204,9 +209,8 @@ def export(
     stored = open_run(run)
     stored.export(out)
     state = stored.status()
-    echo(
-        f"{state.done} of {state.samples} {stored.counted} written to {out}; the others are NaN"
-    )
+    rest = "" if state.complete else "; the others are NaN"
+    echo(f"{state.done} of {state.samples} {stored.counted} written to {out}{rest}")
 
 
 def report(
@@ -229,16 +233,21 @@ def report(
 def check(study: StudyFile) -> None:
     """Validate a study file and estimate its time and size, or list all errors.
 
-    A few samples are solved to estimate the time.
+    A few samples are solved to estimate the time. Exit code 1: all of them failed.
     """
     from stiction.study.study import Study
 
     loaded = Study.from_toml(study)
     echo(f"{study}: valid" + (f", {loaded.title!r}" if loaded.title else ""))
     with Meter("timing a few samples"):
-        lines = description(loaded) | _cost(loaded)
-    for name, text in lines.items():
+        cost, tried, failures = _cost(loaded)
+    for name, text in (description(loaded) | cost).items():
         echo(f"  {name:20s} {text}")
+    if failures:
+        echo(f"{len(failures)} of {tried} probed samples failed:", err=True)
+        _show_some(failures, "  ", err=True)
+    if len(failures) == tried:
+        raise typer.Exit(1)
 
 
 def description(study: Any) -> dict[str, str]:
@@ -285,8 +294,11 @@ def _numbers(point: Any) -> dict[tuple[str, str], float]:
     return found
 
 
-def _cost(study: Any) -> dict[str, str]:
-    """Estimate the time of a study from a few timed samples, and the size of its result."""
+def _cost(study: Any) -> tuple[dict[str, str], int, list[str]]:
+    """Estimate the time of a study from a few timed samples, and the size of its result.
+
+    Return also how many samples were solved or failed, and the failures.
+    """
     import numpy as np
 
     from stiction.ensemble.batches import Span, solve_span, usable_cores
@@ -295,6 +307,7 @@ def _cost(study: Any) -> dict[str, str]:
     chosen = np.unique(np.linspace(0, len(points) - 1, PROBED).round().astype(int))
     rates: list[float] = []
     failures: dict[str, None] = {}
+    tried = 0
     with collect_warnings():  # the run itself warns
         for number in chosen.tolist():
             point, best = points[number], np.inf
@@ -305,6 +318,7 @@ def _cost(study: Any) -> dict[str, str]:
                 best = min(best, table.seconds / count)
                 failures |= dict.fromkeys(map(str, table.failures))
             rates.append(best)
+            tried += count
     seconds = float(np.interp(np.arange(len(points)), chosen, rates).sum()) * ensemble.samples
     each = " to ".join(dict.fromkeys((duration(min(rates)), duration(max(rates)))))
     cores, size = usable_cores(), sum(point.sample_bytes for point in points) * ensemble.samples
@@ -313,7 +327,7 @@ def _cost(study: Any) -> dict[str, str]:
         f" here ({each} a sample, probed at {len(chosen)} of {len(points)} points)",
         "size": f"about {size / 1e6:.3g} MB",
     }
-    return lines | ({"failed in the probe": "; ".join(failures)} if failures else {})
+    return lines, tried, list(failures)
 
 
 def schema() -> None:

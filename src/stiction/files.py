@@ -17,12 +17,27 @@ from numpy.typing import NDArray
 from stiction.errors import InputError, StoreError
 
 PART = ".part"
+LARGEST = 2**30
+"""Bytes of a file that is read whole."""
 
 UNREADABLE = (
     OSError, ValueError, EOFError, KeyError, NotImplementedError, RuntimeError,
     SyntaxError, zipfile.BadZipFile, zlib.error, struct.error,
 )  # fmt: skip
 """Errors that damaged archives raise."""
+
+
+def content_of(path: Path, *, read: bool = True) -> bytes:
+    """Return the bytes of a regular file of reasonable size, or only check that it is one."""
+    try:
+        size = path.stat().st_size
+        if not path.is_file():
+            raise InputError("is not a regular file")
+        if size > LARGEST:
+            raise InputError(f"has {size} bytes, more than the {LARGEST} of a profile")
+        return path.read_bytes() if read else b""
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror or error}") from None
 
 
 def write_whole(path: Path, content: bytes | Callable[[Path], object]) -> None:

@@ -37,6 +37,8 @@ RIGIDITY = (1e-8, 1.0)
 """Strength over shear modulus; steel (8e10 Pa) under 10 kPa at a coefficient of 0.1 has 1e-8."""
 FRICTION = (1e-3, 10.0)
 """Mean strength over normal pressure, from superlubricity to adhesive gels."""
+SHORT = 4.0
+"""Nucleation lengths: on shorter lines free ends change the mean onset by more than about 1 %."""
 BARRIER = 10.0
 """A node is a barrier where tau_p - tau_r is above so many times its lower quartile, of nodes that
 weaken."""
@@ -216,6 +218,13 @@ class Problem:
                 f" ({length:.3g} m), which slides as a whole; if this is not intended, check"
                 " the units of the length, the shear modulus and the weakening rate",
                 UnitWarning,
+            )
+        elif length < SHORT * patch and not self.interface.is_plane:
+            warn_accuracy(
+                f"the interface is {length / patch:.2g} nucleation lengths long and continues"
+                " periodically: free ends would lower its onset by about"
+                f" {5.0 * patch / length:.1g} % on average, that of single interfaces by up to 16 %"
+                " (antiplane, uniform load)"
             )
 
     def warn_of_units(self, strength: float, residual: float = 0.0) -> None:

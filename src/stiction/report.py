@@ -3,6 +3,7 @@
 import base64
 import io
 import itertools
+import math
 import platform
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -19,9 +20,9 @@ from matplotlib.figure import Figure
 from stiction import __version__, plot
 from stiction.errors import InputError
 from stiction.files import write_whole
-from stiction.plot.axes import scaled, shown_quantity
+from stiction.plot.axes import scaled, shown_quantity, with_unit
 from stiction.plot.style import PAGE, panel, paper_style
-from stiction.statistics.estimates import mean, quantiles, standard_deviation
+from stiction.statistics.estimates import Estimate, mean, quantiles, standard_deviation
 from stiction.study.export import table_of
 from stiction.study.failure import StoredCurves
 from stiction.study.run import StoredRun
@@ -212,9 +213,12 @@ def add_tables(page: Page, result: xr.Dataset, dims: list[str], keys: list[str])
     """Add mean, spread and quantiles of the onset at every point, with errors."""
     flat = result.stack(point=dims) if dims else result.expand_dims("point")
     points = range(min(flat.sizes["point"], MOST_ROWS))
-    error = "\N{PLUS-MINUS SIGN}"
-    levels = [f"{100 * level:g} %" for level in LEVELS]
-    columns = [*keys, "samples", "mean", error, "standard deviation", error, *levels]
+    swept, labels = [], []
+    for key in keys:
+        factor, unit, _ = scaled(result[key])
+        swept.append(with_unit(key.replace("_", " "), unit))
+        values = flat[key].values
+        labels.append(values * factor if values.dtype.kind == "f" else values)
     for name in ("critical_stress", "first_instability", "friction_coefficient"):
         if name not in flat:
             continue
@@ -223,22 +227,42 @@ def add_tables(page: Page, result: xr.Dataset, dims: list[str], keys: list[str])
         for point in points:
             values = flat[name].isel(point=point).values.astype(np.float64) * factor
             values = values[np.isfinite(values)]
-            row: list[Any] = [*(flat[key].values[point] for key in keys), values.size]
+            row: list[Any] = [*(each[point] for each in labels), values.size]
             if values.size >= 4:
-                for estimate in (mean(values), standard_deviation(values)):
-                    row += [estimate.value, estimate.error]
-                row += list(quantiles(values, LEVELS).value)
+                row += [with_error(mean(values)), with_error(standard_deviation(values))]
+                found = quantiles(values, LEVELS)
+                errors = 0.25 * (found.upper - found.lower)  # 95 % lie within two
+                row += map(rounded, found.value, errors)
             else:
-                row += [None] * (4 + len(LEVELS))
+                row += [None] * (2 + len(LEVELS))
             rows.append(row)
-        title = flat[name].attrs["long_name"].capitalize()
-        page.table(f"{title} ({unit})" if unit else title, columns, rows)
+        columns = [
+            f"{what} \N{PLUS-MINUS SIGN} standard error"
+            for what in ("mean", "standard deviation")
+        ]
+        columns += [f"{100 * level:g} % quantile" for level in LEVELS]
+        columns = [*swept, "samples", *(with_unit(column, unit) for column in columns)]
+        page.table(flat[name].attrs["long_name"].capitalize(), columns, rows)
     if "arrested_events" in flat:
         rows = []
         for point in points:
             events = flat["arrested_events"].isel(point=point).values
             events = events[np.isfinite(events)]
-            share = float(np.mean(events > 0)) if events.size else None
-            rows.append([*(flat[key].values[point] for key in keys), events.size, share])
-        columns = [*keys, "samples", "share of samples with an arrested event"]
+            arrested = int(np.sum(events > 0))
+            rows.append([*(each[point] for each in labels), events.size, arrested])
+        columns = [*swept, "samples", "of these with an arrested event"]
         page.table("Arrested events", columns, rows)
+
+
+def rounded(value: float, error: float) -> str:
+    """Return a number to the second digit of its error."""
+    digits = 1 - math.floor(math.log10(error)) if 0.0 < error < math.inf else 4
+    return f"{value:.{max(digits, 0)}f}".replace("-", "\N{MINUS SIGN}")
+
+
+def with_error(estimate: Estimate) -> str:
+    """Return an estimate and its standard error, both to the second digit of the error."""
+    value, error = (
+        rounded(number, estimate.error) for number in (estimate.value, estimate.error)
+    )
+    return f"{value} \N{PLUS-MINUS SIGN} {error}"

@@ -10,7 +10,7 @@ import pytest
 import scipy.stats
 import xarray as xr
 from refusals import refusals, refuses
-from setups import LENGTH, LOCAL, RATE, SOLID, beta_strength, make_problem
+from setups import LENGTH, LOCAL, RATE, SOLID, beta_strength, local_onset, make_problem
 
 import stiction as st
 from stiction.criterion.local import excess_of
@@ -427,6 +427,19 @@ def test_a_wrong_unit_is_doubted(words):
         DOUBTS[words]()
     (unit, *_) = [one for one in caught if one.category is st.UnitWarning]
     assert unit.filename == __file__
+
+
+def test_what_a_short_interface_means_is_said_once():
+    """At a few nucleation lengths: what free ends would change; no word where that is 1 %."""
+    words = "interface is 2.1 nucleation .* by about 2 % on average, .* up to 16 %"
+    with pytest.warns(st.AccuracyWarning, match=words) as caught:
+        local_onset(
+            scaled(length=2.1 * PROBLEM.nucleation_length), np.linspace(1e6, 1.1e6, 256)
+        )
+    assert len([one for one in caught if "nucleation lengths long" in str(one.message)]) == 1
+    with warnings.catch_warnings(action="error", category=st.AccuracyWarning):
+        scaled(length=4.1 * PROBLEM.nucleation_length)
+        make_problem((64, 64), (0.01, 0.01))  # a plane: its ends were not measured
 
 
 def test_the_nucleation_length_is_doubted_by_its_value():

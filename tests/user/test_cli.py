@@ -74,7 +74,7 @@ def test_run_grow_look_export_report(runs, study):
     out = runs("run study.toml --out run", "450 of 450 samples in run", "critical_stress, MPa")
     assert out.count("150.0") == 6  # samples at three points, of stress and coefficient
     runs("status run", "450 of 450 (100.0 %)", "all stored chunks match their checksums")
-    runs("export run result.nc")
+    assert runs("export run result.nc") == "450 of 450 samples written to result.nc\n"
     with xr.open_dataset("result.nc") as result:
         assert result.load().identical(st.Study.from_toml(study).run())
     runs("report run")
@@ -191,12 +191,16 @@ def test_messages_are_in_the_words_of_the_command_line(runs):
     table = np.column_stack([LOADED.problem.interface.x, holes])
     np.savetxt("p.csv", table, delimiter=",")
     own = OWN.replace("npy", "csv")
-    assert "gaps=" not in runs(own, "11 of 256 nodes", "--gaps fill", code=2)
+    said = runs(own, "11 of 256 nodes", "pass --gaps fill, which fills", code=2)
+    assert not re.search(r"gaps=|\bst\.", said)
     runs(f"{own} --gaps fill", "local_criterion")
     np.savetxt("three.csv", np.ones((2, 3)), delimiter=",")
     runs("onset study.toml --strength three.csv", "give --x, --value", code=2)
     said = in_options('pass gaps="skip" or interpolate=True', onset)
     assert said == "pass --gaps skip or --interpolate"
+    said = in_options("use st.Rupture(loading_rate=...) or st.LocalCriterion()", onset)
+    assert said == "use the method rupture or the method local_criterion"
+    runs("run study.toml --out run --part 65/64", "K from 1 to N, such as '3/100'", code=2)
 
 
 def test_a_method_that_does_not_apply_says_why(runs, study):
@@ -231,6 +235,7 @@ MISTAKES = {
     "run study.toml --out run --workers 0": (2, "--workers"),
     "run study.toml --out run --part 3/2": (2, "--part"),
     "run study.toml --out study.toml": (1, "File exists"),
+    "run other.toml --out other": (2, "ensemble.seed: 4 here, 3 there"),
     f"run study.toml --out {LONG}": (2, "error: "),
     "run study.toml --out not-utf8-\udcff": (2, "error: "),
     f"check {LONG}.toml": (2, "error: "),
@@ -250,6 +255,11 @@ MISTAKES = {
 @pytest.mark.parametrize("line", MISTAKES)
 def test_mistakes_end_with_a_message(runs, line):
     code, words = MISTAKES[line]
+    if "other" in line:
+        LOADED.run(out="other")
+        st.Study.from_dict(STUDY | {"ensemble": {"samples": 100, "seed": 4}}).to_toml(
+            "other.toml"
+        )
     runs(line, words, code=code)
 
 

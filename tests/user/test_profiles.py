@@ -3,8 +3,11 @@
 import dataclasses
 import os
 import struct
+import sys
+import warnings
 
 import numpy as np
+import openpyxl
 import pytest
 import xarray as xr
 from refusals import refusals, refuses
@@ -170,6 +173,7 @@ HEADINGS = {  # scales of x and of the strength
     "position: mm;tau_p: MPa": (MM, 1e-6),
     "mm,MPa": (MM, 1e-6),
     "Interferometer\nrun 14, room 3\nx (mm);tau (MPa)": (MM, 1e-6),
+    "Messung 3;\n;\nx (mm);tau\nmm;MPa": (MM, 1e-6),
     "x,strength": (1.0, 1.0),
     "Position [\N{MICRO SIGN}m];Festigkeit [MPa]": (1e6, 1e-6),
     "# x (mm)  tau (kPa)": (MM, 1e-3),
@@ -189,6 +193,46 @@ def test_headings_of_laboratories(tmp_path, head, comma):
     profile = st.read_profile(path, interface=LINE)
     np.testing.assert_allclose(profile, STRENGTH, rtol=1e-9)
     assert (profile.attrs["units"], profile.coords["x"].attrs["units"]) == ("Pa", "m")
+
+
+def test_a_spreadsheet_as_it_comes(tmp_path, monkeypatch):
+    """A padded title, an empty column and empty rows at the end; a workbook with another sheet."""
+    rows = [f"{x};{v};" for x, v in zip(X * MM, STRENGTH * 1e-6, strict=True)]
+    lines = ["sep=;", "Messung 3;;", "x (mm);tau (MPa);", *rows, ";;", "", ";;"]
+    (tmp_path / "p.csv").write_text("\n".join(lines).replace(".", ","))
+    book = openpyxl.Workbook()
+    for line in [*lines[1:3], *zip(X * MM, STRENGTH * 1e-6, strict=True), ""]:
+        book.active.append(line.split(";") if isinstance(line, str) else line)
+    book.create_sheet("remarks").append(["ground with 400"])
+    book.save(tmp_path / "p.xlsx")
+    for name in ("p.csv", "p.xlsx"):
+        found = st.read_profile(tmp_path / name, interface=LINE)
+        np.testing.assert_allclose(found, STRENGTH, rtol=1e-9)
+    book["remarks"].append([400])
+    book.save(tmp_path / "p.xlsx")
+    refuses("one sheet, got Sheet, remarks", lambda: st.read_profile(tmp_path / "p.xlsx"))
+    (tmp_path / "p.xlsx").write_text("x;tau")
+    refuses("is not a workbook", lambda: st.read_profile(tmp_path / "p.xlsx"))
+    monkeypatch.setitem(sys.modules, "openpyxl", None)
+    refuses("needs openpyxl ... save it as .csv", lambda: st.read_profile(tmp_path / "p.xlsx"))
+
+
+@pytest.mark.parametrize("ending", ["npy", "txt"])
+def test_heights_without_a_unit_are_not_metres_in_silence(tmp_path, ending):
+    """Of a matrix, which as text has its rows along x, as the array has."""
+    path, heights = tmp_path / f"h.{ending}", 9.6 * np.cos(np.arange(96.0)).reshape(12, 8)
+    np.save(path, heights) if ending == "npy" else np.savetxt(path, heights)
+    with pytest.warns(st.UnitWarning, match=r"height .* ranges over 19.2 m; give its unit"):
+        st.read_profile(path, quantity="height")
+    with warnings.catch_warnings(action="error"):
+        found = st.read_profile(path, quantity="height", unit="um")
+        st.read_profile(found, quantity="height")
+    np.testing.assert_allclose(found, heights * 1e-6, rtol=1e-12)
+    assert found.dims == ("x", "y")
+    plane = st.Interface(length=(0.02, 0.01), nodes=(8, 12))
+    refuses(
+        "swapped", lambda: st.read_profile(path, interface=plane, quantity="height", unit="um")
+    )
 
 
 @pytest.fixture
@@ -256,9 +300,10 @@ TEXTS = {
     "\n# nothing\n": "holds no numbers",
     "x;tau\n": "holds no numbers",
     "x\0;tau\n": "not a text file",
-    "x;tau\n;1e6\n0.05;1e6\n": "x must be finite; entry 0",
+    "x;tau\n;1e6\n0.05;1e6\n": "x must be finite; entry 0 (line 2)",
+    "x;tau\n0;1\n;\n0.05;1\n": "x must be finite; entry 1 (line 3)",
     "x;tau\nmm;Pa\nmean;1\n0;1\n": "line 3: 'mean' is not a number",
-    "x (mm);tau\nmm;Pa\n0;1\n": "line 2: 'mm' is neither a number nor a unit",
+    "x (mm);tau\num;Pa\n0;1\n": "line 2: 'um' is below a heading that has a unit",
     "x;tau\n0;1_000\n": "'1_000' is not a number",
 }
 

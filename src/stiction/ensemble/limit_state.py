@@ -40,6 +40,10 @@ class LimitState:
     workers: int = 1  # threads; the numbers do not depend on this
     meter: Meter = SILENT  # counts the samples
 
+    def __repr__(self) -> str:
+        what = f"{self.event} by {self.experiment.method.label}"
+        return f"LimitState({what}, of {self.dimension} draws)"
+
     @property
     def dimension(self) -> int:
         """Number of draws of a sample."""

@@ -23,7 +23,7 @@ import numpy as np
 
 from stiction.ensemble.batches import Failure, Table
 from stiction.ensemble.pilot import ON_A_LINE
-from stiction.errors import StoreError, warn_user
+from stiction.errors import InputError, StoreError, warn_user
 from stiction.files import PART, cannot, write_whole
 from stiction.model import describe
 
@@ -205,7 +205,7 @@ def _refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any
     if now < before:
         found += [f"ensemble.samples: {now} here, {before} there: a run can grow, not shrink"]
     if found:
-        raise StoreError(
+        raise InputError(
             f"{path}: holds another study; choose another place, or make the study the same:\n"
             + "\n".join(f"  {text}" for text in found[:20])
         )

@@ -28,8 +28,8 @@ WIDE = 4.0
 IN_GAP, MEASURED = "in_gap", "measured"
 """Variable of a result; coordinate of results and profiles with gaps, False where none was."""
 OF_A_PLANE = (
-    "; a map of a plane has columns or coordinates x and y, or is an .npy of shape (nx, ny), and"
-    " needs interface=st.Interface(length=(Lx, Ly), nodes=(nx, ny))"
+    "; a map has columns or coordinates x and y, or is a matrix of shape (nx, ny), and needs an"
+    " interface of two lengths and two numbers of nodes"
 )
 """What to do with two dimensions where a line was expected."""
 

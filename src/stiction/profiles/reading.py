@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from stiction.errors import InputError, prefixed, unknown_name
+from stiction.errors import InputError, UnitWarning, prefixed, unknown_name, warn_user
 from stiction.interface import Interface
 from stiction.model import FilePath, Flag, as_numbers, check, checked, describe, real_array
 from stiction.profiles.placing import MEASURED, OF_A_PLANE, Gaps, close_gaps, place
@@ -41,6 +41,11 @@ SAMPLES = ("sample", "samples")
 _UNNAMED = re.compile(r"\d+$|values?$")
 """Columns that say nothing of what they hold; without a heading they are called by numbers."""
 
+NARROWEST = 8
+"""Columns without headings that are a matrix, its rows along x."""
+TALL = 1e-3
+"""Range of heights, m, from which on a unit must be stated: numbers in um or nm have more."""
+
 Column = str | int | None
 
 
@@ -62,9 +67,10 @@ def read_profile(
     Parameters
     ----------
     source : path, xarray.DataArray or xarray.Dataset
-        ``.npy``: shape (nodes,) or (nx, ny). ``.csv``, ``.txt``, ``.dat``, ``.tsv``: columns, with
-        or without a line of names such as ``x (mm); strength (MPa)``. ``.nc``: variables with
-        `units`, and x as a coordinate. A map is over 'x' and 'y'; as text it has both as columns.
+        ``.npy``: shape (nodes,) or (nx, ny). ``.csv``, ``.txt``, ``.dat``, ``.tsv``, ``.xlsx``:
+        columns, with or without a line of names such as ``x (mm); strength (MPa)``. ``.nc``:
+        variables with `units`, and x as a coordinate. A map is over 'x' and 'y'; a table has both
+        as columns, or is a matrix of eight columns or more without names, its rows along x.
     x, value : str or int, optional
         Name, heading or number (from 0) of the column, coordinate or variable. By default the one
         with such a name (``x``, ``position``; ``strength``, ``tau_p``), the only one in a unit of
@@ -99,6 +105,8 @@ def read_profile(
     -----
     AccuracyWarning
         If something is interpolated or filled in, or x lies between the nodes.
+    UnitWarning
+        If heights without a unit range over more than 1 mm.
 
     Examples
     --------
@@ -227,6 +235,10 @@ def labelled(
     data: Any = load(Path(source)) if isinstance(source, str | Path) else source
     if not is_labelled(data):
         raise InputError(f"must be a path, a DataArray or a Dataset, got {describe(source)}")
+    wide = "row" in data.dims and len(data.variables) >= NARROWEST
+    wide = wide and x is value is None and dims != ("x",)
+    if wide and all(str(name).isdecimal() for name in data.variables):
+        data = data.to_array("y").transpose("row", "y").drop_vars("y").rename(row="x")
     if not hasattr(data, "data_vars"):
         if value not in (None, data.name):
             only = f"the name of the only variable, {data.name!r}"
@@ -267,11 +279,23 @@ def labelled(
     if len({*dims} & {*array.coords}) == 1 < len(dims):
         raise InputError("has the coordinate x or y only; a map has both, or none")
     values = _in_si(array, quantity, si, unit)
+    unsaid = not (unit or _unit_of(array)) and isinstance(array.data, np.ndarray)
+    if (
+        quantity == "height"
+        and unsaid
+        and (range_ := np.nanmax(values) - np.nanmin(values)) > TALL
+    ):
+        warn_user(
+            f"height states no unit, is taken in m, and ranges over {range_:.3g} m; give its unit,"
+            " such as unit='um', or unit='m' if that is right",
+            UnitWarning,
+        )
     for dim in {*dims} & {*array.coords}:
         place = _in_si(array[dim], dim, "m", x_unit)
         if not np.all(np.isfinite(place)):
             entry = int(np.argmin(np.isfinite(place)))
-            raise InputError(f"{dim} must be finite; entry {entry} is not")
+            line = f" (line {data.attrs['lines'][entry]})" if "lines" in data.attrs else ""
+            raise InputError(f"{dim} must be finite; entry {entry}{line} is not")
         array = array.assign_coords({dim: (array[dim].dims, place)})
     return array.copy(data=values)
 

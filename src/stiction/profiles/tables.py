@@ -1,4 +1,4 @@
-"""Files of measured data: text tables, .npy and NetCDF. Nothing in them is trusted."""
+"""Files of measured data: tables, .npy and NetCDF. Nothing in them is trusted."""
 
 from __future__ import annotations
 
@@ -6,21 +6,20 @@ import csv
 import io
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from stiction.arrays import Array
 from stiction.errors import InputError
+from stiction.files import content_of
 from stiction.model import describe
 from stiction.profiles.units import parse
 
 if TYPE_CHECKING:
     import xarray as xr
 
-TEXT, NETCDF = (".csv", ".txt", ".dat", ".tsv"), (".nc", ".nc4")
-LARGEST = 2**30
-"""Bytes; a profile is one line of numbers, and what is larger than this is something else."""
+TEXT, EXCEL, NETCDF = (".csv", ".txt", ".dat", ".tsv"), ".xlsx", (".nc", ".nc4")
 
 _EMPTY = ("", "nan", "na", "n/a", "null", "none", "-", "--")
 _WORDS = re.compile(r"[^\s(\[{]+(?:\s*[(\[{][^)\]}]*[)\]}])?|[(\[{][^)\]}]*[)\]}]")
@@ -32,17 +31,17 @@ def load(path: Path) -> xr.Dataset | xr.DataArray:
     import xarray as xr
 
     ending = path.suffix.lower()
-    if ending in TEXT:
+    if ending in (*TEXT, EXCEL):
         return read_table(path)
     if ending == ".npy":
         array = _read_npy(path)
         return xr.DataArray(array, dims=("x", "y")[: array.ndim])
     if ending not in NETCDF:
+        endings = ", ".join((".npy", *TEXT, EXCEL, *NETCDF))
         raise InputError(
-            f"a profile must end in {', '.join(('.npy', *TEXT, *NETCDF))}, got {path.name!r};"
-            " export text from the instrument's software, or give a DataArray"
+            f"must end in {endings}, got {path.name!r}; export text from the instrument"
         )
-    _content(path, read=False)
+    content_of(path, read=False)
     try:
         # Times are not decoded: a variable in seconds is refused by its unit, like any other.
         with xr.open_dataset(path, decode_times=False, decode_timedelta=False) as opened:
@@ -52,21 +51,8 @@ def load(path: Path) -> xr.Dataset | xr.DataArray:
         raise InputError(f"is not a NetCDF file of numbers: {error}") from None
 
 
-def _content(path: Path, *, read: bool = True) -> bytes:
-    """Return the bytes of a regular file of reasonable size."""
-    try:
-        size = path.stat().st_size
-        if not path.is_file():
-            raise InputError("is not a regular file")
-        if size > LARGEST:
-            raise InputError(f"has {size} bytes, more than the {LARGEST} of a profile")
-        return path.read_bytes() if read else b""
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror or error}") from None
-
-
 def _read_npy(path: Path) -> Array:
-    data = _content(path)
+    data = content_of(path)
     try:
         array = np.load(io.BytesIO(data), allow_pickle=False)
     except Exception as error:  # numpy lets through whatever Python's own parser raises
@@ -81,27 +67,35 @@ def _read_npy(path: Path) -> Array:
 
 
 def read_table(path: Path) -> xr.Dataset:
-    """Read a table of numbers from a text file.
+    """Read a table of numbers from a text file, or from the sheet of a workbook that has numbers.
 
     Columns are separated by semicolons, tabs, commas or blanks, in this order; the decimal sign may
     be a comma unless commas separate. Lines that begin with ``#`` are comments; the last one before
     the numbers names the columns if no other line does. Names may have a line of units below them,
-    and lines of another number of cells above them. Columns become variables along 'row', NaN where
-    a cell is empty; those without names are called by their numbers, from 0.
+    and titles above them. Columns become variables along 'row', NaN where a cell is empty; those
+    without names are called by their numbers, from 0. What is empty at the end is left out. The
+    attribute `lines` has the number of each row's line.
     """
     import xarray as xr
 
     lines: list[tuple[int, str]] = []
-    comment = ""
-    for number, line in enumerate(_text(path).splitlines(), 1):
-        if line.lstrip().startswith("#"):
-            comment = comment if lines else line.strip().lstrip("#").strip()
-        elif line.strip():
-            lines.append((number, line))
-    separator = _separator([line for _, line in lines])
-    rows = [(number, _split(line, separator)) for number, line in lines]
+    comment, separator = "", ""
+    if path.suffix.lower() == EXCEL:
+        rows = _sheet(path)
+    else:
+        for number, line in enumerate(_text(path).splitlines(), 1):
+            if line.lstrip().startswith("#"):
+                comment = comment if lines else line.strip().lstrip("#").strip()
+            elif line.strip():
+                lines.append((number, line))
+        separator = _separator([line for _, line in lines])
+        rows = [(number, _split(line, separator)) for number, line in lines]
+    while rows and not any(rows[-1][1]):
+        rows.pop()
+    width = max((i for _, cells in rows for i, cell in enumerate(cells, 1) if cell), default=0)
+    rows = [(number, cells[:width]) for number, cells in rows]
     header = []
-    while rows and all(_number(cell, separator) is None for cell in rows[0][1]):
+    while rows and not _has_number(rows[0][1], separator):
         header.append(rows.pop(0))
     if not rows:
         raise InputError("holds no numbers")
@@ -127,7 +121,7 @@ def read_table(path: Path) -> xr.Dataset:
                 columns[column, place] = value
             elif cell.lower() not in _EMPTY:
                 raise InputError(f"line {number}: {describe(cell)} is not a number")
-    data = xr.Dataset()
+    data = xr.Dataset(attrs={"lines": [number for number, _ in rows]})
     for number, (name, about) in enumerate(_headings(header, len(first))):
         if name in data:
             name = about["heading"] if about["heading"] not in data else f"{name} {number}"
@@ -135,9 +129,32 @@ def read_table(path: Path) -> xr.Dataset:
     return data
 
 
+def _sheet(path: Path) -> list[tuple[int, list[str]]]:
+    """Return the rows of the one sheet of a workbook that holds numbers."""
+    import pandas as pd
+
+    options: Any = {"sheet_name": None, "header": None, "dtype": str, "na_filter": False}
+    try:
+        sheets = pd.read_excel(io.BytesIO(content_of(path)), engine="openpyxl", **options)
+    except ImportError:
+        raise InputError("needs openpyxl (pip install openpyxl), or save it as .csv") from None
+    except Exception as error:  # the library lets through whatever a broken file leads to
+        raise InputError(f"is not a workbook: {error}") from None
+    tables = {str(name): sheet.to_numpy().tolist() for name, sheet in sheets.items()}
+    found = [name for name, rows in tables.items() if any(map(_has_number, rows))]
+    if len(found) != 1:
+        names = ", ".join(found) or "none"
+        raise InputError(f"must have numbers on one sheet, got {names}; save that one as .csv")
+    return [(n, [cell.strip() for cell in row]) for n, row in enumerate(tables[found[0]], 1)]
+
+
+def _has_number(cells: list[str], separator: str = "") -> bool:
+    return any(_number(cell, separator) is not None for cell in cells)
+
+
 def _text(path: Path) -> str:
     """Return the text of a file in UTF-8, UTF-16 with a mark, or else Windows' western code."""
-    data = _content(path)
+    data = content_of(path)
     try:
         wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
         text = data.decode("utf-16" if wide else "utf-8-sig")
@@ -190,16 +207,17 @@ def _headings(
             f"line {number} names {len(cells)} columns, the numbers below it have"
             f" {width}; begin comment lines with '#'"
         )
+    # Titles stand above the names, padded with empty cells perhaps, and units below them.
+    filled = [sum(map(bool, cells)) for _, cells in rows]
+    (_, names), *below = rows[filled.index(max(filled)) :]
     found = []
-    for column, heading in enumerate(rows[0][1]):
+    for column, heading in enumerate(names):
         name, unit = name_and_unit(heading)
-        for number, cells in rows[1:]:
-            below = cells[column].strip("()[]{} ")
-            if below and unit:
-                raise InputError(
-                    f"line {number}: {describe(below)} is neither a number nor a unit"
-                )
-            unit = unit or below
+        for number, cells in below:
+            cell = cells[column].strip("()[]{} ")
+            if cell and unit not in ("", cell):
+                raise InputError(f"line {number}: {cell!r} is below a heading that has a unit")
+            unit = unit or cell
         found.append((name, {"heading": heading} | ({"units": unit} if unit else {})))
     return found
 

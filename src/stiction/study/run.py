@@ -31,7 +31,7 @@ def _part(value: Any) -> tuple[int, int]:
     number, of = map(int, found.groups()) if found else (0, 0)
     if not 1 <= number <= of:
         raise ValueError(
-            "must be a part and the number of parts, such as '3/100', from 1/100 to 100/100"
+            "must be K/N with K from 1 to N, such as '3/100' for the third of 100 parts"
         )
     return number, of
 

@@ -233,7 +233,7 @@ class Study(_Parts):
         Raises
         ------
         InputError, RunError
-            See `stiction.monte_carlo`; also if a worker is lost.
+            See `stiction.monte_carlo`; also if `out` holds another study, or a worker is lost.
         StoreError
             If `out` cannot be used.
         """

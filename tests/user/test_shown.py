@@ -1,0 +1,289 @@
+"""What is shown is what the dataset holds, in the unit that stands beside it: reports, exports,
+commands and plots."""
+
+import html
+import re
+from collections import namedtuple
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from crooked import LINE, LINE_GAP, LINE_STRENGTH, PLANE, PLANE_STRENGTH
+from refusals import refuses
+from setups import EXACT, LOCAL, exact_onset, local_onset
+from small_study import small_study
+
+import stiction as st
+from stiction import cli, report
+from stiction.ensemble import batches
+from stiction.ensemble.experiment import Experiment
+from stiction.errors import StoreError
+from stiction.study import export
+
+SCALES = {"": 1.0, "mm": 1e3, "kPa": 1e-3, "MPa": 1e-6}
+AXES = ("correlation_length", "low")
+
+
+def swept(**ensemble):
+    """A study over a length and a stress, under a pressure, some samples of which have events."""
+    field = {
+        "marginal": {"type": "beta", "alpha": 1.5, "beta": 3.0, "high": 1.66e6},
+        "spectrum": {"type": "power_law"},
+    }
+    plain = small_study(
+        length=0.037,
+        nodes=96,
+        weakening_rate=0.28e12,
+        random={"strength": field},
+        method={"type": "equilibrium", "events": 2},
+        ensemble={"samples": 30, "seed": 3, "first": 5} | ensemble,
+        sweep=[
+            {"random.strength.spectrum.correlation_length": [1.5e-3, 3.5e-3]},
+            {"random.strength.marginal.low": [0.02e6, 0.66e6]},
+        ],
+    )
+    plain["problem"]["load"] = {"normal_pressure": 3e6}
+    return st.Study.from_dict(plain)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Where the study ran."""
+    path = tmp_path_factory.mktemp("shown") / "run"
+    swept().run(out=path)
+    return path
+
+
+def tables(page):
+    """The tables of a page by title, as rows of texts."""
+    found = {}
+    for title, body in re.findall(
+        r"<h2>([^<]*)</h2>\s*<div[^>]*><table>(.*?)</table>", page, re.DOTALL
+    ):
+        rows = re.findall(r"<tr>(.*?)</tr>", body, re.DOTALL)
+        cells = [re.findall(r"<t[hd]>(.*?)</t[hd]>", row, re.DOTALL) for row in rows]
+        found[html.unescape(title)] = [[html.unescape(cell) for cell in row] for row in cells]
+    return found
+
+
+def in_si(heading, text):
+    """The name of a column, its number in SI by the unit of the heading, and its last digit."""
+    name, unit = re.fullmatch(r"(.*?)(?: \((\w+)\))?", heading).groups()
+    shown = text.partition(" ")[0].replace("\N{MINUS SIGN}", "-")
+    digits = len(shown.partition(".")[2])
+    return name, float(shown) / SCALES[unit or ""], 10.0**-digits / SCALES[unit or ""]
+
+
+def test_tables_of_a_report_are_the_dataset_in_the_units_of_their_headings(folder, runs):
+    runs(f"report {folder}")
+    found, data = (
+        tables((folder / "report.html").read_text("utf-8")),
+        st.open_run(folder).dataset(),
+    )
+    for variable in ("critical_stress", "first_instability", "friction_coefficient"):
+        head, *rows = found[data[variable].long_name.capitalize()]
+        assert len(rows) == 4
+        for row in rows:
+            numbers = {name: (value, digit) for name, value, digit in map(in_si, head, row)}
+            at = {axis: numbers[axis.replace("_", " ")][0] for axis in AXES}
+            values = data[variable].sel(at, method="nearest").values
+            expected = {
+                "samples": values.size,
+                "mean \N{PLUS-MINUS SIGN} standard error": values.mean(),
+                "standard deviation \N{PLUS-MINUS SIGN} standard error": values.std(ddof=1),
+            } | {
+                f"{level} % quantile": np.quantile(
+                    values, level / 100, method="median_unbiased"
+                )
+                for level in (5, 50, 95)
+            }
+            for name, value in expected.items():
+                shown, digit = numbers[name]
+                assert abs(shown - value) <= 0.501 * digit, (name, row)
+            scale = numbers[head[3].partition(" (")[0]][0] / float(row[3].split()[0])
+            error = float(row[3].split()[2]) * scale
+            assert error == pytest.approx(values.std(ddof=1) / 30**0.5, rel=0.06)
+    head, *rows = found["Arrested events"]
+    events = (data.arrested_events > 0).sum("sample").values.ravel()
+    assert events.max() > 0
+    assert [int(row[-1]) for row in rows] == events.tolist()
+    assert [row[-2] for row in rows] == ["30"] * 4
+
+
+class Shown(report.Page):
+    """A page that keeps its figures, with their captions."""
+
+    def figure(self, figure, caption):
+        self.parts.append((figure, caption))
+
+
+def test_figures_of_a_report_are_the_dataset_in_the_units_of_their_axes(folder):
+    data, page = st.open_run(folder).dataset(), Shown("")
+    report.add_figures(page, data, [*AXES])
+    (densities, text), (medians, _) = page.parts
+    assert text.endswith("critical position at low = 20 kPa.")
+    first, second = densities.axes
+    assert (first.get_xlabel(), second.get_xlabel()) == (
+        "static friction coefficient", "critical position (mm)",
+    )  # fmt: skip
+    assert len(first.lines) == len(second.patches) == 2
+    for line, step, part in zip(first.lines, second.patches, (0, 1), strict=True):
+        x, y = line.get_data()
+        values = data.friction_coefficient[part, 0]
+        assert np.trapezoid(y, x) == pytest.approx(1.0, abs=0.05)
+        assert np.trapezoid(x * y, x) == pytest.approx(values.mean().item(), rel=0.05)
+        places = data.critical_position[part, 0].values * 1e3
+        expected = np.histogram(places, 5, density=True)
+        for found, value in zip(step.get_data()[:2], expected, strict=True):
+            assert found == pytest.approx(value)
+    (axes,) = medians.axes[:1]
+    assert axes.get_xlabel() == "correlation length (mm)"
+    curves = zip(axes.containers, axes.collections[::2], (0, 1), strict=True)
+    for bars, band, low in curves:
+        values = data.friction_coefficient[:, low].values
+        low, middle, high = np.quantile(
+            values, (0.25, 0.5, 0.75), axis=1, method="median_unbiased"
+        )
+        x, y = bars.lines[0].get_data()
+        assert x == pytest.approx([1.5, 3.5])
+        assert y == pytest.approx(middle)
+        x, y = band.get_paths()[0].vertices.T
+        for at, least, most in zip((1.5, 3.5), low, high, strict=True):
+            assert {*y[np.isclose(x, at)].round(9)} == {least.round(9), most.round(9)}
+
+
+def test_a_report_without_a_sweep_of_a_run_with_failures(tmp_path, monkeypatch, runs):
+    original = Experiment.results
+
+    def results(self, first, count):
+        if first <= 9 < first + count:
+            raise FloatingPointError("not finite")
+        return original(self, first, count)
+
+    plain = swept().to_dict() | {"sweep": []}
+    plain["random"]["strength"]["spectrum"]["correlation_length"] = 2e-3
+    plain["random"]["strength"]["marginal"]["low"] = 0.5e6
+    study = st.Study.from_dict(plain)
+    study.to_toml(tmp_path / "study.toml")
+    path = tmp_path / "run"
+    with monkeypatch.context() as patch:
+        patch.setattr(Experiment, "results", results)
+        runs(f"run {tmp_path / 'study.toml'} --out {path} --workers 1", code=1)
+        assert "1 of 1 probed" not in runs(
+            f"check {tmp_path / 'study.toml'}", "probed samples failed"
+        )
+        patch.setattr(Experiment, "results", lambda *given: results(None, 9, 1))
+        runs(
+            f"check {tmp_path / 'study.toml'}",
+            "not finite",
+            "30 of 30 probed samples failed",
+            code=1,
+        )
+    runs(f"report {path}")
+    page = (path / "report.html").read_text("utf-8")
+    assert "29 of 30 samples by equilibrium." in page
+    assert "The run is not complete." in page
+    (_, failure) = tables(page)["Samples that failed (1)"]
+    assert failure == ["sample 9 (seed 3): FloatingPointError: not finite"]
+    shown, data = Shown(""), st.open_run(path).dataset()
+    report.add_figures(shown, data, [])
+    ((figure, text),) = shown.parts
+    assert text == "Static friction coefficient and critical position."
+    places = data.critical_position.values[~np.isnan(data.critical_position)] * 1e3
+    assert figure.axes[1].patches[0].get_data()[1] == pytest.approx(np.histogram(places, 5)[1])
+    assert tables(page)["Static friction coefficient"][1][0] == "29"
+
+
+Cost = namedtuple("Cost", "seconds failures")
+
+
+def test_the_description_of_a_study_and_its_time(monkeypatch):
+    study = swept()
+    lines = cli.description(study)
+    h_n = study.experiments[0].problem.nucleation_length
+    assert lines["nucleation length"] == f"{h_n:.5g} m"
+    assert lines["nodes in h_n"] == f"{h_n / (0.037 / 96):.5g}"
+    assert lines["L / h_n along x"] == f"{0.037 / h_n:.5g}"
+    assert lines["xi_0 / h_n"] == f"{1.5e-3 / h_n:.5g} to {3.5e-3 / h_n:.5g}"
+    fields = [point.random.strength for point in study.experiments]
+    for title, values in {
+        "mean strength": [field.mean for field in fields],
+        "standard deviation": [field.standard_deviation for field in fields],
+    }.items():
+        assert lines[title] == f"{min(values):.5g} to {max(values):.5g} Pa"
+    assert lines["correlation length"].endswith(" m (to 1/e)")
+
+    # Points take 1, 2, 3 and 4 s a sample.
+    def solved(point, span):
+        return Cost((1.0 + span.point) * span.samples, ())
+
+    monkeypatch.setattr(batches, "solve_span", solved)
+    monkeypatch.setattr(batches, "usable_cores", lambda: 4)
+    cost, _, _ = cli._cost(study)
+    assert cost["time"].startswith(
+        "about 5 min on one core, 75 s on the 4 here (1 s to 4 s a sample"
+    )
+    size = sum(point.sample_bytes for point in study.experiments) * 30
+    assert cost["size"] == f"about {size / 1e6:.3g} MB"
+
+
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+@pytest.mark.parametrize("kind", ["line", "gaps", "plane"])
+def test_columns_of_a_table_are_the_variables_in_their_units(kind, tmp_path):
+    """A gap brings a coordinate along x, a plane a column for each component."""
+    problem, strength = (PLANE, PLANE_STRENGTH) if kind == "plane" else (LINE, LINE_STRENGTH)
+    values = np.where(LINE_GAP, np.nan, strength) if kind == "gaps" else strength
+    options = {"slip": True} | ({} if kind == "plane" else {"events": 2})
+    result = st.onset(
+        problem, np.stack([values, 1.1 * values]), method=st.Equilibrium(**options), gaps="fill"
+    )
+    export.export(result, tmp_path / "out.csv")
+    table = pd.read_csv(tmp_path / "out.csv")
+    events = result.sizes.get("event", 1)
+    assert len(table) == 2 * events
+    found = {re.fullmatch(r"(\w+) \((.+)\)", column).groups() for column in table.columns}
+    expected = {}
+    for name, variable in {**result.data_vars, "sample": result.sample}.items():
+        if not {"x", "y"} & {*variable.dims}:
+            parts = {name: variable}
+            if "direction" in variable.dims:
+                parts = {f"{name}_{c}": variable.sel(direction=c) for c in ("x", "y")}
+            expected |= {(one, variable.units): part for one, part in parts.items()}
+    assert found - {("event", "1")} == set(expected)
+    shape = result.event_load if events > 1 else result.critical_load
+    for (name, unit), variable in expected.items():
+        rows = variable.broadcast_like(shape).values.ravel()
+        np.testing.assert_array_equal(table[f"{name} ({unit})"].values, rows, err_msg=name)
+    export.export(result, tmp_path / "out.nc")
+    with xr.open_dataset(tmp_path / "out.nc") as read:
+        for name, variable in result.variables.items():
+            assert read[name].attrs.get("units") == variable.attrs.get("units"), name
+            assert "units" in variable.attrs or variable.dtype.kind in "Ub", name
+
+
+def test_a_disk_without_room_for_a_result_is_left_as_it_was(tmp_path, monkeypatch):
+    """The NetCDF library itself would report nothing."""
+    result = local_onset(LINE, LINE_STRENGTH)
+    Usage = namedtuple("Usage", "free")
+    room = {"free": result.nbytes + 2**16}
+    monkeypatch.setattr(export.shutil, "disk_usage", lambda _: Usage(**room))
+    words = "cannot be written: No space left on device"
+    refuses(words, lambda: export.write_result(result, tmp_path / "out.nc"), StoreError)
+    assert not list(tmp_path.iterdir())
+    room["free"] *= 2
+    export.write_result(result, tmp_path / "out.nc")
+
+
+def test_marks_of_weak_loads_lie_on_the_scale_of_the_strength():
+    """The legend states them in a unit of their own size."""
+    found = [exact_onset(LINE, LINE_STRENGTH), local_onset(LINE, LINE_STRENGTH)]
+    weak = [one.map(lambda values: values * 0.1, keep_attrs=True) for one in found]
+    axes = st.plot.onset(weak, LINE_STRENGTH, problem=LINE)
+    assert axes.get_ylabel().endswith("(MPa)")
+    marks = [line for line in axes.lines if line.get_marker() != "None"]
+    for mark, one, method in zip(marks, weak, (EXACT, LOCAL), strict=True):
+        (x,), (y,) = mark.get_data()
+        assert x == pytest.approx(one.critical_position.item() * 1e3)
+        assert y == pytest.approx(one.critical_load.item() * 1e-6)
+        assert f"{method.label}: {one.critical_load.item() * 1e-3:.4f} kPa" in mark.get_label()
