@@ -29,6 +29,14 @@ def test_imports_run_downwards():
     python("-c", "from importlinter.cli import lint_imports_command as f; f()", cwd=ROOT)
 
 
+def test_public_modules_show_their_functions():
+    """In `dir`, which completion asks, and in stubs, which editors read."""
+    for module in (st.external, st.plot, st.statistics, st.theory):
+        assert {*module.__all__} <= {*dir(module)}
+    stub = (SOURCES / "statistics" / "__init__.pyi").read_text()
+    assert sorted(re.findall(r" as (\w+)", stub)) == st.statistics.__all__ == dir(st.statistics)
+
+
 def test_the_drawing_is_what_is_held():
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
     held = [re.findall(r"(?<!\()\b\w+", layer) for layer in contracts["contracts"][0]["layers"]]

@@ -390,6 +390,15 @@ def test_other_places_are_said_and_interpolated_only_where_it_is_asked_for():
         profile = st.read_profile(TENT, interface=LINE, interpolate=True)
     inside = (X > 1e-3) & (X < 0.045)
     np.testing.assert_allclose(profile[inside], 1e6 + 1e7 * X[inside], rtol=1e-14)
+    # From an x on that is not 0, to unlike values: between the last and the first, too.
+    at = 0.0113 + np.arange(40) * 0.0025
+    values = 1e6 + 1e5 * np.sin(np.arange(40.0))
+    with pytest.warns(st.AccuracyWarning, match="interpolated"):
+        profile = st.read_profile(labelled(values, at), interface=LINE, interpolate=True)
+    expected = np.interp(
+        np.where(at[0] > X, X + 0.1, X), np.r_[at, at[0] + 0.1], np.r_[values, values[0]]
+    )
+    np.testing.assert_allclose(profile, expected, rtol=1e-13)
 
 
 def test_gaps_are_named_filled_on_request_and_remembered():
@@ -417,6 +426,10 @@ def test_an_onset_in_a_gap_is_called_that():
         with pytest.warns(st.AccuracyWarning, match="the critical patch .* reaches into a gap"):
             assert bool(onset(given, gaps="fill")["in_gap"][0])
     assert not bool(onset(without(slice(10, 13)), gaps="fill")["in_gap"][0])
+    for gap, reached in ((slice(1, 3), True), (slice(6, 8), False)):  # across x = 0
+        seam = np.roll(STRENGTH, 47)  # weakest at node 124
+        seam[gap] = np.nan
+        assert bool(onset(seam, gaps="fill")["in_gap"][0]) is reached
     method = st.Rupture(loading_rate=1e8, stop="onset")
     assert bool(st.simulate_rupture(SYSTEM, profile, method=method, save=st.Save([]))["in_gap"])
 

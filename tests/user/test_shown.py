@@ -101,6 +101,7 @@ def test_tables_of_a_report_are_the_dataset_in_the_units_of_their_headings(folde
             for name, value in expected.items():
                 shown, digit = numbers[name]
                 assert abs(shown - value) <= 0.501 * digit, (name, row)
+                assert digit <= 0.1 * values.std() or name == "samples", (name, row)
             scale = numbers[head[3].partition(" (")[0]][0] / float(row[3].split()[0])
             error = float(row[3].split()[2]) * scale
             assert error == pytest.approx(values.std(ddof=1) / 30**0.5, rel=0.06)
@@ -287,3 +288,9 @@ def test_marks_of_weak_loads_lie_on_the_scale_of_the_strength():
         assert x == pytest.approx(one.critical_position.item() * 1e3)
         assert y == pytest.approx(one.critical_load.item() * 1e-6)
         assert f"{method.label}: {one.critical_load.item() * 1e-3:.4f} kPa" in mark.get_label()
+
+
+def test_a_limit_state_says_in_a_line_what_it_is():
+    state = st.external.limit_state(LINE, st.paper.strength(LINE), method=LOCAL)
+    expected = f"LimitState(critical_stress by local criterion, of {state.dimension} draws)"
+    assert repr(state) == expected
