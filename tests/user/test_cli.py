@@ -135,7 +135,7 @@ def test_interrupted_from_outside(runs, study, number):
         err = process.communicate(timeout=60.0)[1]
     assert process.returncode == 130
     assert "interrupted:" in err
-    assert "samples so far are in run; rerun the command to resume" in err
+    assert "what is done is in run; rerun the command to resume" in err
     assert "Traceback" not in err
     runs("status run", "of 9000000")
 
