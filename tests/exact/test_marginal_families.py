@@ -7,10 +7,7 @@ import pytest
 import scipy.stats
 
 import stiction as st
-from stiction.kinds import register
-from stiction.model import model, to_plain
-from stiction.random.marginals import Marginal, affine_parameters
-from stiction.random.spectra import ScaledSpectrum
+from stiction.random.marginals import affine_parameters
 
 SPECTRUM = st.PowerLawSpectrum(correlation_length=2e-3)
 EACH = [
@@ -57,49 +54,6 @@ def test_names_of_scipy_still_mean_scipy():
     assert scipys.mean == pytest.approx(2e6)
     ours = st.RandomField({"type": "gamma", "mean": 2e6, "cv": 0.5}, SPECTRUM)
     assert ours.standard_deviation == pytest.approx(1e6)
-
-
-def test_one_class_and_one_line_add_a_marginal_and_a_spectrum():
-    @register
-    @model
-    class Triangular(Marginal):
-        low: float
-        high: float
-        type: str = "triangular"
-
-        @property
-        def distribution(self):
-            return scipy.stats.triang(0.5, self.low, self.high - self.low)
-
-    @register
-    @model
-    class Band(ScaledSpectrum):
-        type: str = "band"
-
-        def density(self, wavenumber, dimensions=1):
-            return np.where(np.asarray(wavenumber) < self.scale, 1.0, 0.0)
-
-        def power_within(self, wavenumber, dimensions=1):
-            return min(wavenumber / self.scale, 1.0) ** dimensions
-
-        def quantile(self, share, dimensions=1):
-            return self.scale * share ** (1.0 / dimensions)
-
-        def untruncated_correlation(self, lag):
-            return np.sinc(np.asarray(lag) * self.scale / np.pi)
-
-    table = {
-        "marginal": {"type": "triangular", "low": 1e6, "high": 2e6},
-        "spectrum": {"type": "band", "correlation_length": 1e-3},
-    }
-    field = st.RandomField(**table)
-    assert field.mean == pytest.approx(1.5e6)
-    assert to_plain(field)["marginal"] == table["marginal"]
-    values = field.sample(st.Interface(length=0.1, nodes=256), samples=200, seed=1)[:, ::16]
-    # 3,200 values, of which neighbours are correlated: 0.04 is exceeded once in a thousand times.
-    assert scipy.stats.kstest(values.ravel(), field.marginal.distribution.cdf).statistic < 0.04
-    # sin(x/xi)/(x/xi) of a band falls to 1/e at 2.2006 xi, a little further without 0.03 % of it.
-    assert field.spectrum.efolding_length == pytest.approx(2.2006e-3, rel=1e-3)
 
 
 @pytest.mark.parametrize(
