@@ -80,7 +80,7 @@ assert np.array_equal(own.onset.critical_load, found.dataset().critical_load)
 # sin(x/xi)/(x/xi) of a band falls to 1/e at 2.2006 xi, a little further without 0.03 % of it.
 assert abs(own.field.spectrum.efolding_length / 2e-3 - 2.2006) < 2e-3
 values = own.field.sample(st.Interface(length=0.1, nodes=256), samples=200, seed=1)
-assert abs(values.mean() / 1.2e6 - 1.0) < 2e-3
+assert abs(values.mean() / 1.2e6 - 1.0) < 5e-3  # four standard errors
 print(*names)
 """
 
