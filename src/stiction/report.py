@@ -22,7 +22,7 @@ from stiction.errors import InputError
 from stiction.files import write_whole
 from stiction.plot.axes import scaled, shown_quantity, with_unit
 from stiction.plot.style import PAGE, panel, paper_style
-from stiction.statistics.estimates import Estimate, mean, quantiles, standard_deviation
+from stiction.statistics.estimates import mean, quantiles, standard_deviation
 from stiction.study.export import table_of
 from stiction.study.failure import StoredCurves
 from stiction.study.run import StoredRun
@@ -31,6 +31,8 @@ from stiction.variables import DIRECTION
 MOST_ROWS = 200
 MOST_FIGURES = 12
 LEVELS = (0.05, 0.5, 0.95)
+QUANTITIES = ("critical_stress", "first_instability", "friction_coefficient")
+SPREAD = ("mean", "standard deviation")
 
 
 @dataclass
@@ -88,11 +90,8 @@ def write_report(run: StoredRun, path: Path) -> None:
     state = run.status()
     if not state.done:
         raise InputError(f"{run.path}: no sample is stored yet")
-    what = (
-        "Failure probability"
-        if isinstance(run, StoredCurves)
-        else "Onset of sliding: a Monte Carlo study"
-    )
+    curves = isinstance(run, StoredCurves)
+    what = "Failure probability" if curves else "Onset of sliding: a Monte Carlo study"
     page = Page(run.study.title or what)
     methods = " and ".join(dict.fromkeys(plan.method.label for plan in run.study.experiments))
     page.text(f"{state.done:,} of {state.samples:,} {run.counted} by {methods}.")
@@ -119,13 +118,8 @@ def write_report(run: StoredRun, path: Path) -> None:
 
 def add_samples(page: Page, run: StoredRun) -> None:
     """Add the figures and the tables of samples."""
-    names = [
-        "critical_stress",
-        "first_instability",
-        "friction_coefficient",
-        "critical_position",
-    ]
-    result, axes = run.dataset(only=[*names, "arrested_events"]), run.study.axes
+    names = [*QUANTITIES, "critical_position", "arrested_events"]
+    result, axes = run.dataset(only=names), run.study.axes
     add_figures(page, result, list(axes))
     add_tables(page, result, list(axes), [name for own in axes.values() for name in own])
 
@@ -212,57 +206,43 @@ def densities(result: xr.Dataset, along: str | None) -> Figure:
 def add_tables(page: Page, result: xr.Dataset, dims: list[str], keys: list[str]) -> None:
     """Add mean, spread and quantiles of the onset at every point, with errors."""
     flat = result.stack(point=dims) if dims else result.expand_dims("point")
-    points = range(min(flat.sizes["point"], MOST_ROWS))
-    swept, labels = [], []
-    for key in keys:
-        factor, unit, _ = scaled(result[key])
-        swept.append(with_unit(key.replace("_", " "), unit))
-        values = flat[key].values
-        labels.append(values * factor if values.dtype.kind == "f" else values)
-    for name in ("critical_stress", "first_instability", "friction_coefficient"):
-        if name not in flat:
-            continue
-        factor, unit, _ = scaled(flat[name])
-        rows = []
-        for point in points:
-            values = flat[name].isel(point=point).values.astype(np.float64) * factor
-            values = values[np.isfinite(values)]
-            row: list[Any] = [*(each[point] for each in labels), values.size]
-            if values.size >= 4:
-                row += [with_error(mean(values)), with_error(standard_deviation(values))]
-                found = quantiles(values, LEVELS)
-                errors = 0.25 * (found.upper - found.lower)  # 95 % lie within two
-                row += map(rounded, found.value, errors)
-            else:
-                row += [None] * (2 + len(LEVELS))
-            rows.append(row)
-        columns = [
-            f"{what} \N{PLUS-MINUS SIGN} standard error"
-            for what in ("mean", "standard deviation")
-        ]
-        columns += [f"{100 * level:g} % quantile" for level in LEVELS]
-        columns = [*swept, "samples", *(with_unit(column, unit) for column in columns)]
-        page.table(flat[name].attrs["long_name"].capitalize(), columns, rows)
+    scales = [scaled(result[key]) for key in keys]
+    swept = [*(label for _, _, label in scales), "samples"]
+    values = [flat[key].values for key in keys]
+    pairs = zip(values, scales, strict=True)
+    places = [each * scale[0] if each.dtype.kind == "f" else each for each, scale in pairs]
+    labels = [[each[i] for each in places] for i in range(min(flat.sizes["point"], MOST_ROWS))]
+    quantities = [f"{what} \N{PLUS-MINUS SIGN} standard error" for what in SPREAD]
+    quantities += [f"{100 * level:g} % quantile" for level in LEVELS]
+    for name in QUANTITIES:
+        if name in flat:
+            factor, unit, _ = scaled(flat[name])
+            columns = [*swept, *(with_unit(quantity, unit) for quantity in quantities)]
+            found = flat[name].transpose("point", ...).values * factor
+            rows = [[*at, *_estimates(row)] for at, row in zip(labels, found, strict=False)]
+            page.table(flat[name].attrs["long_name"].capitalize(), columns, rows)
     if "arrested_events" in flat:
-        rows = []
-        for point in points:
-            events = flat["arrested_events"].isel(point=point).values
-            events = events[np.isfinite(events)]
-            arrested = int(np.sum(events > 0))
-            rows.append([*(each[point] for each in labels), events.size, arrested])
-        columns = [*swept, "samples", "of these with an arrested event"]
-        page.table("Arrested events", columns, rows)
+        found = flat["arrested_events"].transpose("point", ...).values
+        counts = [[int(np.isfinite(row).sum()), int(np.sum(row > 0))] for row in found]
+        rows = [[*at, *count] for at, count in zip(labels, counts, strict=False)]
+        page.table("Arrested events", [*swept, "of these with an arrested event"], rows)
+
+
+def _estimates(found: Any) -> list[Any]:
+    """Return number, mean, standard deviation and quantiles of samples as texts."""
+    values = found[np.isfinite(found)]
+    if values.size < 4:
+        return [values.size, *[None] * (2 + len(LEVELS))]
+    levels = quantiles(values, LEVELS)
+    errors = 0.25 * (levels.upper - levels.lower)  # 95 % lie within two
+    estimates = [
+        f"{rounded(one.value, one.error)} \N{PLUS-MINUS SIGN} {rounded(one.error, one.error)}"
+        for one in (mean(values), standard_deviation(values))
+    ]
+    return [values.size, *estimates, *map(rounded, levels.value, errors)]
 
 
 def rounded(value: float, error: float) -> str:
     """Return a number to the second digit of its error."""
     digits = 1 - math.floor(math.log10(error)) if 0.0 < error < math.inf else 4
     return f"{value:.{max(digits, 0)}f}".replace("-", "\N{MINUS SIGN}")
-
-
-def with_error(estimate: Estimate) -> str:
-    """Return an estimate and its standard error, both to the second digit of the error."""
-    value, error = (
-        rounded(number, estimate.error) for number in (estimate.value, estimate.error)
-    )
-    return f"{value} \N{PLUS-MINUS SIGN} {error}"

@@ -15,7 +15,7 @@ from setups import make_problem
 from small_study import small_study
 
 import stiction as st
-from stiction.profiles.units import parse
+from stiction.units import parse
 
 NODES = 128
 LINE = st.Interface(length=0.1, nodes=NODES)
@@ -222,7 +222,9 @@ def test_heights_without_a_unit_are_not_metres_in_silence(tmp_path, ending):
     """Of a matrix, which as text has its rows along x, as the array has."""
     path, heights = tmp_path / f"h.{ending}", 9.6 * np.cos(np.arange(96.0)).reshape(12, 8)
     np.save(path, heights) if ending == "npy" else np.savetxt(path, heights)
-    with pytest.warns(st.UnitWarning, match=r"height .* ranges over 19.2 m; give its unit"):
+    with pytest.warns(
+        st.UnitWarning, match=r"height: has no unit, .* over 19.2 m; give unit=.um"
+    ):
         st.read_profile(path, quantity="height")
     with warnings.catch_warnings(action="error"):
         found = st.read_profile(path, quantity="height", unit="um")

@@ -9,7 +9,7 @@ from scipy.optimize import minimize_scalar
 
 from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.profiles.units import factor_to
+from stiction.units import factor_to
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,7 +10,7 @@ from stiction.arrays import Array
 from stiction.errors import InputError, prefixed
 from stiction.model import FilePath, Numbers, check, describe, is_finite
 from stiction.profiles.tables import read_table
-from stiction.profiles.units import factor_to, is_in
+from stiction.units import factor_to, is_in
 
 FEWEST = 3
 """Fewest peaks in all: of two numbers, one may be a mistake."""

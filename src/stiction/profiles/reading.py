@@ -19,7 +19,7 @@ from stiction.interface import Interface
 from stiction.model import FilePath, Flag, as_numbers, check, checked, describe, real_array
 from stiction.profiles.placing import MEASURED, OF_A_PLANE, Gaps, close_gaps, place
 from stiction.profiles.tables import load
-from stiction.profiles.units import factor_to, is_in, parse
+from stiction.units import factor_to, is_in, parse
 from stiction.variables import QUANTITIES
 
 if TYPE_CHECKING:
@@ -146,8 +146,7 @@ def read_profile(
         array[dim].attrs.update(units="m", long_name=f"position along {dim}")
     if MEASURED in array.coords:
         array[MEASURED].attrs["long_name"] = "measured, not filled in"
-    attributes = {"units": QUANTITIES[quantity].units, "long_name": quantity.replace("_", " ")}
-    array.attrs = attributes
+    array.attrs = {"units": QUANTITIES[quantity].units, "long_name": quantity.replace("_", " ")}
     return array.rename(quantity)
 
 
@@ -235,9 +234,8 @@ def labelled(
     data: Any = load(Path(source)) if isinstance(source, str | Path) else source
     if not is_labelled(data):
         raise InputError(f"must be a path, a DataArray or a Dataset, got {describe(source)}")
-    wide = "row" in data.dims and len(data.variables) >= NARROWEST
-    wide = wide and x is value is None and dims != ("x",)
-    if wide and all(str(name).isdecimal() for name in data.variables):
+    numbered = "row" in data.dims and all(str(name).isdecimal() for name in data.variables)
+    if numbered and len(data.variables) >= NARROWEST and x is value is None and dims != ("x",):
         data = data.to_array("y").transpose("row", "y").drop_vars("y").rename(row="x")
     if not hasattr(data, "data_vars"):
         if value not in (None, data.name):
@@ -266,9 +264,8 @@ def labelled(
     if chosen is None and len(left) == 1 and _UNNAMED.match(_plain(left[0])):
         chosen = left[0]
     rivals = [name for name in left if name != chosen and _plain(name) in PLACES]
-    unplaced = len(places) < len(dims) and (
-        len(dims) == 2 or (value is None and len(names) > 2)
-    )
+    many = value is None and len(names) > 2
+    unplaced = len(places) < len(dims) and (len(dims) == 2 or many)
     if chosen is None or (table and (unplaced or (rivals and x is None and len(dims) == 1))):
         raise InputError(_unclear(data, names, quantity, dims))
     array = data[chosen]
@@ -279,15 +276,12 @@ def labelled(
     if len({*dims} & {*array.coords}) == 1 < len(dims):
         raise InputError("has the coordinate x or y only; a map has both, or none")
     values = _in_si(array, quantity, si, unit)
-    unsaid = not (unit or _unit_of(array)) and isinstance(array.data, np.ndarray)
-    if (
-        quantity == "height"
-        and unsaid
-        and (range_ := np.nanmax(values) - np.nanmin(values)) > TALL
-    ):
+    stated = unit or _unit_of(array) or hasattr(array.data, "units")
+    finite = values[np.isfinite(values)]
+    if quantity == "height" and not stated and finite.size and np.ptp(finite) > TALL:
         warn_user(
-            f"height states no unit, is taken in m, and ranges over {range_:.3g} m; give its unit,"
-            " such as unit='um', or unit='m' if that is right",
+            f"height: has no unit, is taken in m, and ranges over {np.ptp(finite):.3g} m; give"
+            " unit='um' or another, or unit='m' if that is right",
             UnitWarning,
         )
     for dim in {*dims} & {*array.coords}:

@@ -14,7 +14,7 @@ from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.files import content_of
 from stiction.model import describe
-from stiction.profiles.units import parse
+from stiction.units import parse
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -143,8 +143,7 @@ def _sheet(path: Path) -> list[tuple[int, list[str]]]:
     tables = {str(name): sheet.to_numpy().tolist() for name, sheet in sheets.items()}
     found = [name for name, rows in tables.items() if any(map(_has_number, rows))]
     if len(found) != 1:
-        names = ", ".join(found) or "none"
-        raise InputError(f"must have numbers on one sheet, got {names}; save that one as .csv")
+        raise InputError(f"must have numbers on one sheet, got {', '.join(found) or 'none'}")
     return [(n, [cell.strip() for cell in row]) for n, row in enumerate(tables[found[0]], 1)]
 
 
