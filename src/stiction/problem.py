@@ -222,9 +222,9 @@ class Problem:
         elif length < SHORT * patch and not self.interface.is_plane:
             warn_accuracy(
                 f"the interface is {length / patch:.2g} nucleation lengths long and continues"
-                " periodically: free ends would lower its onset by about"
-                f" {5.0 * patch / length:.1g} % on average, that of single interfaces by up to 16 %"
-                " (antiplane, uniform load)"
+                " periodically: under a uniform antiplane load, free ends would lower its onset by"
+                f" about {min(3.0, 5.0 * patch / length):.1g} % on average and by up to 17 % in"
+                " single cases"
             )
 
     def warn_of_units(self, strength: float, residual: float = 0.0) -> None:

@@ -173,7 +173,9 @@ HEADINGS = {  # scales of x and of the strength
     "position: mm;tau_p: MPa": (MM, 1e-6),
     "mm,MPa": (MM, 1e-6),
     "Interferometer\nrun 14, room 3\nx (mm);tau (MPa)": (MM, 1e-6),
-    "Messung 3;\n;\nx (mm);tau\nmm;MPa": (MM, 1e-6),
+    "Messung 3;\nDatum;3. Mai\n;\nx (mm);tau\nmm;MPa": (MM, 1e-6),
+    "Datum;3. Mai\nx (mm);tau (MPa)\nWeg;am Rand": (MM, 1e-6),
+    "Versuch 100 mm;\nProbe;A12\nx;strength": (1.0, 1.0),
     "x,strength": (1.0, 1.0),
     "Position [\N{MICRO SIGN}m];Festigkeit [MPa]": (1e6, 1e-6),
     "# x (mm)  tau (kPa)": (MM, 1e-3),
@@ -305,7 +307,9 @@ TEXTS = {
     "x;tau\n;1e6\n0.05;1e6\n": "x must be finite; entry 0 (line 2)",
     "x;tau\n0;1\n;\n0.05;1\n": "x must be finite; entry 1 (line 3)",
     "x;tau\nmm;Pa\nmean;1\n0;1\n": "line 3: 'mean' is not a number",
-    "x (mm);tau\num;Pa\n0;1\n": "line 2: 'um' is below a heading that has a unit",
+    "x (mm);tau\num;Pa\n0;1\n": "'x (mm)' has 'um' below it",
+    "x;tau\nmm;Pa\nm;Pa\n0;1\n": "line 3 is a second line of units",
+    "x;tau\npx;MPa\n0;1\n0.05;1\n": "unknown unit 'px'",
     "x;tau\n0;1_000\n": "'1_000' is not a number",
 }
 

@@ -206,19 +206,31 @@ def _headings(
             f"line {number} names {len(cells)} columns, the numbers below it have"
             f" {width}; begin comment lines with '#'"
         )
-    # Titles stand above the names, padded with empty cells perhaps, and units below them.
+    # Titles stand above the names, and units below them: the last line that states units counts.
     filled = [sum(map(bool, cells)) for _, cells in rows]
-    (_, names), *below = rows[filled.index(max(filled)) :]
+    first = filled.index(max(filled))
+    names, units = rows[first][1], [""] * width
+    for number, cells in rows[first + 1 :]:
+        bare = [cell.strip("()[]{} ") for cell in cells]
+        if any(map(parse, filter(None, bare))):
+            if any(units):
+                raise InputError(f"line {number} is a second line of units")
+            units = bare
+        elif sum(map(bool, cells)) == max(filled) and (_states(cells) or not _states(names)):
+            names = cells
     found = []
-    for column, heading in enumerate(names):
+    for heading, below in zip(names, units, strict=True):
         name, unit = name_and_unit(heading)
-        for number, cells in below:
-            cell = cells[column].strip("()[]{} ")
-            if cell and unit not in ("", cell):
-                raise InputError(f"line {number}: {cell!r} is below a heading that has a unit")
-            unit = unit or cell
+        if unit and below not in ("", unit):
+            raise InputError(f"{heading!r} has {below!r} below it, which is another unit")
+        unit = unit or below
         found.append((name, {"heading": heading} | ({"units": unit} if unit else {})))
     return found
+
+
+def _states(headings: list[str]) -> bool:
+    """Whether any of them states a unit."""
+    return any(name_and_unit(heading)[1] for heading in headings)
 
 
 def name_and_unit(text: str) -> tuple[str, str]:
