@@ -18,7 +18,8 @@ from setups import (
 import stiction as st
 from stiction.elasticity.linear import lowest_eigenvector
 from stiction.elasticity.operator import make_operator
-from stiction.equilibrium.relaxation import BALANCED, SLIDING, least_equilibrium
+from stiction.equilibrium.relaxation import least_equilibrium
+from stiction.equilibrium.sample import Outcome
 from stiction.equilibrium.solver import follow
 from stiction.equilibrium.transforms import Plane, PlaneProgram, plane_onset
 
@@ -239,7 +240,7 @@ def test_arrest_and_sliding_on_a_lattice_equal_relaxation(program, seed, events)
         ours = found.slip
         slip = by_relaxation(symbol, np.full(SMALL, load), law, critical, slip, rest)
         assert (slip is None) == (load > path.last.load)
-        assert found.status == (SLIDING if slip is None else BALANCED)
+        assert found.status == (Outcome.SLIDING if slip is None else Outcome.ARRESTED)
         if slip is not None:
             # Relaxation stops at 1e-8 of the strength, over the lowest eigenvalue.
             assert np.abs(ours - slip.ravel()).max() < 1e-4 * critical.max()

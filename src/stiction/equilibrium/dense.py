@@ -21,8 +21,6 @@ from stiction.equilibrium.jump import jump
 from stiction.equilibrium.linear_program import SOLVED, certificate, solve_program
 from stiction.equilibrium.patches import main_patch
 from stiction.equilibrium.runaway import (
-    ARRESTED,
-    UNDECIDED,
     Runs,
     block_factor,
     runs_away,
@@ -30,6 +28,7 @@ from stiction.equilibrium.runaway import (
 )
 from stiction.equilibrium.sample import (
     Jump,
+    Outcome,
     Program,
     Sample,
     State,
@@ -212,17 +211,17 @@ class LineProgram(Program):
             sample, self.runs, found.load, slip, stiff, direction, pushed, start, length,
             np.empty((4, self.nodes)),
         )  # fmt: skip
-        if outcome == UNDECIDED:
+        if outcome == Outcome.UNDECIDED:
             griffith = MARGIN * unstoppable_length(sample, found.load, self.runs)
             other, stiff = make_workspace(self.stiffness), stiff.copy()
             outcome = jump(sample, found.load, slip, stiff, griffith, self._workspace, other)
-        if outcome == ARRESTED:
+        if outcome == Outcome.ARRESTED:
             before, after = (present_pieces(sample, each).piece for each in (found.slip, slip))
             if not np.any(after > before):
                 # Round-off: only nodes that pass a corner can stop an instability.
-                outcome = UNDECIDED
+                outcome = Outcome.UNDECIDED
         state = State(found.load, slip, stiff, direction, stuck=found.stuck)
-        return Jump(outcome == ARRESTED, outcome != UNDECIDED, state)
+        return Jump(outcome == Outcome.ARRESTED, outcome != Outcome.UNDECIDED, state)
 
     def stress_released(self, state: State) -> Array:
         """Return the stress that the slip takes off the interface, K d, Pa."""

@@ -20,8 +20,8 @@ from stiction.equilibrium.cholesky import (
     substitute_members,
 )
 from stiction.equilibrium.linear_program import overstressed, stress_tolerance
-from stiction.equilibrium.runaway import ARRESTED, SLIDING, UNDECIDED
 from stiction.equilibrium.sample import (
+    Outcome,
     Sample,
     piece_at,
     step_to_corner,
@@ -117,7 +117,7 @@ def _settle(
     workspace: Workspace,
     other: Workspace,
     size: int,
-) -> int:
+) -> Outcome:
     """Take one step with the true states: along the unstable direction or towards equilibrium.
 
     Returns ARRESTED if the step ends in the equilibrium of the members, SLIDING if nothing bounds
@@ -148,12 +148,12 @@ def _settle(
             direction[other.members[t]] = max(solution[t], 0.0)
     step = step_to_corner(sample, slip, direction, longest)
     if step == np.inf:
-        return SLIDING
+        return Outcome.SLIDING
     solution = workspace.vectors[1]
     for t in range(size):
         solution[t] = slip[workspace.members[t]]
     multiply_members(workspace, size, solution, stiff)
-    return ARRESTED if step == 1.0 and longest == 1.0 else UNDECIDED
+    return Outcome.ARRESTED if step == 1.0 and longest == 1.0 else Outcome.UNDECIDED
 
 
 @jit
@@ -165,7 +165,7 @@ def jump(
     griffith: float,
     workspace: Workspace,
     other: Workspace,
-) -> int:
+) -> Outcome:
     """Follow an instability at a fixed load to the next least equilibrium, or to sliding.
 
     Slip d and K d are those of the state that became unstable, moved along the unstable direction
@@ -181,22 +181,22 @@ def jump(
             workspace.order[count] = i
             count += 1
     if count > MOST_MEMBERS:
-        return UNDECIDED
+        return Outcome.UNDECIDED
     size = append(workspace, ZERO, count)
     if size < count:
-        return SLIDING
+        return Outcome.SLIDING
     waited = 0
     passed = 0
     for _ in range(STEPS):
         before = size
         size = _relax(sample, load, slip, stiff, workspace, size, tolerance)
         if size == CROWDED:
-            return UNDECIDED
+            return Outcome.UNDECIDED
         if size == ALL or unsupported(sample, load, slip):
-            return SLIDING
+            return Outcome.SLIDING
         run, corners = _residual_runs(sample, slip)
         if run >= griffith:
-            return SLIDING
+            return Outcome.SLIDING
         waited += 1
         # A factor of their own pays once elastic steps change only the slip, or creep on.
         if waited < PATIENCE and (size > before or corners > passed):
@@ -206,11 +206,11 @@ def jump(
         passed = corners
         before = size
         status = _settle(sample, load, slip, stiff, workspace, other, size)
-        if status == SLIDING:
-            return SLIDING
+        if status == Outcome.SLIDING:
+            return Outcome.SLIDING
         size = _join(sample, load, stiff, workspace, size, tolerance)
         if size < 0:
-            return UNDECIDED if size == CROWDED else SLIDING
-        if status == ARRESTED and size == before:
-            return ARRESTED
-    return UNDECIDED
+            return Outcome.UNDECIDED if size == CROWDED else Outcome.SLIDING
+        if status == Outcome.ARRESTED and size == before:
+            return Outcome.ARRESTED
+    return Outcome.UNDECIDED

@@ -23,16 +23,13 @@ from stiction.elasticity.linear import (
 from stiction.elasticity.operator import Operator
 from stiction.equilibrium.held_equilibrium import ITERATIONS, equilibrate
 from stiction.equilibrium.sample import (
+    Outcome,
     Present,
     Sample,
     present_pieces,
     residual_nodes,
     step_to_corner,
 )
-
-BALANCED = 0
-SLIDING = 1
-UNDECIDED = 2
 
 NEWTON = 100
 STEPS = 2000
@@ -188,9 +185,9 @@ def _weakening_step(
 
 
 class Relaxed(NamedTuple):
-    """Status (BALANCED, SLIDING or UNDECIDED) and slip."""
+    """What becomes of the interface at the load, and its slip."""
 
-    status: int
+    status: Outcome
     slip: Array
 
 
@@ -215,7 +212,7 @@ def least_equilibrium(
         now = present_pieces(sample, slip)
         drive = load * sample.profile - now.strength
         if float((drive + now.rate * slip).sum()) > tolerance * slip.size:
-            return Relaxed(SLIDING, slip)
+            return Relaxed(Outcome.SLIDING, slip)
         allowed = max(tolerance, ROUGH * left * dropped)
         status, new, true = _bound(operator, sample, load, slip, now, 1.0 - left, allowed)
         if status == NEGATIVE and left < 1.0:
@@ -226,7 +223,7 @@ def least_equilibrium(
         if status != SOLVED:
             break
         if true:
-            return Relaxed(BALANCED, new)
+            return Relaxed(Outcome.ARRESTED, new)
         weakening = ~residual_nodes(sample, new) & (sample.critical > 0.0)
         growth = np.where(weakening, new - slip, 0.0)
         dropped = float((now.rate * growth).max())
@@ -235,4 +232,4 @@ def least_equilibrium(
             left *= EASED
         else:
             left, kept = 0.0, left
-    return Relaxed(UNDECIDED, slip)
+    return Relaxed(Outcome.UNDECIDED, slip)

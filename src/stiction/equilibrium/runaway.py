@@ -14,6 +14,7 @@ from stiction.arrays import Array
 from stiction.elasticity.line import griffith_length
 from stiction.equilibrium.cholesky import back_substitute, row_start, substitute
 from stiction.equilibrium.sample import (
+    Outcome,
     Sample,
     step_to_corner,
     strength_at,
@@ -21,10 +22,6 @@ from stiction.equilibrium.sample import (
 )
 from stiction.jit import ZERO, jit
 from stiction.lanes import multiply_add
-
-SLIDING = 0
-ARRESTED = 1
-UNDECIDED = 2
 
 STEPS = 30
 """Elastic steps; most samples need five to eight."""
@@ -96,7 +93,7 @@ def runs_away(
     first: int,
     length: int,
     work: Array,
-) -> int:
+) -> Outcome:
     """Whether the patch of an instability certainly becomes global sliding: SLIDING or UNDECIDED.
 
     Slip d and K d are those of the state that became unstable; afterwards slip is a lower bound of
@@ -107,9 +104,9 @@ def runs_away(
     griffith = unstoppable_length(sample, load, runs)
     step = step_to_corner(sample, slip, direction, np.inf)
     if step == np.inf:
-        return SLIDING
+        return Outcome.SLIDING
     if (griffith > runs.longest and griffith < np.inf) or length > runs.longest:
-        return UNDECIDED
+        return Outcome.UNDECIDED
     # Everything below is numbered from `origin`, so that the patch lies in the middle.
     begin = (n - length) // 2
     end = begin + length
@@ -138,7 +135,7 @@ def runs_away(
             end += 1
         length = end - begin
         if length > runs.longest:
-            return UNDECIDED
+            return Outcome.UNDECIDED
         for t in range(length):
             q = begin + t
             i = (origin + q) % n
@@ -158,9 +155,9 @@ def runs_away(
             run = run + 1 if slip[i] >= sample.pieces.at_corner * sample.critical[i] else 0
             longest = max(longest, run)
         if longest >= griffith or unsupported(sample, load, slip):
-            return SLIDING
+            return Outcome.SLIDING
         if fastest < SHARE * largest:
-            return UNDECIDED
+            return Outcome.UNDECIDED
         low = max(begin - length // 2, 0)
         high = min(end + length // 2, n)
         near = extra[low:high]
@@ -171,4 +168,4 @@ def runs_away(
             factor = grown[q]
             for t in range(near.shape[0]):
                 near[t] = multiply_add(factor, source[t], near[t])
-    return UNDECIDED
+    return Outcome.UNDECIDED

@@ -6,6 +6,7 @@ has one piece: its start is tau_p, to the bit.
 """
 
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -68,6 +69,14 @@ def pieces_of(law: FrictionLaw) -> Pieces:
     steep = np.append(-np.diff(f) / np.diff(u), 0.0)
     starts = f + steep * u
     return Pieces(u[1:].copy(), starts, steep / steep[0], float(steep[0]), law.integral)
+
+
+class Outcome(IntEnum):
+    """What becomes of an interface that moves at a fixed load."""
+
+    SLIDING = 0
+    ARRESTED = 1
+    UNDECIDED = 2
 
 
 class Sample(NamedTuple):

@@ -18,13 +18,12 @@ from stiction.elasticity.operator import Operator, make_operator, stiffness_symb
 from stiction.equilibrium.bracket import Bracket, bisect, make_bracket
 from stiction.equilibrium.fold import Turn, follow_to_turn
 from stiction.equilibrium.relaxation import (
-    BALANCED,
-    UNDECIDED,
     least_equilibrium,
     stable_equilibrium,
 )
 from stiction.equilibrium.sample import (
     Jump,
+    Outcome,
     Program,
     Sample,
     State,
@@ -256,19 +255,19 @@ class PlaneProgram(Program):
         ahead = least_equilibrium(
             self._operator(sample), sample, beyond, found.slip, 0.1 * self.requested
         )
-        arrested = ahead.status == BALANCED
+        arrested = ahead.status == Outcome.ARRESTED
         weakens = sample.critical > 0.0
         moved = ahead.slip - found.slip > MOVED * sample.critical
         after = State(beyond, ahead.slip, found.stiff, found.direction)
         counts = not arrested or bool(moved[weakens].any())
-        return Jump(arrested, ahead.status != UNDECIDED, after, counts)
+        return Jump(arrested, ahead.status != Outcome.UNDECIDED, after, counts)
 
     def at(self, sample: Sample, state: State, load: float, fresh: bool) -> State | None:
         """Return the equilibrium at a load from a state below, None if it is not found."""
         if load <= state.load:
             return state
         found = least_equilibrium(self._operator(sample), sample, load, state.slip, ACCURACY)
-        if found.status != BALANCED:
+        if found.status != Outcome.ARRESTED:
             return None
         return State(load, found.slip, state.stiff, state.direction, unstable=False)
 

@@ -19,19 +19,19 @@ from numba.core.compiler import Compiler, CompileResult, Flags
 
 from stiction.jit.folder import kernel_folder
 
-OLDEST, NEWEST = (0, 62), (0, 68)
-"""Versions of numba with which the tests ran."""
+NEWEST = (0, 68)
+"""The newest numba with which the tests ran."""
 PARTS: dict[type, str] = {
     Compiler: "compile_extra define_pipelines",
     CompileResult: "_find_referenced_environments",
     Flags: "_values",
     FunctionCache: "load_overload save_overload",
-    JITCPUCodegen: "_module_pass_manager set_env",
+    JITCPUCodegen: "set_env",
     JITCodeLibrary: "_optimize_final_module _finalize_final_module _finalize_dynamic_globals"
     " enable_object_caching serialize_using_bitcode serialize_using_object_code",
 }
 """What is used of numba's classes; without it `decorators.py` makes do with plain numba."""
-if not OLDEST <= numba.version_info.short <= NEWEST:
+if numba.version_info.short > NEWEST:
     raise ImportError(f"numba {numba.__version__} was not tried")
 for owner, names in PARTS.items():
     if missing := [name for name in names.split() if not hasattr(owner, name)]:
@@ -92,14 +92,6 @@ class _Flags(Flags):
         return given
 
 
-class _Library(JITCodeLibrary):
-    """Code that LLVM optimises in one pass: numba's first one is there for reference counts."""
-
-    def _optimize_final_module(self) -> None:
-        manager, builder = self._codegen._module_pass_manager()
-        manager.run(self._final_module, builder)
-
-
 class _Draft(JITCodeLibrary):
     """Code that becomes machine code only as a part of the kernels that call it."""
 
@@ -128,8 +120,6 @@ class _Draft(JITCodeLibrary):
 class _Compiler(Compiler):
     """numba's compiler with these options."""
 
-    library: ClassVar = _Library
-
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self.state.flags = _Flags(self.state.flags)
@@ -144,17 +134,15 @@ class _Compiler(Compiler):
             if collects:  # compilations are nested
                 gc.enable()
 
-    def define_pipelines(self) -> Any:
-        state = self.state
-        state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
-        state.library.enable_object_caching()
-        return super().define_pipelines()
-
 
 class _InsideCompiler(_Compiler):
     """A compiler of drafts."""
 
-    library = _Draft
+    def define_pipelines(self) -> Any:
+        state = self.state
+        state.library = _Draft(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return super().define_pipelines()
 
 
 OPTIONS: dict[str, Any] = {"_nrt": False, "no_cfunc_wrapper": True, "pipeline_class": _Compiler}
