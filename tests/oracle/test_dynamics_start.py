@@ -8,7 +8,7 @@ from setups import make_problem, turns
 
 import stiction as st
 from stiction.dynamics import slow_start as module
-from stiction.dynamics.slow_start import slow_start, static_setting
+from stiction.dynamics.slow_start import slow_start, static_program
 
 RATES = (2e5, 2e7, 2e8)
 RATIOS = (0.25, 0.5, 1.0, 2.0)
@@ -95,7 +95,7 @@ def test_the_estimate_bounds_the_error_and_grows_towards_the_onset(monkeypatch):
     The run's own error at 2e7 Pa/s, seen by halving its steps, is 1e-5 of the stress scale.
     """
     method = st.Rupture(loading_rate=2e7, stop="onset")
-    tau_p, setting = profiles(0.5, 3), static_setting(PROBLEM)
+    tau_p, setting = profiles(0.5, 3), static_program(PROBLEM)
     rest = solve(tau_p, loading_rate=2e7, stop="onset", start="rest")["critical_stress"]
     monkeypatch.setattr(module, "_TOLERANCE", 1.0)
     for strength, exact in zip(tau_p, rest, strict=True):
@@ -133,9 +133,9 @@ def test_where_no_equilibrium_is_followed_it_begins_at_rest(initial_stress, fact
 def test_laws_without_straight_pieces_and_planes_have_no_equilibrium_to_begin_from():
     curved = st.ExponentialWeakening(weakening_rate=2e10)
     plane = make_problem((16, 16), (0.1, 0.1), weakening_rate=2e10)
-    assert static_setting(make_problem(64, weakening_rate=2e10)) is not None
-    assert static_setting(make_problem(64, friction=curved)) is None
-    assert static_setting(plane) is None
+    assert static_program(make_problem(64, weakening_rate=2e10)) is not None
+    assert static_program(make_problem(64, friction=curved)) is None
+    assert static_program(plane) is None
 
 
 def test_everything_may_vary_and_a_sample_alone_gives_the_same_bits():

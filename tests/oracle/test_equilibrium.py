@@ -84,10 +84,10 @@ def test_transforms_agree_with_the_dense_factor(make_strength, monkeypatch, roug
     program = LineProgram(problem)
     rows = problem.sample(make_strength(0.25).sample(problem.interface, samples=4, seed=12))
     samples = [program.sample_of(rows, row) for row in range(4)]
-    dense = [program.programme(sample) for sample in samples]
+    dense = [program.solve(sample) for sample in samples]
     monkeypatch.setattr(stiction.equilibrium.dense, "MANY_NODES", 10)
     for sample, exact in zip(samples, dense, strict=True):
-        found = program.programme(sample)
+        found = program.solve(sample)
         assert found.load == pytest.approx(exact.load, rel=1e-9)
         assert found.load != exact.load
         # At the optimum slip may be steep in the load; 1e-3 of d_c is far below any use of it.
@@ -125,7 +125,7 @@ def test_patches_alike_on_a_long_interface():
         problem = make_problem(128 * periods, 0.0135 * periods)
         tau_p = np.tile(1e6 + 0.3e6 * np.cos(turns(128)), periods)
         program = LineProgram(problem)
-        loads.append(program.programme(program.sample_of(problem.sample(tau_p), 0)).load)
+        loads.append(program.solve(program.sample_of(problem.sample(tau_p), 0)).load)
     assert loads[1] == pytest.approx(loads[0], rel=1e-11)
 
 

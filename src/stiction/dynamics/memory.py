@@ -18,8 +18,10 @@ from stiction.arrays import Array
 from stiction.dynamics.state import ExplicitTables, Floats, Grid, ImplicitTables, Ints, Spectrum
 from stiction.jit import jit_inside
 
-LANES = 64
-LINE = 64  # bytes of a cache line
+ENTRIES = 64
+"""Entries of a block of the memory, which a pass takes together."""
+LINE = 64
+"""Bytes of a cache line."""
 
 
 def phi(z: Spectrum) -> Spectrum:
@@ -40,13 +42,13 @@ def offsets(half: tuple[int, ...]) -> tuple[Ints, Ints, int]:
         folded = np.minimum(row, half[0] - row)
         entry = (folded[:, None] * half[1] + np.arange(half[1])[None, :]).ravel()
         copy, multiplicity = np.repeat((row > half[0] // 2).astype(np.int64), half[1]), 2
-    offset = (entry // LANES * multiplicity + copy) * (2 * LANES) + entry % LANES
+    offset = (entry // ENTRIES * multiplicity + copy) * (2 * ENTRIES) + entry % ENTRIES
     return entry, offset, multiplicity
 
 
 def blocks(entries: int) -> int:
     """Number of blocks for so many entries."""
-    return -(-entries // LANES)
+    return -(-entries // ENTRIES)
 
 
 def zeros(size: int, kind: type = float) -> NDArray[Any]:
@@ -73,18 +75,18 @@ def work_arrays(count: int, size: int, kind: type) -> list[NDArray[Any]]:
 
 def empty_memory(grid: Grid) -> tuple[Floats, Floats]:
     """Memory variables and their sum for the next explicit step, all zero."""
-    count = blocks(grid.frequency.size) * grid.multiplicity * LANES
+    count = blocks(grid.frequency.size) * grid.multiplicity * ENTRIES
     return zeros(count * grid.poles.size * 4), zeros(count * 2)
 
 
 def step_table(grid: Grid, step: float) -> tuple[Floats, Floats]:
     """Tables of one fixed explicit step h: `table` and `response` of `ExplicitTables`."""
     pairs, count = grid.poles.size, blocks(grid.frequency.size)
-    table = zeros(count * pairs * 4 * LANES).reshape(count, pairs, 4, LANES)
+    table = zeros(count * pairs * 4 * ENTRIES).reshape(count, pairs, 4, ENTRIES)
     response = np.empty(grid.frequency.size)
     in_plane = (np.arange(pairs) < grid.split)[:, None]
     for block in range(count):  # one by one: all exponentials together would take more
-        some = slice(block * LANES, (block + 1) * LANES)
+        some = slice(block * ENTRIES, (block + 1) * ENTRIES)
         z = np.multiply.outer(grid.poles, grid.frequency[some] * step)
         share = np.where(in_plane, grid.mode_two[some], 1.0 - grid.mode_two[some])
         decay, gain, weights = np.exp(z), step * phi(z), grid.weights[:, None] * share
@@ -99,7 +101,7 @@ def step_table(grid: Grid, step: float) -> tuple[Floats, Floats]:
 def explicit_tables(grid: Grid, step: float, table: Floats, response: Floats) -> ExplicitTables:
     """Tables from `step_table` with arrays to work in, which belongs to one run."""
     modes, nodes = grid.entry.size, int(np.prod(grid.transform.shape))
-    packed = zeros(blocks(grid.frequency.size) * grid.multiplicity * 2 * LANES)
+    packed = zeros(blocks(grid.frequency.size) * grid.multiplicity * 2 * ENTRIES)
     spectra, fields = work_arrays(2, modes, complex), work_arrays(2, nodes, float)
     return ExplicitTables(step, table, response, packed, *spectra, *fields)
 
@@ -151,22 +153,22 @@ def advance_memory(
 def sum_memory(grid: Grid, memory: Floats, table: Floats, memory_sum: Floats) -> None:
     """Put Re sum w E B y into `memory_sum` without advancing: where an explicit phase begins."""
     count, pairs = blocks(grid.frequency.size), grid.poles.size
-    rows = table.reshape(count, pairs, 4, LANES)
-    y = memory.reshape(count, grid.multiplicity, pairs, 2, 2, LANES)  # of both signals
+    rows = table.reshape(count, pairs, 4, ENTRIES)
+    y = memory.reshape(count, grid.multiplicity, pairs, 2, 2, ENTRIES)  # of both signals
     for block in range(count):
         real, imaginary = rows[block, :, 2, None, :], rows[block, :, 3, None, :]
         for copy in range(grid.multiplicity):
             own = y[block, copy]
             terms = real * own[:, :, 0] - imaginary * own[:, :, 1]
-            memory_sum.reshape(count, grid.multiplicity, 2, LANES)[block, copy] = terms.sum(0)
+            memory_sum.reshape(count, grid.multiplicity, 2, ENTRIES)[block, copy] = terms.sum(0)
 
 
 def scale_memory(grid: Grid, memory: Floats, step: float, *, divide: bool) -> None:
     """psi = B y, or y = psi/B with `divide`, in place: at the switch between kinds of step."""
     count = blocks(grid.frequency.size)
-    y = memory.reshape(count, grid.multiplicity, grid.poles.size, 4, LANES)
+    y = memory.reshape(count, grid.multiplicity, grid.poles.size, 4, ENTRIES)
     for block in range(count):
-        frequency = grid.frequency[block * LANES : (block + 1) * LANES]
+        frequency = grid.frequency[block * ENTRIES : (block + 1) * ENTRIES]
         factor = step * phi(np.multiply.outer(grid.poles, frequency * step))
         part = y[block, ..., : frequency.size]
         for row in (0, 2):
@@ -194,14 +196,14 @@ def implicit_tables(grid: Grid) -> ImplicitTables:
     """Tables that are not yet valid for any step."""
     count, pairs, entries = blocks(grid.frequency.size), grid.poles.size, grid.frequency.size
     modes, nodes = grid.entry.size, int(np.prod(grid.transform.shape))
-    table, ramp = (zeros(count * pairs * rows * LANES) for rows in (4, 2))
+    table, ramp = (zeros(count * pairs * rows * ENTRIES) for rows in (4, 2))
     arrays: Any = (
         *(table, ramp, *work_arrays(2, entries, float), *work_arrays(2, modes, float)),
         *work_arrays(4, modes, complex),
         *work_arrays(8, nodes, float),
         np.zeros(nodes, dtype=np.int64),
-        *np.zeros((2, count * grid.multiplicity * 2 * LANES)),
-        np.empty((2, 2 * LANES)),
+        *np.zeros((2, count * grid.multiplicity * 2 * ENTRIES)),
+        np.empty((2, 2 * ENTRIES)),
     )
     return ImplicitTables(np.array([-1.0, -1.0]), *arrays)
 
@@ -308,13 +310,13 @@ def grown_memory(grid: Grid, memory: Floats, rate_hat: Spectrum, growth: float) 
     """psi of a slip rate that has always grown as exp(growth t); return Re sum w psi, (modes,)."""
     total = np.zeros(rate_hat.size, dtype=np.complex128)
     rate, entry, pairs = rate_hat[1:], grid.entry[1:], grid.poles.size
-    first = grid.offset[1:] // (2 * LANES) * pairs * 4 * LANES + grid.offset[1:] % LANES
+    first = grid.offset[1:] // (2 * ENTRIES) * pairs * 4 * ENTRIES + grid.offset[1:] % ENTRIES
     for p in range(pairs):
         part = grid.mode_two[entry] if p < grid.split else 1.0 - grid.mode_two[entry]
         gain = 1.0 / (growth - grid.poles[p] * grid.frequency[entry])
-        own = first + p * 4 * LANES
+        own = first + p * 4 * ENTRIES
         for row, signal in enumerate((rate.real, rate.imag)):
-            memory[own + 2 * row * LANES] = gain.real * signal
-            memory[own + (2 * row + 1) * LANES] = gain.imag * signal
+            memory[own + 2 * row * ENTRIES] = gain.real * signal
+            memory[own + (2 * row + 1) * ENTRIES] = gain.imag * signal
         total[1:] += part * (grid.weights[p] * gain).real * rate
     return total

@@ -15,7 +15,7 @@ from stiction.dynamics.diagnostics import stress_scale
 from stiction.dynamics.integrator import Run
 from stiction.dynamics.loading import load_history, turning_times
 from stiction.dynamics.medium import Medium, prepare_medium
-from stiction.dynamics.slow_start import slow_start, static_setting
+from stiction.dynamics.slow_start import slow_start, static_program
 from stiction.dynamics.state import History, Nodes, Setting, State, Thresholds
 from stiction.dynamics.summary import scalars, summary
 from stiction.errors import InputError
@@ -183,7 +183,7 @@ class Rupture:
         """Return a solver for samples of this problem, with its kernel fitted once."""
         medium, rate = self.medium(problem), self.loading_rate
         from_equilibrium = self.start == "equilibrium" and self.implicit and rate is not None
-        static = static_setting(problem) if from_equilibrium else None
+        static = static_program(problem) if from_equilibrium else None
 
         def solve(rows: Sample) -> dict[str, NDArray[Any]]:
             checks.warn_if_coarse(problem, rows)

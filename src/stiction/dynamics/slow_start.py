@@ -28,33 +28,33 @@ _BACK = 0.25  # share of the distance to the onset over which the rate is measur
 _TRIALS = 5
 
 
-def static_setting(problem: Problem) -> LineProgram | None:
-    """Return the setting for equilibria of a problem; None where they are not followed."""
+def static_program(problem: Problem) -> LineProgram | None:
+    """Return the programme for equilibria of a problem; None where they are not followed."""
     if problem.interface.is_plane or refused(problem.friction):
         return None
     return LineProgram(problem)
 
 
 def slow_start(
-    setting: LineProgram, run: Run, rows: Sample, number: int, rate: float
+    program: LineProgram, run: Run, rows: Sample, number: int, rate: float
 ) -> State | None:
     """The state closest to the onset whose error is small enough, None if there is none."""
     nodes = run.setting.nodes
     if not np.all(np.isfinite(nodes.strength)) or np.any(nodes.strength <= nodes.initial):
         return None
-    static = setting.sample_of(rows, number)
-    onset = setting.programme(static)
+    static = program.sample_of(rows, number)
+    onset = program.solve(static)
     if onset is None:
         return None
     asked = _TOLERANCE * run.scale_at(onset.load)
-    crossing = setting.problem.nucleation_lengths(run.steepest_rate)[0] / (
-        setting.problem.solid.shear_wave_speed
+    crossing = program.problem.nucleation_lengths(run.steepest_rate)[0] / (
+        program.problem.solid.shear_wave_speed
     )
     distance = max(_CROSSINGS * crossing * rate, 1e-6 * asked)
     for _ in range(_TRIALS):
         if onset.load - (1.0 + _BACK) * distance <= run.first_load:
             return None
-        found = _at(setting, run, static, onset.load, distance, rate)
+        found = _at(program, run, static, onset.load, distance, rate)
         if found is None:
             distance *= 4.0
         elif found.now["start_error"] <= asked:
@@ -65,7 +65,7 @@ def slow_start(
 
 
 def _at(
-    setting: LineProgram,
+    program: LineProgram,
     run: Run,
     static: StaticSample,
     onset: float,
@@ -79,7 +79,7 @@ def _at(
     """
     nodes, grid = run.setting.nodes, run.medium.grid
     load, back = onset - distance, _BACK * distance
-    here, before = (setting.programme(static, cap) for cap in (load, load - back))
+    here, before = (program.solve(static, cap) for cap in (load, load - back))
     if here is None or before is None or exceeds(static, here.slip):
         return None
     weakens = nodes.critical > 0.0

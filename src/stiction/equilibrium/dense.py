@@ -105,7 +105,7 @@ class LineProgram(Program):
         work, multiplier = np.empty((2, self.nodes))
         return window_bound(sample, self._windows(sample.rate), work, multiplier), multiplier
 
-    def programme(
+    def solve(
         self,
         sample: Sample,
         cap: float = np.inf,
@@ -163,7 +163,7 @@ class LineProgram(Program):
             if state is not None:
                 piece, strength, rate = present_pieces(sample, state.slip)
                 present = sample._replace(excess=strength, rate=rate)
-            found = self.programme(present, state=state)
+            found = self.solve(present, state=state)
             straight = found is not None and (state is None or found.load >= state.load)
             if found is not None and straight and not exceeds(sample, found.slip, piece):
                 self._certify(present, found, found.direction)
@@ -196,7 +196,7 @@ class LineProgram(Program):
         if load <= state.load:
             return state
         if fresh and not state.stuck:
-            found = self.programme(sample, load)
+            found = self.solve(sample, load)
             if found is not None and not exceeds(sample, found.slip):
                 return replace(found, load=load, direction=state.direction, unstable=False)
         there = self.next(sample, replace(state, stuck=True), load)

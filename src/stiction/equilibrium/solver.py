@@ -42,7 +42,7 @@ ROUGHLY = {
 EVENT_CORE = 1e-3
 """Share of the largest added slip above which a node belongs to the patch of an event."""
 
-Program: TypeAlias = LineProgram | PlaneProgram
+AnyProgram: TypeAlias = LineProgram | PlaneProgram
 
 
 def event_variables(interface: Interface) -> dict[str, Variable]:
@@ -110,7 +110,7 @@ class Path:
     known: bool = True
 
 
-def follow(program: Program, sample: Sample) -> Path:
+def follow(program: AnyProgram, sample: Sample) -> Path:
     """Follow a sample from rest to global sliding.
 
     Arrest is overdamped: the patch stops at the least equilibrium of the same load. Inertia may
@@ -140,7 +140,7 @@ def listed(numbers: NDArray[np.int64], most: int = 5) -> str:
     return f"sample{'s' * (numbers.size > 1)} {shown}{more}"
 
 
-def make_program(problem: Problem, gap: float = 1e-6) -> Program:
+def make_program(problem: Problem, gap: float = 1e-6) -> AnyProgram:
     """Return the programme that finds equilibria of a problem."""
     plane = problem.interface.is_plane
     return PlaneProgram(problem, gap) if plane else LineProgram(problem)

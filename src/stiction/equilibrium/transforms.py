@@ -187,7 +187,7 @@ class PlaneProgram(Program):
             self.plane.symbol(self.shape), sample.rate.reshape(self.shape), self.shape
         )
 
-    def programme(self, sample: Sample) -> PlaneOnset | None:
+    def solve(self, sample: Sample) -> PlaneOnset | None:
         """Return the first instability if no node reaches a corner before it."""
         excess, profile, rate = (
             field.reshape(self.shape) for field in (sample.excess, sample.profile, sample.rate)
@@ -197,7 +197,7 @@ class PlaneProgram(Program):
 
     def next(self, sample: Sample, state: State | None = None) -> State:
         """Return the next instability on the path from a stable state or from rest."""
-        found = self.programme(sample) if state is None else None
+        found = self.solve(sample) if state is None else None
         if found is None:
             return self._step_on(sample, state or self.at_rest(sample))
         slip, multiplier = found.slip.reshape(-1), found.multiplier.reshape(-1)

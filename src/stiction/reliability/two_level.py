@@ -22,7 +22,7 @@ from stiction.reliability.uncertainty import ancestral_variance
 
 GUIDING = 5
 """Samples of the guide per level for each exact sample of the middle factor."""
-COVERED = 0.95
+LAST_FACTOR = 0.95
 """Smallest last factor: below it the walk must first find failures that the guide misses."""
 STEPS = 10
 FORGOTTEN = 5
@@ -153,6 +153,6 @@ def bridge(
             samples, rarest, spent, guided, True, population.log_probability, values, families,
             float(failed.mean()), last, last_variance, failing, stresses,
         )  # fmt: skip
-        if last >= COVERED:
+        if last >= LAST_FACTOR:
             break
     return best or Bridge(samples, rarest, spent, guided)
