@@ -112,6 +112,9 @@ def test_failed_samples_make_exit_code_one(runs, monkeypatch):
         patch.setattr(Experiment, "results", results)
         words = "sample 17 of point 2 (seed 3): FloatingPointError: not finite"
         runs(run, "297 of 300 samples in", words, code=1)
+        runs("check study.toml", "3 of 300 probed samples failed, such as sample 17")
+        patch.setattr(Experiment, "results", lambda self, *given: results(self, 17, 1))
+        runs("check study.toml", "valid", "300 of 300 probed samples failed", code=1)
     runs("status run", "sample 17 (seed 3)")
     runs(run)
 

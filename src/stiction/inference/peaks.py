@@ -102,7 +102,7 @@ def _values(given: Any, unit: str) -> Array:
 
 
 def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
-    """Read the peaks of repeated tests from a text file.
+    """Read the peaks of repeated tests from a text file or a workbook (.xlsx).
 
     Parameters
     ----------
