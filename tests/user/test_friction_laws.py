@@ -176,11 +176,8 @@ def test_law_without_a_compiled_strength_is_refused():
     class Sketch(type(EXPONENTIAL_AGAIN)):
         parameters = ()
 
-    for method in (EXACT, RUPTURE):
-        with pytest.raises(st.InputError, match="Sketch"):
-            onset(Sketch(weakening_rate=0.5e12), method=method)
-    with pytest.raises(TypeError, match=r"abstract.*slip_at"):
-        FrictionLaw(weakening_rate=0.5e12)
+    words = "Sketch: its parameters must be a NamedTuple with a method f(self, u)"
+    refuses(words, lambda: with_law(Sketch(weakening_rate=0.5e12)))
 
 
 def test_a_plateau_is_followed_and_its_later_slope_counts():
