@@ -24,7 +24,7 @@ NEWEST = (0, 68)
 PARTS: dict[type, str] = {
     Compiler: "compile_extra define_pipelines",
     CompileResult: "_find_referenced_environments",
-    Flags: "_values",
+    Flags: "values",
     FunctionCache: "load_overload save_overload",
     JITCPUCodegen: "set_env",
     JITCodeLibrary: "_optimize_final_module _finalize_final_module _finalize_dynamic_globals"
