@@ -76,6 +76,12 @@ def test_run_grow_look_export_report(runs, study):
     assert runs("export run result.nc") == "450 of 450 samples written to result.nc\n"
     with xr.open_dataset("result.nc") as result:
         assert result.load().identical(st.Study.from_toml(study).run())
+        rows = re.findall(r"150\.0 +(\S+) +(\S+)", out)[:3]  # mean and deviation, MPa
+        expected = result.critical_stress.values * 1e-6
+        for row, values in zip(rows, expected, strict=True):
+            assert [*map(float, row)] == pytest.approx(
+                [values.mean(), values.std(ddof=1)], 1e-4
+            )
     runs("report run")
     page = Path("run/report.html").read_text()
     for words in (

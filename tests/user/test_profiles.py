@@ -222,10 +222,10 @@ def test_a_spreadsheet_as_it_comes(tmp_path, monkeypatch):
 @pytest.mark.parametrize("ending", ["npy", "txt"])
 def test_heights_without_a_unit_are_not_metres_in_silence(tmp_path, ending):
     """Of a matrix, which as text has its rows along x, as the array has."""
-    path, heights = tmp_path / f"h.{ending}", 9.6 * np.cos(np.arange(96.0)).reshape(12, 8)
+    path, heights = tmp_path / f"h.{ending}", 1e-3 * np.cos(np.arange(96.0)).reshape(12, 8)
     np.save(path, heights) if ending == "npy" else np.savetxt(path, heights)
     with pytest.warns(
-        st.UnitWarning, match=r"height: has no unit, .* over 19.2 m; give unit=.um"
+        st.UnitWarning, match=r"height: has no unit, .* over 0.00\d+ m; give unit=.um"
     ):
         st.read_profile(path, quantity="height")
     with warnings.catch_warnings(action="error"):
@@ -264,6 +264,8 @@ def test_columns_are_chosen_by_name_heading_number_or_meaning(table):
     table.write_text(text_of([X * 1e3, STRENGTH], head="Weg (mm);value"))
     heights = st.read_profile(table, quantity="height", unit="um")
     np.testing.assert_allclose(heights, 1e-6 * STRENGTH, rtol=1e-10)
+    table.write_text(text_of([X, X[::-1], STRENGTH], head="x;y;strength"))
+    assert st.read_profile(table).dims == ("x",)  # one y for each x is no map
     given = labelled().rename("tau")
     np.testing.assert_array_equal(st.read_profile(given, value="tau"), STRENGTH)
 
@@ -311,6 +313,7 @@ TEXTS = {
     "x;tau\nmm;Pa\nm;Pa\n0;1\n": "line 3 is a second line of units",
     "x;tau\npx;MPa\n0;1\n0.05;1\n": "unknown unit 'px'",
     "x;tau\n0;1_000\n": "'1_000' is not a number",
+    'x,tau\n0,"1,500"\n': "'1,500' is not a number",
 }
 
 
@@ -390,8 +393,9 @@ test_what_is_no_profile_is_refused = refusals({
 
 
 def test_other_places_are_said_and_interpolated_only_where_it_is_asked_for():
-    with pytest.warns(st.AccuracyWarning, match="0.5 of a spacing from the nodes"):
-        assert found(labelled(x=X + 0.05 / NODES)) == found(STRENGTH)
+    for shift in ("0.5", "-0.3"):
+        with pytest.warns(st.AccuracyWarning, match=f"{shift} of a spacing from the nodes"):
+            assert found(labelled(x=X + 0.1 * float(shift) / NODES)) == found(STRENGTH)
     with pytest.warns(st.AccuracyWarning, match="40 points are interpolated linearly to 128"):
         profile = st.read_profile(TENT, interface=LINE, interpolate=True)
     inside = (X > 1e-3) & (X < 0.045)
@@ -405,6 +409,14 @@ def test_other_places_are_said_and_interpolated_only_where_it_is_asked_for():
         np.where(at[0] > X, X + 0.1, X), np.r_[at, at[0] + 0.1], np.r_[values, values[0]]
     )
     np.testing.assert_allclose(profile, expected, rtol=1e-13)
+    # A gap ends where points lie on nodes but for a hundredth; dense points may lack a few.
+    h = X[1]
+    ends = np.r_[X[:11], 20.01 * h, X[21:], 40.5 * h]
+    dense = np.delete(np.arange(1280) * 0.1 * h, range(297, 303))
+    for at, missing in ((ends, range(11, 20)), (dense, ())):
+        given = labelled(1e6 + 1e6 * at, at)
+        profile = st.read_profile(given, interface=LINE, interpolate=True, gaps="skip")
+        assert [*np.flatnonzero(np.isnan(profile))] == [*missing]
 
 
 def test_gaps_are_named_filled_on_request_and_remembered():
@@ -416,6 +428,10 @@ def test_gaps_are_named_filled_on_request_and_remembered():
         result = onset(given, gaps="fill")
         assert result["critical_stress"][0] == pytest.approx(found(expected)[0], rel=1e-14)
         np.testing.assert_array_equal(result["measured"], ~np.isnan(holes))
+    with pytest.warns(
+        st.AccuracyWarning, match=r"65 of 128.*check interface.length and the unit"
+    ):
+        onset(labelled(STRENGTH[:63], X[:63]), gaps="fill")
     profile = st.read_profile(labelled(holes), interface=LINE, gaps="fill")
     np.testing.assert_allclose(profile, expected, rtol=1e-14)
     np.testing.assert_array_equal(profile["measured"], ~np.isnan(holes))

@@ -33,6 +33,15 @@ def test_short_work_is_silent(capsys):
     assert capsys.readouterr() == ("", "")
 
 
+def test_the_time_that_is_left_is_that_of_what_is_left(monkeypatch):
+    clock = iter([0.0, 10.0, 40.0, 40.0])  # prepared, first ten, first fifty, asked twice
+    monkeypatch.setattr(progress.time, "monotonic", lambda: next(clock))
+    meter = Meter("", 100)
+    meter.advance(10)
+    meter.advance(40)
+    assert meter.text == "50 of 100 samples, 40 s, about 38 s left"  # 30 s for 40 of them
+
+
 def test_a_pipe_gets_few_lines_the_last_at_the_end(hasty, capsys):
     begin = time.monotonic()
     work(Meter("long work", 60), 0.6, 60)

@@ -149,6 +149,20 @@ def test_figures_of_a_report_are_the_dataset_in_the_units_of_their_axes(folder):
             assert {*y[np.isclose(x, at)].round(9)} == {least.round(9), most.round(9)}
 
 
+def test_three_axes_are_along_within_and_over_the_figures(folder):
+    data, page = st.open_run(folder).dataset(), Shown("")
+    grown = xr.concat([data, data, data], "length").assign_coords(length=[0.1, 0.2, 0.3])
+    report.add_figures(page, grown, ["low", "length", "correlation_length"])
+    texts = [text for _, text in page.parts]
+    assert len(texts) == 4
+    for text, over in zip(texts, ("1.5", "1.5", "3.5", "3.5"), strict=True):
+        assert f"correlation length = {over} mm" in text
+    assert page.parts[1][0].axes[0].get_xlabel() == "length"
+    legend = page.parts[1][0].axes[0].get_legend()
+    assert [text.get_text() for text in legend.get_texts()] == ["0.02", "0.66"]
+    assert legend.get_title().get_text() == "low (MPa)"
+
+
 def test_a_report_without_a_sweep_of_a_run_with_failures(tmp_path, monkeypatch, runs):
     original = Experiment.results
 
