@@ -397,25 +397,19 @@ def contradictions(law: FrictionLaw) -> list[str]:
         lines = [line for line in str(error).splitlines() if line.strip()]
         reason = next((line for line in lines if "pipeline" not in line), type(error).__name__)
         return [f"{name}: numba cannot compile its f, which must return f and -f': {reason}"]
-    if not np.isfinite([f, slope]).all():
-        return [f"{name}: f and -f' must be finite up to u = {u[-1]:.4g}"]
-    if not abs(f[0] - 1.0) <= 1e-9:
-        return [f"{name}: f(0) must be 1, got {f[0]:g}"]
-    if not (slope[0] > 0.0 and law.initial_slope > 0.0):
-        return [
-            f"{name}: f must fall from zero slip on, got -f'(0) = {slope[0]:g}; it sets the"
-            " weakening rate"
-        ]
-    if (rising := np.flatnonzero(np.diff(f) > 1e-9)).size:
-        return [
-            f"{name}: strength must not rise with slip, as beyond u = {u[rising[0]]:.4g}; no"
-            " method follows a hump (begin at its top, with tau_p there)"
-        ]
-    if not 0.0 < law.integral < np.inf:
-        return [
-            f"{name}: the integral of f, area(inf), must be finite, got {law.integral:g}; let f"
-            " end at 0"
-        ]
+    rising = u[:-1][np.diff(f) > 1e-9]
+    wrong = {
+        f"f and -f' must be finite up to u = {u[-1]:.4g}": not np.isfinite([f, slope]).all(),
+        f"f(0) must be 1, got {f[0]:g}": not abs(f[0] - 1.0) <= 1e-9,
+        f"f must fall from zero slip on, got -f'(0) = {slope[0]:g}; it sets the weakening rate":
+            not min(slope[0], law.initial_slope) > 0.0,
+        f"strength must not rise with slip, as beyond u = {rising.min(initial=u[-1]):.4g}; no"
+        " method follows a hump (begin at its top, with tau_p there)": rising.size,
+        f"the integral of f, area(inf), must be finite, got {law.integral:g}; let f end at 0":
+            not 0.0 < law.integral < np.inf,
+    }  # fmt: skip
+    if found := [text for text, is_so in wrong.items() if is_so]:
+        return [f"{name}: {found[0]}"]
     pairs: dict[str, tuple[Any, Any]] = {
         "initial_slope": (law.initial_slope, slope[0]),
         "the integral of -f'": (np.trapezoid(slope, u), 1.0 - f[-1]),
