@@ -244,7 +244,9 @@ def table(tmp_path):
     """A file of four columns."""
     path = tmp_path / "p.csv"
     head = "time (s);Weg (mm);height (um);Local strength [MPa]"
-    path.write_text(text_of([X, X * 1e3, STRENGTH, STRENGTH * 1e-6], comma=True, head=head))
+    text = text_of([X, X * 1e3, STRENGTH, STRENGTH * 1e-6], comma=True, head=head)
+    # A column of dates that nobody asks for.
+    path.write_text("".join(f"{line};3.4.2024 12:03\n" for line in text.splitlines()))
     return path
 
 

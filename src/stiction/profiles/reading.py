@@ -269,6 +269,9 @@ def labelled(
     if chosen is None or (table and (unplaced or (rivals and x is None and len(dims) == 1))):
         raise InputError(_unclear(data, names, quantity, dims))
     array = data[chosen]
+    texts = [data[name].attrs.get("text") for name in (chosen, *places.values()) if table]
+    if any(texts):
+        raise InputError(filter(None, texts))
     at = {dim: data[name].variable for dim, name in places.items()}
     at = {dim: one for dim, one in at.items() if {*one.dims} <= {*array.dims}}
     own = [name for name in array.coords if name not in (MEASURED, *array.dims)]

@@ -74,7 +74,8 @@ def read_table(path: Path) -> xr.Dataset:
     the numbers names the columns if no other line does. Names may have a line of units below them,
     and titles above them. Columns become variables along 'row', NaN where a cell is empty; those
     without names are called by their numbers, from 0. What is empty at the end is left out. The
-    attribute `lines` has the number of each row's line.
+    attribute `lines` has the number of each row's line; `text` of a column without any number says
+    what it holds.
     """
     import xarray as xr
 
@@ -110,6 +111,9 @@ def read_table(path: Path) -> xr.Dataset:
             " with ';', or write decimal points"
         )
     columns = np.full((len(first), len(rows)), np.nan)
+    texts: dict[
+        int, str
+    ] = {}  # such as a date, of columns without a number: nobody may want them
     for place, (number, cells) in enumerate(rows):
         if len(cells) != len(first):
             raise InputError(
@@ -120,12 +124,14 @@ def read_table(path: Path) -> xr.Dataset:
             if value is not None:
                 columns[column, place] = value
             elif cell.lower() not in _EMPTY:
-                raise InputError(f"line {number}: {describe(cell)} is not a number")
+                texts.setdefault(column, f"line {number}: {describe(cell)} is not a number")
+    if mixed := [text for column, text in texts.items() if np.isfinite(columns[column]).any()]:
+        raise InputError(mixed)
     data = xr.Dataset(attrs={"lines": [number for number, _ in rows]})
     for number, (name, about) in enumerate(_headings(header, len(first))):
         if name in data:
             name = about["heading"] if about["heading"] not in data else f"{name} {number}"
-        data[name] = ("row", columns[number], about)
+        data[name] = ("row", columns[number], about | {"text": texts.get(number, "")})
     return data
 
 
