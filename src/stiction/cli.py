@@ -149,9 +149,16 @@ def run(
         if name in result:
             scale, unit = (1e-6, ", MPa") if result[name].attrs["units"] == "Pa" else (1.0, "")
             values = (result[name] * scale).transpose(*dims, "sample")
-            labels = values.isel(sample=0, drop=True).to_series().index if dims else [name]
+            labels: Any = [name]
+            if dims:
+                labels = values.isel(sample=0, drop=True).to_series().index
+                labels = labels.set_names(
+                    [f"{dim} ({result[dim].attrs['units']})" for dim in dims]
+                )
             rows = pd.DataFrame(values.values.reshape(len(labels), -1), index=labels)
             table = rows.T.describe(percentiles=LEVELS).T
+            for level in LEVELS:  # as the report estimates them
+                table[f"{level:.0%}"] = [_quantile(row, level) for row in rows.to_numpy()]
             echo(f"{name}{unit}\n{table.to_string(max_rows=48)}")
     state = open_run(out).status()
     echo(f"part {part}: " * bool(part) + f"{state.done} of {state.samples} samples in {out}")
@@ -159,6 +166,13 @@ def run(
         echo(f"{len(state.failures)} samples failed; the same command retries:", err=True)
         _show_some(state.failures, "  ", err=True)
         raise typer.Exit(1)
+
+
+def _quantile(row: Any, level: float) -> float:
+    from stiction.statistics.estimates import quantiles
+
+    known = row[row == row]
+    return float(quantiles(known, level).value[0]) if known.size else float("nan")
 
 
 def status(
@@ -266,8 +280,10 @@ def description(study: Any) -> dict[str, str]:
     lines = {"method": methods, "samples": samples}
     for number, (dim, coordinates) in enumerate(study.axes.items(), start=1):
         keys = " with ".join(variable.long_name for _, variable in coordinates.values())
-        values = coordinates[dim][0]
-        lines[f"axis {number}"] = f"{keys}: {len(values)} values, {values[0]} to {values[-1]}"
+        values, variable = coordinates[dim]
+        unit = f" {variable.units}".removesuffix(" 1")
+        text = f"{keys}: {len(values)} values, {values[0]} to {values[-1]}{unit}"
+        lines[f"axis {number}"] = text
     numbers = pd.DataFrame([_numbers(point) for point in some])
     for (title, unit), each in numbers.items():
         ends = dict.fromkeys(f"{value:.5g}" for value in (each.min(), each.max()))

@@ -210,6 +210,9 @@ def grid_axes(
             labels, parts = _labels(values), key.split(".")
             number = labels.dtype.kind in "if" and "correlation" not in parts
             unit = _unit(parts, coefficients) if number else "1"
+            labels = (
+                labels if unit == "1" else labels.astype(float)
+            )  # to be shown in other units
             own[names[key]] = (labels, Variable(unit, key, (dim,)))
     return result
 
