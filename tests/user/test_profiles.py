@@ -233,6 +233,11 @@ def test_heights_without_a_unit_are_not_metres_in_silence(tmp_path, ending):
         st.read_profile(found, quantity="height")
     np.testing.assert_allclose(found, heights * 1e-6, rtol=1e-12)
     assert found.dims == ("x", "y")
+    np.savetxt(
+        tmp_path / "places.csv", np.add.outer(np.arange(9.0), np.arange(9.0)), delimiter=";"
+    )
+    words = "the first row and the first column of the matrix are places"
+    refuses(words, lambda: st.read_profile(tmp_path / "places.csv", quantity="height"))
     plane = st.Interface(length=(0.02, 0.01), nodes=(8, 12))
     refuses(
         "swapped", lambda: st.read_profile(path, interface=plane, quantity="height", unit="um")
@@ -302,6 +307,7 @@ TEXTS = {
     "x;tau\n0;1e6\n0.05;strong\n": "line 3: 'strong' is not a number",
     "0;1\n0.05\n": "line 2 has 1 columns, line 1 has 2",
     "a;b;c\n1;2;3\n": "got 'a', 'b', 'c'",
+    "1 2 3 4 5 6 7 8 9\n2 3 4 5 6 7 8 9 1\n": "9 columns without names, as of a matrix",
     "x;tau;mu\n0;1\n": "line 1 names 3 columns",
     "pos;distance;tau\n0;0;1\n": "'pos', 'distance' ... give x=..., value=",
     "x;tau (Volt)\n0;1\n": "unknown unit 'Volt'",

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from stiction.arrays import Array
 from stiction.errors import InputError, UnitWarning, prefixed, unknown_name, warn_user
 from stiction.interface import Interface
 from stiction.model import FilePath, Flag, as_numbers, check, checked, describe, real_array
@@ -42,7 +43,7 @@ _UNNAMED = re.compile(r"\d+$|values?$")
 """Columns that say nothing of what they hold; without a heading they are called by numbers."""
 
 NARROWEST = 8
-"""Columns without headings that are a matrix, its rows along x."""
+"""Rows, and columns without headings, that are a matrix, its rows along x."""
 TALL = 1e-3
 """Range of heights, m, from which on a unit must be stated: numbers in um or nm have more."""
 
@@ -235,8 +236,14 @@ def labelled(
     if not is_labelled(data):
         raise InputError(f"must be a path, a DataArray or a Dataset, got {describe(source)}")
     numbered = "row" in data.dims and all(str(name).isdecimal() for name in data.variables)
-    if numbered and len(data.variables) >= NARROWEST and x is value is None and dims != ("x",):
+    wide = numbered and min(len(data.variables), data.sizes["row"]) >= NARROWEST
+    if wide and x is value is None and dims != ("x",):
         data = data.to_array("y").transpose("row", "y").drop_vars("y").rename(row="x")
+        if all(map(_equidistant, (data.values[0, 1:], data.values[1:, 0]))):
+            raise InputError(
+                "the first row and the first column of the matrix are places, not values; leave"
+                " them out, and give the interface"
+            )
     if not hasattr(data, "data_vars"):
         if value not in (None, data.name):
             only = f"the name of the only variable, {data.name!r}"
@@ -295,6 +302,11 @@ def labelled(
             raise InputError(f"{dim} must be finite; entry {entry}{line} is not")
         array = array.assign_coords({dim: (array[dim].dims, place)})
     return array.copy(data=values)
+
+
+def _equidistant(values: Array) -> bool:
+    steps = np.diff(values)
+    return bool(np.ptp(steps) < 1e-3 * np.abs(steps.mean()))
 
 
 def _is_map(data: Any) -> bool:
