@@ -182,6 +182,11 @@ def test_the_table_of_claims_is_tidy_and_the_main_results_stand(pipeline):
     short = " ".join((out / "report.html").read_text(encoding="utf-8").split())
     assert rules.rising()([spread]).value == verdicts["variability"] != HOLDS.value
     assert re.search(rf"correlation length (is )?{verdicts['variability']}: as median", short)
+    # Two moduli are compared with either reading of one.
+    row = re.search(r"likelihood of both.*?</tr>", short)[0]
+    a, b, *two = [float(cell) for cell in re.findall(r"<td>([\d.e-]+)</td>", row)]
+    times = float(re.search(r"is ([\d.e+]+) times as likely", short)[1])
+    assert times == pytest.approx(max(two) / max(a, b), rel=0.1)
     for name in (
         "lower-friction", "good-prediction", "interaction-suffices", "neighbours-lower",
     ):  # fmt: skip
