@@ -176,6 +176,7 @@ HEADINGS = {  # scales of x and of the strength
     "Messung 3;\nDatum;3. Mai\n;\nx (mm);tau\nmm;MPa": (MM, 1e-6),
     "Datum;3. Mai\nx (mm);tau (MPa)\nWeg;am Rand": (MM, 1e-6),
     "Versuch 100 mm;\nProbe;A12\nx;strength": (1.0, 1.0),
+    "Probe;12\nTemperatur;21,5\nx (mm);tau (MPa)": (MM, 1e-6),
     "x,strength": (1.0, 1.0),
     "Position [\N{MICRO SIGN}m];Festigkeit [MPa]": (1e6, 1e-6),
     "# x (mm)  tau (kPa)": (MM, 1e-3),
@@ -321,6 +322,7 @@ TEXTS = {
     "x;tau\nmm;Pa\nm;Pa\n0;1\n": "line 3 is a second line of units",
     "x;tau\npx;MPa\n0;1\n0.05;1\n": "unknown unit 'px'",
     "x;tau\n0;1_000\n": "'1_000' is not a number",
+    "x (mm);tau (MPa)\n0;ERR\n50;1\n": "line 2: 'ERR' is not a number",
     'x,tau\n0,"1,500"\n': "'1,500' is not a number",
 }
 

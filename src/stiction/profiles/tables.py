@@ -95,9 +95,16 @@ def read_table(path: Path) -> xr.Dataset:
         rows.pop()
     width = max((i for _, cells in rows for i, cell in enumerate(cells, 1) if cell), default=0)
     rows = [(number, cells[:width]) for number, cells in rows]
-    header = []
-    while rows and not _has_number(rows[0][1], separator):
+    header: list[tuple[int, list[str]]] = []
+    numeric = [_number(cell, separator) is not None for cell in rows[-1][1]] if rows else []
+    while rows and _is_heading(rows[0][1], numeric, separator):
         header.append(rows.pop(0))
+    while header and _has_number(header[-1][1], separator):  # refused below
+        rows.insert(0, header.pop())
+    while any(
+        _has_number(cells, separator) for _, cells in header
+    ):  # titles such as 'Probe;12'
+        header.pop(0)
     if not rows:
         raise InputError("holds no numbers")
     start, first = rows[0]
@@ -111,9 +118,7 @@ def read_table(path: Path) -> xr.Dataset:
             " with ';', or write decimal points"
         )
     columns = np.full((len(first), len(rows)), np.nan)
-    texts: dict[
-        int, str
-    ] = {}  # such as a date, of columns without a number: nobody may want them
+    texts: dict[int, str] = {}  # such as dates: nobody may want a column without a number
     for place, (number, cells) in enumerate(rows):
         if len(cells) != len(first):
             raise InputError(
@@ -151,6 +156,15 @@ def _sheet(path: Path) -> list[tuple[int, list[str]]]:
     if len(found) != 1:
         raise InputError(f"must have numbers on one sheet, got {', '.join(found) or 'none'}")
     return [(n, [cell.strip() for cell in row]) for n, row in enumerate(tables[found[0]], 1)]
+
+
+def _is_heading(cells: list[str], numeric: list[bool], separator: str) -> bool:
+    """Whether a row has no numbers, or other text where there are numbers in the end."""
+    pairs = zip(cells, numeric, strict=False)
+    text = any(
+        n and c.lower() not in _EMPTY and _number(c, separator) is None for c, n in pairs
+    )
+    return text or not _has_number(cells, separator)
 
 
 def _has_number(cells: list[str], separator: str = "") -> bool:
