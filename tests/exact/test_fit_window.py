@@ -6,14 +6,14 @@ from setups import beta_strength
 
 import stiction as st
 from stiction.inference.whittle import SpectrumFamily
-from stiction.inference.window import Window
+from stiction.inference.window import RecordWindow
 
 SPACING = 1e-4
 SPECTRUM = st.PowerLawSpectrum(1.5e-3, exponent=1.5, power_kept=0.999)
 
 
 def window_of(points, *options, spacing=SPACING):
-    return Window((spacing,), np.ones(points, dtype=bool), *options)
+    return RecordWindow((spacing,), np.ones(points, dtype=bool), *options)
 
 
 def model_of(name, parameters, **given):
@@ -37,7 +37,7 @@ def by_brute_force(window, covariance):
 def test_expectation_of_a_line(degree, gap):
     at, measured = np.arange(96), np.ones(96, dtype=bool)
     measured[gap] = False
-    window = Window((SPACING,), measured, degree)
+    window = RecordWindow((SPACING,), measured, degree)
     rho = window.correlation(window.power(SPECTRUM))
     expected = by_brute_force(window, rho[np.abs(np.subtract.outer(at, at))])
     found = window.expectation(rho)
@@ -88,7 +88,7 @@ def test_power_above_the_sampling_wavenumber_is_folded_back():
 
 def test_a_map_has_the_correlation_of_the_plane():
     spectrum = st.PowerLawSpectrum(1e-3, exponent=2.0, power_kept=0.99)
-    window = Window((1e-4, 1.2e-4), np.ones((48, 40), dtype=bool))
+    window = RecordWindow((1e-4, 1.2e-4), np.ones((48, 40), dtype=bool))
     rho = window.correlation(window.power(spectrum, 1.5))
     plane = st.Interface(length=(192 * 1e-4, 160 * 1.2e-4), nodes=(192, 160))
     marginal = beta_strength(1.0).marginal

@@ -15,7 +15,7 @@ from setups import LENGTH, LOCAL, RATE, SOLID, beta_strength, local_onset, make_
 import stiction as st
 from stiction.criterion.local import excess_of
 from stiction.elasticity.exponential_sum import fit_exponentials
-from stiction.equilibrium.solver import Solver, follow
+from stiction.equilibrium.solver import OnsetSolver, follow
 from stiction.reliability import subset
 from stiction.statistics import combined_mean, density, quantiles
 from stiction.theory import energy_release_rate, griffith_length, nucleation_statistics
@@ -335,7 +335,7 @@ def test_fields_and_grids_that_are_doubted(recwarn):
 def test_errors_of_equilibrium_are_warned_of():
     no = np.zeros(2, dtype=bool)
     with pytest.warns(st.AccuracyWarning, match="did not close to 1e-09 of it in 1 of 2"):
-        Solver(PROBLEM, st.Equilibrium())._warn(
+        OnsetSolver(PROBLEM, st.Equilibrium())._warn(
             np.array([1e-6, np.nan]), np.full(2, 1e6), no, no
         )
 

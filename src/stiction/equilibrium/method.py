@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from stiction.equilibrium.sample import pieces_of, refused
-from stiction.equilibrium.solver import Solver, event_variables
+from stiction.equilibrium.solver import OnsetSolver, event_variables
 from stiction.model import Flag, Number, Real, model
 from stiction.problem import Problem
 from stiction.problem import Sample as Samples
@@ -140,4 +140,4 @@ class Equilibrium:
 
     def prepare(self, problem: Problem) -> Callable[[Samples], dict[str, NDArray[Any]]]:
         """Return a solver for samples of this problem."""
-        return Solver(problem, self)
+        return OnsetSolver(problem, self)

@@ -146,7 +146,7 @@ def make_program(problem: Problem, gap: float = 1e-6) -> AnyProgram:
     return PlaneProgram(problem, gap) if plane else LineProgram(problem)
 
 
-class Solver:
+class OnsetSolver:
     """Solves samples of a problem with options of `Equilibrium`; safe in several threads."""
 
     def __init__(self, problem: Problem, options: Any) -> None:

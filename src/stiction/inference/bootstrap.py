@@ -23,7 +23,7 @@ from stiction.inference.whittle import (
     observe,
     origin,
 )
-from stiction.inference.window import Window
+from stiction.inference.window import RecordWindow
 from stiction.progress import Meter, Show
 from stiction.random.fields import RandomField
 from stiction.random.mapping import from_normal
@@ -50,10 +50,10 @@ ROUNDS = 2
 
 
 @dataclass(frozen=True, eq=False)
-class Setting:
+class FitSetting:
     """Families to fit, and a window for each record (equal windows are shared)."""
 
-    windows: tuple[Window, ...]
+    windows: tuple[RecordWindow, ...]
     marginal: Family
     spectrum: SpectrumFamily
     between: bool = False
@@ -63,7 +63,7 @@ class Setting:
 class Estimate:
     """The result of one fit."""
 
-    setting: Setting
+    setting: FitSetting
     marginal: Any
     model: Model
     distance: float  # Kolmogorov's, between values and marginal
@@ -131,7 +131,7 @@ class Estimate:
 
 
 def estimate(
-    rows: Sequence[Array], setting: Setting, start: Estimate | None = None
+    rows: Sequence[Array], setting: FitSetting, start: Estimate | None = None
 ) -> Estimate:
     """Fit measured values (points,) of each record, without trend; from a start if there is one.
 
@@ -148,7 +148,7 @@ def estimate(
     return replace(found, between=between)
 
 
-def _estimate(rows: Sequence[Array], setting: Setting, start: Estimate | None) -> Estimate:
+def _estimate(rows: Sequence[Array], setting: FitSetting, start: Estimate | None) -> Estimate:
     """Fit records of one field.
 
     The noise is found with the marginal of the values, which it widens; then both are fitted again.

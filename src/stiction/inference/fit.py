@@ -15,7 +15,7 @@ from stiction.inference.between import levels_of, scatter_between
 from stiction.inference.bootstrap import (
     FEWEST,
     Estimate,
-    Setting,
+    FitSetting,
     bootstrapped,
     estimate,
     intervals,
@@ -23,7 +23,7 @@ from stiction.inference.bootstrap import (
 from stiction.inference.marginal_fit import Family, family_of, mean_log_likelihood
 from stiction.inference.records import Record, records_of
 from stiction.inference.whittle import SpectrumFamily, spectrum_of
-from stiction.inference.window import Window
+from stiction.inference.window import RecordWindow
 from stiction.interface import Interface
 from stiction.load import NotNegative
 from stiction.model import Flag, Number, Positive, Progress, at_least, checked
@@ -261,7 +261,9 @@ def fit_field(
     (name, fixed), deviation = spectrum, None if noise is True else float(noise)
     family = SpectrumFamily(name, fixed, ratio, deviation, (spacing, 2.0 * float(longest)))
     windows, rows = _windowed(records, detrend)
-    found, compared = _best([Setting(windows, one, family, between) for one in marginal], rows)
+    found, compared = _best(
+        [FitSetting(windows, one, family, between) for one in marginal], rows
+    )
     measured, rows = rows, found.as_of_one(rows)
     repeated = bootstrapped(found, bootstrap, confidence, seed, progress)
     tests = {"marginal": "distance", "spectrum": "roughness"}
@@ -300,22 +302,24 @@ def fit_field(
     return fit
 
 
-def _windowed(records: Sequence[Record], degree: int) -> tuple[tuple[Window, ...], list[Array]]:
+def _windowed(
+    records: Sequence[Record], degree: int
+) -> tuple[tuple[RecordWindow, ...], list[Array]]:
     """A window for each record, which those of one geometry share, and values without trend."""
-    made: dict[Any, Window] = {}
+    made: dict[Any, RecordWindow] = {}
     windows, rows = [], []
     for values, spacings in records:
         measured = np.isfinite(values)
         key = (values.shape, spacings, measured.tobytes())
         if key not in made:
-            made[key] = Window(spacings, measured, degree)
+            made[key] = RecordWindow(spacings, measured, degree)
         windows.append(made[key])
         rows.append(made[key].without_trend(values[measured]))
     return tuple(windows), rows
 
 
 def _best(
-    settings: Sequence[Setting], rows: Sequence[Array]
+    settings: Sequence[FitSetting], rows: Sequence[Array]
 ) -> tuple[Estimate, dict[str, Goodness]]:
     """The family that describes the values best, and how well each does."""
     fitted: list[tuple[float, Estimate]] = []
@@ -388,7 +392,7 @@ def _doubts(found: Estimate, p_values: Mapping[str, float], failed: int) -> list
     return doubts
 
 
-def _power_at_cutoff(found: Estimate, window: Window) -> float:
+def _power_at_cutoff(found: Estimate, window: RecordWindow) -> float:
     """What is left of the field's power where it has fallen to a quarter, beside white noise."""
     model = found.model
     if model.noise_share <= 0.0:

@@ -18,7 +18,7 @@ BATCH = 5_000
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class PosteriorGrid:
     """Cells of equal prior mass in a box, each with its share of the posterior."""
 
     box: Array  # (2, parameters): its corners, as u
@@ -48,7 +48,7 @@ class Grid:
 
 def grid_of(
     function: Callable[[Array], Array], box: Array, points: int = POINTS
-) -> Grid | None:
+) -> PosteriorGrid | None:
     """Return a density, given by its logarithm at points (points, parameters), in a box.
 
     None if it is zero.
@@ -71,7 +71,7 @@ def grid_of(
             return None
         mass, cell = np.exp(values - top), (high - low) / along
         evidence = top + float(np.log(mass.sum() * np.prod(cell)))
-        grid = Grid(box, mass / mass.sum(), evidence)
+        grid = PosteriorGrid(box, mass / mass.sum(), evidence)
         # Cells on either side that hold almost no mass, less one of margin.
         rows = [grid.marginal(axis) for axis in range(dimension)]
         empty = [[np.sum(np.cumsum(r) <= NEGLIGIBLE) - 1 for r in (o, o[::-1])] for o in rows]

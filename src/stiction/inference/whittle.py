@@ -27,7 +27,7 @@ from scipy.special import factorial
 from stiction.arrays import Array
 from stiction.inference.marginal_fit import table_of
 from stiction.inference.scoring import climb
-from stiction.inference.window import Window
+from stiction.inference.window import RecordWindow
 from stiction.kinds import from_table
 from stiction.random.mapping import quantile_of_normal
 from stiction.random.spectra import SPECTRA
@@ -84,15 +84,15 @@ def hermite_shares(marginal: Any) -> Array:
 class Observed(NamedTuple):
     """Periodograms of all records of one geometry: their number, their average, and its floor."""
 
-    window: Window
+    window: RecordWindow
     records: int
     average: Array
     floor: float
 
 
-def observe(rows: Sequence[Array], windows: Sequence[Window]) -> list[Observed]:
+def observe(rows: Sequence[Array], windows: Sequence[RecordWindow]) -> list[Observed]:
     """Return the periodograms of measured values (points,), by geometry."""
-    powers: dict[Window, list[Array]] = {}
+    powers: dict[RecordWindow, list[Array]] = {}
     for row, window in zip(rows, windows, strict=True):
         powers.setdefault(window, []).append(window.periodogram(row))
     found = []
@@ -123,20 +123,20 @@ class Model(NamedTuple):
         """Standard deviation of the measurement noise."""
         return math.sqrt(self.noise_share * self.variance)
 
-    def power(self, window: Window) -> Array:
+    def power(self, window: RecordWindow) -> Array:
         """Return the variance of z in each mode of a period of a window's grid."""
         return window.power(self.spectrum, self.anisotropy, end_seen=self.end_seen)
 
-    def correlation(self, window: Window) -> Array:
+    def correlation(self, window: RecordWindow) -> Array:
         """Return the correlation of values without noise, at all lags."""
         rho = window.correlation(self.power(window))
         return np.polynomial.polynomial.polyval(rho, self.shares)
 
-    def signal(self, window: Window) -> Array:
+    def signal(self, window: RecordWindow) -> Array:
         """Return the expected periodogram of values of unit variance without noise, (*half)."""
         return window.expectation(self.correlation(window))
 
-    def expectation(self, window: Window, signal: Array | None = None) -> Array:
+    def expectation(self, window: RecordWindow, signal: Array | None = None) -> Array:
         """Return the expected periodogram, (*half), from that without noise if it is there."""
         signal = self.signal(window) if signal is None else signal
         share = self.noise_share

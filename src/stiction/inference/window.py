@@ -47,7 +47,7 @@ class Edge(NamedTuple):
     width: float
 
 
-class Window:
+class RecordWindow:
     """Points of records of one geometry, `spacings` (m) apart: taper, gaps, and degree of trend.
 
     Lags are 0, 1, ..., n - 1, -n, ..., -1 in each direction; (*half) is the shape of a real
