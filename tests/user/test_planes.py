@@ -1,6 +1,5 @@
 """Planes as a user meets them: results, warnings, refusals, study files, commands, figures."""
 
-import csv
 import functools
 import warnings
 
@@ -177,13 +176,6 @@ def test_a_study_in_memory_on_disk_and_by_commands(written, runs):
     runs("run plane.toml --out run")
     runs("status run", "60 of 60")
     xr.testing.assert_equal(memory, st.open_run("run").dataset())
-    runs("export run run.csv")
-    with open("run.csv") as file:
-        rows = list(csv.DictReader(file))
-    assert len(rows) == 60
-    for dim in ("x", "y"):
-        place = float(rows[7][f"critical_position_{dim} (m)"])
-        assert place == memory.critical_position.sel(direction=dim).values.ravel()[7]
     runs("export run run.nc")
     xr.testing.assert_equal(xr.load_dataset("run.nc"), memory)
     runs("report run")
