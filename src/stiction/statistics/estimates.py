@@ -17,15 +17,15 @@ from stiction.model import Numbers, brief, check, checked
 
 
 @dataclass(frozen=True)
-class Estimate:
+class WithError:
     """An estimated number and its standard error, zero if exact."""
 
     value: float
     error: float = 0.0
 
-    def __sub__(self, other: Estimate | float) -> Estimate:
-        other = other if isinstance(other, Estimate) else Estimate(other)
-        return Estimate(self.value - other.value, math.hypot(self.error, other.error))
+    def __sub__(self, other: WithError | float) -> WithError:
+        other = other if isinstance(other, WithError) else WithError(other)
+        return WithError(self.value - other.value, math.hypot(self.error, other.error))
 
 
 def as_sample(values: Any, fewest: int = 2) -> Array:
@@ -39,13 +39,13 @@ def as_sample(values: Any, fewest: int = 2) -> Array:
     return array
 
 
-def mean(values: Any) -> Estimate:
+def mean(values: Any) -> WithError:
     """Estimate the mean of independent values (samples,), in their unit."""
     sample = as_sample(values)
-    return Estimate(float(sample.mean()), float(sample.std(ddof=1)) / math.sqrt(sample.size))
+    return WithError(float(sample.mean()), float(sample.std(ddof=1)) / math.sqrt(sample.size))
 
 
-def standard_deviation(values: Any) -> Estimate:
+def standard_deviation(values: Any) -> WithError:
     """Estimate the standard deviation of independent values (samples,), in their unit.
 
     Error by the delta method from the fourth moment: sqrt((m_4 - s^4)/N)/(2 s), without a
@@ -55,14 +55,14 @@ def standard_deviation(values: Any) -> Estimate:
     s = float(sample.std(ddof=1))
     fourth = float(np.mean((sample - sample.mean()) ** 4))
     error = math.sqrt(max(fourth - s**4, 0.0) / sample.size)
-    return Estimate(s, error / (2.0 * s) if s else 0.0)
+    return WithError(s, error / (2.0 * s) if s else 0.0)
 
 
 @dataclass(frozen=True)
 class Combined:
     """A mean from all methods, with the standard error of the expensive results by themselves."""
 
-    estimate: Estimate
+    estimate: WithError
     plain_error: float
     freedom: int  # of the error of the estimate
 
@@ -114,7 +114,7 @@ def combined_mean(expensive: Any, *inexpensive: Any) -> Combined:
         )
     value, variance = _telescoped(first, chain)
     plain, freedom = math.sqrt(_telescoped(first, [])[1]), first.size - (2 if chain else 1)
-    return Combined(Estimate(value, math.sqrt(variance)), plain, freedom)
+    return Combined(WithError(value, math.sqrt(variance)), plain, freedom)
 
 
 def _telescoped(results: Array, chain: Sequence[Array]) -> tuple[float, float]:
