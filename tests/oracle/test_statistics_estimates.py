@@ -9,7 +9,7 @@ import scipy.stats
 
 import stiction as st
 from stiction.statistics.densities import density
-from stiction.statistics.estimates import Estimate, mean, quantiles, standard_deviation
+from stiction.statistics.estimates import WithError, mean, quantiles, standard_deviation
 
 RNG = np.random.default_rng(20)
 EXAMPLE = Path(__file__).parents[2] / "examples" / "rupture_ensemble_on_a_plane.py"
@@ -27,7 +27,7 @@ def test_errors_are_the_scatter_of_repetitions(estimator):
 
 
 def test_errors_of_independent_estimates_add_in_squares():
-    difference = Estimate(3.0, 0.3) - Estimate(1.0, 0.4)
+    difference = WithError(3.0, 0.3) - WithError(1.0, 0.4)
     assert (difference.value, difference.error) == pytest.approx((2.0, 0.5))
 
 
