@@ -17,7 +17,7 @@ from line_and_plane_figures import NAMES, draw
 from scipy.stats import rankdata
 
 import stiction as st
-from stiction.statistics.estimates import Estimate, mean
+from stiction.statistics.estimates import WithError, mean
 
 RATIOS = (0.25, 0.5, 1.0, 2.0)
 """Correlation lengths xi_0 over the nucleation length h_n of a line."""
@@ -135,7 +135,7 @@ def slipping(data: xr.Dataset) -> xr.DataArray:
     return 100.0 * (data.slip > 0.0).mean(along)
 
 
-def far_lowering(case: Case, data: xr.Dataset) -> list[Estimate]:
+def far_lowering(case: Case, data: xr.Dataset) -> list[WithError]:
     """Lowering by slip far from the critical patch, per cent of the local criterion.
 
     Of the first `NEIGHBOURS` samples, each with its onset if only nodes within `REACH` h_n of the
@@ -177,21 +177,21 @@ def rank_correlation(pairs: np.ndarray) -> float:
     return float(np.corrcoef(rankdata(pairs[:, 0]), rankdata(pairs[:, 1]))[0, 1])
 
 
-def bootstrap(statistic, rows: np.ndarray, resampled: int = RESAMPLED) -> Estimate:
+def bootstrap(statistic, rows: np.ndarray, resampled: int = RESAMPLED) -> WithError:
     """A statistic of independent rows, with the standard error from resampling them."""
     random = np.random.default_rng(0)
     choices = (random.integers(len(rows), size=len(rows)) for _ in range(resampled))
     again = [statistic(rows[chosen]) for chosen in choices]
-    return Estimate(statistic(rows), float(np.std(again, ddof=1)))
+    return WithError(statistic(rows), float(np.std(again, ddof=1)))
 
 
-def share(events: np.ndarray) -> Estimate:
+def share(events: np.ndarray) -> WithError:
     """Per cent."""
     p = float(events.mean())
-    return Estimate(100.0 * p, 100.0 * np.sqrt(p * (1.0 - p) / events.size))
+    return WithError(100.0 * p, 100.0 * np.sqrt(p * (1.0 - p) / events.size))
 
 
-def text(estimate: Estimate) -> str:
+def text(estimate: WithError) -> str:
     """Value and standard error, with two digits of the error."""
     if estimate.error < 1e-9:
         return f"{estimate.value:.3g}"
@@ -199,9 +199,9 @@ def text(estimate: Estimate) -> str:
     return f"{estimate.value:.{digits}f} ± {estimate.error:.{digits}f}"
 
 
-def summarise(data: xr.Dataset) -> dict[str, list[Estimate]]:
+def summarise(data: xr.Dataset) -> dict[str, list[WithError]]:
     """Estimates at each correlation length of one case."""
-    rows: dict[str, list[Estimate]] = defaultdict(list)
+    rows: dict[str, list[WithError]] = defaultdict(list)
     for ratio in RATIOS:
         at = data.sel(ratio=ratio)
         rows["lowering"].append(mean(lowering(at).values))
@@ -209,15 +209,15 @@ def summarise(data: xr.Dataset) -> dict[str, list[Estimate]]:
         pairs = np.column_stack([at.local.values, at.first_instability.values])
         rank = bootstrap(rank_correlation, pairs)
         rows["rank"].append(rank)
-        rows["disorder"].append(Estimate(1.0 - rank.value, rank.error))
+        rows["disorder"].append(WithError(1.0 - rank.value, rank.error))
         rows["arrested"].append(share(at.arrested_events.values > 0))
         rows["single"].append(share(at.slip_patches.values == 1))
     return rows
 
 
-def size_effect(small: xr.Dataset, large: xr.Dataset) -> dict[str, list[Estimate]]:
+def size_effect(small: xr.Dataset, large: xr.Dataset) -> dict[str, list[WithError]]:
     """Mean fall of the onset, per cent, when the interface grows: seen, and of a weakest link."""
-    rows: dict[str, list[Estimate]] = defaultdict(list)
+    rows: dict[str, list[WithError]] = defaultdict(list)
     for name, column in (("exact", "first_instability"), ("local", "local")):
         for before, after in zip(small[column].values, large[column].values, strict=True):
             before, after = (100.0 * each / before.mean() for each in (before, after))
@@ -227,7 +227,7 @@ def size_effect(small: xr.Dataset, large: xr.Dataset) -> dict[str, list[Estimate
     return rows
 
 
-def grid_error(coarse: xr.Dataset, fine: xr.Dataset) -> dict[str, list[Estimate]]:
+def grid_error(coarse: xr.Dataset, fine: xr.Dataset) -> dict[str, list[WithError]]:
     """Change by half the spacing of nodes on the same samples, per cent of the onset."""
     few = fine.sizes["sample"]
     coarse = coarse.isel(sample=slice(few))
@@ -238,7 +238,7 @@ def grid_error(coarse: xr.Dataset, fine: xr.Dataset) -> dict[str, list[Estimate]
     return {name: [mean(row) for row in change.values] for name, change in changes.items()}
 
 
-def table(title: str, columns: dict[str, list[Estimate]]) -> None:
+def table(title: str, columns: dict[str, list[WithError]]) -> None:
     """Print a table in Markdown, with a row for each correlation length."""
     heads = [NAMES.get(name, name).replace("$", "") for name in columns]
     print(f"{title}:\n\n| xi_0/h_n | " + " | ".join(heads) + " |")
