@@ -14,12 +14,13 @@ from crooked import (
     as_measured,
     write_table,
 )
-from oracles import angle_rule, largest_load
+from oracles import angle_rule, dense, largest_load, symbol_of
 from setups import exact_onset, local_onset
 
 import stiction as st
 from stiction.criterion.eigenfunction import weight
 from stiction.criterion.local import beyond_residual
+from stiction.criterion.windows import STRETCHES
 from stiction.theory import energy_release_rate, griffith_length
 
 BOTH = pytest.mark.parametrize(
@@ -79,6 +80,44 @@ def test_nucleation_stress_is_the_least_weighted_mean_over_a_patch():
     assert found.critical_load.item() == pytest.approx(ratio.min(), rel=1e-5)
     place = centre[ratio.argmin()] * LINE.interface.spacing
     assert apart(found.critical_position.item(), place, 0.037) < 0.05 * LINE.interface.spacing
+
+
+def test_critical_ellipses_of_a_plane_by_dense_eigenvectors():
+    """The smallest of each shape on whose nodes K has an eigenvalue up to W, by whole matrices."""
+    shape, spacings, rate = PLANE.interface.shape, PLANE.interface.spacings, PLANE.uniform_rate
+    matrix = dense(symbol_of(PLANE), shape)
+    x, y = (np.fft.fftfreq(n, 1.0 / (n * h)) for n, h in zip(shape, spacings, strict=True))
+    least = np.inf
+    for stretch in STRETCHES:
+        aspect = stretch / np.sqrt(1.0 - PLANE.solid.poisson_ratio)
+        square = (x[:, None] ** 2 + (aspect * y) ** 2).ravel()
+        for bound in 1.000001 * np.sort(square):
+            inside = square <= bound
+            values, vectors = np.linalg.eigh(matrix[np.ix_(inside, inside)])
+            if values[0] <= rate:
+                break
+        weight = np.zeros(square.size)
+        weight[inside] = np.abs(vectors[:, 0]) / np.abs(vectors[:, 0]).sum()
+        spectrum = np.conj(np.fft.rfft2(weight.reshape(shape)))
+        excess, load = (
+            np.fft.irfft2(spectrum * np.fft.rfft2(field), shape)
+            for field in (PLANE_STRENGTH - PLANE.load.initial_stress, PLANE.load.profile)
+        )
+        if (excess / load).min() < least:
+            least = (excess / load).min()
+            node = np.unravel_index((excess / load).argmin(), shape)
+            patch = aspect, 2.0 * np.sqrt(bound), inside.sum() * np.prod(spacings)
+    found = local_onset(PLANE, PLANE_STRENGTH)
+    # Eigenvectors are known to 1e-9 of W.
+    assert found.critical_load.item() == pytest.approx(least, rel=1e-7)
+    assert found.critical_aspect.item() == pytest.approx(patch[0], rel=1e-12)
+    extents = patch[1], patch[1] / patch[0]
+    assert found.critical_patch_extent.values[0] == pytest.approx(extents, rel=1e-5)
+    assert found.critical_patch_area.item() == pytest.approx(patch[2], rel=1e-12)
+    for place, at, h, length in zip(
+        found.critical_position.values[0], node, spacings, PLANE.interface.lengths, strict=True
+    ):
+        assert apart(place, at * h, length) <= 0.5 * h
 
 
 @BOTH
