@@ -6,7 +6,7 @@ import numpy as np
 
 from stiction.arrays import Array
 from stiction.dynamics.loading import value_at
-from stiction.dynamics.state import History, Nodes, Record, Setting, State, Thresholds
+from stiction.dynamics.state import Grid, History, Nodes, Record, Setting, State, Thresholds
 from stiction.jit import jit_inside
 
 REACH = 3.0  # a node counts with at most so many times the stress drop that the load provides
@@ -111,6 +111,7 @@ def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
 @jit_inside
 def finish_step(
     state: State,
+    grid: Grid,
     setting: Setting,
     step: Step,
     increments: Array,
@@ -142,8 +143,7 @@ def finish_step(
     now.time, now.size, now.load = step.time, step.size, step.load
     now.mean_stress, now.top_slip_rate, now.top_node, now.slid = mean_stress, top, node, slid
     now.least, now.least_node = least, least_node
-    now.work += step.work
-    now.mean_slip = slip_sum / slip.size
+    now.work, now.mean_slip = now.work + step.work, slip_sum / slip.size
     now.scale = max(now.scale, value_at(setting.scale, step.load))
     fall = observe(now, setting.thresholds, step.radiated)
     if record.steps.size > 0:

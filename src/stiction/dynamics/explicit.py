@@ -154,7 +154,7 @@ def explicit_steps(
         rise, radiated = abs(load - now.load), impedance * total / n
         now.explicit_steps += 1
         done, limit = Step(time, step, load, work * grid.cell, radiated), tables.transfer
-        fall = finish_step(state, setting, done, tables.predicted, limit, record, taken)
+        fall = finish_step(state, grid, setting, done, tables.predicted, limit, record, taken)
         taken += 1
         if now.slid >= thresholds.slid_stop:
             reason = Reason.ALL_SLID

@@ -264,7 +264,7 @@ def implicit_steps(
         done = _accept(state, grid, setting, tables, attempt, radiated)
         now.implicit_steps += 1
         now.past_step, now.radiated = size, radiated
-        fall = finish_step(state, setting, done, u, tables.driving, record, taken)
+        fall = finish_step(state, grid, setting, done, u, tables.driving, record, taken)
         taken += 1
         if not clipped:
             step = _next_size(thresholds.slip_step, size, largest, growing)
