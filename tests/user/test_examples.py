@@ -212,6 +212,18 @@ def test_community_fault(tmp_path):
         assert np.nanmax(np.abs(other - arrival)) < 1e-6
     outside = (np.abs(found.x) > 15.1e3)[:, None] | (np.abs(found.y) > 7.6e3)[None, :]
     assert np.all(np.isnan(arrival[outside]))
+    path = FAULT.write_station(found, "oblique", 200.0, tmp_path)
+    assert path.name == "200m_faultst075dp045.txt"
+    lines = path.read_text().splitlines()
+    first = next(i for i, line in enumerate(lines) if not line.startswith("# "))
+    assert "# location=on fault, 7.5 km along strike, 4.5 km down-dip" in lines[:first]
+    assert lines[first].split()[::7] == ["t", "n-stress"]
+    rows, own = np.loadtxt(lines[first + 1 :]), found.run.sel(station="oblique")
+    assert rows[0] == pytest.approx([0, 0, 0, 70.0, 0, 0, 0, -120.0])
+    assert rows[1:, :2] == pytest.approx(np.stack([own.step_time, own.station_slip], axis=1))
+    stresses = own.station_slip_rate, own.station_shear_stress / 1e6
+    assert rows[1:, 2:4] == pytest.approx(np.stack(stresses, axis=1))
+    assert f"# num_time_steps={len(rows)}" in lines
     record = found.run.sel(station="along the slip")
     slipped = record.station_slip.values > FAULT.CRITICAL_SLIP
     # Nodes are 200 m apart, and the nearest to 7.5 km is 100 m further out or in.
