@@ -45,6 +45,15 @@ test_what_no_station_is = refusals({
 })  # fmt: skip
 
 
+def test_an_end_of_the_interface_is_its_first_node():
+    """It is periodic; half a node before the end is its last node."""
+    for problem, place, node in (
+        (LINE, 0.04, 0), (LINE, 0.03963, 63), (BREAKING_PLANE, (0.04, 0.0124), 15),
+        (BREAKING_PLANE, (0.0124, 0.03), 12 * 36),
+    ):  # fmt: skip
+        assert st.Save(stations={"a": place}).nodes(problem.interface) == node
+
+
 @pytest.fixture(scope="module", params=list(CASES))
 def case(request):
     problem, stations, nodes = CASES[request.param]

@@ -15,7 +15,7 @@ NODES = 128
 PROBLEM, TAU_P = ruptures.wavy_line(NODES)
 X = np.arange(NODES) / NODES
 METHOD = st.Rupture(loading_rate=1e7)
-DETOUR = ([0.0, 0.1, 0.2, 0.3], [0.0, 7.75e5, 7.0e5, 9e5])
+DETOUR = ([0.0, 0.1, 0.11, 0.2, 0.27, 0.3], [0.0, 7.75e5, 7.75e5, 7.0e5, 8.3e5, 9e5])
 
 
 @pytest.fixture(scope="module")
@@ -151,6 +151,9 @@ def test_a_load_that_goes_down_and_up_again_is_no_instability(exact, stop):
     assert run.attrs["stopped"] == ("onset" if stop == "onset" else "sliding")
     assert run.arrested_events.item() == 0
     assert run.first_instability.item() == run.critical_stress.item()
+    # A step ends at each peak of the load, and none is needed where its slope only changes.
+    ends = [np.abs(run.step_time.values - time).min() < 1e-12 for time in DETOUR[0][1:5]]
+    assert ends == [True, True, True, False]
     # Reached at 2e6 Pa/s: inertia lifts it by 1e-5.
     assert run.critical_stress.item() == pytest.approx(exact, rel=5e-5)
 
@@ -200,6 +203,31 @@ def test_where_a_run_stops_and_what_is_known_then(stop):
         assert one.arrested_events.item() >= 1
         assert one.radiated_energy.item() > 0.0
         assert simulate(strength=tau_p, stop=stop).top_slip_rate[-1].item() < 1e-3
+
+
+def test_a_place_that_weakens_too_steeply_for_the_grid_is_said():
+    """Only if it slips; a run on which all is well says nothing."""
+    tau_p = np.where(np.abs(X - 0.3) < 0.01, 2e7, TAU_P)
+    problem = dataclasses.replace(PROBLEM, friction=st.LinearWeakening(critical_slip=8e-6))
+    with pytest.warns(st.AccuracyWarning, match="2 nodes slipped, .* x = 0.0148438 m.*too steeply"):
+        simulate(tau_p, problem)
+    with warnings.catch_warnings(action="error"):
+        simulate(tau_p, problem, stop="onset")
+    with warnings.catch_warnings(action="error"):
+        critical_stress(METHOD)
+
+
+def test_what_is_unstable_is_faster_than_waves_and_creep():
+    """Z V is 7.5 % of the median of tau_p - tau_r over what can break."""
+    tau_p = np.where(X < 0.4, np.inf, TAU_P)
+    run = ruptures.run_of(PROBLEM, tau_p, METHOD, accept=("barriers",))
+    solid = PROBLEM.solid
+    stress = (
+        solid.shear_modulus
+        / (2.0 * solid.shear_wave_speed)
+        * run.setting.thresholds.unstable_rate
+    )
+    assert stress == pytest.approx(0.075 * np.median(TAU_P[X >= 0.4]), rel=1e-12)
 
 
 def test_rates_that_cannot_be_resolved_are_said():

@@ -53,6 +53,22 @@ def test_without_alignment_times_are_those_of_the_run():
     assert half.misfit == pytest.approx(1.0, abs=2e-3)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_the_shift_is_found_between_steps_of_any_length(seed):
+    """A run that is linear between few steps, and its own values at shifted times."""
+    rng = np.random.default_rng(seed)
+    clock = np.cumsum(rng.exponential(3e-5, 40) + 1e-6)
+    values = np.cumsum(
+        rng.exponential(1e-6, (40, 2)) * np.hypot(1.0, 30.0 * (clock > 4e-4))[:, None], axis=0
+    )
+    run = RUN.isel(step=slice(40)).assign_coords(step_time=("step", clock))
+    run = run.assign(station_slip=(("step", "station"), values))
+    times, shift = np.linspace(0.0, 2e-4, 400), rng.uniform(2e-4, 8e-4)
+    measured = np.stack([np.interp(times + shift, clock, own) for own in values.T], axis=1)
+    found = misfit(run, history(measured, times, PLACES))
+    assert found.time_shift == pytest.approx(shift, abs=2e-8)
+
+
 def test_units_gaps_and_single_gauges():
     stated = (record() * 1e6).assign_attrs(units="um").rename("slip")
     assert misfit(RUN, stated).misfit < 2e-3
