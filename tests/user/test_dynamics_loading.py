@@ -209,7 +209,9 @@ def test_a_place_that_weakens_too_steeply_for_the_grid_is_said():
     """Only if it slips; a run on which all is well says nothing."""
     tau_p = np.where(np.abs(X - 0.3) < 0.01, 2e7, TAU_P)
     problem = dataclasses.replace(PROBLEM, friction=st.LinearWeakening(critical_slip=8e-6))
-    with pytest.warns(st.AccuracyWarning, match="2 nodes slipped, .* x = 0.0148438 m.*too steeply"):
+    with pytest.warns(
+        st.AccuracyWarning, match="2 nodes slipped, .* x = 0.0148438 m.*too steeply"
+    ):
         simulate(tau_p, problem)
     with warnings.catch_warnings(action="error"):
         simulate(tau_p, problem, stop="onset")
