@@ -141,12 +141,12 @@ def test_laws_without_straight_pieces_and_planes_have_no_equilibrium_to_begin_fr
 def test_the_state_at_the_start_is_that_of_the_slow_path():
     """Slip rates by central differences of equilibria; what is radiated only begins there."""
     run = run_of(CROOKED, CROOKED_STRENGTH, st.Rupture(loading_rate=1e7))
-    setting, rows = static_setting(CROOKED), CROOKED.sample(CROOKED_STRENGTH)
-    state = slow_start(setting, run, rows, 0, 1e7)
-    static, impedance = setting.sample_of(rows, 0), run.medium.impedance
+    program, rows = static_program(CROOKED), CROOKED.sample(CROOKED_STRENGTH)
+    state = slow_start(program, run, rows, 0, 1e7)
+    static, impedance = program.sample_of(rows, 0), run.medium.impedance
     load = state.now["load"] - impedance * state.rate.mean() / 1.2  # <p>
-    step = 0.01 * (setting.programme(static).load - load)
-    slips = [setting.programme(static, load + side * step).slip for side in (-1.0, 1.0)]
+    step = 0.01 * (program.solve(static).load - load)
+    slips = [program.solve(static, load + side * step).slip for side in (-1.0, 1.0)]
     rate = 1e7 * (slips[1] - slips[0]) / (2.0 * step)
     # Extrapolated as at a fold, by 1/16; on this grid the path is straight there.
     assert np.all((state.rate >= 0.999 * rate) & (state.rate <= 1.07 * rate))
