@@ -10,7 +10,6 @@ from refusals import refuses
 from small_study import lengths, small_study
 
 import stiction as st
-from stiction.errors import StoreError
 from stiction.reliability.repetitions import SAMPLES
 
 SWEPT = lengths(3e-3, 7e-3, 5e-3)
@@ -84,7 +83,6 @@ def test_a_folder_of_other_settings_and_what_cannot_be_sampled_are_refused(tmp_p
         lambda: study(sweep=[]).failure_curve(
             out=tmp_path / "run", smallest=0.01, repetitions=1
         ),
-        StoreError,
     )
     rupture = study(method={"type": "rupture", "loading_rate": 2e7}, sweep=[])
     refuses(
