@@ -193,9 +193,8 @@ class Rupture:
                 start = slow_start(static, run, rows, i, rate) if static and rate else None
                 found.append(self._one(run, start))
             checks.warn_of_survival(self.stop, found)
-            return {
-                name: np.array([one[name] for one in found]) for name in self.variables(problem)
-            }
+            names = self.variables(problem)
+            return {name: np.array([one[name] for one in found]) for name in names}
 
         return solve
 

@@ -35,9 +35,8 @@ def per_area(interface: Interface, variable: Variable) -> Variable:
     if not interface.is_plane:
         return variable
     units = {"N": "N m", "J/m": "J"}.get(variable.units, variable.units)
-    return replace(
-        variable, units=units, long_name=variable.long_name.replace(" per length", "")
-    )
+    name = variable.long_name.replace(" per length", "")
+    return replace(variable, units=units, long_name=name)
 
 
 def scalars(interface: Interface) -> dict[str, Variable]:
