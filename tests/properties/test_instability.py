@@ -103,6 +103,17 @@ def test_an_arrested_instability_is_no_sliding():
         assert np.isnan(found[name].item()), name
 
 
+def test_what_slides_without_an_instability_does_so_at_its_largest_stress():
+    """A third of a nucleation length between barriers slips as the load drives it."""
+    strength = np.where(np.abs(X / 0.05 - 0.37) < 0.03, CROOKED_STRENGTH, np.inf)
+    run = simulate(st.Rupture(loading_rate=1e7), strength)
+    assert run.attrs["stopped"] == "sliding"
+    assert run.arrested_events.item() == 0
+    assert run.critical_stress.item() == run.step_mean_stress.values[-1]
+    assert run.first_instability.item() == run.critical_stress.item()
+    assert run.onset_time.item() == run.step_time.values[-1]
+
+
 def test_an_ensemble_counts_what_survived():
     """Held at a load between those of many onsets; the weakest nodes of some do not even slip."""
     problem = make_problem(
