@@ -136,6 +136,8 @@ def test_a_run_cut_short_goes_on_to_the_same_numbers(tmp_path, monkeypatch, ever
     part = simulate(st.Save(**kept), method=dataclasses.replace(METHOD, max_steps=113))
     assert part.attrs["stopped"] == "max_steps"
     assert open_rupture(tmp_path / "run").sizes["step"] == 113
+    now = read_arrays(tmp_path / "run" / "checkpoint.npz")["diagnostics"][0]
+    assert 113 - every <= now["explicit_steps"] + now["implicit_steps"] < 113  # little is lost
     for most in (150, 40):
 
         def cut(done, _, most=most):
