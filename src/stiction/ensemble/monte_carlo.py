@@ -146,8 +146,9 @@ def monte_carlo(
     progress : bool or callable
         True shows progress on standard error after two seconds; a callable gets (done, total).
     pilot : bool
-        With the local criterion, also solve the first samples (32 on a line, 8 on a plane)
-        by `Equilibrium` and report the difference; the ensemble stays the same.
+        With the local criterion, also solve the first samples (32 on a line, 8 on a plane), and
+        the weakest of the first thousand, by `Equilibrium` and report the difference; the ensemble
+        stays the same.
 
     Returns
     -------
@@ -156,7 +157,8 @@ def monte_carlo(
         seed: enough to run it again. Samples that could not be solved are NaN, and listed in the
         attribute 'failed_samples' (point, sample, seed, message, whether the sample itself does
         not fit). With a pilot, 'pilot_bias' and 'pilot_scatter' are the mean and the standard
-        deviation of the difference in `critical_stress`, relative to the mean by `Equilibrium`.
+        deviation of the difference in `critical_stress`, relative to the mean by `Equilibrium`;
+        'pilot_weakest_bias' and 'pilot_weakest_scatter' are those of the weakest samples.
 
     Raises
     ------

@@ -14,7 +14,11 @@ from stiction.errors import InputError, collect_warnings
 from stiction.progress import Meter
 
 ON_A_LINE, ON_A_PLANE = 32, 8
-"""Number of samples of a pilot."""
+"""Numbers of first samples of a pilot, and of the weakest ones."""
+LOOKED_AT, SECONDS = 1000, 1.0
+"""Number of first samples among which the weakest are, and seconds on one core that these take."""
+BATCH = 64
+"""Samples that the inexpensive method solves at once."""
 MOST_POINTS = 8
 """Number of points of a sweep that have a pilot."""
 WORTH_A_WARNING = 0.01
@@ -34,56 +38,76 @@ def compare(
     """Solve samples of at most eight points by their method and by its exact counterpart.
 
     Return mean and scatter of the difference relative to the mean of the exact onset, of the
-    points with the largest; nothing if there is no exact counterpart.
+    points with the largest, for the first samples and for the weakest among more of them;
+    nothing if there is no exact counterpart.
     """
     chosen = np.unique(np.linspace(0, len(points) - 1, MOST_POINTS).round().astype(int))
-    found = []
+    parts: dict[str, list[Array]] = {}
     with Meter("comparing with the exact onset", len(chosen), show, unit="points") as meter:
         for number in chosen.tolist():
-            relative = _differences(points[number], first, most)
-            if relative.size > 1:
-                found.append((relative.size, relative.mean(), relative.std(ddof=1)))
+            for name, relative in _differences(points[number], first, most).items():
+                if relative.size > 1:
+                    parts.setdefault(name, []).append(relative)
             meter.advance()
-    if not found:
-        return {}
-    samples, bias, scatter = zip(*found, strict=True)
-    return {
-        "pilot_samples": samples[0],
-        "pilot_bias": float(max(bias, key=abs)),
-        "pilot_scatter": float(max(scatter)),
-    }
+    found: dict[str, Any] = {}
+    for name, each in parts.items():
+        found[f"{name}_samples"] = each[0].size
+        found[f"{name}_bias"] = float(max((one.mean() for one in each), key=abs))
+        found[f"{name}_scatter"] = float(max(one.std(ddof=1) for one in each))
+    return found
 
 
-def _differences(experiment: Experiment, first: int, most: int) -> Array:
+def _differences(experiment: Experiment, first: int, most: int) -> dict[str, Array]:
     """Return the differences to the exact onset, relative to its mean; none if there is no such."""
     exact = exact_counterpart(experiment)
     if exact is None:
-        return np.empty(0)
-
-    def both(row: Array) -> list[float]:
-        try:
-            profiles = experiment.profiles(row[None, :])
-            solved = (one.onset(profiles)["critical_stress"] for one in (experiment, exact))
-            return [float(stress[0]) for stress in solved]
-        except (InputError, RuntimeError, ArithmeticError):
-            return [float("nan")] * 2
-
+        return {}
     size = ON_A_PLANE if experiment.problem.interface.is_plane else ON_A_LINE
     with collect_warnings():  # the ensemble itself warns
-        draws = experiment.draws(first, min(size, most))
-        pairs = np.array(in_threads(both, list(draws), usable_cores()))
-    near, true = pairs[np.isfinite(pairs).all(axis=1)].T
-    difference: Array = (near - true) / abs(true.mean()) if near.size else near
-    return difference
+        looked_at = max(size, min(LOOKED_AT, int(SECONDS / experiment.seconds)))
+        draws = experiment.draws(first, min(looked_at, most))
+        near = _onsets(experiment, draws, BATCH)
+        chosen = {"pilot": np.arange(min(size, most))}
+        if most > size:
+            chosen["pilot_weakest"] = np.argsort(near)[:size]
+        some = np.unique(np.concatenate(list(chosen.values())))
+        true = np.full(near.size, np.nan)
+        true[some] = _onsets(exact, draws[some], 1)
+    found = {}
+    for name, rows in chosen.items():
+        rows = rows[np.isfinite(near[rows]) & np.isfinite(true[rows])]
+        found[name] = (near[rows] - true[rows]) / abs(true[rows].mean()) if rows.size else rows
+    return found
+
+
+def _onsets(experiment: Experiment, draws: Array, batch: int) -> Array:
+    """Return the stress at onset of each row of draws, NaN where it cannot be solved."""
+
+    def solve(rows: Array) -> Array:
+        try:
+            found: Array = experiment.onset(experiment.profiles(rows))["critical_stress"]
+        except (InputError, RuntimeError, ArithmeticError):
+            alone = len(rows) == 1
+            return np.full(1, np.nan) if alone else _onsets(experiment, rows, 1)
+        return found
+
+    parts = np.split(draws, range(batch, len(draws), batch))
+    return np.concatenate(in_threads(solve, parts, usable_cores()))
 
 
 def doubt(found: dict[str, Any], where: str = "") -> str | None:
-    """Return the text of a warning if the difference is beyond 1 %."""
-    if not found or max(abs(found["pilot_bias"]), found["pilot_scatter"]) <= WORTH_A_WARNING:
+    """Return the text of a warning if a difference is beyond 1 %."""
+    sizes = [abs(size) for name, size in found.items() if not name.endswith("samples")]
+    if max(sizes, default=0.0) <= WORTH_A_WARNING:
         return None
-    bias, scatter = 100.0 * found["pilot_bias"], 100.0 * found["pilot_scatter"]
+    each = (
+        f"{100.0 * found[f'{name}_bias']:+.2g} % on average, with a scatter of"
+        f" {100.0 * found[f'{name}_scatter']:.2g} %,{where} in the {found[f'{name}_samples']}"
+        f" {text}"
+        for name, text in (("pilot", "first samples"), ("pilot_weakest", "weakest of more"))
+        if f"{name}_bias" in found
+    )
     return (
-        f"the local criterion differs from the exact onset by {bias:+.2g} % on average, with a"
-        f" scatter of {scatter:.2g} %{where} (a pilot of {found['pilot_samples']} samples);"
+        f"the local criterion differs from the exact onset by {', and by '.join(each)};"
         " method=st.Equilibrium() has no such error"
     )

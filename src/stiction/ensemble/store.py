@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from stiction.ensemble.batches import Failure, Table
-from stiction.ensemble.pilot import ON_A_LINE
+from stiction.ensemble.pilot import LOOKED_AT
 from stiction.errors import InputError, StoreError, warn_user
 from stiction.files import PART, cannot, write_whole
 from stiction.model import describe
@@ -72,7 +72,7 @@ class Store:
             if list(store.chunks()) or STUDY in others:
                 store.warn(f"{STUDY} is damaged or missing; it is rebuilt from the given study")
         if before != study:
-            if before and before["ensemble"]["samples"] < ON_A_LINE:  # a pilot of fewer samples
+            if before and before["ensemble"]["samples"] < LOOKED_AT:  # a pilot of fewer samples
                 (path / PILOT).unlink(missing_ok=True)
             _write_json(path / STUDY, study)
         return store
