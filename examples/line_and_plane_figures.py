@@ -147,7 +147,7 @@ def _plane(figure: Any, case: Any, tau_p: np.ndarray, onset: Any) -> None:
     figure.colorbar(image, ax=axes, location="bottom", label="strength (MPa)", shrink=0.8)
     at = np.arange(case.size * case.nodes) / case.nodes
     moves = (onset.slip.values > 0.0).astype(float)
-    inside, _ = critical_patch(onset.sensitivity.values, (1.0, 1.0))
+    inside, _ = critical_patch(onset.sensitivity.values, case.problem.interface)
     axes.contourf(at, at, moves.T, levels=[0.5, 2.0], colors=[color(1)], alpha=0.3)
     axes.contour(at, at, moves.T, levels=[0.5], colors=[color(1)], linewidths=0.7)
     axes.contour(at, at, inside.T.astype(float), levels=[0.5], colors=[ACCENT], linewidths=1.5)

@@ -46,6 +46,9 @@ from stiction.reliability.failure import design_stress as design_stress
 from stiction.reliability.failure import failure_curve as failure_curve
 from stiction.reliability.failure import failure_probability as failure_probability
 from stiction.solid import Solid as Solid
+from stiction.specimen import Blocks as Blocks
+from stiction.specimen import Platen as Platen
+from stiction.specimen import Pusher as Pusher
 from stiction.study.study import Study as Study
 from stiction.study.study import open_run as open_run
 

@@ -145,9 +145,11 @@ def run(
     with _resumable(out), _executor(scheduler) as executor:
         result = loaded.run(out=out, workers=workers, executor=executor, part=part, pilot=pilot)
     dims = list(loaded.axes)
-    for name in ("critical_stress", "friction_coefficient"):
+    for name in ("critical_stress", "friction_coefficient", "critical_force"):
         if name in result:
-            scale, unit = (1e-6, ", MPa") if result[name].attrs["units"] == "Pa" else (1.0, "")
+            scale, unit = {"Pa": (1e-6, ", MPa"), "N": (1.0, ", N")}.get(
+                result[name].attrs["units"], (1.0, "")
+            )
             values = (result[name] * scale).transpose(*dims, "sample")
             labels: Any = [name]
             if dims:
@@ -402,7 +404,7 @@ def onset(
     )
     # Each method refuses, and warns, for itself.
     problem.sample(profile, accept=("barriers", "overstress", "constant"))
-    printed = (*ONSET_VARIABLES, "friction_coefficient")
+    printed = (*ONSET_VARIABLES, "friction_coefficient", "critical_force")
     rows: dict[str, dict[str, float]] = {}
     refused: list[str] = []
     for name in method or METHODS.usable():

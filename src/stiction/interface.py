@@ -1,18 +1,18 @@
-"""The interface: a periodic line or plane of nodes, its coordinates and its Fourier transform."""
+"""The interface: a line or plane of nodes, its coordinates and its Fourier transform."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, model_validator
 
 from stiction.arrays import Array
 from stiction.errors import InputError
-from stiction.model import as_count, as_number, model
+from stiction.model import Positive, as_count, as_number, model
 
 FEWEST, MOST = 8, 2**24
 """Nodes in each direction, and in all."""
@@ -49,7 +49,7 @@ _counts = BeforeValidator(partial(_one_or_two, read=_node_count))
 
 @model
 class Interface:
-    """Periodic interface with equally spaced nodes: a line, or a plane.
+    """Interface with equally spaced nodes, periodic: a line, or a plane; or that of a specimen.
 
     Parameters
     ----------
@@ -59,6 +59,12 @@ class Interface:
     nodes : int or (int, int)
         Number of nodes in each direction, even and at least 8, at most 2^24 in all. Powers of two
         are fastest.
+    width : float, optional
+        Of a line, m: turns its stresses into forces, N. A plane has its area, and a specimen its
+        thickness.
+    ends : {"periodic", "free"}
+        Set by a `Problem`: "free" if it has a `specimen`. The nodes are then the centres of cells,
+        x_i = (i + 1/2) length/nodes, and nothing is continued beyond the ends.
 
     Examples
     --------
@@ -71,6 +77,8 @@ class Interface:
 
     length: Annotated[float | tuple[float, float], _lengths]
     nodes: Annotated[int | tuple[int, int], _counts]
+    width: Positive | None = None
+    ends: Literal["periodic", "free"] = "periodic"
 
     @model_validator(mode="after")
     def _one_geometry(self) -> Interface:
@@ -78,6 +86,12 @@ class Interface:
             raise InputError(
                 "length and nodes: give one number each for a line or two each for a plane, got"
                 f" length = {self.length}, nodes = {self.nodes}"
+            )
+        if self.width is not None and self.is_plane:
+            raise InputError("width: a plane has its area; leave the width out")
+        if self.is_free and self.is_plane:
+            raise InputError(
+                "ends: a plane is periodic in both directions; only lines have free ends"
             )
         if self.size > MOST:
             raise InputError(f"nodes: must be at most 2^24 = {MOST} in all, got {self.nodes}")
@@ -87,6 +101,23 @@ class Interface:
                 f" {min(self.spacings):g} m; check its unit"
             )
         return self
+
+    @property
+    def is_free(self) -> bool:
+        """Whether the interface ends, as that of a specimen, instead of being periodic."""
+        return self.ends == "free"
+
+    @property
+    def first(self) -> float:
+        """Distance of the first node from the beginning, in spacings."""
+        return 0.5 if self.is_free else 0.0
+
+    @property
+    def embedding(self) -> Interface:
+        """The periodic interface on which its random fields live: itself, or one twice as long."""
+        if not self.is_free:
+            return self
+        return Interface(2.0 * self.extent, 2 * self.size)
 
     @property
     def lengths(self) -> tuple[float, ...]:
@@ -142,7 +173,7 @@ class Interface:
     def coordinates(self) -> dict[str, Array]:
         """Positions of the nodes along each direction, in [0, length), m."""
         each = zip(self.dims, self.shape, self.spacings, strict=True)
-        return {dim: np.arange(n) * spacing for dim, n, spacing in each}
+        return {dim: (np.arange(n) + self.first) * spacing for dim, n, spacing in each}
 
     @property
     def x(self) -> Array:
@@ -153,7 +184,9 @@ class Interface:
         """Return the position of a node of the flat profile in words."""
         entry = np.unravel_index(int(node), self.shape)
         places = zip(self.dims, entry, self.spacings, strict=True)
-        return ", ".join(f"{dim} = {i * spacing:.6g} m" for dim, i, spacing in places)
+        return ", ".join(
+            f"{dim} = {(i + self.first) * spacing:.6g} m" for dim, i, spacing in places
+        )
 
     @property
     def wave_vectors(self) -> tuple[Array, ...]:

@@ -23,6 +23,8 @@ from stiction.variables import (
     ONSET_VARIABLES,
     SAMPLE,
     Variable,
+    force_variables,
+    forces,
 )
 
 if TYPE_CHECKING:
@@ -113,7 +115,7 @@ def prepared(problem: Problem, method: Method) -> Solver:
         pressure = sample.normal_pressure.mean(axis=sample.axes)
         if not np.isnan(pressure).all():
             values["friction_coefficient"] = values["critical_stress"] / pressure
-        return values
+        return values if problem.area is None else values | forces(values, problem.area)
 
     return solve
 
@@ -160,7 +162,7 @@ def variables_of(
     variables = dict(method.variables(problem))
     if pressure or problem.load.normal_pressure is not None:
         variables["friction_coefficient"] = FRICTION_COEFFICIENT
-    return variables
+    return variables if problem.area is None else variables | force_variables(variables)
 
 
 def label(
@@ -211,8 +213,9 @@ def onset(
     -------
     xarray.Dataset
         Over 'sample': `critical_load`, `critical_stress`, `first_instability` (Pa),
-        `critical_position` (m), with a normal pressure `friction_coefficient`, and what the
-        method adds. Every variable has `units` and `long_name`. If gaps were filled, also
+        `critical_position` (m), with a normal pressure `friction_coefficient`, with a thickness,
+        width or area `critical_force` and `first_instability_force` (N), and what the method
+        adds. Every variable has `units` and `long_name`. If gaps were filled, also
         `in_gap`, whether the critical patch reaches into one, and the coordinate `measured`.
 
     Raises

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import model_validator
 
 from stiction.arrays import Array
+from stiction.elasticity.driven import Driven
 from stiction.errors import (
     InputError,
     UnitWarning,
@@ -27,6 +28,7 @@ from stiction.model import Mode, as_numbers, describe, is_unplaced, model
 from stiction.profiles.placing import Gaps, turned
 from stiction.profiles.reading import at_nodes
 from stiction.solid import Solid
+from stiction.specimen import Blocks
 from stiction.variables import PROFILES
 
 FEWEST_NODES = 4
@@ -39,6 +41,8 @@ FRICTION = (1e-3, 10.0)
 """Mean strength over normal pressure, from superlubricity to adhesive gels."""
 SHORT = 4.0
 """Nucleation lengths: on shorter lines free ends change the mean onset by more than about 1 %."""
+AT_END = {"II": 0.445 / 1.158, "III": 0.5}
+"""Nucleation length at a free end as a share of that in the middle."""
 BARRIER = 10.0
 """A node is a barrier where tau_p - tau_r is above so many times its lower quartile, of nodes that
 weaken."""
@@ -136,6 +140,10 @@ class Problem:
         By default uniform and without initial stress.
     mode : {"II", "III"}
         In-plane or anti-plane shear; a plane is in-plane along x and anti-plane along y.
+    specimen : Blocks, optional
+        Finite blocks instead of half-spaces. Their drive makes the load profile, the interface ends
+        with them (`interface.ends` is "free"), and tau_0 is the drive: the mean stress that it
+        would cause if nothing slipped.
 
     Raises
     ------
@@ -160,10 +168,12 @@ class Problem:
     friction: Friction
     load: Load = Load()
     mode: Mode = "II"
+    specimen: Blocks | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> Problem:
-        problems = self._place_profiles()
+        problems = self._of_specimen()
+        problems += self._place_profiles()
         if isinstance(self.load.profile, LoadShape):
             self.load.profile.on(self.interface)  # refuses one that is not positive
         if self.interface.is_plane and self.solid.plane != "strain":
@@ -179,11 +189,58 @@ class Problem:
         problems += [f"friction: {text}" for text in contradictions(self.friction)]
         if problems:
             raise InputError(problems)
+        if self.specimen is not None:
+            self._check_drive()
         rate = self.friction.weakening_rate
         if rate is not None:
             self._check_resolution(float(np.max(rate)))
             self._warn_if_short(float(np.median(rate)))
         return self
+
+    def _of_specimen(self) -> list[str]:
+        """Let the interface end with the specimen; return what does not go with one."""
+        interface, specimen = self.interface, self.specimen
+        if specimen is None:
+            return [
+                "interface.ends: free ends are those of a specimen: give"
+                " specimen=st.Blocks(...), or leave ends = 'periodic'"
+            ] * interface.is_free
+        if interface.is_plane:
+            return ["specimen: blocks meet on a line; give length and nodes one number each"]
+        object.__setattr__(self, "interface", dataclasses.replace(interface, ends="free"))
+        problems = []
+        if interface.width is not None:
+            problems.append("interface.width: give the thickness of a specimen instead")
+        if not (isinstance(self.load.profile, float) and self.load.profile == 1.0):
+            problems.append(
+                "load.profile: the drive of a specimen makes its load profile; leave one of load"
+                " and specimen out"
+            )
+        if specimen.pressing == "glued" and np.ndim(self.load.normal_pressure or 0.0):
+            problems.append(
+                "load.normal_pressure: with pressing = 'glued' the blocks make the profile: give"
+                " the mean; or use pressing = 'frictionless' with the array"
+            )
+        if specimen.height < 2.0 * interface.spacing:
+            problems.append(
+                f"specimen.height: {specimen.height:g} m is less than two spacings of the nodes,"
+                f" {interface.spacing:.3g} m; take more nodes"
+            )
+        return problems
+
+    def _check_drive(self) -> None:
+        """Refuse a drive that pulls somewhere in reverse, and blocks that open."""
+        for what, profile, advice in (
+            ("drive", self.blocks.shear, "move the pusher up, widen it, or use st.Platen()"),
+            ("pressing", self.blocks.pressure, "use pressing = 'frictionless'"),
+        ):
+            if not profile.min() > 0.0:
+                at = self.interface.describe_node(int(np.argmin(profile)))
+                effect = "shears in reverse" if what == "drive" else "opens the interface"
+                raise InputError(
+                    f"specimen.{what}: {effect} at {at} ({profile.min():.3g} of the mean), which"
+                    f" is not modelled; {advice}"
+                )
 
     def _place_profiles(self) -> list[str]:
         """Put profiles with coordinates of their own on the nodes; return what does not fit."""
@@ -219,12 +276,19 @@ class Problem:
                 " the units of the length, the shear modulus and the weakening rate",
                 UnitWarning,
             )
-        elif length < SHORT * patch and not self.interface.is_plane:
+        elif length < SHORT * patch and not self.interface.is_plane and self.specimen is None:
             warn_accuracy(
                 f"the interface is {length / patch:.2g} nucleation lengths long and continues"
                 " periodically: under a uniform antiplane load, free ends would lower its onset by"
                 f" about {min(3.0, 5.0 * patch / length):.1g} % on average and by up to 17 % in"
                 " single cases"
+            )
+        if self.specimen is not None and self.specimen.height < 0.5 * patch:
+            warn_user(
+                f"specimen.height: {self.specimen.height:.3g} m is below half the nucleation"
+                f" length of half-spaces, {patch:.3g} m: the blocks act as strips, and no length of"
+                " half-spaces applies; check the units if this is not intended",
+                UnitWarning,
             )
 
     def warn_of_units(self, strength: float, residual: float = 0.0) -> None:
@@ -251,8 +315,42 @@ class Problem:
             self._warn_if_short(max(float(rate), 1e-300))
 
     @property
+    def blocks(self) -> Driven:
+        """Stiffness and profiles of the specimen, which must not be None."""
+        if self.specimen is None:
+            raise InputError("problem.specimen: is not given; the solids are half-spaces")
+        interface = self.interface
+        return self.specimen.driven(interface.extent, interface.size, self.solid, self.mode)
+
+    @property
+    def area(self) -> float | None:
+        """Area of the interface, m², if its width, or the specimen's thickness, is known."""
+        interface, specimen = self.interface, self.specimen
+        depth = interface.width if specimen is None else specimen.thickness
+        if interface.is_plane:
+            return interface.extent
+        return None if depth is None else interface.extent * depth
+
+    def refuse_specimen(self, what: str, instead: str) -> None:
+        """Raise an `InputError` if the problem has a specimen, with what to do instead."""
+        if self.specimen is not None:
+            raise InputError(
+                f"problem.specimen: {what} holds for half-spaces, not for finite blocks; {instead}"
+            )
+
+    @property
+    def normal_pressure(self) -> Any:
+        """Normal pressure, Pa: a number, an array at the nodes, or None."""
+        pressure = self.load.normal_pressure
+        if self.specimen is None or pressure is None or self.specimen.pressing != "glued":
+            return pressure
+        return pressure * self.blocks.pressure
+
+    @property
     def load_profile(self) -> Any:
         """Load profile p: a number, or an array at the nodes, (*shape)."""
+        if self.specimen is not None:
+            return self.blocks.shear
         profile = self.load.profile
         return profile.on(self.interface) if isinstance(profile, LoadShape) else profile
 
@@ -328,6 +426,8 @@ class Problem:
             spanned = f"{resolution[0]:.1f} nodes"
             if self.interface.is_plane:
                 spanned += f" along x and, in mode III, {resolution[1]:.1f} along y"
+            if self.specimen is not None:
+                spanned += f", {AT_END[self.mode] * resolution[0]:.1f} at a free end"
             wanted = 16 if enough <= 12.0 else 32
             warn_accuracy(
                 f"the nucleation length spans {spanned}; {wanted} are recommended"
@@ -399,7 +499,7 @@ class Problem:
         initial = read("initial_stress", self.load.initial_stress, samples)
         pressure = np.broadcast_to(np.nan, (samples, *interface.shape))
         if self.load.normal_pressure is not None or "normal_pressure" in given:
-            pressure = read("normal_pressure", self.load.normal_pressure, samples)
+            pressure = read("normal_pressure", self.normal_pressure, samples)
         scale, value = friction.scale
         scale = scales[0] if scales else scale
         value = read(scale, value, samples)

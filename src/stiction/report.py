@@ -31,7 +31,7 @@ from stiction.variables import DIRECTION
 MOST_ROWS = 200
 MOST_FIGURES = 12
 LEVELS = (0.05, 0.5, 0.95)
-QUANTITIES = ("critical_stress", "first_instability", "friction_coefficient")
+QUANTITIES = ("critical_stress", "first_instability", "friction_coefficient", "critical_force")
 SPREAD = ("mean", "standard deviation")
 
 

@@ -117,6 +117,12 @@ class Solid:
         real = roots.real[np.abs(roots.imag) < 1e-9]
         return math.sqrt(float(real.min())) * self.shear_wave_speed
 
+    @property
+    def kolosov(self) -> float:
+        """Kolosov's constant: 3 - 4 nu in plane strain, (3 - nu)/(1 + nu) in plane stress."""
+        nu = self.poisson_ratio
+        return 3.0 - 4.0 * nu if self.plane == "strain" else (3.0 - nu) / (1.0 + nu)
+
     def effective_modulus(self, mode: Mode = "II") -> float:
         """Static modulus G*, Pa, in tau(k) = tau_0 - (G*/2) |k| delta(k).
 

@@ -1,6 +1,8 @@
 """Names, units and meaning of what is given, drawn and computed along an interface."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -58,5 +60,28 @@ ONSET_VARIABLES: dict[str, Variable] = {
     ),
     "critical_position": Variable("m", "position of the critical patch"),
 }
+
+FORCES: dict[str, tuple[str, str]] = {
+    "critical_stress": ("critical_force", "largest shear force on the way to sliding"),
+    "first_instability": (
+        "first_instability_force", "shear force when the first patch is unstable"
+    ),
+    "event_stress": ("event_force", "shear force at the event"),
+    "event_stress_drop": ("event_force_drop", "fall of the shear force in the event"),
+    "mean_stress": ("force", "shear force"),
+}  # fmt: skip
+"""Mean stresses that are given as forces, too, where the area is known: their names and texts."""
+
+
+def force_variables(variables: Mapping[str, Variable]) -> dict[str, Variable]:
+    """Return the forces, N, of the stresses among some variables."""
+    found = [(FORCES[name], one.dims) for name, one in variables.items() if name in FORCES]
+    return {name: Variable("N", text, dims) for (name, text), dims in found}
+
+
+def forces(values: Mapping[str, Any], area: float) -> dict[str, Any]:
+    """Return the forces, N, of the stresses among some values; the area is in m²."""
+    return {FORCES[name][0]: one * area for name, one in values.items() if name in FORCES}
+
 
 SAMPLE = Variable("1", "sample number", ("sample",))

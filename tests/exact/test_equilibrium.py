@@ -41,7 +41,7 @@ def test_closed_form_of_the_stiffness_and_sparse_products(problem):
 
 def growing_factor(nodes, column, diagonal, groups):
     """The factor of A on these nodes, appended group by group, and how many are in it."""
-    workspace = make_workspace(make_stiffness(column))
+    workspace = make_workspace(make_stiffness(column), column.size)
     workspace.diagonal[:] = diagonal
     size = 0
     for group in groups:
@@ -159,7 +159,7 @@ def test_certificate_is_the_distance_of_both_bounds(problem, make_strength):
     sample = program.sample_of(problem.sample(excess), 0)
     load, multiplier = program.bound(sample)
     # Without slip nothing below the weakest node is overstressed; above is the local bound.
-    workspace = make_workspace(program.stiffness)
+    workspace = make_workspace(program.stiffness, program.nodes)
     gap = certificate(sample, *np.zeros((2, 256)), multiplier, workspace)
     assert gap == pytest.approx(load - excess.min(), rel=1e-9)
 

@@ -132,6 +132,7 @@ def _stress_drops(problem: Problem) -> Array:
     """Return the stress drop (Pa) without a load, and by a unit load, at the nodes: (2, nodes)."""
     if problem.interface.is_plane:
         raise InputError("problem: must have a line interface")
+    problem.refuse_specimen("the theory of cracks between half-spaces", "use st.Equilibrium()")
     if problem.friction.residual_ratio is not None:
         raise InputError(
             "problem.friction.residual_ratio: the stress drop needs the residual strength in Pa;"

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from stiction.arrays import Array
 from stiction.criterion.average import averages, least_average
+from stiction.criterion.places import places_in
+from stiction.criterion.weakest import Places, weakest_place
 from stiction.criterion.windows import Window, windows_of
 from stiction.errors import InputError, warn_accuracy
 from stiction.friction import ExponentialWeakening
@@ -30,6 +32,7 @@ OWN_VARIABLES = {
     "critical_patch_extent": Variable("m", "extents of the critical ellipse"),
     "critical_patch_area": Variable("m2", "area of the critical ellipse"),
 }
+LENGTH = {"critical_patch_length": Variable("m", "nucleation length at the critical place")}
 
 
 @model(kw_only=True)
@@ -54,6 +57,11 @@ class LocalCriterion:
     stiffness K - W of the discrete problem is unstable, with its eigenvector as the weight; the
     minimum is taken over nodes and shapes. `critical_aspect`, `critical_patch_extent` (m, along x
     and y) and `critical_patch_area` (m²) are those of the critical ellipse.
+
+    On a specimen each place has a nucleation length of its own, the shortest run of nodes on which
+    the stiffness of the blocks is unstable, with the eigenvector as the weight; that at the
+    critical place is `critical_patch_length` (m). A pusher near the interface causes events long
+    before it slides: `critical_stress` is then far too low, as the pilot of `monte_carlo` tells.
 
     Examples
     --------
@@ -90,7 +98,7 @@ class LocalCriterion:
         if problem.interface.is_plane:
             extent = position(problem.interface, OWN_VARIABLES["critical_patch_extent"])
             found = found | OWN_VARIABLES | {"critical_patch_extent": extent}
-        return found
+        return found if problem.specimen is None else found | LENGTH
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, Array]]:
         """Return a solver for samples of this problem.
@@ -100,6 +108,8 @@ class LocalCriterion:
         """
         check_law(problem)
         interface = problem.interface
+        if problem.specimen is not None:
+            return lambda sample: _onset_of_specimen(problem, sample)
 
         def solve(sample: Sample) -> dict[str, Array]:
             _warn_if_coarse(problem, sample)
@@ -158,6 +168,8 @@ def beyond_residual(
     strength by regression with the weights of the patch.
     """
     sample, shape = sample.part(slice(0, ENOUGH)), problem.interface.shape
+    if problem.specimen is not None:
+        return _beyond_residual_of_specimen(problem, sample, values)
     reached, missing = np.zeros(sample.samples, dtype=np.bool_), np.zeros(sample.samples)
     spacings = np.array(problem.interface.spacings)
     loads, places = (np.asarray(values[f"critical_{name}"]) for name in ("load", "position"))
@@ -174,16 +186,86 @@ def beyond_residual(
             offsets, square = offsets[square < 1.0], square[square < 1.0]
             weight = window.weight[tuple(offsets.T)]
             weight = weight / weight.sum()
-            slope = weight * (square - weight @ square)
             node = np.rint(places[some].reshape(some.size, 1, len(shape)) / spacings)
             at = tuple(np.moveaxis((node.astype(np.int64) + offsets) % shape, -1, 0))
             patch, profile = (some[:, None], *at), sample.load_profile[at]
-            load = loads[some]
-            bend = (excess[patch] - load[:, None] * profile) @ slope / (slope @ square)
-            slip = SLIP[len(shape)] * np.maximum(bend, 0.0)[:, None] * (1.0 - square) ** 1.6
-            lost = np.maximum(slip - drop[patch], 0.0)
-            reached[some] = lost.any(axis=1)
-            missing[some] = (lost @ weight) / (profile @ weight) / load
+            reached[some], missing[some] = _lost(
+                excess[patch], profile, drop[patch], loads[some], weight, square, len(shape)
+            )
+    return reached, missing
+
+
+def _lost(
+    excess: Array,
+    profile: Array,
+    drop: Array,
+    load: Array,
+    weight: Array,
+    square: Array,
+    d: int,
+) -> tuple[Any, Any]:
+    """Return whether patches (samples, nodes) pass their residual strength, and the error then."""
+    slope = weight * (square - weight @ square)
+    bend = (excess - load[:, None] * profile) @ slope / (slope @ square)
+    slip = SLIP[d] * np.maximum(bend, 0.0)[:, None] * (1.0 - square) ** 1.6
+    lost = np.maximum(slip - drop, 0.0)
+    return lost.any(axis=1), (lost @ weight) / (profile @ weight) / load
+
+
+def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
+    """Return the onset at the weakest place of each specimen."""
+    _warn_if_coarse(problem, sample)
+    excess, spacing = excess_of(sample), problem.interface.spacing
+    load, start, width = np.empty((3, sample.samples))
+    allowed = np.empty(problem.interface.size)
+    for places, same in _places_by_rate(problem, sample):
+        for i in same:
+            load[i], c = weakest_place(
+                excess[i], sample.load_profile, sample.weakening_rate[i], places, allowed
+            )
+            start[i], width[i] = places.starts[c], places.widths[c]
+    stress = sample.mean_stress(load)
+    return {
+        "critical_load": load,
+        "critical_stress": stress,
+        "first_instability": stress.copy(),
+        "critical_position": (start + 0.5 * width) * spacing,
+        "critical_patch_length": width * spacing,
+    }
+
+
+def _places_by_rate(
+    problem: Problem, sample: Sample
+) -> Iterator[tuple[Places, NDArray[np.int64]]]:
+    """Yield the critical windows of a specimen at each rate, and the samples of this rate."""
+    for rate, same in _rates(sample):
+        places = places_in(problem, rate)
+        if not places.starts.size:
+            raise InputError(
+                "interface.length: no part of the specimen becomes unstable by itself, so the local"
+                " criterion does not hold; use st.Equilibrium()"
+            )
+        yield places, same
+
+
+def _beyond_residual_of_specimen(
+    problem: Problem, sample: Sample, values: Mapping[str, Any]
+) -> tuple[NDArray[np.bool_], Array]:
+    """Estimate the same for specimens; a patch at a free end is taken as one in the middle."""
+    reached, missing = np.zeros(sample.samples, dtype=np.bool_), np.zeros(sample.samples)
+    for places, same in _places_by_rate(problem, sample):
+        centres = (places.starts + 0.5 * places.widths) * problem.interface.spacing
+        for i in same:
+            c = int(np.argmin(np.abs(centres - values["critical_position"][i])))
+            width = int(places.widths[c])
+            patch = int(places.starts[c]) + np.arange(width)
+            square = ((2.0 * np.arange(width) - width + 1.0) / width) ** 2
+            drop = (sample.strength - sample.residual_strength)[i, patch]
+            excess = (sample.strength - sample.initial_stress)[i, patch]
+            (reached[i],), (missing[i],) = _lost(
+                excess[None], sample.load_profile[patch], drop[None],
+                np.array([values["critical_load"][i]]), places.modes[c, :width], square, 1,
+            )  # fmt: skip
     return reached, missing
 
 
@@ -223,6 +305,7 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     True
     """
     check_law(problem)
+    problem.refuse_specimen("nucleation_stress", "st.LocalCriterion() gives its minimum")
     sample, interface = problem.sample(tau_p), problem.interface
     _warn_if_coarse(problem, sample)
     ((windows, _), *others) = _by_rate(problem, sample)
@@ -283,6 +366,12 @@ def _by_rate(
     problem: Problem, sample: Sample
 ) -> Iterator[tuple[list[Window], NDArray[np.int64]]]:
     """Yield the windows of each weakening rate, and the samples of this rate."""
+    for rate, same in _rates(sample):
+        yield windows_of(problem, rate), same
+
+
+def _rates(sample: Sample) -> Iterator[tuple[float, NDArray[np.int64]]]:
+    """Yield each weakening rate, and the samples of this rate."""
     if not sample.uniform_weakening:
         raise InputError(
             "weakening_rate: varies along the interface, so there is no single nucleation length"
@@ -290,4 +379,4 @@ def _by_rate(
         )
     rates = sample.weakening_rate.reshape(sample.samples, -1)[:, 0]
     for rate in np.unique(rates):
-        yield windows_of(problem, float(rate)), np.flatnonzero(rates == rate)
+        yield float(rate), np.flatnonzero(rates == rate)

@@ -169,7 +169,12 @@ class Rupture:
 
     def supports(self, problem: Problem) -> list[str]:
         """Return the reasons why the method cannot solve a problem; none if it can."""
-        return []
+        if problem.specimen is None:
+            return []
+        return [
+            "problem.specimen: ruptures run between half-spaces, and waves that return from the"
+            " faces of blocks are not modelled; use st.Equilibrium(), which arrests without inertia"
+        ]
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
         """Return the variables that the solver computes for each sample."""

@@ -39,7 +39,7 @@ def make_stiffness(column: Array) -> Stiffness:
 
 
 @jit
-def _add_four(
+def add_four(
     target: Array, strip: Array, places: tuple[int, int, int, int], values: tuple[float, ...]
 ) -> None:
     """Add the contribution of four nodes to one half of a product."""
@@ -84,11 +84,11 @@ def apply_stiffness(
             z0, z1, z2, z3 = values[t], z0, z1, z2
             held += 1
             if held == 4:
-                _add_four(target, strip, (p0, p1, p2, p3), (z0, z1, z2, z3))
+                add_four(target, strip, (p0, p1, p2, p3), (z0, z1, z2, z3))
                 held = 0
                 z0 = z1 = z2 = z3 = 0.0
         if held > 0:
-            _add_four(target, strip, (p0, p1, p2, p3), (z0, z1, z2, z3))
+            add_four(target, strip, (p0, p1, p2, p3), (z0, z1, z2, z3))
     for q in range(half):
         result[2 * q] = halves[0, q]
         result[2 * q + 1] = halves[1, q]

@@ -8,6 +8,7 @@ from typing import Any, Literal, Self
 import numpy as np
 
 from stiction.arrays import Array
+from stiction.criterion.places import places_in
 from stiction.criterion.windows import windows_of
 from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.experiment import Experiment
@@ -137,7 +138,10 @@ def no_single_length(problem: Problem, random: RandomInterface) -> str | None:
     if rate is None or set(SCALES) & set(random.names):
         return "the weakening rate is not uniform"
     try:
-        windows_of(problem, rate)
+        if problem.specimen is None:
+            windows_of(problem, rate)
+        elif not places_in(problem, rate).starts.size:
+            return "no part of the specimen becomes unstable by itself"
     except InputError:
         return "a critical patch does not fit on the interface"
     return None

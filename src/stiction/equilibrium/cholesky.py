@@ -5,14 +5,14 @@ numbers: half the memory of a square, and no two rows compete for the same cache
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiction.arrays import Array
-from stiction.elasticity.line import Stiffness, apply_stiffness
 from stiction.elasticity.linear import dot
+from stiction.elasticity.stiffness import apply, entry
 from stiction.jit import ZERO, jit, jit_inside
 from stiction.lanes import LANES, load, multiply_add, totals, zeros
 
@@ -179,7 +179,7 @@ class Workspace(NamedTuple):
     and of the strength. `order` is a list of nodes to append.
     """
 
-    stiffness: Stiffness
+    stiffness: Any
     factor: Array
     members: NDArray[np.int64]
     order: NDArray[np.int64]
@@ -190,9 +190,8 @@ class Workspace(NamedTuple):
     halves: Array
 
 
-def make_workspace(stiffness: Stiffness) -> Workspace:
-    """Workspace for samples of a line. Pages of the factor that are never used cost no memory."""
-    n = stiffness.column.shape[0]
+def make_workspace(stiffness: Any, n: int) -> Workspace:
+    """Workspace for samples of n nodes. Pages of the factor that are never used cost no memory."""
     capacity = min(n, MOST_MEMBERS)
     return Workspace(
         stiffness,
@@ -215,7 +214,7 @@ def append(workspace: Workspace, size: int, count: int) -> int:
     failed, and its row, without the pivot, follows the last one in the factor.
     """
     factor, members, nodes = workspace.factor, workspace.members, workspace.order
-    coupling, diagonal = workspace.stiffness.column, workspace.diagonal
+    stiffness, diagonal = workspace.stiffness, workspace.diagonal
     done = 0
     while done < count:
         group = min(GROUP, count - done)
@@ -224,7 +223,7 @@ def append(workspace: Workspace, size: int, count: int) -> int:
             start = row_start(size + r)
             row = factor[start : start + size]
             for t in range(size):
-                row[t] = coupling[abs(node - members[t])]
+                row[t] = entry(stiffness, node, members[t])
         if group == 1:
             start = row_start(size)
             substitute(factor, ZERO, size, factor[start : start + size])
@@ -241,8 +240,8 @@ def append(workspace: Workspace, size: int, count: int) -> int:
             for q in range(r):
                 base = row_start(size + q)
                 known = factor[base : base + size + q + 1]
-                entry = coupling[abs(node - members[size + q])]
-                row[size + q] = (entry - dot(known, row, size + q)) / known[size + q]
+                own = entry(stiffness, node, members[size + q])
+                row[size + q] = (own - dot(known, row, size + q)) / known[size + q]
             pivot = diagonal[node] - dot(row, row, size + r)
             members[size + r] = node
             if pivot <= PIVOT * diagonal[node]:
@@ -266,9 +265,7 @@ def substitute_members(
 @jit_inside
 def multiply_members(workspace: Workspace, size: int, values: Array, result: Array) -> None:
     """Multiply K by a field given on the members; the result is at all nodes."""
-    apply_stiffness(
-        workspace.stiffness, workspace.members, size, values, workspace.halves, result
-    )
+    apply(workspace.stiffness, workspace.members, size, values, workspace.halves, result)
 
 
 @jit_inside

@@ -6,16 +6,13 @@ Where very many nodes slip the factor is slower than the transforms of planes, w
 import threading
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
 from stiction.arrays import Array
-from stiction.elasticity.line import (
-    Stiffness,
-    apply_stiffness,
-    make_stiffness,
-    stiffness_column,
-)
+from stiction.elasticity.line import Stiffness, make_stiffness, stiffness_column
+from stiction.elasticity.stiffness import apply
 from stiction.equilibrium.cholesky import Workspace, make_workspace
 from stiction.equilibrium.jump import jump
 from stiction.equilibrium.linear_program import SOLVED, certificate, solve_program
@@ -78,7 +75,9 @@ class LineProgram(Program):
         self.nodes = problem.interface.size
         self.modulus, self.extent = problem.effective_modulus, problem.interface.extent
         self.unit = np.pi * self.modulus / self.extent
+        self.stiffness: Any
         self.stiffness, self.runs = _stiffness_and_runs(self.nodes, self.extent, self.modulus)
+        self.own: Any = self.stiffness.column[0]
         rate = problem.friction.weakening_rate
         self.usual_rate = np.nan if rate is None or np.ptp(rate) else float(np.max(rate))
         self.usual = exact_window(self.nodes, self.usual_rate, self.unit)
@@ -88,7 +87,7 @@ class LineProgram(Program):
     def _workspace(self) -> Workspace:
         """The workspace of the thread."""
         if not hasattr(self._own, "workspace"):
-            self._own.workspace = make_workspace(self.stiffness)
+            self._own.workspace = make_workspace(self.stiffness, self.nodes)
         space: Workspace = self._own.workspace
         return space
 
@@ -103,7 +102,13 @@ class LineProgram(Program):
     def bound(self, sample: Sample) -> tuple[float, Array]:
         """Return the discrete local bound of one sample (Pa), and its multiplier."""
         work, multiplier = np.empty((2, self.nodes))
-        return window_bound(sample, self._windows(sample.rate), work, multiplier), multiplier
+        return self._bound(sample, multiplier, work)[0], multiplier
+
+    def _bound(self, sample: Sample, multiplier: Array, work: Array) -> tuple[float, float]:
+        """Return the bound of the weakest window, and where `solve_program` begins."""
+        windows = self._windows(sample.rate)
+        bound = window_bound(sample, windows, work, multiplier)
+        return bound, np.inf if windows is self.usual else -np.inf
 
     def solve(
         self,
@@ -116,17 +121,15 @@ class LineProgram(Program):
         Only the first piece of the friction law counts: `excess` and `rate`. The state is an
         equilibrium at a lower load, if one was found.
         """
-        windows = self._windows(sample.rate)
         multiplier, slip, stiff = np.zeros((3, self.nodes))
-        bound = window_bound(sample, windows, stiff, multiplier)
+        bound, start = self._bound(sample, multiplier, stiff)
         if cap == np.inf and self.nodes > MANY_NODES:
             weak = np.count_nonzero(sample.excess < bound * sample.profile)
             found = self._by_transforms(sample, state) if weak > MANY_NODES else None
             if found is not None:
                 return found
         workspace = self._workspace
-        workspace.diagonal[:] = self.stiffness.column[0] - sample.rate
-        start = np.inf if windows is self.usual else -np.inf
+        workspace.diagonal[:] = self.own - sample.rate
         if state is not None:
             start, slip = state.load, state.slip.copy()
         load, status = solve_program(
@@ -172,12 +175,13 @@ class LineProgram(Program):
             stuck = state is not None
         state = state or self.at_rest(sample)
         slip, stiff, direction = state.slip.copy(), state.stiff.copy(), state.direction.copy()
-        load, status = advance(
+        load, peak, status = advance(
             sample, state.load, target, slip, stiff, direction, self._workspace
         )
         found = State(
             load, slip, stiff, direction,
             unstable=status == UNSTABLE, known=status in (UNSTABLE, REACHED), stuck=stuck,
+            peak=peak,
         )  # fmt: skip
         # No multiplier bounds the load from above where a law steepens.
         found.certified = found.unstable and not self.pieces.steepens
@@ -205,15 +209,9 @@ class LineProgram(Program):
     def jump(self, sample: Sample, found: State) -> Jump:
         """Let an unstable state jump to another equilibrium, or to sliding."""
         slip, stiff, direction = found.slip.copy(), found.stiff, found.direction
-        start, length, _ = main_patch(direction)
-        pushed = self._stiffness_times(direction) if found.ahead is None else found.ahead
-        outcome = runs_away(
-            sample, self.runs, found.load, slip, stiff, direction, pushed, start, length,
-            np.empty((4, self.nodes)),
-        )  # fmt: skip
+        outcome, griffith = self._runs_away(sample, found, slip)
         if outcome == Outcome.UNDECIDED:
-            griffith = MARGIN * unstoppable_length(sample, found.load, self.runs)
-            other, stiff = make_workspace(self.stiffness), stiff.copy()
+            other, stiff = make_workspace(self.stiffness, self.nodes), stiff.copy()
             outcome = jump(sample, found.load, slip, stiff, griffith, self._workspace, other)
         if outcome == Outcome.ARRESTED:
             before, after = (present_pieces(sample, each).piece for each in (found.slip, slip))
@@ -223,6 +221,22 @@ class LineProgram(Program):
         state = State(found.load, slip, stiff, direction, stuck=found.stuck)
         return Jump(outcome == Outcome.ARRESTED, outcome != Outcome.UNDECIDED, state)
 
+    def _runs_away(self, sample: Sample, found: State, slip: Array) -> tuple[int, float]:
+        """Try whether the patch certainly slides; return that and the length that would show it.
+
+        The slip moves on to a lower bound of the next equilibrium.
+        """
+        direction = found.direction
+        start, length, _ = main_patch(direction)
+        pushed = self._stiffness_times(direction) if found.ahead is None else found.ahead
+        outcome = runs_away(
+            sample, self.runs, found.load, slip, found.stiff, direction, pushed, start, length,
+            np.empty((4, self.nodes)),
+        )  # fmt: skip
+        if outcome != Outcome.UNDECIDED:
+            return outcome, np.inf
+        return outcome, MARGIN * unstoppable_length(sample, found.load, self.runs)
+
     def stress_released(self, state: State) -> Array:
         """Return the stress that the slip takes off the interface, K d, Pa."""
         return state.stiff
@@ -231,7 +245,7 @@ class LineProgram(Program):
         members = np.flatnonzero(field)
         result = np.empty(self.nodes)
         halves = np.empty((2, self.nodes // 2))
-        apply_stiffness(self.stiffness, members, members.size, field[members], halves, result)
+        apply(self.stiffness, members, members.size, field[members], halves, result)
         return result
 
 

@@ -10,6 +10,7 @@ present states, as far as the first node that reaches the next corner of its fri
 import numpy as np
 
 from stiction.arrays import Array
+from stiction.elasticity.stiffness import entry, mean_relief
 from stiction.equilibrium.cholesky import (
     MOST_MEMBERS,
     Workspace,
@@ -72,7 +73,7 @@ def _join(
     if size + count > MOST_MEMBERS:
         return CROWDED
     now = append(workspace, size, count)
-    if now < size + count:
+    if now < size + count or now == stiff.shape[0]:
         return ALL
     for t in range(size, now):
         workspace.inside[workspace.members[t]] = True
@@ -123,9 +124,9 @@ def _settle(
     Returns ARRESTED if the step ends in the equilibrium of the members, SLIDING if nothing bounds
     it, else UNDECIDED.
     """
-    own = workspace.stiffness.column[0]
     for t in range(size):
         i = workspace.members[t]
+        own = entry(workspace.stiffness, i, i)
         other.order[t] = i
         piece = piece_at(sample.pieces, sample.critical[i], slip[i])
         other.diagonal[i] = own - sample.pieces.slopes[piece] * sample.rate[i]
@@ -175,7 +176,7 @@ def jump(
     tolerance = stress_tolerance(sample, load)
     count = ZERO
     for i in range(slip.shape[0]):
-        workspace.diagonal[i] = workspace.stiffness.column[0]
+        workspace.diagonal[i] = entry(workspace.stiffness, i, i)
         workspace.inside[i] = slip[i] > 0.0
         if workspace.inside[i]:
             workspace.order[count] = i
@@ -183,7 +184,7 @@ def jump(
     if count > MOST_MEMBERS:
         return Outcome.UNDECIDED
     size = append(workspace, ZERO, count)
-    if size < count:
+    if size < count or count == slip.shape[0]:
         return Outcome.SLIDING
     waited = 0
     passed = 0
@@ -192,7 +193,8 @@ def jump(
         size = _relax(sample, load, slip, stiff, workspace, size, tolerance)
         if size == CROWDED:
             return Outcome.UNDECIDED
-        if size == ALL or unsupported(sample, load, slip):
+        fixed = mean_relief(workspace.stiffness, sample.profile, slip) == 0.0
+        if size == ALL or (fixed and unsupported(sample, load, slip)):
             return Outcome.SLIDING
         run, corners = _residual_runs(sample, slip)
         if run >= griffith:

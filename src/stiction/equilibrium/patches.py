@@ -1,10 +1,10 @@
-"""Patches on a periodic line or plane: their number, and the position and width of one of them.
+"""Patches on a line or plane: their number, and the position and width of one of them.
 
 Nodes of a plane are connected where their cells share an edge (four neighbours), also across the
-borders.
+borders. The `interface` of these functions is an `Interface`; kernels do not depend on its file.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,9 +71,16 @@ def main_patch(field: Array) -> tuple[int, int, float]:
     return start, length, centre - n if centre >= n else centre
 
 
-def line_patch(field: Array, spacing: float) -> Patch:
+def with_ends(field: Array, interface: Any) -> Array:
+    """Return a field with a node at rest between its ends, where these do not meet."""
+    return np.append(field, 0.0) if interface.is_free else field
+
+
+def line_patch(field: Array, interface: Any) -> Patch:
     """Return the measures of the run of `main_patch`."""
-    _, length, centre = main_patch(field)
+    spacing = interface.spacing
+    _, length, centre = main_patch(with_ends(field, interface))
+    centre += interface.first
     return Patch((centre * spacing,), (length * spacing,), length * spacing)
 
 
@@ -121,9 +128,7 @@ def patch_of(mask: Mask, weight: Array, spacings: tuple[float, ...]) -> Patch:
     return Patch((centre[0], centre[1]), (extents[0], extents[1]), area)
 
 
-def largest_patch(
-    weight: Array, spacings: tuple[float, ...], share: float
-) -> tuple[Mask, Patch]:
+def largest_patch(weight: Array, interface: Any, share: float) -> tuple[Mask, Patch]:
     """Return the patch around the largest weight: which nodes belong to it, and its measures.
 
     The weight is not negative and not all zero; nodes belong to a patch where it is above a share
@@ -132,23 +137,23 @@ def largest_patch(
     above = weight > share * weight.max()
     if weight.ndim == 1:
         above = np.where(above, weight, 0.0)
-        start, length, _ = main_patch(above)
+        start, length, _ = main_patch(with_ends(above, interface))
         inside = np.zeros(weight.size, dtype=np.bool_)
         inside[(start + np.arange(length)) % weight.size] = True
-        return inside, line_patch(above, spacings[0])
+        return inside, line_patch(above, interface)
     numbers, _ = labelled_patches(above)
     inside = numbers == numbers.flat[int(np.argmax(weight))]
-    return inside, patch_of(inside, weight, spacings)
+    return inside, patch_of(inside, weight, interface.spacings)
 
 
-def critical_patch(multiplier: Array, spacings: tuple[float, ...]) -> tuple[Mask, Patch]:
+def critical_patch(multiplier: Array, interface: Any) -> tuple[Mask, Patch]:
     """Return the patch that becomes unstable, from its multiplier y >= 0, not all zero.
 
     On a line it is the run with the largest y. On a plane it is where y is above a tenth of its
     largest value, around that value. It is not all slipping nodes connected with it: on rough
     strengths these reach across the plane, with a y close to zero.
     """
-    return largest_patch(multiplier, spacings, 0.0 if multiplier.ndim == 1 else CORE)
+    return largest_patch(multiplier, interface, 0.0 if multiplier.ndim == 1 else CORE)
 
 
 def patches_of(slip: Array) -> int:

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from stiction.arrays import Array
+from stiction.equilibrium.blocks import BlockProgram
 from stiction.equilibrium.solver import (
     event_table,
     event_variables,
@@ -16,7 +17,7 @@ from stiction.errors import InputError, warn_accuracy
 from stiction.model import Numbers, check, check_memory
 from stiction.problem import Problem
 from stiction.results import along, study_attributes, to_dataset
-from stiction.variables import Variable
+from stiction.variables import Variable, force_variables, forces
 
 LOAD = Variable("Pa", "load factor tau_0", ("load",))
 VARIABLES = {
@@ -26,7 +27,10 @@ VARIABLES = {
     "arrested_events": Variable("1", "instabilities that came to rest so far", ("load",)),
     "sliding": Variable("1", "whether the interface as a whole slides", ("load",)),
 }
+TRAVEL = Variable("m", "travel of both drives together", ("load",))
 EVENT = Variable("1", "event number", ("event",))
+CLOSE = 1e-9
+"""Relative distance of loads that count as the same."""
 GAP = 1e-6
 """Relative distance of the bounds of instabilities on planes."""
 
@@ -69,6 +73,12 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
         (Pa, tau_0), `event_stress` (Pa, the mean on the interface), `event_position` (m),
         `event_length` (m) of the patch that slipped, `event_mean_slip` (m, over that length) and
         `event_moment` (N per unit depth: G times the slip added, integrated over the interface).
+        On specimens the load is the drive, the mean stress that it would cause if nothing slipped;
+        `travel` (m) is that of both drives together, on top of which a machine gives by its force
+        over its stiffness; and events have `event_stress_drop` (Pa), `event_travel` (m, before it)
+        and `event_travel_step` (m). With a thickness, width or area each mean stress is given as a
+        force, too: `force`, `event_force` and `event_force_drop` (N).
+
         On planes positions have two components, along 'direction', `event_extent` (m) and
         `event_area` (m²) take the place of the length, and the moment is in N m.
 
@@ -103,6 +113,7 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
     whole = follow(program, sample)
     passed, end, known = whole.events, whole.last.load, whole.known
     slip, stress = np.full((2, given.size, interface.size), np.nan)
+    travel = np.full(given.size, np.nan)
     at = np.array([event.before.load for event in passed])
     events = (at[None, :] < given[:, None]).sum(axis=1)
     sliding = given > end
@@ -110,13 +121,18 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
     for i, load in enumerate(map(float, given[~sliding])):
         if events[i]:
             after = passed[events[i] - 1].after
-            state = max(state, after, key=lambda one: one.load)
+            state = max(after, state, key=lambda one: one.load)
         there = program.at(sample, state, load, fresh=not events[i])
+        ahead = passed[events[i]].before if events[i] < len(passed) else None
+        if there is None and ahead is not None and load > (1.0 - CLOSE) * ahead.load:
+            there = ahead  # the state about to jump
         if there is None:  # within the accuracy of the load of sliding
             sliding[i:] = True
             break
         state = there
         slip[i] = state.slip
+        if isinstance(program, BlockProgram):
+            travel[i] = program.travel(load, state.slip)
         released = program.stress_released(state)
         stress[i] = rows.initial_stress[0].reshape(-1) + load * sample.profile - released
     if not known and sliding.any():
@@ -131,9 +147,14 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
         "mean_stress": stress.mean(axis=1),
         "arrested_events": events,
         "sliding": sliding,
-    } | event_table(problem, rows, 0, passed)
+    } | event_table(problem, program, rows, 0, passed)
     variables = VARIABLES | event_variables(interface)
     variables |= {name: along(interface, VARIABLES[name]) for name in ("slip", "stress")}
+    if interface.is_free:
+        values["travel"], variables["travel"] = travel, TRAVEL
+    if problem.area is not None:
+        values |= forces(values, problem.area)
+        variables |= force_variables(variables)
     coordinates = {"load": (given, LOAD), "event": (np.arange(len(passed)), EVENT)}
     attributes = study_attributes(problem=problem)
     return to_dataset(values, variables, coordinates, attributes, interface)

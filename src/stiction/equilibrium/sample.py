@@ -148,7 +148,9 @@ class State:
     and the distance to a load without equilibrium (Pa), NaN where none is known.
     `certified` is true if that is proved, `unstable` if the path is unstable there, `known` if it
     could be followed so far, `stuck` if the programme failed to find the next instability before.
-    `ahead` is what is known beyond: on lines K times the direction, on planes the turn of the path.
+    `peak` is the largest mean stress on the way there, over the mean of the load profile: the load
+    itself (None), unless a machine drives. `ahead` is what is known beyond: on lines K times the
+    direction, on planes the turn of the path.
     """
 
     load: float
@@ -161,6 +163,7 @@ class State:
     known: bool = True
     stuck: bool = False
     ahead: Any = None
+    peak: float | None = None
 
 
 class Program:
@@ -180,6 +183,10 @@ class Program:
     def at_turn(self, sample: Sample, state: State) -> State:
         """Return an instability with its exact direction, as it is on lines."""
         return state
+
+    def relief(self, slip: Array) -> float:
+        """Return by how much slip lowers the load that the interface carries, Pa."""
+        return 0.0
 
 
 def multiplier_of(sample: Sample, state: State) -> Array:

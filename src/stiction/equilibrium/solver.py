@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.arrays import Array
+from stiction.equilibrium.blocks import BlockProgram
 from stiction.equilibrium.dense import LineProgram
 from stiction.equilibrium.patches import (
     Patch,
@@ -14,6 +15,7 @@ from stiction.equilibrium.patches import (
     largest_patch,
     line_patch,
     patches_of,
+    with_ends,
 )
 from stiction.equilibrium.sample import (
     Sample,
@@ -39,6 +41,11 @@ ROUGHLY = {
     " quarter of it, by 3 and 9 % if it is a tenth",
     2: "single onsets are off by 0.15 % at 9 nodes along x and 6 along y, by 0.5 % at 6 and 4",
 }
+OF_SPECIMENS = {
+    "event_stress_drop": Variable("Pa", "fall of the mean interface stress", ("event",)),
+    "event_travel": Variable("m", "travel of the drives before the event", ("event",)),
+    "event_travel_step": Variable("m", "travel of the drives in the event", ("event",)),
+}
 EVENT_CORE = 1e-3
 """Share of the largest added slip above which a node belongs to the patch of an event."""
 
@@ -63,6 +70,7 @@ def event_variables(interface: Interface) -> dict[str, Variable]:
         **({"event_area": variable("m2", "area of the patch that slipped")} if plane else {}),
         "event_mean_slip": variable("m", "mean slip added to that patch"),
         "event_moment": variable("N m" if plane else "N", moment),
+        **(OF_SPECIMENS if interface.is_free else {}),
     }
 
 
@@ -74,7 +82,7 @@ class Event(NamedTuple):
 
 
 def event_table(
-    problem: Problem, rows: Samples, row: int, events: list[Event]
+    problem: Problem, program: AnyProgram, rows: Samples, row: int, events: list[Event]
 ) -> dict[str, Array]:
     """Return the variables of the arrested events of one sample, (events, ...) arrays."""
     interface, plane = problem.interface, problem.interface.is_plane
@@ -82,13 +90,19 @@ def event_table(
     table = []
     for before, after in events:
         added = (after.slip - before.slip).reshape(interface.shape)
-        inside, patch = largest_patch(np.maximum(added, 0.0), interface.spacings, EVENT_CORE)
-        stress = initial + before.load * profile
+        inside, patch = largest_patch(np.maximum(added, 0.0), interface, EVENT_CORE)
+        held = before.load - program.relief(before.slip)
+        stress = initial + held * profile
         moment = problem.solid.shear_modulus * float(added.sum()) * interface.cell
         measures = (
             (patch.centre, patch.extents, patch.area) if plane else (*patch.centre, patch.area)
         )
-        table.append((before.load, stress, *measures, added[inside].mean(), moment))
+        values: tuple[Any, ...] = (*measures, added[inside].mean(), moment)
+        if isinstance(program, BlockProgram):
+            left = after.load - program.relief(after.slip)
+            moved, on = (program.travel(one.load, one.slip) for one in (before, after))
+            values += ((held - left) * profile, moved, on - moved)
+        table.append((before.load, stress, *values))
     names = event_variables(interface)
     if not table:
         return {name: np.empty((0, 2)[: len(names[name].dims)]) for name in names}
@@ -101,11 +115,13 @@ class Path:
     """Course of one sample until it slides.
 
     `first` is the first instability, `last` the last equilibrium, `known` is false where a jump
-    or a path did not come to its end: `last` is then a lower bound.
+    or a path did not come to its end: `last` is then a lower bound. `peak` is the largest mean
+    stress on the way, over the mean of the load profile.
     """
 
     first: State
     last: State
+    peak: float
     events: list[Event] = field(default_factory=list)
     known: bool = True
 
@@ -119,7 +135,7 @@ def follow(program: AnyProgram, sample: Sample) -> Path:
     found = program.next(sample)
     first: State | None = None
     events: list[Event] = []
-    known = found.known
+    known, peak = found.known, peak_of(found)
     while found.unstable:
         jump = program.jump(sample, found)
         if jump.counts:
@@ -129,8 +145,13 @@ def follow(program: AnyProgram, sample: Sample) -> Path:
                 break
             events.append(Event(found, jump.state))
         found = program.next(sample, jump.state)
-        known = found.known
-    return Path(first or found, found, events, known)
+        known, peak = found.known, max(peak, peak_of(found))
+    return Path(first or found, found, peak, events, known)
+
+
+def peak_of(state: State) -> float:
+    """Return the largest load that the interface carried on the way to a state."""
+    return state.load if state.peak is None else state.peak
 
 
 def listed(numbers: NDArray[np.int64], most: int = 5) -> str:
@@ -142,8 +163,9 @@ def listed(numbers: NDArray[np.int64], most: int = 5) -> str:
 
 def make_program(problem: Problem, gap: float = 1e-6) -> AnyProgram:
     """Return the programme that finds equilibria of a problem."""
-    plane = problem.interface.is_plane
-    return PlaneProgram(problem, gap) if plane else LineProgram(problem)
+    if problem.specimen is not None:
+        return BlockProgram(problem)
+    return PlaneProgram(problem, gap) if problem.interface.is_plane else LineProgram(problem)
 
 
 class OnsetSolver:
@@ -171,7 +193,7 @@ class OnsetSolver:
         values = {name: np.array([each[name] for each in table]) for name in table[0]}
         at_first, proved = values["first_instability"], values.pop("certified")
         self._warn(values["certificate_gap"], at_first, ~proved, ~np.array(known))
-        values["critical_stress"] = rows.mean_stress(values["critical_load"])
+        values["critical_stress"] = rows.mean_stress(values["critical_stress"])
         values["first_instability"] = rows.mean_stress(at_first)
         values["certificate_gap"] *= rows.load_profile.mean()
         if self.problem.interface.is_plane:
@@ -193,11 +215,14 @@ class OnsetSolver:
             slides = self._patch(last.direction)
         values: dict[str, Any] = {
             "critical_load": last.load,
-            "first_instability": first.load,
+            "critical_stress": path.peak,
+            "first_instability": first.load - self.program.relief(first.slip),
             "certificate_gap": first.gap,
             "critical_position": patch.centre,
             "sliding_position": slides.centre,
-            "slip_patches": patches_of(first.slip.reshape(interface.shape)),
+            "slip_patches": patches_of(
+                with_ends(first.slip.reshape(interface.shape), interface)
+            ),
             "arrested_events": len(path.events),
             "residual_reached": not straight and bool(residual_nodes(sample, last.slip).any()),
             "certified": first.certified,
@@ -210,6 +235,9 @@ class OnsetSolver:
             values["critical_position"], values["sliding_position"] = (
                 *patch.centre, *slides.centre,
             )  # fmt: skip
+        if path.known and not first.unstable:  # behind a stiff machine
+            of_patch = ("first_instability", "critical_position", "critical_patch_length")
+            values |= dict.fromkeys(of_patch, np.nan)
         if self.options.slip:
             values["slip"] = first.slip.reshape(shape)
         if self.options.sensitivity:
@@ -217,7 +245,7 @@ class OnsetSolver:
             derivative = _sensitivity(sample, turn) * rows.load_profile.mean()
             values["sensitivity"] = derivative.reshape(shape)
         if most := self.options.events:
-            events = event_table(self.problem, rows, row, path.events[:most])
+            events = event_table(self.problem, self.program, rows, row, path.events[:most])
             for name, column in events.items():
                 values[name] = np.full((most, *column.shape[1:]), np.nan)
                 values[name][: len(column)] = column
@@ -226,8 +254,8 @@ class OnsetSolver:
     def _patch(self, direction: Array) -> Patch:
         interface = self.problem.interface
         if not interface.is_plane:
-            return line_patch(direction, interface.spacings[0])
-        return critical_patch(direction.reshape(interface.shape), interface.spacings)[1]
+            return line_patch(direction, interface)
+        return critical_patch(direction.reshape(interface.shape), interface)[1]
 
     def _warn(
         self, gap: Array, load: Array, unproved: NDArray[np.bool_], lost: NDArray[np.bool_]
@@ -248,6 +276,12 @@ class OnsetSolver:
                 f" instability in {free.size} of {gap.size} samples ({listed(free)}): it was found"
                 f" by following equilibria, to {share[free].max():.2g} of it, and has no"
                 " certificate"
+            )
+        stable = int(np.isnan(load).sum())
+        if stable:
+            warn_accuracy(
+                f"no patch becomes unstable in {stable} of {gap.size} samples: behind so stiff a"
+                " machine their interface slides stably, and first_instability is NaN"
             )
         if lost.any():
             warn_accuracy(

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.arrays import Array
+from stiction.elasticity.stiffness import entry, mean_relief
 from stiction.equilibrium.cholesky import (
     MOST_MEMBERS,
     Workspace,
@@ -43,11 +44,11 @@ def _begin(
 ) -> int:
     """Strength and diagonal of A for the present pieces; returns how many nodes slip."""
     count = ZERO
-    own = workspace.stiffness.column[0]
     for i in range(slip.shape[0]):
         workspace.inside[i] = slip[i] > 0.0
         piece[i] = piece_at(sample.pieces, sample.critical[i], slip[i])
         strength[i] = start_of(sample, i, piece[i])
+        own = entry(workspace.stiffness, i, i)
         workspace.diagonal[i] = own - sample.pieces.slopes[piece[i]] * sample.rate[i]
         if workspace.inside[i]:
             workspace.order[count] = i
@@ -97,7 +98,7 @@ def _change_slope(
 ) -> int:
     """Change the weakening rate of a member in the factor; returns the members still in it."""
     node = workspace.members[member]
-    workspace.diagonal[node] = workspace.stiffness.column[0] - after
+    workspace.diagonal[node] = entry(workspace.stiffness, node, node) - after
     if after <= before:
         raise_diagonal(workspace.factor, size, member, before - after, workspace.vectors)
         return size
@@ -116,9 +117,11 @@ def advance(
     stiff: Array,
     direction: Array,
     workspace: Workspace,
-) -> tuple[float, int]:
+) -> tuple[float, float, int]:
     """Follow the stable path from a load towards another one; slip d and K d go with it.
 
+    It ends where all nodes slip, too. Returned are the load at the end, the largest mean stress on
+    the way (over the mean of the load profile; the load, unless a machine drives) and the status.
     The status is REACHED; UNSTABLE, in the direction z >= 0, A z <= 0, that is then written; or
     CROWDED: more members than the workspace holds.
     """
@@ -133,13 +136,14 @@ def advance(
     strength = np.empty(n)
     members, order = workspace.members, workspace.order
     count = _begin(sample, slip, piece, strength, workspace)
+    peak = load - mean_relief(workspace.stiffness, sample.profile, slip)
     if count > MOST_MEMBERS:
-        return load, CROWDED
+        return load, load, CROWDED
     size = append(workspace, ZERO, count)
     if size < count:
         # Stability was lost exactly as the residual strength was reached.
         singular_direction(workspace, size, direction)
-        return load, UNSTABLE
+        return load, peak, UNSTABLE
     substitute_members(workspace, ZERO, size, sample.profile, workspace.forward[0])
     substitute_members(workspace, ZERO, size, strength, workspace.forward[1])
     # A node begins to slip, and passes each corner, once.
@@ -161,6 +165,7 @@ def advance(
             slip[members[t]] += step * rate[t]
         for i in range(n):
             stiff[i] += step * stiff_rate[i]
+        peak = max(peak, load - mean_relief(workspace.stiffness, sample.profile, slip))
         changed = size
         if ends >= 0:
             i = members[ends]
@@ -172,20 +177,22 @@ def advance(
             now = _change_slope(workspace, size, ends, before, after)
             if now < size:
                 singular_direction(workspace, now, direction)
-                return load, UNSTABLE
+                return load, peak, UNSTABLE
             changed = ends
         elif starts >= 0:
             if size == MOST_MEMBERS:
-                return load, CROWDED
+                return load, peak, CROWDED
             order[0] = starts
             now = append(workspace, size, ONE)
             if now == size:
                 singular_direction(workspace, size, direction)
-                return load, UNSTABLE
+                return load, peak, UNSTABLE
             workspace.inside[starts] = True
             size = now
+            if size == n:
+                return load, peak, REACHED
         else:
-            return load, REACHED
+            return load, peak, REACHED
         substitute_members(workspace, changed, size, sample.profile, workspace.forward[0])
         substitute_members(workspace, changed, size, strength, workspace.forward[1])
-    return load, CROWDED
+    return load, peak, CROWDED

@@ -65,8 +65,8 @@ def infer(
     random : RandomInterface or RandomField
         The random properties with known parameters; `prior` replaces their values.
     peaks : array, mapping of arrays, or Peaks
-        Mean shear stress at which each specimen slid, in `unit`; for specimens of several
-        lengths a mapping of each length (m) to its peaks, ``{0.1: [...], 0.2: [...]}``,
+        Mean shear stress, or force, at which each specimen slid, in `unit`; for specimens of
+        several lengths a mapping of each length (m) to its peaks, ``{0.1: [...], 0.2: [...]}``,
         with the node spacing of the problem. Or the result of `read_peaks`.
     prior : mapping
         Parameters and the prior of each: a frozen continuous `scipy.stats` distribution, a
@@ -78,11 +78,12 @@ def infer(
         The method that finds the onset. For all but the local criterion, that one, if applicable,
         first finds the relevant part of the prior, which grows until it contains the posterior.
     load_cell_error : float
-        Standard deviation of the error of a peak, in `unit`; with `Peaks` in Pa, or as a
+        Standard deviation of the error of a peak, in `unit`; with `Peaks` in Pa, in N, or as a
         coefficient.
     unit : str
-        Unit of peaks and load-cell error: a unit of stress, or "1" for friction
-        coefficients, which need ``Load(normal_pressure=...)``.
+        Unit of peaks and load-cell error: a unit of stress; of force, which needs a specimen's
+        ``thickness``, a line's ``width`` or a plane; or "1" for friction coefficients, which need
+        ``Load(normal_pressure=...)``.
     samples : int, optional
         Simulated specimens at each point: by default 2000 by the local criterion, 500 by
         equilibrium.
@@ -146,6 +147,7 @@ def infer(
             f"load_cell_error: {load_cell_error:g} {unit} is more than the largest peak; it is a"
             " standard deviation in the unit of the peaks"
         )
+    measured, error = measured.in_stress(problem.interface.extent, problem.area, error)
     (own,) = experiments_at(parameters, parameters.middle[None], method)
     own.problem.warn_of_units(mean_in_stress(own.problem, own.random, "strength"))
     _check_reach(parameters, method, measured, error)

@@ -17,7 +17,6 @@ from stiction.errors import InputError
 from stiction.inference.density import ERRORS, Densities, log_likelihoods, tabulate
 from stiction.inference.prior import Prior
 from stiction.inference.scaling import Scaling, find_scaling
-from stiction.interface import Interface
 from stiction.progress import SILENT, Meter
 from stiction.random.synthesis import BLOCK
 
@@ -100,7 +99,7 @@ def experiments_at(
         with prior.named(theta):
             if length is not None and not np.isclose(length, own.extent, rtol=1e-9):
                 nodes = 2 * max(4, round(0.5 * length / own.spacing))
-                problem = replace(problem, interface=Interface(length, nodes))
+                problem = replace(problem, interface=replace(own, length=length, nodes=nodes))
             found.append(Experiment(problem, random, method))
     return found
 

@@ -1,5 +1,7 @@
 """Measured peaks: validated, in SI units, one array for each kind of specimen."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,14 +28,36 @@ class Peaks(NamedTuple):
     lengths : tuple of float or None
         Length of each kind of specimen, m; None for that of the problem.
     values : tuple of arrays
-        Peaks of each kind: Pa, or coefficients of friction.
-    coefficients : bool
-        Whether the peaks are coefficients of friction.
+        Peaks of each kind: Pa, coefficients of friction, or forces, N.
+    coefficients, forces : bool
+        Whether the peaks are coefficients of friction, or forces.
     """
 
     lengths: tuple[float | None, ...]
     values: tuple[Array, ...]
     coefficients: bool
+    forces: bool = False
+
+    def in_stress(self, length: float, area: float | None, error: float) -> tuple[Peaks, float]:
+        """Return the peaks, and the error of a peak, as stresses if they are forces.
+
+        `area` (m²) is that of a specimen of `length` (m); None if it is unknown.
+        """
+        if not self.forces:
+            return self, error
+        if area is None:
+            raise InputError(
+                "peaks: are forces, which need the area of the interface: give"
+                " Blocks(thickness=...), or Interface(width=...) of a line"
+            )
+        areas = [area * (one or length) / length for one in self.lengths]
+        if error and len(areas) > 1:
+            raise InputError(
+                "load_cell_error: as a force it is another stress on each length of specimens; give"
+                " peaks and error as stresses"
+            )
+        values = tuple(v / a for v, a in zip(self.values, areas, strict=True))
+        return Peaks(self.lengths, values, False), error / areas[0]
 
     @property
     def variable(self) -> str:
@@ -67,24 +91,24 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
             f" {np.unique(every).size} in {every.size} peaks; fewer than about ten"
             " constrain little: see st.design_of_tests"
         )
-    return Peaks(lengths, values, is_in(unit, "1"))
+    return Peaks(lengths, values, is_in(unit, "1"), is_in(unit, "N"))
 
 
 def factor_of(unit: str) -> float:
-    """Return the factor from a unit of stress, or of a pure number, to SI."""
+    """Return the factor from a unit of stress, of force or of a pure number to SI."""
+    si = next((one for one in ("1", "N") if is_in(unit, one)), "Pa")
     try:
-        return factor_to("1" if is_in(unit, "1") else "Pa", unit)
+        return factor_to(si, unit)
     except InputError as error:
         raise InputError(
-            f"unit: {error}; divide a force by the area of the interface, or by the normal force"
-            " for a coefficient of friction (unit = '1')"
+            f"unit: {error}; give a stress, a force (N), or a coefficient of friction (unit = '1')"
         ) from None
 
 
 def _values(given: Any, unit: str) -> Array:
     """Return the peaks of one kind of specimen, in SI."""
     stated = str(getattr(given, "attrs", {}).get("units", unit))
-    if is_in(stated, "1") != is_in(unit, "1"):
+    if any(is_in(stated, one) != is_in(unit, one) for one in ("1", "N")):
         raise InputError(f"peaks: are in {stated}, but unit = {unit!r}")
     values: Array = check("peaks", getattr(given, "values", given), Numbers)
     if values.ndim != 1:
@@ -108,9 +132,9 @@ def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
     ----------
     path : path
         A table, separated by commas, semicolons, tabs or blanks, one test a line, with a heading.
-        One column is called peak, stress, strength or friction, with its unit: ``peak [MPa]``; a
-        coefficient of friction has the unit 1 or -. Another may be the length of the specimen:
-        ``length [mm]``. Columns of other names are not read.
+        One column is called peak, stress, strength, force or friction, with its unit: ``peak
+        [MPa]``; a coefficient of friction has the unit 1 or -, a force N or kN. Another may be the
+        length of the specimen: ``length [mm]``. Columns of other names are not read.
     unit : str, optional
         Unit of the peaks if the file states none.
 

@@ -59,7 +59,7 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
         return none  # a bound of such a marginal changes its shape
     places = {full.index(MARGINAL + name): name for name in names if MARGINAL + name in full}
     slopes = np.array([SLOPES[name] for name in places.values()], dtype=float).reshape(-1, 2)
-    pressure = problem.load.normal_pressure
+    pressure = problem.normal_pressure
     varies = field.of is not None and np.ndim(pressure) > 0
     if (varies or method.type != "local_criterion") and (location or slopes[:, 0].any()):
         return none

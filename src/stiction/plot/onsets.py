@@ -133,7 +133,7 @@ def _draw_plane(
     shades: Any = {"cmap": "cividis"} if exact is None else {"cmap": "gray", "alpha": 0.6}
     draw_map(axes, interface, tau_p * factor, rf"strength $\tau_p$ ({unit})", **shades)
     if exact is not None:
-        inside, _ = critical_patch(exact["sensitivity"].values[0], interface.spacings)
+        inside, _ = critical_patch(exact["sensitivity"].values[0], interface)
         sliding = exact["slip"].values[0] > 0.0
         for mask, ink, width, text in (
             (sliding, color(1), 0.9, "slips at the first instability"),

@@ -1,7 +1,8 @@
 """Values put on the nodes of a line or a plane, and their gaps.
 
 The nodes are x_i = i L/n in each direction, periodically: points may come in any order and begin
-anywhere. What is missing stays NaN unless it is filled on request.
+anywhere. Those of a specimen are x_i = (i + 1/2) L/n, and nothing continues beyond its ends. What
+is missing stays NaN unless it is filled on request.
 """
 
 from __future__ import annotations
@@ -77,12 +78,19 @@ def place(
     finer = 10**6 if None in offsets else 1
     shape = tuple(finer * n for n in interface.shape)
     steps = [
-        np.round(finer * (places[dim] / h - (offset or 0.0))).astype(np.int64)
+        np.round(finer * (places[dim] / h - interface.first - (offset or 0.0))).astype(np.int64)
         for dim, h, offset in zip(interface.dims, interface.spacings, offsets, strict=True)
     ]
-    node, first, twins = np.unique(
-        np.ravel_multi_index(steps, shape, mode="wrap"), return_index=True, return_inverse=True
-    )
+    if interface.is_free:
+        flat, at = steps[0], places["x"]
+        if finer == 1 and not 0 <= flat.min() <= flat.max() < interface.size:
+            raise InputError(
+                f"x reaches from {at.min():g} to {at.max():g} m, beyond the nodes of a specimen of"
+                f" {interface.extent:g} m; crop the record, or pass interpolate=True"
+            )
+    else:
+        flat = np.ravel_multi_index(steps, shape, mode="wrap")
+    node, first, twins = np.unique(flat, return_index=True, return_inverse=True)
     _check_repeats(values, places, first[twins], interface)
 
     def put(rows: Array) -> Array:
@@ -115,7 +123,10 @@ def _offset(dim: str, x: Array, interface: Interface, interpolate: bool) -> floa
     """
     axis = interface.dims.index(dim)
     spacing, length = interface.spacings[axis], interface.lengths[axis]
-    at = np.unique(x) / spacing
+    formula, cells = f"{dim}_i = i L/n", ", as at the centres of cells"
+    if interface.is_free:
+        formula, cells = f"{dim}_i = (i + 1/2) L/n", ""
+    at = np.unique(x) / spacing - interface.first
     if at[-1] - at[0] > interface.shape[axis] + TOLERANCE:
         period = np.ptp(x) + spacing * np.median(np.diff(at))  # both ends are not one place
         raise InputError(
@@ -123,6 +134,8 @@ def _offset(dim: str, x: Array, interface: Interface, interpolate: bool) -> floa
             f" check the unit of {dim}, crop the record, or make interface.length {period:.6g}"
         )
     first = at[0] - np.ceil(at[0] - 0.5 - TOLERANCE)
+    if interface.is_free and first > 0.5 - 2.0 * TOLERANCE:
+        first -= 1.0  # the node before would lie outside
     deviation = at - first - np.round(at - first)
     coarse = not interface.is_plane and (at.size < 2 or np.median(np.diff(at)) > 1.5)
     if coarse or np.abs(deviation).max() > TOLERANCE:
@@ -130,17 +143,15 @@ def _offset(dim: str, x: Array, interface: Interface, interpolate: bool) -> floa
             return None
         advice = "" if interface.is_plane else ", or interpolate linearly with interpolate=True"
         raise InputError(
-            f"{dim} does not coincide with the {interface.shape[axis]} nodes {dim}_i = i L/n, which"
+            f"{dim} does not coincide with the {interface.shape[axis]} nodes {formula}, which"
             f" are {spacing:.6g} m apart: {at.size} points from {x.min():.6g} to {x.max():.6g} m;"
-            f" check the unit of {dim}, give values at the nodes, as np.linspace(0, L, n,"
-            f" endpoint=False) does{advice}"
+            f" check the unit of {dim}, give values at the nodes, interface.{dim}{advice}"
         )
     offset = float(first + deviation.mean())
     if abs(offset) > TOLERANCE:
         warn_accuracy(
-            f"{dim} is offset by {offset:.2g} of a spacing from the nodes {dim}_i = i"
-            f" L/n, as at the centres of cells: node i stands for {dim}_i"
-            f" {offset * spacing:+.4g} m, to be added to positions in the result"
+            f"{dim} is offset by {offset:.2g} of a spacing from the nodes {formula}{cells}: node i"
+            f" stands for {dim}_i {offset * spacing:+.4g} m, to be added to positions in the result"
         )
     return offset
 
@@ -169,7 +180,8 @@ def _interpolated(x: Array, values: Array, interface: Interface) -> Array:
     """Linear between points, and NaN in intervals that are gaps."""
     length, nodes = interface.extent, interface.x
     margin = TOLERANCE * interface.spacing
-    x = np.mod(x, length)
+    if not interface.is_free:
+        x = np.mod(x, length)
     order = np.argsort(x)
     x = x[order]
     typical = float(np.median(np.diff(x))) if x.size > 1 else length
@@ -180,6 +192,15 @@ def _interpolated(x: Array, values: Array, interface: Interface) -> Array:
         if known.size == 0:
             raise InputError("has no value at all")
         begin = x[known]
+        if interface.is_free:  # constant beyond the outermost points, or a gap
+            inner = np.searchsorted(begin, nodes).clip(1, max(known.size - 1, 1))
+            apart = np.diff(begin, append=begin[-1])[inner - 1]
+            cut = (apart > widest) | (np.diff(known, append=known[-1] + 1)[inner - 1] > 1)
+            near = np.abs(nodes[:, None] - begin).min(axis=1)
+            outside = (nodes < begin[0]) | (nodes > begin[-1])
+            found = np.interp(nodes, begin, row[known])
+            hole = np.where(outside, near > 0.5 * widest, cut & (near > margin))
+            return np.where(hole, np.nan, found)
         width = np.diff(begin, append=begin[0] + length)
         is_gap = (width > widest) | (np.diff(known, append=known[0] + x.size) > 1)
         interval = np.searchsorted(begin, nodes, side="right") - 1
@@ -215,15 +236,15 @@ def close_gaps(
         rows = rows.copy()
         for one, hole in zip(rows, holes, strict=True):
             if hole.any():
-                _fill(one, hole, interface.spacings)
+                _fill(one, hole, interface)
         values = rows.reshape(values.shape)
         doubt = "; check interface.length and the unit of x" if missing.mean() > 0.5 else ""
         warn_accuracy(f"{text}; filled {how}{doubt}")
     return values, ~missing & measured
 
 
-def _fill(values: Array, hole: Mask, spacings: tuple[float, ...]) -> None:
-    """Solve Laplace's equation of the nodes in the hole, periodically.
+def _fill(values: Array, hole: Mask, interface: Interface) -> None:
+    """Solve Laplace's equation of the nodes in the hole, periodically or up to free ends.
 
     On a line that is the straight line between its ends; nothing is higher or lower than its rim.
     """
@@ -234,13 +255,17 @@ def _fill(values: Array, hole: Mask, spacings: tuple[float, ...]) -> None:
         raise InputError("has no value at all")
     known, own = np.where(hole, 0.0, values), np.flatnonzero(hole)
     nodes = np.arange(hole.size).reshape(hole.shape)
-    right, columns, entries = np.zeros(own.size), [own], [np.zeros(own.size)]
-    for axis, spacing in enumerate(spacings):
-        weight = (min(spacings) / spacing) ** 2
+    right, columns = np.zeros(own.size), [own]
+    entries: list[Array] = [np.zeros(own.size)]
+    for axis, spacing in enumerate(interface.spacings):
         for step in (1, -1):
+            weight: Array = np.full(hole.shape, (min(interface.spacings) / spacing) ** 2)
+            if interface.is_free:
+                weight[0 if step == 1 else -1] = 0.0
+            weight = weight[hole]
             right += weight * np.roll(known, step, axis)[hole]
             columns.append(np.roll(nodes, step, axis)[hole])
-            entries.append(np.full(own.size, -weight))
+            entries.append(-weight)
             entries[0] += weight
     rows = np.tile(np.arange(own.size), len(columns))
     index = (rows, np.concatenate(columns))
@@ -258,7 +283,9 @@ def with_gaps(problem: Any, result: xr.Dataset, measured: Any) -> xr.Dataset:
     patch = spacings if rate is None else problem.nucleation_lengths(rate)
     for axis, nodes in enumerate(interface.coordinates.values()):
         half, reach = 0.5 * interface.lengths[axis], max(0.5 * patch[axis], spacings[axis])
-        apart = np.abs(np.mod(nodes - places[:, axis, None] + half, 2.0 * half) - half)
+        apart = np.abs(nodes - places[:, axis, None])
+        if not interface.is_free:
+            apart = np.abs(np.mod(nodes - places[:, axis, None] + half, 2.0 * half) - half)
         others = [other + 1 for other in range(len(spacings)) if other != axis]
         missing = missing & np.expand_dims(apart < (1.0 - 1e-9) * reach, others)
     found = missing.any(axis=interface.axes)

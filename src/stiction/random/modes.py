@@ -36,7 +36,7 @@ class Modes:
     @property
     def unresolved(self) -> float:
         """Share of the variance at wavelengths that the nodes do not resolve."""
-        limit = np.array(self.interface.shape)[:, None] // 2
+        limit = np.array(self.interface.embedding.shape)[:, None] // 2
         return float(np.sum(self.sigma[(np.abs(self.numbers) > limit).any(axis=0)] ** 2))
 
     def gaussian(self, draws: Array) -> Array:
@@ -44,16 +44,30 @@ class Modes:
 
         One inverse transform a sample, so that the numbers do not depend on the batch.
         """
-        numbers, shape = self.numbers, self.interface.shape
+        numbers, shape = self.numbers, self.interface.embedding.shape
         if len(shape) == 1:
             numbers = np.concatenate([np.zeros_like(numbers), numbers])
+        if self.interface.is_free:
+            draws = self._from_first_node(draws)
         out = np.empty((draws.shape[0], math.prod(shape[:-1]), shape[-1]))
         synthesise(draws, self.sigma, numbers, self.has_mean, out)
-        return out.reshape(-1, *shape)
+        found = out.reshape(-1, *shape)
+        if self.interface.is_free:
+            return np.ascontiguousarray(found[:, : self.interface.size])
+        return found
+
+    def _from_first_node(self, draws: Array) -> Array:
+        """Return the draws of the same waves counted from the first node, half a spacing on."""
+        turn = np.pi * self.interface.first * self.numbers[0, 1:] / self.interface.size
+        start, turned = int(self.has_mean), draws.copy()
+        a, b = draws[:, start::2], draws[:, start + 1 :: 2]
+        turned[:, start::2] = a * np.cos(turn) + b * np.sin(turn)
+        turned[:, start + 1 :: 2] = b * np.cos(turn) - a * np.sin(turn)
+        return turned
 
     def basis(self, places: Array) -> Array:
         """Return phi, (points, dimension): z at places (dimensions, points) is phi @ draws."""
-        lengths = np.array(self.interface.lengths)[:, None]
+        lengths = np.array(self.interface.embedding.lengths)[:, None]
         phase = 2.0 * np.pi * (places / lengths).T @ self.numbers[:, 1:]
         phi = np.empty((phase.shape[0], self.dimension))
         start = int(self.has_mean)
@@ -67,7 +81,12 @@ class Modes:
 def make_modes(
     spectrum: Any, mean_mode: bool, anisotropy: float, interface: Interface
 ) -> Modes:
-    """Find the modes of a spectrum; `InputError` if there are too many, or none."""
+    """Find the modes of a spectrum; `InputError` if there are too many, or none.
+
+    A field on a specimen is one of twice its length, cut: with that period its correlation along
+    the specimen is that of an endless one.
+    """
+    own, interface = interface, interface.embedding
     dimensions = len(interface.shape)
     cutoff = spectrum.cutoff(dimensions)
     units = 2.0 * math.pi / np.array(interface.lengths)
@@ -97,7 +116,7 @@ def make_modes(
     sigma = np.sqrt(power / total)
     for array in (sigma, numbers, ranks):
         array.flags.writeable = False
-    return Modes(interface, sigma, numbers, ranks, mean_mode)
+    return Modes(own, sigma, numbers, ranks, mean_mode)
 
 
 def _numbers(interface: Interface, reach: Array) -> NDArray[np.int64]:

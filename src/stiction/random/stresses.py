@@ -37,7 +37,7 @@ def profiles_in_stress(
     problem: Problem, random: RandomInterface, profiles: Mapping[str, Array]
 ) -> dict[str, Array]:
     """Return sampled profiles with coefficients multiplied by the pressure at each node."""
-    pressure = profiles.get("normal_pressure", problem.load.normal_pressure)
+    pressure = profiles.get("normal_pressure", problem.normal_pressure)
     return {**profiles, **{name: profiles[name] * pressure for name in coefficients_of(random)}}
 
 
@@ -59,7 +59,7 @@ def support_in_stress(
     if field.of is not None and "normal_pressure" in random.names:
         factors.append(support_in_stress(problem, random, "normal_pressure", chance))
     elif field.of is not None:
-        pressure = problem.load.normal_pressure
+        pressure = problem.normal_pressure
         factors.append((np.min(pressure), np.max(pressure)))
     for one in factors:  # positive; 0 times infinity is 0 here
         ends = [a * b if a and b else 0.0 for a in (low, high) for b in one]
@@ -76,7 +76,7 @@ def _pressures(problem: Problem, random: RandomInterface) -> Array:
     """Pressures that a point may have, equally likely."""
     if "normal_pressure" in random.names:
         return _equally_likely(random.properties["normal_pressure"].marginal, PRESSURES)
-    flat = np.sort(np.ravel(problem.load.normal_pressure))
+    flat = np.sort(np.ravel(problem.normal_pressure))
     return flat[np.linspace(0, flat.size - 1, min(flat.size, PRESSURES)).round().astype(int)]
 
 

@@ -57,6 +57,9 @@ class Answer:
         Reasons not to trust the answer; empty if there are none.
     normal_pressure, friction_coefficient : float
         Mean pressure, Pa, and `stress` over it; NaN without a normal pressure.
+    area, force : float
+        Area of the interface, m², and `stress` times it, N; NaN if it is unknown: give
+        ``Blocks(thickness=...)``, or ``Interface(width=...)`` of a line.
     failing_profiles : xarray.Dataset
         From `failure_probability`: some samples of the failure set over ('sample', 'x'), drawn
         with its distribution: `strength` (and what else is random), `critical_stress`,
@@ -76,6 +79,7 @@ class Answer:
     reason: str
     warnings: tuple[str, ...]
     normal_pressure: float
+    area: float = math.nan
     failing_profiles: xr.Dataset = field(default_factory=xr.Dataset, repr=False)
     of_stress: bool = False
 
@@ -85,14 +89,21 @@ class Answer:
         for text in doubts:
             warn_accuracy(text)
         bound, pressure = state.bounds[0], state.experiment.pressure
+        area = state.experiment.problem.area or math.nan
         return cls(
-            lower_bound=bound, normal_pressure=pressure, warnings=tuple(doubts), **values
-        )
+            lower_bound=bound, normal_pressure=pressure, area=area, warnings=tuple(doubts),
+            **values,
+        )  # fmt: skip
 
     @property
     def friction_coefficient(self) -> float:
         """`stress` over the mean normal pressure; NaN without one."""
         return self.stress / self.normal_pressure
+
+    @property
+    def force(self) -> float:
+        """`stress` times the area of the interface, N; NaN where that is unknown."""
+        return self.stress * self.area
 
     @property
     def stress_above_bound(self) -> float:
@@ -109,6 +120,8 @@ class Answer:
             result += f" c.o.v. {self.cv:.2g}) below {self.stress / 1e6:.6g} MPa"
         if math.isfinite(self.normal_pressure):
             result += f" (friction coefficient {self.friction_coefficient:.4g})"
+        if math.isfinite(self.area):
+            result += f" (force {self.force:.4g} N)"
         if bounded(self.lower_bound):
             result += f", {self.stress_above_bound / 1e3:.4g} kPa above the bound"
         return f"{result}; {self.algorithm}, {self.evaluations} evaluations"

@@ -57,6 +57,7 @@ CURVE = {
         ("stress", "Pa", "stress"),
         ("stress_above_bound", "Pa", "stress above its lower bound"),
         ("friction_coefficient", "1", "stress over the mean normal pressure"),
+        ("force", "N", "stress times the area of the interface"),
         ("probability", "1", "probability of an onset below the stress"),
         ("probability_low", "1", "lower end of the interval of the probability"),
         ("probability_high", "1", "upper end of the 95 % interval of the probability"),
@@ -411,8 +412,8 @@ def failure_curve(
     xarray.Dataset
         Over 'point': `stress`, `stress_above_bound` (Pa), `probability` with `probability_low`,
         `probability_high` and `cv`, `stress_low`, `stress_high` (Pa), and with a normal pressure
-        `friction_coefficient`, the stress over its mean. `stress_above_bound` means little where
-        the attribute `lower_bound` is zero or less.
+        `friction_coefficient`, the stress over its mean, and with an area `force` (N).
+        `stress_above_bound` means little where the attribute `lower_bound` is zero or less.
 
     Raises
     ------
@@ -469,19 +470,23 @@ def curve_of(
 ) -> xr.Dataset:
     """Return the curve of a tail at these probabilities, labelled."""
     lowest, pressure = state.bounds[0], state.experiment.pressure
+    area = state.experiment.problem.area or np.nan
     rows = []
     for chance in wanted.tolist():
         stress = tail.quantile(chance)
         found, cv = tail.probability(stress), tail.cv(stress)
         ends = lognormal_interval(found, cv)
         sides = tail.stress_interval(chance, cv, lowest)
-        rows.append((stress, stress - lowest, stress / pressure, found, *ends, cv, *sides))
-    values: dict[str, Any] = dict(zip(CURVE, np.array(rows).T, strict=True))
+        values = stress, stress - lowest, stress / pressure, stress * area
+        rows.append((*values, found, *ends, cv, *sides))
+    table: dict[str, Any] = dict(zip(CURVE, np.array(rows).T, strict=True))
     if not np.isfinite(pressure):
-        del values["friction_coefficient"]
+        del table["friction_coefficient"]
+    if not np.isfinite(area):
+        del table["force"]
     about = {
         "lower_bound": lowest,
         "event": state.event,
         "method": state.experiment.method.type,
     }
-    return to_dataset(values, CURVE, {}, {**attributes, **about})
+    return to_dataset(table, CURVE, {}, {**attributes, **about})

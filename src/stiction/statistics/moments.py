@@ -100,6 +100,7 @@ def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, f
     The unit of friction coefficients is the normal pressure.
     """
     check_law(problem)
+    problem.refuse_specimen("this", "sample the nucleation stress with st.monte_carlo")
     load, initial = problem.load_profile, problem.load.initial_stress
     pressure = 1.0 if strength.of is None else problem.load.normal_pressure
     varying = {

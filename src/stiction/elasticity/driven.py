@@ -1,0 +1,93 @@
+"""Two blocks behind the machine that drives them: stiffness, shear profile, travel and force.
+
+Per block, drive and machine are springs in series. With F the force per unit depth, U the travel
+of the drive, X that of the machine's far end and k the machine's stiffness,
+
+    F = k (X - U),    U = F/C + (dx/2L) <q, d>,
+
+the second by reciprocity: C is the block's stiffness against its drive where nothing slips, and
+slip d at the interface moves the drive by its average with q. Eliminating U,
+
+    tau = D q - K d,   D = k C X/((k + C) L),   K = K_dead + h/n q q^T,   F/L = D - h <q, d>/n,
+
+with h = (k/(k + C)) C/(2 L). Under dead load h = 0, and for a rigid machine h = C/(2 L).
+"""
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stiction.arrays import Array
+from stiction.elasticity.blocks import Pushes, block_response, glued_pressure
+
+POSITIVE = 1e-12
+"""Share of the diagonal up to which a positive entry of K beside it is round-off."""
+
+
+class Driven(NamedTuple):
+    """Two blocks behind their machine; arrays are not to be written to.
+
+    Attributes
+    ----------
+    stiffness : (n, n) array
+        K, Pa/m.
+    shear, pressure : (n,) arrays
+        q and p, each of mean one.
+    relief : float
+        h, Pa/m: how much stress the mean of q d takes off the drive.
+    drive_stiffness : float
+        C, Pa.
+    """
+
+    stiffness: Array
+    shear: Array
+    pressure: Array
+    relief: float
+    drive_stiffness: float
+
+    @property
+    def positive(self) -> float:
+        """Largest positive entry of K off its diagonal, as a share of the diagonal; 0 for none."""
+        off = self.stiffness - np.diag(np.diag(self.stiffness))
+        share = float(off.max() / np.diag(self.stiffness).min())
+        return share if share > POSITIVE else 0.0
+
+    def mean_relief(self, slip: Array) -> Array:
+        """Return h <q, d>/n: by how much slip (..., n) lowers the mean stress, Pa."""
+        mean: Array = self.relief * (slip * self.shear).mean(axis=-1)
+        return mean
+
+    def travel(self, force: Any, slip: Array) -> Any:
+        """Return the travel of both drives together, m, at a force per unit depth, N/m."""
+        moved = 2.0 * force / self.drive_stiffness + (slip * self.shear).mean(axis=-1)
+        return moved
+
+
+@lru_cache(maxsize=8)
+def driven(
+    length: float,
+    nodes: int,
+    height: float,
+    modulus: float,
+    kappa: float,
+    anti_plane: bool,
+    pushes: Pushes | None,
+    glued: bool,
+    machine: float,
+) -> Driven:
+    """Return the response of blocks behind a machine; `block_response` explains what it takes.
+
+    The pressure is not uniform if they are pressed `glued`; `machine` is the stiffness of the
+    machine per unit depth, Pa, as one block sees it.
+    """
+    kind = None if anti_plane else kappa
+    found = block_response(length, nodes, height, modulus, kind, pushes)
+    pressure = glued_pressure(length, nodes, height, kappa) if glued else np.ones(nodes)
+    drive = found.drive_stiffness
+    share = 1.0 / (1.0 + drive / machine) if machine > 0.0 else 0.0
+    relief = 0.5 * share * drive / length
+    stiffness = found.stiffness
+    if relief > 0.0:
+        stiffness = stiffness + relief / nodes * np.outer(found.shear, found.shear)
+    return Driven(np.ascontiguousarray(stiffness), found.shear, pressure, relief, drive)

@@ -1,0 +1,115 @@
+"""The programme of a specimen: that of a line, with a dense stiffness and windows of its own.
+
+Under dead load all of it holds as on lines. Behind a machine the path is followed event by event:
+slip lowers the force, whose largest value may lie before the instability, and where all nodes slip
+without one the interface slides stably. Arrest is always decided by following the jump.
+"""
+
+import threading
+from dataclasses import replace
+
+import numpy as np
+
+from stiction.arrays import Array
+from stiction.criterion.places import places_in
+from stiction.criterion.weakest import weakest_place
+from stiction.elasticity.stiffness import make_block_stiffness
+from stiction.equilibrium.dense import LineProgram
+from stiction.equilibrium.sample import (
+    Outcome,
+    Sample,
+    State,
+    pieces_of,
+    refused,
+    step_to_corner,
+)
+from stiction.errors import InputError, warn_accuracy
+from stiction.problem import Problem
+
+RUNG = 1.5
+"""Ratio of successive weakening rates whose windows are tried where the rate varies."""
+MOST_RUNGS = 12
+
+
+class BlockProgram(LineProgram):
+    """Equilibria of a specimen.
+
+    Parameters
+    ----------
+    problem : Problem
+        With a specimen.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        if reasons := refused(problem.friction):
+            raise InputError(reasons)
+        self.problem = problem
+        self.pieces = pieces_of(problem.friction)
+        self.nodes = problem.interface.size
+        self.blocks = problem.blocks
+        self.machine = self.blocks.relief > 0.0
+        self.stiffness = make_block_stiffness(self.blocks.stiffness, self.blocks.relief)
+        self.own = np.diag(self.blocks.stiffness).copy()
+        self._own = threading.local()
+        if self.blocks.positive:
+            self.widest_gap = 1e-4
+            warn_accuracy(
+                "the stiffness of these blocks has positive entries off its diagonal, up to"
+                f" {self.blocks.positive:.1g} of the diagonal: that equilibria are the least ones,"
+                " and bounds rigorous, is then not proved (docs/specimens.md)"
+            )
+
+    def at_rest(self, sample: Sample) -> State:
+        """Return the state in which the first node is about to slip."""
+        return replace(super().at_rest(sample), stuck=self.machine)
+
+    def relief(self, slip: Array) -> float:
+        """Return by how much slip lowers the mean stress of the interface, Pa."""
+        return float(self.blocks.mean_relief(slip))
+
+    def travel(self, load: float, slip: Array) -> float:
+        """Return the travel of both drives together from the unloaded state, m."""
+        force = (load - self.relief(slip)) * self.problem.interface.extent
+        return float(self.blocks.travel(force, slip))
+
+    def next(self, sample: Sample, state: State | None = None, target: float = np.inf) -> State:
+        """Return the next instability, or the state at a load before it; see `LineProgram`."""
+        if self.machine:
+            state = state or self.at_rest(sample)
+        return super().next(sample, state, target)
+
+    def _bound(self, sample: Sample, multiplier: Array, work: Array) -> tuple[float, float]:
+        """Return the bound of the weakest window, or of sliding as a whole under dead load."""
+        rates = sample.rate[sample.rate > 0.0]
+        low, high = float(rates.min(initial=np.inf)), float(rates.max(initial=0.0))
+        best = float(sample.excess.sum() / sample.profile.sum())
+        multiplier[:] = 1.0
+        steps = 0
+        if low < high * (1.0 - 1e-12):
+            steps = min(int(np.ceil(np.log(high / low) / np.log(RUNG))), MOST_RUNGS)
+        for step in range(steps + 1 if high > 0.0 else 0):
+            places = places_in(self.problem, low if steps == 0 else _rung(high, step))
+            load, choice = weakest_place(
+                sample.excess, sample.profile, sample.rate, places, work
+            )
+            if load < best:
+                best = load
+                multiplier[:] = 0.0
+                first, width = places.starts[choice], places.widths[choice]
+                multiplier[first : first + width] = places.modes[choice, :width]
+        multiplier /= multiplier @ sample.profile
+        return best, np.inf if steps == 0 else -np.inf
+
+    def _by_transforms(self, sample: Sample, state: State | None) -> State | None:
+        """Return None: a specimen has no transforms."""
+        return None
+
+    def _runs_away(self, sample: Sample, found: State, slip: Array) -> tuple[int, float]:
+        """Move the slip on as far as the unstable direction goes; the jump decides."""
+        step = step_to_corner(sample, slip, found.direction, np.inf)
+        return (Outcome.SLIDING if step == np.inf else Outcome.UNDECIDED), np.inf
+
+
+def _rung(rate: float, step: int) -> float:
+    """Return a rate of a fixed ladder, the same for all samples: `step` below the first."""
+    return float(RUNG ** (np.floor(np.log(rate) / np.log(RUNG)) - step))

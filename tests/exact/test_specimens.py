@@ -1,0 +1,226 @@
+"""Specimens: exact statements, and the path against one by brute force."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import xarray as xr
+from refusals import refusals
+from specimens import BruteForce, crooked, rough
+
+import stiction as st
+from stiction.criterion.places import places_in
+
+INF = float("inf")
+DRIVES = {
+    "platen": st.Platen(),
+    "platen, machine": st.Platen(stiffness=3e7),
+    "platen, rigid": st.Platen(stiffness=INF),
+    "pusher": st.Pusher(height=0.01, width=0.004),
+    "low pusher, machine": st.Pusher(height=0.004, width=0.003, stiffness=2e7),
+    "right pusher, rigid": st.Pusher(height=0.012, width=0.005, side="right", stiffness=INF),
+    "both": st.Pusher(height=0.014, width=0.01, side="both"),
+}
+
+
+def drops(result):
+    found = result.event_stress_drop.values
+    return found[np.isfinite(found)]
+
+
+@pytest.mark.parametrize("name", DRIVES)
+@pytest.mark.parametrize("mode", ["II", "III"])
+def test_path_against_brute_force(name, mode):
+    """Onset, largest stress, sliding and every arrested event with its drop."""
+    problem = crooked(drive=DRIVES[name], mode=mode)
+    strength = rough(problem, 3, 2)
+    found = st.onset(problem, strength, method=st.Equilibrium(events=30))
+    for i in range(2):
+        one, brute = found.isel(sample=i), BruteForce(problem, strength[i : i + 1]).run()
+        assert float(one.critical_load) == pytest.approx(brute.load, rel=1e-9)
+        assert float(one.critical_stress) == pytest.approx(brute.peak, rel=1e-9)
+        assert int(one.arrested_events) == len(brute.drops)
+        if brute.first is not None:
+            assert float(one.first_instability) == pytest.approx(brute.first, rel=1e-9)
+        np.testing.assert_allclose(drops(one), brute.drops, rtol=1e-5, atol=1e-4)
+
+
+@pytest.mark.parametrize("name", ["platen", "platen, rigid", "low pusher, machine", "pusher"])
+def test_energy(name):
+    """Work at the grips is stored or dissipated, and lost only in jumps, to round-off."""
+    problem = crooked(drive=DRIVES[name], load=st.Load())
+    strength = rough(problem, 3)
+    kinks = np.array(BruteForce(problem, strength).run().kinks)
+    first = st.equilibrium_path(problem, strength, [1.0])
+    at = first.event_load.values
+    loads = np.unique(np.concatenate([[1.0], kinks, at, at * (1.0 + 1e-13)]))
+    path = st.equilibrium_path(problem, strength, loads)
+    path = path.isel(load=~path.sliding.values)
+    d, cell, blocks = path.slip.values, problem.interface.cell, problem.blocks
+    force = path.mean_stress.values * problem.interface.extent
+    work = 0.5 * (force[1:] + force[:-1]) * np.diff(path.travel.values)
+    q, h, n = blocks.shear, blocks.relief, 96
+    dead = blocks.stiffness - h / n * np.outer(q, q)
+    stored = force**2 / blocks.drive_stiffness
+    stored += 0.5 * cell * np.einsum("ti,ij,tj->t", d, dead, d)
+    rate, critical = problem.friction.weakening_rate, (strength[0] - 0.52e6) / 0.19e12
+    weak = np.minimum(d, critical)
+    spent = cell * (strength[0] * weak - 0.5 * rate * weak**2 + 0.52e6 * (d - weak)).sum(axis=1)
+    lost = work - np.diff(stored) - np.diff(spent)
+    jumps = np.diff(path.arrested_events.values) > 0
+    assert jumps.sum() == at.size > 0
+    assert (lost[jumps] > 0.0).all()
+    assert np.abs(lost[~jumps]).sum() < 1e-9 * work.sum()
+
+
+def test_uniform_strength_under_dead_load_slides_at_the_largest_ratio():
+    """A platen in mode III: everything slides at once, at the strength."""
+    problem = crooked(mode="III", load=st.Load())
+    found = st.onset(problem, np.full(96, 1.1e6), method=st.Equilibrium())
+    assert float(found.critical_stress[0]) == pytest.approx(1.1e6, rel=1e-12)
+    assert float(found.arrested_events[0]) == 0
+
+
+def test_a_stiff_machine_on_a_short_specimen_slides_stably():
+    """No patch is unstable; the largest stress is that under dead load."""
+    soft, stiff = (
+        crooked(
+            height=0.004, rate=0.02e12, drive=st.Platen(stiffness=k), mode="III", load=st.Load()
+        )
+        for k in (0.0, INF)
+    )
+    strength = rough(soft, 5, 1, 0.02)
+    free = st.onset(soft, strength, method=st.Equilibrium())
+    with pytest.warns(st.AccuracyWarning, match="slides stably"):
+        held = st.onset(stiff, strength, method=st.Equilibrium())
+    assert np.isnan(held.first_instability.item())
+    assert np.isnan(held.critical_position.item())
+    assert held.critical_stress.item() == pytest.approx(free.critical_stress.item(), rel=1e-9)
+    assert held.critical_load.item() > free.critical_load.item()
+
+
+def test_windows_bound_the_onset_and_become_it():
+    """The local criterion from above; where nothing interacts, the programme itself."""
+    problem = crooked(nodes=256, residual=0.0, load=st.Load())
+    strength = rough(problem, 11, 20)
+    exact = st.onset(problem, strength, method=st.Equilibrium())
+    local = st.onset(problem, strength, method=st.LocalCriterion())
+    above = local.first_instability.values / exact.first_instability.values - 1.0
+    assert above.min() > -1e-12
+    assert np.median(above) < 0.03
+    smooth = np.broadcast_to(1e6 + 3e5 * (problem.interface.x / 0.083 - 0.3) ** 2, (1, 256))
+    both = [
+        st.onset(problem, smooth, method=one) for one in (st.Equilibrium(), st.LocalCriterion())
+    ]
+    a, b = (float(one.first_instability[0]) for one in both)
+    assert a == pytest.approx(b, rel=3e-3)
+
+
+@pytest.mark.parametrize(("mode", "end"), [("II", 0.445), ("III", 0.579)])
+def test_nucleation_length_at_a_free_end_and_in_the_middle(mode, end):
+    """In units of G*/W; 1.158 in the middle, half of it at an end in mode III."""
+    problem = crooked(nodes=512, height=0.4, mode=mode, rate=0.12e12)
+    places = places_in(problem, 0.12e12)
+    unit = problem.effective_modulus / 0.12e12 / problem.interface.spacing
+    lengths = places.widths / unit
+    assert lengths[0] == pytest.approx(end, rel=0.03) == lengths[-1]
+    assert lengths[len(lengths) // 2] == pytest.approx(1.158, rel=0.02)
+    assert places.starts[-1] + places.widths[-1] == 512
+
+
+def test_fields_end_with_the_specimen():
+    """Same field on any grid; ends are far from each other; measured values are met."""
+    problem, fine = crooked(nodes=64), crooked(nodes=192)
+    marginal = st.Beta(alpha=1.5, beta=3.0, low=0.68e6, high=1.61e6)
+    field = st.RandomField(
+        marginal, st.PowerLawSpectrum(correlation_length=9e-3), mean_mode=True
+    )
+    some = field.sample(problem.interface, samples=2000, seed=2)
+    same = field.sample(fine.interface, samples=1, seed=2)
+    np.testing.assert_allclose(same[0, 1::3], some[0], rtol=1e-8)  # centres of three cells
+    assert abs(np.corrcoef(some[:, 0], some[:, -1])[0, 1]) < 0.12
+    endless = field.sample(st.Interface(length=8.3, nodes=6400), samples=200, seed=0)
+    for lag in (3, 9):
+        here = np.mean([np.corrcoef(some[:, i], some[:, i + lag])[0, 1] for i in range(50)])
+        there = np.corrcoef(endless[:, :-lag].ravel(), endless[:, lag:].ravel())[0, 1]
+        assert here == pytest.approx(there, abs=0.02)
+    x = problem.interface.x[[5, 40]]
+    given = field.given(xr.DataArray([0.8e6, 1.3e6], {"x": x}, "x"), noise=10.0)
+    met = given.sample(problem.interface, samples=3, seed=1)[:, [5, 40]]
+    np.testing.assert_allclose(met, np.broadcast_to([0.8e6, 1.3e6], (3, 2)), rtol=1e-4)
+
+
+def test_forces_travel_and_pressure():
+    """Newtons beside stresses; the machine's line through every event; coefficients times p(x)."""
+    k = 2.5e7
+    problem = crooked(drive=st.Pusher(height=0.004, width=0.003, stiffness=k), load=st.Load())
+    strength, area = rough(problem, 4), 0.083 * 0.0071
+    path = st.equilibrium_path(problem, strength, [1e5, 3e5])
+    np.testing.assert_allclose(path.force, path.mean_stress * area)
+    assert len(path.event) > 2
+    # At rest of the machine's far end, force falls along its stiffness.
+    np.testing.assert_allclose(
+        path.event_force_drop, k * path.event_travel_step, rtol=1e-6, atol=1e-9
+    )
+    # Its far end moves by travel + force/k: D is that over the stiffness of all.
+    far = path.travel + path.force / k
+    np.testing.assert_allclose(far / path["load"], far[0] / 1e5, rtol=1e-10)
+    glued = st.Blocks(height=0.031, pressing="glued")
+    pressed = of(specimen=glued, load=st.Load(normal_pressure=2e6))
+    p = pressed.normal_pressure
+    assert p.mean() == pytest.approx(2e6)
+    assert p[0] < 0.95 * p[48]
+    coefficient = st.RandomField(
+        st.Lognormal(mean=0.5, cv=0.1), st.PowerLawSpectrum(correlation_length=4e-3),
+        of="friction_coefficient",
+    )  # fmt: skip
+    found = st.monte_carlo(
+        pressed,
+        coefficient,
+        method=st.LocalCriterion(),
+        samples=2,
+        keep="strength",
+        pilot=False,
+    )
+    mu = coefficient.sample(pressed.interface, samples=2)
+    np.testing.assert_allclose(found.strength, mu * p)
+
+
+def plane(**given):
+    return st.Interface(length=(0.1, 0.1), nodes=(32, 32), **given)
+
+
+def of(**given):
+    return dataclasses.replace(crooked(load=st.Load()), **given)
+
+
+def solved(call):
+    problem = crooked(load=st.Load())
+    return call(problem, rough(problem, 1))
+
+
+PUSHER = st.Pusher(height=0.0295, width=0.001)
+test_refused = refusals(
+    {
+        "load.profile ... drive": lambda: of(
+            load=st.Load(profile=st.GradientLoad(amplitude=0.2))
+        ),
+        "specimen.height ... spacings": lambda: crooked(height=1e-3),
+        "reverse ... st.Platen": lambda: crooked(drive=PUSHER),
+        "lower or narrow": lambda: st.Blocks(height=0.0299, drive=PUSHER),
+        "unlike blocks": lambda: st.Blocks(height=(0.05, 0.02)),
+        "rigid base": lambda: st.Blocks(height=INF),
+        "tilt": lambda: st.Blocks(height=0.05, pressing="free"),
+        "thickness": lambda: st.Blocks(height=0.05, drive=st.Platen(stiffness=2e7)),
+        "stiffness": lambda: st.Platen(stiffness=-1.0),
+        "blocks meet on a line": lambda: of(interface=plane()),
+        "width ... area": lambda: plane(width=0.1),
+        "thickness of a specimen": lambda: of(interface=st.Interface(0.1, 64, width=0.1)),
+        "specimen=st.Blocks": lambda: of(specimen=None),
+        "rupture ... half-spaces": lambda: solved(
+            lambda p, s: st.onset(p, s, method=st.Rupture(loading_rate=1e9))
+        ),
+        "nucleation_stress": lambda: solved(st.theory.nucleation_stress),
+        "cracks": lambda: solved(lambda p, s: st.theory.griffith_length(p, 1e6, 1.0)),
+    }
+)
