@@ -1,8 +1,8 @@
 """A line and a plane with nothing symmetric: what holds on them does not hold by accident.
 
 The load has a mean other than one, initial stress, residual strength and pressure vary, cells have
-unequal sides, the weakest place and the gap lie across the seam, random properties have spectra of
-their own in a chain of correlations, and what is read comes in mm and MPa from an x that is not 0.
+unequal sides, the weakest place and the gap lie across the seam, and what is measured comes in mm
+and MPa from an x that is not 0.
 """
 
 from __future__ import annotations
@@ -67,33 +67,6 @@ PLANE_GAP = np.logical_and.outer(
     np.isin(np.arange(24), (22, 23, 0)), np.isin(np.arange(20), (19, 0))
 )
 """Nodes where nothing was measured, across the seam of x and, on the plane, of y."""
-STATIONS = (0.0, 0.0129, 0.037)
-"""Places on the line, m: its beginning, one between the nodes, and its end."""
-
-
-def crooked_random(interface: st.Interface, **options: Any) -> st.RandomInterface:
-    """Three properties with spectra of their own: strength - residual - initial stress."""
-    length = min(interface.lengths)
-    own: dict[str, Any] = {
-        "strength": st.RandomField(
-            st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
-            st.PowerLawSpectrum(0.09 * length),
-        ),
-        "residual_strength": st.RandomField(
-            st.Lognormal(mean=2e5, cv=0.2),
-            st.ExponentialSpectrum(0.21 * length),
-            mean_mode=True,
-        ),
-        "initial_stress": st.RandomField(
-            st.Gamma(mean=5e4, cv=0.3), st.SquaredExponentialSpectrum(0.13 * length)
-        ),
-        "correlation": {
-            ("strength", "residual_strength"): 0.7,
-            ("residual_strength", "initial_stress"): -0.5,
-        },
-        "between": {"strength": st.Lognormal(mean=1.0, cv=0.07)},
-    }
-    return st.RandomInterface(**own | options)
 
 
 def as_measured(

@@ -1,7 +1,6 @@
 """Sample i depends on (seed, i) and on nothing else: not on workers, executors or batches."""
 
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from itertools import pairwise
 from multiprocessing import get_context
 
 import numpy as np
@@ -95,27 +94,6 @@ def test_any_batch_is_a_part_of_the_whole(first, samples):
     assert_same(experiment.results(first, samples), part)
 
 
-@given(
-    samples=some.integers(1, 5000), size=some.integers(1, 1025), first=some.integers(0, 10**9)
-)
-def test_batches_cover_all_samples_once(samples, size, first):
-    experiment = Experiment(make_problem(), beta_strength(2e-3), LOCAL)
-    pieces = list(experiment.batches(first, samples, size))
-    assert sum(count for _, count in pieces) == samples
-    assert pieces[0][0] == first
-    for (start, count), (following, _) in pairwise(pieces):
-        assert start + count == following
-    assert all(0 < count <= size for _, count in pieces)
-
-
-def test_a_batch_of_rough_planes_stays_small():
-    problem = make_problem((48, 48), length=(0.02, 0.02))
-    rough = st.RandomField(st.Lognormal(mean=1e6, cv=0.2), st.ExponentialSpectrum(1e-3))
-    experiment = Experiment(problem, rough, LOCAL)
-    assert experiment.dimension > 100 * problem.interface.size
-    assert experiment.batch * experiment.dimension <= 2**20
-
-
 def field(low, high):
     marginal = st.Beta(alpha=2.0, beta=2.0, low=low, high=high)
     return st.RandomField(marginal, st.SquaredExponentialSpectrum(correlation_length=LENGTH))
@@ -163,15 +141,6 @@ def test_what_else_is_random_is_independent_of_the_strength(arguments):
     assert abs(np.corrcoef(*(values.ravel() for values in kept.values()))[0, 1]) < 0.05
     direct = local_onset(arguments["problem"], kept)
     np.testing.assert_array_equal(result["critical_load"], direct["critical_load"])
-
-
-def test_what_is_kept_does_not_depend_on_the_samples_around_it(arguments):
-    result = st.monte_carlo(**arguments, samples=40, first=10, keep=("strength",))
-    assert result["strength"].dims == ("sample", "x")
-    direct = arguments["random"].sample(arguments["problem"].interface, first=49)[0]
-    np.testing.assert_array_equal(result["strength"].sel(sample=49), direct)
-    one = st.monte_carlo(**arguments, samples=1, first=12, keep=("strength",))
-    np.testing.assert_array_equal(result["strength"].sel(sample=[12]), one["strength"])
 
 
 def test_progress_counts_every_sample_once(arguments):

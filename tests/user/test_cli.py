@@ -205,23 +205,6 @@ def test_a_method_that_does_not_apply_says_why(runs, study):
     runs(OWN, "local_criterion does not apply", "varies along the interface", code=1)
 
 
-@pytest.mark.slow
-def test_rupture_of_an_overstressed_patch_under_a_load_of_its_own(runs, study):
-    """Slip begins at once; load, end and stations stand in the study file, and no loading rate."""
-    np.save("p.npy", np.full(256, 1.2e6))
-    np.save("i.npy", np.where(np.abs(np.arange(256) - 128) < 40, 1.3e6, 0.6e6))
-    held = {"type": "rupture", "load": [[0.0, 1.0], [0.0, 0.0]], "stop": "time"}
-    given = small_study(length=0.05, nodes=256, method=held | {"end_time": 4e-5})
-    given["problem"]["load"] = {"initial_stress": "i.npy"}
-    given["save"] = {"every": 5, "stations": {"beside": 0.01}}
-    study.write_text(tomli_w.dumps(given))
-    runs("rupture study.toml --strength p.npy --out rupture", "ended by: time")
-    with xr.open_dataset("rupture/rupture.nc") as result:
-        assert np.isnan(result.critical_load)
-        assert result.station_slip.sizes["step"] > 50
-        assert float(result.time[-1]) >= 4e-5
-
-
 # -- mistakes and faults -------------------------------------------------------------------------
 
 

@@ -156,21 +156,6 @@ EXPONENTIAL_AGAIN = own_law(
 )
 
 
-@pytest.mark.slow  # its functions are compiled anew
-def test_law_of_ones_own():
-    own = EXPONENTIAL_AGAIN
-    found, expected = (
-        onset(law, method=RUPTURE).critical_stress.item() for law in (own, EXPONENTIAL)
-    )
-    assert found == pytest.approx(expected, rel=1e-12)
-    method = dataclasses.replace(RUPTURE, stop="onset")
-    run = st.simulate_rupture(with_law(own), TAU_P, method=method, save=st.Save([]))
-    assert "Own is a class of your own" in run.attrs["study_incomplete"]
-    refuses("Own has none", lambda: onset(own))
-    polygons = [st.PiecewiseWeakening.from_law(law, 32) for law in (own, EXPONENTIAL)]
-    assert polygons[0] == polygons[1]
-
-
 def test_law_without_a_compiled_strength_is_refused():
     @model
     class Sketch(type(EXPONENTIAL_AGAIN)):
