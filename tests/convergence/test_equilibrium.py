@@ -1,4 +1,4 @@
-"""Onset of smooth strengths: to the criterion of Uenishi and Rice (2003); lattice to spectral."""
+"""Onset of smooth strengths: to the criterion of Uenishi and Rice (2003)."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Failure probabilities by different algorithms, and by OpenTURNS, of the same limit states."""
+"""Failure probabilities by different algorithms of the same limit states."""
 
 import math
 

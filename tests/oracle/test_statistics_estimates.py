@@ -1,6 +1,5 @@
 """Estimates, quantiles and densities against simulation and known distributions."""
 
-
 import numpy as np
 import pytest
 import scipy.stats

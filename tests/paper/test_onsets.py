@@ -1,4 +1,4 @@
-"""The paper's onsets: bias of the local criterion, patches, planes, and the lower tail."""
+"""The paper's onsets: bias of the local criterion, patches, and the lower tail."""
 
 import math
 

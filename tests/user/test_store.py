@@ -368,7 +368,7 @@ def test_a_study_that_another_version_wrote_is_refused_as_such(tmp_path):
         st.open_run(tmp_path / "run")
 
 
-# -- samples of any ensemble, the pilot by the exact method, Dask and MPI --------------------------
+# -- samples of any ensemble, the pilot by the exact method, Dask --------------------------
 
 SMALL = st.Study.from_dict(small_study(sweep=lengths(4e-3, 6e-3)))
 
