@@ -19,8 +19,8 @@ from stiction.equilibrium.cholesky import (
 from stiction.equilibrium.dense import LineProgram
 from stiction.equilibrium.linear_program import certificate
 from stiction.equilibrium.patches import count_patches, main_patch
-from stiction.equilibrium.runaway import block_factor
-from stiction.equilibrium.sample import LINEAR, make_sample
+from stiction.equilibrium.runaway import Runs, block_factor, unstoppable_length
+from stiction.equilibrium.sample import LINEAR, make_sample, pieces_of
 from stiction.equilibrium.windows import smallest_window, window_mode
 
 COLUMN = stiffness_column(256, 0.1, 1e9)
@@ -164,15 +164,39 @@ def test_certificate_is_the_distance_of_both_bounds(problem, make_strength):
     assert gap == pytest.approx(load - excess.min(), rel=1e-9)
 
 
-def test_patches_on_the_circle():
-    slip = np.array([1.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 1.0])
-    assert count_patches(slip) == 2
+@pytest.mark.parametrize(
+    ("field", "count", "start", "length", "centre"),
+    [
+        ([3.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0], 2, 0, 2, 0.25),
+        ([1.0, 3.0, 0.0, 2.0, 0.0, 0.0, 0.0, 4.0], 2, 7, 3, 7.875),
+        ([3.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 1.0], 2, 7, 3, 0.0),
+        ([1.0, 2.0, 1.0, 6.0, 1.0, 1.0, 1.0], 1, 0, 7, 37.0 / 13.0),
+    ],
+)
+def test_patches_on_the_circle(field, count, start, length, centre):
+    assert count_patches(np.array(field)) == count
     assert count_patches(np.zeros(8)) == 0
-    assert count_patches(np.ones(8)) == 1
-    y = np.array([3.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 1.0])
-    first, length, centre = main_patch(y)
-    assert (first, length) == (7, 3)
-    assert centre == pytest.approx(0.0)
+    first, nodes, middle = main_patch(np.array(field))
+    assert (first, nodes) == (start, length)
+    assert middle == pytest.approx(centre)
+
+
+def test_a_length_that_nothing_stops_has_the_least_drop_and_the_largest_energy():
+    """Of a law with more than the half under it: 0.9 at 0.6 of d_c, an area of 0.75."""
+    law = st.PiecewiseWeakening(slip=[0.6, 1.0], strength=[0.9, 0.0], weakening_rate=1e10)
+    rng = np.random.default_rng(0)
+    peak, residual, profile, rate = rng.uniform(1.0, 2.0, (4, 9)) * [
+        [2e6],
+        [1e5],
+        [1.0],
+        [1e10],
+    ]
+    sample = make_sample(peak, residual, profile, rate, pieces_of(law))
+    runs = Runs(COLUMN, COLUMN, 9, 2e-3, 1.5e9)
+    # Half-length a: pi a D^2/(2 G*) is the energy; d_c is 0.1/0.6 of (tau_p - tau_r)/W.
+    energy = (0.75 * (peak - residual) ** 2 / (6.0 * rate)).max()
+    half = 2.0 * 1.5e9 * energy / (np.pi * (3e6 * profile - residual).min() ** 2)
+    assert unstoppable_length(sample, 3e6, runs) == pytest.approx(half / 1e-3, rel=1e-12)
 
 
 @pytest.fixture

@@ -11,7 +11,9 @@ from crooked import (
     PLANE,
     PLANE_GAP,
     PLANE_STRENGTH,
+    across_the_seam,
     as_measured,
+    uneven,
     write_table,
 )
 from oracles import angle_rule, dense, largest_load, symbol_of
@@ -158,6 +160,30 @@ def test_moving_the_origin_moves_places_only():
             assert apart(there[name].item(), place, 0.037) < 1e-6
 
 
+@pytest.mark.parametrize(("problem", "radius"), [(LINE, 3.2e-3), (PLANE, 4.6e-3)])
+def test_what_slides_is_not_what_was_arrested(problem, radius):
+    """A weak place across the seam within a barrier: then the onset is that without it."""
+    interface = problem.interface
+    seam, wall = (
+        across_the_seam(interface, r) > np.exp(-1.0) for r in (radius, radius + 1.6e-3)
+    )
+    other = tuple(int(0.45 * n) for n in interface.shape)
+    dip = np.roll(across_the_seam(interface, 5e-3), other, range(len(other)))
+    strength = 1.3e6 + 1e5 * uneven(interface, seed=5) - 4.5e5 * dip
+    barred = np.where(wall, 3.5e6, strength)
+    within = np.where(seam, 5e5 + 1e5 * uneven(interface, seed=6), barred)
+    plain, found = (exact_onset(problem, each, events=2) for each in (barred, within))
+    assert found.arrested_events.item() == 1
+    assert found.critical_stress.item() > 1.2 * found.first_instability.item()
+    ends = found.event_position.values[0].T[..., 0], found.critical_position.values[0]
+    for place, goal in (
+        (found.sliding_position.values[0], plain.critical_position.values[0]),
+        *((end, 0.0) for end in ends),
+    ):
+        off = apart(place, goal, np.array(interface.lengths)) / interface.spacings
+        assert np.all(off < (0.6 if np.any(goal) else 3.0))
+
+
 def tips(load, whole, centre):
     """G of a row of cracks at both tips by the textbook's weights (Tada, Paris and Irwin)."""
     s, measure = angle_rule(4000)
@@ -192,14 +218,34 @@ def test_cracks_across_the_seam_under_an_uneven_load():
         assert found == pytest.approx(lengths[end] - 23e-6, abs=26e-6)
 
 
-def test_estimate_of_what_the_residual_strength_takes_has_no_unit_of_load():
+def doubled_profile(problem):
     """Twice the profile halves the load, and nothing else."""
+    load = dataclasses.replace(problem.load, profile=2.0 * problem.load.profile)
+    return dataclasses.replace(problem, load=load)
+
+
+@BOTH
+def test_bounds_and_gradient_have_no_unit_of_load(problem, strength, gap):
+    friction = dataclasses.replace(problem.friction, residual_strength=0.0)
+    problem = dataclasses.replace(problem, friction=friction)
+    one, other = (
+        exact_onset(each, strength, gap=1e-3, sensitivity=True)
+        for each in (problem, doubled_profile(problem))
+    )
+    for name in ("critical_stress", "first_instability", "sensitivity", "certificate_gap"):
+        close = {"rtol": 1e-6, "atol": 1e-9 * one[name].values.max()}
+        np.testing.assert_allclose(other[name], one[name], **close)
+    np.testing.assert_allclose(2.0 * other.critical_load, one.critical_load, rtol=1e-9)
+    profile = np.broadcast_to(problem.load.profile, strength.shape)
+    assert (one.sensitivity.values[0] * profile).sum() == pytest.approx(profile.mean())
+
+
+def test_estimate_of_what_the_residual_strength_takes_has_no_unit_of_load():
     residual = LINE.friction.residual_strength + 3.8e5
     friction = dataclasses.replace(LINE.friction, residual_strength=residual)
-    twice = dataclasses.replace(LINE.load, profile=2.0 * LINE.load.profile)
     estimates = []
-    for load in (LINE.load, twice):
-        problem = dataclasses.replace(LINE, friction=friction, load=load)
+    for each in (LINE, doubled_profile(LINE)):
+        problem = dataclasses.replace(each, friction=friction)
         found = local_onset(problem, LINE_STRENGTH)
         estimates.append(beyond_residual(problem, problem.sample(LINE_STRENGTH), dict(found)))
     (reached, missing), (again, same) = estimates

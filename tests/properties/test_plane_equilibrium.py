@@ -6,6 +6,7 @@ from planes import WAVENUMBERS, Lattice, plane_sample
 from setups import LENGTH, RATE, exact_onset, make_problem, smooth_noise
 
 import stiction as st
+from stiction.criterion.average import _between_nodes
 from stiction.elasticity.operator import make_operator
 from stiction.equilibrium import transforms
 from stiction.equilibrium.relaxation import least_equilibrium
@@ -155,6 +156,16 @@ def test_monotone_and_concave_in_the_strength():
     stronger[10:20, 5:15] *= 1.05
     assert bounds_of(stronger).upper >= one * (1.0 - 1e-9)
     assert bounds_of(first + 1e5).upper == pytest.approx(one + 1e5, rel=2e-9)
+
+
+def test_the_place_of_the_least_average_lies_between_nodes():
+    """Of a paraboloid it is that of the vertex, also across the borders."""
+    for x, y in ((11.7, 0.4), (0.2, 8.6), (3.4, 5.0)):
+        along, across = (
+            (np.arange(n) - at + 0.5 * n) % n - 0.5 * n for n, at in ((12, x), (9, y))
+        )
+        average = 2.0 + 0.3 * along[:, None] ** 2 + 0.7 * across**2
+        np.testing.assert_allclose(_between_nodes(average), (x, y), rtol=1e-12)
 
 
 def test_path_is_the_slip_at_onset_just_below_it():

@@ -1,5 +1,6 @@
 """Planes as a user meets them: results, warnings, refusals, study files, commands, figures."""
 
+import dataclasses
 import functools
 import warnings
 
@@ -14,6 +15,8 @@ from small_study import lengths, small_study
 
 import stiction as st
 from stiction.equilibrium import solver, transforms
+from stiction.equilibrium.relaxation import UNDECIDED, Relaxed
+from stiction.equilibrium.sample import Jump
 
 
 def smooth(shape, seed=0):
@@ -74,6 +77,30 @@ def test_no_certificate_where_the_residual_strength_is_reached_first():
     residual = found["slip"].values >= (STRENGTH - 0.69e6) / RATE
     assert residual.any()
     assert (found["sensitivity"].values[residual] == 0.0).all()
+
+
+def test_a_path_that_is_lost_is_warned_of(monkeypatch, found):
+    """In its first jump, before it, or after a jump that came to rest."""
+    follow_on = transforms.PlaneProgram.next
+
+    def path_lost(*given):
+        return dataclasses.replace(follow_on(*given), unstable=False, known=False)
+
+    def at_rest(program, sample, state):
+        monkeypatch.setattr(transforms.PlaneProgram, "next", path_lost)
+        return Jump(True, True, state)
+
+    for owner, name, lost in (
+        (transforms, "least_equilibrium", lambda *given: Relaxed(UNDECIDED, given[3])),
+        (transforms.PlaneProgram, "next", path_lost),
+        (transforms.PlaneProgram, "jump", at_rest),
+    ):
+        monkeypatch.setattr(owner, name, lost)
+        text = r"not followed .* in 1 of 1 samples \(sample 0\): .* a lower bound"
+        with pytest.warns(st.AccuracyWarning, match=text):
+            ends = onset(STRENGTH)
+        monkeypatch.undo()
+        assert ends["critical_load"].item() >= found["critical_load"].values[0]
 
 
 def test_nodes_of_constant_strength(found):

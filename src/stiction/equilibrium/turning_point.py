@@ -79,7 +79,7 @@ def _hold(bracket: Bracket, held: Array, guess: Held, accuracy: float) -> Held |
     residual_of(operator, spring, held, slope, bracket.residual)
     # A lift of y by epsilon costs epsilon <s - tau_0 p, 1>/<p, y>.
     cost = float(np.abs(excess - load * profile).sum())
-    tolerance = accuracy * stiffness * bracket.scale * inner(profile, slope) / cost
+    tolerance = accuracy * stiffness * bracket.magnitude * inner(profile, slope) / cost
     status, _ = solve_inside(
         operator, spring, inside, slope, bracket.residual, workspace, tolerance, ITERATIONS
     )
