@@ -15,8 +15,8 @@ from small_study import lengths, small_study
 
 import stiction as st
 from stiction.equilibrium import solver, transforms
-from stiction.equilibrium.relaxation import UNDECIDED, Relaxed
-from stiction.equilibrium.sample import Jump
+from stiction.equilibrium.relaxation import Relaxed
+from stiction.equilibrium.sample import Jump, Outcome
 
 
 def smooth(shape, seed=0):
@@ -91,7 +91,7 @@ def test_a_path_that_is_lost_is_warned_of(monkeypatch, found):
         return Jump(True, True, state)
 
     for owner, name, lost in (
-        (transforms, "least_equilibrium", lambda *given: Relaxed(UNDECIDED, given[3])),
+        (transforms, "least_equilibrium", lambda *given: Relaxed(Outcome.UNDECIDED, given[3])),
         (transforms.PlaneProgram, "next", path_lost),
         (transforms.PlaneProgram, "jump", at_rest),
     ):
