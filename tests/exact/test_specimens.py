@@ -9,7 +9,7 @@ from refusals import refusals
 from specimens import BruteForce, crooked, rough
 
 import stiction as st
-from stiction.criterion.places import places_in
+from stiction.elasticity.places import places_of
 
 INF = float("inf")
 DRIVES = {
@@ -120,7 +120,7 @@ def test_windows_bound_the_onset_and_become_it():
 def test_nucleation_length_at_a_free_end_and_in_the_middle(mode, end):
     """In units of G*/W; 1.158 in the middle, half of it at an end in mode III."""
     problem = crooked(nodes=512, height=0.4, mode=mode, rate=0.12e12)
-    places = places_in(problem, 0.12e12)
+    places = places_of(problem.blocks, 0.12e12)
     unit = problem.effective_modulus / 0.12e12 / problem.interface.spacing
     lengths = places.widths / unit
     assert lengths[0] == pytest.approx(end, rel=0.03) == lengths[-1]

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from stiction.arrays import Array
 from stiction.criterion.average import averages, least_average
-from stiction.criterion.places import places_in
-from stiction.criterion.weakest import Places, weakest_place
 from stiction.criterion.windows import Window, windows_of
+from stiction.elasticity.places import places_of
+from stiction.elasticity.weakest import Places, weakest_place
 from stiction.errors import InputError, warn_accuracy
 from stiction.friction import ExponentialWeakening
 from stiction.model import checked, model
@@ -239,7 +239,7 @@ def _places_by_rate(
 ) -> Iterator[tuple[Places, NDArray[np.int64]]]:
     """Yield the critical windows of a specimen at each rate, and the samples of this rate."""
     for rate, same in _rates(sample):
-        places = places_in(problem, rate)
+        places = places_of(problem.blocks, rate)
         if not places.starts.size:
             raise InputError(
                 "interface.length: no part of the specimen becomes unstable by itself, so the local"

@@ -13,8 +13,9 @@ slip d at the interface moves the drive by its average with q. Eliminating U,
 with h = (k/(k + C)) C/(2 L). Under dead load h = 0, and for a rigid machine h = C/(2 L).
 """
 
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +26,8 @@ POSITIVE = 1e-12
 """Share of the diagonal up to which a positive entry of K beside it is round-off."""
 
 
-class Driven(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Driven:
     """Two blocks behind their machine; arrays are not to be written to.
 
     Attributes

@@ -8,8 +8,8 @@ from typing import Any, Literal, Self
 import numpy as np
 
 from stiction.arrays import Array
-from stiction.criterion.places import places_in
 from stiction.criterion.windows import windows_of
+from stiction.elasticity.places import places_of
 from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.errors import InputError
@@ -140,7 +140,7 @@ def no_single_length(problem: Problem, random: RandomInterface) -> str | None:
     try:
         if problem.specimen is None:
             windows_of(problem, rate)
-        elif not places_in(problem, rate).starts.size:
+        elif not places_of(problem.blocks, rate).starts.size:
             return "no part of the specimen becomes unstable by itself"
     except InputError:
         return "a critical patch does not fit on the interface"

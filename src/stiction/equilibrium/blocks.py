@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from stiction.arrays import Array
-from stiction.criterion.places import places_in
-from stiction.criterion.weakest import weakest_place
+from stiction.elasticity.places import places_of
 from stiction.elasticity.stiffness import make_block_stiffness
+from stiction.elasticity.weakest import weakest_place
 from stiction.equilibrium.dense import LineProgram
 from stiction.equilibrium.sample import (
     Outcome,
@@ -88,7 +88,7 @@ class BlockProgram(LineProgram):
         if low < high * (1.0 - 1e-12):
             steps = min(int(np.ceil(np.log(high / low) / np.log(RUNG))), MOST_RUNGS)
         for step in range(steps + 1 if high > 0.0 else 0):
-            places = places_in(self.problem, low if steps == 0 else _rung(high, step))
+            places = places_of(self.blocks, low if steps == 0 else _rung(high, step))
             load, choice = weakest_place(
                 sample.excess, sample.profile, sample.rate, places, work
             )

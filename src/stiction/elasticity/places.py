@@ -8,17 +8,13 @@ the shortest unstable run that begins at a node ends the further on the later it
 """
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import scipy.linalg
 
 from stiction.arrays import Array
-from stiction.criterion.weakest import Places
-from stiction.interface import Interface
-from stiction.model import Mode
-from stiction.solid import Solid
-from stiction.specimen import Blocks
+from stiction.elasticity.driven import Driven
+from stiction.elasticity.weakest import Places
 
 FINEST = 32
 """Windows that begin within the length of one, at most."""
@@ -60,14 +56,6 @@ def make_places(matrix: Array, rate: float) -> Places:
 
 
 @lru_cache(maxsize=32)
-def places_of(
-    specimen: Blocks, interface: Interface, solid: Solid, mode: Mode, rate: float
-) -> Places:
-    """Return the shortest unstable runs of a specimen; none if it is stable as a whole."""
-    driven = specimen.driven(interface.extent, interface.size, solid, mode)
-    return make_places(driven.stiffness, rate)
-
-
-def places_in(problem: Any, rate: float) -> Places:
-    """Return the shortest unstable runs of a problem with a specimen."""
-    return places_of(problem.specimen, problem.interface, problem.solid, problem.mode, rate)
+def places_of(blocks: Driven, rate: float) -> Places:
+    """Return the shortest unstable runs of blocks; none if they are stable as a whole."""
+    return make_places(blocks.stiffness, rate)
