@@ -224,3 +224,20 @@ test_refused = refusals(
         "cracks": lambda: solved(lambda p, s: st.theory.griffith_length(p, 1e6, 1.0)),
     }
 )
+
+
+def test_figures():
+    """Blocks and profiles; the machine's curve goes through every event, down its drop."""
+    problem = crooked(drive=DRIVES["low pusher, machine"])
+    strength = rough(problem, 3)
+    found = st.onset(problem, strength, method=st.Equilibrium())
+    below = st.plot.specimen(problem, strength, found).axes[1]
+    shear = next(line for line in below.lines if "shear" in str(line.get_label()))
+    np.testing.assert_allclose(shear.get_ydata(), problem.load_profile)
+    path = st.equilibrium_path(problem, strength, np.linspace(0.0, 1.1e6, 30))
+    axes = st.plot.force_travel(path)
+    force = axes.lines[0].get_ydata()
+    assert (
+        np.isclose(force[:, None], path.event_force - path.event_force_drop).any(axis=0).all()
+    )
+    assert len(axes.lines[1].get_ydata()) == path.sizes["event"] > 2

@@ -118,6 +118,7 @@ def weak_spots(
     if not failing:
         raise InputError("found: holds no failing profile")
     problem = problem_of(failing, problem)
+    problem.refuse_specimen("weak spots", "draw a failing profile with st.plot.onset")
     interface, length = problem.interface, problem.nucleation_length
     if interface.is_plane:
         raise InputError("found: weak spots are drawn of a line; st.plot.field draws a plane")

@@ -1,0 +1,181 @@
+"""Figures of specimens: blocks and their drive, and the curve that a machine records."""
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
+
+from stiction.model import check
+from stiction.plot.axes import need, on_axes, problem_of, unit_for, with_unit
+from stiction.plot.fields import rows_of
+from stiction.plot.style import ACCENT, COLUMN, PALE, QUIET, paper_style, series
+from stiction.problem import Problem
+from stiction.specimen import Pusher
+
+Array = NDArray[np.float64]
+
+
+def specimen(
+    problem: Problem,
+    strength: Any = None,
+    result: xr.Dataset | None = None,
+    *,
+    sample: int = 0,
+) -> Figure:
+    """Draw the blocks with their drive, and the shear and pressure that it causes.
+
+    Parameters
+    ----------
+    problem : Problem
+        With a specimen.
+    strength : array, optional
+        tau_p, Pa, (nodes,) or (samples, nodes).
+    result : Dataset, optional
+        From `stiction.onset` with this strength: the critical patch is marked.
+    sample : int
+        Number of the sample, counted from 0.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.Problem(
+    ...     solid=st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress"),
+    ...     interface=st.Interface(length=0.1, nodes=128),
+    ...     friction=st.LinearWeakening(weakening_rate=0.2e12),
+    ...     specimen=st.Blocks(height=0.05, drive=st.Pusher(height=0.01, width=0.005)),
+    ... )
+    >>> len(st.plot.specimen(problem).axes)
+    2
+    """
+    import matplotlib.pyplot as plt
+
+    check("problem", problem, Problem)
+    blocks, interface = problem.blocks, problem.interface
+    figure = plt.figure(figsize=(1.35 * COLUMN, 1.5 * COLUMN), layout="constrained")
+    with paper_style():
+        top, below = figure.subplots(2, sharex=True, height_ratios=(1.0, 1.2))
+    scale, unit = unit_for("m", interface.lengths)
+    _draw_blocks(top, problem, scale)
+    top.set_ylabel(f"height ({unit})")
+    x = interface.x * scale
+    if strength is not None:
+        tau_p = rows_of(interface, strength)[sample]
+        below.plot(x, tau_p / tau_p.mean(), color=QUIET, linewidth=0.7, label="strength")
+    below.plot(x, blocks.shear, label="shear of the drive $q$", **series(0))
+    below.plot(x, blocks.pressure, label="pressure $p$", **series(1))
+    if result is not None:
+        need(result, "critical_position", "critical_patch_length")
+        one = result.isel(sample=sample) if "sample" in result.dims else result
+        middle, half = (
+            float(one["critical_position"]) * scale,
+            0.5 * float(one["critical_patch_length"]) * scale,
+        )
+        for axes in (top, below):
+            axes.axvspan(middle - half, middle + half, color=ACCENT, alpha=0.3, linewidth=0.0)
+        below.plot([], [], color=ACCENT, alpha=0.3, linewidth=6.0, label="critical patch")
+    below.set(xlabel=f"position $x$ ({unit})", ylabel="over the mean", ylim=(0.0, None))
+    with paper_style():
+        figure.legend(loc="outside lower center", ncols=2)
+    return figure
+
+
+def _draw_blocks(axes: Axes, problem: Problem, scale: float) -> None:
+    """Two blocks, and arrows where the drive acts on them; heights have their own scale."""
+    blocks, length = problem.specimen, problem.interface.extent * scale
+    assert blocks is not None  # `problem.blocks` has refused it
+    height, drive = blocks.height * scale, blocks.drive
+    for low in (-height, 0.0):
+        axes.add_patch(Rectangle((0.0, low), length, height, facecolor=PALE, edgecolor=QUIET))
+    axes.plot([0.0, length], [0.0, 0.0], color="black", linewidth=1.2)
+    arrow = {"color": ACCENT, "width": 0.004 * length, "length_includes_head": True}
+    reach, head = 0.14 * length, {"head_width": 0.03 * length}
+    for up in (1.0, -1.0):
+        if isinstance(drive, Pusher):
+            at, half = up * drive.height * scale, 0.5 * drive.width * scale
+            sides = ("left", "right") if drive.side == "both" else (drive.side,)
+            for side in sides:
+                end = 0.0 if side == "left" else length
+                # Upper block: pushed at the left, or pulled there where it is driven to the left.
+                pushed = up if side == "left" or drive.side == "both" else -up
+                outside = -1.0 if side == "left" else 1.0
+                start = end + outside * reach if pushed * outside < 0.0 else end
+                axes.arrow(start, at, pushed * reach, 0.0, **arrow, **head)
+                axes.plot([end, end], [at - half, at + half], color=ACCENT, linewidth=3.0)
+        else:
+            axes.plot([0.0, length], [up * height] * 2, color=ACCENT, linewidth=3.0)
+            axes.arrow(
+                0.5 * (length - up * 2.0 * reach), up * 1.15 * height, 2.0 * up * reach, 0.0,
+                **arrow, **head,
+            )  # fmt: skip
+    axes.set(xlim=(-0.2 * length, 1.2 * length), ylim=(-1.3 * height, 1.3 * height))
+
+
+def force_travel(
+    result: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None = None
+) -> Axes:
+    """Draw the force over the travel of the drives, with its drops: the curve of a machine.
+
+    Parameters
+    ----------
+    result : Dataset
+        From `stiction.equilibrium_path` of a specimen, at many loads.
+    problem : Problem, optional
+        Needed only if the result does not hold it.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw on; new ones by default.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The mean stress where the thickness of the blocks is unknown.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import stiction as st
+    >>> problem = st.Problem(
+    ...     solid=st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress"),
+    ...     interface=st.Interface(length=0.1, nodes=128),
+    ...     friction=st.LinearWeakening(weakening_rate=0.2e12),
+    ...     specimen=st.Blocks(height=0.05, thickness=0.006),
+    ... )
+    >>> strength = 1e6 + 3e8 * (problem.interface.x - 0.04) ** 2
+    >>> path = st.equilibrium_path(problem, strength, np.linspace(0.0, 1.3e6, 50))
+    >>> st.plot.force_travel(path).get_xlabel()
+    'travel (µm)'
+    """
+    need(result, "travel", "event_travel", hint="; give the path of a specimen")
+    problem_of(result, problem)
+    name, event = (
+        ("force", "event_force") if "force" in result else ("mean_stress", "event_stress")
+    )
+    load, before = result["load"].values, result["event_load"].values
+    high, drop = result[event].values, result[f"{event}_drop"].values
+    start, step = result["event_travel"].values, result["event_travel_step"].values
+    order = np.argsort(np.concatenate([load, before, before]), kind="stable")
+    travel = np.concatenate([result["travel"].values, start, start + step])[order]
+    force = np.concatenate([result[name].values, high, high - drop])[order]
+    length, length_unit = unit_for("m", travel)
+    factor, unit = unit_for(str(result[name].attrs["units"]), force)
+    with on_axes(ax) as axes:
+        axes.plot(travel * length, force * factor, **series(0))
+        if before.size:
+            style: dict[str, Any] = {
+                "linestyle": "none",
+                "marker": "o",
+                "markersize": 3.5,
+                "color": ACCENT,
+            }
+            axes.plot(start * length, high * factor, **style, label="arrested events")
+            axes.legend()
+        text = "force" if name == "force" else "mean stress"
+        axes.set(xlabel=with_unit("travel", length_unit), ylabel=with_unit(text, unit))
+    return axes
