@@ -198,17 +198,6 @@ def test_distributions_that_scipy_has_no_name_for():
     assert field_of(Narrow(name="norm", a=0.0, b=1.0)()).mean == pytest.approx(0.5)
 
 
-def test_a_function_that_returns_its_own_array_keeps_it():
-    table = {}
-
-    def density(k):
-        return table.setdefault(np.shape(k), np.ones(np.shape(k)))
-
-    spectrum = st.CustomSpectrum(function=density, max_wavenumber=500.0)
-    st.RandomField(marginal=scipy.stats.norm(), spectrum=spectrum).modes(COARSE)
-    assert all(np.all(values == 1.0) for values in table.values())
-
-
 def mapped(distribution, rho):
     return correlation_of_mapped(rho, hermite_coefficients(field_of(distribution).marginal))
 
@@ -241,18 +230,6 @@ def test_efolding_length_is_that_of_the_modes_that_are_sampled(exponent):
         found = np.interp(-np.exp(-1.0), -correlation[:200], interface.x[:200])
         assert found == pytest.approx(length, rel=2e-3)
     assert field.efolding_length() < 0.05
-
-
-def test_truncated_correlation_is_the_sum_of_cosines():
-    """Against the midpoint rule on a million wavenumbers."""
-    spectrum = st.ExponentialSpectrum(correlation_length=0.3, power_kept=0.95)
-    k = (np.arange(1_000_000) + 0.5) * spectrum.cutoff() / 1e6
-    g = spectrum.density(k)
-    for lag in (0.0, 1e-3, 0.3, 5.0, 300.0):
-        expected = np.sum(g * np.cos(k * lag)) / g.sum()
-        # The midpoint rule: (lag dk)^2/24 with dk = 4e-5.
-        error = 1e-9 + (lag * k[0] * 2.0) ** 2 / 24.0
-        assert spectrum.correlation(np.array([lag]))[0] == pytest.approx(expected, abs=error)
 
 
 def test_correlation_of_a_custom_spectrum_with_a_step():

@@ -11,7 +11,6 @@ import stiction as st
 import stiction.equilibrium.dense
 from stiction.equilibrium.dense import LineProgram
 from stiction.equilibrium.solver import follow
-from stiction.equilibrium.transforms import Plane, plane_onset
 
 
 def relaxed(problem, strength, load, rate=RATE):
@@ -88,29 +87,6 @@ def test_transforms_agree_with_the_dense_factor(make_strength, monkeypatch, roug
         np.testing.assert_allclose(found.slip, exact.slip, atol=1e-3 * sample.critical.max())
         # Nodes at rest have no part in the multiplier.
         assert np.mean((found.direction > 0.0) == (exact.direction > 0.0)) > 0.99
-
-
-def test_a_patch_that_does_not_slip_yet_is_no_division_by_zero(solid):
-    """One dip, so wide that hardly a node slips before the instability."""
-    strength, one = 1e6 + 3e5 * np.cos(turns(4096)), np.ones(4096)
-    line = Plane((0.4,), solid.effective_modulus(), 0.0)
-    found = plane_onset(line, strength, one, RATE * one, 1e-9)
-    assert found.closed
-    assert 0.7e6 < found.lower < 0.701e6
-
-
-def test_patches_alike_on_a_long_interface():
-    """Thirty-two periods of a profile let go at the load of one: all patches are singular at once.
-
-    By symmetry there is a multiplier with the period of the profile.
-    """
-    loads = []
-    for periods in (1, 32):
-        problem = make_problem(128 * periods, 0.0135 * periods)
-        tau_p = np.tile(1e6 + 0.3e6 * np.cos(turns(128)), periods)
-        program = LineProgram(problem)
-        loads.append(program.solve(program.sample_of(problem.sample(tau_p), 0)).load)
-    assert loads[1] == pytest.approx(loads[0], rel=1e-11)
 
 
 @pytest.mark.parametrize("high", [1.66e6, 4.0e6])

@@ -9,7 +9,7 @@ from checks import assert_same
 from hypothesis import given, settings
 from hypothesis import strategies as some
 from ruptures import BREAKING_PLANE, BREAKING_STRENGTH
-from setups import EXACT, LENGTH, LOCAL, beta_strength, local_onset, make_problem
+from setups import EXACT, LENGTH, LOCAL, beta_strength, make_problem
 
 import stiction as st
 from stiction.ensemble.experiment import Experiment
@@ -120,27 +120,6 @@ def test_an_ensemble_of_planes_may_be_continued_and_computed_again(method, rando
     again = st.onset(PLANE, kept, method=method)
     assert again["critical_load"].values[0] == result["critical_load"].values[1]
     assert result["critical_position"].dims == ("sample", "direction")
-
-
-def test_an_ensemble_may_be_continued_and_seeds_differ(arguments, reference):
-    rest = st.monte_carlo(**arguments, samples=SAMPLES - 700, seed=5, first=700)
-    np.testing.assert_array_equal(rest["sample"], np.arange(700, SAMPLES))
-    np.testing.assert_array_equal(rest["critical_load"], reference["critical_load"][700:])
-    other = st.monte_carlo(**arguments, samples=SAMPLES, seed=6)
-    assert not np.any(other["critical_load"].values == reference["critical_load"].values)
-
-
-def test_what_else_is_random_is_independent_of_the_strength(arguments):
-    marginal = st.Beta(alpha=2.0, beta=2.0, low=-1e5, high=1e5)
-    initial = st.RandomField(marginal, st.PowerLawSpectrum(2e-3))
-    random = st.RandomInterface(strength=arguments["random"], initial_stress=initial)
-    keep = ("strength", "initial_stress")
-    result = st.monte_carlo(**arguments | {"random": random}, samples=300, seed=5, keep=keep)
-    kept = {name: result[name].values for name in keep}
-    # 300 samples of about 20 independent lengths each: correlations scatter by 1/sqrt(6000).
-    assert abs(np.corrcoef(*(values.ravel() for values in kept.values()))[0, 1]) < 0.05
-    direct = local_onset(arguments["problem"], kept)
-    np.testing.assert_array_equal(result["critical_load"], direct["critical_load"])
 
 
 def test_progress_counts_every_sample_once(arguments):

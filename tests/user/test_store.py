@@ -21,7 +21,6 @@ from small_study import lengths, small_study
 import stiction as st
 from stiction import files
 from stiction.ensemble import batches, pilot, store
-from stiction.ensemble.batches import Span, solve_spans
 from stiction.ensemble.experiment import Experiment
 from stiction.errors import StoreError, WorkerError
 from stiction.study.run import samples_of_part
@@ -323,36 +322,6 @@ def test_versions_that_differ_are_said(tmp_path, often, monkeypatch):
 
 
 # -- size and time -------------------------------------------------------------------------------
-
-
-def test_memory_is_bounded_by_the_pieces_in_flight(monkeypatch):
-    """Only so many pieces are handed out, and each is only so big, whatever the study."""
-    monkeypatch.setattr(batches, "MOST_BYTES", 2**20)
-    monkeypatch.setattr(batches, "SECONDS", 1e6)
-    alive, most = set(), 0
-
-    class Watching:
-        def submit(self, function, experiment, span):
-            nonlocal most
-            future = Future()
-            alive.add(span)
-            most = max(most, len(alive))
-            threading.Timer(0.002, self.finish, (future, function, experiment, span)).start()
-            return future
-
-        def finish(self, future, function, experiment, span):
-            table = function(experiment, span)
-            alive.discard(span)
-            future.set_result(table)
-
-    keep = {"samples": 20000, "keep": ["strength"]}
-    points = make_study(sweep=[], ensemble=keep).experiments
-    spans, largest = [Span(0, 0, 20000)], 0
-    for table in solve_spans(points, spans, executor=Watching(), workers=3):
-        largest = max(largest, table.rows.nbytes)
-    assert most <= 6  # two a worker
-    # 128 nodes and six more numbers a sample make 1072 bytes: a fair share would be 3.5 MB.
-    assert 2**18 < largest < 1.1 * 2**20
 
 
 def test_a_run_that_grows_from_few_samples_has_the_whole_pilot(tmp_path):

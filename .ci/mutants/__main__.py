@@ -1,6 +1,6 @@
 """Do the tests notice? Small faults, one at a time, in a copy of the package.
 
-    python tests/mutants criterion --faults 20 --seed 1
+    python .ci/mutants criterion --faults 20 --seed 1
 
 Signs, factors, minima for maxima, bounds off by one, terms and periods left out, arguments swapped,
 warnings not given, at sampled lines of a folder or file of the package. Each runs against the
@@ -104,7 +104,7 @@ def leaves_a_program(path: Path, fault: Fault) -> bool:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="python tests/mutants", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python .ci/mutants", description=__doc__)
     parser.add_argument(
         "target", help="folder or file of src/stiction, such as random/fields.py"
     )
