@@ -1,6 +1,5 @@
 """Friction laws that are not linear against brute force."""
 
-
 import numpy as np
 import pytest
 from oracles import by_relaxation, symbol_of
