@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 
 from stiction.elasticity.blocks import Pushes
 from stiction.elasticity.driven import Driven, driven
@@ -14,7 +14,19 @@ from stiction.kinds import Kinds, OneOf
 from stiction.model import Mode, Positive, as_number, model
 from stiction.solid import Solid
 
-Stiffness = Annotated[float, BeforeValidator(as_number), Field(ge=0.0)]
+
+def _stiffness(value: Any) -> float:
+    return math.inf if value == "inf" else as_number(value)
+
+
+def _written(value: float) -> Any:
+    """Return a number, or 'inf', which JSON has no number for."""
+    return "inf" if value == math.inf else value
+
+
+Stiffness = Annotated[
+    float, BeforeValidator(_stiffness), PlainSerializer(_written), Field(ge=0.0)
+]
 
 
 def _height(value: Any) -> float:

@@ -241,3 +241,23 @@ def test_figures():
         np.isclose(force[:, None], path.event_force - path.event_force_drop).any(axis=0).all()
     )
     assert len(axes.lines[1].get_ydata()) == path.sizes["event"] > 2
+
+
+def test_a_swept_rigid_machine_is_stored(tmp_path):
+    """Infinity has no number in JSON: it is written as text, and read again."""
+    problem = crooked(drive=DRIVES["right pusher, rigid"], nodes=64, load=st.Load())
+    field = st.RandomField(
+        st.Lognormal(mean=1.0e6, cv=0.2), st.PowerLawSpectrum(correlation_length=9e-3)
+    )
+    study = st.Study(
+        problem=problem,
+        random=field,
+        method=st.Equilibrium(),
+        ensemble=st.Ensemble(samples=2),
+        sweep=[{"problem.specimen.drive.stiffness": [0.0, INF]}],
+    )
+    found = study.run(out=tmp_path / "run", pilot=False)
+    again = st.open_run(tmp_path / "run")
+    assert again.study.problem.specimen == problem.specimen
+    np.testing.assert_array_equal(again.dataset().stiffness, [0.0, INF])
+    np.testing.assert_array_equal(again.dataset().critical_force, found.critical_force)

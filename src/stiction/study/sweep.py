@@ -91,7 +91,10 @@ def _values(key: str, given: Any) -> list[Any]:
 def _axis(given: Any) -> Axis:
     if not isinstance(given, Mapping) or not given:
         raise InputError(f"must be a table of keys and their values, got {describe(given)}")
-    axis = {key: _values(key, values) for key, values in _flat(given).items()}
+    axis = {
+        key: [math.inf if one == "inf" else one for one in _values(key, values)]
+        for key, values in _flat(given).items()
+    }
     if len({len(values) for values in axis.values()}) > 1:
         named = ", ".join(f"{key} has {len(values)}" for key, values in axis.items())
         raise InputError(
@@ -144,7 +147,14 @@ def read_axes(given: Any) -> list[Axis]:
 def _plain_axes(axes: Sequence[Axis]) -> list[Axis]:
     return [
         {
-            key: [to_plain(one) if dataclasses.is_dataclass(one) else one for one in values]
+            key: [
+                to_plain(one)
+                if dataclasses.is_dataclass(one)
+                else "inf"
+                if one == math.inf
+                else one
+                for one in values
+            ]
             for key, values in axis.items()
         }
         for axis in axes
