@@ -67,6 +67,14 @@ def pytest_sessionfinish(session):
         session.exitstatus = 1
 
 
+@pytest.fixture(autouse=True)
+def figures():
+    """Close the figures of a test: matplotlib warns of more than twenty that are open."""
+    yield
+    if "matplotlib.pyplot" in sys.modules:
+        sys.modules["matplotlib.pyplot"].close("all")
+
+
 @pytest.fixture
 def solid():
     from setups import SOLID

@@ -141,7 +141,7 @@ FIVE = [f"marginal.{name}" for name in ("alpha", "beta")] + ["exponent", "trunca
 FIVE = {key: (1.0, 2.0) for key in FIVE} | {"problem.friction.weakening_rate": (4e11, 6e11)}
 test_mistakes = refusals({
     "unit ... Mstone ... Pa": {"unit": "Mstone"},
-    "unit ... force ... area": {"unit": "kN"},
+    "peaks ... forces ... area": {"unit": "kN"},
     "30 of 30 ... below all that ... unit": {"peaks": PEAKS / 1e6},
     "200000, which lies below ... lowest come from marginal.low = 400000":
         {"peaks": np.append(PEAKS, 0.2e6)},

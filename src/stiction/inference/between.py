@@ -30,7 +30,7 @@ def as_of_one(rows: Sequence[Array], within: Array) -> list[Array]:
     """Return the records, scaled as if all came from one specimen.
 
     Equal means would lack the part of the variance that a field itself has from record to record.
-    So the logarithms of the means are drawn together until Q(0) of `scatter_between` is what it is
+    So the logarithms of the means are drawn together until Q(0) of `variance_between` is what it is
     without scatter between specimens; `within` are their variances from the field alone.
     """
     levels = levels_of(rows)
@@ -43,34 +43,38 @@ def as_of_one(rows: Sequence[Array], within: Array) -> list[Array]:
     return [row * factor for row, factor in zip(rows, factors, strict=True)]
 
 
+def variance_between(logarithms: Array, within: Array, level: float) -> float:
+    """Return the variance s between records at which Q(s) is as large as `level`.
+
+    Q(s) = sum (L - m(s))^2/(s + v) is chi-square distributed with one degree of freedom
+    less than records at the true variance s of the logarithms L (Viechtbauer, 2007),
+    whatever their number. `within` are the variances v of the logarithms from the field alone,
+    (records,).
+    """
+
+    def excess(s: float) -> float:
+        weight = 1.0 / (s + within)
+        middle = float(weight @ logarithms / weight.sum())
+        return float(weight @ (logarithms - middle) ** 2) - level
+
+    if excess(0.0) <= 0.0:
+        return 0.0
+    return (
+        MOST_SCATTER if excess(MOST_SCATTER) >= 0.0 else float(brentq(excess, 0, MOST_SCATTER))
+    )
+
+
 def scatter_between(
     logarithms: Array, within: Array, confidence: float
 ) -> tuple[float, tuple[float, float], float]:
     """Estimate the coefficient of variation of a log-normal factor between records.
 
-    Q(s) = sum (L - m(s))^2/(s + v) is chi-square distributed with one degree of freedom
-    less than records at the true variance s of the logarithms L (Viechtbauer, 2007),
-    whatever their number; the estimate is where Q is as large as that (Paule and Mandel,
-    1982). `within` are the variances v of the logarithms from the field alone, (records,).
-    Returns the coefficient, its interval, and half the width of that of the mean logarithm.
+    The estimate is where Q is as large as expected (Paule and Mandel, 1982). Returns the
+    coefficient, its interval, and half the width of that of the mean logarithm.
     """
-    freedom = logarithms.size - 1
-
-    def excess(s: float, level: float) -> float:
-        weight = 1.0 / (s + within)
-        middle = float(weight @ logarithms / weight.sum())
-        return float(weight @ (logarithms - middle) ** 2) - level
-
-    def where(level: float) -> float:
-        if excess(0.0, level) <= 0.0:
-            return 0.0
-        if excess(MOST_SCATTER, level) >= 0.0:
-            return MOST_SCATTER
-        return float(brentq(excess, 0, MOST_SCATTER, args=(level,)))
-
-    tail = 0.5 * (1.0 - confidence)
+    freedom, tail = logarithms.size - 1, 0.5 * (1.0 - confidence)
     levels = (freedom, chi2.ppf(1.0 - tail, freedom), chi2.ppf(tail, freedom))
-    found, low, high = (where(float(level)) for level in levels)
+    found, low, high = (variance_between(logarithms, within, float(one)) for one in levels)
     error = float((1.0 / (found + within)).sum() ** -0.5)
     cv, least, most = (math.sqrt(math.expm1(s)) for s in (found, low, high))
     return cv, (least, most), float(student.ppf(0.5 + 0.5 * confidence, freedom)) * error

@@ -12,7 +12,7 @@ from stiction.arrays import Array
 from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.errors import InputError
 from stiction.inference.between import as_of_one, levels_of, scatter_between
-from stiction.inference.marginal_fit import Family, distance
+from stiction.inference.marginal_fit import Family, distance, with_parameters
 from stiction.inference.whittle import (
     RANGES,
     Model,
@@ -289,12 +289,22 @@ class Scale(NamedTuple):
         start, side = self._from(values)
         return scaled if self.linear else start + side * math.exp(scaled)
 
+    def errors(self, repeated: Repetitions) -> Array:
+        """Return the errors of repetitions in units of their widths."""
+        truth = repeated.truth
+        true = truth.model.noise**2 if self.name == "noise" else self.of(truth)[0]
+        return np.array([(own - true) / wide for own, wide in map(self.of, repeated.fits)])
+
     def end(self, found: Estimate, repeated: Repetitions, share: float) -> float:
         """Return an estimate less a quantile of its error in units of its width."""
-        (at, width), truth = self.of(found), repeated.truth
-        true = truth.model.noise**2 if self.name == "noise" else self.of(truth)[0]
-        errors = [(own - true) / wide for own, wide in map(self.of, repeated.fits)]
-        return at - width * float(np.quantile(errors, share, method="weibull"))
+        at, width = self.of(found)
+        return at - width * float(np.quantile(self.errors(repeated), share, method="weibull"))
+
+
+def scale_of(name: str, repeated: Sequence[Repetitions]) -> Scale:
+    """Return the scale of a parameter, linear if it was found negative."""
+    least = min(one.parameters[name] for own in repeated for one in (own.truth, *own.fits))
+    return Scale(name, name in PLACES or (name not in SIDES and least < 0.0))
 
 
 def intervals(
@@ -313,8 +323,7 @@ def intervals(
     lengths = [math.log(one.parameters["efolding_length"]) for one in around.fits]
     result = {}
     for name in estimated:
-        least = min(one.parameters[name] for own in repeated for one in (own.truth, *own.fits))
-        scale = Scale(name, name in PLACES or (name not in SIDES and least < 0.0))
+        scale = scale_of(name, repeated)
         shorter, longer = ends if ends and name != "noise" else (around, around)
         if np.cov([scale.of(one)[0] for one in around.fits], lengths)[0, 1] < 0.0:
             shorter, longer = longer, shorter
@@ -324,6 +333,15 @@ def intervals(
         first, last = sorted(scale.back(end, estimated) for end in (low, high))
         result[name] = first, last
     noise = result["noise"][1] if "noise" in result else found.model.noise
+    limits = limits_of(found, values, noise)
+    for name in limits.keys() & result.keys():
+        result[name] = cut(result[name], limits[name], estimated[name])
+    return result
+
+
+def limits_of(found: Estimate, values: Array, noise: float) -> dict[str, tuple[float, float]]:
+    """Return the limits of parameters, with bounds of the marginal outside of all values."""
+    estimated = found.parameters
     quiet = found.setting.marginal.quiet(values, noise)
     bottom, top = (float(end) for end in found.marginal.distribution.support())
     least, most = max(float(quiet.min()), bottom), min(float(quiet.max()), top)
@@ -339,8 +357,35 @@ def intervals(
         limits["marginal.loc"] = below if loc == bottom else above
     if extent is not None and math.isclose(extent, top - bottom):
         limits["marginal.scale"] = (most - least, math.inf)
-    for name in limits.keys() & result.keys():
-        result[name] = cut(result[name], limits[name], estimated[name])
+    return limits
+
+
+def likely(repeated: Repetitions, measured: Array) -> list[Estimate]:
+    """Return estimates as likely as the one found: it less the error of each repetition."""
+    found = repeated.truth
+    limits = limits_of(found, measured, found.model.noise)
+    moved: dict[str, Array] = {}
+    for name in found.parameters:
+        if name == "mean" or name.startswith("marginal.") or name in NAMES.values():
+            scale = scale_of(name, [repeated])
+            at, width = scale.of(found)
+            places = (at - width * scale.errors(repeated)).tolist()
+            means = moved.get("mean", places)  # bounds lie at distances from them
+            values = [scale.back(p, {"mean": m}) for p, m in zip(places, means, strict=True)]
+            moved[name] = np.clip(values, *limits.get(name, (-math.inf, math.inf)))
+    result = []
+    for number in range(len(repeated.fits)):
+        own = {name: float(value[number]) for name, value in moved.items()}
+        parts: dict[str, dict[str, float]] = {"marginal": {}, "spectrum": {}}
+        for name, value in own.items():
+            part, _, last = name.rpartition(".")
+            parts.setdefault(part, {})[last] = value
+        model = found.model._replace(
+            spectrum=replace(found.model.spectrum, **parts["spectrum"]),
+            anisotropy=own.get("anisotropy", found.model.anisotropy),
+        )
+        marginal = with_parameters(found.marginal, parts["marginal"])
+        result.append(replace(found, marginal=marginal, model=model))
     return result
 
 

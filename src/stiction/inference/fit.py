@@ -2,23 +2,26 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import BeforeValidator, Field
+from scipy.stats import chi2
 from scipy.stats import t as student
 
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name, warn_accuracy
-from stiction.inference.between import levels_of, scatter_between
+from stiction.inference.between import scatter_between, variance_between
 from stiction.inference.bootstrap import (
     FEWEST,
     Estimate,
     FitSetting,
+    Repetitions,
     bootstrapped,
     estimate,
     intervals,
+    likely,
 )
 from stiction.inference.marginal_fit import Family, family_of, mean_log_likelihood
 from stiction.inference.records import Record, records_of
@@ -26,8 +29,9 @@ from stiction.inference.whittle import SpectrumFamily, spectrum_of
 from stiction.inference.window import RecordWindow
 from stiction.interface import Interface
 from stiction.load import NotNegative
-from stiction.model import Flag, Number, Positive, Progress, at_least, checked
-from stiction.random.fields import RandomField
+from stiction.model import Count, Flag, Number, Positive, Progress, at_least, checked
+from stiction.random.fields import RandomField, RandomInterface
+from stiction.random.marginals import Lognormal
 from stiction.random.spectra import Share
 from stiction.variables import QUANTITIES
 
@@ -41,6 +45,8 @@ ADVICE = {
     "marginal": "the values are far from its family; compare families",
     "spectrum": "the periodogram is far from its family; take another spectrum or a higher detrend",
 }
+LEAST_SCATTER = 1e-8
+"""Variance of the logarithm of a factor that stands for none."""
 STRESSES = ("mean", "standard_deviation", "noise", "low", "high", "loc", "scale")
 """Parameters in the unit of the field."""
 
@@ -116,8 +122,63 @@ class FieldFit:
     missing: tuple[int, int]
     quantity: str
     doubts: tuple[str, ...]
-    _estimate: Estimate
+    _repeated: Repetitions
     _rows: Sequence[Array]
+    _levels: Array
+
+    @property
+    def _estimate(self) -> Estimate:
+        return self._repeated.truth
+
+    @checked
+    def interfaces(self, count: Count, seed: Number = 0) -> list[RandomInterface]:
+        """Return equally likely random interfaces, for a failure probability under all of them.
+
+        Each is the estimate less the error of one repetition, so that bias and scatter are those
+        of the intervals; with `between`, each has a factor of its own likely scatter.
+
+        Parameters
+        ----------
+        count : int
+            Their number; at most as many as `repetitions` differ.
+        seed : int
+            Not negative.
+
+        Raises
+        ------
+        InputError
+            If the fitted quantity is not a strength.
+
+        Examples
+        --------
+        >>> import stiction as st
+        >>> truth = st.RandomField(st.Lognormal(mean=1e6, cv=0.2), st.ExponentialSpectrum(1e-3))
+        >>> interface = st.Interface(length=0.05, nodes=500)
+        >>> fit = st.fit_field(truth.sample(interface, seed=2), interface, marginal="lognormal",
+        ...                    spectrum="exponential", noise=0.0, bootstrap=20)
+        >>> means = [one.strength.mean for one in fit.interfaces(10)]
+        >>> min(means) < fit.field.mean < max(means)
+        True
+        """
+        if self.quantity not in ("strength", "friction_coefficient"):
+            raise InputError(
+                f"interfaces: need a strength, and the fit is of {self.quantity}; put"
+                " `repetitions` into random interfaces of your own"
+            )
+        fields = likely(self._repeated, np.concatenate(self._rows))
+        rng = np.random.default_rng([seed, 5])
+        chosen = rng.choice(len(fields), count, replace=count > len(fields))
+        found = [RandomInterface(strength=fields[i].field(self.quantity)) for i in chosen]
+        if "between" not in self.parameters:
+            return found
+        levels = chi2.rvs(self._levels.size - 1, size=count, random_state=rng)
+        logarithms, within = np.log(self._levels), self._estimate.within
+        variances = [variance_between(logarithms, within, float(level)) for level in levels]
+        cvs = [math.sqrt(math.expm1(max(s, LEAST_SCATTER))) for s in variances]
+        return [
+            replace(one, between={"strength": Lognormal(mean=1.0, cv=cv)})
+            for one, cv in zip(found, cvs, strict=True)
+        ]
 
     def __str__(self) -> str:
         marginal = getattr(self.field.marginal, "type", "marginal").replace("_", " ")
@@ -264,7 +325,7 @@ def fit_field(
     found, compared = _best(
         [FitSetting(windows, one, family, between) for one in marginal], rows
     )
-    measured, rows = rows, found.as_of_one(rows)
+    levels, rows = np.array([row.mean() for row in rows]), found.as_of_one(rows)
     repeated = bootstrapped(found, bootstrap, confidence, seed, progress)
     tests = {"marginal": "distance", "spectrum": "roughness"}
     p_values = {name: _p_value(of, *repeated[0]) for name, of in tests.items()}
@@ -273,9 +334,7 @@ def fit_field(
     parameters = dict(found.parameters)
     ends = intervals(repeated, confidence, np.concatenate(rows))
     if between:
-        cv, ends["between"], width = scatter_between(
-            np.log(levels_of(measured)), found.within, confidence
-        )
+        cv, ends["between"], width = scatter_between(np.log(levels), found.within, confidence)
         for name in {"mean", "marginal.mean"} & parameters.keys():  # of other specimens, too
             ends[name] = parameters[name] * math.exp(-width), parameters[name] * math.exp(width)
         parameters["between"] = cv
@@ -291,8 +350,9 @@ def fit_field(
         missing=(points - sum(row.size for row in rows), points),
         quantity=quantity,
         doubts=tuple(_doubts(found, p_values, failed)),
-        _estimate=found,
+        _repeated=repeated[0],
         _rows=rows,
+        _levels=levels,
     )
     for doubt in fit.doubts:
         warn_accuracy(doubt)

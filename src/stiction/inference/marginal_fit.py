@@ -9,7 +9,7 @@ estimate consistent (a composite likelihood) and its error to the bootstrap.
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -164,6 +164,15 @@ class Family:
                 f" and {high:.6g}; give others, as in {{'type': {self.name!r}, 'low': ...}}, or"
                 " noise=True if measurement noise carries them there"
             )
+
+
+def with_parameters(marginal: Any, parameters: Mapping[str, float]) -> Any:
+    """Return a marginal with some of its parameters replaced."""
+    if isinstance(marginal, ScipyMarginal):
+        return marginal_of(
+            {"type": marginal.type} | dict(marginal.parameters) | dict(parameters)
+        )
+    return replace(marginal, **parameters)
 
 
 def table_of(given: Any) -> dict[str, Any]:

@@ -11,8 +11,8 @@ from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.inference.likelihood import Likelihood
 from stiction.inference.peaks import Peaks
-from stiction.inference.prior import Prior
-from stiction.model import Numbers, check, checked
+from stiction.inference.prior import Prior, full_key
+from stiction.model import Count, Number, Numbers, check, checked
 from stiction.problem import Problem
 from stiction.random.fields import RandomInterface
 from stiction.random.spectra import Share
@@ -90,6 +90,44 @@ class Posterior:
     def at(self, draw: int) -> tuple[Problem, RandomInterface]:
         """Return the problem and what is random at one draw, to compute with."""
         return self.prior.at(np.array([own[draw] for own in self.draws.values()]))
+
+    @checked
+    def interfaces(self, count: Count, seed: Number = 0) -> list[RandomInterface]:
+        """Return equally likely random interfaces, for a failure probability under all of them.
+
+        Parameters
+        ----------
+        count : int
+            Their number; 30 show a 90 % band.
+        seed : int
+            Not negative.
+
+        Raises
+        ------
+        InputError
+            If a parameter belongs to the problem and not to what is random on it.
+
+        Examples
+        --------
+        >>> import stiction as st
+        >>> problem = st.paper.problem(nodes=256)
+        >>> strength = st.paper.strength(problem, correlation_ratio=0.5)
+        >>> posterior = st.infer(
+        ...     problem, strength, [0.69e6, 0.70e6, 0.73e6, 0.68e6, 0.71e6],
+        ...     prior={"marginal.low": (0.5e6, 0.8e6)}, method=st.LocalCriterion(), samples=200,
+        ... )
+        >>> len({one.strength.marginal.low for one in posterior.interfaces(10)})
+        10
+        """
+        others = [name for name in self.names if full_key(name).startswith("problem.")]
+        if others:
+            raise InputError(
+                f"interfaces: {', '.join(others)} belong to the problem, which interfaces do not"
+                " hold; take `at(draw)`, a problem and an interface for each draw"
+            )
+        total = self.u.shape[0]
+        draws = np.random.default_rng([seed, 4]).choice(total, count, replace=count > total)
+        return [self.at(int(draw))[1] for draw in draws]
 
     def prior_transform(self, u: Any) -> Array:
         """Return the parameters at points u of the unit cube, in which the prior is uniform.
@@ -169,8 +207,8 @@ class Posterior:
         for name, before in zip(self.names, prior, strict=True):
             low, high = self.interval(name)
             lines.append(
-                f"  {name:{width}s}  mean {self.mean(name):.4g}, 90 % {low:.4g} to {high:.4g}"
-                f" (prior {before[0]:.4g} to {before[1]:.4g}), {self.information[name]:.2f} nats"
+                f"  {name:{width}s}  mean {self.mean(name):.4g}, 90 % {low:.4g} to {high:.4g} (of"
+                f" the prior {before[0]:.4g} to {before[1]:.4g}), {self.information[name]:.2f} nats"
             )
         lines += [f"  {note}" for note in self.notes]
         return "\n".join(lines)

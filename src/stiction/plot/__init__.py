@@ -10,13 +10,14 @@ pressure, friction coefficients are drawn too.
 from stiction.plot.distributions import monte_carlo, quantiles
 from stiction.plot.failure import failure_curve, weak_spots
 from stiction.plot.fields import field
-from stiction.plot.fits import fit, posterior
+from stiction.plot.fits import agreement, fit, posterior
 from stiction.plot.onsets import onset
 from stiction.plot.ruptures import film, rupture
 from stiction.plot.specimens import force_travel, specimen
 from stiction.plot.style import paper_style
 
 __all__ = [
+    "agreement",
     "failure_curve",
     "field",
     "film",

@@ -1,4 +1,4 @@
-"""Figures for checking fits: a random field fitted to profiles, a posterior from peaks."""
+"""Figures for checking fits: a field fitted to profiles, a posterior, peaks and predictions."""
 
 from dataclasses import replace
 from typing import Any
@@ -10,11 +10,12 @@ from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 from numpy.typing import NDArray
 from scipy import fft
 
+from stiction.inference.agreement import Agreement
 from stiction.inference.bootstrap import bands
 from stiction.inference.fit import FieldFit
 from stiction.inference.posterior import Posterior
 from stiction.inference.whittle import Observed, observe
-from stiction.plot.axes import unit_for, with_unit
+from stiction.plot.axes import on_axes, unit_for, with_unit
 from stiction.plot.style import (
     ACCENT,
     INK,
@@ -213,6 +214,73 @@ def posterior(found: Posterior) -> Figure:
     return figure
 
 
+def agreement(found: Agreement, *, ax: Axes | None = None) -> Axes:
+    """Draw measured peaks as steps on the predicted distribution.
+
+    Parameters
+    ----------
+    found : Agreement
+        From `stiction.statistics.agreement`.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw on; new ones by default.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The shaded band holds all steps of 90 % of campaigns of so many tests, if the
+        prediction is right. Specimens of several lengths have a color each.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=256)
+    >>> strength = st.paper.strength(problem, correlation_ratio=0.5)
+    >>> predicted = st.monte_carlo(
+    ...     problem, strength, method=st.LocalCriterion(), samples=200, seed=0
+    ... )
+    >>> found = st.statistics.agreement(predicted, [0.695, 0.702, 0.731, 0.688], unit="MPa")
+    >>> st.plot.agreement(found).get_xlabel()
+    'peak (MPa)'
+    """
+    peaks = found.peaks
+    factor, unit = unit_for("1" if peaks.coefficients else "Pa", np.concatenate(peaks.values))
+    ends: list[float] = []
+    with on_axes(ax) as axes:
+        for number, (length, values, (at, share)) in enumerate(
+            zip(peaks.lengths, peaks.values, found.predicted, strict=True)
+        ):
+            of = "" if length is None else f", {length:g} m"
+            paint = color(number + 1)
+            away = found.band / np.sqrt(values.size)
+            band = (np.clip(share + sign * away, 0.0, 1.0) for sign in (-1.0, 1.0))
+            name = f"90 % of {values.size} tests each{of}"
+            axes.fill_between(
+                at * factor, *band, color=paint, alpha=0.2, linewidth=0.0, label=name
+            )
+            axes.plot(at * factor, share, color=paint, label=f"predicted{of}")
+            seen = at[np.searchsorted(share, [0.001, 0.999]).clip(max=at.size - 1)]
+            low, high = min(seen[0], values.min()), max(seen[1], values.max())
+            margin = 0.05 * (high - low)
+            ends += [(low - margin) * factor, (high + margin) * factor]
+            steps = np.concatenate(([low - margin], np.sort(values), [high + margin])) * factor
+            reached = np.minimum(np.arange(values.size + 2) / values.size, 1.0)
+            style = {"color": INK if number == 0 else paint, "linewidth": 1.2}
+            axes.step(steps, reached, where="post", label=f"{values.size} tests{of}", **style)
+        axes.set_xlim(min(ends), max(ends))
+        axes.set_ylim(0.0, 1.02)
+        axes.set_xlabel(with_unit(_peak_name(peaks.coefficients), unit))
+        axes.set_ylabel("share of tests up to it")
+        after = ", parameters fitted to them" if found.fitted else ""
+        p = found.p_values["cramer_von_mises"]
+        axes.set_title(f"p = {p:.2g}{after}", fontsize=8, loc="left", color=QUIET)
+        axes.legend()
+    return axes
+
+
+def _peak_name(coefficients: bool) -> str:
+    return "coefficient of friction" if coefficients else "peak"
+
+
 def _unit_of(name: str, values: Array) -> tuple[float, str]:
     """Return the unit of a parameter by the last part of its key."""
     last = name.split(".")[-1]
@@ -262,8 +330,7 @@ def _draw_peaks(figure: Any, found: Posterior) -> None:
         style: dict[str, Any] = {"fmt": "o", "color": ACCENT, "markersize": 3.5}
         bars = error * factor or None
         axes.errorbar(ordered, steps, xerr=bars, elinewidth=0.6, label="measured", **style)
-        name = "coefficient of friction" if peaks.coefficients else "peak"
-        axes.set_xlabel(with_unit(name, unit))
+        axes.set_xlabel(with_unit(_peak_name(peaks.coefficients), unit))
         axes.set_ylabel("share of tests")
         text = f"{values.size} tests" + ("" if length is None else f", length {length:g} m")
         axes.set_title(text, fontsize=8, loc="left", color=QUIET)

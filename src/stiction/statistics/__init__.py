@@ -1,16 +1,17 @@
-"""Statistics of samples: densities, quantiles, combined means, and the misfit of two ruptures."""
+"""Statistics of samples: densities, quantiles, combined means, agreement with tests, misfits."""
 
 from importlib import import_module
 from typing import Any
 
 _HOMES = {
+    "agreement": "stiction.inference.agreement",
     "density": "stiction.statistics.densities",
     "quantiles": "stiction.statistics.estimates",
     "combined_mean": "stiction.statistics.estimates",
     "misfit": "stiction.dynamics.misfit",
 }
 
-__all__ = ["combined_mean", "density", "misfit", "quantiles"]
+__all__ = ["agreement", "combined_mean", "density", "misfit", "quantiles"]
 
 
 def __getattr__(name: str) -> Any:

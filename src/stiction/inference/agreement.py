@@ -1,0 +1,300 @@
+"""Whether measured peaks agree with a prediction: tests whose p-values hold for few peaks.
+
+A prediction that did not see the peaks is one more sample of theirs: under it every choice of as
+many values from all of them together is equally likely (a permutation test, exact for any number
+of either and where values are equal). A posterior that was fitted to the peaks lies near them, so
+each campaign that is drawn from it is fitted as well (a bootstrap of the posterior predictive
+check, whose own p-values crowd around one half; Robins, van der Vaart and Ventura, 2000).
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from stiction.arrays import Array
+from stiction.errors import InputError, warn_accuracy
+from stiction.inference.grid import grid_of
+from stiction.inference.peaks import Peaks, factor_of, make_peaks
+from stiction.inference.posterior import Posterior
+from stiction.load import NotNegative
+from stiction.model import Number, at_least, brief, checked
+
+POINTS, VALUES = 1000, 400
+"""Parameters that stand for a posterior, and values at which the density of a peak is kept."""
+MARGIN = 0.25
+"""What is added on either side to the range of the predicted peaks, as a share of it."""
+BAND = 0.9
+
+
+class Predicted(NamedTuple):
+    """Distribution function of the predicted peaks of one kind of specimen."""
+
+    values: Array  # rising, in the unit of the peaks
+    share: Array  # of peaks up to each
+
+
+@dataclass(frozen=True, eq=False)
+class Agreement:
+    """Distances between measured and predicted peaks, and how often chance exceeds them.
+
+    Attributes
+    ----------
+    peaks : Peaks
+        The measured peaks.
+    cramer_von_mises, largest_deviation : float
+        Sum over tests of the squared difference between the measured and the predicted share of
+        peaks, and the largest of these differences times the square root of the number of tests.
+    p_values : dict of str to float
+        By these two names: probability of a distance at least as large if the prediction is right.
+    fitted : bool
+        Whether parameters of the prediction were fitted to these peaks, which `p_values` include.
+    predicted : tuple of (values, share)
+        Predicted distribution function of each kind of specimen.
+    band : float
+        Largest deviation that 90 % of campaigns do not exceed.
+    """
+
+    peaks: Peaks
+    cramer_von_mises: float
+    largest_deviation: float
+    p_values: dict[str, float]
+    fitted: bool
+    predicted: tuple[Predicted, ...]
+    band: float
+
+    def __str__(self) -> str:
+        one, other = self.p_values.values()
+        of = "a prediction that was fitted to them" if self.fitted else "the prediction"
+        return (
+            f"{self.peaks} against {of}: p = {one:.3g} (Cramer-von Mises), {other:.3g} (largest"
+            " deviation)"
+        )
+
+    __repr__ = brief
+
+
+@checked
+def agreement(
+    prediction: xr.Dataset | Posterior,
+    peaks: Any = None,
+    *,
+    unit: str = "Pa",
+    load_cell_error: NotNegative = 0.0,
+    replicates: at_least(100) = 999,  # type: ignore[valid-type]
+    seed: Number = 0,
+) -> Agreement:
+    """Test whether measured peaks agree with a prediction.
+
+    Parameters
+    ----------
+    prediction : Dataset or Posterior
+        From `stiction.monte_carlo`, with parameters that were not fitted to these peaks; or from
+        `stiction.infer`, of whose parameters it takes the uncertainty into account.
+    peaks : array, mapping of arrays, or Peaks
+        As in `stiction.infer`. Left out, those that the posterior was fitted to, which is
+        accounted for; peaks of further tests are compared with what it predicts.
+    unit : str
+        Unit of the peaks and the load-cell error.
+    load_cell_error : float
+        Standard deviation of the error of a peak, for a dataset; a posterior has its own.
+    replicates : int
+        Number of simulated campaigns; p-values are at least 1/(replicates + 1).
+    seed : int
+        Not negative.
+
+    Returns
+    -------
+    Agreement
+        `stiction.plot.agreement` draws it.
+
+    Raises
+    ------
+    InputError
+        If the prediction lacks the quantity that was measured, is swept, or is of one kind of
+        specimen where several were tested.
+
+    Warns
+    -----
+    AccuracyWarning
+        If samples of the prediction have no peak; they are left out.
+
+    Notes
+    -----
+    A p-value of 0.3 says that three of ten campaigns of as many tests would lie as far from a right
+    prediction; it does not say that the prediction is right. A few tests find gross errors only.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=256)
+    >>> strength = st.paper.strength(problem, correlation_ratio=0.5)
+    >>> predicted = st.monte_carlo(
+    ...     problem, strength, method=st.LocalCriterion(), samples=500, seed=0
+    ... )
+    >>> found = st.statistics.agreement(predicted, [0.725, 0.732, 0.751, 0.718, 0.735], unit="MPa")
+    >>> found.p_values["cramer_von_mises"] > 0.05
+    True
+    """
+    rng = np.random.default_rng([seed, 3])
+    if isinstance(prediction, Posterior):
+        if load_cell_error:
+            raise InputError("load_cell_error: the posterior has its own; leave it out")
+        measured = prediction.peaks if peaks is None else make_peaks(peaks, unit)
+        return _with_posterior(prediction, measured, replicates, rng)
+    if peaks is None:
+        raise InputError("peaks: are needed beside a dataset")
+    measured = make_peaks(peaks, unit)
+    values = _values(prediction, measured)
+    factor = 1.0 if isinstance(peaks, Peaks) else factor_of(unit)
+    values = values + factor * load_cell_error * rng.standard_normal(values.size)
+    return _with_sample(values, measured, replicates, rng)
+
+
+def _values(prediction: xr.Dataset, measured: Peaks) -> Array:
+    """Return the predicted peaks of a dataset."""
+    name = measured.variable
+    if name not in prediction:
+        raise InputError(
+            f"prediction: has no {name}, which was measured; it holds"
+            f" {', '.join(map(str, prediction.data_vars))}"
+        )
+    if prediction[name].ndim != 1 or len(measured.values) > 1:
+        raise InputError(
+            f"prediction: must be of one kind of specimen, got {name} over"
+            f" {', '.join(map(str, prediction[name].dims))} for {len(measured.values)} kinds;"
+            " choose a step of a sweep with isel, and compare kinds one by one"
+        )
+    values = np.asarray(prediction[name].values, dtype=np.float64)
+    if missing := int(np.isnan(values).sum()):
+        warn_accuracy(f"{missing} of {values.size} predicted samples have no peak: left out")
+    if missing == values.size:
+        raise InputError("prediction: no sample has a peak")
+    return values[np.isfinite(values)]
+
+
+def _with_sample(values: Array, measured: Peaks, replicates: int, rng: Any) -> Agreement:
+    """Permutation test: which of all values are the measured ones?"""
+    (own,) = measured.values
+    at, place, counts = np.unique(
+        np.concatenate([own, values]), return_inverse=True, return_counts=True
+    )
+    share = counts / place.size
+    before = np.append(0.0, np.cumsum(np.bincount(place[own.size :], minlength=at.size)))
+    found = np.empty((replicates + 1, 2))
+    for row in range(replicates + 1):
+        chosen = rng.choice(place.size, own.size, replace=False) if row else np.arange(own.size)
+        reached = np.cumsum(np.bincount(place[chosen], minlength=at.size)) / own.size
+        # The others' share follows from that of all.
+        away = (reached - np.cumsum(share)) * place.size / values.size
+        found[row] = own.size * (share @ away**2), np.sqrt(own.size) * np.abs(away).max()
+    return _summary(measured, found, (Predicted(at, before[1:] / values.size),), fitted=False)
+
+
+def _with_posterior(
+    posterior: Posterior, measured: Peaks, replicates: int, rng: Any
+) -> Agreement:
+    """Compare with campaigns drawn from the posterior, each fitted as the measured one was."""
+    fitted, likelihood = posterior.peaks, posterior.likelihood
+    if measured.coefficients != fitted.coefficients or not set(measured.lengths) <= set(
+        fitted.lengths
+    ):
+        raise InputError(f"peaks: the posterior predicts {fitted}, got {measured}")
+    again = measured.lengths == fitted.lengths and all(
+        map(np.array_equal, measured.values, fitted.values)
+    )
+    # Parameters from a wider posterior stand, by weights, for the posterior of every campaign.
+    wide = grid_of(lambda u: 0.5 * likelihood(u), likelihood.box)
+    assert wide is not None  # where the posterior is
+    u = wide.draws(POINTS, int(rng.integers(2**32)))
+    own = 0.5 * likelihood(u)
+    u, own = (
+        u[np.isfinite(own)],
+        own[np.isfinite(own)],
+    )  # a cell may reach where it is impossible
+    weight = np.exp(own - own.max())
+    weight /= weight.sum()
+    laws = [
+        _law(posterior, fitted.lengths.index(length), u, peaks)
+        for length, peaks in zip(measured.lengths, measured.values, strict=True)
+    ]
+    found, mixed = np.empty((replicates + 1, 2)), weight
+    for row in reversed(range(replicates + 1)):  # the measured campaign last
+        campaign = measured.values
+        if row:
+            one = rng.choice(own.size, p=weight)
+            pairs = zip(campaign, laws, strict=True)
+            campaign = tuple(
+                np.interp(rng.random(peaks.size), law.share[one], law.at)
+                for peaks, law in pairs
+            )
+        if again:
+            logs = -own
+            for peaks, law in zip(campaign, laws, strict=True):
+                logs = logs + np.log(np.maximum(law.density_at(peaks), 1e-300)).sum(axis=1)
+            mixed = np.exp(logs - logs.max())
+            mixed /= mixed.sum()
+        distances = [
+            _distances(np.interp(np.sort(peaks), law.at, mixed @ law.share))
+            for peaks, law in zip(campaign, laws, strict=True)
+        ]
+        found[row] = np.sum(distances, axis=0)[0], np.max(distances, axis=0)[1]
+    predicted = tuple(Predicted(law.at, mixed @ law.share) for law in laws)
+    return _summary(measured, found, predicted, fitted=again)
+
+
+class _Law(NamedTuple):
+    """Density and distribution function of a peak, by parameters, (points, VALUES)."""
+
+    at: Array
+    density: Array
+    share: Array
+
+    def density_at(self, peaks: Array) -> Array:
+        """Return the density at some peaks, (points, peaks), linear between values."""
+        place = np.interp(peaks, self.at, np.arange(VALUES))
+        first = np.minimum(place.astype(np.int64), VALUES - 2)
+        rest = place - first
+        result: Array = (
+            self.density[:, first] * (1.0 - rest) + self.density[:, first + 1] * rest
+        )
+        return result
+
+
+def _law(posterior: Posterior, kind: int, u: Array, peaks: Array) -> _Law:
+    """Return the law of the peaks of one kind of specimen at parameters u."""
+    every = np.concatenate([posterior.predicted[kind], peaks])
+    margin = MARGIN * float(np.ptp(every))
+    at = np.linspace(every.min() - margin, every.max() + margin, VALUES)
+    known = [posterior.likelihood.densities[kind]]
+    density = np.exp(replace(posterior.likelihood, densities=known, peaks=[at]).parts(u))
+    between = 0.5 * (density[:, 1:] + density[:, :-1])
+    share = np.cumsum(np.pad(between, ((0, 0), (1, 0))), axis=1)
+    return _Law(at, density, share / np.maximum(share[:, -1:], 1e-300))
+
+
+def _distances(share: Array) -> tuple[float, float]:
+    """Return both distances of predicted shares at sorted peaks from a uniform distribution."""
+    size = share.size
+    steps = np.arange(size + 1) / size
+    squares = 1.0 / (12.0 * size) + np.sum((0.5 * (steps[1:] + steps[:-1]) - share) ** 2)
+    most = max((steps[1:] - share).max(), (share - steps[:-1]).max())
+    return float(squares), float(np.sqrt(size) * most)
+
+
+def _summary(measured: Peaks, found: Array, predicted: Any, *, fitted: bool) -> Agreement:
+    """Summarise distances (1 + replicates, 2), of which the first are the measured ones."""
+    own, others = found[0], found[1:]
+    as_far = np.sum(others >= own * (1.0 - 1e-9), axis=0)
+    p_values = (1 + as_far) / (1 + len(others))
+    names = ("cramer_von_mises", "largest_deviation")
+    return Agreement(
+        peaks=measured,
+        cramer_von_mises=float(own[0]),
+        largest_deviation=float(own[1]),
+        p_values=dict(zip(names, p_values.tolist(), strict=True)),
+        fitted=fitted,
+        predicted=predicted,
+        band=float(np.quantile(others[:, 1], BAND, method="higher")),
+    )

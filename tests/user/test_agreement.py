@@ -1,0 +1,106 @@
+"""Agreement of measured peaks with a prediction, and interfaces that are equally likely."""
+
+import itertools
+
+import numpy as np
+import pytest
+import xarray as xr
+from refusals import refuses
+from setups import LOCAL
+
+import stiction as st
+
+PEAKS = np.array([0.71, 0.69, 0.75, 0.68, 0.71]) * 1e6  # Pa, two of them equal
+
+
+def predicted(values):
+    return xr.Dataset({"critical_stress": ("sample", np.asarray(values, dtype=float))})
+
+
+def test_p_values_are_those_of_all_permutations():
+    """Of three peaks and six predicted ones, by hand: Cramer-von Mises over all 84 choices."""
+    own, others = np.array([3.0, 8.0, 9.0]), np.array([1.0, 2.0, 4.0, 5.0, 8.0, 7.0])
+    every = np.concatenate([own, others])
+
+    def distance(chosen):
+        rest = np.setdiff1d(np.arange(9), chosen)
+        steps = [
+            np.mean(every[list(some)][:, None] <= every, axis=0) for some in (chosen, rest)
+        ]
+        away = steps[0] - steps[1]
+        return np.mean(away**2) * 3, np.abs(away).max() * np.sqrt(3)
+
+    all_of_them = np.array([distance(np.array(c)) for c in itertools.combinations(range(9), 3)])
+    here = np.array(distance(np.arange(3)))
+    exact = np.mean(all_of_them >= here * (1 - 1e-9), axis=0)
+    found = st.statistics.agreement(predicted(others), own, replicates=8000)
+    assert (found.cramer_von_mises, found.largest_deviation) == pytest.approx(tuple(here))
+    error = np.sqrt(exact * (1.0 - exact) / 8000)
+    assert np.all(np.abs(np.array(list(found.p_values.values())) - exact) < 4.0 * error + 2e-4)
+
+
+def test_a_wrong_prediction_is_seen_in_the_unit_of_the_peaks():
+    rng = np.random.default_rng(2)
+    right = 0.71e6 + 0.03e6 * rng.standard_normal(300)
+    agrees = st.statistics.agreement(predicted(right), PEAKS / 1e6, unit="MPa")
+    differs = st.statistics.agreement(predicted(1.08 * right), PEAKS)
+    assert agrees.p_values["cramer_von_mises"] > 0.1
+    assert differs.p_values["cramer_von_mises"] < 0.02
+    assert not agrees.fitted
+    axes = st.plot.agreement(agrees)
+    (steps,) = [line for line in axes.lines if line.get_label() == "5 tests"]
+    np.testing.assert_allclose(steps.get_xdata()[1:-1], np.sort(PEAKS) / 1e6)
+    assert axes.get_xlabel() == "peak (MPa)"
+    for words, call in {
+        "peaks: are needed": lambda: st.statistics.agreement(predicted(right)),
+        "prediction: has no": lambda: st.statistics.agreement(xr.Dataset({"load": 1.0}), PEAKS),
+        "no sample has a peak": lambda: st.statistics.agreement(predicted([np.nan]), PEAKS),
+    }.items():
+        refuses(words, call)
+
+
+@pytest.fixture(scope="module")
+def posterior():
+    problem = st.paper.problem(nodes=256)
+    strength = st.paper.strength(problem, correlation_ratio=0.5)
+    prior = {"marginal.low": (0.5e6, 0.8e6)}
+    return st.infer(problem, strength, PEAKS, prior=prior, method=LOCAL, samples=300)
+
+
+def test_what_was_fitted_to_the_peaks_lies_nearer_than_chance(posterior):
+    """Each campaign is fitted, too: without that, p would be larger."""
+    fitted = st.statistics.agreement(posterior, replicates=300)
+    assert fitted.fitted
+    assert 0.0 < fitted.p_values["cramer_von_mises"] < 1.0
+    # The same peaks as those of further tests: nothing is fitted to them.
+    further = st.statistics.agreement(posterior, PEAKS + 1.0, replicates=300)
+    assert not further.fitted
+    assert further.p_values["cramer_von_mises"] > fitted.p_values["cramer_von_mises"]
+    assert further.cramer_von_mises == pytest.approx(fitted.cramer_von_mises, rel=0.05)
+
+
+def test_likely_interfaces_scatter_as_the_posterior_does(posterior):
+    lows = [one.strength.marginal.low for one in posterior.interfaces(400, seed=3)]
+    low, high = posterior.interval("marginal.low")
+    assert np.mean((np.array(lows) > low) & (np.array(lows) < high)) == pytest.approx(
+        0.9, abs=0.06
+    )
+    assert posterior.interfaces(400, seed=4)[1].strength.marginal.low != lows[1]
+
+
+def test_likely_interfaces_of_a_fit_scatter_as_its_intervals_do():
+    truth = st.RandomField(st.Lognormal(mean=1e6, cv=0.2), st.ExponentialSpectrum(1e-3))
+    interface = st.Interface(length=0.05, nodes=500)
+    levels = np.array([[0.7], [1.0], [1.35], [1.1]])  # of specimens
+    fit = st.fit_field(
+        truth.sample(interface, seed=2, samples=4) * levels, interface, marginal="lognormal",
+        spectrum="exponential", noise=0.0, bootstrap=40, between=True,
+    )  # fmt: skip
+    some = fit.interfaces(40, seed=1)
+    means = np.array([one.strength.mean for one in some])
+    low, high = fit.interval["marginal.cv"]
+    cvs = np.array([one.strength.marginal.cv for one in some])
+    assert 0.75 <= np.mean((cvs >= low) & (cvs <= high)) <= 1.0
+    assert means.std() > 0.0
+    factors = {round(one.between["strength"].cv, 6) for one in some}
+    assert len(factors) > 10
