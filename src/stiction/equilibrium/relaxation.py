@@ -39,8 +39,6 @@ SETTLED = 0.02
 """Growth of slip in one step, as a share of d_c, below which the whole weakening is tried."""
 LEAST_LEFT = 0.02
 """Least share of the weakening that a step leaves out, if it leaves out any."""
-EASED = 0.7
-"""Factor of that share after a step that succeeded; after one that failed it is doubled."""
 DRAG = 1e-3
 """Stiffness added to steps that leave out all weakening, as a share of the largest W."""
 ROUGH = 0.05
@@ -228,8 +226,6 @@ def least_equilibrium(
         growth = np.where(weakening, new - slip, 0.0)
         dropped = float((now.rate * growth).max())
         slip = new
-        if (growth > SETTLED * sample.critical).any():
-            left *= EASED
-        else:
+        if not (growth > SETTLED * sample.critical).any():
             left, kept = 0.0, left
     return Relaxed(Outcome.UNDECIDED, slip)

@@ -43,6 +43,8 @@ RETREATS = (0.0, 1e-5, 1e-4)
 """Shares of the load below its lower bound from which a path is followed to its turn."""
 FIRST_STEP = 1e-3
 """Step of the load where the path is followed in steps, as a share of the load."""
+ROUGHNESS = 0.01
+"""Largest residual stress after a step, as a share of the step."""
 MOVED = 0.02
 """Slip, as a share of d_c, below which a jump is a long step of the stable path and no event."""
 AT_CORNER = 1.0 - 1e-9
@@ -215,7 +217,8 @@ class PlaneProgram(Program):
         step = FIRST_STEP * load
         passed = [(load, slip)]
         while True:
-            there = stable_equilibrium(operator, sample, load + step, slip, 0.1 * gap)
+            accuracy = max(0.1 * gap, ROUGHNESS * step / abs(load))
+            there = stable_equilibrium(operator, sample, load + step, slip, accuracy)
             if there is None and step > gap * load:
                 step = max(0.3 * step, 0.7 * gap * load)
                 continue
