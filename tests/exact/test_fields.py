@@ -103,6 +103,14 @@ def test_table_of_the_map_matches_the_quantile(distribution):
     assert np.isnan(quantile_table(marginal)[:, 1]).mean() < 0.02  # where scipy is slow
 
 
+def test_quantile_of_normal_by_scipy_below_the_median():
+    """The reference itself, against the textbook composition where that has all its digits."""
+    distribution = scipy.stats.beta(1.5, 3.0, 0.66e6, 1e6)
+    z = np.linspace(-8.0, 3.0, 101)
+    composed = distribution.ppf(scipy.stats.norm.cdf(z))
+    np.testing.assert_allclose(quantile_of_normal(distribution, z), composed, rtol=1e-12)
+
+
 @pytest.mark.parametrize("nodes", [64, 100, 256, 1024])
 @pytest.mark.parametrize("mean_mode", [False, True])
 def test_gaussian_field_is_the_sum_of_its_modes_on_any_grid(make_strength, nodes, mean_mode):
@@ -152,6 +160,15 @@ def test_sample_i_is_the_same_in_every_batch(interface, length):
     assert 0.66e6 <= whole.min() < whole.max() <= 1.66e6
 
 
+def test_finer_grids_extend_the_field():
+    fine, coarse = (
+        beta_strength(0.025).sample(st.Interface(PLANE.length, nodes), samples=3, seed=5)
+        for nodes in ((64, 64), (32, 16))
+    )
+    # Exact but for the round-off of two transforms through the map.
+    np.testing.assert_allclose(coarse, fine[:, ::2, ::4], rtol=1e-9)
+
+
 def test_the_same_modes_have_the_same_draws_whatever_the_spectrum(make_strength):
     fields = make_strength(2.0), make_strength(0.25), make_strength(2.0, mean_mode=True)
     a, b, with_mean = (
@@ -162,6 +179,14 @@ def test_the_same_modes_have_the_same_draws_whatever_the_spectrum(make_strength)
     np.testing.assert_array_equal(with_mean[:, 1:], a)
 
 
+def test_with_the_mean_mode_only_the_field_is_constant(make_strength):
+    """The limit of a correlation length that is infinite against the interface."""
+    profiles = make_strength(1e6, mean_mode=True).sample(COARSE, samples=300, seed=1)
+    # Round-off of one transform.
+    np.testing.assert_allclose(profiles, profiles[:, :1] * np.ones(64), rtol=1e-13)
+    assert np.ptp(profiles[:, 0]) > 0.5e6
+
+
 def test_draws_are_defined_by_seed_block_and_mode():
     """The promise of reproducibility, spelled out with numpy alone."""
     field = field_of(scipy.stats.norm(), 0.05)
@@ -169,6 +194,22 @@ def test_draws_are_defined_by_seed_block_and_mode():
     key = np.random.SeedSequence(entropy=7, spawn_key=(0, 1))  # sample 300 lies in block 1
     block = np.random.Generator(np.random.PCG64DXSM(key)).standard_normal((12, 256))
     np.testing.assert_array_equal(found, block[2:, 300 - 256])
+
+
+def test_custom_spectrum_agrees_with_the_named_one():
+    named = st.SquaredExponentialSpectrum(correlation_length=0.02)
+    custom = st.CustomSpectrum(
+        function=lambda k: 7.0 * np.exp(-((0.01 * k) ** 2)), max_wavenumber=named.cutoff() * 3.0
+    )
+    lags = np.linspace(0.0, 0.06, 30)
+    # At three times the cutoff less than 1e-20 of the power is left out.
+    expected = named.untruncated_correlation(lags)
+    np.testing.assert_allclose(custom.correlation(lags), expected, atol=1e-9)
+    assert custom.efolding_length == pytest.approx(0.02, rel=1e-9)
+    interface = st.Interface(length=1.0, nodes=256)
+    fields = [st.RandomField(marginal=scipy.stats.norm(), spectrum=s) for s in (named, custom)]
+    one, other = (field.modes(interface).sigma for field in fields)
+    np.testing.assert_allclose(other[: one.size], one, atol=2e-4)
 
 
 def test_efolding_length_is_the_first_crossing():
@@ -198,6 +239,36 @@ def test_distributions_that_scipy_has_no_name_for():
     assert field_of(Narrow(name="norm", a=0.0, b=1.0)()).mean == pytest.approx(0.5)
 
 
+def test_a_function_that_returns_its_own_array_keeps_it():
+    table = {}
+
+    def density(k):
+        return table.setdefault(np.shape(k), np.ones(np.shape(k)))
+
+    spectrum = st.CustomSpectrum(function=density, max_wavenumber=500.0)
+    st.RandomField(marginal=scipy.stats.norm(), spectrum=spectrum).modes(COARSE)
+    assert all(np.all(values == 1.0) for values in table.values())
+
+
+@pytest.mark.parametrize(
+    ("distribution", "apart"),
+    [
+        (scipy.stats.rice(5.0), 0.03),
+        (scipy.stats.moyal(), 0.03),
+        (scipy.stats.genlogistic(1.0), 0.03),
+        (scipy.stats.invgauss(0.145), 0.03),
+        (scipy.stats.beta(0.05, 0.05), 1.0),  # forty terms cannot follow it
+    ],
+    ids=lambda d: getattr(d, "dist", scipy.stats.norm).name,
+)
+def test_correlation_of_families_whose_tails_scipy_inverts_poorly(distribution, apart):
+    """Mildly nonlinear maps: the correlations of strength and z stay close."""
+    field = field_of(distribution)
+    strength, z = field.correlation(LINE), field.correlation(LINE, of="z")
+    assert strength[0] == pytest.approx(1.0, rel=1e-12)
+    np.testing.assert_allclose(strength, z, atol=apart)
+
+
 def mapped(distribution, rho):
     return correlation_of_mapped(rho, hermite_coefficients(field_of(distribution).marginal))
 
@@ -208,6 +279,15 @@ def test_correlation_of_a_heavy_lognormal():
     expected = np.expm1(s2 * rho) / np.expm1(s2)
     # Less than a millionth of the variance is left to the last coefficient.
     np.testing.assert_allclose(mapped(scipy.stats.lognorm(1.5), rho), expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("width", [1e2, 1.0, 1e-2])
+def test_narrow_marginals_have_the_correlation_of_wide_ones(width):
+    rho = np.linspace(-1.0, 1.0, 21)
+    wide = mapped(scipy.stats.beta(2.0, 2.0), rho)
+    narrow = mapped(scipy.stats.beta(2.0, 2.0, loc=1e6, scale=width), rho)
+    # Values of 1e6 have 1e-10 of round-off, that is 1e-8 of the narrowest width.
+    np.testing.assert_allclose(narrow, wide, atol=1e-7)
 
 
 @pytest.mark.parametrize("distribution", [scipy.stats.t(2.01), scipy.stats.pareto(2.01)])
@@ -230,6 +310,18 @@ def test_efolding_length_is_that_of_the_modes_that_are_sampled(exponent):
         found = np.interp(-np.exp(-1.0), -correlation[:200], interface.x[:200])
         assert found == pytest.approx(length, rel=2e-3)
     assert field.efolding_length() < 0.05
+
+
+def test_truncated_correlation_is_the_sum_of_cosines():
+    """Against the midpoint rule on a million wavenumbers."""
+    spectrum = st.ExponentialSpectrum(correlation_length=0.3, power_kept=0.95)
+    k = (np.arange(1_000_000) + 0.5) * spectrum.cutoff() / 1e6
+    g = spectrum.density(k)
+    for lag in (0.0, 1e-3, 0.3, 5.0, 300.0):
+        expected = np.sum(g * np.cos(k * lag)) / g.sum()
+        # The midpoint rule: (lag dk)^2/24 with dk = 4e-5.
+        error = 1e-9 + (lag * k[0] * 2.0) ** 2 / 24.0
+        assert spectrum.correlation(np.array([lag]))[0] == pytest.approx(expected, abs=error)
 
 
 def test_correlation_of_a_custom_spectrum_with_a_step():

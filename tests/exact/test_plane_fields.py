@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from checks import assert_mean
 from scipy.integrate import quad
 from setups import beta_strength
 
@@ -100,6 +101,23 @@ def test_own_spectrum_is_the_density_on_the_plane():
     )
     one, other = (field_of(s, mean_mode=True).modes(PLANE).sigma for s in (named, own))
     np.testing.assert_allclose(one, other, rtol=1e-12)
+
+
+def test_sampled_correlation_is_the_exact_one():
+    """Mean, variance and correlation of the strength, anisotropy included, without a mean mode."""
+    plane = st.Interface(length=(1.0, 1.5), nodes=(32, 24))
+    field = beta_strength(0.25, anisotropy=2.0)
+    strength = field.sample(plane, samples=1500, seed=1)
+    scaled = (strength - field.mean) / field.standard_deviation
+    power = np.abs(np.fft.fft2(scaled)) ** 2
+    each = np.fft.ifft2(power).real / plane.size  # correlation of each sample, over all places
+    error = each.std(axis=0) / np.sqrt(1500)
+    correlation = field.correlation(plane)
+    # Of 768 lags, largely dependent, none is likely to be 4.5 standard errors off.
+    assert (np.abs(each.mean(axis=0) - correlation) < 4.5 * error).all()
+    assert_mean(scaled.mean(axis=(1, 2)), 0.0, errors=4.5)
+    # Twice as far along y; the modes of a small plane are few.
+    assert correlation[0, 4] == pytest.approx(correlation[4, 0], abs=0.01)
 
 
 def test_a_mode_keeps_its_draws_whatever_the_spectrum():

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from scipy.stats import binom, nbinom
-from setups import LOCAL, local_onset, turns
+from setups import LOCAL, ensemble, local_onset, turns
 
 import stiction as st
 from stiction.progress import SILENT
@@ -146,6 +146,24 @@ def test_errors_and_intervals_of_counts():
     assert nbinom.cdf(195, 5, low) == pytest.approx(0.025)
     assert nbinom.sf(194, 5, high) == pytest.approx(0.025)
     assert count.probability == 4 / 199
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("algorithm", ["auto", "plain"])
+def test_frequent_failures_of_an_interface_are_counted_without_bias(algorithm):
+    """Near P = 1e-2, where 'auto' takes now one algorithm and now another."""
+    problem = st.paper.problem(nodes=136)
+    field = st.paper.strength(problem, 0.5)
+    onsets = ensemble(problem, field, 1_000_000, seed=10**6)["critical_stress"]
+    stress = float(np.quantile(onsets, 0.01))
+    options = {"method": LOCAL, "algorithm": algorithm, "target_cv": 0.3}
+    found = np.array([
+        st.failure_probability(problem, field, stress, seed=i, **options).probability
+        for i in range(150)
+    ])  # fmt: skip
+    # Two standard errors: about 5 % for the mean of 150 runs, 2 % for the reference.
+    error = math.hypot(2.0 * found.std() / 0.01 / math.sqrt(150), 0.02)
+    assert abs(found.mean() / 0.01 - 1.0) < error
 
 
 def test_every_key_has_its_own_generator():

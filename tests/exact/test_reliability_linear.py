@@ -9,7 +9,7 @@ from checks import assert_mean, standard_error
 from scipy.stats import norm
 
 from stiction.reliability.subset import descend
-from stiction.reliability.tail import Tail, agreement
+from stiction.reliability.tail import Tail, agreement, repeat_until_precise
 from stiction.reliability.two_level import bridge
 from stiction.reliability.uncertainty import generator, log_width
 
@@ -110,6 +110,30 @@ def test_interval_of_a_stress_is_where_the_interval_of_its_probability_ends():
     # Below what any run has seen there is only the bound.
     assert tail.stress_interval(1e-8, 2.0, -9.0)[0] == -9.0
     assert tail.stress_interval(chance, math.inf, -9.0)[0] == -9.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("beta", [3.0, 4.0, 5.0])
+def test_runs_until_precise_are_unbiased(beta):
+    """Stopping when the estimate looks good must not favour estimates that look good."""
+
+    def one(seed):
+        def make(samples, number, left):
+            rng = generator(seed, 1, number)
+            return descend(linear, DIMENSION, rng=rng, samples=samples, threshold=-beta)
+
+        limits = {"first": 1000, "largest": 5000, "max_evaluations": 10**7}
+        runs = repeat_until_precise(
+            make, lambda runs: Tail(runs).cv(-beta), target_cv=0.2, **limits
+        )
+        return Tail(runs).probability(-beta), Tail(runs).cv(-beta)
+
+    found, reported = np.array([one(seed) for seed in range(50)]).T
+    found /= norm.cdf(-beta)
+    assert np.all(reported <= 0.2)
+    assert_mean(found, 1.0, errors=3.0)
+    observed = found.std(ddof=1) / found.mean()
+    assert root_mean(reported**2) == pytest.approx(observed, rel=0.3)
 
 
 @pytest.mark.parametrize("likeness", [1.0, 0.9])

@@ -11,6 +11,7 @@ import stiction as st
 import stiction.equilibrium.dense
 from stiction.equilibrium.dense import LineProgram
 from stiction.equilibrium.solver import follow
+from stiction.equilibrium.transforms import Plane, plane_onset
 
 
 def relaxed(problem, strength, load, rate=RATE):
@@ -60,6 +61,12 @@ def test_linear_programme_with_everything_varying(make_strength, mode):
     np.testing.assert_allclose(ours.critical_stress, mean, rtol=1e-14)
 
 
+def test_uniform_critical_slip(make_strength):
+    problem = make_problem(critical_slip=2e-6)
+    tau_p = make_strength(0.5).sample(problem.interface, samples=3, seed=9)
+    assert_first(problem, tau_p, tau_p / 2e-6)
+
+
 def test_interface_shorter_than_a_critical_patch(solid, make_strength):
     # h_n is twice the period: no window is unstable by itself, yet the whole interface is.
     rate = 2.0 * 0.57888694185 * solid.effective_modulus() / 0.2
@@ -87,6 +94,39 @@ def test_transforms_agree_with_the_dense_factor(make_strength, monkeypatch, roug
         np.testing.assert_allclose(found.slip, exact.slip, atol=1e-3 * sample.critical.max())
         # Nodes at rest have no part in the multiplier.
         assert np.mean((found.direction > 0.0) == (exact.direction > 0.0)) > 0.99
+
+
+def test_a_patch_that_does_not_slip_yet_is_no_division_by_zero(solid):
+    """One dip, so wide that hardly a node slips before the instability."""
+    strength, one = 1e6 + 3e5 * np.cos(turns(4096)), np.ones(4096)
+    line = Plane((0.4,), solid.effective_modulus(), 0.0)
+    found = plane_onset(line, strength, one, RATE * one, 1e-9)
+    assert found.closed
+    assert 0.7e6 < found.lower < 0.701e6
+
+
+def test_onset_of_a_long_line(make_strength):
+    """Certified, and with the quick test for arrest, as shorter lines are."""
+    problem = make_problem(4096, 0.4)
+    tau_p = make_strength(0.25).sample(problem.interface, samples=2, seed=12)
+    onset = exact_onset(problem, tau_p, sensitivity=True)
+    assert np.all(onset.certificate_gap < 1e-9 * onset.critical_load)
+    loads = (onset.sensitivity.values * tau_p).sum(axis=1)
+    np.testing.assert_allclose(onset.first_instability, loads, rtol=1e-11)
+
+
+def test_patches_alike_on_a_long_interface():
+    """Thirty-two periods of a profile let go at the load of one: all patches are singular at once.
+
+    By symmetry there is a multiplier with the period of the profile.
+    """
+    loads = []
+    for periods in (1, 32):
+        problem = make_problem(128 * periods, 0.0135 * periods)
+        tau_p = np.tile(1e6 + 0.3e6 * np.cos(turns(128)), periods)
+        program = LineProgram(problem)
+        loads.append(program.solve(program.sample_of(problem.sample(tau_p), 0)).load)
+    assert loads[1] == pytest.approx(loads[0], rel=1e-11)
 
 
 @pytest.mark.parametrize("high", [1.66e6, 4.0e6])
@@ -135,6 +175,17 @@ def test_arrested_samples_of_the_paper_rest_in_relaxation(problem, make_strength
     stresses = exact_onset(problem, tau_p, events=8).event_stress
     np.testing.assert_array_equal(np.isfinite(stresses).sum("event"), onset.arrested_events)
     np.testing.assert_allclose(stresses.values[arrested, 0], firsts[arrested], rtol=1e-14)
+
+
+def test_residual_strength_only_shifts_the_stress(problem, make_strength):
+    """Only tau_p - tau_r and tau_0 - tau_r matter, floor and all."""
+    strength = make_strength(0.5).sample(problem.interface, samples=20, seed=15)
+    wide = 0.05e6 + 2.0 * (strength - 0.66e6)
+    one = exact_onset(problem, wide)
+    two = exact_onset(make_problem(residual_strength=0.3e6), wide + 0.3e6)
+    assert one.arrested_events.values.sum() > 0
+    np.testing.assert_allclose(two.critical_load, one.critical_load + 0.3e6, rtol=1e-11)
+    np.testing.assert_array_equal(two.arrested_events, one.arrested_events)
 
 
 def assert_onset(problem, profile, load, rate=RATE):

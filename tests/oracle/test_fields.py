@@ -45,6 +45,16 @@ def test_the_same_field_elsewhere(name):
     np.testing.assert_allclose([third([r])[0, 0] for r in R], expected, atol=1e-12)
 
 
+def test_correlation_of_a_long_interface_with_its_mean_mode_is_that_of_gstools():
+    interface = st.Interface(length=20.0 * XI, nodes=1024)
+    spectrum = st.PowerLawSpectrum(correlation_length=XI, truncation=10.0)
+    field = st.RandomField(scipy.stats.norm(5.0, 1.0), spectrum, mean_mode=True)
+    expected = CASES["power law 4.0"][1].correlation(interface.x[:100])
+    # Truncation at 10 lambda leaves out 4e-8 of the power.
+    found = field.correlation(interface, of="z")[:100]
+    np.testing.assert_allclose(found, expected, atol=1e-7)
+
+
 LINE = st.Interface(length=1.0, nodes=64)
 
 
@@ -53,6 +63,21 @@ def sampled():
     """1e5 samples on a short, coarse interface: 64 nodes, L = 16 xi_0."""
     strength = beta_strength(1.0 / 16.0)
     return strength, strength.sample(LINE, samples=100_000, seed=11)
+
+
+def assert_marginal(values, field):
+    """With a fixed seed: a p-value this small would occur once in a thousand seeds."""
+    assert scipy.stats.kstest(values, field.marginal.distribution.cdf).pvalue > 1e-3
+
+
+def test_marginal_at_one_node(sampled):
+    strength, profiles = sampled
+    assert_marginal(profiles[:, 17], strength)
+    distribution = scipy.stats.lognorm(0.4, scale=1e6)
+    field = st.RandomField(distribution, st.ExponentialSpectrum(correlation_length=0.05))
+    profiles = field.sample(LINE, samples=20_000, seed=2)
+    assert_marginal(profiles[:, 0], field)
+    assert_marginal(profiles[:, 40], field)
 
 
 def test_variance_and_correlation(sampled):

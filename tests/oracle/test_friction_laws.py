@@ -1,4 +1,6 @@
-"""Friction laws that are not linear against brute force."""
+"""Friction laws that are not linear against brute force, and each method against the other."""
+
+import dataclasses
 
 import numpy as np
 import pytest
@@ -75,3 +77,25 @@ def test_first_instability_is_where_slip_jumps(law):
     path = st.equilibrium_path(problem, several[sample], loads)
     np.testing.assert_array_equal(path.arrested_events, [0, 0, 1])
     np.testing.assert_allclose(path.slip[2], above, atol=1e-5 * above.max())
+
+
+@pytest.mark.slow
+def test_exponential_rupture_is_the_limit_of_polygons(problem, make_strength):
+    law = st.ExponentialWeakening(weakening_rate=0.5e12)
+    tau_p = make_strength(1.0).sample(problem.interface, samples=2, seed=1)
+
+    def stress(friction, method=None):
+        with_law = dataclasses.replace(problem, friction=friction)
+        rupture = st.Rupture(loading_rate=2e7)
+        return st.onset(with_law, tau_p, method=method or rupture).critical_stress.values
+
+    exact = stress(law)
+    eight, polygon = (st.PiecewiseWeakening.from_law(law, pieces) for pieces in (8, 32))
+    coarse, fine = (np.abs(stress(friction) / exact - 1.0) for friction in (eight, polygon))
+    # Second order in the number of pieces: 16 times closer.
+    assert (fine < coarse / 8.0).all()
+    assert (fine < 3e-4).all()
+    # Equilibrium along as many pieces: loading this fast raises the onset by some 1e-4.
+    slow = stress(polygon, st.Equilibrium())
+    np.testing.assert_allclose(slow, exact, rtol=1e-3)
+    assert (slow > stress(st.LinearWeakening(weakening_rate=0.5e12)) * (1.0 + 5e-5)).any()

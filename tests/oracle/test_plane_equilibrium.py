@@ -8,8 +8,10 @@ from scipy.linalg import eigh
 from setups import (
     LENGTH,
     RATE,
+    beta_strength,
     exact_onset,
     make_problem,
+    repeated,
     smooth_noise,
 )
 
@@ -87,11 +89,51 @@ def test_lowest_eigenvector_equals_a_dense_one(size):
     assert np.abs(vector[inside] - np.abs(vectors[:, 0])).max() < 1e-7
 
 
+def relaxed(problem, strength, load, slip):
+    """Slip at a load by relaxation to 1e-8 of the strength, or None where the plane slides."""
+    residual = problem.friction.residual_strength
+
+    def law(slip):
+        return np.maximum(strength - RATE * slip, residual)
+
+    given = np.full(strength.shape, load), law, (strength - residual) / RATE
+    return by_relaxation(symbol_of(problem), *given, slip, rest=1e-8 * strength.mean())
+
+
 @pytest.fixture(scope="module")
 def wide():
     """Strength over a wide range, so that ruptures are arrested: a problem and three samples."""
     problem = make_problem((32, 32), WIDE, residual_strength=3.5e5)
     return problem, np.array([0.4e6 + 4.6e6 * noise(5.0, s, (32, 32)) for s in (20, 23, 0)])
+
+
+def test_arrest_equals_relaxation_node_by_node(wide):
+    problem, strength = wide
+    found = exact_onset(problem, strength)
+    assert list(found["arrested_events"].values) == [1, 1, 0]
+    assert not found["certified"].values.any()
+    for number in range(2):
+        first = found["first_instability"].values[number]
+        last = found["critical_load"].values[number]
+        assert first < last
+        # Before and after each instability, at some distance: near one, relaxation takes for ever.
+        loads = np.array([first * 0.998, first * 1.002, last * 0.998, last * 1.002])
+        path = st.equilibrium_path(problem, strength[number], loads)
+        assert path["event_load"].item() == pytest.approx(first, rel=1e-5)
+        assert list(path["arrested_events"].values) == [0, 1, 1, 1]
+        assert list(path["sliding"].values) == [False, False, False, True]
+        slip = np.zeros(problem.interface.shape)
+        for load, ours in zip(loads[:3], path["slip"].values, strict=False):
+            slip = relaxed(problem, strength[number], load, slip)
+            # Relaxation stops at 1e-8 of the strength, over the lowest eigenvalue.
+            assert np.abs(ours - slip).max() < 1e-4 * 9e-6
+        assert relaxed(problem, strength[number], loads[3], slip) is None
+        near = first * (1 + np.r_[-1e-7, 3e-6])
+        around = st.equilibrium_path(problem, strength[number], near)
+        moved = np.diff(around["slip"].values, axis=0)
+        moment = problem.solid.shear_modulus * moved.sum() * problem.interface.cell
+        # Slip goes with the root of the distance to the instability, and this jump is a short one.
+        assert path["event_moment"].item() == pytest.approx(moment, rel=0.1)
 
 
 def test_what_moves_next_to_nothing_is_no_instability(wide):
@@ -123,6 +165,26 @@ LAWS = {
     "steepens": {"slip": [0.5, 1.0], "strength": [0.7, 0.0], "weakening_rate": 0.5 * RATE},
     "three": {"slip": [0.2, 0.6, 1.0], "strength": [0.7, 0.2, 0.0], "weakening_rate": RATE},
 }
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("residual", [0.0, 0.25e6])
+def test_laws_of_several_pieces_on_a_strip_are_those_of_the_line(name, residual):
+    """Strength uniform along y; the line follows each corner exactly, with a dense factor."""
+    law = st.PiecewiseWeakening(**LAWS[name], residual_strength=residual)
+    line = make_problem(64, 0.02, friction=law)
+    strip = make_problem((64, 8), (0.02, 0.0025), friction=law)
+    tau_p = beta_strength(3e-3, 0.3e6, 2.66e6).sample(line.interface, samples=4, seed=2)
+    exact = exact_onset(line, tau_p)
+    assert exact["residual_reached"].any()
+    found = exact_onset(strip, repeated(tau_p, 8), gap=1e-8)
+    # Nothing is found more closely than the gap; measured 7e-9 at most.
+    np.testing.assert_allclose(found["critical_load"], exact["critical_load"], rtol=2e-8)
+    # On planes a jump of 2 % of d_c at most is a step of the stable path.
+    assert (found["arrested_events"] <= exact["arrested_events"]).all()
+    same = found["arrested_events"].values == exact["arrested_events"].values
+    ours, theirs = (onset["first_instability"].values[same] for onset in (found, exact))
+    np.testing.assert_allclose(ours, theirs, rtol=2e-8)
 
 
 @pytest.mark.parametrize("name", LAWS)

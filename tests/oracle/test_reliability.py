@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from importance import by_importance, longer
+from checks import assert_mean, standard_error
+from importance import by_importance, longer, mixture
 from setups import EXACT, LOCAL, ensemble
 
 import stiction as st
@@ -26,6 +27,17 @@ def assert_agree(one, other):
     """Within four joint standard errors of their logarithms."""
     error = math.hypot(one.cv, other.cv)
     assert abs(math.log(one.probability / other.probability)) < 4.0 * error
+
+
+def test_weights_make_the_mixture_of_importance_sampling_normal_again():
+    """E[w h] over the mixture is E[h] over the normal density, for h that the mixture covers."""
+    shifts = np.zeros((3, 40))
+    shifts[:, :6] = (1.0, 0.5, 0.5, -0.5, 0.2, 0.1), (0.5, 1.0, 0.5, 0.5, 0, 0), (0.1,) * 6
+    draws, logs = mixture(shifts, 200_000, np.random.default_rng(2))
+    weights = np.exp(logs)
+    for found in (weights, weights * draws[:, 0] ** 2):
+        assert_mean(found, 1.0, errors=4.0)
+        assert standard_error(found) < 0.02
 
 
 # P is about 1e-2, of four times the length 5e-2, and 1e-3 and 1e-4.
@@ -79,6 +91,36 @@ def test_design_stress_has_the_probability_asked_for(method):
     assert abs(math.log(back.probability / 1e-5)) < 4.0 * error
     low, high = answer.interval
     assert 0.66e6 < low < answer.stress < high
+
+
+@pytest.mark.slow
+def test_against_openturns_subset_sampling():
+    """Its block size must not exceed p_0 N: larger blocks report too small an error."""
+    ot = pytest.importorskip("openturns")
+    system = PROBLEM, st.paper.strength(PROBLEM, 1.0)
+    state, stress = st.external.limit_state(*system, LOCAL), 0.6615e6
+
+    def sample(points):
+        return state(np.asarray(points))[:, None]
+
+    ot.RandomGenerator.SetSeed(1)
+    function = ot.PythonFunction(state.dimension, 1, func_sample=sample)
+    vector = ot.CompositeRandomVector(function, ot.RandomVector(ot.Normal(state.dimension)))
+    event = ot.ThresholdEvent(vector, ot.Less(), stress)
+    found = []
+    for _ in range(6):
+        algorithm = ot.SubsetSampling(event)
+        algorithm.setMaximumOuterSampling(20)
+        algorithm.setBlockSize(100)
+        algorithm.setConditionalProbability(0.1)
+        algorithm.run()
+        found.append(algorithm.getResult().getProbabilityEstimate())
+    ours = by(system, stress, "subset", 0.1)
+    assert ours.probability < 1e-3
+    # Four joint standard errors; theirs from the spread of its own six runs.
+    spread = np.std(found, ddof=1) / math.sqrt(len(found))
+    error = math.hypot(spread, ours.probability * ours.cv)
+    assert abs(np.mean(found) - ours.probability) < 4.0 * error
 
 
 @pytest.mark.slow

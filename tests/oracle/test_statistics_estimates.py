@@ -1,5 +1,8 @@
 """Estimates, quantiles and densities against simulation and known distributions."""
 
+import runpy
+from pathlib import Path
+
 import numpy as np
 import pytest
 import scipy.stats
@@ -9,6 +12,7 @@ from stiction.statistics.densities import density
 from stiction.statistics.estimates import WithError, mean, quantiles, standard_deviation
 
 RNG = np.random.default_rng(20)
+EXAMPLE = Path(__file__).parents[2] / "examples" / "rupture_ensemble_on_a_plane.py"
 
 
 @pytest.mark.parametrize("estimator", [mean, standard_deviation])
@@ -147,3 +151,16 @@ def test_intervals_of_few_results_cover(expensive):
         low, high = st.statistics.combined_mean(results, others).interval()
         inside += low < 1.0 < high
     assert 0.935 < inside / 1500 < 0.98  # a standard error of 0.6 %
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+def test_eight_ruptures_on_a_plane_are_worth_a_hundred(capsys):
+    found = runpy.run_path(str(EXAMPLE))
+    mean, ruptures, onsets = (found[name] for name in ("mean", "ruptures", "onsets"))
+    assert mean.saving > 10.0
+    # The same samples: what inertia adds at this rate is small and positive.
+    added = ruptures.first_instability.values / onsets.first_instability.values[:8] - 1.0
+    assert np.all((added > -1e-5) & (added < 5e-3))
+    assert abs(mean.estimate.value / float(onsets.first_instability.mean()) - 1.0) < 0.02
+    assert "MPa" in capsys.readouterr().out

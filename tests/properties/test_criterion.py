@@ -108,6 +108,24 @@ def test_weights_certify_the_bound():
         assert forces.max() < 1e-6 * RATE * y.max()  # residual of the eigenvector
 
 
+def test_translations_and_reflections_of_a_plane_change_nothing():
+    strength = field_of().sample(PLANE.interface, samples=3, seed=1)
+    first = local_onset(PLANE, strength).critical_load
+    shifted = np.roll(strength, (7, -3), (1, 2))
+    for changed in (shifted, strength[:, ::-1].copy(), strength[:, :, ::-1].copy()):
+        found = local_onset(PLANE, changed).critical_load
+        np.testing.assert_allclose(first, found, rtol=1e-12)
+
+
+def test_between_least_and_greatest_strength_of_a_plane():
+    weak = np.random.default_rng(0).random((2, 48, 48)) < 0.5
+    tau_n = st.theory.nucleation_stress(PLANE, np.where(weak, 0.7e6, 1.6e6))
+    assert tau_n.min() >= 0.7e6 * (1.0 - ROUND_OFF)
+    assert tau_n.max() <= 1.6e6 * (1.0 + ROUND_OFF)
+    uniform = local_onset(PLANE, np.full((48, 48), 1e6))
+    assert uniform.critical_load.item() == pytest.approx(1e6, rel=1e-13)
+
+
 @pytest.mark.parametrize("mean_mode", [False, True])
 def test_variance_of_the_nucleation_stress_of_a_plane_is_that_of_theory(mean_mode):
     field = field_of(1.0, mean_mode=mean_mode, anisotropy=1.4)

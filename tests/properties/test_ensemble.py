@@ -1,6 +1,7 @@
 """Sample i depends on (seed, i) and on nothing else: not on workers, executors or batches."""
 
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from itertools import pairwise
 from multiprocessing import get_context
 
 import numpy as np
@@ -9,7 +10,7 @@ from checks import assert_same
 from hypothesis import given, settings
 from hypothesis import strategies as some
 from ruptures import BREAKING_PLANE, BREAKING_STRENGTH
-from setups import EXACT, LENGTH, LOCAL, beta_strength, make_problem
+from setups import EXACT, LENGTH, LOCAL, beta_strength, local_onset, make_problem
 
 import stiction as st
 from stiction.ensemble.experiment import Experiment
@@ -94,6 +95,27 @@ def test_any_batch_is_a_part_of_the_whole(first, samples):
     assert_same(experiment.results(first, samples), part)
 
 
+@given(
+    samples=some.integers(1, 5000), size=some.integers(1, 1025), first=some.integers(0, 10**9)
+)
+def test_batches_cover_all_samples_once(samples, size, first):
+    experiment = Experiment(make_problem(), beta_strength(2e-3), LOCAL)
+    pieces = list(experiment.batches(first, samples, size))
+    assert sum(count for _, count in pieces) == samples
+    assert pieces[0][0] == first
+    for (start, count), (following, _) in pairwise(pieces):
+        assert start + count == following
+    assert all(0 < count <= size for _, count in pieces)
+
+
+def test_a_batch_of_rough_planes_stays_small():
+    problem = make_problem((48, 48), length=(0.02, 0.02))
+    rough = st.RandomField(st.Lognormal(mean=1e6, cv=0.2), st.ExponentialSpectrum(1e-3))
+    experiment = Experiment(problem, rough, LOCAL)
+    assert experiment.dimension > 100 * problem.interface.size
+    assert experiment.batch * experiment.dimension <= 2**20
+
+
 def field(low, high):
     marginal = st.Beta(alpha=2.0, beta=2.0, low=low, high=high)
     return st.RandomField(marginal, st.SquaredExponentialSpectrum(correlation_length=LENGTH))
@@ -120,6 +142,36 @@ def test_an_ensemble_of_planes_may_be_continued_and_computed_again(method, rando
     again = st.onset(PLANE, kept, method=method)
     assert again["critical_load"].values[0] == result["critical_load"].values[1]
     assert result["critical_position"].dims == ("sample", "direction")
+
+
+def test_an_ensemble_may_be_continued_and_seeds_differ(arguments, reference):
+    rest = st.monte_carlo(**arguments, samples=SAMPLES - 700, seed=5, first=700)
+    np.testing.assert_array_equal(rest["sample"], np.arange(700, SAMPLES))
+    np.testing.assert_array_equal(rest["critical_load"], reference["critical_load"][700:])
+    other = st.monte_carlo(**arguments, samples=SAMPLES, seed=6)
+    assert not np.any(other["critical_load"].values == reference["critical_load"].values)
+
+
+def test_what_else_is_random_is_independent_of_the_strength(arguments):
+    marginal = st.Beta(alpha=2.0, beta=2.0, low=-1e5, high=1e5)
+    initial = st.RandomField(marginal, st.PowerLawSpectrum(2e-3))
+    random = st.RandomInterface(strength=arguments["random"], initial_stress=initial)
+    keep = ("strength", "initial_stress")
+    result = st.monte_carlo(**arguments | {"random": random}, samples=300, seed=5, keep=keep)
+    kept = {name: result[name].values for name in keep}
+    # 300 samples of about 20 independent lengths each: correlations scatter by 1/sqrt(6000).
+    assert abs(np.corrcoef(*(values.ravel() for values in kept.values()))[0, 1]) < 0.05
+    direct = local_onset(arguments["problem"], kept)
+    np.testing.assert_array_equal(result["critical_load"], direct["critical_load"])
+
+
+def test_what_is_kept_does_not_depend_on_the_samples_around_it(arguments):
+    result = st.monte_carlo(**arguments, samples=40, first=10, keep=("strength",))
+    assert result["strength"].dims == ("sample", "x")
+    direct = arguments["random"].sample(arguments["problem"].interface, first=49)[0]
+    np.testing.assert_array_equal(result["strength"].sel(sample=49), direct)
+    one = st.monte_carlo(**arguments, samples=1, first=12, keep=("strength",))
+    np.testing.assert_array_equal(result["strength"].sel(sample=[12]), one["strength"])
 
 
 def test_progress_counts_every_sample_once(arguments):

@@ -6,7 +6,8 @@ from planes import WAVENUMBERS, Lattice, plane_sample
 from setups import LENGTH, RATE, exact_onset, make_problem, smooth_noise
 
 import stiction as st
-from stiction.criterion.average import _between_nodes
+from stiction.criterion.average import _between_nodes, least_average
+from stiction.criterion.windows import ellipse_window
 from stiction.elasticity.operator import make_operator
 from stiction.equilibrium import transforms
 from stiction.equilibrium.relaxation import least_equilibrium
@@ -46,6 +47,35 @@ def bounds_of(strength, wavenumbers="lattice", gap=1e-9):
     found = plane_onset(PLANES[wavenumbers], strength, ONE, RATE * ONE, gap)
     assert found.closed
     return found
+
+
+@pytest.mark.parametrize(
+    ("change", "move"),
+    [
+        (lambda s: np.roll(s, (7, -3), (0, 1)), lambda x, y: (x + 7, y - 3)),
+        (lambda s: np.roll(s[::-1], 1, 0), lambda x, y: (-x, y)),
+        (lambda s: np.roll(s[:, ::-1], 1, 1), lambda x, y: (x, -y)),
+    ],
+)
+def test_translations_and_reflections(change, move):
+    strength = strength_of(0)
+    first, second = solve(strength), solve(change(strength))
+    for name in ("first_instability", "critical_load"):
+        # The gap asked for.
+        assert second[name].item() == pytest.approx(first[name].item(), rel=2e-9)
+    for name in (
+        "slip_patches", "critical_patch_extent", "critical_patch_area", "arrested_events",
+    ):  # fmt: skip
+        assert np.array_equal(second[name].values, first[name].values)
+    spacings, lengths = np.array(PLANE.interface.spacings), np.array(LENGTHS)
+    place = np.array(move(*(first["critical_position"].values[0] / spacings))) * spacings
+    off = second["critical_position"].values[0] - place
+    off = (off + 0.5 * lengths) % lengths - 0.5 * lengths
+    # y goes with the root of the gap.
+    assert np.abs(off).max() < 1e-2 * spacings.min()
+    for name in ("slip", "sensitivity"):
+        one, other = first[name].values[0], second[name].values[0]
+        assert np.abs(change(one) - other).max() < 1e-3 * one.max()
 
 
 LAWS = {
@@ -166,6 +196,22 @@ def test_the_place_of_the_least_average_lies_between_nodes():
         )
         average = 2.0 + 0.3 * along[:, None] ** 2 + 0.7 * across**2
         np.testing.assert_allclose(_between_nodes(average), (x, y), rtol=1e-12)
+
+
+def test_local_criterion_is_an_upper_bound_for_every_aspect():
+    plane = PLANES["lattice"]
+    symbol = plane.symbol(SHAPE)
+    aspects = (1.0, 1.25, 1.5)
+    windows = [ellipse_window(symbol, SHAPE, plane.lengths, RATE, a) for a in aspects]
+    interface = st.Interface(plane.lengths, SHAPE)
+    for seed in range(4):
+        strength = rough_strength(seed)
+        exact = bounds_of(strength, gap=1e-6)
+        local = least_average(interface, windows, strength[None], ONE)[0][0]
+        assert exact.lower <= local < 1.2 * exact.upper
+        uneven = 1.0 + 0.2 * rough_strength(seed + 10) / 1e6
+        found = plane_onset(plane, strength, uneven, RATE * ONE, 1e-6)
+        assert least_average(interface, windows, strength[None], uneven)[0][0] >= found.lower
 
 
 def test_path_is_the_slip_at_onset_just_below_it():
