@@ -206,14 +206,17 @@ def _with_posterior(
     )
     # Parameters from a wider posterior stand, by weights, for the posterior of every campaign.
     wide = grid_of(lambda u: 0.5 * likelihood(u), likelihood.box)
-    assert wide is not None  # where the posterior is
-    u = wide.draws(POINTS, int(rng.integers(2**32)))
-    own = 0.5 * likelihood(u)
-    u, own = (
-        u[np.isfinite(own)],
-        own[np.isfinite(own)],
-    )  # a cell may reach where it is impossible
-    weight = np.exp(own - own.max())
+    if wide is None:  # narrower than its cells: the posterior stands for itself
+        u, power = posterior.u[:POINTS], 1.0
+    else:
+        u, power = wide.draws(POINTS, int(rng.integers(2**32))), 0.5
+    value = likelihood(u)
+    u, value = (
+        u[np.isfinite(value)],
+        value[np.isfinite(value)],
+    )  # a cell may be partly impossible
+    own = power * value
+    weight = np.exp((1.0 - power) * (value - value.max()))
     weight /= weight.sum()
     laws = [
         _law(posterior, fitted.lengths.index(length), u, peaks)
