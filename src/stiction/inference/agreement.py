@@ -124,6 +124,8 @@ def agreement(
     -----
     A p-value of 0.3 says that three of ten campaigns of as many tests would lie as far from a right
     prediction; it does not say that the prediction is right. A few tests find gross errors only.
+    With parameters fitted to many peaks p-values come out somewhat too large: over 140 campaigns of
+    50 tests 4 % were at most 0.1, over 280 of 12 tests 9 to 10 %.
 
     Examples
     --------
