@@ -32,16 +32,16 @@ NEAREST = {
     "ensemble": "store ensemble study progress own_method reliability",
     "equilibrium": "crooked equilibrium plane_equilibrium planes plane_gaps friction_laws",
     "friction": "friction_laws friction_coefficients crooked dynamics_properties",
-    "inference": "inference* fit_* profiles",
+    "inference": "inference* fit_* profiles agreement",
     "jit": "cache architecture own_method",
     "plot": "plot planes inference examples",
     "problem": "bad_input crooked criterion equilibrium profiles friction_coefficients",
     "profiles": "profiles plane_gaps crooked fit_field",
     "random": "fields conditional* random_interface marginal_families plane_fields",
-    "reliability": "reliability*",
+    "reliability": "reliability* failure_run",
     "report": "cli study planes",
     "statistics": "statistics_* criterion inference",
-    "study": "study store cli planes own_method",
+    "study": "study store cli planes own_method failure_run",
 }
 """Names of test files; the rest of the package is tested by what uses it."""
 REST = "bad_input criterion crooked study dynamics_input own_method"

@@ -11,7 +11,7 @@ from setups import LOCAL, ensemble, local_onset, turns
 import stiction as st
 from stiction.progress import SILENT
 from stiction.reliability.counting import Count, count_failures
-from stiction.reliability.tail import Tail
+from stiction.reliability.tail import Tail, repeat_until_precise
 from stiction.reliability.uncertainty import (
     ancestral_variance,
     binomial_interval,
@@ -168,7 +168,12 @@ def test_frequent_failures_of_an_interface_are_counted_without_bias(algorithm):
 
 def test_every_key_has_its_own_generator():
     keys = [(0, 1), (0, 1, 0), (0, 1, 1), (0, 2, 1), (1, 1, 0)]
-    assert len({generator(*key).random() for key in keys}) == len(keys)
+    found = {generator(*key).random() for key in keys}
+    assert len(found) == len(keys)
+    # Nor is any that of a random field: property 0 or 1, block 1.
+    for key in ((0, 1), (1, 1)):
+        sequence = np.random.SeedSequence(entropy=0, spawn_key=key)
+        assert np.random.Generator(np.random.PCG64DXSM(sequence)).random() not in found
 
 
 @dataclass(frozen=True)
@@ -178,6 +183,11 @@ class KnownRun:
     samples: int
     chance: float
     variance: float
+    evaluations: int = 0
+    complete: bool = True
+
+    def light(self):
+        return self
 
     def probability(self, value):
         return self.chance
@@ -194,3 +204,26 @@ def test_runs_are_pooled_by_their_size():
     # Standard errors of the parts: 0.2 * 1e-3 * 0.2 and 0.6 * 2e-3 * 0.1; nothing seen adds none.
     error = math.hypot(0.4e-4, 1.2e-4)
     assert tail.cv(1.0) == pytest.approx(error / 1.4e-3)
+
+
+@pytest.mark.parametrize(
+    ("target_cv", "budget", "sizes"),
+    [
+        (0.1, 10**6, [100, 3200]),  # 1.1 times the 30/0.1^2 wanted, less those that are there
+        (0.04, 10**6, [100, *5 * [4000]]),
+        (0.1, 5000, [100, 1566]),  # for 4700 evaluations, three a sample
+        (0.1, 400, [100]),
+    ],
+)
+def test_repetitions_are_as_large_as_the_target_asks_for_and_the_budget_allows(
+    target_cv, budget, sizes
+):
+    def make(samples, number, left):
+        assert left == budget - 3 * sum(sizes[:number])
+        return KnownRun(samples, 1e-3, 30.0 / samples, 3 * samples)
+
+    limits = {"first": 100, "largest": 4000, "max_evaluations": budget}
+    runs = repeat_until_precise(
+        make, lambda runs: Tail(runs).cv(0.0), target_cv=target_cv, **limits
+    )
+    assert [one.samples for one in runs] == pytest.approx(sizes, abs=1)

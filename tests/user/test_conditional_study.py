@@ -154,3 +154,17 @@ def test_a_factor_may_carry_measured_values_beyond_the_marginal():
     found = st.monte_carlo(OWN.problem, random, method=OWN.method, samples=50, seed=0)
     exact = st.onset(OWN.problem, high, method=OWN.method).critical_stress.item()
     assert found.critical_stress.mean() == pytest.approx(exact, rel=0.03)  # the scan's error
+
+
+@pytest.mark.filterwarnings(
+    "ignore::stiction.AccuracyWarning"
+)  # of values that are so unlikely
+def test_what_was_measured_may_be_rarer_than_what_is_called_impossible():
+    """A place at 0.3 MPa, as of one node in 1e23: without the scan nothing slides at 0.33 MPa."""
+    field = st.RandomField(st.Lognormal(mean=1e6, cv=0.12), FIELD.spectrum)
+    weak = KNOWN.copy(data=np.full(KNOWN.size, 0.3e6))
+    options = {"stress": 0.33e6, "method": OWN.method, "target_cv": 0.5, "progress": False}
+    without = st.failure_probability(OWN.problem, field, **options)
+    assert (without.probability, without.algorithm) == (0.0, "exact")
+    found = st.failure_probability(OWN.problem, field.given(weak, noise=1e3), **options)
+    assert found.probability == 1.0
