@@ -11,6 +11,7 @@ from stiction.elasticity.line import apply_stiffness, make_stiffness, stiffness_
 from stiction.equilibrium.cholesky import (
     append,
     back_substitute,
+    factor_inside,
     make_workspace,
     raise_diagonal,
     row_start,
@@ -91,6 +92,27 @@ def test_factor_of_a_matrix_with_a_raised_diagonal_entry(position):
     matrix[position, position] += 0.3 * COLUMN[0]
     # Rotations are as stable as the factorisation itself.
     assert_factor(factor, 41, matrix, 1e-12)
+
+
+def test_factor_of_a_crack_that_grows_keeps_rows_that_stand():
+    """Nodes that weaken no more come first; another rate, or another node, is a row made anew."""
+    rng = np.random.default_rng(5)
+    workspace = make_workspace(make_stiffness(COLUMN), COLUMN.size)
+    workspace.inside[:] = False
+    workspace.diagonal[:] = 0.8 * COLUMN[0]
+    nodes = rng.permutation(256)[:60]
+    for slipping, residual, changed in ((30, 0, 0.8), (41, 17, 0.7), (50, 23, 0.9), (45, 23, 0.9)):
+        workspace.diagonal[nodes[residual:]] = changed * COLUMN[0]
+        workspace.diagonal[nodes[:residual]] = COLUMN[0]
+        workspace.inside[:] = False
+        workspace.inside[nodes[:slipping]] = True
+        assert factor_inside(workspace) == slipping
+        members = workspace.members[:slipping]
+        assert set(members) == set(nodes[:slipping])
+        assert set(members[:residual]) == set(nodes[:residual])
+        matrix = COLUMN[np.abs(members[:, None] - members)]
+        np.fill_diagonal(matrix, workspace.diagonal[members])
+        assert_factor(workspace.factor, slipping, matrix, 1e-12)
 
 
 def test_factor_stops_at_the_node_that_makes_the_matrix_singular():

@@ -176,7 +176,8 @@ class Workspace(NamedTuple):
 
     `members[:size]` are the slipping nodes in the order of the rows of `factor`, `inside` marks
     them, `diagonal` is that of A; `forward` holds the forward substitutions of the load profile
-    and of the strength. `order` is a list of nodes to append.
+    and of the strength. `order` is a list of nodes to append. Rows of the factor up to `held` are
+    valid for these members and `entries`, their diagonal entries of A.
     """
 
     stiffness: Any
@@ -188,6 +189,8 @@ class Workspace(NamedTuple):
     forward: Array
     vectors: Array
     halves: Array
+    held: NDArray[np.int64]
+    entries: Array
 
 
 def make_workspace(stiffness: Any, n: int) -> Workspace:
@@ -203,6 +206,8 @@ def make_workspace(stiffness: Any, n: int) -> Workspace:
         np.empty((2, n + 4)),
         np.empty((4, n + 4)),
         np.empty((2, n // 2)),
+        np.zeros(1, dtype=np.int64),
+        np.empty(n + 4),
     )
 
 
@@ -245,11 +250,49 @@ def append(workspace: Workspace, size: int, count: int) -> int:
             pivot = diagonal[node] - dot(row, row, size + r)
             members[size + r] = node
             if pivot <= PIVOT * diagonal[node]:
+                workspace.held[0] = size + r
                 return size + r
             row[size + r] = math.sqrt(pivot)
+            workspace.entries[size + r] = diagonal[node]
         size += group
         done += group
+    workspace.held[0] = size
     return size
+
+
+@jit
+def factor_inside(workspace: Workspace) -> int:
+    """Factor A on the nodes that are `inside`; returns what `append` returns.
+
+    Nodes that weaken no more come first, in the order in which they stand in the factor already:
+    as a crack grows most nodes are such, and their rows need not be computed again.
+    """
+    stiffness, diagonal = workspace.stiffness, workspace.diagonal
+    members, order, inside = workspace.members, workspace.order, workspace.inside
+    held = workspace.held[0]
+    count = ZERO
+    for t in range(held):
+        i = members[t]
+        if inside[i] and diagonal[i] == entry(stiffness, i, i):
+            inside[i] = False
+            order[count] = i
+            count += 1
+    for weakening in (False, True):
+        for i in range(inside.shape[0]):
+            if inside[i] and (weakening or diagonal[i] == entry(stiffness, i, i)):
+                inside[i] = False
+                order[count] = i
+                count += 1
+    kept = ZERO
+    for t in range(count):
+        i = order[t]
+        inside[i] = True
+        same = kept == t and t < held and members[t] == i
+        if same and workspace.entries[t] == diagonal[i]:
+            kept += 1
+        else:
+            order[t - kept] = i
+    return append(workspace, kept, count - kept)
 
 
 @jit_inside

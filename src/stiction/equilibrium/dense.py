@@ -84,12 +84,18 @@ class LineProgram(Program):
         self._own = threading.local()
 
     @property
+    def _workspaces(self) -> tuple[Workspace, Workspace]:
+        """The workspaces of the thread: one for the path, another one for jumps."""
+        if not hasattr(self._own, "workspaces"):
+            self._own.workspaces = tuple(
+                make_workspace(self.stiffness, self.nodes) for _ in range(2)
+            )
+        pair: tuple[Workspace, Workspace] = self._own.workspaces
+        return pair
+
+    @property
     def _workspace(self) -> Workspace:
-        """The workspace of the thread."""
-        if not hasattr(self._own, "workspace"):
-            self._own.workspace = make_workspace(self.stiffness, self.nodes)
-        space: Workspace = self._own.workspace
-        return space
+        return self._workspaces[0]
 
     def _windows(self, rate: Array) -> Windows:
         """Windows of a sample with these weakening rates, Pa/m; `usual` where all are."""
@@ -161,6 +167,9 @@ class LineProgram(Program):
         That is not tried again after it once failed, but for from rest.
         """
         stuck = state is not None and state.stuck
+        if state is None or not state.slip.any():
+            for workspace in self._workspaces:  # what is held is of another sample
+                workspace.held[0] = 0
         if target == np.inf and not stuck:
             piece, present = None, sample
             if state is not None:
@@ -211,8 +220,8 @@ class LineProgram(Program):
         slip, stiff, direction = found.slip.copy(), found.stiff, found.direction
         outcome, griffith = self._runs_away(sample, found, slip)
         if outcome == Outcome.UNDECIDED:
-            other, stiff = make_workspace(self.stiffness, self.nodes), stiff.copy()
-            outcome = jump(sample, found.load, slip, stiff, griffith, self._workspace, other)
+            stiff = stiff.copy()
+            outcome = jump(sample, found.load, slip, stiff, griffith, *self._workspaces)
         if outcome == Outcome.ARRESTED:
             before, after = (present_pieces(sample, each).piece for each in (found.slip, slip))
             if not np.any(after > before):

@@ -16,6 +16,7 @@ from stiction.equilibrium.cholesky import (
     Workspace,
     append,
     back_substitute,
+    factor_inside,
     multiply_members,
     singular_direction,
     substitute_members,
@@ -124,13 +125,12 @@ def _settle(
     Returns ARRESTED if the step ends in the equilibrium of the members, SLIDING if nothing bounds
     it, else UNDECIDED.
     """
-    for t in range(size):
-        i = workspace.members[t]
+    for i in range(slip.shape[0]):
         own = entry(workspace.stiffness, i, i)
-        other.order[t] = i
+        other.inside[i] = workspace.inside[i]
         piece = piece_at(sample.pieces, sample.critical[i], slip[i])
         other.diagonal[i] = own - sample.pieces.slopes[piece] * sample.rate[i]
-    now = append(other, ZERO, size)
+    now = factor_inside(other)
     direction = other.vectors[3]
     longest = 1.0
     if now < size:
@@ -178,12 +178,10 @@ def jump(
     for i in range(slip.shape[0]):
         workspace.diagonal[i] = entry(workspace.stiffness, i, i)
         workspace.inside[i] = slip[i] > 0.0
-        if workspace.inside[i]:
-            workspace.order[count] = i
-            count += 1
+        count += workspace.inside[i]
     if count > MOST_MEMBERS:
         return Outcome.UNDECIDED
-    size = append(workspace, ZERO, count)
+    size = factor_inside(workspace)
     if size < count or count == slip.shape[0]:
         return Outcome.SLIDING
     waited = 0

@@ -10,6 +10,7 @@ there. A load that is an upper bound and has an equilibrium is the critical one.
 import numpy as np
 
 from stiction.arrays import Array
+from stiction.elasticity.stiffness import apply
 from stiction.equilibrium.cholesky import (
     MOST_MEMBERS,
     Workspace,
@@ -227,10 +228,10 @@ def certificate(
         balance = sample.excess[i] + stiff[i] - sample.rate[i] * slip[i]
         lower = min(lower, balance / sample.profile[i])
         if multiplier[i] > 0.0:
-            workspace.members[count] = i
+            workspace.order[count] = i
             values[count] = multiplier[i]
             count += 1
-    multiply_members(workspace, count, values, product)
+    apply(workspace.stiffness, workspace.order, count, values, workspace.halves, product)
     above = 0.0
     below = 0.0
     excess = 0.0

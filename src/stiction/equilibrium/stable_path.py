@@ -19,6 +19,7 @@ from stiction.equilibrium.cholesky import (
     Workspace,
     append,
     back_substitute,
+    factor_inside,
     multiply_members,
     raise_diagonal,
     singular_direction,
@@ -51,7 +52,6 @@ def _begin(
         own = entry(workspace.stiffness, i, i)
         workspace.diagonal[i] = own - sample.pieces.slopes[piece[i]] * sample.rate[i]
         if workspace.inside[i]:
-            workspace.order[count] = i
             count += 1
     return count
 
@@ -101,6 +101,7 @@ def _change_slope(
     workspace.diagonal[node] = entry(workspace.stiffness, node, node) - after
     if after <= before:
         raise_diagonal(workspace.factor, size, member, before - after, workspace.vectors)
+        workspace.entries[member] = workspace.diagonal[node]
         return size
     # It weakens more steeply: the factor is made anew from there on.
     for t in range(member, size):
@@ -139,7 +140,7 @@ def advance(
     peak = load - mean_relief(workspace.stiffness, sample.profile, slip)
     if count > MOST_MEMBERS:
         return load, load, CROWDED
-    size = append(workspace, ZERO, count)
+    size = factor_inside(workspace)
     if size < count:
         # Stability was lost exactly as the residual strength was reached.
         singular_direction(workspace, size, direction)
