@@ -101,7 +101,12 @@ def test_factor_of_a_crack_that_grows_keeps_rows_that_stand():
     workspace.inside[:] = False
     workspace.diagonal[:] = 0.8 * COLUMN[0]
     nodes = rng.permutation(256)[:60]
-    for slipping, residual, changed in ((30, 0, 0.8), (41, 17, 0.7), (50, 23, 0.9), (45, 23, 0.9)):
+    for slipping, residual, changed in (
+        (30, 0, 0.8),
+        (41, 17, 0.7),
+        (50, 23, 0.9),
+        (45, 23, 0.9),
+    ):
         workspace.diagonal[nodes[residual:]] = changed * COLUMN[0]
         workspace.diagonal[nodes[:residual]] = COLUMN[0]
         workspace.inside[:] = False
