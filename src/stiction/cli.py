@@ -20,7 +20,7 @@ from typer.models import OptionInfo
 
 from stiction import __version__
 from stiction.errors import InputError, RunError, collect_warnings, unknown_name
-from stiction.progress import Meter, duration
+from stiction.progress import Meter, duration, interrupted
 
 SHOWN = 12
 """Points, failures or damaged chunks that are listed."""
@@ -94,15 +94,26 @@ def _save_figure(axes: Any, path: Path) -> None:
 # -- studies and runs ----------------------------------------------------------------------------
 
 
+def _interrupt(*_: object) -> None:
+    interrupted.set()
+    raise KeyboardInterrupt
+
+
 @contextmanager
 def _resumable(out: Path) -> Iterator[None]:
     """Let an interruption end a run as Ctrl-C does: what is done is stored."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # of a batch system
+    signal.signal(signal.SIGTERM, _interrupt)  # of a batch system
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else it is ignored
+        signal.signal(signal.SIGINT, _interrupt)
     try:
         yield
+        if interrupted.is_set():
+            raise KeyboardInterrupt
     except KeyboardInterrupt:
         echo(f"interrupted: what is done is in {out}; rerun the command to resume", err=True)
         raise typer.Exit(130) from None
+    finally:
+        interrupted.clear()
 
 
 @contextmanager
@@ -393,15 +404,9 @@ def onset(
     if unknown := [name for name in method or () if name not in METHODS]:
         raise InputError([unknown_name("--method", name, METHODS) for name in unknown])
     profile = read_profile(
-        strength,
-        interface=problem.interface,
-        unit=unit,
-        x_unit=x_unit,
-        interpolate=interpolate,
-        gaps=gaps,
-        value=_column(value),
-        x=_column(x),
-    )
+        strength, interface=problem.interface, unit=unit, x_unit=x_unit, interpolate=interpolate,
+        gaps=gaps, value=_column(value), x=_column(x),
+    )  # fmt: skip
     # Each method refuses, and warns, for itself.
     problem.sample(profile, accept=("barriers", "overstress", "constant"))
     printed = (*ONSET_VARIABLES, "friction_coefficient", "critical_force")
@@ -511,13 +516,9 @@ def reliability(
     loaded = Study.from_toml(study)
     with _resumable(out), _executor(scheduler) as executor:
         curve = loaded.failure_curve(
-            out=out,
-            repetitions=repetitions,
-            smallest=smallest,
-            workers=workers,
-            executor=executor,
-            part=part,
-        )
+            out=out, repetitions=repetitions, smallest=smallest, workers=workers,
+            executor=executor, part=part,
+        )  # fmt: skip
     echo(table_of(curve).to_string(index=False, float_format="{:.7g}".format, max_rows=200))
     state = open_run(out).status()
     echo(

@@ -24,6 +24,10 @@ WIDTH = 100
 """Letters of a line in a notebook."""
 TICK = 0.25
 
+interrupted = threading.Event()
+"""Set by a signal that ends a run: the exception of its handler is lost if it comes in a finalizer
+or a callback from C, where Python ignores exceptions."""
+
 
 def duration(seconds: float) -> str:
     """Return seconds as text for people, such as '1.5 h'."""
@@ -37,12 +41,7 @@ class Meter:
     """Progress of a computation, of `total` units if that is known; a context manager."""
 
     def __init__(
-        self,
-        what: str,
-        total: int | None = None,
-        show: Show = True,
-        *,
-        unit: str = "samples",
+        self, what: str, total: int | None = None, show: Show = True, *, unit: str = "samples"
     ) -> None:
         self.unit, self._show = unit, show
         self._watcher: threading.Thread | None = None
@@ -55,7 +54,9 @@ class Meter:
         self._first: tuple[float, int] | None = None
 
     def advance(self, count: int = 1) -> None:
-        """Report that `count` more are done."""
+        """Report that `count` more are done; end an interrupted run."""
+        if interrupted.is_set():
+            raise KeyboardInterrupt
         self.done += count
         if self._first is None:  # the rate is that of what follows: preparations come first
             self._first = time.monotonic(), self.done

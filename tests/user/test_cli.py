@@ -20,6 +20,7 @@ import stiction as st
 from stiction import files
 from stiction.cli import app, in_options, onset
 from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.store import Store
 from stiction.files import private_folder
 
 STUDY = small_study(
@@ -153,6 +154,32 @@ def test_interrupted_from_outside(runs, study, number):
     assert "what is done is in run; rerun the command to resume" in err
     assert "Traceback" not in err
     runs("status run", "of 9000000")
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "SIGTERM"])
+@pytest.mark.parametrize(
+    ("where", "done"), [("add", "100 of 300"), ("note_pilot", "300 of 300")]
+)
+def test_an_interruption_whose_exception_is_lost(runs, monkeypatch, number, where, done):
+    """As in a finalizer or a callback from C: the run ends at the next table, or at its end."""
+
+    class Losing:
+        def __del__(self):
+            signal.raise_signal(number)
+
+    def lose(*given):
+        original(*given)
+        Losing()
+
+    original = getattr(Store, where)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    with monkeypatch.context() as patch:
+        patch.setattr(Store, where, lose)
+        words = "interrupted: what is done is in run"
+        runs("run study.toml --out run --workers 1", words, code=130)
+    runs("status run", done)
+    runs("run study.toml --out run", "300 of 300")
 
 
 def test_profiles_are_exported_to_netcdf_and_left_out_of_tables(runs):
