@@ -205,11 +205,12 @@ def _lost(
     d: int,
 ) -> tuple[Any, Any]:
     """Return whether patches (samples, nodes) pass their residual strength, and the error then."""
-    slope = weight * (square - weight @ square)
-    bend = (excess - load[:, None] * profile) @ slope / (slope @ square)
+    slope = weight * (square - (weight * square).sum(axis=-1, keepdims=True))
+    bend = ((excess - load[:, None] * profile) * slope).sum(axis=1) / (slope @ square)
     slip = SLIP[d] * np.maximum(bend, 0.0)[:, None] * (1.0 - square) ** 1.6
     lost = np.maximum(slip - drop, 0.0)
-    return lost.any(axis=1), (lost @ weight) / (profile @ weight) / load
+    missing = (lost * weight).sum(axis=1) / (profile * weight).sum(axis=1)
+    return lost.any(axis=1), missing / load
 
 
 def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
@@ -253,18 +254,23 @@ def _beyond_residual_of_specimen(
 ) -> tuple[NDArray[np.bool_], Array]:
     """Estimate the same for specimens; a patch at a free end is taken as one in the middle."""
     reached, missing = np.zeros(sample.samples, dtype=np.bool_), np.zeros(sample.samples)
+    excess = sample.strength - sample.initial_stress
+    drop = sample.strength - sample.residual_strength
+    loads, lengths = (
+        np.asarray(values[name]) for name in ("critical_load", "critical_patch_length")
+    )
+    spacing = problem.interface.spacing
+    widths = np.rint(lengths / spacing).astype(np.int64)
+    starts = np.rint(values["critical_position"] / spacing - 0.5 * widths).astype(np.int64)
     for places, same in _places_by_rate(problem, sample):
-        centres = (places.starts + 0.5 * places.widths) * problem.interface.spacing
-        for i in same:
-            c = int(np.argmin(np.abs(centres - values["critical_position"][i])))
-            width = int(places.widths[c])
-            patch = int(places.starts[c]) + np.arange(width)
+        for width in np.unique(widths[same]):
+            some = same[widths[same] == width]
+            chosen = np.searchsorted(places.starts, starts[some])
+            patch = starts[some, None] + np.arange(width)
             square = ((2.0 * np.arange(width) - width + 1.0) / width) ** 2
-            drop = (sample.strength - sample.residual_strength)[i, patch]
-            excess = (sample.strength - sample.initial_stress)[i, patch]
-            (reached[i],), (missing[i],) = _lost(
-                excess[None], sample.load_profile[patch], drop[None],
-                np.array([values["critical_load"][i]]), places.modes[c, :width], square, 1,
+            reached[some], missing[some] = _lost(
+                excess[some[:, None], patch], sample.load_profile[patch],
+                drop[some[:, None], patch], loads[some], places.modes[chosen, :width], square, 1,
             )  # fmt: skip
     return reached, missing
 
