@@ -75,9 +75,10 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
         `event_moment` (N per unit depth: G times the slip added, integrated over the interface).
         On specimens the load is the drive, the mean stress that it would cause if nothing slipped;
         `travel` (m) is that of both drives together, on top of which a machine gives by its force
-        over its stiffness; and events have `event_stress_drop` (Pa), `event_travel` (m, before it)
-        and `event_travel_step` (m). With a thickness, width or area each mean stress is given as a
-        force, too: `force`, `event_force` and `event_force_drop` (N).
+        over its stiffness; and events have `event_stress_drop` (Pa), `event_travel` (m, before it),
+        `event_travel_step` (m) and `event_start` (m), the left end of the patch. With a thickness,
+        width or area each mean stress is given as a force, too: `force`, `event_force` and
+        `event_force_drop` (N).
 
         On planes positions have two components, along 'direction', `event_extent` (m) and
         `event_area` (m²) take the place of the length, and the moment is in N m.

@@ -45,6 +45,7 @@ OF_SPECIMENS = {
     "event_stress_drop": Variable("Pa", "fall of the mean interface stress", ("event",)),
     "event_travel": Variable("m", "travel of the drives before the event", ("event",)),
     "event_travel_step": Variable("m", "travel of the drives in the event", ("event",)),
+    "event_start": Variable("m", "left end of the patch that slipped", ("event",)),
 }
 EVENT_CORE = 1e-3
 """Share of the largest added slip above which a node belongs to the patch of an event."""
@@ -101,7 +102,8 @@ def event_table(
         if isinstance(program, BlockProgram):
             left = after.load - program.relief(after.slip)
             moved, on = (program.travel(one.load, one.slip) for one in (before, after))
-            values += ((held - left) * profile, moved, on - moved)
+            start = float(np.argmax(inside)) * interface.spacing
+            values += ((held - left) * profile, moved, on - moved, start)
         table.append((before.load, stress, *values))
     names = event_variables(interface)
     if not table:

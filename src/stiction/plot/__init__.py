@@ -1,7 +1,8 @@
 """Plots of results.
 
 A plot of one panel draws on `ax`, or on new axes, and returns the axes. A plot of several panels
-(`fit`, `posterior`, `specimen`) returns a figure. `film` writes a file and returns its path.
+(`fit`, `posterior`, `precursors`, `specimen`) returns a figure. `film` writes a file and returns
+its path.
 
 Units follow the size of what is drawn: mm and µs, or km and s. Where the problem has a normal
 pressure, friction coefficients are drawn too.
@@ -13,7 +14,7 @@ from stiction.plot.fields import field
 from stiction.plot.fits import agreement, fit, posterior
 from stiction.plot.onsets import onset
 from stiction.plot.ruptures import film, rupture
-from stiction.plot.specimens import force_travel, specimen
+from stiction.plot.specimens import force_travel, precursors, specimen
 from stiction.plot.style import paper_style
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "onset",
     "paper_style",
     "posterior",
+    "precursors",
     "quantiles",
     "rupture",
     "specimen",

@@ -152,22 +152,14 @@ def force_travel(
     >>> st.plot.force_travel(path).get_xlabel()
     'travel (µm)'
     """
-    need(result, "travel", "event_travel", hint="; give the path of a specimen")
     problem_of(result, problem)
-    name, event = (
-        ("force", "event_force") if "force" in result else ("mean_stress", "event_stress")
-    )
-    load, before = result["load"].values, result["event_load"].values
-    high, drop = result[event].values, result[f"{event}_drop"].values
-    start, step = result["event_travel"].values, result["event_travel_step"].values
-    order = np.argsort(np.concatenate([load, before, before]), kind="stable")
-    travel = np.concatenate([result["travel"].values, start, start + step])[order]
-    force = np.concatenate([result[name].values, high, high - drop])[order]
+    travel, force, name = _curve(result)
+    start, high = result["event_travel"].values, result[_event(name)].values
     length, length_unit = unit_for("m", travel)
     factor, unit = unit_for(str(result[name].attrs["units"]), force)
     with on_axes(ax) as axes:
         axes.plot(travel * length, force * factor, **series(0))
-        if before.size:
+        if start.size:
             style: dict[str, Any] = {
                 "linestyle": "none",
                 "marker": "o",
@@ -179,3 +171,73 @@ def force_travel(
         text = "force" if name == "force" else "mean stress"
         axes.set(xlabel=with_unit("travel", length_unit), ylabel=with_unit(text, unit))
     return axes
+
+
+def _event(name: str) -> str:
+    """Return the name of a force, or of a mean stress, at events."""
+    return "event_force" if name == "force" else "event_stress"
+
+
+def _curve(result: xr.Dataset) -> tuple[Array, Array, str]:
+    """Return travel (m) and force (N) along the curve of a machine, and the force's name.
+
+    The mean stress (Pa) where no thickness is known.
+    """
+    need(result, "travel", "event_start", hint="; give the path of a specimen")
+    name = "force" if "force" in result else "mean_stress"
+    high, drop = result[_event(name)].values, result[f"{_event(name)}_drop"].values
+    start, step = result["event_travel"].values, result["event_travel_step"].values
+    load, before = result["load"].values, result["event_load"].values
+    order = np.argsort(np.concatenate([load, before, before]), kind="stable")
+    travel = np.concatenate([result["travel"].values, start, start + step])[order]
+    force = np.concatenate([result[name].values, high, high - drop])[order]
+    return travel, force, name
+
+
+def precursors(result: xr.Dataset, *, problem: Problem | None = None) -> Figure:
+    """Draw the curve of a machine, and below it where the interface slips in arrested events.
+
+    Parameters
+    ----------
+    result : Dataset
+        From `stiction.equilibrium_path` of a specimen, at many loads.
+    problem : Problem, optional
+        Needed only if the result does not hold it.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Above as by `force_travel`; below, at its travel, the extent of each event.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import stiction as st
+    >>> problem = st.Problem(
+    ...     solid=st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress"),
+    ...     interface=st.Interface(length=0.1, nodes=128),
+    ...     friction=st.LinearWeakening(weakening_rate=0.2e12, residual_ratio=0.5),
+    ...     specimen=st.Blocks(height=0.05, drive=st.Pusher(height=0.008, width=0.005)),
+    ... )
+    >>> strength = 1e6 + 3e8 * (problem.interface.x - 0.02) ** 2
+    >>> path = st.equilibrium_path(problem, strength, np.linspace(0.0, 1.3e6, 50))
+    >>> st.plot.precursors(path).axes[1].get_ylabel()
+    'position $x$ (mm)'
+    """
+    import matplotlib.pyplot as plt
+
+    interface = problem_of(result, problem).interface
+    length, _ = unit_for("m", _curve(result)[0])
+    scale, unit = unit_for("m", interface.lengths)
+    start = result["event_start"].values * scale
+    end = start + result["event_length"].values * scale
+    with paper_style():
+        figure = plt.figure(figsize=(1.35 * COLUMN, 1.35 * COLUMN), layout="constrained")
+        above, below = figure.subplots(2, sharex=True, height_ratios=(1.3, 1.0))
+        force_travel(result, problem=problem, ax=above)
+        at = result["event_travel"].values * length
+        below.vlines(at, start, end, color=ACCENT, linewidth=2.0)
+    below.set(xlabel=above.get_xlabel(), ylabel=f"position $x$ ({unit})")
+    below.set_ylim(0.0, interface.extent * scale)
+    above.set_xlabel("")
+    return figure
