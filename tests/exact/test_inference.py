@@ -82,6 +82,13 @@ SCALING = {
         with_friction(weakening_rate=0.5e12, residual_ratio=0.4), WEIBULL, EXACT,
         {"marginal.scale": (0.5e6, 2e6)}, 1,
     ),
+    "stretch of a specimen": (
+        dataclasses.replace(
+            with_friction(weakening_rate=0.5e12, residual_ratio=0.4),
+            specimen=st.Blocks(height=0.03, drive=st.Pusher(height=0.01, width=0.004)),
+        ),
+        WEIBULL, EXACT, {"marginal.scale": (0.5e6, 2e6)}, 1,
+    ),
 }  # fmt: skip
 
 
@@ -109,6 +116,10 @@ NOT_SCALING = {
         WITH_RESIDUAL, WEIBULL, EXACT, {"marginal.scale": (0.8e6, 2e6)},
     ),
     "load profile": (with_load(profile=1.0 + 0.3 * WAVE), STRENGTH, LOCAL, LOW),
+    "initial stress and load profile": (
+        with_load(profile=1.0 + 0.3 * WAVE, initial_stress=0.1e6), WEIBULL, LOCAL,
+        {"marginal.scale": (0.8e6, 2e6)},
+    ),
     "shift of coefficients under a pressure that varies": (UNEVEN, COEFFICIENTS, LOCAL, SMALL),
     "gradient load": (
         with_load(profile=st.GradientLoad(amplitude=0.4)), STRENGTH, LOCAL, LOW,

@@ -16,7 +16,8 @@ scale with b. Where W follows from a critical slip or a fracture energy, it chan
 nucleation length with it: nothing scales.
 
 Friction coefficients mu = a + b s are a strength sigma_n (a + b s). The shift sigma_n a is the same
-everywhere only if the normal pressure is; where it varies, a must be zero.
+everywhere only if the normal pressure is; where it varies, a must be zero. So it must where the
+load profile p varies, as on specimens, without initial stress: <b s, y>/<p, y> only stretches.
 """
 
 from typing import Any, NamedTuple
@@ -61,6 +62,7 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
     slopes = np.array([SLOPES[name] for name in places.values()], dtype=float).reshape(-1, 2)
     pressure = problem.normal_pressure
     varies = field.of is not None and np.ndim(pressure) > 0
+    varies = varies or np.ptp(problem.load_profile) > 0.0
     if (varies or method.type != "local_criterion") and (location or slopes[:, 0].any()):
         return none
     slopes[:, 1] /= scale
@@ -72,15 +74,15 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
 
 def _may_scale(problem: Any, random: Any, method: Any) -> bool:
     """Whether the onset scales with the strength if this keeps its distribution."""
-    friction, load = problem.friction, problem.load
+    friction, initial = problem.friction, np.asarray(problem.load.initial_stress)
     exact = method.type == "equilibrium"
     return bool(
         (exact or method.type == "local_criterion")
         and len(random.names) == 1
         and friction.weakening_rate is not None
-        and np.ptp(problem.load_profile) == 0.0
-        and np.ptp(load.initial_stress) == 0.0
+        and np.ptp(initial) == 0.0
+        and not (np.any(initial) and np.ptp(problem.load_profile))
         # Neither of these scales with the strength; the local criterion needs no zero.
         and not (exact and np.any(np.asarray(friction.residual_strength)))
-        and not (exact and np.any(np.asarray(load.initial_stress)))
+        and not (exact and np.any(initial))
     )
