@@ -20,6 +20,7 @@ import scipy.stats
 import stiction as st
 from stiction.inference.grid import grid_of
 from stiction.inference.likelihood import experiments_at, make_likelihood, simulate
+from stiction.inference.peaks import make_peaks
 from stiction.inference.prior import make_prior
 from stiction.progress import SILENT
 
@@ -38,6 +39,8 @@ class Case(NamedTuple):
     """Standard deviation of the load cell, in the unit of the peaks."""
     variable: str = "critical_stress"
     lengths: tuple[float | None, ...] = (None,)
+    tests: int = TESTS
+    unit: str = "Pa"
 
 
 def cases(nodes=256):
@@ -64,6 +67,14 @@ def cases(nodes=256):
     )  # fmt: skip
     weibull = st.RandomField(st.Weibull(mean=1e6, cv=0.25), strength.spectrum, mean_mode=True)
     low = {"marginal.low": bounds["marginal.low"]}
+    blocks = st.Problem(
+        st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress"),
+        st.Interface(0.1, 64), st.LinearWeakening(weakening_rate=0.12e12, residual_ratio=0.35),
+        specimen=st.Blocks(
+            height=0.05, thickness=0.006,
+            drive=st.Pusher(height=0.02, width=0.01, stiffness=2e7),
+        ),
+    )  # fmt: skip
     return {
         "three parameters": Case(
             problem, strength, {"correlation_length": length, **bounds}, local, 5e3
@@ -89,15 +100,24 @@ def cases(nodes=256):
             problem, strength, {"correlation_length": length, **low}, local, 5e3,
             lengths=(0.1, 0.04),
         ),
+        "blocks behind a pusher, newtons": Case(
+            blocks, st.RandomField(st.Weibull(mean=1e6, cv=0.25), strength.spectrum),
+            {
+                "marginal.mean": (0.7e6, 1.4e6),
+                "correlation_length": {"low": 2e-3, "high": 2e-2, "spacing": "log"},
+            },
+            st.Equilibrium(), 3.0, tests=12, unit="N",
+        ),
     }  # fmt: skip
 
 
-def ranks(campaigns, tests=TESTS, seed=0, samples=None, points=POINTS, case=None):
+def ranks(campaigns, tests=None, seed=0, samples=None, points=POINTS, case=None):
     """Ranks of the truth, and the truth and the posterior means as u, (campaigns, parameters)."""
     case = cases()["three parameters"] if case is None else case
+    tests, area = tests or case.tests, case.problem.area if case.unit == "N" else 1.0
     prior = make_prior(case.problem, case.random, case.prior)
     simulated = make_likelihood(
-        prior, method=case.method, lengths=case.lengths, error=case.error, samples=samples,
+        prior, method=case.method, lengths=case.lengths, error=case.error / area, samples=samples,
         seed=0, variable=case.variable, meter=SILENT,
     )  # fmt: skip
     rng = np.random.default_rng(seed)
@@ -111,7 +131,9 @@ def ranks(campaigns, tests=TESTS, seed=0, samples=None, points=POINTS, case=None
                 own, samples=tests, first=256 * (i + 10), seed=1000 + seed + number,
                 variable=case.variable, meter=SILENT,
             )  # fmt: skip
-            peaks.append(onsets[0] + case.error * rng.standard_normal(tests))
+            read = area * onsets[0] + case.error * rng.standard_normal(tests)
+            measured = make_peaks(read, case.unit)
+            peaks += measured.in_stress(case.problem.interface.extent, area, 0.0)[0].values
         likelihood = simulated.of(peaks)
         grid = grid_of(likelihood, likelihood.box, points=points)
         draws = grid.draws(DRAWS, i)
