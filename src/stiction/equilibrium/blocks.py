@@ -5,7 +5,6 @@ slip lowers the force, whose largest value may lie before the instability, and w
 without one the interface slides stably. Arrest is always decided by following the jump.
 """
 
-import threading
 from dataclasses import replace
 
 import numpy as np
@@ -19,11 +18,9 @@ from stiction.equilibrium.sample import (
     Outcome,
     Sample,
     State,
-    pieces_of,
-    refused,
     step_to_corner,
 )
-from stiction.errors import InputError, warn_accuracy
+from stiction.errors import warn_accuracy
 from stiction.problem import Problem
 
 RUNG = 1.5
@@ -40,17 +37,11 @@ class BlockProgram(LineProgram):
         With a specimen.
     """
 
-    def __init__(self, problem: Problem) -> None:
-        if reasons := refused(problem.friction):
-            raise InputError(reasons)
-        self.problem = problem
-        self.pieces = pieces_of(problem.friction)
-        self.nodes = problem.interface.size
+    def _make_stiffness(self, problem: Problem) -> None:
         self.blocks = problem.blocks
         self.machine = self.blocks.relief > 0.0
         self.stiffness = make_block_stiffness(self.blocks.stiffness, self.blocks.relief)
         self.own = np.diag(self.blocks.stiffness).copy()
-        self._own = threading.local()
         if self.blocks.positive:
             self.widest_gap = 1e-4
             warn_accuracy(

@@ -66,6 +66,8 @@ class LineProgram(Program):
 
     widest_gap = 1e-9
     """Certificate gap, as a share of the load, above which there is a warning."""
+    stiffness: Any
+    own: Any
 
     def __init__(self, problem: Problem) -> None:
         if reasons := refused(problem.friction):
@@ -73,15 +75,18 @@ class LineProgram(Program):
         self.problem = problem
         self.pieces = pieces_of(problem.friction)
         self.nodes = problem.interface.size
+        self._make_stiffness(problem)
+        self._own = threading.local()
+
+    def _make_stiffness(self, problem: Problem) -> None:
+        """Make K, its diagonal `own`, and what else follows from the elasticity."""
         self.modulus, self.extent = problem.effective_modulus, problem.interface.extent
         self.unit = np.pi * self.modulus / self.extent
-        self.stiffness: Any
         self.stiffness, self.runs = _stiffness_and_runs(self.nodes, self.extent, self.modulus)
-        self.own: Any = self.stiffness.column[0]
+        self.own = self.stiffness.column[0]
         rate = problem.friction.weakening_rate
         self.usual_rate = np.nan if rate is None or np.ptp(rate) else float(np.max(rate))
         self.usual = exact_window(self.nodes, self.usual_rate, self.unit)
-        self._own = threading.local()
 
     @property
     def _workspaces(self) -> tuple[Workspace, Workspace]:
