@@ -5,7 +5,7 @@ import pytest
 from setups import beta_strength
 
 import stiction as st
-from stiction.inference.whittle import SpectrumFamily
+from stiction.inference.whittle import Observed, SpectrumFamily, Whittle
 from stiction.inference.window import RecordWindow
 
 SPACING = 1e-4
@@ -23,13 +23,15 @@ def model_of(name, parameters, **given):
 
 
 def by_brute_force(window, covariance):
-    """E |u_k y|^2 with u = P (h exp(-ikx)), from the whole covariance matrix."""
-    known = window.measured
+    """E |u_k y|^2 with u = P (h exp(-ikx)), from the whole covariance matrix, (*half)."""
+    known = window.measured.ravel()
     projection = np.eye(known.sum()) - window.basis @ window.basis.T
-    places = np.arange(known.size) * SPACING
-    waves = np.exp(-1j * np.outer(window.wave_vectors[0], places)) * window.taper
-    rows = waves[:, known] @ projection
-    return np.einsum("ki,ij,kj->k", rows, covariance[np.ix_(known, known)], rows.conj()).real
+    nodes = np.indices(window.shape).reshape(len(window.shape), -1)
+    axes = zip(np.broadcast_arrays(*window.wave_vectors), nodes, window.spacings, strict=True)
+    phase = sum(np.outer(k, at * spacing) for k, at, spacing in axes)
+    rows = (np.exp(-1j * phase) * window.taper.ravel())[:, known] @ projection
+    found = np.einsum("ki,ij,kj->k", rows, covariance[np.ix_(known, known)], rows.conj()).real
+    return found.reshape(window.white.shape)
 
 
 @pytest.mark.parametrize("degree", [0, 1, 3])
@@ -46,6 +48,27 @@ def test_expectation_of_a_line(degree, gap):
     np.testing.assert_allclose(found[17:], expected[17:], rtol=0.02)
     # And the correlation is that of the spectrum on an infinite line; it fades where it is cut.
     np.testing.assert_allclose(rho[:96], SPECTRUM.correlation(at * SPACING), atol=1e-3)
+
+
+def test_expectation_and_trend_of_a_map():
+    """With a gap, without a trend of the second degree, which nothing is left of."""
+    measured = np.ones((14, 11), dtype=bool)
+    measured[3:6, 7:10] = False
+    window = RecordWindow((1e-4, 1.3e-4), measured, 2)
+    rho = window.correlation(window.power(SPECTRUM, 1.4))
+    nodes = np.indices(measured.shape).reshape(2, -1)
+    covariance = rho[tuple(nodes[:, :, None] - nodes[:, None, :])]
+    found, expected = window.expectation(rho), by_brute_force(window, covariance)
+    low = np.ix_([0, 1, 2, -2, -1], [0, 1, 2])
+    np.testing.assert_allclose(found[low].ravel()[1:], expected[low].ravel()[1:], rtol=1e-9)
+    x, y = (place[measured] for place in np.indices(measured.shape))
+    values = np.random.default_rng(2).uniform(1.0, 2.0, x.size)
+    trend = 3.0 + 0.4 * x - 0.1 * y**2 + 0.2 * x * y
+    rest, same = (window.without_trend(each) for each in (values, values + trend))
+    np.testing.assert_allclose(same - rest, trend.mean(), rtol=1e-10)
+    assert rest.mean() == pytest.approx(values.mean(), rel=1e-12)
+    powers = [window.periodogram(each) for each in (values, rest, same)]
+    np.testing.assert_allclose(powers[1:], [powers[0]] * 2, rtol=1e-8, atol=1e-12)
 
 
 def test_the_end_of_a_spectrum_is_seen_only_if_it_is_given():
@@ -105,3 +128,68 @@ def test_simulated_records_have_the_expectation():
     ratio = np.mean(records, axis=0)[1:] / window.expectation(window.correlation(power))[1:]
     # Each is a mean of 4,000 exponential numbers: 1.6 %; the largest of 64 reaches 3.5 times that.
     assert np.abs(ratio - 1.0).max() < 0.06
+
+
+GAP = np.ones(64, dtype=bool)
+GAP[40:49] = False
+CROOKED = RecordWindow((SPACING,), GAP, 2), window_of(48, 1, spacing=1.7e-4)
+"""Records of two geometries, with trends."""
+MAP = RecordWindow((1e-4, 1.2e-4), np.ones((14, 11), dtype=bool), 1)
+SHARES = np.array([0.0, 0.9, 0.08, 0.02])
+
+
+@pytest.mark.parametrize(
+    ("windows", "noise"),
+    [(CROOKED, None), (CROOKED, 0.5), ((MAP,), None)],
+    ids=["lines", "of a known noise", "map"],
+)
+def test_score_and_information_are_derivatives_of_the_likelihood(windows, noise):
+    """By differences: of any record, and where each is as expected, the information."""
+    ratio = None if windows[0].measured.ndim == 2 else 1.0
+    family = SpectrumFamily("power_law", {}, ratio, noise, (1e-4, 1.0))
+    values = {"variance": 2.3, "correlation_length": 1.1e-3, "exponent": 1.7, "anisotropy": 1.4}
+    at = family.vector([(values | {"noise_share": 0.13})[name] for name in family.free])
+    rng, step = np.random.default_rng(7), 1e-3
+    model = family.model(at, SHARES)
+    expected = [model.expectation(window) for window in windows]
+    for as_expected in (False, True):
+        observed = [
+            Observed(
+                window, 2 + 3 * i, e if as_expected else e * rng.exponential(size=e.shape), f
+            )
+            for i, (window, e, f) in enumerate(
+                zip(windows, expected, (0.02, 0.05), strict=False)
+            )
+        ]
+        whole = Whittle(family, SHARES, observed)
+        score, information = whole.score(at, whole.value(at)[1])
+        moved = at + step * np.stack([np.eye(at.size), -np.eye(at.size)])
+        slopes = np.array(
+            [[whole.score(p, whole.value(p)[1])[0] for p in side] for side in moved]
+        )
+        likely = np.array([[whole.value(p)[0] for p in side] for side in moved])
+        by_differences = (likely[0] - likely[1]) / (2.0 * step)
+        size = np.sqrt(np.diag(information))
+        # In standard errors; the code's own differences are one-sided, over 1e-4.
+        np.testing.assert_allclose(score / size, by_differences / size, atol=5e-3)
+        if as_expected:
+            curvature = (slopes[1] - slopes[0]) / (2.0 * step)
+            both = np.outer(size, size)
+            np.testing.assert_allclose(information / both, curvature / both, atol=1e-3)
+
+
+def test_the_likelihood_of_many_records_is_the_sum_of_theirs():
+    """Of three of one geometry and two of another, over all wavenumbers of a whole transform."""
+    family = SpectrumFamily("power_law", {}, 1.0, None, (1e-4, 1.0))
+    at, rng = family.vector([2.3, 1.1e-3, 1.7, 0.13]), np.random.default_rng(8)
+    model = family.model(at, SHARES)
+    total, observed = 0.0, []
+    for window, records, floor in zip(CROOKED, (3, 2), (0.02, 0.05), strict=True):
+        e = model.expectation(window)
+        powers = e * rng.exponential(size=(records, e.size))
+        observed.append(Observed(window, records, powers.mean(axis=0), floor))
+        terms = np.log(e + floor) + (powers + floor) / (e + floor)
+        n = window.shape[0]
+        every = terms[:, np.minimum(np.arange(1, n), n - np.arange(1, n))]
+        total -= 0.5 * every.sum()  # k and -k are one
+    assert Whittle(family, SHARES, observed).value(at)[0] == pytest.approx(total, rel=1e-12)

@@ -10,7 +10,7 @@ from setups import EXACT, LOCAL, turns
 import stiction as st
 from stiction.inference.density import log_likelihoods, tabulate
 from stiction.inference.grid import grid_of
-from stiction.inference.likelihood import experiments_at, make_likelihood, simulate
+from stiction.inference.likelihood import experiments_at, make_likelihood, moved, simulate
 from stiction.inference.prior import make_prior
 from stiction.inference.scaling import find_scaling
 from stiction.progress import SILENT
@@ -37,9 +37,9 @@ def with_load(**options):
     return dataclasses.replace(PROBLEM, load=st.Load(**options))
 
 
-def likelihood_of(prior, error=0.0, samples=400):
+def likelihood_of(prior, error=0.0, samples=400, lengths=(None,)):
     return make_likelihood(
-        prior, method=LOCAL, lengths=[None], error=error, samples=samples, seed=0,
+        prior, method=LOCAL, lengths=lengths, error=error, samples=samples, seed=0,
         variable="critical_stress", meter=SILENT,
     )  # fmt: skip
 
@@ -208,6 +208,37 @@ def test_the_likelihood_between_nodes_is_that_of_a_simulation_there():
         assert likely.sum() >= 2
         # Linear between nodes; where a test is likely that costs a hundredth of its density.
         np.testing.assert_allclose(found[likely], exact[likely], atol=0.03)
+        # Predicted peaks are these onsets with the error of the load cell.
+        again = dataclasses.replace(model, error=3e4).predicted(
+            0, np.tile(place, (20_000, 1)), 1
+        )
+        assert again.mean() == pytest.approx(direct.mean(), abs=4.0 * again.std() / 140)
+        assert again.std() == pytest.approx(np.hypot(direct.std(), 3e4), rel=0.03)
+
+
+def test_specimens_of_two_lengths_have_samples_of_their_own():
+    """One kind twice, so that the same samples would give the same onsets."""
+    prior = make_prior(PROBLEM, STRENGTH, LOW)
+    one, other = likelihood_of(prior, lengths=(None, 0.1)).densities
+    # 400 samples: four standard errors of a correlation.
+    assert abs(np.corrcoef(one.onsets[0], other.onsets[0])[0, 1]) < 0.2
+    assert one.onsets.mean() == pytest.approx(other.onsets.mean(), rel=0.01)
+
+
+@pytest.mark.parametrize("alike", [0.9, 0.99])
+def test_onsets_moved_to_another_method_are_worth_what_they_say(alike):
+    """The scatter of their mean over many campaigns, in a unit of their own."""
+    rng, means = np.random.default_rng(5), []
+    for _ in range(400):
+        local = rng.standard_normal((1, 1000))
+        rest = rng.standard_normal((1, 100))
+        exact = alike * local[:, :100] + np.sqrt(1.0 - alike**2) * rest
+        found, worth = moved(0.7e6 + 2e4 * exact, 0.9e6 + 3e4 * local)
+        means.append(found.mean())
+    assert np.mean(means) == pytest.approx(0.7e6, abs=4.0 * np.std(means) / 20)
+    # 400 campaigns know a variance to 7 %; that of quantiles is 2/(1 + alike) of that of a mean.
+    assert worth == pytest.approx((2e4 / np.std(means)) ** 2, rel=0.3)
+    assert moved(exact, rng.standard_normal((1, 1000)))[1] == 100
 
 
 def test_grid_against_a_sum_by_hand():

@@ -156,6 +156,21 @@ def test_properties_are_correlated_mode_by_mode():
     assert not np.array_equal(first["residual_strength"], second["residual_strength"])
 
 
+@pytest.mark.parametrize("shape", [(8, 48), (48, 8)])
+def test_waves_that_one_direction_does_not_resolve_are_warned_of(shape):
+    """The variance beyond half the nodes along x or y, from the density at all waves."""
+    plane = st.Interface(length=(1.0, 1.3), nodes=shape)
+    field = beta_strength(0.2, anisotropy=0.8, mean_mode=True)
+    i, j = np.meshgrid(np.arange(-40, 41), np.arange(-40, 41), indexing="ij")
+    k = 2.0 * np.pi * np.hypot(i, 0.8 * j / 1.3)
+    power = field.spectrum.density(k, 2) * (k <= field.spectrum.cutoff(2))
+    beyond = (np.abs(i) > shape[0] // 2) | (np.abs(j) > shape[1] // 2)
+    share = power[beyond].sum() / power.sum()
+    assert field.modes(plane).unresolved == pytest.approx(share, rel=1e-9)
+    with pytest.warns(st.AccuracyWarning, match=rf"but {100.0 * share:.2g} % of the variance"):
+        field.sample(plane)
+
+
 def test_a_plane_that_is_short_across_against_its_anisotropy_is_warned_of():
     """z falls to 1/e within 14 mm along y, 0.9 mm along x."""
     field = beta_strength(1.6e-3, anisotropy=16.0)

@@ -1,9 +1,11 @@
 """Several random properties of one interface: their draws, correlation, and what they mean."""
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
+import scipy.stats
 from setups import exact_onset, make_problem
 
 import stiction as st
@@ -73,6 +75,46 @@ def test_modes_beyond_a_short_spectrum_are_drawn_for_the_longer_one(make_strengt
     short, long = make_strength(0.5), make_strength(4.0)
     found = tied(long, short).profiles(LINE, samples=2, seed=4)["residual_strength"]
     assert np.array_equal(found, short.sample(LINE, samples=2, seed=4))
+
+
+@pytest.mark.parametrize("nodes", [16, (10, 8)], ids=["line", "plane"])
+def test_covariance_of_a_chain_of_properties_with_spectra_of_their_own(nodes):
+    """A and B are correlated, B and C: the response to each draw, as a matrix, times itself."""
+    plane = isinstance(nodes, tuple)
+    interface = st.Interface((1.0, 0.7) if plane else 1.0, nodes)
+    options = {"anisotropy": 1.3} if plane else {}
+    fields = {
+        name: st.RandomField(scipy.stats.norm(), spectrum, mean_mode=mean, **options)
+        for name, spectrum, mean in (
+            ("strength", st.PowerLawSpectrum(0.5), False),
+            ("residual_strength", st.SquaredExponentialSpectrum(0.3), True),
+            ("initial_stress", st.ExponentialSpectrum(0.4, power_kept=0.9), True),
+        )
+    }
+    random = st.RandomInterface(
+        **fields,
+        correlation={
+            ("strength", "residual_strength"): 0.7,
+            ("residual_strength", "initial_stress"): -0.6,
+        },
+    )
+    response = random.from_draws(interface, np.eye(random.dimension(interface)))
+    modes = [fields[name].modes(interface) for name in random.names]
+    places = np.meshgrid(*interface.coordinates.values(), indexing="ij")
+    for one, other in itertools.combinations_with_replacement(range(3), 2):
+        sigma = [dict(zip(map(tuple, m.numbers.T), m.sigma, strict=True)) for m in modes]
+        expected = 0.0
+        for number in sigma[one].keys() & sigma[other].keys():
+            turns = zip(number, places, interface.lengths, strict=True)
+            phase = sum(2.0 * np.pi * j * x / length for j, x, length in turns)
+            wave = sigma[one][number] * sigma[other][number] * np.cos(phase)
+            expected = expected + random.matrix[one, other] * wave
+        here, there = (
+            response[random.names[i]].reshape(-1, interface.size) for i in (one, other)
+        )
+        found = (here.T @ there)[0].reshape(interface.shape)  # of the first node with all
+        # The map is tabulated to 1e-9.
+        np.testing.assert_allclose(found, expected, atol=1e-7)
 
 
 def test_fracture_energy_and_critical_slip_as_random_properties(make_strength):

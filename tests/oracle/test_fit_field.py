@@ -1,5 +1,7 @@
 """Fits against scipy's maximum likelihood, GSTools' variogram, and records of known scatter."""
 
+import dataclasses
+
 import gstools
 import numpy as np
 import pytest
@@ -87,6 +89,9 @@ def test_intervals_hold_the_truth_whatever_the_number_of_records(records, cv):
         levels = np.log1p(cv**2) ** 0.5 * rng.standard_normal(records)
         levels += 0.05 * rng.standard_normal(records)
         found.append(scatter_between(levels, np.full(records, 0.05**2), 0.9))
+        if found[-1][0] > 0.0:  # of records alike the mean is the textbook's, by Student
+            error = scipy.stats.t.ppf(0.95, records - 1) * scipy.stats.sem(levels)
+            assert found[-1][2] == pytest.approx(error, rel=1e-6)
     held = sum(low <= cv <= high for _, (low, high), _ in found)
     assert binom.cdf(held, 400, 0.9) > 1e-3
     assert binom.sf(held, 400, 0.9) > 1e-3
@@ -130,6 +135,23 @@ def test_a_factor_between_short_records_leaves_the_field_as_it_is():
         assert low < np.expm1(0.15**2) ** 0.5 < high < 0.3
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.02)
     assert "between" in str(scattered)
+    # The mean of other specimens is as uncertain as the records' levels scatter.
+    levels = np.log((records * factor).mean(axis=1))
+    width = scipy.stats.t.ppf(0.95, 19) * scipy.stats.sem(levels)
+    mean, low, high = scattered.parameters["mean"], *scattered.interval["marginal.mean"]
+    assert (low, high) == pytest.approx((mean * np.exp(-width), mean * np.exp(width)), rel=1e-5)
+    # Its repetitions scatter, too: the same records, each by a factor of its own.
+    found = dataclasses.replace(scattered._estimate, between=0.3)
+    factors = []
+    for number in range(20):
+        pair = found, dataclasses.replace(found, between=0.0)
+        rows = [np.array(one.simulate(np.random.default_rng(number))) for one in pair]
+        factors.append(rows[0] / rows[1])
+        assert np.ptp(factors[-1], axis=1).max() < 1e-12
+    logarithms = np.log(np.array(factors)[:, :, 0].ravel())
+    spread = np.log1p(0.3**2) ** 0.5
+    assert logarithms.std() == pytest.approx(spread, rel=0.15)  # four errors of 400
+    assert logarithms.mean() == pytest.approx(0.0, abs=4.0 * spread / 20)
 
 
 def test_a_truncation_that_is_given_is_where_the_spectrum_ends():

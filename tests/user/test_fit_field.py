@@ -6,6 +6,7 @@ import xarray as xr
 from refusals import refusals
 
 import stiction as st
+from stiction.inference.bootstrap import bootstrapped
 
 FIELD = st.RandomField(
     st.Lognormal(mean=1e6, cv=0.2), st.ExponentialSpectrum(1e-3), mean_mode=True
@@ -53,6 +54,45 @@ def test_what_it_finds_is_what_was_put_in(plain):
     assert len(plain.repetitions) == 20
     assert plain.field.of is None
     assert plain.field.sample(PIECE, seed=1).shape == (1, COUNT)
+
+
+def test_intervals_are_those_of_three_sets_of_repetitions(plain):
+    """By hand: errors in units of root length; the ends from fields of either length."""
+    name, truth = "spectrum.correlation_length", plain.parameters
+    sets = bootstrapped(plain._estimate, 20, 0.9, 0, False)
+
+    def end(of, share):
+        true = of.truth.parameters[name]
+        errors = [
+            np.log(one.parameters[name] / true) / one.parameters["efolding_length"] ** 0.5
+            for one in of.fits
+        ]
+        off = np.quantile(errors, share, method="weibull") * truth["efolding_length"] ** 0.5
+        return truth[name] * np.exp(-off)
+
+    around, shorter, longer = sets
+    lengths = [one.truth.parameters[name] for one in sets]
+    first = [truth[name], end(around, 0.95), end(around, 0.05)]
+    assert lengths == pytest.approx(first, rel=1e-9)
+    assert lengths[1] < lengths[0] < lengths[2]
+    found = plain.interval[name]
+    assert found == pytest.approx((end(shorter, 0.95), end(longer, 0.05)), rel=1e-9)
+
+
+def test_a_trend_that_is_removed_leaves_the_fit_of_the_record_without(plain):
+    u = np.linspace(-1.0, 1.3, COUNT)
+    trend = 0.5e6 * (u**3 - 0.4 * u**2 + 0.5 * u)
+    found, bare = (
+        fitted(labelled(VALUES + added), detrend=3) for added in (trend - trend.mean(), 0.0)
+    )
+    assert found.parameters == pytest.approx(bare.parameters, rel=1e-6)
+    for name, interval in bare.interval.items():
+        assert found.interval[name] == pytest.approx(interval, rel=1e-5)
+    assert found.parameters["mean"] == pytest.approx(VALUES.mean(), rel=0.01)
+    # Of 80 correlation lengths the trend takes some.
+    truth = {"standard_deviation": 0.2e6, "spectrum.correlation_length": 1e-3}
+    for name, value in truth.items():
+        assert found.parameters[name] == pytest.approx(value, rel=0.25)
 
 
 def test_units_and_places_decide_and_not_the_order(plain):
