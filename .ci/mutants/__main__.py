@@ -37,7 +37,7 @@ NEAREST = {
     "plot": "plot planes inference examples",
     "problem": "bad_input crooked criterion equilibrium profiles friction_coefficients",
     "profiles": "profiles plane_gaps crooked fit_field",
-    "random": "fields conditional* random_interface marginal_families plane_fields",
+    "random": "fields conditional* random_interface marginal_families plane_fields reliability",
     "reliability": "reliability* failure_run",
     "report": "cli study planes",
     "statistics": "statistics_* criterion inference",

@@ -30,6 +30,8 @@ def test_power_kept_by_truncating_at_two_and_a_half_lambda(exponent, kept):
     spectrum = st.PowerLawSpectrum(correlation_length=1.0, exponent=exponent, truncation=2.5)
     digits = len(str(kept)) - 2  # as many as are printed
     assert round(spectrum.power_within(spectrum.cutoff()), digits) == kept
+    usual = st.PowerLawSpectrum(correlation_length=1.0, exponent=exponent)
+    assert usual.power_within(usual.cutoff()) == pytest.approx(0.9997, abs=3e-5)
 
 
 @pytest.mark.parametrize(
