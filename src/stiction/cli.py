@@ -297,16 +297,18 @@ def description(study: Any) -> dict[str, str]:
         unit = f" {variable.units}".removesuffix(" 1")
         text = f"{keys}: {len(values)} values, {values[0]} to {values[-1]}{unit}"
         lines[f"axis {number}"] = text
-    numbers = pd.DataFrame([_numbers(point) for point in some])
+    numbers = pd.DataFrame(
+        [_numbers(one.problem, member) for one in some for member in one.random.members]
+    )
     for (title, unit), each in numbers.items():
         ends = dict.fromkeys(f"{value:.5g}" for value in (each.min(), each.max()))
         lines[title] = f"{' to '.join(ends)} {unit}".rstrip()
     return lines
 
 
-def _numbers(point: Any) -> dict[tuple[str, str], float]:
-    """Return key numbers of a point, by title and unit."""
-    problem, field = point.problem, point.random.strength
+def _numbers(problem: Any, random: Any) -> dict[tuple[str, str], float]:
+    """Return key numbers of a point and what is random there, by title and unit."""
+    field = random.strength
     unit = "Pa" if field.of is None else "(friction coefficient)"
     found = {
         ("mean strength", unit): field.mean,
@@ -520,6 +522,12 @@ def reliability(
             executor=executor, part=part,
         )  # fmt: skip
     echo(table_of(curve).to_string(index=False, float_format="{:.7g}".format, max_rows=200))
+    if "members" in curve:
+        echo(
+            f"probability: the mean over {curve.sizes['member']} equally likely interfaces, to"
+            " decide with; probability_low, _high: its sampling error, 95 %; band_low, _high: 90 %"
+            " of the interfaces"
+        )
     state = open_run(out).status()
     echo(
         f"part {part}: " * bool(part) + f"{state.done} of {state.samples} repetitions in {out}"

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import chain, pairwise
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -25,7 +25,7 @@ from stiction.methods import (
 )
 from stiction.model import Count, Names, Number, model
 from stiction.problem import Problem, refusals
-from stiction.random.fields import RandomField, RandomInterface, as_random_interface
+from stiction.random.equally_likely import as_random
 from stiction.random.stresses import (
     check_pressure,
     check_residual,
@@ -34,8 +34,6 @@ from stiction.random.stresses import (
 )
 from stiction.results import along
 from stiction.variables import PROFILES, Variable
-
-AnyRandom: TypeAlias = RandomInterface | RandomField
 
 MOST_NUMBERS = 1 << 20
 """Nodes, and draws, of all samples of planes that are solved at once: 8 MiB for each profile."""
@@ -50,23 +48,25 @@ class Experiment:
     """
 
     problem: Problem
-    random: Any  # a RandomInterface, or a RandomField that becomes one
+    random: Any  # a RandomInterface or EquallyLikely, or what becomes one
     method: Any
     keep: tuple[str, ...] = ()  # names of random fields that `results` holds
     seed: int = 0
 
     def __post_init__(self) -> None:
-        random = as_random_interface(self.random)
-        problems: list[str] = []
-        try:
-            check_pressure(self.problem, random)
-        except InputError as error:
-            problems += error.problems
-        for name, field in random.properties.items():
+        random = as_random(self.random)
+        found: dict[str, None] = {}  # equally likely interfaces have the same mistakes
+        for one in random.members:
             try:
-                field.modes(self.problem.interface)
+                check_pressure(self.problem, one)
             except InputError as error:
-                problems += [f"{name}: {text}" for text in error.problems]
+                found |= dict.fromkeys(error.problems)
+            for name, field in one.properties.items():
+                try:
+                    field.modes(self.problem.interface)
+                except InputError as error:
+                    found |= dict.fromkeys(f"{name}: {text}" for text in error.problems)
+        problems = list(found)
         problems += refusals(self.problem, self.method)
         unknown = [name for name in self.keep if name not in random.names]
         problems += [unknown_name("keep", name, random.names) for name in unknown]
@@ -83,6 +83,12 @@ class Experiment:
         found = copy.copy(self)
         object.__setattr__(found, "seed", seed)
         return found
+
+    @property
+    def given(self) -> Any:
+        """What is random as a study has it: one interface, or a list of equally likely ones."""
+        members = self.random.members
+        return list(members) if len(members) > 1 else members[0]
 
     @property
     def dimension(self) -> int:
@@ -111,23 +117,31 @@ class Experiment:
     def pressure(self) -> float:
         """Mean normal pressure, Pa; NaN if there is none."""
         if "normal_pressure" in self.random.names:
-            return float(self.random.properties["normal_pressure"].mean)
+            each = [one.properties["normal_pressure"].mean for one in self.random.members]
+            return float(np.mean(each))
         given = self.problem.load.normal_pressure
         return float("nan") if given is None else float(np.mean(given))
 
+    @property
+    def mean_strength(self) -> float:
+        """Mean strength, Pa."""
+        each = [mean_in_stress(self.problem, one, "strength") for one in self.random.members]
+        return float(np.mean(each))
+
     def check_fields(self) -> None:
         """Warn of fields that do not suit the grid, the interface, or their units."""
-        self.random.warn_if_inaccurate(self.problem.interface)
-        for name, field in self.random.properties.items():
-            if not field.modes(self.problem.interface).ranks.size:
-                warn_user(
-                    f"{name}: its correlation length is so long for this interface that each"
-                    " sample is uniform; check its unit, and give scatter between specimens"
-                    " as between= of st.RandomInterface",
-                    UnitWarning,
-                )
-        self.problem.warn_of_units(mean_in_stress(self.problem, self.random, "strength"))
-        check_residual(self.problem, self.random)
+        for one in self.random.members:
+            one.warn_if_inaccurate(self.problem.interface)
+            for name, field in one.properties.items():
+                if not field.modes(self.problem.interface).ranks.size:
+                    warn_user(
+                        f"{name}: its correlation length is so long for this interface that each"
+                        " sample is uniform; check its unit, and give scatter between specimens"
+                        " as between= of st.RandomInterface",
+                        UnitWarning,
+                    )
+            check_residual(self.problem, one)
+        self.problem.warn_of_units(self.mean_strength)
 
     def draws(self, first: int, count: int) -> Array:
         """Return standard normal draws (count, dimension) of samples first, first + 1, ..."""

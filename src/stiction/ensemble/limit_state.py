@@ -6,23 +6,31 @@ from functools import cached_property
 from typing import Any, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
 
 from stiction.arrays import Array
+from stiction.criterion.local import LocalCriterion
 from stiction.criterion.windows import windows_of
 from stiction.elasticity.places import places_of
 from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.monte_carlo import check_fields
 from stiction.errors import InputError
 from stiction.friction import SCALES
 from stiction.methods import MethodObject
 from stiction.model import Count, Numbers, check, checked, describe
 from stiction.problem import Problem
 from stiction.progress import SILENT, Meter
-from stiction.random.fields import RandomField, RandomInterface
+from stiction.random.equally_likely import AnyRandom
+from stiction.random.fields import RandomInterface
 from stiction.random.stresses import support_in_stress
 
 Event = Literal["critical_stress", "first_instability"]
 
+RANKED, LOW = 32, 3.0
+"""Samples of each of equally likely interfaces that put these in order, and the number of standard
+deviations below the mean that does."""
 SHORTEST = 2e-3
 """Seconds of work that justify a thread."""
 
@@ -62,6 +70,11 @@ class LimitState:
     def draws(self, seed: int, first: int, samples: int) -> Array:
         """Return the draws of `stiction.monte_carlo`, (samples, dimension)."""
         return self.experiment.with_seed(seed).draws(first, samples)
+
+    def member(self, draws: Array) -> NDArray[np.int64]:
+        """Return which of equally likely interfaces each sample is of, (samples,)."""
+        found: NDArray[np.int64] = self.experiment.random.member(draws)
+        return found
 
     def profiles(self, draws: Array) -> dict[str, Array]:
         """Return sampled profiles by name, each of shape (samples, *shape)."""
@@ -108,7 +121,16 @@ class LimitState:
 
     def likely_bounds(self, negligible: float) -> tuple[float, float]:
         """Return the same for all samples but a share that is negligible."""
-        problem, random = self.experiment.problem, self.experiment.random
+        lows, highs = zip(*self.bounds_of_members(negligible), strict=True)
+        return min(lows), max(highs)
+
+    def bounds_of_members(self, negligible: float = 0.0) -> list[tuple[float, float]]:
+        """Return the same for each of equally likely interfaces."""
+        members = self.experiment.random.members
+        return [self._bounds_of(one, negligible) for one in members]
+
+    def _bounds_of(self, random: RandomInterface, negligible: float) -> tuple[float, float]:
+        problem = self.experiment.problem
         if any(field.conditions is not None for field in random.properties.values()):
             negligible = 0.0  # what was measured may be rarer
         if self._random_pressure and not negligible:
@@ -130,7 +152,28 @@ class LimitState:
         return low, high
 
 
-def no_single_length(problem: Problem, random: RandomInterface) -> str | None:
+def weakest_first(state: LimitState) -> LimitState:
+    """Return the same limit state with equally likely interfaces in order, the weakest first.
+
+    Neighbours are then alike, and a chain that goes down moves from one to the next. Their order is
+    that of a low quantile of the same few samples of each, by the local criterion if it holds.
+    """
+    experiment = state.experiment
+    problem, random = experiment.problem, experiment.random
+    count = len(random.members)
+    if count == 1:
+        return state
+    draws = np.repeat(state.draws(0, 0, RANKED), count, axis=0)
+    draws[:, 0] = np.tile(ndtri((np.arange(count) + 0.5) / count), RANKED)
+    by = state if no_single_length(problem, random) else state.by(LocalCriterion())
+    onset = by(draws).reshape(RANKED, count)
+    lowest = np.array(state.bounds_of_members())[:, 0]
+    weak = np.maximum(onset.mean(axis=0) - LOW * onset.std(axis=0), lowest)
+    order = replace(random, order=tuple(np.argsort(weak, kind="stable").tolist()))
+    return replace(state, experiment=replace(experiment, random=order))
+
+
+def no_single_length(problem: Problem, random: Any) -> str | None:
     """Return the reason why the local criterion does not hold, or None if it does."""
     rate = problem.uniform_rate
     if not problem.friction.linear:
@@ -150,7 +193,7 @@ def no_single_length(problem: Problem, random: RandomInterface) -> str | None:
 @checked
 def limit_state(
     problem: Problem,
-    random: RandomInterface | RandomField,
+    random: AnyRandom,
     method: MethodObject,
     *,
     event: Event = "critical_stress",
@@ -192,5 +235,5 @@ def limit_state(
     True
     """
     experiment = Experiment(problem, random, method)
-    experiment.check_fields()
+    check_fields([experiment])
     return LimitState(experiment, event, workers=workers or usable_cores())

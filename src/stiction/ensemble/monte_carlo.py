@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stiction.ensemble.batches import missing_spans, solve_spans, usable_cores, versions
 from stiction.ensemble.dataset import Gathered, GridAxes, distinct
-from stiction.ensemble.experiment import AnyRandom, Ensemble, Experiment
+from stiction.ensemble.experiment import Ensemble, Experiment
 from stiction.ensemble.pilot import compare, doubt
 from stiction.ensemble.store import Store
 from stiction.errors import InputError, RunError, collect_warnings, warn_accuracy, warn_user
@@ -20,6 +20,7 @@ from stiction.methods import MethodObject
 from stiction.model import Count, Flag, Names, Number, Progress, checked
 from stiction.problem import Problem
 from stiction.progress import Meter, Show
+from stiction.random.equally_likely import AnyRandom
 from stiction.results import study_attributes
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ HOPELESS = 16
 """Failed samples, with none solved, after which the whole ensemble is given up."""
 
 
-def _check_fields(points: Sequence[Experiment]) -> None:
+def check_fields(points: Sequence[Experiment]) -> None:
     """Warn of fields that do not suit the grid, the interface or their units, once each."""
     with collect_warnings() as caught:
         for point in distinct(points, "random", "problem"):
@@ -40,7 +41,7 @@ def _check_fields(points: Sequence[Experiment]) -> None:
     for text, category in found[:FEW]:
         warn_user(text, category)
     if len(found) > FEW:
-        more = f"{len(found) - FEW} more warnings like these, at other points of the sweep"
+        more = f"{len(found) - FEW} more warnings like these"
         warn_accuracy(more)
 
 
@@ -75,7 +76,7 @@ def gather(
     done = others | rows.done
     spans, total, lost = missing_spans(done, ensemble.first), int((~done).sum()), 0
     if spans:
-        _check_fields(points)
+        check_fields(points)
         points[0].prepare()  # here and not in a thread, so that it warns at the caller's line
     label = " and ".join({one.method.label: None for one in distinct(points, "method")})
     with ExitStack() as stack:
@@ -133,8 +134,9 @@ def monte_carlo(
     Parameters
     ----------
     problem : Problem
-    random : RandomInterface or RandomField
-        The random properties; a field alone is the peak strength, Pa.
+    random : RandomInterface, RandomField or list of them
+        The random properties; a field alone is the peak strength, Pa. Of a list, each is equally
+        likely, and every sample has one of them.
     method : LocalCriterion, Equilibrium or Rupture
     samples, seed, first, keep
         As in `Ensemble`. For profiles of a few samples, repeat these: another call with the same
@@ -186,7 +188,7 @@ def monte_carlo(
     ensemble = Ensemble(samples=samples, seed=seed, first=first, keep=keep)
     experiment = Experiment(problem, random, method, keep, seed)
     about = study_attributes(
-        problem=problem, random=experiment.random, method=experiment.method, ensemble=ensemble
+        problem=problem, random=experiment.given, method=experiment.method, ensemble=ensemble
     )
     return gather(
         [experiment],

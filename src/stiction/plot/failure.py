@@ -17,10 +17,12 @@ from stiction.plot.axes import (
     unit_for,
     with_unit,
 )
-from stiction.plot.style import ACCENT, COLUMN, INK, PALE, QUIET
+from stiction.plot.style import ACCENT, BAND, COLUMN, INK, PALE, QUIET
 from stiction.problem import Problem
 from stiction.reliability.answer import Answer, bounded
 
+TINY = 1e-300
+"""Probability that stands for none on a logarithmic scale."""
 NEAR = 4.0
 """Nucleation lengths on either side of a weak spot that are drawn."""
 
@@ -50,7 +52,8 @@ def failure_curve(
     -------
     matplotlib.axes.Axes
         Without an area, friction coefficients are at the top if there is a normal pressure. A
-        dotted line marks the lower bound of the strength.
+        dotted line marks the lower bound of the strength. Of a list of equally likely interfaces
+        the line is their mean, and a wider band holds 90 % of them.
 
     Raises
     ------
@@ -64,9 +67,14 @@ def failure_curve(
     with on_axes(ax) as axes:
         if bounded(bound):
             axes.axvline(bound * factor, color=QUIET, linewidth=0.7, linestyle=":")
+        text = "subset simulation, 95 % interval"
+        if "members" in curve:
+            ends = (np.maximum(curve[name].values, TINY) for name in ("band_low", "band_high"))
+            label = f"90 % of {curve.sizes['member']} equally likely interfaces"
+            axes.fill_between(x, *ends, color=BAND, linewidth=0.0, label=label)
+            text = "their mean, 95 % interval of sampling"
         low, high = curve["probability_low"].values, curve["probability_high"].values
         axes.fill_between(x, low, high, color=PALE, linewidth=0.0)
-        text = "subset simulation, 95 % interval"
         axes.plot(x, chance, "o-", color=INK, markersize=2.5, linewidth=0.9, label=text)
         if stress is not None:
             text = f"demand: {stress * factor:.4g} {unit}"

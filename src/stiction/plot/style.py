@@ -14,6 +14,7 @@ PAGE = 6.75
 INK = "#1a1a1a"
 QUIET = "#7a7a7a"
 PALE = "#d9d9d9"
+BAND = "#cfe0ea"
 ACCENT = "#b5322a"
 
 # Dark to light, so that the order survives in grey; each also has its own dashes and marker.

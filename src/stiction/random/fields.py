@@ -382,6 +382,15 @@ class RandomInterface:
         return {name: getattr(self, name) for name in NAMES if getattr(self, name) is not None}
 
     @property
+    def members(self) -> tuple[RandomInterface, ...]:
+        """Only itself; several of equally likely interfaces."""
+        return (self,)
+
+    def member(self, draws: Array) -> NDArray[np.int64]:
+        """Return the number of the member of each sample: 0."""
+        return np.zeros(len(draws), np.int64)
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the random properties."""
         return tuple(self.properties)
@@ -403,7 +412,7 @@ class RandomInterface:
 
     def dimension(self, interface: Interface) -> int:
         """Return the number of standard normal draws of a sample."""
-        return int(_layout(self, interface)[-1].columns.stop)
+        return int(layout(self, interface)[-1].columns.stop)
 
     @checked
     def draws(
@@ -414,7 +423,7 @@ class RandomInterface:
         Draw j of a property of sample i depends on (seed, property, i, j) only. Returned are
         (samples, dimension): each property in the order of `names`, then those of `between`.
         """
-        streams = _layout(self, interface)
+        streams = layout(self, interface)
         each = streams[-1].columns.stop + len(self.names) * interface.size
         check_memory("samples", 8.0 * min(samples, 2**62) * each)
         parts = [stream.draw(seed, first, samples) for stream in streams]
@@ -423,7 +432,7 @@ class RandomInterface:
     @checked
     def from_draws(self, interface: Interface, draws: Numbers) -> dict[str, Array]:
         """Map draws (samples, dimension) to profiles by name, (samples, *shape) each."""
-        streams = _layout(self, interface)
+        streams = layout(self, interface)
         dimension = streams[-1].columns.stop
         if draws.ndim != 2 or draws.shape[1] != dimension:
             raise InputError(
@@ -461,7 +470,7 @@ class RandomInterface:
 
 
 @lru_cache(maxsize=256)
-def _layout(random: RandomInterface, interface: Interface) -> list[Stream]:
+def layout(random: RandomInterface, interface: Interface) -> list[Stream]:
     """Draws of each property, and of each factor between specimens."""
     fields = list(random.properties.values())
     found, start, block = [], 0, block_of(len(interface.shape))
@@ -483,7 +492,7 @@ def _layout(random: RandomInterface, interface: Interface) -> list[Stream]:
     return found
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=64)
 def _conditioned(
     random: RandomInterface, interface: Interface
 ) -> list[tuple[NDArray[np.int64], Conditioning]]:
@@ -491,7 +500,7 @@ def _conditioned(
 
     The last column is that of the factor between specimens on which it depends, if any.
     """
-    streams, fields = _layout(random, interface), list(random.properties.values())
+    streams, fields = layout(random, interface), list(random.properties.values())
     columns, between = [np.r_[stream.columns] for stream in streams], random.between or {}
     factor, found = lower_factor(random.matrix), []
     for group in np.unique(random.linked, axis=0):

@@ -13,12 +13,13 @@ from pydantic import Field
 from stiction.arrays import Array
 from stiction.ensemble.batches import usable_cores
 from stiction.ensemble.experiment import Experiment
-from stiction.ensemble.limit_state import Event, LimitState
+from stiction.ensemble.limit_state import Event, LimitState, weakest_first
+from stiction.ensemble.monte_carlo import check_fields
 from stiction.ensemble.pilot import exact_counterpart
 from stiction.errors import InputError, collect_warnings, warn_accuracy
 from stiction.model import Real, at_least
 from stiction.progress import Meter
-from stiction.reliability.tail import two_levels_refused
+from stiction.reliability.tail import Tail, two_levels_refused
 
 TargetCv: TypeAlias = Annotated[Real, Field(ge=1e-6, le=1)]
 """A smaller coefficient of variation would take more than 1e12 failures; a larger is no answer."""
@@ -53,6 +54,10 @@ class Answer:
         Pa; no sample slides below `lower_bound`.
     algorithm, reason : str
         'plain', 'subset', 'two_level' or 'exact' (nothing had to be sampled), and why.
+    members : (members,) array
+        Of a list of equally likely interfaces: the probability of each. `probability` is their
+        mean, the predictive probability: the one to decide with. Where no sample of an interface
+        slides below the stress, its entry is what one would stand for, about an upper bound.
     warnings : tuple of str
         Reasons not to trust the answer; empty if there are none.
     normal_pressure, friction_coefficient : float
@@ -80,6 +85,7 @@ class Answer:
     warnings: tuple[str, ...]
     normal_pressure: float
     area: float = math.nan
+    members: Array = field(default_factory=lambda: np.zeros(0), repr=False)
     failing_profiles: xr.Dataset = field(default_factory=xr.Dataset, repr=False)
     of_stress: bool = False
 
@@ -106,6 +112,15 @@ class Answer:
         return self.stress * self.area
 
     @property
+    def band(self) -> tuple[float, float]:
+        """90 % band of the probability over equally likely interfaces; NaN of a single one.
+
+        5 % of them have at most the one, 95 % at most the other. More tests make it narrower, more
+        samples do not: the sampling error is `interval`.
+        """
+        return band_of(self.members)
+
+    @property
     def stress_above_bound(self) -> float:
         """`stress` less `lower_bound`, Pa."""
         return self.stress - self.lower_bound
@@ -124,7 +139,28 @@ class Answer:
             result += f" (force {self.force:.4g} N)"
         if bounded(self.lower_bound):
             result += f", {self.stress_above_bound / 1e3:.4g} kPa above the bound"
+        if self.members.size:
+            low, high = self.band
+            result += f"; the mean over {self.members.size} equally likely interfaces, of which"
+            result += f" 5 % have at most P = {low:.2g} and 95 % at most {high:.2g}"
         return f"{result}; {self.algorithm}, {self.evaluations} evaluations"
+
+
+def band_of(members: Array) -> tuple[float, float]:
+    """Return the 90 % band over equally likely interfaces; NaN without any."""
+    if not members.size:
+        return math.nan, math.nan
+    low, high = np.quantile(members, [0.05, 0.95])
+    return float(low), float(high)
+
+
+def members_of(state: LimitState, tail: Tail, stress: float) -> Array:
+    """Return the probability of each of equally likely interfaces; none of a single one."""
+    lows, highs = np.array(state.bounds_of_members()).T
+    if lows.size == 1:
+        return np.zeros(0)
+    found = tail.of_members(stress, lows.size)
+    return np.select([stress <= lows, stress >= highs], [0.0, 1.0], found)
 
 
 def prepare(
@@ -150,7 +186,9 @@ def prepare(
         problems.append(f"algorithm: 'two_level' is not possible: {reason}")
     if problems:
         raise InputError(problems)
-    experiment.check_fields()
+    check_fields([experiment])
+    if not (algorithm == "plain" or too_slow(experiment, max_evaluations)):
+        state = weakest_first(state)
     return state, max_evaluations or int(min(MOST, max(FEWEST, SECONDS / experiment.seconds)))
 
 

@@ -4,9 +4,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiction.arrays import Array
 from stiction.ensemble.limit_state import LimitState
+from stiction.reliability.subset import Descent, Population
 from stiction.reliability.uncertainty import binomial_interval
 
 BATCH = 1024
@@ -55,22 +57,25 @@ def count_failures(
     least: int,
     max_evaluations: int,
     start: int = 0,
-) -> tuple[Count, Array]:
+) -> tuple[Count, Descent]:
     """Count until there are enough failures, among at least `least` samples from `start` on.
 
     The number of failures is fixed beforehand: stopping at a precise estimate would favour early
-    failures. Stresses beyond the last of them do not count, and are returned.
+    failures. Samples beyond the last of them do not count, but are among those returned.
     """
     wanted = 2 + math.ceil(1.0 / (target_cv * target_cv))  # the error falls like 1/sqrt(r - 1)
     least = min(least, max_evaluations)
     parts: list[Array] = []
+    members: list[NDArray[np.int64]] = []
     done = failures = 0
     while done < least or (failures < wanted and done < max_evaluations):
         size = least - done
         if size <= 0:
             size = math.ceil((wanted - failures) * done / failures) if failures else BATCH
         size = min(size, BATCH, max_evaluations - done)
-        parts.append(state(state.draws(seed, start + done, size)))
+        draws = state.draws(seed, start + done, size)
+        parts.append(state(draws))
+        members.append(state.member(draws))
         done, failures = done + size, failures + int(np.sum(parts[-1] < stress))
         state.meter.note = f"{failures:,} failures of {wanted:,} wanted"
     values = np.concatenate(parts)
@@ -79,4 +84,7 @@ def count_failures(
         last = int(np.flatnonzero(values < stress)[wanted - 1])
         if last >= least:
             count = Count(wanted, last + 1, until_failure=True)
-    return count, values
+    level = Population(
+        math.inf, 0.0, values, np.arange(done), np.concatenate(members), np.empty((0, 0))
+    )
+    return count, Descent(done, [level], stress, done, complete=True)

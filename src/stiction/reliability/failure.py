@@ -15,16 +15,17 @@ from stiction.methods import MethodObject, label
 from stiction.model import Count, Number, Positive, Progress, Real, checked
 from stiction.problem import Problem
 from stiction.progress import Meter
-from stiction.random.fields import RandomField, RandomInterface
-from stiction.random.stresses import mean_in_stress
+from stiction.random.equally_likely import AnyRandom
 from stiction.reliability.answer import (
     Answer,
     Budget,
     Probability,
     TargetCv,
+    band_of,
     distinct,
     exact_doubts,
     imprecise,
+    members_of,
     prepare,
     too_slow,
 )
@@ -64,14 +65,17 @@ CURVE = {
         ("cv", "1", "coefficient of variation of the probability"),
         ("stress_low", "Pa", "lower end of the interval of the stress"),
         ("stress_high", "Pa", "upper end of the interval of the stress"),
+        ("band_low", "1", "probability that 5 % of the interfaces do not exceed"),
+        ("band_high", "1", "probability that 95 % of the interfaces do not exceed"),
     )
 }
+CURVE["members"] = Variable("1", "probability of each interface", ("point", "member"))
 
 
 @checked
 def failure_probability(
     problem: Problem,
-    random: RandomInterface | RandomField,
+    random: AnyRandom,
     stress: Real | None = None,
     *,
     method: MethodObject,
@@ -88,8 +92,11 @@ def failure_probability(
 
     Parameters
     ----------
-    problem, random, seed, workers, progress
+    problem, seed, workers, progress
         As in `monte_carlo`. The total number of samples is an estimate.
+    random : RandomInterface, RandomField or list of them
+        Of a list, each is equally likely: such as ``posterior.interfaces(30)``. The answer is then
+        for the mean over the list, the predictive probability, and has its `band`.
     stress : float, optional
         Mean shear stress to carry, Pa. Failure is an onset strictly below it.
     method : LocalCriterion, Equilibrium or Rupture
@@ -154,7 +161,7 @@ def failure_probability(
     if stress is None:
         stress = float((friction_coefficient or 0.0) * experiment.pressure)
     likely = state.likely_bounds(NEGLIGIBLE)
-    mean = mean_in_stress(experiment.problem, experiment.random, "strength")
+    mean = experiment.mean_strength
     if max(state.bounds[0], 0.0) < stress < DOUBTFUL * mean or stress > mean / DOUBTFUL:
         name = "stress" if friction_coefficient is None else "friction_coefficient"
         warn_user(
@@ -202,7 +209,9 @@ def _certain(state: LimitState, stress: float, likely: tuple[float, float]) -> d
         chance, interval = 0.0, (0.0, doubt)
         reason = f"no interface slides at or below {low:.7g} Pa"
     reason += "" if certain else f", but for a probability below {doubt:g}"
+    members = len(state.experiment.random.members)
     found = {"probability": chance, "interval": interval, "cv": 0.0, "evaluations": 0}
+    found["members"] = np.full(members if members > 1 else 0, chance)
     return found | {"algorithm": "exact", "reason": reason}
 
 
@@ -219,10 +228,11 @@ def _by_counting(
         rows = [state.draws(seed, start + int(one), 1) for one in numbers]
         return np.concatenate([np.empty((0, state.dimension)), *rows])
 
-    count, stresses = count_failures(
+    count, counted = count_failures(
         state, seed, stress, target_cv=target_cv, least=least,
         max_evaluations=budget - start, start=start,
     )  # fmt: skip
+    stresses = counted.populations[0].values
     failed = np.flatnonzero(stresses < stress)
     # The weakest samples: failures and others in their true shares.
     some = failed[:CHECKED]
@@ -235,6 +245,7 @@ def _by_counting(
         "cv": count.cv,
         "interval": count.interval(),
         "evaluations": start + stresses.size,
+        "members": members_of(state, Tail([counted]), stress),
         "failing_profiles": _profiles(state, drawn(failed[:SHOWN])),
         "doubts": doubts,
     }
@@ -269,6 +280,7 @@ def _by_tail(state: LimitState, stress: float, tail: Tail, target_cv: float) -> 
         "probability": probability,
         "cv": cv,
         "interval": interval,
+        "members": members_of(state, tail, stress),
         "failing_profiles": _profiles(state, draws[chosen]),
         "doubts": doubts,
     }
@@ -290,7 +302,7 @@ def _profiles(state: LimitState, draws: Array) -> xr.Dataset:
 @checked
 def design_stress(
     problem: Problem,
-    random: RandomInterface | RandomField,
+    random: AnyRandom,
     *,
     probability: Probability,
     method: MethodObject,
@@ -314,9 +326,9 @@ def design_stress(
         is refused unless `max_evaluations` is 20,000 or more.
     target_cv : float
         Coefficient of variation to reach, of the failure probability at the stress.
-    problem, random, seed, workers, progress
+    problem, seed, workers, progress
         As in `monte_carlo`.
-    max_evaluations, event
+    random, max_evaluations, event
         As in `failure_probability`.
 
     Returns
@@ -376,14 +388,15 @@ def design_stress(
             doubts.append(tail.short_of(f"P = {probability:g}"))
     return Answer.of(
         state, stress=stress, probability=probability, cv=cv, interval=interval,
-        of_stress=True, doubts=doubts, **tail.attributes,
+        members=members_of(state, tail, stress), of_stress=True, doubts=doubts,
+        **tail.attributes,
     )  # fmt: skip
 
 
 @checked
 def failure_curve(
     problem: Problem,
-    random: RandomInterface | RandomField,
+    random: AnyRandom,
     *,
     method: MethodObject,
     smallest: Probability = 1e-9,
@@ -402,9 +415,9 @@ def failure_curve(
         Smallest probability of the curve.
     target_cv : float
         Coefficient of variation to reach at the smallest probability; it is lower elsewhere.
-    problem, random, seed, workers, progress
+    problem, seed, workers, progress
         As in `monte_carlo`.
-    method, max_evaluations, event
+    random, method, max_evaluations, event
         As in `design_stress`.
 
     Returns
@@ -413,7 +426,9 @@ def failure_curve(
         Over 'point': `stress`, `stress_above_bound` (Pa), `probability` with `probability_low`,
         `probability_high` and `cv`, `stress_low`, `stress_high` (Pa), and with a normal pressure
         `friction_coefficient`, the stress over its mean, and with an area `force` (N).
-        `stress_above_bound` means little where the attribute `lower_bound` is zero or less.
+        `stress_above_bound` means little where the attribute `lower_bound` is zero or less. Of a
+        list, `probability` is the mean over its interfaces; `members`, over 'point' and 'member',
+        has the curve of each, and 5 and 95 % of them have at most `band_low` and `band_high`.
 
     Raises
     ------
@@ -450,7 +465,7 @@ def failure_curve(
             smallest = tail.probability(tail.reached)
     for text in doubts:
         warn_accuracy(text)
-    attributes = study_attributes(problem=problem, random=experiment.random, method=method) | {
+    attributes = study_attributes(problem=problem, random=experiment.given, method=method) | {
         "seed": seed,
         "evaluations": tail.spent,
     }
@@ -471,15 +486,19 @@ def curve_of(
     """Return the curve of a tail at these probabilities, labelled."""
     lowest, pressure = state.bounds[0], state.experiment.pressure
     area = state.experiment.problem.area or np.nan
-    rows = []
+    rows, members = [], []
     for chance in wanted.tolist():
         stress = tail.quantile(chance)
         found, cv = tail.probability(stress), tail.cv(stress)
         ends = lognormal_interval(found, cv)
         sides = tail.stress_interval(chance, cv, lowest)
         values = stress, stress - lowest, stress / pressure, stress * area
-        rows.append((*values, found, *ends, cv, *sides))
-    table: dict[str, Any] = dict(zip(CURVE, np.array(rows).T, strict=True))
+        members.append(members_of(state, tail, stress))
+        rows.append((*values, found, *ends, cv, *sides, *band_of(members[-1])))
+    table: dict[str, Any] = dict(zip(CURVE, np.array(rows).T, strict=False))
+    table["members"] = np.array(members)
+    if not table["members"].size:
+        del table["band_low"], table["band_high"], table["members"]
     if not np.isfinite(pressure):
         del table["friction_coefficient"]
     if not np.isfinite(area):

@@ -32,6 +32,7 @@ ROW = np.dtype(
         ("log_probability", np.float64),
         ("value", np.float64),
         ("ancestor", np.int64),
+        ("member", np.int64),
     ]
 )
 """A sample of a level, with what its level and its repetition share."""
@@ -46,6 +47,7 @@ def repetition(state: LimitState, number: int, smallest: float) -> Descent:
         samples=SAMPLES,
         probability=DEEPER * smallest,
         floor=state.bounds[0],
+        label=state.member,
     )
 
 
@@ -61,6 +63,7 @@ def table_of(state: LimitState, point: int, number: int, smallest: float) -> Tab
     for level, one in enumerate(found.populations):
         own = rows[first : first + one.values.size]
         own["level"], own["value"], own["ancestor"] = level, one.values, one.ancestors
+        own["member"] = one.members
         for name in OF_LEVEL:
             own[name] = getattr(one, name)
         first += one.values.size
@@ -76,6 +79,7 @@ def repetitions_in(rows: NDArray[Any]) -> Iterator[tuple[int, int, Descent]]:
                 level[0]["log_probability"].item(),
                 level["value"],
                 level["ancestor"],
+                level["member"],
                 np.empty((0, 0)),
             )
             for level in np.split(group, _changes(group, "level"))

@@ -17,6 +17,7 @@ from stiction.model import check_memory
 from stiction.reliability.uncertainty import ancestral_variance
 
 Function = Callable[[Array], Array]
+Label = Callable[[Array], NDArray[np.int64]]
 
 LEVEL_PROBABILITY = 0.1
 """Share of a level's samples that continue to the next."""
@@ -37,6 +38,7 @@ class Population(NamedTuple):
     log_probability: float  # of the level
     values: Array  # (samples,)
     ancestors: NDArray[np.int64]  # the sample of the first level that each descends from
+    members: NDArray[np.int64]  # (samples,); which of equally likely interfaces each is of
     draws: Array  # (samples, dimension); empty for early levels
     acceptance: float = 1.0  # share of Metropolis steps
     step: float = FIRST_STEP  # b at the end
@@ -76,6 +78,12 @@ class Descent(NamedTuple):
         """Return the estimate of P(function < value); zero where no sample went so low."""
         rarest = self._holders(value)[-1]
         return math.exp(rarest.log_probability) * float((rarest.values < value).mean())
+
+    def below(self, value: float) -> tuple[float, NDArray[np.int64]]:
+        """Return the probability that each sample below a value stands for; their members."""
+        rarest = self._holders(value)[-1]
+        each = math.exp(rarest.log_probability) / rarest.values.size
+        return each, rarest.members[rarest.values < value]
 
     def relative_variance(self, value: float) -> float:
         """Return the squared coefficient of variation of `probability(value)`, from ancestry."""
@@ -146,11 +154,13 @@ def descend(
     probability: float = 0.0,
     floor: float = -math.inf,
     max_evaluations: float = math.inf,
+    label: Label = lambda draws: np.zeros(len(draws), np.int64),
 ) -> Descent:
     """Walk down to a threshold or a probability, whichever comes first.
 
     `function` takes draws (k, dimension) to values (k,); low values are rare, and none is below
-    `floor`. Each level has `samples`; none is begun that would exceed `max_evaluations`.
+    `floor`. Each level has `samples`; none is begun that would exceed `max_evaluations`. `label`
+    returns which of equally likely interfaces each sample is of.
 
     Au and Beck (2001) with the conditional sampling of Papaioannou, Betz, Zwirglmaier and Straub
     (2015), a preconditioned Crank-Nicolson walk whose acceptance does not fall with the dimension.
@@ -163,7 +173,9 @@ def descend(
     samples = count * max(2, round(samples / count))
     check_memory("algorithm 'subset'", COPIES * 8.0 * samples * dimension, ADVICE)
     draws = rng.standard_normal((samples, dimension))
-    populations = [Population(math.inf, 0.0, function(draws), np.arange(samples), draws)]
+    populations = [
+        Population(math.inf, 0.0, function(draws), np.arange(samples), label(draws), draws)
+    ]
     evaluations = samples
     while True:
         here = populations[-1]
@@ -194,5 +206,7 @@ def descend(
             function, here.draws[seeds], values[seeds], lowest, steps, here.step, rng
         )
         family = np.tile(here.ancestors[seeds], steps)
-        populations.append(Population(lowest, reached, found, family, states, acceptance, step))
+        populations.append(
+            Population(lowest, reached, found, family, label(states), states, acceptance, step)
+        )
         evaluations += cost

@@ -88,6 +88,20 @@ class Tail(NamedTuple):
         variances = [part * part * one.relative_variance(stress) for part, one in pairs if part]
         return math.sqrt(sum(variances)) / sum(parts)
 
+    def of_members(self, stress: float, count: int) -> Array:
+        """Return the probability of each of equally likely interfaces, (members,).
+
+        Where no sample of one is so low, it is not zero but what a single sample stands for.
+        """
+        total = sum(one.samples for one in self.repetitions)
+        found, single = np.zeros(count), 0.0
+        for one in self.repetitions:
+            each, members = one.below(stress)
+            each *= count * one.samples / total
+            found += each * np.bincount(members, minlength=count)
+            single += each / len(self.repetitions)
+        return np.minimum(np.where(found > 0.0, found, single), 1.0)
+
     def quantile(self, probability: float) -> float:
         """Return the stress below which the onset lies with this probability."""
         low, high = self.extent
@@ -200,6 +214,7 @@ def sample_tail(
             "max_evaluations": left,
             "threshold": stress,
             "floor": state.bounds[0],
+            "label": state.member,
             "rng": generator(seed, 1 if guide is None else 3, number),
         }
         if guide is None:

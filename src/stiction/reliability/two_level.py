@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.arrays import Array
-from stiction.reliability.subset import Function, descend, grow
+from stiction.reliability.subset import Function, Label, descend, grow
 from stiction.reliability.uncertainty import ancestral_variance
 
 GUIDING = 5
@@ -45,6 +45,7 @@ class Bridge(NamedTuple):
     log_probability: float = -math.inf  # logarithm of P(L < b)
     values: Array = np.zeros(0)  # E of samples with L < b
     ancestors: NDArray[np.int64] = np.zeros(0, np.int64)  # in the first level of the guide
+    members: NDArray[np.int64] = np.zeros(0, np.int64)  # which of equally likely interfaces
     share: float = 0.0  # share of them that fail
     last: float = 1.0  # P(L < b | E < s)
     last_variance: float = 0.0  # squared coefficient of variation of its estimate
@@ -66,6 +67,11 @@ class Bridge(NamedTuple):
         """Return the estimate of P(E < value), for values near its threshold."""
         share = float(np.mean(self.values < value)) if self.values.size else 0.0
         return math.exp(self.log_probability) * share / self.last
+
+    def below(self, value: float) -> tuple[float, NDArray[np.int64]]:
+        """Return the probability that each sample below a value stands for; their members."""
+        each = math.exp(self.log_probability) / max(self.values.size, 1) / self.last
+        return each, self.members[self.values < value]
 
     def relative_variance(self, value: float) -> float:
         """Return the squared coefficient of variation of `probability(value)`."""
@@ -101,6 +107,7 @@ def bridge(
     threshold: float = -math.inf,
     probability: float = 0.0,
     floor: float = -math.inf,
+    label: Label = lambda draws: np.zeros(len(draws), np.int64),
 ) -> Bridge:
     """Sample the exact lower tail near a threshold, or near a probability if none is given.
 
@@ -109,7 +116,7 @@ def bridge(
     """
     descent = descend(
         guide, dimension, rng=rng, samples=GUIDING * samples, threshold=threshold,
-        probability=MARGIN * probability, floor=floor,
+        probability=MARGIN * probability, floor=floor, label=label,
     )  # fmt: skip
     guided, spent, lowest = descent.evaluations, 0, descent.populations[-1]
     rarest = math.exp(lowest.log_probability)
@@ -151,7 +158,8 @@ def bridge(
             failing, stresses = states[-walkers:], found[-walkers:]
         best = Bridge(
             samples, rarest, spent, guided, True, population.log_probability, values, families,
-            float(failed.mean()), last, last_variance, failing, stresses,
+            population.members[looked], float(failed.mean()), last, last_variance, failing,
+            stresses,
         )  # fmt: skip
         if last >= LAST_FACTOR:
             break

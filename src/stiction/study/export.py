@@ -52,8 +52,10 @@ def write_result(result: xr.Dataset, path: Path) -> None:
 def table_of(result: xr.Dataset) -> pd.DataFrame:
     """Return one column a variable, one row a sample at each point of the sweep.
 
-    Columns are named ``name (unit)``: what is swept, the sample number, what was found.
+    Columns are named ``name (unit)``: what is swept, the sample number, what was found. The curves
+    of equally likely interfaces are left out, their band is not.
     """
+    result = result.drop_dims("member", errors="ignore")  # their band stays
     wide = sorted(str(n) for n, v in result.data_vars.items() if {"x", "y"} & set(v.dims))
     if wide:
         warn_accuracy(

@@ -14,7 +14,7 @@ import xarray as xr
 
 from stiction.ensemble.batches import Table, usable_cores
 from stiction.ensemble.experiment import Experiment
-from stiction.ensemble.limit_state import LimitState
+from stiction.ensemble.limit_state import LimitState, weakest_first
 from stiction.ensemble.pilot import exact_counterpart
 from stiction.ensemble.store import Store
 from stiction.errors import InputError, warn_accuracy
@@ -154,6 +154,8 @@ def compute(
     if part is not None:
         wanted &= samples_of_part(part, *wanted.shape)
     jobs = [(point, number) for number, point in np.argwhere(wanted.T).tolist()]
+    if jobs:
+        points = [weakest_first(_state(one, settings)).experiment for one in points]
     meter = Meter("failure curve", len(jobs), progress, unit="repetitions")
     with ExitStack() as stack:
         stack.callback(store.save)  # also on Ctrl-C

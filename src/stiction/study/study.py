@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import pydantic
 import tomli_w
-from pydantic import BeforeValidator, model_validator
+from pydantic import BeforeValidator, Discriminator, Tag, model_validator
 
 from stiction.dynamics.save import Save
 from stiction.ensemble.dataset import GridAxes, variables_in
@@ -57,13 +57,17 @@ AnyMethod: Any = Annotated[
     ),
 ]
 """Any registered method; in a study file ``type`` selects it."""
-AnyRandom: Any = Annotated[
+_One: Any = Annotated[
     RandomInterface,
     BeforeValidator(
         lambda given: as_random_interface(given) if isinstance(given, RandomField) else given
     ),
 ]
-"""A random interface; a field alone becomes one."""
+AnyRandom: Any = Annotated[
+    Annotated[_One, Tag("one")] | Annotated[list[_One], Tag("several")],
+    Discriminator(lambda given: "several" if isinstance(given, list | tuple) else "one"),
+]
+"""A random interface, or several that are equally likely; a field alone becomes one."""
 
 
 @model(kw_only=True)
@@ -89,8 +93,9 @@ class Study(_Parts):
     Parameters
     ----------
     problem : Problem
-    random : RandomInterface or RandomField
-        The random properties; a field alone is the peak strength, Pa.
+    random : RandomInterface, RandomField or list of them
+        The random properties; a field alone is the peak strength, Pa. Of a list, each is equally
+        likely.
     method : LocalCriterion, Equilibrium or Rupture
     ensemble : Ensemble
     sweep : list of dict
