@@ -3,24 +3,21 @@
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
-import scipy.stats
 
 from stiction.arrays import Array
-from stiction.ensemble.dotted_keys import with_values
 from stiction.errors import InputError, prefixed
-from stiction.model import describe, is_finite
+from stiction.model import describe
 from stiction.problem import Problem
-from stiction.random.fields import RandomField, RandomInterface, as_random_interface
+from stiction.random.dotted_keys import distribution_of, full_key, with_values
+from stiction.random.fields import RandomInterface, as_random_interface
 
 TAIL = 1e-4
 """Probability that is cut from either end of a prior whose density is zero there."""
-MARGINAL = ("mean", "cv", "low", "high", "scale", "alpha", "beta")
-"""Parameters of a marginal, whose keys begin with its name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,41 +109,6 @@ def _tails(distribution: Any) -> tuple[float, float]:
     return low, 1.0 - high
 
 
-def full_key(key: str) -> str:
-    """Return a key as in a sweep; keys of the strength may be given without their prefix."""
-    first = key.split(".")[0]
-    if first in ("problem", "random"):
-        return key
-    if first in {field.name for field in fields(RandomInterface)}:
-        return f"random.{key}"
-    if first in {field.name for field in fields(RandomField)}:
-        return f"random.strength.{key}"
-    if first in MARGINAL:
-        raise InputError(f"unknown {key!r}; did you mean 'marginal.{key}'?")
-    return f"random.strength.spectrum.{key}"
-
-
-def distribution_of(key: str, value: Any) -> Any:
-    """Return a frozen distribution, given one, two ends, or a table {low, high, spacing}."""
-    if isinstance(getattr(value, "dist", None), scipy.stats.rv_continuous):
-        return value
-    if isinstance(value, list | tuple) and len(value) == 2:
-        value = {"low": value[0], "high": value[1]}
-    table = {"spacing": "linear"} | dict(value) if isinstance(value, Mapping) else {}
-    low, high, spacing = (table.get(name, np.nan) for name in ("low", "high", "spacing"))
-    valid = len(table) == 3 and is_finite(low) and is_finite(high) and low < high
-    if valid and spacing == "linear":
-        return scipy.stats.uniform(low, high - low)
-    if valid and spacing == "log" and low > 0.0:
-        return scipy.stats.loguniform(low, high)
-    raise InputError(
-        f"prior: {key}: must be a frozen continuous scipy.stats distribution such as"
-        " scipy.stats.uniform(1e-3, 9e-3), a range (low, high) with low < high, or"
-        " {'low': ..., 'high': ..., 'spacing': 'linear' or, of a positive range, 'log'}, got"
-        f" {describe(value)}"
-    )
-
-
 def make_prior(problem: Problem, random: Any, given: Any) -> Prior:
     """Return the prior of these arguments, or raise one `InputError` with all that is wrong."""
     if not isinstance(given, Mapping) or not given:
@@ -162,7 +124,7 @@ def make_prior(problem: Problem, random: Any, given: Any) -> Prior:
         try:
             found[str(key)] = distribution_of(key, value)
         except InputError as error:
-            problems += error.problems
+            problems += [f"prior: {text}" for text in error.problems]
     if problems:
         raise InputError(problems)
     random = as_random_interface(random)

@@ -25,7 +25,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stiction.arrays import Array
-from stiction.inference.prior import Prior, full_key
+from stiction.inference.prior import Prior
+from stiction.random.dotted_keys import full_key
 from stiction.random.marginals import affine_parameters
 
 MARGINAL = "random.strength.marginal."

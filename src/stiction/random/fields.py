@@ -16,10 +16,11 @@ from scipy.optimize import brentq
 from scipy.special import ndtri
 
 from stiction.arrays import Array
-from stiction.errors import InputError, unknown_name, warn_accuracy
+from stiction.errors import InputError, prefixed, unknown_name, warn_accuracy
 from stiction.friction import SCALES
 from stiction.interface import Interface
 from stiction.model import (
+    Count,
     Flag,
     Number,
     Numbers,
@@ -31,6 +32,7 @@ from stiction.model import (
     model,
 )
 from stiction.random.conditioning import Conditioning, Conditions, Measured
+from stiction.random.dotted_keys import distribution_of, full_key, with_values
 from stiction.random.mapping import correlation_of_mapped, from_normal, hermite_coefficients
 from stiction.random.marginals import AnyMarginal
 from stiction.random.modes import Modes, make_modes
@@ -460,6 +462,64 @@ class RandomInterface:
     ) -> dict[str, Array]:
         """Sample profiles by name, (samples, *shape) each; sample i depends on (seed, i) only."""
         return self.from_draws(interface, self.draws(interface, samples, seed, first))
+
+    @checked
+    def uncertain(
+        self, parameters: Mapping[str, Any], count: Count, seed: Number = 0
+    ) -> list[RandomInterface]:
+        """Return equally likely random interfaces, whose parameters have these distributions.
+
+        For a failure probability under all of them. The parameters are independent; each has one
+        value in every interval of probability 1/count (Latin hypercube; McKay and others, 1979).
+
+        Parameters
+        ----------
+        parameters : mapping
+            Distributions by dotted key, as priors of `infer`: frozen ones of `scipy.stats`, ranges
+            (low, high), or tables as in a study file.
+        count : int
+            Their number; 30 show a 90 % band.
+        seed : int
+            Not negative.
+
+        Examples
+        --------
+        >>> import scipy.stats
+        >>> import stiction as st
+        >>> problem = st.paper.problem(nodes=256)
+        >>> strength = st.paper.strength(problem, correlation_ratio=1.0)
+        >>> likely = st.RandomInterface(strength=strength).uncertain(
+        ...     {"strength.spectrum.correlation_length": scipy.stats.loguniform(1e-3, 6e-2)}, 30
+        ... )
+        >>> len(likely), likely[0].strength.marginal == strength.marginal
+        (30, True)
+        """
+        keys = [full_key(str(key)) for key in parameters]
+        outside = [key for key in keys if not key.startswith("random.")]
+        problems = [f"{key}: is not of what is random" for key in outside]
+        problems += [f"{key}: is given twice" for key in {*keys} if keys.count(key) > 1]
+        if not keys:
+            problems.append("must map keys to distributions, got none")
+        distributions = []
+        for key, given in parameters.items():
+            try:
+                distributions.append(distribution_of(str(key), given))
+            except InputError as error:
+                problems += error.problems
+        if problems:
+            raise InputError([f"uncertain: {text}" for text in problems])
+        rng, found = np.random.default_rng([seed, 6]), []
+        cells = rng.permuted(np.tile(np.arange(count), (len(keys), 1)), axis=1)
+        shares = (cells + rng.random(cells.shape)) / count
+        rows = [one.ppf(share) for one, share in zip(distributions, shares, strict=True)]
+        own = [key.removeprefix("random.") for key in keys]
+        for values in np.transpose(rows).tolist():
+            pairs = dict(zip(own, values, strict=True))
+            with prefixed(
+                "uncertain: at " + ", ".join(f"{k} = {v:.4g}" for k, v in pairs.items())
+            ):
+                found.append(with_values(self, pairs))
+        return found
 
     def warn_if_inaccurate(self, interface: Interface) -> None:
         """Warn if the grid is too coarse or the interface too short for a field."""

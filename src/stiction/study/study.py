@@ -17,7 +17,6 @@ from pydantic import BeforeValidator, Discriminator, Tag, model_validator
 
 from stiction.dynamics.save import Save
 from stiction.ensemble.dataset import GridAxes, variables_in
-from stiction.ensemble.dotted_keys import with_values
 from stiction.ensemble.experiment import Ensemble, Experiment
 from stiction.ensemble.limit_state import Event
 from stiction.ensemble.monte_carlo import gather
@@ -39,6 +38,7 @@ from stiction.model import (
 )
 from stiction.problem import Problem
 from stiction.profiles.reading import profile_in_file
+from stiction.random.dotted_keys import with_values
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 from stiction.reliability.answer import Probability
 from stiction.study.run import AnyPart, StoredRun, samples_of_part

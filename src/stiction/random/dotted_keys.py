@@ -1,0 +1,99 @@
+"""Dotted keys: parameters, however deep, to which values or distributions are given."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import scipy.stats
+
+from stiction.errors import InputError, prefixed, unknown_name
+from stiction.model import describe, is_finite, keys_of
+from stiction.random.marginals import Marginal, ScipyMarginal, marginal_of
+from stiction.variables import PROFILES
+
+OF_INTERFACE = (*PROFILES, "correlation", "between")
+OF_FIELD = ("marginal", "spectrum", "anisotropy", "given")
+"""Keys of a random interface, and of a field."""
+MARGINAL = ("mean", "cv", "low", "high", "scale", "alpha", "beta")
+"""Parameters of a marginal, whose keys begin with its name."""
+
+
+def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
+    """Return a copy of a model object, or of each of a list, with dotted keys replaced at once.
+
+    Messages begin with `path`, the dotted key of the object itself. It is an `InputError` if a key
+    does not exist (the nearest valid one is named) or a value does not fit.
+    """
+    if isinstance(owner, list):
+        return [with_values(one, values, path) for one in owner]
+    changes: dict[str, Any] = {}
+    inside: dict[str, dict[str, Any]] = {}
+    for key, value in values.items():
+        name, _, rest = key.partition(".")
+        if rest:
+            inside.setdefault(name, {})[rest] = value
+        else:
+            changes[name] = value
+    if isinstance(owner, ScipyMarginal):
+        owner = {"type": owner.type, **dict(owner.parameters)}
+    table, begin = isinstance(owner, Mapping), f"{path}." if path else ""
+    if not table and not (dataclasses.is_dataclass(owner) and not isinstance(owner, type)):
+        raise InputError(f"{path}: has no keys of its own, it is {describe(owner)}")
+    names = {} if table else keys_of(type(owner))
+    unknown = [name for name in {**changes, **inside} if not table and name not in names]
+    if unknown:
+        raise InputError([unknown_name(path or "sweep", name, names) for name in unknown])
+    for name, below in inside.items():
+        part = owner.get(name) if table else getattr(owner, names[name])
+        changes[name] = with_values({} if part is None else part, below, begin + name)
+    if table:
+        return {**owner, **changes}
+    try:
+        return dataclasses.replace(owner, **{names[key]: one for key, one in changes.items()})
+    except InputError as error:
+        kind = f"{type(owner).__name__}."
+        texts = (text.removeprefix(kind) for text in error.problems)
+        raise InputError([begin + text for text in texts]) from None
+
+
+def full_key(key: str) -> str:
+    """Return a key as in a sweep; keys of the strength may be given without their prefix."""
+    first = key.split(".")[0]
+    if first in ("problem", "random"):
+        return key
+    if first in OF_INTERFACE:
+        return f"random.{key}"
+    if first in OF_FIELD:
+        return f"random.strength.{key}"
+    if first in MARGINAL:
+        raise InputError(f"unknown {key!r}; did you mean 'marginal.{key}'?")
+    return f"random.strength.spectrum.{key}"
+
+
+def distribution_of(key: str, value: Any) -> Any:
+    """Return a frozen distribution, given one, two ends, or a table {low, high, spacing}.
+
+    A marginal of a field, or its table, is one too.
+    """
+    if isinstance(value, Marginal) or (isinstance(value, Mapping) and "type" in value):
+        with prefixed(key):
+            return marginal_of(value).distribution
+    if isinstance(getattr(value, "dist", None), scipy.stats.rv_continuous):
+        return value
+    if isinstance(value, list | tuple) and len(value) == 2:
+        value = {"low": value[0], "high": value[1]}
+    table = {"spacing": "linear"} | dict(value) if isinstance(value, Mapping) else {}
+    low, high, spacing = (table.get(name, np.nan) for name in ("low", "high", "spacing"))
+    valid = len(table) == 3 and is_finite(low) and is_finite(high) and low < high
+    if valid and spacing == "linear":
+        return scipy.stats.uniform(low, high - low)
+    if valid and spacing == "log" and low > 0.0:
+        return scipy.stats.loguniform(low, high)
+    raise InputError(
+        f"{key}: must be a frozen continuous scipy.stats distribution such as"
+        " scipy.stats.uniform(1e-3, 9e-3), a range (low, high) with low < high, or"
+        " {'low': ..., 'high': ..., 'spacing': 'linear' or, of a positive range, 'log'}, or a"
+        " table of a marginal such as {'type': 'lognormal', 'mean': ..., 'cv': ...}, got"
+        f" {describe(value)}"
+    )
