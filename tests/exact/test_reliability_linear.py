@@ -1,13 +1,19 @@
 """Linear limit states in many dimensions, whose failure probability is known."""
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 import pytest
 from checks import assert_mean, standard_error
-from scipy.stats import norm
+from crooked import LINE
+from scipy.stats import chi2, norm
+from scipy.stats import t as student
+from setups import beta_strength
 
+import stiction as st
+from stiction.random.equally_likely import EquallyLikely
 from stiction.reliability.subset import descend
 from stiction.reliability.tail import Tail, agreement, repeat_until_precise
 from stiction.reliability.two_level import _covered, bridge
@@ -219,3 +225,76 @@ def test_runs_over_two_levels_that_find_no_failure_count_as_well():
     # Some 20 runs find one. Were those that find none left out, or replaced by a look at a more
     # frequent level, the mean would be thirty times too high.
     assert_mean(found, norm.cdf(-2.0) * norm.cdf(-3.0), errors=4.0)
+
+
+@dataclass(frozen=True)
+class AtOnePlace:
+    """A method whose onset is the strength at one node: its distribution is the marginal."""
+
+    type: str = "at_one_place"
+    label = "strength at node 37"
+    variables = staticmethod(st.LocalCriterion().variables)
+
+    def supports(self, problem):
+        return []
+
+    def seconds_per_sample(self, problem):
+        return 1e-5
+
+    def prepare(self, problem):
+        return lambda rows: dict.fromkeys(self.variables(problem), rows.strength[:, 37])
+
+
+def test_unknown_mean_and_variance_give_students_tail():
+    """Five Gaussian peaks, of mean 1.1 MPa and deviation 30 kPa: their posterior in 7 x 8 cells."""
+    count, mean, deviation = 5, 1.1e6, 30e3
+    variances = (count - 1) * deviation**2 / chi2.ppf((np.arange(8) + 0.5) / 8, count - 1)
+    places = norm.ppf((np.arange(7) + 0.5) / 7)
+    pairs = [(mean + place * (v / count) ** 0.5, v**0.5) for v in variances for place in places]
+    spectrum = beta_strength(9e-3).spectrum
+    likely = [
+        st.RandomInterface(strength=st.RandomField(norm(*pair), spectrum)) for pair in pairs
+    ]
+    options = {"method": AtOnePlace(), "target_cv": 0.2, "seed": 5, "workers": 1}
+    for score, algorithm in ((1.3, "plain"), (3.5, "subset")):
+        stress, scale = mean - score * deviation, (1.0 + 1.0 / count) ** 0.5
+        found = st.failure_probability(LINE, likely, stress, algorithm=algorithm, **options)
+        each = np.array([norm.cdf(stress, *pair) for pair in pairs])
+        error = 4.0 * found.cv * found.probability
+        assert found.probability == pytest.approx(each.mean(), abs=error)
+        # The cells are coarse: 21 % in the tail, where known parameters give a seventieth of it.
+        tail = student.cdf(-score / scale, count - 1)
+        assert found.probability == pytest.approx(tail, abs=0.21 * tail + error)
+    assert norm.cdf(-score) < tail / 70.0
+    # Those of members have this mean but for the many that no sample resolves, which are not zero.
+    assert found.probability < found.members.mean() < 1.4 * found.probability
+    assert found.members.min() > 0.0
+    carry = each > each.mean()
+    assert found.members[carry].sum() == pytest.approx(each[carry].sum(), rel=4.0 * found.cv)
+    assert found.band[1] == pytest.approx(np.quantile(each, 0.95), rel=0.5)
+
+
+def test_small_repetitions_over_members_are_unbiased():
+    """Five members in an order that is not that of their strength: the weakest carries the tail."""
+    shifts = np.array([1.5, -0.4, 0.3, 1.1, 0.0])
+    random = EquallyLikely((st.RandomInterface(strength=beta_strength(9e-3)),) * 5)
+
+    def lowest(draws):
+        return draws[:, 1:].sum(axis=1) / 5.0 + shifts[random.member(draws)]
+
+    options = {"samples": 100, "threshold": -3.3, "label": random.member}
+    runs = [descend(lowest, 26, rng=generator(seed, 8), **options) for seed in range(400)]
+    true = norm.cdf(-3.3 - shifts)
+    found = np.array([run.probability(-3.3) for run in runs]) / true.mean()
+    assert standard_error(found) < 0.12
+    assert_mean(found, 1.0, errors=3.5)
+    # The probability of each member is unbiased as well, those that are seen in few runs too.
+    shares = []
+    for run in runs:
+        each, members = run.below(-3.3)
+        shares.append(5 * each * np.bincount(members, minlength=5))
+    for number in (1, 2, 4):
+        assert_mean(np.array(shares)[:, number], true[number], errors=3.5)
+    resolved = Tail(runs).of_members(-3.3, 5)
+    assert resolved[[1, 2, 4]] == pytest.approx(true[[1, 2, 4]], rel=0.5)
+    assert 0.0 < resolved.min()

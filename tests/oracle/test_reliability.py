@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import xarray as xr
 from checks import assert_mean, standard_error
+from crooked import LINE
 from importance import by_importance, longer, mixture
-from setups import EXACT, LOCAL, ensemble
+from setups import EXACT, LOCAL, beta_strength, ensemble
 
 import stiction as st
 
@@ -135,3 +136,36 @@ def test_failure_probability_of_a_scanned_specimen_is_that_of_counting(probabili
     found = by((PROBLEM, given), stress, "subset", 0.1)
     error = np.hypot((probability * count) ** -0.5, found.cv)
     assert abs(np.log(found.probability / probability)) < 3.5 * error
+
+
+def test_two_very_different_interfaces_against_counting_and_each_alone():
+    """On a crooked line: short and weak, or long and strong with a random residual strength."""
+    problem, residual = LINE, st.Lognormal(mean=0.2e6, cv=0.1)
+    pair = [
+        st.RandomInterface(
+            strength=beta_strength(length, low, 1.9e6),
+            residual_strength=st.RandomField(residual, st.ExponentialSpectrum(5e-3)),
+            between={"strength": st.Lognormal(mean=1.0, cv=cv)},
+        )
+        for length, low, cv in ((2.3e-3, 0.66e6, 0.03), (17e-3, 0.73e6, 0.11))
+    ]
+    onsets = [ensemble(problem, one, 6000, seed=4).critical_stress.values for one in pair]
+    together = ensemble(problem, pair, 6000, seed=9).critical_stress.values
+    for share in (0.2, 0.02):
+        stress = float(np.quantile(np.concatenate(onsets), share))
+        each = np.array([(own < stress).mean() for own in onsets])
+        # Counting the list, and the tail of the list, within four standard errors.
+        error = 4.0 * (share / 6000) ** 0.5
+        assert (together < stress).mean() == pytest.approx(share, abs=error)
+    found = by((problem, pair), stress, "subset", 0.07)
+    error = math.hypot(found.cv, (share * 12_000) ** -0.5)
+    assert found.probability == pytest.approx(share, rel=4.0 * error)
+    assert each.min() < 0.5 * each.max()
+    assert found.members == pytest.approx(each, rel=0.3, abs=0.05 * each.max())
+    assert found.probability == pytest.approx(found.members.mean(), rel=1e-9)
+    design = st.design_stress(problem, pair, probability=0.001, method=LOCAL, target_cv=0.1)
+    alone = [by((problem, one), design.stress, "subset", 0.1).probability for one in pair]
+    assert np.mean(alone) == pytest.approx(0.001, rel=4.0 * math.hypot(0.1, 0.1))
+    # In the other order they are the same two.
+    back = by((problem, pair[::-1]), stress, "plain", 0.07)
+    assert back.members[::-1] == pytest.approx(each, rel=0.3, abs=0.05 * each.max())

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from stiction.arrays import Array
-from stiction.criterion.local import LocalCriterion
 from stiction.criterion.windows import windows_of
 from stiction.elasticity.places import places_of
 from stiction.ensemble.batches import in_threads, usable_cores
@@ -18,7 +17,7 @@ from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.monte_carlo import check_fields
 from stiction.errors import InputError
 from stiction.friction import SCALES
-from stiction.methods import MethodObject
+from stiction.methods import METHODS, MethodObject
 from stiction.model import Count, Numbers, check, checked, describe
 from stiction.problem import Problem
 from stiction.progress import SILENT, Meter
@@ -156,16 +155,17 @@ def weakest_first(state: LimitState) -> LimitState:
     """Return the same limit state with equally likely interfaces in order, the weakest first.
 
     Neighbours are then alike, and a chain that goes down moves from one to the next. Their order is
-    that of a low quantile of the same few samples of each, by the local criterion if it holds.
+    that of a low quantile of the same few samples of each, by the method's first stage if it holds.
     """
-    experiment = state.experiment
-    problem, random = experiment.problem, experiment.random
+    experiment, random = state.experiment, state.experiment.random
     count = len(random.members)
     if count == 1:
         return state
+    first_stage = getattr(experiment.method, "first_stage", None)
+    apt = first_stage and not no_single_length(experiment.problem, random)
+    by = state.by(METHODS[first_stage]()) if apt else state
     draws = np.repeat(state.draws(0, 0, RANKED), count, axis=0)
     draws[:, 0] = np.tile(ndtri((np.arange(count) + 0.5) / count), RANKED)
-    by = state if no_single_length(problem, random) else state.by(LocalCriterion())
     onset = by(draws).reshape(RANKED, count)
     lowest = np.array(state.bounds_of_members())[:, 0]
     weak = np.maximum(onset.mean(axis=0) - LOW * onset.std(axis=0), lowest)
