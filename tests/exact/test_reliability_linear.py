@@ -297,4 +297,4 @@ def test_small_repetitions_over_members_are_unbiased():
         assert_mean(np.array(shares)[:, number], true[number], errors=3.5)
     resolved = Tail(runs).of_members(-3.3, 5)
     assert resolved[[1, 2, 4]] == pytest.approx(true[[1, 2, 4]], rel=0.5)
-    assert 0.0 < resolved.min()
+    assert resolved.min() > 0.0

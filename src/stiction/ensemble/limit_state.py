@@ -161,7 +161,7 @@ def weakest_first(state: LimitState) -> LimitState:
     count = len(random.members)
     if count == 1:
         return state
-    first_stage = getattr(experiment.method, "first_stage", None)
+    first_stage: Any = getattr(experiment.method, "first_stage", None)
     apt = first_stage and not no_single_length(experiment.problem, random)
     by = state.by(METHODS[first_stage]()) if apt else state
     draws = np.repeat(state.draws(0, 0, RANKED), count, axis=0)
