@@ -28,23 +28,25 @@ NEAREST = {
     "cli": "cli reliability conditional_study planes",
     "criterion": "criterion griffith crooked statistics_*",
     "dynamics": "dynamics_* rupture_stations plane_rupture misfit examples",
-    "elasticity": "dynamics_kernels dynamics_waves dynamics_convolution criterion equilibrium",
+    "elasticity": "blocks block_response specimens dynamics_kernels dynamics_waves criterion"
+    " dynamics_convolution equilibrium",
     "ensemble": "store ensemble study progress own_method reliability",
-    "equilibrium": "crooked equilibrium plane_equilibrium planes plane_gaps friction_laws",
+    "equilibrium": "crooked specimens equilibrium plane_equilibrium planes plane_gaps"
+    " instability friction_laws",
     "friction": "friction_laws friction_coefficients crooked dynamics_properties",
     "inference": "inference* fit_* profiles agreement",
     "jit": "cache architecture own_method",
-    "plot": "plot planes inference examples",
-    "problem": "bad_input crooked criterion equilibrium profiles friction_coefficients",
+    "plot": "plot shown specimens agreement planes inference examples",
+    "problem": "specimens bad_input crooked criterion equilibrium profiles friction_coefficients",
     "profiles": "profiles plane_gaps crooked fit_field",
     "random": "fields conditional* random_interface marginal_families plane_fields reliability",
     "reliability": "reliability* failure_run",
-    "report": "cli study planes",
+    "report": "shown cli study planes",
     "statistics": "statistics_* criterion inference",
     "study": "study store cli planes own_method failure_run",
 }
 """Names of test files; the rest of the package is tested by what uses it."""
-REST = "bad_input criterion crooked study dynamics_input own_method"
+REST = "bad_input specimens crooked criterion study dynamics_input own_method"
 
 
 def tests_near(target: str) -> list[str]:
