@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
+from crooked import crooked
 from oracles import by_linear_programme, by_relaxation, dense, largest_load, symbol_of
 from planes import WAVENUMBERS, Lattice, plane_sample
 from scipy.linalg import eigh
 from setups import (
     LENGTH,
     RATE,
+    ROUND_OFF,
     beta_strength,
     exact_onset,
     make_problem,
@@ -18,8 +20,9 @@ from setups import (
 import stiction as st
 from stiction.elasticity.linear import lowest_eigenvector
 from stiction.elasticity.operator import make_operator
-from stiction.equilibrium.relaxation import least_equilibrium
-from stiction.equilibrium.sample import Outcome
+from stiction.equilibrium.bracket import make_bracket
+from stiction.equilibrium.relaxation import least_equilibrium, stable_equilibrium
+from stiction.equilibrium.sample import Outcome, present_pieces
 from stiction.equilibrium.solver import follow
 from stiction.equilibrium.transforms import Plane, PlaneProgram, plane_onset
 
@@ -72,6 +75,33 @@ def test_bounds_and_multiplier_equal_the_linear_programme(seed, wavenumbers):
     assert found.lower == pytest.approx(exact, rel=1e-9)
     error = np.abs(found.multiplier - multiplier.reshape(shape)).max()
     assert error < 1e-6 * multiplier.max()
+
+
+def test_any_multiplier_bounds_the_onset_where_some_nodes_do_not_weaken():
+    """What is lifted to A y <= 0 bounds the linear programme from above; A z < 0 throughout."""
+    rng, shape = np.random.default_rng(8), (14, 12)
+    symbol = Lattice((3.0 * LENGTH, 2.3 * LENGTH), 1e9, 0.33).symbol(shape)
+    rate = np.maximum(RATE * (noise(3.0, rng, shape) - 0.3), 0.0)
+    strength, profile = 0.7e6 + 1e6 * noise(2.0, rng, shape), 1.3 + 0.4 * noise(3.0, rng, shape)
+    assert 20 < np.sum(rate == 0.0) < 120
+    matrix = dense(symbol, shape) - np.diag(rate.ravel())
+    given = (field.ravel() for field in (rate, strength, profile))
+    exact, _, multiplier = by_linear_programme(dense(symbol, shape), *given)
+    bracket = make_bracket(symbol, rate, strength, profile)
+    lifting, lifted = bracket.lifting
+    assert lifting.min() > 0.0
+    assert lifted.min() > 1e-3 * RATE
+    np.testing.assert_allclose(lifted, -matrix @ lifting, atol=ROUND_OFF * RATE)
+    for rough in (1.0, 1e-2, 1e-5):
+        bound = bracket.raise_multiplier(
+            multiplier * (1.0 + rough * noise(1.0, rng, shape).ravel())
+        )
+        assert exact * (1.0 - 1e-12) <= bound
+        taken = bracket.multiplier
+        assert bracket.upper == pytest.approx(taken @ strength.ravel(), rel=1e-12)
+        assert profile.ravel() @ taken == pytest.approx(1.0, rel=1e-12)
+        assert (matrix @ taken).max() <= ROUND_OFF * RATE * taken.max()
+    assert bracket.upper == pytest.approx(exact, rel=1e-3)
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-170])  # of the guess; the square of the other is zero
@@ -203,6 +233,40 @@ def test_laws_of_several_pieces_against_relaxation(name):
         loads = np.full(NODES, share * load)
         slip = by_relaxation(symbol_of(problem), loads, law, critical, rest=1e-5)
         assert (slip is None) == slides
+
+
+def test_a_step_of_the_stable_path_passes_no_steeper_weakening_that_is_unstable():
+    """By eigenvalues of the dense matrix: a long step over the steep piece is refused, although
+    each end of it is stable; one that only shorter steps show to be stable is taken."""
+    law = {"slip": [0.02, 0.05, 1.0], "strength": [0.98, 0.9, 0.0], "weakening_rate": 6e10}
+    friction = st.PiecewiseWeakening(**law, residual_strength=1.5e5)
+    problem, strength = crooked((24, 20), (0.023, 0.0164), friction=friction)
+    program = PlaneProgram(problem)
+    sample = program.sample_of(problem.sample(strength), 0)
+    operator = program._operator(sample)
+    stiffness, slopes = dense(symbol_of(problem), (24, 20)), sample.pieces.slopes
+    first = (sample.excess / sample.profile).min()
+
+    def least(rate):
+        """The lowest eigenvalue of A on the nodes that slip, over K of one node."""
+        at = np.flatnonzero(slip > 0.0)
+        matrix = stiffness[np.ix_(at, at)] - np.diag((rate * sample.rate)[at])
+        return eigh(matrix, eigvals_only=True, subset_by_index=[0, 0])[0] / stiffness[0, 0]
+
+    slip, taken, refused, spared = np.zeros(480), 0, 0, 0
+    for share in np.arange(1.02, 1.515, 0.01):
+        load = share * first
+        slip = stable_equilibrium(operator, sample, load, slip, 1e-9)
+        present = present_pieces(sample, slip).piece
+        steepest = least(np.maximum.accumulate(slopes[:-1])[present])
+        found = stable_equilibrium(operator, sample, load, np.zeros(480), 1e-9)
+        assert (found is not None) == (steepest > 0.0)
+        taken, refused = taken + (steepest > 0.0), refused + (steepest <= 0.0)
+        spared += steepest > 0.0 > least(np.full(480, slopes.max()))
+        if found is not None:
+            np.testing.assert_allclose(found, slip, atol=1e-6 * slip.max())
+    assert taken > refused > 0
+    assert spared > 0
 
 
 @pytest.fixture

@@ -180,6 +180,23 @@ def test_kinetic_stress_is_that_of_the_first_global_sliding():
     assert run.arrested_events.item() == 0
 
 
+def test_after_global_sliding_there_is_no_other_onset():
+    """A sudden load on a barrier overshoots: the mean stress falls, from above the onset."""
+    problem = ruptures.wavy_line(NODES, residual_strength=1e5)[0]
+    load = ([0.0, 0.1, 0.10001, 0.2], [0.0, 1e6, 2.2e6, 2.2e6])
+    one, other = (
+        simulate(barred(np.inf), problem, st.Save(every=100), load=load, **options)
+        for options in ({}, {"stop": "time", "end_time": 0.1002})
+    )
+    later = other.step_mean_stress.values[other.step_time.values > 0.10001]
+    fall = np.maximum.accumulate(later) - later
+    assert fall.max() > 2e-3 * later.max()
+    assert later.max() > 2.0 * other.critical_stress.item()
+    for name in ("critical_stress", "onset_time", "critical_position", "kinetic_stress"):
+        assert one[name].item() == other[name].item(), name
+    assert one.arrested_events.item() == other.arrested_events.item()
+
+
 @pytest.mark.parametrize("stop", ["onset", "rest"])
 def test_where_a_run_stops_and_what_is_known_then(stop):
     tau_p = np.where(np.abs(X - 0.4) < 0.15, 0.8e6, 3e6)

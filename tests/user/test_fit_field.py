@@ -122,6 +122,46 @@ def test_several_records_are_of_one_field(plain):
     assert many.lengths_held == pytest.approx(2.0 * plain.lengths_held, rel=0.2)
 
 
+def test_the_figure_of_a_fit_is_the_record_and_the_fit():
+    values, _ = record_of(FIELD, COUNT, SPACING, seed=5, noise=8e4)
+    fit = fitted(values, PIECE, noise=True)
+    histogram, quantiles, correlation, spectrum = st.plot.fit(fit).axes
+    noise = fit.parameters["noise"]
+    assert noise == pytest.approx(8e4, rel=0.3)
+    heights = np.array([bar.get_height() * bar.get_width() for bar in histogram.patches])
+    assert heights.sum() == pytest.approx(1.0)
+    middles = [bar.get_x() + 0.5 * bar.get_width() for bar in histogram.patches]
+    assert heights @ middles == pytest.approx(values.mean() * 1e-6, abs=0.01)
+    x, y = histogram.lines[0].get_data()
+    distribution = fit.field.marginal.distribution
+    assert y == pytest.approx(distribution.pdf(x * 1e6) * 1e6)
+    share = (np.arange(200) + 0.5) / 200
+    line, points = quantiles.lines
+    assert line.get_xdata() == pytest.approx(distribution.ppf(share) * 1e-6)
+    # The noise is taken off the values.
+    spread = points.get_ydata().std() / (values.std() * 1e-6)
+    assert spread == pytest.approx((1.0 - noise**2 / values.var()) ** 0.5, rel=0.03)
+    line, points = correlation.lines[:2]
+    assert points.get_xdata()[1] == pytest.approx(SPACING * 1e3)
+    residue = values - values.mean()
+    products = [residue[: COUNT - lag] @ residue[lag:] / (residue @ residue) for lag in (1, 4)]
+    assert points.get_ydata()[[1, 4]] == pytest.approx(products, abs=0.08)  # its taper
+    assert line.get_ydata()[1] < 0.95  # not without the noise
+    line, points, level = spectrum.lines
+    assert points.get_xdata()[0] == pytest.approx(2.0 * np.pi / (COUNT * SPACING))
+    excess = np.log(points.get_ydata() / line.get_ydata())[-12:-1]  # of many values each
+    assert np.abs(excess).max() < 0.7
+    assert excess.mean() == pytest.approx(0.0, abs=0.15)
+    assert level.get_ydata()[0] == pytest.approx(noise**2 * SPACING * 1e-12)
+    assert 1.0 < line.get_ydata()[-1] / level.get_ydata()[0] < 3.0
+    axes = (histogram, quantiles, correlation, spectrum)
+    labels = [one.get_xlabel() for one in axes] + [spectrum.get_ylabel()]
+    assert labels == [
+        "strength (MPa)", "quantile of the fit (MPa)", "lag along x (mm)", "wavenumber (rad/m)",
+        "spectral density (MPa² m)",
+    ]  # fmt: skip
+
+
 def test_maps_are_fitted_too():
     truth = st.RandomField(
         st.Weibull(mean=2e6, cv=0.3), st.SquaredExponentialSpectrum(1e-3), mean_mode=True

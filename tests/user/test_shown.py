@@ -149,6 +149,18 @@ def test_figures_of_a_report_are_the_dataset_in_the_units_of_their_axes(folder):
             assert {*y[np.isclose(x, at)].round(9)} == {least.round(9), most.round(9)}
 
 
+def test_bands_of_a_single_curve_are_its_quantiles(folder):
+    data = st.open_run(folder).dataset().isel(low=1)
+    axes = st.plot.quantiles(data, quantity="critical_stress")
+    assert axes.get_ylabel() == "critical stress (MPa)"
+    values = data.critical_stress.values * 1e-6
+    for band, share in zip(axes.collections[:2], (5, 25), strict=True):
+        x, y = band.get_paths()[0].vertices.T
+        for at, row in zip((1.5, 3.5), values, strict=True):
+            ends = np.percentile(row, (share, 100 - share), method="median_unbiased")
+            assert {*y[np.isclose(x, at)].round(9)} == {*ends.round(9)}
+
+
 def test_three_axes_are_along_within_and_over_the_figures(folder):
     data, page = st.open_run(folder).dataset(), Shown("")
     grown = xr.concat([data, data, data], "length").assign_coords(length=[0.1, 0.2, 0.3])

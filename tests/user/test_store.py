@@ -13,14 +13,16 @@ import numpy as np
 import pytest
 import scipy.stats
 import xarray as xr
+from crooked import LINE
 from executors import Counting, Forbidding
 from refusals import refuses
-from setups import make_problem
+from setups import beta_strength, make_problem
 from small_study import lengths, small_study
 
 import stiction as st
 from stiction import files
 from stiction.ensemble import batches, pilot, store
+from stiction.ensemble.dataset import Gathered
 from stiction.ensemble.experiment import Experiment
 from stiction.errors import StoreError, WorkerError
 from stiction.study.run import samples_of_part
@@ -282,6 +284,22 @@ def test_failed_samples_are_nan_listed_and_retried(tmp_path, often, reference, m
     assert len(json.loads(stored.attrs["failed_samples"])) == 8
     assert make_study().run(out=tmp_path / "run").identical(reference)
     assert st.open_run(tmp_path / "run").status().failures == ()
+
+
+def test_counts_are_whole_numbers_and_samples_beyond_the_last_are_left_out():
+    """Which another process, with more samples, may have stored; a count that is lost is NaN."""
+    point = Experiment(LINE, beta_strength(4e-3), st.Equilibrium())
+    whole = batches.solve_span(point, batches.Span(0, 5, 5))
+    failures = tuple(batches.Failure(0, sample, 0, "lost") for sample in (7, 8))
+    for rows, lost in ((whole.rows, []), (np.delete(whole.rows, 2), [7])):
+        gathered = Gathered([point], st.Ensemble(samples=3, first=5))
+        gathered.add(whole._replace(rows=rows, failures=failures))
+        assert [one.sample for one in gathered.failed] == lost
+        found = gathered.dataset({})
+        counts = found.arrested_events
+        assert counts.dtype.kind == ("f" if lost else "i")
+        assert found.sample[counts.isnull().values].values.tolist() == lost
+        np.testing.assert_array_equal(counts[:2], whole.rows["arrested_events"][:2])
 
 
 def test_a_study_that_fails_from_the_start_is_given_up(tmp_path, often, monkeypatch):
