@@ -9,7 +9,7 @@ import stiction as st
 from stiction.criterion.average import _between_nodes, least_average
 from stiction.criterion.windows import ellipse_window
 from stiction.elasticity.operator import make_operator
-from stiction.equilibrium import transforms
+from stiction.equilibrium import relaxation, transforms
 from stiction.equilibrium.relaxation import least_equilibrium
 from stiction.equilibrium.sample import Outcome
 from stiction.equilibrium.transforms import Plane, plane_onset
@@ -228,6 +228,50 @@ def test_path_is_the_slip_at_onset_just_below_it():
     assert (np.diff(slips[:4], axis=0) >= -1e-12 * slips[3].max()).all()
     # slip comes up to that at onset with the square root of the load, 1e-3 of it
     assert np.abs(slips[3].reshape(SHAPE) - found.slip).max() < 0.01 * found.slip.max()
+
+
+def walled(seed):
+    """A weak patch behind a barrier around it, with other weak patches beyond."""
+    rng = np.random.default_rng(seed)
+    strength = 0.5e6 + 2.5e6 * smooth(rng, 3.0, SHAPE)
+    x, y = np.ogrid[: SHAPE[0], : SHAPE[1]]
+    far = np.hypot(x - rng.uniform(12, 28), y - rng.uniform(10, 20))
+    wall, thick = rng.uniform(6, 9), rng.uniform(1.5, 4.0)
+    strength[far < wall] *= 0.6
+    strength[(far >= wall) & (far < wall + thick)] *= rng.uniform(1.0, 2.0)
+    return plane_sample(strength, 3e5 * rng.uniform(0.5, 1.0), RATE)
+
+
+@pytest.mark.parametrize("seed", [7, 13])
+def test_a_growing_patch_stops_at_a_barrier_and_meets_others(monkeypatch, seed):
+    """As with steps that solve for the least equilibrium of bounds; not if nothing is checked."""
+    sample = walled(seed)
+    operator = make_operator(PLANES["lattice"].symbol(SHAPE), RATE, SHAPE)
+    loads = sample.excess.min() * np.linspace(1.1, 3.0, 12)
+
+    def course():
+        slips = [np.zeros(sample.excess.size)]
+        for load in loads:
+            found = least_equilibrium(operator, sample, load, slips[-1])
+            if found.status != Outcome.ARRESTED:
+                break
+            slips.append(found.slip)
+        return np.array(slips)
+
+    def apart(first, second):
+        return np.abs(first - second).max() / sample.critical.max()
+
+    ours = course()
+    assert 5 < len(ours) < len(loads)
+    with monkeypatch.context() as patch:
+        patch.setattr(relaxation, "ENDS", np.inf)  # no patch is followed as it grows
+        exact = course()
+    assert len(exact) == len(ours)
+    # Residuals of 1e-7 of the strength, over the lowest eigenvalue.
+    assert apart(ours, exact) < 1e-5
+    monkeypatch.setattr(relaxation, "longest_step", lambda *_: 1.5)
+    passed = course()
+    assert len(passed) < len(ours) or apart(passed[: len(ours)], ours) > 1e-2
 
 
 def test_tiny_and_negative_loads_close_as_well():

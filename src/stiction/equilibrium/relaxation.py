@@ -15,21 +15,25 @@ from stiction.elasticity.linear import (
     EXHAUSTED,
     NEGATIVE,
     SOLVED,
+    Spring,
+    inner,
     lowest_eigenvector,
     no_spring,
     residual_of,
     solve_inside,
 )
-from stiction.elasticity.operator import Operator
+from stiction.elasticity.operator import Operator, filtered
 from stiction.equilibrium.held_equilibrium import ITERATIONS, equilibrate
 from stiction.equilibrium.sample import (
     Outcome,
     Present,
     Sample,
+    piece_at,
     present_pieces,
     residual_nodes,
     step_to_corner,
 )
+from stiction.jit import jit
 
 NEWTON = 100
 STEPS = 2000
@@ -43,6 +47,24 @@ DRAG = 1e-3
 """Stiffness added to steps that leave out all weakening, as a share of the largest W."""
 ROUGH = 0.05
 """Largest residual stress of a step, as a share of the weakening left out in the step before."""
+FIRST = 0.05
+"""Growth of a patch that is tried first, as a share of d_c."""
+ENDS = 2e-3
+"""Growth in a step, as a share of d_c, below which a patch is not followed any more."""
+MOST = 0.98
+"""Largest share of the weakening in a step of a growing patch."""
+SPARED = 0.1
+"""Residual stress of such a step, as a share of the weakening left out."""
+HELD = 0.9
+"""Amplitude at which a spring holds a growing patch, as a share of that expected."""
+FREE = 0.3
+"""Share of the weakening up to which no spring holds the patch."""
+RUNS = -1.0
+"""Force of the spring, over that at rest, below which the patch outruns what was expected."""
+USED, LONGEST = 0.3, 1.5
+"""Share of a step that must be possible, or it has failed, and how much of it is made at most."""
+FAILURES = 3
+"""Failures in a row after which a growing patch is not followed any more."""
 
 
 def residual_tolerance(sample: Sample, load: float, accuracy: float) -> float:
@@ -182,6 +204,142 @@ def _weakening_step(
     return moved
 
 
+@jit
+def longest_step(sample: Sample, rest: Array, slip: Array, move: Array, image: Array) -> float:
+    """Return the largest t at which no node that moves to slip + t `move` is held back.
+
+    `rest` is the overload at the slip (Pa), not negative where a node moves, and `image` K times
+    the move. Under a law that only flattens the overload is concave in t: it is not negative on the
+    way, either.
+    """
+    pieces = sample.pieces
+    longest = np.inf
+    for i in range(slip.size):
+        if not move[i] > 0.0:
+            continue
+        here, left = 0.0, rest[i]
+        piece = piece_at(pieces, sample.critical[i], slip[i])
+        while here < longest:
+            corner = np.inf
+            if piece < pieces.ends.shape[0]:
+                corner = (pieces.ends[piece] * sample.critical[i] - slip[i]) / move[i]
+            fall = image[i] - pieces.slopes[piece] * sample.rate[i] * move[i]
+            if fall > 0.0 and left < (corner - here) * fall:
+                longest = min(longest, here + max(left, 0.0) / fall)
+                break
+            if corner == np.inf:
+                break
+            left -= (corner - here) * fall
+            here = corner
+            piece += 1
+    return longest
+
+
+class Push(NamedTuple):
+    """Slip to be added (m), K times it (Pa), how often it may be, the force that holds it."""
+
+    move: Array
+    image: Array
+    longest: float
+    force: float
+
+
+def _push(
+    operator: Operator,
+    sample: Sample,
+    rest: Array,
+    slip: Array,
+    growth: Array,
+    share: float,
+    tolerance: float,
+) -> Push | None:
+    """Slip that a growing patch adds where it is overloaded by `rest`; None if it has no bound.
+
+    Nodes weaken by a share of what they do on the way to the growth expected. A spring holds the
+    patch at an amplitude: K less this weakening may have a direction of negative curvature.
+    """
+    inside = rest >= 0.0
+    move = np.where(inside, growth, 0.0)
+    rate, moving = present_pieces(sample, slip).rate, move > 0.0
+    if not moving.any():
+        return None
+    fall = _strength(sample, slip) - _strength(sample, slip + move)
+    rate[moving] = fall[moving] / move[moving]
+    size = np.sqrt(inner(move, move))
+    stiffness = float(sample.rate.max()) if share > FREE else 0.0
+    spring = Spring(stiffness, move / size)
+    spared = max(SPARED * (1.0 - share) * float(fall.max()), tolerance)
+    drive = rest - spared + (HELD * stiffness * size) * spring.shape
+    image = np.empty_like(slip)
+    held = operator._replace(rate=share * rate)
+    residual_of(held, spring, drive, move, image)
+    status, _ = solve_inside(
+        held, spring, inside, move, image, np.empty((3, slip.size)), spared, ITERATIONS
+    )
+    if status != SOLVED:
+        return None
+    force = HELD - inner(spring.shape, move) / size
+    move = np.maximum(move, 0.0)
+    filtered(operator, operator.symbol, move, image)
+    return Push(move, image, longest_step(sample, rest, slip, move, image), force)
+
+
+def _strength(sample: Sample, slip: Array) -> Array:
+    """Strength less initial stress after a slip, Pa."""
+    now = present_pieces(sample, slip)
+    return now.strength - now.rate * slip
+
+
+def _grown(
+    operator: Operator,
+    sample: Sample,
+    load: float,
+    slip: Array,
+    growth: Array,
+    tolerance: float,
+) -> Array:
+    """Slip of a patch that grows by itself, from the growth in the step before.
+
+    Each step moves overloaded nodes alone, as far as all of them stay overloaded all the way, by
+    concavity (the law only flattens). So the first of them that came to its slip in the next
+    equilibrium would not be in balance there: that equilibrium is not passed, however
+    rough the step is. The load is lowered by the tolerance, which makes the overload positive.
+    """
+    stress = np.empty_like(slip)
+    filtered(operator, operator.symbol, slip, stress)
+    weakens = sample.critical > 0.0
+    share, failures = 1.0 - FIRST, 0
+    while failures < FAILURES:
+        rest = load * sample.profile - _strength(sample, slip) - tolerance
+        if float(rest.sum()) > 0.0:
+            break
+        found = _push(operator, sample, rest - stress, slip, growth, share, tolerance)
+        if found is None:
+            share, failures = 0.7 * share, failures + 1
+            continue
+        step = min(found.longest, LONGEST)
+        slip = slip + step * found.move
+        stress += step * found.image
+        size = float((found.move[weakens] / sample.critical[weakens]).max(initial=0.0))
+        if share > FREE and found.force < RUNS:
+            growth, share = found.move / max(size, 1.0), 0.5 * share
+            continue
+        if step < USED:
+            growth, failures = 0.5 * found.move, failures + 1
+            share *= 1.0 if found.force > 0.0 else 0.7
+            continue
+        if step * size < ENDS:
+            break
+        failures = 0
+        if share <= FREE:
+            faster = 1.2
+        else:
+            faster = 0.9 if found.force > 0.0 else 1.5 if found.force > -0.05 else 2.0
+        growth = faster * step * found.move
+        share = min(max(1.0 - 0.7 * step * size, 0.0), MOST)
+    return slip
+
+
 class Relaxed(NamedTuple):
     """What becomes of the interface at the load, and its slip."""
 
@@ -205,6 +363,7 @@ def least_equilibrium(
     """
     tolerance = residual_tolerance(sample, load, accuracy)
     slip = np.maximum(slip, 0.0)
+    weakens = sample.critical > 0.0
     left = kept = dropped = 0.0
     for _ in range(STEPS):
         now = present_pieces(sample, slip)
@@ -215,14 +374,21 @@ def least_equilibrium(
         status, new, true = _bound(operator, sample, load, slip, now, 1.0 - left, allowed)
         if status == NEGATIVE and left < 1.0:
             if left == 0.0:
+                before = slip
                 slip = _weakening_step(operator, sample, load, slip, tolerance)
+                growth = slip - before
+                largest = float((growth[weakens] / sample.critical[weakens]).max(initial=0.0))
+                if largest > ENDS and not sample.pieces.steepens:
+                    growth *= min(1.0, FIRST / largest)
+                    slip = _grown(operator, sample, load, slip, growth, tolerance)
+                    continue
             left, kept = min(max(2.0 * left, kept, LEAST_LEFT), 1.0), 0.0
             continue
         if status != SOLVED:
             break
         if true:
             return Relaxed(Outcome.ARRESTED, new)
-        weakening = ~residual_nodes(sample, new) & (sample.critical > 0.0)
+        weakening = ~residual_nodes(sample, new) & weakens
         growth = np.where(weakening, new - slip, 0.0)
         dropped = float((now.rate * growth).max())
         slip = new
