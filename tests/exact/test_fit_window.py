@@ -5,6 +5,7 @@ import pytest
 from setups import beta_strength
 
 import stiction as st
+from stiction.inference.bootstrap import bands
 from stiction.inference.whittle import Observed, SpectrumFamily, Whittle
 from stiction.inference.window import RecordWindow
 
@@ -193,3 +194,21 @@ def test_the_likelihood_of_many_records_is_the_sum_of_theirs():
         every = terms[:, np.minimum(np.arange(1, n), n - np.arange(1, n))]
         total -= 0.5 * every.sum()  # k and -k are one
     assert Whittle(family, SHARES, observed).value(at)[0] == pytest.approx(total, rel=1e-12)
+
+
+@pytest.mark.parametrize("window", [*CROOKED, MAP], ids=["gap", "line", "map"])
+def test_bands_are_means_over_thirds_of_an_octave(window):
+    """Of wavenumber, periodogram and expectation, one band after the other; not of the mean."""
+    rng, shape = np.random.default_rng(4), window.white.shape
+    average, expected = rng.uniform(size=(2, *shape))
+    k = np.zeros(shape)
+    for axis in window.wave_vectors:
+        k = np.hypot(k, axis)
+    lowest = np.min(k[k > 0.0])
+    rows = []
+    for number in range(30):
+        inside = (k > 0.0) & (np.round(3.0 * np.log2(np.maximum(k, lowest) / lowest)) == number)
+        if inside.any():
+            rows.append([field[inside].mean() for field in (k, average, expected)])
+    found = bands(Observed(window, 2, average, 0.0), expected)
+    np.testing.assert_allclose(found, rows, rtol=1e-12)

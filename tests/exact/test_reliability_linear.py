@@ -199,6 +199,27 @@ def test_walkers_of_one_ancestor_are_one_observation():
     assert np.mean(variance * last**2) == pytest.approx(exact, rel=0.1)
 
 
+def test_evaluations_are_the_samples_that_were_solved():
+    """Of both functions, within the budget."""
+    solved = {"exact": 0, "guide": 0}
+
+    def counted(name):
+        def function(draws):
+            solved[name] += len(draws)
+            return draws[:, 0]
+
+        return function
+
+    options = {"samples": 90, "threshold": -3.3, "max_evaluations": 333}
+    run = descend(counted("exact"), 7, rng=generator(1, 9), **options)
+    assert run.evaluations == solved["exact"] <= 333
+    solved["exact"] = 0
+    run = bridge(counted("guide"), counted("exact"), 7, rng=generator(1, 9), **options)
+    found = {"exact": run.evaluations, "guide": run.first_stage_evaluations}
+    assert found == solved
+    assert solved["exact"] <= 333
+
+
 def test_a_poor_first_stage_is_told_by_its_ranks():
     rng = np.random.default_rng(0)
     exact = rng.standard_normal(1000)

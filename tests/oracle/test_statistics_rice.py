@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 import scipy.signal
-from setups import ensemble, make_problem
+from setups import beta_strength, ensemble, make_problem
 
 import stiction as st
 from stiction.statistics.rice import rice_distribution
@@ -104,6 +104,28 @@ def test_crossings_are_those_of_the_profiles(problem, make_strength):
         # The formula itself, with the crossings of one interface.
         chance = 1.0 - above * np.exp(-crossings / 32 / above)
         assert found.probability[index] == pytest.approx(chance, rel=1e-9)
+
+
+def test_dips_of_a_plane_are_nodes_less_edges_plus_faces():
+    """Of what lies below a level, by whole arrays, across both seams."""
+    problem = make_problem((24, 20), (0.023, 0.0164), weakening_rate=0.28e12)
+    field = beta_strength(4e-3, mean_mode=True)
+    levels = np.linspace(0.7e6, 1.3e6, 13)
+    found = rice_distribution(problem, field, profiles=40, seed=3, stress=levels)
+    tau_p = field.sample(problem.interface, samples=40, seed=3)
+    tau_n = st.theory.nucleation_stress(problem, tau_p)
+    for index, level in enumerate(levels):
+        below = tau_n <= level
+        along, across = (below & np.roll(below, -1, axis=axis) for axis in (1, 2))
+        faces = along & np.roll(along, -1, axis=2)
+        dips = below.sum() - along.sum() - across.sum() + faces.sum()
+        reached, share = below.any(axis=(1, 2)).sum(), below.mean()
+        assert found.crossing_rate[index] * 40 * 0.023 * 0.0164 == pytest.approx(dips, abs=1e-6)
+        assert found.point_survival[index] == pytest.approx(1.0 - share, abs=1e-12)
+        assert found.relative_error[index] == pytest.approx(max(reached, 1) ** -0.5)
+        chance = max(1.0 - np.exp(-max(dips, 0) / 40), share)
+        if index == 0 or chance >= found.probability[index - 1]:
+            assert found.probability[index] == pytest.approx(chance, rel=1e-12)
 
 
 def test_same_seed_same_numbers(problem, make_strength):
