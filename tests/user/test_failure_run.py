@@ -1,5 +1,6 @@
 """Failure probabilities as runs on disk: resumed, in parts, with more repetitions, and read."""
 
+import dataclasses
 import re
 import warnings
 from concurrent.futures import ThreadPoolExecutor
@@ -19,6 +20,13 @@ SMALLEST = 1e-3
 
 def study(**tables):
     return st.Study.from_dict(small_study(64, **{"sweep": SWEPT, **tables}))
+
+
+UNCERTAIN = {
+    "count": 4,
+    "random.strength.marginal.low": [0.58e6, 0.7e6],
+    "random.strength.marginal.high": {"type": "lognormal", "mean": 1.6e6, "cv": 0.1},
+}
 
 
 def computed(folder, repetitions=2, one=None, **options):
@@ -53,28 +61,97 @@ def test_a_curve_is_that_of_samples_of_its_point(whole):
     assert one.cv.values[0] == pytest.approx(np.sqrt(0.5 / SAMPLES), rel=0.2)
 
 
-def test_interrupted_in_parts_and_grown_it_has_the_same_bits(whole, tmp_path):
+@pytest.mark.parametrize("uncertain", [False, True])
+def test_interrupted_in_parts_and_grown_it_has_the_same_bits(uncertain, whole, tmp_path):
+    one = study(uncertain=UNCERTAIN) if uncertain else study()
+    if uncertain:
+        whole = computed(tmp_path / "whole", one=one)
+        assert whole.members.dims == ("correlation_length", "point", "member")
+
     def stop(done, total):
         if done == 2:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        computed(tmp_path / "broken", progress=stop)
+        computed(tmp_path / "broken", one=one, progress=stop)
     stored = st.open_run(tmp_path / "broken")
     assert (stored.status().done, stored.status().samples) == (2, 6)
     assert stored.missing_parts(3) == [1, 2, 3]
     # The first repetitions of two points are there: the third has no number yet.
     assert np.isnan(stored.dataset().stress.values).any(axis=1).tolist() == [False, False, True]
-    xr.testing.assert_equal(computed(tmp_path / "broken"), whole)
+    xr.testing.assert_equal(computed(tmp_path / "broken", one=one), whole)
 
-    computed(tmp_path / "parts", 1, part="2/2")
+    computed(tmp_path / "parts", 1, one, part="2/2")
     assert st.open_run(tmp_path / "parts").missing_parts(2) == [1]
     for part in ("1/2", "2/2"):
         with ThreadPoolExecutor(2) as pool:
-            computed(tmp_path / "parts", part=part, executor=pool)
+            computed(tmp_path / "parts", one=one, part=part, executor=pool)
     found = st.open_run(tmp_path / "parts")
     assert found.missing_parts(2) == []
     xr.testing.assert_equal(found.dataset(), whole)
+
+
+def test_uncertain_parameters_are_interfaces_that_are_equally_likely(
+    runs, tmp_path, monkeypatch
+):
+    """A study file, the list it stands for, and each interface of that list alone."""
+    monkeypatch.chdir(tmp_path)
+    one = study(uncertain=UNCERTAIN, sweep=[])
+    one.to_toml("study.toml")
+    assert st.Study.from_toml("study.toml") == one
+    likely = one.experiments[0].given
+    lows = sorted(member.strength.marginal.low for member in likely)
+    assert np.floor((np.array(lows) - 0.58e6) / 0.03e6).tolist() == [0, 1, 2, 3]
+    again = study(random=st.Study(
+        problem=one.problem, random=likely, method=one.method, ensemble=one.ensemble
+    ).to_dict()["random"], sweep=[])  # fmt: skip
+    printed = runs(
+        f"reliability study.toml --out RUN --smallest {SMALLEST} --repetitions 2", ""
+    )
+    assert "the mean over 4 equally likely interfaces" in printed
+    assert "band_high (1)" in printed
+    found = st.open_run("RUN").dataset()
+    xr.testing.assert_equal(computed(tmp_path / "list", one=again), found)
+    for number, member in enumerate(likely):
+        onsets = st.monte_carlo(
+            one.problem, member, method=one.method, samples=3000, seed=6
+        ).critical_stress.values
+        for stress, chance in zip(found.stress.values, found.members.values, strict=True):
+            share = (onsets < stress).mean()
+            assert share == pytest.approx(chance[number], rel=0.25, abs=0.012)
+    # A band is of some; samples of a plain run are of all.
+    assert (found.band_low < found.probability)[1:].all()
+    assert (found.probability < found.band_high)[1:].all()
+    onsets = dataclasses.replace(one, ensemble=st.Ensemble(samples=4000, seed=3)).run(
+        pilot=False
+    )
+    share = (onsets.critical_stress.values < float(found.stress[2])).mean()
+    assert share == pytest.approx(float(found.probability[2]), rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("tables", "words"),
+    [
+        ({"uncertain": 3}, "uncertain: must be a table of keys"),
+        ({"uncertain": {"count": 5}}, "uncertain: names no parameter"),
+        ({"uncertain": {"marginal.low": 3}}, "uncertain: marginal.low: must be a frozen"),
+        (
+            {"uncertain": {"marginal.lw": [1, 2]}},
+            "random.strength.marginal: unknown 'lw'; did you mean 'low'?",
+        ),
+        (
+            {"uncertain": {"correlation_length": [1e-3, 2e-3]}, "sweep": SWEPT},
+            "uncertain: random.strength.spectrum.correlation_length is swept, too",
+        ),
+        (
+            {"uncertain": UNCERTAIN, "random": [small_study()["random"]] * 2},
+            "uncertain: random is a list of equally likely interfaces already",
+        ),
+        ({"random": []}, "random: must hold at least one random interface"),
+    ],
+)
+def test_mistakes_in_what_is_uncertain_are_named(tables, words):
+    refuses(words, lambda: study(**{"sweep": [], **tables}))
 
 
 def test_a_folder_of_other_settings_and_what_cannot_be_sampled_are_refused(tmp_path):

@@ -42,7 +42,7 @@ from stiction.random.dotted_keys import with_values
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 from stiction.reliability.answer import Probability
 from stiction.study.run import AnyPart, StoredRun, samples_of_part
-from stiction.study.sweep import Point, Sweep, grid_axes, with_first_values
+from stiction.study.sweep import Point, Sweep, Uncertain, grid_axes, with_first_values
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -102,6 +102,10 @@ class Study(_Parts):
         Axes that are crossed; each maps dotted keys of the study, which vary together, to lists
         of values or ranges ``{start, stop, count, spacing = "linear" | "log"}``. Every point of
         the sweep has the same samples.
+    uncertain : dict, optional
+        Distributions of parameters of ``random`` by dotted key, as of `RandomInterface.uncertain`,
+        and their ``count``, by default 30: that many interfaces, drawn with the seed, are equally
+        likely. `failure_curve` gives their mean and band; `run` samples over them.
     save : Save, optional
         Results that `stiction rupture` keeps, and the places of its stations.
     title : str
@@ -131,6 +135,7 @@ class Study(_Parts):
     """
 
     sweep: Sweep = ()
+    uncertain: Uncertain = None
     save: Save | None = None
     title: Text = ""
 
@@ -176,6 +181,10 @@ class Study(_Parts):
         for point in self.points:
             try:
                 problem, random, method, ensemble = (part(n, point.values) for n in _PARTS)
+                if self.uncertain:
+                    likely = "uncertain", id(random)
+                    made[likely] = made.get(likely) or self._likely(random)
+                    random = made[likely]
                 key = id(problem), id(random), id(method)
                 if key not in made:
                     made[key] = Experiment(problem, random, method, self.ensemble.keep)
@@ -186,6 +195,20 @@ class Study(_Parts):
                     problems.setdefault(text, text + where)
         if problems:
             raise InputError(problems.values())
+        return found
+
+    def _likely(self, random: Any) -> list[RandomInterface]:
+        """Return the equally likely interfaces of uncertain parameters."""
+        parameters = dict(self.uncertain)
+        count = parameters.pop("count")
+        swept = [key for axis in self.sweep for key in axis if key in parameters]
+        if swept or isinstance(random, list):
+            raise InputError(
+                f"uncertain: {swept[0]} is swept, too; take it out of one of them"
+                if swept
+                else "uncertain: random is a list of equally likely interfaces already"
+            )
+        found: list[RandomInterface] = random.uncertain(parameters, count, self.ensemble.seed)
         return found
 
     @property

@@ -13,9 +13,13 @@ from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
 
 from stiction.ensemble.dataset import Coordinates, GridAxes
 from stiction.errors import InputError, prefixed, unknown_name
-from stiction.model import Real, at_least, describe, model, to_plain
+from stiction.model import Count, Real, at_least, check, describe, model, to_plain
+from stiction.random.dotted_keys import distribution_of, full_key
+from stiction.random.marginals import marginal_of
 from stiction.variables import PROFILES, Variable
 
+INTERFACES = 30
+"""Number of equally likely interfaces of a study with uncertain parameters."""
 MOST_POINTS = 100_000
 _FIXED = ("ensemble", "ensemble.samples", "ensemble.first", "ensemble.keep")
 _TABLES = ("problem", "random", "method", "ensemble")
@@ -104,14 +108,18 @@ def _axis(given: Any) -> Axis:
     return axis
 
 
-def _flat(given: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+def _flat(
+    given: Mapping[str, Any],
+    prefix: str = "",
+    leaf: Collection[str] = ("start", "stop", "count"),
+) -> dict[str, Any]:
     """Dotted keys of a table: TOML reads an unquoted ``a.b = 1`` as nested tables."""
     result: dict[str, Any] = {}
     for key, value in given.items():
         inner = value if isinstance(value, Mapping) else {}
-        lists = [one for one in inner.values() if isinstance(one, list | tuple | np.ndarray)]
-        if lists or (inner and not {"start", "stop", "count"} & set(inner)):
-            result |= _flat(inner, f"{prefix}{key}.")
+        nested = any(isinstance(v, Mapping | list | tuple | np.ndarray) for v in inner.values())
+        if nested or (inner and not {*leaf} & set(inner)):
+            result |= _flat(inner, f"{prefix}{key}.", leaf)
         else:  # values, or a range of them
             result[f"{prefix}{key}"] = value
     return result
@@ -177,12 +185,58 @@ Sweep: TypeAlias = Annotated[
 """A list of tables of dotted keys and their values."""
 
 
+def _read_uncertain(given: Any) -> dict[str, Any] | None:
+    """Return ``count`` and, by full dotted key, the distributions as tables of marginals."""
+    if given is None:
+        return None
+    if not isinstance(given, Mapping):
+        raise InputError(
+            f"must be a table of keys and their distributions, got {describe(given)}"
+        )
+    rest = dict(given)
+    found: dict[str, Any] = {"count": check("count", rest.pop("count", INTERFACES), Count)}
+    problems: list[str] = []
+    for key, value in _flat(rest, leaf=("low", "high", "type")).items():
+        try:
+            plain = marginal_of(distribution_of(key, value))
+            found[full_key(key)] = plain.plain() if hasattr(plain, "plain") else to_plain(plain)
+        except (InputError, ValueError) as error:
+            problems += getattr(error, "problems", [f"{key}: {error}"])
+    if problems:
+        raise InputError(problems)
+    if len(found) == 1:
+        raise InputError("names no parameter; give its dotted key and a distribution")
+    return found
+
+
+Uncertain: TypeAlias = Annotated[
+    Any,
+    BeforeValidator(_read_uncertain),
+    WithJsonSchema(
+        {
+            "type": "object",
+            "description": "distributions of parameters by dotted key, each {low, high, spacing} or"
+            " {type, ...}; and count, the number of equally likely interfaces",
+        }
+    ),
+]
+"""Distributions by dotted key, and the number of interfaces."""
+
+
 def with_first_values(given: dict[str, Any]) -> dict[str, Any]:
-    """Return a study in plain form, each swept key without a value with the first of its sweep."""
+    """Return a study in plain form, each swept key without a value with the first of its sweep.
+
+    An uncertain one without a value has its median.
+    """
     try:
         axes = read_axes(given.get("sweep", ()))
+        uncertain = _read_uncertain(given.get("uncertain")) or {}
     except InputError:  # which the validation of the whole explains
         return given
+    for key, one in uncertain.items():
+        if key != "count":
+            median = float(marginal_of(one).distribution.median())
+            given = _with_default(given, key.split("."), median)
     for axis in axes:
         for key, values in axis.items():
             given = _with_default(given, key.split("."), values[0])
