@@ -342,6 +342,25 @@ def reliability():
 
 
 @case
+def equally_likely():
+    """Thirty interfaces of a prior at P = 1e-4 by the local criterion, beside their middle."""
+    problem = st.paper.problem(nodes=512)
+    middle = st.RandomInterface(strength=st.paper.strength(problem, correlation_ratio=0.5))
+    length = middle.strength.spectrum.correlation_length
+    likely = middle.uncertain(
+        {"correlation_length": (0.5 * length, 2.0 * length), "marginal.low": (0.64e6, 0.68e6)},
+        30,
+    )
+    options = {"target_cv": 0.1, "workers": 1, "progress": False, "method": st.LocalCriterion()}
+    for probability in (1e-2, 1e-4):
+        design = partial(st.design_stress, problem, probability=probability, **options)
+        one, all_found = design(middle), design(likely)
+        alone, together = (timed(partial(design, each), 1) for each in (middle, likely))
+        note = f"{together / alone:.1f} times one, {one.evaluations} and {all_found.evaluations} onsets"
+        row(f"P = {probability:g}", together, [("thirty alone", 30.0 * alone)], note)
+
+
+@case
 def store():
     """A stored run, beside the same samples in memory and beside the bare solver."""
     problem = st.paper.problem(nodes=1024)
