@@ -354,9 +354,9 @@ def equally_likely():
     options = {"target_cv": 0.1, "workers": 1, "progress": False, "method": st.LocalCriterion()}
     for probability in (1e-2, 1e-4):
         design = partial(st.design_stress, problem, probability=probability, **options)
-        one, all_found = design(middle), design(likely)
         alone, together = (timed(partial(design, each), 1) for each in (middle, likely))
-        note = f"{together / alone:.1f} times one, {one.evaluations} and {all_found.evaluations} onsets"
+        counts = " and ".join(str(design(each).evaluations) for each in (middle, likely))
+        note = f"{together / alone:.1f} times one, {counts} onsets"
         row(f"P = {probability:g}", together, [("thirty alone", 30.0 * alone)], note)
 
 

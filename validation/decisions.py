@@ -91,10 +91,9 @@ def table(name, campaigns, run):
     chances = np.array([row[0] for row in rows])
     errors = chances.std(axis=0, ddof=1) / campaigns**0.5
     shares = np.array([np.array(row[1]) / row[2] for row in rows])
-    texts = [f"{100 * m:5.2f} +- {100 * e:.2f} %" for m, e in zip(chances.mean(axis=0), errors)]
-    spread = ", ".join(
-        f"{a:.3f} +- {b:.3f}" for a, b in zip(shares.mean(0), shares.std(0, ddof=1))
-    )
+    pairs = zip(chances.mean(axis=0), errors, strict=True)
+    texts = [f"{100 * mean:5.2f} +- {100 * error:.2f} %" for mean, error in pairs]
+    spread = " and ".join(f"{one.mean():.3f} +- {one.std(ddof=1):.3f}" for one in shares.T)
     print(
         f"{name:15s} true P of a design for 1 %: plug-in {texts[0]}, predictive {texts[1]};"
         f" stress over the right one {spread} ({time.perf_counter() - start:.0f} s)",
