@@ -230,6 +230,32 @@ def residual_strength():
 
 
 @case
+def specimens():
+    """Response of blocks beside inverting K, and their onsets beside those of half-spaces."""
+    free = line()
+    drives = {
+        "platen": st.Platen(),
+        "pusher at H/2": st.Pusher(height=0.025, width=0.005),
+        "pusher at H/10, machine": st.Pusher(height=0.005, width=0.002, stiffness=2e7),
+    }
+    strength = field(0.5 * free.nucleation_length)
+    for name, drive in drives.items():
+        blocks = st.Blocks(height=0.05, thickness=0.006, drive=drive)
+        start = time.process_time()
+        problem = st.Problem(SOLID, st.Interface(0.1, 1024), free.friction, specimen=blocks)
+        spent, found = time.process_time() - start, problem.blocks
+        invert = timed(lambda k=found.stiffness: np.linalg.inv(k + np.eye(len(k))), 3)
+        row(f"{name}, response", spent, [("an inverse", invert)], "first time")
+        tau_p = strength.sample(problem.interface, samples=64, seed=0)
+        for method in (st.LocalCriterion(), st.Equilibrium()):
+            ours, onsets = solver_time(problem, method, tau_p, 3)
+            plain, _ = solver_time(free, method, tau_p, 3)
+            events = onsets.get("arrested_events", np.zeros(1)).mean()
+            note = f"{ours / plain:.1f} times as long as half-spaces; {events:.1f} events"
+            row(f"  {method.type}", ours, (), note)
+
+
+@case
 def planes():
     """The local criterion and exact onsets on planes, beside numpy and HiGHS."""
     problem, strength = plane(24, size=4)

@@ -141,16 +141,52 @@ def print_paths(found: dict[str, list[tuple[Difference, int]]]) -> None:
         )
 
 
+def grid(samples: int = 30, finest: int = 1024) -> dict[tuple[str, int], float]:
+    """Return the rms error of the first instability by drive and nodes in the nucleation length.
+
+    The strengths are those of the finest grid; nothing is left at residual strength.
+    """
+    drives = {
+        "platen": st.Platen(),
+        "pusher at H/2": st.Pusher(height=0.025, width=0.005),
+        "pusher at H/10": st.Pusher(height=0.005, width=0.002),
+    }
+    strength = st.RandomField(MARGINAL, st.PowerLawSpectrum(correlation_length=3.125e-3))
+    found = {}
+    for name, drive in drives.items():
+        onsets = {}
+        for nodes in (128, 256, finest):
+            problem = st.Problem(
+                st.Solid(
+                    youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress"
+                ),
+                st.Interface(length=0.1, nodes=nodes),
+                st.LinearWeakening(weakening_rate=0.27787e12),
+                specimen=st.Blocks(height=0.05, drive=drive),
+            )
+            own = strength.sample(problem.interface, samples=samples, seed=4)
+            onset = st.onset(problem, own, method=st.Equilibrium())
+            onsets[nodes] = onset.first_instability.values
+        for nodes in (128, 256):
+            error = onsets[nodes] / onsets[finest] - 1.0
+            found[name, nodes // 16] = float(np.sqrt(np.mean(error**2)))
+    return found
+
+
 def main() -> None:
     """Print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", nargs="?", default="paths", choices=["paths"])
+    parser.add_argument("what", nargs="?", default="paths", choices=["paths", "grid"])
     parser.add_argument("--profiles", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     warnings.simplefilter("ignore", st.AccuracyWarning)
     warnings.simplefilter("ignore", st.UnitWarning)
-    print_paths(paths(options.profiles, options.seed))
+    if options.what == "paths":
+        print_paths(paths(options.profiles, options.seed))
+    else:
+        for (name, nodes), error in grid().items():
+            print(f"{name}, {nodes} nodes in h_n: rms {error:.3%}")
 
 
 if __name__ == "__main__":

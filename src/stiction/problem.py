@@ -41,6 +41,8 @@ FRICTION = (1e-3, 10.0)
 """Mean strength over normal pressure, from superlubricity to adhesive gels."""
 SHORT = 4.0
 """Nucleation lengths: on shorter lines free ends change the mean onset by more than about 1 %."""
+FLATTEST = 40.0
+"""Length of blocks over their height up to which their response takes seconds, and below 1 GB."""
 AT_END = {"II": 0.445 / 1.158, "III": 0.5}
 """Nucleation length at a free end as a share of that in the middle."""
 BARRIER = 10.0
@@ -225,6 +227,12 @@ class Problem:
             problems.append(
                 f"specimen.height: {specimen.height:g} m is less than two spacings of the nodes,"
                 f" {interface.spacing:.3g} m; take more nodes"
+            )
+        flat = interface.extent / specimen.height
+        if self.mode == "II" and flat > FLATTEST:
+            problems.append(
+                f"specimen.height: the blocks are {flat:.3g} times as long as high, at most"
+                f" {FLATTEST:g} times in mode II; check the units, or take a shorter piece"
             )
         return problems
 
@@ -451,8 +459,9 @@ class Problem:
         Raises
         ------
         InputError
-            If a name, shape or value is invalid, a strength is not above the initial stress,
-            or no strength is above the residual strength; the message lists every problem.
+            If a name, shape or value is invalid, a strength is not above the initial stress, no
+            strength is above the residual strength, or a `Sample` was made for another specimen;
+            the message lists every problem.
 
         Notes
         -----
@@ -471,6 +480,12 @@ class Problem:
             if profiles.shape != interface.shape:
                 shapes = f"shape {profiles.shape}, the interface {interface.shape}"
                 raise InputError(f"profiles: the sample has {shapes}")
+            drive = self.load_profile
+            if interface.is_free and not np.allclose(profiles.load_profile, drive, rtol=1e-6):
+                raise InputError(
+                    "profiles: the sample has another load profile than the drive of the specimen:"
+                    " it was made for another problem; make it with problem.sample(strength)"
+                )
             return profiles, True
         given = named_profiles(profiles)
         if "strength" not in given:

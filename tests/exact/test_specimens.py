@@ -1,6 +1,8 @@
 """Specimens: exact statements, and the path against one by brute force."""
 
 import dataclasses
+import runpy
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ import stiction as st
 from stiction.elasticity.places import places_of
 
 INF = float("inf")
+VALIDATION = Path(__file__).parents[2] / "validation" / "specimens.py"
 DRIVES = {
     "platen": st.Platen(),
     "platen, machine": st.Platen(stiffness=3e7),
@@ -84,6 +87,17 @@ def test_a_stiff_machine_on_a_short_specimen_slides_stably():
     assert held.critical_load.item() > free.critical_load.item()
 
 
+def test_slip_that_goes_back_is_reported():
+    """Two pushers behind a rigid machine: slip at one end unloads the other."""
+    drive = st.Pusher(height=0.004, width=0.003, side="both", stiffness=INF)
+    problem = crooked(drive=drive, height=0.009)
+    strength = rough(problem, 3)
+    with pytest.warns(st.AccuracyWarning, match="slip goes back by up to .* 1 of 1 samples"):
+        st.onset(problem, strength, method=st.Equilibrium())
+    with pytest.warns(st.AccuracyWarning, match="slip goes back"):
+        st.equilibrium_path(problem, strength, [1e5])
+
+
 def test_windows_bound_the_onset_and_become_it():
     """The local criterion from above; where nothing interacts, the programme itself."""
     problem = crooked(nodes=256, residual=0.0, load=st.Load())
@@ -111,6 +125,14 @@ def test_nucleation_length_at_a_free_end_and_in_the_middle(mode, end):
     assert lengths[0] == pytest.approx(end, rel=0.03) == lengths[-1]
     assert lengths[len(lengths) // 2] == pytest.approx(1.158, rel=0.02)
     assert places.starts[-1] + places.widths[-1] == 512
+
+
+def test_the_same_strength_on_a_finer_grid():
+    """Against 32 nodes in the nucleation length of the middle; the page has those of 64."""
+    found = runpy.run_path(str(VALIDATION))["grid"](samples=20, finest=512)
+    for name in ("platen", "pusher at H/2"):
+        assert 2e-4 < found[name, 8] < 1.5e-3
+        assert found[name, 16] < min(5e-4, 0.4 * found[name, 8])  # of second order: a quarter
 
 
 def test_fields_end_with_the_specimen():
@@ -191,6 +213,7 @@ test_refused = refusals(
             load=st.Load(profile=st.GradientLoad(amplitude=0.2))
         ),
         "specimen.height ... spacings": lambda: crooked(height=1e-3),
+        "42.6 times as long as high": lambda: crooked(height=0.083 / 42.6),
         "reverse ... st.Platen": lambda: crooked(drive=PUSHER),
         "lower or narrow": lambda: st.Blocks(height=0.0299, drive=PUSHER),
         "unlike blocks": lambda: st.Blocks(height=(0.05, 0.02)),
@@ -204,6 +227,9 @@ test_refused = refusals(
         "specimen=st.Blocks": lambda: of(specimen=None),
         "rupture ... half-spaces": lambda: solved(
             lambda p, s: st.onset(p, s, method=st.Rupture(loading_rate=1e9))
+        ),
+        "another problem ... problem.sample": lambda: solved(
+            lambda p, s: p.sample(of(specimen=st.Blocks(height=0.02)).sample(s))
         ),
         "nucleation_stress": lambda: solved(st.theory.nucleation_stress),
         "cracks": lambda: solved(lambda p, s: st.theory.griffith_length(p, 1e6, 1.0)),

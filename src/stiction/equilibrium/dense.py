@@ -189,13 +189,13 @@ class LineProgram(Program):
             stuck = state is not None
         state = state or self.at_rest(sample)
         slip, stiff, direction = state.slip.copy(), state.stiff.copy(), state.direction.copy()
-        load, peak, status = advance(
+        load, peak, back, status = advance(
             sample, state.load, target, slip, stiff, direction, self._workspace
         )
         found = State(
             load, slip, stiff, direction,
             unstable=status == UNSTABLE, known=status in (UNSTABLE, REACHED), stuck=stuck,
-            peak=peak,
+            peak=peak, back=back,
         )  # fmt: skip
         # No multiplier bounds the load from above where a law steepens.
         found.certified = found.unstable and not self.pieces.steepens

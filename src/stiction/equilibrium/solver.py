@@ -47,6 +47,8 @@ OF_SPECIMENS = {
     "event_travel_step": Variable("m", "travel of the drives in the event", ("event",)),
     "event_start": Variable("m", "left end of the patch that slipped", ("event",)),
 }
+BACK = 1e-6
+"""Share of the largest slip by which slip may go back without a warning."""
 EVENT_CORE = 1e-3
 """Share of the largest added slip above which a node belongs to the patch of an event."""
 
@@ -118,7 +120,8 @@ class Path:
 
     `first` is the first instability, `last` the last equilibrium, `known` is false where a jump
     or a path did not come to its end: `last` is then a lower bound. `peak` is the largest mean
-    stress on the way, over the mean of the load profile.
+    stress on the way, over the mean of the load profile; `back` is how far slip went back, as a
+    share of the largest.
     """
 
     first: State
@@ -126,6 +129,7 @@ class Path:
     peak: float
     events: list[Event] = field(default_factory=list)
     known: bool = True
+    back: float = 0.0
 
 
 def follow(program: AnyProgram, sample: Sample) -> Path:
@@ -137,7 +141,7 @@ def follow(program: AnyProgram, sample: Sample) -> Path:
     found = program.next(sample)
     first: State | None = None
     events: list[Event] = []
-    known, peak = found.known, peak_of(found)
+    known, peak, back = found.known, peak_of(found), found.back
     while found.unstable:
         jump = program.jump(sample, found)
         if jump.counts:
@@ -147,8 +151,9 @@ def follow(program: AnyProgram, sample: Sample) -> Path:
                 break
             events.append(Event(found, jump.state))
         found = program.next(sample, jump.state)
-        known, peak = found.known, max(peak, peak_of(found))
-    return Path(first or found, found, peak, events, known)
+        known, peak, back = found.known, max(peak, peak_of(found)), max(back, found.back)
+    back /= max(float(found.slip.max()), 1e-300)
+    return Path(first or found, found, peak, events, known, back)
 
 
 def peak_of(state: State) -> float:
@@ -180,7 +185,7 @@ class OnsetSolver:
     def __call__(self, rows: Samples) -> dict[str, NDArray[Any]]:
         """Return the onset of each sample; see `Equilibrium`."""
         self.problem.warn_if_coarse(rows, FINE, ROUGHLY[len(self.problem.interface.shape)])
-        samples, table, known = sample_of(rows, self.program.pieces), [], []
+        samples, table, known, back = sample_of(rows, self.program.pieces), [], [], []
         for row in range(rows.samples):
             sample = row_of(samples, row)
             try:
@@ -191,10 +196,12 @@ class OnsetSolver:
                 )
                 raise
             known.append(path.known)
+            back.append(path.back)
             table.append(self._values(rows, row, sample, path))
         values = {name: np.array([each[name] for each in table]) for name in table[0]}
         at_first, proved = values["first_instability"], values.pop("certified")
         self._warn(values["certificate_gap"], at_first, ~proved, ~np.array(known))
+        warn_if_back(np.array(back))
         values["critical_stress"] = rows.mean_stress(values["critical_stress"])
         values["first_instability"] = rows.mean_stress(at_first)
         values["certificate_gap"] *= rows.load_profile.mean()
@@ -304,6 +311,18 @@ def _sensitivity(sample: Sample, state: State) -> Array:
     # A piece starts from share tau_p + (1 - share) tau_r; the share of the last piece is 0.
     piece = present_pieces(sample, state.slip).piece
     return y * np.where(sample.critical > 0.0, pieces.starts[piece], 1.0)
+
+
+def warn_if_back(back: Array) -> None:
+    """Warn where slip goes back, by a share of the largest in each sample."""
+    where = np.flatnonzero(back > BACK)
+    if where.size:
+        warn_accuracy(
+            f"slip goes back by up to {back.max():.1g} of the largest in {where.size} of"
+            f" {back.size} samples ({listed(where)}): behind so stiff a machine slip at one place"
+            " unloads another, where it should stop, which is not modelled; their loads and events"
+            " are approximate (docs/specimens.md); under dead load this does not happen"
+        )
 
 
 def _warn_if_lost(sensitivity: Array) -> None:

@@ -118,13 +118,14 @@ def advance(
     stiff: Array,
     direction: Array,
     workspace: Workspace,
-) -> tuple[float, float, int]:
+) -> tuple[float, float, float, int]:
     """Follow the stable path from a load towards another one; slip d and K d go with it.
 
     It ends where all nodes slip, too. Returned are the load at the end, the largest mean stress on
-    the way (over the mean of the load profile; the load, unless a machine drives) and the status.
-    The status is REACHED; UNSTABLE, in the direction z >= 0, A z <= 0, that is then written; or
-    CROWDED: more members than the workspace holds.
+    the way (over the mean of the load profile; the load, unless a machine drives), how far a node
+    slipped back (m; it would have stopped, which is not modelled) and the status. The status is
+    REACHED; UNSTABLE, in the direction z >= 0, A z <= 0, that is then written; or CROWDED: more
+    members than the workspace holds.
     """
     n = slip.shape[0]
     solution, stiff_rate, rate = (
@@ -138,13 +139,14 @@ def advance(
     members, order = workspace.members, workspace.order
     count = _begin(sample, slip, piece, strength, workspace)
     peak = load - mean_relief(workspace.stiffness, sample.profile, slip)
+    back = 0.0
     if count > MOST_MEMBERS:
-        return load, load, CROWDED
+        return load, load, 0.0, CROWDED
     size = factor_inside(workspace)
     if size < count:
         # Stability was lost exactly as the residual strength was reached.
         singular_direction(workspace, size, direction)
-        return load, peak, UNSTABLE
+        return load, peak, back, UNSTABLE
     substitute_members(workspace, ZERO, size, sample.profile, workspace.forward[0])
     substitute_members(workspace, ZERO, size, strength, workspace.forward[1])
     # A node begins to slip, and passes each corner, once.
@@ -157,13 +159,16 @@ def advance(
             solve_forward(workspace, size, load, solution)
             multiply_members(workspace, size, solution, stiff)
             for t in range(size):
+                before = slip[members[t]]
                 slip[members[t]] = max(solution[t], 0.0)
+                back = max(back, before - slip[members[t]])
         step, starts, ends = _next_event(
             sample, load, target, slip, stiff, piece, workspace, size
         )
         load = target if starts < 0 and ends < 0 else load + step
         for t in range(size):
             slip[members[t]] += step * rate[t]
+            back = max(back, -step * rate[t])
         for i in range(n):
             stiff[i] += step * stiff_rate[i]
         peak = max(peak, load - mean_relief(workspace.stiffness, sample.profile, slip))
@@ -178,22 +183,22 @@ def advance(
             now = _change_slope(workspace, size, ends, before, after)
             if now < size:
                 singular_direction(workspace, now, direction)
-                return load, peak, UNSTABLE
+                return load, peak, back, UNSTABLE
             changed = ends
         elif starts >= 0:
             if size == MOST_MEMBERS:
-                return load, peak, CROWDED
+                return load, peak, back, CROWDED
             order[0] = starts
             now = append(workspace, size, ONE)
             if now == size:
                 singular_direction(workspace, size, direction)
-                return load, peak, UNSTABLE
+                return load, peak, back, UNSTABLE
             workspace.inside[starts] = True
             size = now
             if size == n:
-                return load, peak, REACHED
+                return load, peak, back, REACHED
         else:
-            return load, peak, REACHED
+            return load, peak, back, REACHED
         substitute_members(workspace, changed, size, sample.profile, workspace.forward[0])
         substitute_members(workspace, changed, size, strength, workspace.forward[1])
-    return load, peak, CROWDED
+    return load, peak, back, CROWDED
