@@ -41,8 +41,8 @@ FRICTION = (1e-3, 10.0)
 """Mean strength over normal pressure, from superlubricity to adhesive gels."""
 SHORT = 4.0
 """Nucleation lengths: on shorter lines free ends change the mean onset by more than about 1 %."""
-FLATTEST = 40.0
-"""Length of blocks over their height up to which their response takes seconds, and below 1 GB."""
+FLATTEST, HIGHEST = 0.025, 10.0
+"""Height of blocks over their length between which their response takes seconds and below 1 GB."""
 AT_END = {"II": 0.445 / 1.158, "III": 0.5}
 """Nucleation length at a free end as a share of that in the middle."""
 BARRIER = 10.0
@@ -228,18 +228,23 @@ class Problem:
                 f"specimen.height: {specimen.height:g} m is less than two spacings of the nodes,"
                 f" {interface.spacing:.3g} m; take more nodes"
             )
-        flat = interface.extent / specimen.height
-        if self.mode == "II" and flat > FLATTEST:
+        high = specimen.height / interface.extent
+        if self.mode == "II" and not FLATTEST <= high <= HIGHEST:
             problems.append(
-                f"specimen.height: the blocks are {flat:.3g} times as long as high, at most"
-                f" {FLATTEST:g} times in mode II; check the units, or take a shorter piece"
+                f"specimen.height: is {high:.3g} times the length, which must be {FLATTEST:g} to"
+                f" {HIGHEST:g} in mode II; check the units. Blocks that are higher than long act as"
+                " if they had no top; of flat ones, take a shorter piece"
             )
         return problems
 
     def _check_drive(self) -> None:
         """Refuse a drive that pulls somewhere in reverse, and blocks that open."""
         for what, profile, advice in (
-            ("drive", self.blocks.shear, "move the pusher up, widen it, or use st.Platen()"),
+            (
+                "drive",
+                self.blocks.shear,
+                "lower the pusher, push from both sides, or use st.Platen()",
+            ),
             ("pressing", self.blocks.pressure, "use pressing = 'frictionless'"),
         ):
             if not profile.min() > 0.0:

@@ -129,7 +129,8 @@ class Blocks:
             if low < -1e-9 * self.height or high > (1.0 + 1e-9) * self.height:
                 problems.append(
                     f"drive: the pusher reaches from {low:g} to {high:g} m above the interface, the"
-                    f" side of the block from 0 to {self.height:g} m; lower or narrow it"
+                    f" side of the block from 0 to {self.height:g} m;"
+                    f" {'raise' if low < 0.0 else 'lower'} or narrow it"
                 )
         if 0.0 < drive.stiffness < math.inf and self.thickness is None:
             problems.append(

@@ -213,7 +213,8 @@ test_refused = refusals(
             load=st.Load(profile=st.GradientLoad(amplitude=0.2))
         ),
         "specimen.height ... spacings": lambda: crooked(height=1e-3),
-        "42.6 times as long as high": lambda: crooked(height=0.083 / 42.6),
+        "0.0235 times the length": lambda: crooked(height=0.0235 * 0.083),
+        "height ... 373 times ... units": lambda: crooked(height=31.0),
         "reverse ... st.Platen": lambda: crooked(drive=PUSHER),
         "lower or narrow": lambda: st.Blocks(height=0.0299, drive=PUSHER),
         "unlike blocks": lambda: st.Blocks(height=(0.05, 0.02)),
