@@ -87,6 +87,12 @@ def test_a_stiff_machine_on_a_short_specimen_slides_stably():
     assert held.critical_load.item() > free.critical_load.item()
 
 
+def test_a_stiffness_in_another_unit_draws_a_warning():
+    """20 kN/mm given as 20."""
+    with pytest.warns(st.UnitWarning, match="as good as dead load"):
+        crooked(drive=st.Platen(stiffness=20.0))
+
+
 def test_slip_that_goes_back_is_reported():
     """Two pushers behind a rigid machine: slip at one end unloads the other."""
     drive = st.Pusher(height=0.004, width=0.003, side="both", stiffness=INF)
