@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from oracles import from_laplace, mode_two_stiffness
 
-from stiction.elasticity.exponential_sum import fit_exponentials, kernel_sum
+from stiction.elasticity.exponential_sum import _Polish, fit_exponentials, kernel_sum
 from stiction.elasticity.memory_kernels import memory_kernel, static_stiffness
 
 ETA = np.sqrt(2.0 / 0.67)
@@ -76,3 +76,12 @@ def test_short_sum_reaches_its_tolerance_on_times_it_never_saw(mode, eta):
 def test_a_looser_tolerance_needs_fewer_pairs():
     loose, tight = fit_exponentials("III", 1.0, 1e-3), kernel_sum("III", 1.0, 1e-6)
     assert loose.poles.size < 0.6 * tight.poles.size
+
+
+def test_a_real_pole_has_a_weight():
+    """The sine beside it is zero, and the basis of both is singular."""
+    times = np.linspace(0.0, 5.0, 40)
+    fit = _Polish(times, 0.7 * np.exp(-times))
+    _, _, weights, residual = fit.project(np.array([-1.0 + 0.0j]), 1.0 + times)
+    assert weights == pytest.approx([0.7])
+    assert np.abs(residual).max() < 1e-14

@@ -2,17 +2,20 @@
 
 import dataclasses
 import runpy
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 from brute_force import BruteForce, energy
+from matplotlib.patches import Rectangle
 from refusals import refusals
 from specimens import crooked, rough
 
 import stiction as st
 from stiction.elasticity.places import places_of
+from stiction.equilibrium.blocks import BlockProgram
 
 INF = float("inf")
 VALIDATION = Path(__file__).parents[2] / "validation" / "specimens.py"
@@ -119,6 +122,39 @@ def test_windows_bound_the_onset_and_become_it():
     ]
     a, b = (float(one.first_instability[0]) for one in both)
     assert a == pytest.approx(b, rel=3e-3)
+
+
+@pytest.mark.parametrize(("wavy", "close"), [(0.0, 0.01), (0.4, 0.06)])
+def test_the_multiplier_of_the_weakest_window_proves_its_bound(wavy, close):
+    """Rates that vary have the windows of a ladder of rates, which are less close."""
+    rate = 0.19e12 * (1.0 + wavy * np.sin(7.0 * np.linspace(0.0, 1.0, 96)))
+    problem = crooked(rate=rate, residual=0.0)
+    strength = rough(problem, 11, 8)
+    exact = st.onset(problem, strength, method=st.Equilibrium()).first_instability.values
+    program, rows = BlockProgram(problem), problem.sample(strength)
+    above = []
+    for i, stress in enumerate(exact):
+        sample = program.sample_of(rows, i)
+        bound, multiplier = program.bound(sample)
+        assert multiplier.min() >= 0.0
+        assert multiplier @ sample.profile == pytest.approx(1.0)
+        assert multiplier @ sample.excess == pytest.approx(bound)
+        pushed = problem.blocks.stiffness @ multiplier - sample.rate * multiplier
+        assert pushed.max() < 1e-12 * np.abs(pushed).max()
+        above.append(bound / (stress - problem.load.initial_stress.mean()) - 1.0)
+    assert min(above) > -1e-12
+    assert np.median(above) < close
+
+
+def test_positive_entries_of_the_stiffness_are_doubted():
+    """Of flat blocks behind a rigid machine in mode II; not under dead load or in mode III."""
+    for mode, k, doubted in (("II", INF, True), ("II", 0.0, False), ("III", INF, False)):
+        problem = crooked(height=0.012, drive=st.Platen(stiffness=k), mode=mode)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            BlockProgram(problem)
+        said = ["off its diagonal, up to 2e-07 of" in str(one.message) for one in caught]
+        assert said == [True] * doubted
 
 
 @pytest.mark.parametrize(("mode", "end"), [("II", 0.445), ("III", 0.579)])
@@ -249,16 +285,38 @@ def test_figures():
     problem = crooked(drive=DRIVES["right pusher, rigid"])
     strength = rough(problem, 3)
     found = st.onset(problem, strength, method=st.Equilibrium())
-    below = st.plot.specimen(problem, strength, found).axes[1]
-    shear = next(line for line in below.lines if "shear" in str(line.get_label()))
-    np.testing.assert_allclose(shear.get_ydata(), problem.load_profile)
+    above, below = st.plot.specimen(problem, strength, found).axes
+    drawn = dict(zip(("strength", "shear", "pressure"), below.lines, strict=False))
+    for name, values in {
+        "strength": strength[0] / strength[0].mean(),
+        "shear": problem.load_profile,
+        "pressure": np.ones(96),
+    }.items():
+        assert str(drawn[name].get_label()).startswith(name)
+        np.testing.assert_allclose(drawn[name].get_ydata(), values)
+        np.testing.assert_allclose(drawn[name].get_xdata(), 1e3 * problem.interface.x)
+    boxes = [patch for patch in above.patches if isinstance(patch, Rectangle)]
+    ends = [(*box.get_xy(), box.get_width(), box.get_height()) for box in boxes]
+    middle, length = found.critical_position.item(), found.critical_patch_length.item()
+    patch = 1e3 * (middle - 0.5 * length), 0.0, 1e3 * length, 1.0
+    expected = [(0.0, -31.0, 83.0, 31.0), (0.0, 0.0, 83.0, 31.0), patch]
+    np.testing.assert_allclose(ends, expected)
+    pushers = [line.get_xydata() for line in above.lines[1:]]
+    np.testing.assert_allclose(pushers[0], [(83.0, 9.5), (83.0, 14.5)])
+    np.testing.assert_allclose(pushers[1], [(83.0, -14.5), (83.0, -9.5)])
     path = st.equilibrium_path(problem, strength, np.linspace(0.0, 1.1e6, 30))
     axes = st.plot.force_travel(path)
     force = axes.lines[0].get_ydata()
     assert (
         np.isclose(force[:, None], path.event_force - path.event_force_drop).any(axis=0).all()
     )
-    assert len(axes.lines[1].get_ydata()) == path.sizes["event"] > 2
+    assert path.sizes["event"] > 2
+    np.testing.assert_allclose(axes.lines[1].get_ydata(), path.event_force)
+    np.testing.assert_allclose(axes.lines[1].get_xdata(), 1e6 * path.event_travel)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("travel (µm)", "force (N)")
+    axes = st.plot.force_travel(path.drop_vars("force"))
+    np.testing.assert_allclose(axes.lines[1].get_ydata(), 1e-6 * path.event_stress)
+    assert axes.get_ylabel() == "mean stress (MPa)"
     at = path.event_load.values
     around = np.unique([at * (1.0 - 1e-9), at * (1.0 + 1e-9)])
     slip = st.equilibrium_path(problem, strength, around).slip.values
@@ -266,7 +324,9 @@ def test_figures():
     moved = added > 1e-3 * added.max(axis=1, keepdims=True)
     cell = problem.interface.cell
     np.testing.assert_allclose(path.event_start, moved.argmax(axis=1) * cell)
-    bars = np.array(st.plot.precursors(path).axes[1].collections[0].get_segments())
+    below = st.plot.precursors(path).axes[1]
+    assert below.get_ylim() == (0.0, 83.0)
+    bars = np.array(below.collections[0].get_segments())
     np.testing.assert_allclose(bars[:, 0, 0], 1e6 * path.event_travel)
     np.testing.assert_allclose(bars[:, 0, 1], 1e3 * path.event_start)
     np.testing.assert_allclose(np.ptp(bars[..., 1], axis=1), 1e3 * moved.sum(axis=1) * cell)

@@ -1,6 +1,7 @@
 """Failure probabilities as runs on disk: resumed, in parts, with more repetitions, and read."""
 
 import dataclasses
+import json
 import re
 import warnings
 from concurrent.futures import ThreadPoolExecutor
@@ -55,6 +56,8 @@ def test_a_curve_is_that_of_samples_of_its_point(whole):
             share = (counted < stress).mean()
             error = np.hypot(cv * chance, np.sqrt(chance * (1.0 - chance) / counted.size))
             assert abs(share - chance) < 4.0 * error
+    assert whole.attrs["repetitions"] == 2
+    assert json.loads(whole.attrs["study"])["ensemble"]["seed"] == 3
     assert one.lower_bound == 0.66e6
     np.testing.assert_allclose(one.stress_above_bound, one.stress - 0.66e6, atol=1e-6)
     # Errors fall as the square root of the repetitions, here two of a fifth of plain counting.
