@@ -87,6 +87,20 @@ def test_polygon_along_a_law():
     assert again.weakening_rate == pytest.approx(RATE, rel=1e-14)
 
 
+@pytest.mark.parametrize("scale", ["weakening_rate", "critical_slip", "fracture_energy"])
+def test_a_polygon_has_the_scale_of_its_law(scale):
+    law = st.ExponentialWeakening(weakening_rate=RATE)
+    critical = law.critical_slip_of(DROP, RATE)
+    energy = DROP * critical * law.integral
+    value = {"weakening_rate": RATE, "critical_slip": critical, "fracture_energy": energy}[
+        scale
+    ]
+    polygon = st.PiecewiseWeakening.from_law(st.ExponentialWeakening(**{scale: value}), 8)
+    # Of the chord to the first corner, at seven eighths of the drop.
+    chord = DROP / 8.0 / (critical * law.slip_at(0.875))
+    assert polygon.rate(np.array([DROP]), *polygon.scale)[0] == pytest.approx(chord, rel=1e-12)
+
+
 @pytest.mark.parametrize(
     "scale",
     [{"weakening_rate": 0.5e12}, {"critical_slip": 5e-6}, {"fracture_energy": 12.0}],

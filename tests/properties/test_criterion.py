@@ -98,6 +98,16 @@ def test_what_is_returned_of_a_plane():
     np.testing.assert_allclose(found.critical_patch_area, area, rtol=0.15)
 
 
+def test_the_minimum_of_a_rough_line_is_the_same_wherever_the_line_begins():
+    """Strengths without correlation, whose minima lie at every node, the seam among them."""
+    problem = make_problem(64, 0.02)
+    rough = np.random.default_rng(5).uniform(0.6e6, 1.4e6, (300, 64))
+    found = local_onset(problem, rough).critical_stress
+    for shift in range(1, 64):
+        there = local_onset(problem, np.roll(rough, shift, axis=1)).critical_stress
+        np.testing.assert_allclose(there, found, rtol=ROUND_OFF)
+
+
 def test_weights_certify_the_bound():
     """(K - W) y <= 0 everywhere, with spectral wave vectors too: an upper bound."""
     for window in windows_of(PLANE, RATE):
