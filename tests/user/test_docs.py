@@ -81,7 +81,7 @@ def test_the_tutorial_from_a_profile_to_a_failure_probability(monkeypatch, tmp_p
     monkeypatch.chdir(tmp_path)
     shutil.copytree(ROOT / "examples" / "data", tmp_path / "examples" / "data")
     less = {
-        "bootstrap=200": "bootstrap=20", r"\[:20\]": "[:2]", r"seed=1\)": "seed=1, target_cv=0.3)"
+        "bootstrap=200": "bootstrap=20", r"interfaces\(30\)": "interfaces(4)", r"seed=1\)": "seed=1, target_cv=0.3)"
     }  # fmt: skip
     scope = run_blocks("docs/tutorials/measured-profile.md", {}, **less)
     fit, truth = scope["fit"], {"mean": 1e6, "noise": 0.03e6, "spectrum.exponent": 2.0}
@@ -89,6 +89,8 @@ def test_the_tutorial_from_a_profile_to_a_failure_probability(monkeypatch, tmp_p
         assert fit.parameters[name] == pytest.approx(value, rel=0.2)
     assert 0.0 < scope["found"].probability < 0.5
     assert 0.2e6 < scope["design"].stress < 1e6
+    assert 0.2e6 < scope["decision"].stress < 1e6
+    assert scope["decision"].members.size == 4
     joint = tomllib.loads((ROOT / "examples/data/joint.toml").read_text())["problem"]
     assert st.Problem(**joint) == scope["joint"]
 
@@ -98,6 +100,8 @@ def test_python_of_the_page_on_reliability():
     """With a failure curve by equilibrium: about a minute."""
     scope = run_blocks("docs/reliability.md", {})
     assert 1e-6 < scope["found"].probability < 1e-3
+    low, high = scope["decision"].band
+    assert low < scope["decision"].probability < high
 
 
 WITH_EXAMPLES = [
