@@ -81,8 +81,10 @@ def test_the_tutorial_from_a_profile_to_a_failure_probability(monkeypatch, tmp_p
     monkeypatch.chdir(tmp_path)
     shutil.copytree(ROOT / "examples" / "data", tmp_path / "examples" / "data")
     less = {
-        "bootstrap=200": "bootstrap=20", r"interfaces\(30\)": "interfaces(4)", r"seed=1\)": "seed=1, target_cv=0.3)"
-    }  # fmt: skip
+        "bootstrap=200": "bootstrap=20",
+        r"interfaces\(30\)": "interfaces(4)",
+        r"seed=1\)": "seed=1, target_cv=0.3)",
+    }
     scope = run_blocks("docs/tutorials/measured-profile.md", {}, **less)
     fit, truth = scope["fit"], {"mean": 1e6, "noise": 0.03e6, "spectrum.exponent": 2.0}
     for name, value in truth.items():
