@@ -246,7 +246,9 @@ def fit_field(
         as ``{"type": "power_law", "exponent": 4.0}``. Its end is seen in the record only if
         ``"truncation"`` or ``"power_kept"`` is given; the field has the usual one otherwise.
     detrend : int
-        Degree of the polynomial trend that is removed, 0 to 3. The mean is always kept.
+        Degree of the polynomial trend that is removed, 0 to 3. The mean is always kept. A trend
+        takes scatter with it, which the interval includes and the estimate does not: of a record of
+        30 correlation lengths 4, 7 and 13 % of the standard deviation with degrees 0, 1 and 3.
     noise : bool or float
         Whether to estimate white, normal measurement noise along with the field; or its
         standard deviation, if known (SI).
