@@ -256,10 +256,11 @@ def test_a_step_of_the_stable_path_passes_no_steeper_weakening_that_is_unstable(
     slip, taken, refused, spared = np.zeros(480), 0, 0, 0
     for share in np.arange(1.02, 1.515, 0.01):
         load = share * first
-        slip = stable_equilibrium(operator, sample, load, slip, 1e-9)
+        slip = stable_equilibrium(operator, sample, load, slip, 1e-9, slip)
         present = present_pieces(sample, slip).piece
         steepest = least(np.maximum.accumulate(slopes[:-1])[present])
-        found = stable_equilibrium(operator, sample, load, np.zeros(480), 1e-9)
+        rest = np.zeros(480)
+        found = stable_equilibrium(operator, sample, load, rest, 1e-9, rest)
         assert (found is not None) == (steepest > 0.0)
         taken, refused = taken + (steepest > 0.0), refused + (steepest <= 0.0)
         spared += steepest > 0.0 > least(np.full(480, slopes.max()))

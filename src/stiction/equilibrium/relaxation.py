@@ -31,6 +31,7 @@ from stiction.equilibrium.sample import (
     piece_at,
     present_pieces,
     residual_nodes,
+    start_of,
     step_to_corner,
 )
 from stiction.jit import jit
@@ -101,19 +102,20 @@ def _definite(operator: Operator, rate: Array, inside: NDArray[np.bool_]) -> boo
 
 
 def stable_equilibrium(
-    operator: Operator, sample: Sample, load: float, slip: Array, accuracy: float
+    operator: Operator, sample: Sample, load: float, slip: Array, accuracy: float, guess: Array
 ) -> Array | None:
     """Return the equilibrium at a load to which a stable path leads from one at a lower load.
 
-    None if that is not certain. It is if A is positive definite, on the nodes that slip at the
-    end, with the steepest weakening that each passes on the way: then it is at each state on the
-    way, and there is no other equilibrium. Newton's method finds the pieces at the end; if no node
-    comes to weaken more steeply, its first matrix is that A, and it comes from above.
+    The guess is a slip there. None if that is not certain. It is if A is positive definite, on the
+    nodes that slip at the end, with the steepest weakening that each passes on the way: then it is
+    at each state on the way, and there is no other equilibrium. Newton's method finds the pieces at
+    the end; if no node comes to weaken more steeply, its first matrix is that A, and it comes from
+    above.
     """
     tolerance = residual_tolerance(sample, load, accuracy)
     pieces = sample.pieces
     first = now = present_pieces(sample, slip)
-    new = slip
+    new = guess
     for _ in range(NEWTON):
         drive = load * sample.profile - now.strength
         status, found = slip_under(operator, drive, now.rate, new, tolerance)
@@ -235,59 +237,59 @@ def longest_step(sample: Sample, rest: Array, slip: Array, move: Array, image: A
     return longest
 
 
-class Push(NamedTuple):
-    """Slip to be added (m), K times it (Pa), how often it may be, the force that holds it."""
-
-    move: Array
-    image: Array
-    longest: float
-    force: float
-
-
-def _push(
-    operator: Operator,
-    sample: Sample,
-    rest: Array,
-    slip: Array,
-    growth: Array,
-    share: float,
-    tolerance: float,
-) -> Push | None:
-    """Slip that a growing patch adds where it is overloaded by `rest`; None if it has no bound.
-
-    Nodes weaken by a share of what they do on the way to the growth expected. A spring holds the
-    patch at an amplitude: K less this weakening may have a direction of negative curvature.
-    """
-    inside = rest >= 0.0
-    move = np.where(inside, growth, 0.0)
-    rate, moving = present_pieces(sample, slip).rate, move > 0.0
-    if not moving.any():
-        return None
-    fall = _strength(sample, slip) - _strength(sample, slip + move)
-    rate[moving] = fall[moving] / move[moving]
-    size = np.sqrt(inner(move, move))
-    stiffness = float(sample.rate.max()) if share > FREE else 0.0
-    spring = Spring(stiffness, move / size)
-    spared = max(SPARED * (1.0 - share) * float(fall.max()), tolerance)
-    drive = rest - spared + (HELD * stiffness * size) * spring.shape
-    image = np.empty_like(slip)
-    held = operator._replace(rate=share * rate)
-    residual_of(held, spring, drive, move, image)
-    status, _ = solve_inside(
-        held, spring, inside, move, image, np.empty((3, slip.size)), spared, ITERATIONS
-    )
-    if status != SOLVED:
-        return None
-    force = HELD - inner(spring.shape, move) / size
-    move = np.maximum(move, 0.0)
-    filtered(operator, operator.symbol, move, image)
-    return Push(move, image, longest_step(sample, rest, slip, move, image), force)
-
-
 def _strength(sample: Sample, slip: Array) -> Array:
     """Strength less initial stress after a slip, Pa."""
     now = present_pieces(sample, slip)
     return now.strength - now.rate * slip
+
+
+@jit
+def secants(sample: Sample, slip: Array, move: Array, rate: Array) -> float:
+    """`rate` = weakening on the way to slip + `move` (Pa/m); return the largest fall, Pa."""
+    pieces = sample.pieces
+    largest = 0.0
+    for i in range(slip.size):
+        piece = piece_at(pieces, sample.critical[i], slip[i])
+        rate[i] = pieces.slopes[piece] * sample.rate[i]
+        if move[i] > 0.0:
+            before = start_of(sample, i, piece) - rate[i] * slip[i]
+            there = slip[i] + move[i]
+            piece = piece_at(pieces, sample.critical[i], there)
+            after = start_of(sample, i, piece) - pieces.slopes[piece] * sample.rate[i] * there
+            rate[i] = (before - after) / move[i]
+            largest = max(largest, before - after)
+    return largest
+
+
+def _push(
+    operator: Operator, sample: Sample, rest: Array, slip: Array, growth: Array, share: float,
+    tolerance: float, residual: Array,
+) -> tuple[Array, float] | None:  # fmt: skip
+    """Slip that a growing patch adds where it is overloaded by `rest`; None if it has no bound.
+
+    Nodes weaken by a share of what they do on the way to the growth expected. A spring holds the
+    patch at an amplitude, as K less this weakening may have a direction of negative curvature: its
+    force is returned, too, as a share of that at no slip. `residual` is a workspace.
+    """
+    inside = rest >= 0.0
+    move = np.where(inside, growth, 0.0)
+    size = np.sqrt(inner(move, move))
+    if size == 0.0:
+        return None
+    rate = np.empty_like(slip)
+    fall = secants(sample, slip, move, rate)
+    stiffness = float(sample.rate.max()) if share > FREE else 0.0
+    spring = Spring(stiffness, move / size)
+    spared = max(SPARED * (1.0 - share) * fall, tolerance)
+    drive = rest - spared + (HELD * stiffness * size) * spring.shape
+    rate *= share
+    held = operator._replace(rate=rate)
+    residual_of(held, spring, drive, move, residual)
+    status, _ = solve_inside(
+        held, spring, inside, move, residual, np.empty((3, slip.size)), spared, ITERATIONS
+    )
+    force = HELD - inner(spring.shape, move) / size
+    return (np.maximum(move, 0.0), force) if status == SOLVED else None
 
 
 def _grown(
@@ -305,37 +307,37 @@ def _grown(
     equilibrium would not be in balance there: that equilibrium is not passed, however
     rough the step is. The load is lowered by the tolerance, which makes the overload positive.
     """
-    stress = np.empty_like(slip)
-    filtered(operator, operator.symbol, slip, stress)
     weakens = sample.critical > 0.0
+    stress, image = np.empty((2, slip.size))
+    filtered(operator, operator.symbol, slip, stress)
     share, failures = 1.0 - FIRST, 0
     while failures < FAILURES:
         rest = load * sample.profile - _strength(sample, slip) - tolerance
         if float(rest.sum()) > 0.0:
             break
-        found = _push(operator, sample, rest - stress, slip, growth, share, tolerance)
+        rest -= stress
+        found = _push(operator, sample, rest, slip, growth, share, tolerance, image)
         if found is None:
             share, failures = 0.7 * share, failures + 1
             continue
-        step = min(found.longest, LONGEST)
-        slip = slip + step * found.move
-        stress += step * found.image
-        size = float((found.move[weakens] / sample.critical[weakens]).max(initial=0.0))
-        if share > FREE and found.force < RUNS:
-            growth, share = found.move / max(size, 1.0), 0.5 * share
+        move, force = found
+        filtered(operator, operator.symbol, move, image)
+        step = min(longest_step(sample, rest, slip, move, image), LONGEST)
+        slip = slip + step * move
+        stress += step * image
+        size = float((move[weakens] / sample.critical[weakens]).max(initial=0.0))
+        if share > FREE and force < RUNS:
+            growth, share = move / max(size, 1.0), 0.5 * share
             continue
         if step < USED:
-            growth, failures = 0.5 * found.move, failures + 1
-            share *= 1.0 if found.force > 0.0 else 0.7
+            growth, failures = 0.5 * move, failures + 1
+            share *= 1.0 if force > 0.0 else 0.7
             continue
         if step * size < ENDS:
             break
         failures = 0
-        if share <= FREE:
-            faster = 1.2
-        else:
-            faster = 0.9 if found.force > 0.0 else 1.5 if found.force > -0.05 else 2.0
-        growth = faster * step * found.move
+        faster = 0.9 if force > 0.0 else 1.5 if force > -0.05 else 2.0
+        growth = (faster if share > FREE else 1.2) * step * move
         share = min(max(1.0 - 0.7 * step * size, 0.0), MOST)
     return slip
 

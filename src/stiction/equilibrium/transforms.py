@@ -218,7 +218,11 @@ class PlaneProgram(Program):
         passed = [(load, slip)]
         while True:
             accuracy = max(0.1 * gap, ROUGHNESS * step / abs(load))
-            there = stable_equilibrium(operator, sample, load + step, slip, accuracy)
+            guess = slip
+            if len(passed) > 1:
+                below, less = passed[-2]
+                guess = slip + min(step / (load - below), 3.0) * (slip - less)
+            there = stable_equilibrium(operator, sample, load + step, slip, accuracy, guess)
             if there is None and step > gap * load:
                 step = max(0.3 * step, 0.7 * gap * load)
                 continue
