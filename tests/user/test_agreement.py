@@ -1,6 +1,7 @@
 """Agreement of measured peaks with a prediction, and interfaces that are equally likely."""
 
 import itertools
+import re
 
 import numpy as np
 import pytest
@@ -46,6 +47,9 @@ def test_a_wrong_prediction_is_seen_in_the_unit_of_the_peaks():
     differs = st.statistics.agreement(predicted(1.08 * right), PEAKS)
     assert agrees.p_values["cramer_von_mises"] > 0.1
     assert differs.p_values["cramer_von_mises"] < 0.02
+    shown = [float(p) for p in re.findall(r"= (\S+) \(Cra.*, (\S+) \(largest", str(agrees))[0]]
+    assert shown == pytest.approx([*agrees.p_values.values()], rel=6e-3)
+    assert "against the prediction: p" in str(agrees)
     assert not agrees.fitted
     axes = st.plot.agreement(agrees)
     (steps,) = [line for line in axes.lines if line.get_label() == "5 tests"]

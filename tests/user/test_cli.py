@@ -1,6 +1,7 @@
 """The commands: what they print and write, how they end, and what they make of mistakes."""
 
 import errno
+import json
 import os
 import re
 import signal
@@ -22,6 +23,7 @@ from stiction.cli import app, in_options, onset
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.store import Store
 from stiction.files import private_folder
+from stiction.study.study import study_schema
 
 STUDY = small_study(
     title="a small sweep",
@@ -102,6 +104,10 @@ def test_points_with_one_label_are_not_thrown_together(runs, study):
     study.write_text(tomli_w.dumps(STUDY | {"sweep": [axis]}))
     out = runs("run study.toml --out run --no-pilot")
     assert out.count("100.0") == 4  # two points, of stress and coefficient
+
+
+def test_the_schema_is_printed(runs):
+    assert json.loads(runs("schema")) == json.loads(json.dumps(study_schema()))
 
 
 def test_parts_of_a_run(runs):

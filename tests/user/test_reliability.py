@@ -223,11 +223,13 @@ def test_a_force_as_a_stress_is_answered_at_once(stress, pressed):
         normal_pressure=pressure if pressed else None,
         between={"strength": st.Lognormal(mean=1.0, cv=0.08)},
     )
-    problem = dataclasses.replace(PROBLEM, load=st.Load(normal_pressure=80e6))
+    joint = dataclasses.replace(PROBLEM.interface, width=0.03)
+    problem = dataclasses.replace(PROBLEM, interface=joint, load=st.Load(normal_pressure=80e6))
     for given in ({"stress": stress}, {"friction_coefficient": stress / 80e6}):
         with pytest.warns(st.UnitWarning, match="check the units"):
             found = st.failure_probability(problem, random, **given, method=EXACT)
         assert (found.probability, found.evaluations) == (float(stress > 1e8), 0)
+        assert found.force == pytest.approx(stress * 0.03 * joint.extent)
 
 
 @pytest.fixture(scope="module")
