@@ -107,7 +107,7 @@ def figure(path, shares):
     """Draw design stresses over the right one, plug-in and predictive, by number of tests."""
     from matplotlib.figure import Figure
 
-    drawn = Figure(figsize=(4.2, 2.8), layout="constrained")
+    drawn = Figure(figsize=(4.6, 3.0), layout="constrained")
     axes = drawn.subplots()
     axes.axhline(1.0, color="0.4", linewidth=0.7, linestyle=":")
     kinds = (("plug-in", "#b5322a", "^", -0.15), ("predictive", "#14213d", "o", 0.15))
@@ -119,7 +119,7 @@ def figure(path, shares):
                       label=kind if place == 0 else None)  # fmt: skip
             axes.plot(place + shift + np.array([-0.12, 0.12]), [own.mean()] * 2, color=colour)
     axes.set_xticks(range(len(TESTS)), [f"{tests} tests" for tests in TESTS])
-    axes.set_ylabel("design stress for 1 %, over the right one")
+    axes.set_ylabel("design stress / right one")
     axes.legend(frameon=False)
     drawn.savefig(path, dpi=130)
 
