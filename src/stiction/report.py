@@ -23,7 +23,6 @@ from stiction.files import write_whole
 from stiction.plot.axes import scaled, shown_quantity, with_unit
 from stiction.plot.style import PAGE, panel, paper_style
 from stiction.statistics.estimates import mean, quantiles, standard_deviation
-from stiction.study.export import table_of
 from stiction.study.failure import StoredCurves
 from stiction.study.run import StoredRun
 from stiction.variables import DIRECTION
@@ -90,18 +89,17 @@ def write_report(run: StoredRun, path: Path) -> None:
     state = run.status()
     if not state.done:
         raise InputError(f"{run.path}: no sample is stored yet")
-    curves = isinstance(run, StoredCurves)
-    what = "Failure probability" if curves else "Onset of sliding: a Monte Carlo study"
+    add: Any
+    what, add = "Onset of sliding: a Monte Carlo study", add_samples
+    if isinstance(run, StoredCurves):
+        what, add = "Failure probability", add_curves
     page = Page(run.study.title or what)
     methods = " and ".join(dict.fromkeys(plan.method.label for plan in run.study.experiments))
     page.text(f"{state.done:,} of {state.samples:,} {run.counted} by {methods}.")
     if not state.complete:
         page.text("The run is not complete.", warning=True)
     with paper_style():
-        if isinstance(run, StoredCurves):
-            add_curves(page, run)
-        else:
-            add_samples(page, run)
+        add(page, run)
     if state.failures:
         rows = [[str(failure)] for failure in state.failures[:MOST_ROWS]]
         page.table(f"Samples that failed ({len(state.failures):,})", ["sample"], rows)
@@ -135,8 +133,10 @@ def add_curves(page: Page, run: StoredCurves) -> None:
             figure = Figure(figsize=(0.75 * PAGE, 3.2))
             plot.failure_curve(curve, ax=figure.subplots())
             page.figure(figure, f"Probability of an onset below a stress{where}.")
-        frame = table_of(curve)
-        page.table(f"Failure probability{where}", list(frame.columns), frame.values.tolist())
+        own = [one for one in curve.data_vars.values() if one.dims == ("point",)]
+        factors, _, labels = zip(*map(scaled, own), strict=True)
+        rows = np.transpose(own) * factors
+        page.table(f"Failure probability{where}", labels, rows)
 
 
 def add_figures(page: Page, result: xr.Dataset, dims: list[str]) -> None:

@@ -13,6 +13,7 @@ from refusals import refuses
 from small_study import lengths, small_study
 
 import stiction as st
+from stiction.reliability import repetitions
 from stiction.reliability.repetitions import SAMPLES
 
 SWEPT = lengths(3e-3, 7e-3, 5e-3)
@@ -84,14 +85,22 @@ def test_interrupted_in_parts_and_grown_it_has_the_same_bits(uncertain, whole, t
     assert np.isnan(stored.dataset().stress.values).any(axis=1).tolist() == [False, False, True]
     xr.testing.assert_equal(computed(tmp_path / "broken", one=one), whole)
 
-    computed(tmp_path / "parts", 1, one, part="2/2")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(repetitions, "versions", lambda: "stiction 99.0")
+        computed(tmp_path / "parts", 1, one, part="2/2")
     assert st.open_run(tmp_path / "parts").missing_parts(2) == [1]
     for part in ("1/2", "2/2"):
-        with ThreadPoolExecutor(2) as pool:
+        with (
+            ThreadPoolExecutor(2) as pool,
+            pytest.warns(UserWarning, match="begun with st.* 99"),
+        ):
             computed(tmp_path / "parts", one=one, part=part, executor=pool)
     found = st.open_run(tmp_path / "parts")
     assert found.missing_parts(2) == []
     xr.testing.assert_equal(found.dataset(), whole)
+    next((tmp_path / "parts" / "chunks").iterdir()).write_bytes(b"damaged")
+    with pytest.warns(UserWarning, match="its repetitions are missing"):
+        found.dataset()
 
 
 def test_uncertain_parameters_are_interfaces_that_are_equally_likely(
@@ -206,5 +215,5 @@ def test_commands_print_export_and_report_its_numbers(runs, tmp_path, monkeypatc
     page = (tmp_path / "RUN" / "report.html").read_text(encoding="utf-8")
     assert "6 of 6 repetitions by local criterion" in page
     cells = re.findall(r"<td[^>]*>([^<]+)</td>", page)
-    assert f"{float(last.stress):.5g}" in cells
+    assert f"{1e-6 * float(last.stress):.5g}" in cells
     assert page.count("data:image/png") == 3

@@ -57,16 +57,12 @@ class Gathered:
             check_memory("samples", largest * len(points) * ensemble.samples)
         self.points, self.first, self._only = points, ensemble.first, only
         self.done = np.zeros((len(points), ensemble.samples), dtype=np.bool_)
-        self.tables, self.seconds = 0, 0.0  # of one core
-        self.versions: dict[str, None] = {}  # of the packages that computed the samples
         self._failures: dict[tuple[int, int], Failure] = {}
         self._arrays: dict[str, NDArray[Any]] = {}  # floats, NaN where nothing is
         self._types: dict[str, np.dtype[Any]] = {}
 
     def add(self, table: Table) -> None:
         """Put the rows of a table in their places; those of other samples are left out."""
-        self.tables, self.seconds = self.tables + 1, self.seconds + table.seconds
-        self.versions[table.versions] = None
         for failure in table.failures:
             if failure.sample - self.first < self.done.shape[1]:
                 self._failures[failure.point, failure.sample - self.first] = failure

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from stiction.ensemble.batches import missing_spans, solve_spans, usable_cores, versions
+from stiction.ensemble.batches import missing_spans, solve_spans, usable_cores
 from stiction.ensemble.dataset import Gathered, GridAxes, distinct
 from stiction.ensemble.experiment import Ensemble, Experiment
 from stiction.ensemble.pilot import compare, doubt
@@ -65,14 +65,7 @@ def gather(
     """
     rows = Gathered(points, ensemble)
     if store:
-        for table in store.chunks():
-            rows.add(table)
-        store.delete_damaged()
-        for other in sorted({*rows.versions} - {versions()}):
-            store.warn(
-                f"was begun with {other}, not {versions()}: samples of the two may differ"
-                " in their last digits"
-            )
+        store.resume(rows.add)
     done = others | rows.done
     spans, total, lost = missing_spans(done, ensemble.first), int((~done).sum()), 0
     if spans:

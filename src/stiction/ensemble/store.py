@@ -14,14 +14,14 @@ import json
 import os
 import re
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from stiction.ensemble.batches import Failure, Table
+from stiction.ensemble.batches import Failure, Table, versions
 from stiction.ensemble.pilot import LOOKED_AT
 from stiction.errors import InputError, StoreError, warn_user
 from stiction.files import PART, cannot, write_whole
@@ -42,13 +42,16 @@ class Damaged(StoreError):
 class Store:
     """The folder of a run: samples of a study, which is given in plain form.
 
-    `damage` gives the defects of damaged chunks, by name, as far as they were read.
+    Of the chunks that were read, `damage` gives the defects of damaged ones, by name; `seconds`
+    (of one core, for each) and `versions` are those of the others.
     """
 
     def __init__(self, path: Path, study: dict[str, Any]) -> None:
         self.path = path
         self._mark = digest(json.dumps(_identity(study), sort_keys=True).encode())
         self.damage: dict[str, str] = {}
+        self.seconds: list[float] = []
+        self.versions: dict[str, None] = {}
         self._taken: list[Table] = []
         self._saved = time.monotonic()
 
@@ -82,7 +85,8 @@ class Store:
 
         A file that exists and cannot be read may be whole: it raises a `StoreError`.
         """
-        folder, self.damage = self.path / CHUNKS, {}
+        folder = self.path / CHUNKS
+        self.damage, self.seconds, self.versions = {}, [], {}
         try:
             names = sorted(filter(NAME.fullmatch, os.listdir(folder)))
         except OSError as error:
@@ -100,13 +104,22 @@ class Store:
                 if mark != self._mark:
                     raise StoreError(f"{folder / name}: belongs to another study")
                 failures = tuple(Failure(*one) for one in failed)
+                self.seconds.append(seconds)
+                self.versions[made_by] = None
                 yield Table(archive["rows"], failures, seconds, made_by)
 
-    def delete_damaged(self) -> None:
-        """Delete the damaged chunks that were found, with a warning of each."""
+    def resume(self, add: Callable[[Table], None]) -> None:
+        """Hand over what is stored; warn of other versions and of damage, which is deleted."""
+        for table in self.chunks():
+            add(table)
         for name, text in self.damage.items():
             self.warn(f"{CHUNKS}/{name}: {text}; its samples are computed again")
             (self.path / CHUNKS / name).unlink(missing_ok=True)
+        for other in sorted({*self.versions} - {versions()}):
+            self.warn(
+                f"was begun with {other}, not {versions()}: samples of the two may differ"
+                " in their last digits"
+            )
 
     def warn(self, text: str) -> None:
         """Issue a warning about this run."""

@@ -36,17 +36,17 @@ BOUND = "stress below which no interface slides"
 class Repetitions:
     """The repetitions of all points of a study that are there, in memory."""
 
-    def __init__(self, points: int, repetitions: int) -> None:
+    failed = ()  # none does
+
+    def __init__(
+        self, points: int, repetitions: int, only: Sequence[str] | None = None
+    ) -> None:
+        self.only = only
         self.done = np.zeros((points, repetitions), dtype=np.bool_)
-        self.failed: list[Any] = []  # none does
-        self.tables, self.seconds = 0, 0.0  # of one core
-        self.versions: dict[str, None] = {}
         self._found: dict[tuple[int, int], Descent] = {}
 
     def add(self, table: Table) -> None:
         """Take the repetitions of a table."""
-        self.tables, self.seconds = self.tables + 1, self.seconds + table.seconds
-        self.versions[table.versions] = None
         for point, number, found in repetitions_in(table.rows):
             self._found[point, number] = found
             self.done[point, number] = True
@@ -67,12 +67,12 @@ class StoredCurves(StoredRun):
         super().__init__(store, study)
         self.settings = settings
 
-    def dataset(self, only: Sequence[str] | None = None) -> xr.Dataset:
-        """Return the curves from all stored repetitions, over the axes of a sweep and 'point'.
+    def labelled(self, rows: Repetitions) -> xr.Dataset:
+        """Return the curves from repetitions, over the axes of a sweep and 'point'.
 
         As from `stiction.failure_curve`; NaN at points of the sweep without a repetition.
         """
-        found, axes = self.curves(), self.study.axes
+        found, axes = self.curves(rows), self.study.axes
         dims, shape = tuple(axes), tuple(len(axes[dim][dim][0]) for dim in axes)
         result = found[0]
         if axes:
@@ -86,11 +86,12 @@ class StoredCurves(StoredRun):
                 variables[str(name)] = Variable(*about, (*dims, *map(str, one.dims[1:])))
             coordinates = {name: one for own in axes.values() for name, one in own.items()}
             result = to_dataset(values, variables, coordinates, result.attrs)
-        return result[list(only)] if only else result
+        return result[list(rows.only)] if rows.only else result
 
-    def curves(self) -> list[xr.Dataset]:
+    def curves(self, rows: Repetitions | None = None) -> list[xr.Dataset]:
         """Return the curve of each point of the sweep, NaN without a repetition."""
-        rows, wanted = self._read(), chances(self.settings["smallest"])
+        rows = rows or self._read(None)
+        wanted = chances(self.settings["smallest"])
         found: list[xr.Dataset | None] = []
         for point, experiment in enumerate(self.study.experiments):
             if (tail := rows.tail(point)) is None:
@@ -105,11 +106,8 @@ class StoredCurves(StoredRun):
         empty = some.where(False).assign_attrs(lower_bound=np.nan)
         return [empty if one is None else one for one in found]
 
-    def _read(self, only: Sequence[str] | None = None) -> Any:
-        rows = Repetitions(len(self.study.experiments), self.study.ensemble.samples)
-        for table in self._store.chunks():
-            rows.add(table)
-        return rows
+    def _rows(self, only: Sequence[str] | None) -> Repetitions:
+        return Repetitions(len(self.study.experiments), self.study.ensemble.samples, only)
 
 
 def _state(
@@ -134,22 +132,18 @@ def compute(
     executor: Executor | None,
     progress: Show,
     part: tuple[int, int] | None,
-) -> StoredCurves:
-    """Compute the repetitions of a study that are not stored, or a part of them."""
+) -> xr.Dataset:
+    """Return the curves, after computing what is not stored, or a part of it."""
     points = study.experiments
     if any(point.method.type == "rupture" for point in points):
         raise InputError(
             "method: failures by rupture are counted, not sampled by levels; use st.Equilibrium()"
             " or st.LocalCriterion(), or failure_probability(..., algorithm='plain')"
         )
-    plain = study.to_dict()
-    plain["ensemble"] = plain["ensemble"] | {"samples": repetitions}
-    plain[CURVES] = dict(settings)
-    store = Store.open(out, plain)
+    study = replace(study, ensemble=replace(study.ensemble, samples=repetitions))
+    store = Store.open(out, study.to_dict() | {CURVES: settings})
     rows = Repetitions(len(points), repetitions)
-    for table in store.chunks():
-        rows.add(table)
-    store.delete_damaged()
+    store.resume(rows.add)
     wanted = ~rows.done
     if part is not None:
         wanted &= samples_of_part(part, *wanted.shape)
@@ -162,15 +156,14 @@ def compute(
         stack.enter_context(meter)
         for table in _tables(points, settings, jobs, workers or usable_cores(), executor):
             store.add(table)
+            rows.add(table)
             meter.advance(1)
     if store.pilot is None and (part is None or part[0] == 1):
         doubts = dict.fromkeys(text for point in points for text in _doubts(point, settings))
         for text in doubts:
             warn_accuracy(text)
         store.note_pilot({"doubts": list(doubts)})
-    return StoredCurves(
-        store, replace(study, ensemble=replace(study.ensemble, samples=repetitions)), settings
-    )
+    return StoredCurves(store, study, settings).labelled(rows)
 
 
 def _tables(

@@ -93,16 +93,16 @@ class StoredRun:
         StoreError
             If a stored file cannot be read.
         """
-        rows: Any = self._read(only=())
+        rows = self._read(only=())
         return Status(
             samples=rows.done.size,
             done=int(rows.done.sum()),
             done_by_point=rows.done.sum(axis=1),
             failures=tuple(rows.failed),
             damaged=tuple(f"{name}: {text}" for name, text in self._store.damage.items()),
-            chunks=rows.tables,
-            seconds=rows.seconds,
-            versions=tuple(rows.versions),
+            chunks=len(self._store.seconds),
+            seconds=sum(self._store.seconds),
+            versions=tuple(self._store.versions),
         )
 
     def dataset(self, only: Sequence[str] | None = None) -> xr.Dataset:
@@ -120,10 +120,16 @@ class StoredRun:
         """
         rows = self._read(only)
         for name, text in self._store.damage.items():
-            self._store.warn(f"{name}: {text}; its samples are missing; run the study again")
-        return rows.dataset(
-            {**self.study.attributes, **(self._store.pilot or {})}, self.study.axes
-        )
+            self._store.warn(
+                f"{name}: {text}; its {self.counted} are missing; run the study again"
+            )
+        return self.labelled(rows)
+
+    def labelled(self, rows: Any) -> xr.Dataset:
+        """Return what was read as a dataset."""
+        attributes = {**self.study.attributes, **(self._store.pilot or {})}
+        found: xr.Dataset = rows.dataset(attributes, self.study.axes)
+        return found
 
     def missing_parts(self, parts: int) -> list[int]:
         """Return which of so many parts, numbered from 1, are not complete."""
@@ -131,8 +137,11 @@ class StoredRun:
         mine = (samples_of_part((k, parts), *done.shape) for k in range(1, parts + 1))
         return [k for k, own in enumerate(mine, start=1) if not done[own].all()]
 
+    def _rows(self, only: Sequence[str] | None) -> Any:
+        return Gathered(self.study.experiments, self.study.ensemble, only)
+
     def _read(self, only: Sequence[str] | None) -> Any:
-        rows = Gathered(self.study.experiments, self.study.ensemble, only)
+        rows = self._rows(only)
         for table in self._store.chunks():
             rows.add(table)
         return rows

@@ -318,8 +318,8 @@ class Study(_Parts):
         Returns
         -------
         xarray.Dataset
-            As from `stiction.failure_curve`, from all repetitions that are stored; over the
-            sweep's axes too, with `lower_bound` (Pa). NaN where none is stored.
+            As from `stiction.failure_curve`, from the repetitions that were stored and those
+            computed; over the sweep's axes too, with `lower_bound` (Pa). NaN where there is none.
 
         Raises
         ------
@@ -329,7 +329,7 @@ class Study(_Parts):
         from stiction.study.failure import compute
 
         settings = {"smallest": smallest, "event": event}
-        found = compute(
+        return compute(
             self,
             settings,
             out=out,
@@ -339,7 +339,6 @@ class Study(_Parts):
             progress=progress,
             part=part,
         )
-        return found.dataset()
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain dictionaries, lists and numbers, as in TOML.
