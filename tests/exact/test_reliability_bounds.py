@@ -105,6 +105,9 @@ class Uniform:
     def __call__(self, draws):
         return draws
 
+    def member(self, draws):
+        return np.zeros(draws.size, dtype=np.int64)
+
 
 @pytest.mark.parametrize(
     ("chance", "target_cv", "least", "most"),
