@@ -52,6 +52,8 @@ FIRST = 0.05
 """Growth of a patch that is tried first, as a share of d_c."""
 ENDS = 2e-3
 """Growth in a step, as a share of d_c, below which a patch is not followed any more."""
+QUICK = 0.7
+"""Growth up to which a step is expected to add more than the one before, as a share of d_c."""
 MOST = 0.98
 """Largest share of the weakening in a step of a growing patch."""
 SPARED = 0.1
@@ -337,7 +339,8 @@ def _grown(
             break
         failures = 0
         faster = 0.9 if force > 0.0 else 1.5 if force > -0.05 else 2.0
-        growth = (faster if share > FREE else 1.2) * step * move
+        faster = min(faster if share > FREE else 1.2, max(QUICK / (step * size), 1.0))
+        growth = faster * step * move
         share = min(max(1.0 - 0.7 * step * size, 0.0), MOST)
     return slip
 
@@ -350,14 +353,20 @@ class Relaxed(NamedTuple):
 
 
 def least_equilibrium(
-    operator: Operator, sample: Sample, load: float, slip: Array, accuracy: float = 1e-7
+    operator: Operator,
+    sample: Sample,
+    load: float,
+    slip: Array,
+    accuracy: float = 1e-7,
+    unstable: bool = False,
 ) -> Relaxed:
     """Return the least equilibrium at a load that is not below a given slip.
 
     The slip is zero, or an equilibrium at a lower load, or beyond it along an unstable direction;
     the accuracy is the largest residual stress as a share of the mean strength or load. Steps with
     a share of the weakening do not pass it, and are the longer the larger the share; with the whole
-    of it they end there, or A is not positive definite, and slip moves in the unstable direction.
+    of it they end there, or A is not positive definite, and slip moves in the unstable direction:
+    at once if the slip is `unstable`, that of an instability.
 
     The interface slides once the load exceeds the average strength that is left: stiffness adds
     nothing to the mean. If K has no positive entry off its diagonal, the result is exact up to
@@ -373,7 +382,10 @@ def least_equilibrium(
         if float((drive + now.rate * slip).sum()) > tolerance * slip.size:
             return Relaxed(Outcome.SLIDING, slip)
         allowed = max(tolerance, ROUGH * left * dropped)
-        status, new, true = _bound(operator, sample, load, slip, now, 1.0 - left, allowed)
+        status, new, true = NEGATIVE, slip, False
+        if not unstable:
+            status, new, true = _bound(operator, sample, load, slip, now, 1.0 - left, allowed)
+        unstable = False
         if status == NEGATIVE and left < 1.0:
             if left == 0.0:
                 before = slip

@@ -260,7 +260,7 @@ class PlaneProgram(Program):
         beyond = found.load + found.gap
         beyond += self.requested * abs(beyond)
         ahead = least_equilibrium(
-            self._operator(sample), sample, beyond, found.slip, 0.1 * self.requested
+            self._operator(sample), sample, beyond, found.slip, 0.1 * self.requested, True
         )
         arrested = ahead.status == Outcome.ARRESTED
         weakens = sample.critical > 0.0
