@@ -134,7 +134,7 @@ def test_counting_is_unbiased_whenever_it_stops(chance, target_cv, least, most):
     inside = [low <= chance <= high for low, high in ends]
     # Clopper and Pearson hold at least 95 %; three standard errors less.
     assert np.mean(inside) > 0.95 - 3.0 * math.sqrt(0.05 * 0.95 / repeats)
-    assert all(count.samples <= values.size <= most for count, values in counts)
+    assert all(count.samples <= all_of_them.samples <= most for count, all_of_them in counts)
 
 
 def test_errors_and_intervals_of_counts():
