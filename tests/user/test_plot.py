@@ -74,10 +74,6 @@ def test_monte_carlo_shows_coefficients_where_there_is_a_pressure(swept):
     found = st.monte_carlo(PROBLEM, FIELD, method=LOCAL, samples=200, seed=0)
     axes = st.plot.monte_carlo(found)
     assert axes.get_xlabel() == "static friction coefficient"
-    curve = axes.lines[0].get_xydata()
-    assert np.trapezoid(curve[:, 1], curve[:, 0]) == pytest.approx(1.0, abs=0.02)
-    mean = np.trapezoid(curve[:, 0] * curve[:, 1], curve[:, 0])
-    assert mean == pytest.approx(found.critical_stress.mean().item() / PRESSURE, rel=0.01)
     both = st.plot.monte_carlo({"one": found, "other": found})
     assert [text.get_text() for text in both.get_legend().get_texts()] == ["one", "other"]
     assert len(st.plot.monte_carlo(swept.isel(residual_strength=0)).lines) == 3

@@ -213,10 +213,8 @@ def _with_posterior(
     else:
         u, power = wide.draws(POINTS, int(rng.integers(2**32))), 0.5
     value = likelihood(u)
-    u, value = (
-        u[np.isfinite(value)],
-        value[np.isfinite(value)],
-    )  # a cell may be partly impossible
+    possible = np.isfinite(value)  # a cell may be partly impossible
+    u, value = u[possible], value[possible]
     own = power * value
     weight = np.exp((1.0 - power) * (value - value.max()))
     weight /= weight.sum()

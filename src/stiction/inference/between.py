@@ -59,9 +59,9 @@ def variance_between(logarithms: Array, within: Array, level: float) -> float:
 
     if excess(0.0) <= 0.0:
         return 0.0
-    return (
-        MOST_SCATTER if excess(MOST_SCATTER) >= 0.0 else float(brentq(excess, 0, MOST_SCATTER))
-    )
+    if excess(MOST_SCATTER) >= 0.0:
+        return MOST_SCATTER
+    return float(brentq(excess, 0, MOST_SCATTER))
 
 
 def scatter_between(

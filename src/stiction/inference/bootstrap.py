@@ -43,8 +43,6 @@ SIDES = {"marginal.low": -1.0, "marginal.high": 1.0}
 """Side of the mean on which a bound lies."""
 SAME = 1e-3
 """Distance within which an interval is uninformative, as a share of an end of a range."""
-
-
 ROUNDS = 2
 """In each, the error of the field's share in the scatter of means falls to that share of it."""
 

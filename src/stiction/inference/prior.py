@@ -13,7 +13,7 @@ from stiction.arrays import Array
 from stiction.errors import InputError, prefixed
 from stiction.model import describe
 from stiction.problem import Problem
-from stiction.random.dotted_keys import distribution_of, full_key, with_values
+from stiction.random.dotted_keys import distributions_of, full_key, with_values
 from stiction.random.fields import RandomInterface, as_random_interface
 
 TAIL = 1e-4
@@ -116,17 +116,8 @@ def make_prior(problem: Problem, random: Any, given: Any) -> Prior:
             "prior: must map parameters to distributions or ranges, such as"
             f" {{'correlation_length': (1e-3, 1e-2)}}, got {describe(given)}"
         )
-    problems: list[str] = []
-    found: dict[str, Any] = {}
-    for key, value in given.items():
-        if full_key(str(key)) in map(full_key, found):
-            problems.append(f"prior: {key} is given twice: it is the same parameter")
-        try:
-            found[str(key)] = distribution_of(key, value)
-        except InputError as error:
-            problems += [f"prior: {text}" for text in error.problems]
-    if problems:
-        raise InputError(problems)
+    with prefixed("prior"):
+        found = distributions_of(given)
     random = as_random_interface(random)
     for name, field in random.properties.items():
         if field.conditions is not None:

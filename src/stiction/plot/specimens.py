@@ -74,10 +74,8 @@ def specimen(
     if result is not None:
         need(result, "critical_position", "critical_patch_length")
         one = result.isel(sample=sample) if "sample" in result.dims else result
-        middle, half = (
-            float(one["critical_position"]) * scale,
-            0.5 * float(one["critical_patch_length"]) * scale,
-        )
+        middle = float(one["critical_position"]) * scale
+        half = 0.5 * float(one["critical_patch_length"]) * scale
         for axes in (top, below):
             axes.axvspan(middle - half, middle + half, color=ACCENT, alpha=0.3, linewidth=0.0)
         below.plot([], [], color=ACCENT, alpha=0.3, linewidth=6.0, label="critical patch")
@@ -118,17 +116,13 @@ def _draw_blocks(axes: Axes, problem: Problem, scale: float) -> None:
     axes.set(xlim=(-0.2 * length, 1.2 * length), ylim=(-1.3 * height, 1.3 * height))
 
 
-def force_travel(
-    result: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None = None
-) -> Axes:
+def force_travel(result: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     """Draw the force over the travel of the drives, with its drops: the curve of a machine.
 
     Parameters
     ----------
     result : Dataset
         From `stiction.equilibrium_path` of a specimen, at many loads.
-    problem : Problem, optional
-        Needed only if the result does not hold it.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on; new ones by default.
 
@@ -152,7 +146,6 @@ def force_travel(
     >>> st.plot.force_travel(path).get_xlabel()
     'travel (µm)'
     """
-    problem_of(result, problem)
     travel, force, name = _curve(result)
     start, high = result["event_travel"].values, result[_event(name)].values
     length, length_unit = unit_for("m", travel)
@@ -160,13 +153,8 @@ def force_travel(
     with on_axes(ax) as axes:
         axes.plot(travel * length, force * factor, **series(0))
         if start.size:
-            style: dict[str, Any] = {
-                "linestyle": "none",
-                "marker": "o",
-                "markersize": 3.5,
-                "color": ACCENT,
-            }
-            axes.plot(start * length, high * factor, **style, label="arrested events")
+            places = start * length, high * factor
+            axes.plot(*places, "o", color=ACCENT, markersize=3.5, label="arrested events")
             axes.legend()
         text = "force" if name == "force" else "mean stress"
         axes.set(xlabel=with_unit("travel", length_unit), ylabel=with_unit(text, unit))
@@ -234,7 +222,7 @@ def precursors(result: xr.Dataset, *, problem: Problem | None = None) -> Figure:
     with paper_style():
         figure = plt.figure(figsize=(1.35 * COLUMN, 1.35 * COLUMN), layout="constrained")
         above, below = figure.subplots(2, sharex=True, height_ratios=(1.3, 1.0))
-        force_travel(result, problem=problem, ax=above)
+        force_travel(result, ax=above)
         at = result["event_travel"].values * length
         below.vlines(at, start, end, color=ACCENT, linewidth=2.0)
     below.set(xlabel=above.get_xlabel(), ylabel=f"position $x$ ({unit})")

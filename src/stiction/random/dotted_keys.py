@@ -71,6 +71,28 @@ def full_key(key: str) -> str:
     return f"random.strength.spectrum.{key}"
 
 
+def distributions_of(given: Mapping[str, Any], begin: str = "") -> dict[str, Any]:
+    """Return frozen distributions by the keys that were given; an `InputError` lists all faults.
+
+    Full keys must begin with `begin`.
+    """
+    problems: list[str] = []
+    found: dict[str, Any] = {}
+    for key, value in given.items():
+        try:
+            full = full_key(str(key))
+            if not full.startswith(begin):
+                problems.append(f"{full}: is not of what is random")
+            if full in map(full_key, found):
+                problems.append(f"{key} is given twice: it is the same parameter")
+            found[str(key)] = distribution_of(str(key), value)
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(problems)
+    return found
+
+
 def distribution_of(key: str, value: Any) -> Any:
     """Return a frozen distribution, given one, two ends, or a table {low, high, spacing}.
 

@@ -32,7 +32,7 @@ from stiction.model import (
     model,
 )
 from stiction.random.conditioning import Conditioning, Conditions, Measured
-from stiction.random.dotted_keys import distribution_of, full_key, with_values
+from stiction.random.dotted_keys import distributions_of, full_key, with_values
 from stiction.random.mapping import correlation_of_mapped, from_normal, hermite_coefficients
 from stiction.random.marginals import AnyMarginal
 from stiction.random.modes import Modes, make_modes
@@ -494,25 +494,17 @@ class RandomInterface:
         >>> len(likely), likely[0].strength.marginal == strength.marginal
         (30, True)
         """
-        keys = [full_key(str(key)) for key in parameters]
-        outside = [key for key in keys if not key.startswith("random.")]
-        problems = [f"{key}: is not of what is random" for key in outside]
-        problems += [f"{key}: is given twice" for key in {*keys} if keys.count(key) > 1]
-        if not keys:
-            problems.append("must map keys to distributions, got none")
-        distributions = []
-        for key, given in parameters.items():
-            try:
-                distributions.append(distribution_of(str(key), given))
-            except InputError as error:
-                problems += error.problems
-        if problems:
-            raise InputError([f"uncertain: {text}" for text in problems])
+        with prefixed("uncertain"):
+            distributions = distributions_of(parameters, "random.")
+            if not distributions:
+                raise InputError("must map keys to distributions, got none")
         rng, found = np.random.default_rng([seed, 6]), []
-        cells = rng.permuted(np.tile(np.arange(count), (len(keys), 1)), axis=1)
+        cells = rng.permuted(np.tile(np.arange(count), (len(distributions), 1)), axis=1)
         shares = (cells + rng.random(cells.shape)) / count
-        rows = [one.ppf(share) for one, share in zip(distributions, shares, strict=True)]
-        own = [key.removeprefix("random.") for key in keys]
+        rows = [
+            one.ppf(share) for one, share in zip(distributions.values(), shares, strict=True)
+        ]
+        own = [full_key(key).removeprefix("random.") for key in distributions]
         for values in np.transpose(rows).tolist():
             pairs = dict(zip(own, values, strict=True))
             with prefixed(

@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
 from stiction.ensemble.dataset import Coordinates, GridAxes
 from stiction.errors import InputError, prefixed, unknown_name
 from stiction.model import Count, Real, at_least, check, describe, model, to_plain
-from stiction.random.dotted_keys import distribution_of, full_key
+from stiction.random.dotted_keys import distributions_of, full_key
 from stiction.random.marginals import marginal_of
 from stiction.variables import PROFILES, Variable
 
@@ -153,20 +153,12 @@ def read_axes(given: Any) -> list[Axis]:
 
 
 def _plain_axes(axes: Sequence[Axis]) -> list[Axis]:
-    return [
-        {
-            key: [
-                to_plain(one)
-                if dataclasses.is_dataclass(one)
-                else "inf"
-                if one == math.inf
-                else one
-                for one in values
-            ]
-            for key, values in axis.items()
-        }
-        for axis in axes
-    ]
+    def plain(one: Any) -> Any:
+        if dataclasses.is_dataclass(one):
+            return to_plain(one)
+        return "inf" if one == math.inf else one
+
+    return [{key: list(map(plain, values)) for key, values in axis.items()} for axis in axes]
 
 
 Sweep: TypeAlias = Annotated[
@@ -195,15 +187,12 @@ def _read_uncertain(given: Any) -> dict[str, Any] | None:
         )
     rest = dict(given)
     found: dict[str, Any] = {"count": check("count", rest.pop("count", INTERFACES), Count)}
-    problems: list[str] = []
-    for key, value in _flat(rest, leaf=("low", "high", "type")).items():
+    for key, one in distributions_of(_flat(rest, leaf=("low", "high", "type"))).items():
         try:
-            plain = marginal_of(distribution_of(key, value))
+            plain = marginal_of(one)
             found[full_key(key)] = plain.plain() if hasattr(plain, "plain") else to_plain(plain)
-        except (InputError, ValueError) as error:
-            problems += getattr(error, "problems", [f"{key}: {error}"])
-    if problems:
-        raise InputError(problems)
+        except ValueError as error:
+            raise InputError(f"{key}: {error}") from None
     if len(found) == 1:
         raise InputError("names no parameter; give its dotted key and a distribution")
     return found
@@ -278,9 +267,8 @@ def grid_axes(
             labels, parts = _labels(values), key.split(".")
             number = labels.dtype.kind in "if" and "correlation" not in parts
             unit = _unit(parts, coefficients) if number else "1"
-            labels = (
-                labels if unit == "1" else labels.astype(float)
-            )  # to be shown in other units
+            if unit != "1":  # to be shown in other units
+                labels = labels.astype(float)
             own[names[key]] = (labels, Variable(unit, key, (dim,)))
     return result
 
