@@ -13,12 +13,11 @@ import numpy as np
 import xarray as xr
 
 from stiction.ensemble.batches import Table, usable_cores
-from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import LimitState, weakest_first
 from stiction.ensemble.pilot import exact_counterpart
 from stiction.ensemble.store import Store
 from stiction.errors import InputError, warn_accuracy
-from stiction.progress import SILENT, Meter, Show
+from stiction.progress import Meter, Show
 from stiction.reliability.answer import exact_doubts
 from stiction.reliability.failure import chances, curve_of
 from stiction.reliability.repetitions import repetition, repetitions_in, table_of
@@ -99,7 +98,8 @@ class StoredCurves(StoredRun):
                 continue
             attributes = {"seed": experiment.seed, "evaluations": tail.spent}
             attributes |= {"repetitions": len(tail.repetitions)} | self.study.attributes
-            found.append(curve_of(tail, _state(experiment, self.settings), wanted, attributes))
+            state = LimitState(experiment, self.settings["event"])
+            found.append(curve_of(tail, state, wanted, attributes))
         some = next((one for one in found if one is not None), None)
         if some is None:
             raise InputError(f"{self.path}: no repetition is stored yet")
@@ -108,18 +108,6 @@ class StoredCurves(StoredRun):
 
     def _rows(self, only: Sequence[str] | None) -> Repetitions:
         return Repetitions(len(self.study.experiments), self.study.ensemble.samples, only)
-
-
-def _state(
-    experiment: Experiment, settings: Mapping[str, Any], workers: int = 1, meter: Meter = SILENT
-) -> LimitState:
-    return LimitState(experiment, settings["event"], False, workers, meter)
-
-
-def _solve(
-    experiment: Experiment, settings: Mapping[str, Any], point: int, number: int
-) -> Table:
-    return table_of(_state(experiment, settings), point, number, settings["smallest"])
 
 
 def compute(
@@ -134,32 +122,33 @@ def compute(
     part: tuple[int, int] | None,
 ) -> xr.Dataset:
     """Return the curves, after computing what is not stored, or a part of it."""
-    points = study.experiments
-    if any(point.method.type == "rupture" for point in points):
+    if any(point.method.type == "rupture" for point in study.experiments):
         raise InputError(
             "method: failures by rupture are counted, not sampled by levels; use st.Equilibrium()"
             " or st.LocalCriterion(), or failure_probability(..., algorithm='plain')"
         )
     study = replace(study, ensemble=replace(study.ensemble, samples=repetitions))
     store = Store.open(out, study.to_dict() | {CURVES: settings})
-    rows = Repetitions(len(points), repetitions)
+    states = [LimitState(point, settings["event"]) for point in study.experiments]
+    rows = Repetitions(len(states), repetitions)
     store.resume(rows.add)
     wanted = ~rows.done
     if part is not None:
         wanted &= samples_of_part(part, *wanted.shape)
     jobs = [(point, number) for number, point in np.argwhere(wanted.T).tolist()]
     if jobs:
-        points = [weakest_first(_state(one, settings)).experiment for one in points]
+        states = list(map(weakest_first, states))
+    smallest, cores = settings["smallest"], workers or usable_cores()
     meter = Meter("failure curve", len(jobs), progress, unit="repetitions")
     with ExitStack() as stack:
         stack.callback(store.save)  # also on Ctrl-C
         stack.enter_context(meter)
-        for table in _tables(points, settings, jobs, workers or usable_cores(), executor):
+        for table in _tables(states, smallest, jobs, cores, executor):
             store.add(table)
             rows.add(table)
             meter.advance(1)
     if store.pilot is None and (part is None or part[0] == 1):
-        doubts = dict.fromkeys(text for point in points for text in _doubts(point, settings))
+        doubts = dict.fromkeys(text for state in states for text in _doubts(state, smallest))
         for text in doubts:
             warn_accuracy(text)
         store.note_pilot({"doubts": list(doubts)})
@@ -167,8 +156,8 @@ def compute(
 
 
 def _tables(
-    points: Sequence[Experiment],
-    settings: Mapping[str, Any],
+    states: Sequence[LimitState],
+    smallest: float,
     jobs: Sequence[tuple[int, int]],
     workers: int,
     executor: Executor | None,
@@ -176,10 +165,10 @@ def _tables(
     """Yield repetitions as they are done: one after the other, or all by an executor."""
     if executor is None:
         for point, number in jobs:
-            state = _state(points[point], settings, workers)
-            yield table_of(state, point, number, settings["smallest"])
+            state = replace(states[point], workers=workers)
+            yield table_of(state, point, number, smallest)
         return
-    running = [executor.submit(_solve, points[p], settings, p, number) for p, number in jobs]
+    running = [executor.submit(table_of, states[p], p, number, smallest) for p, number in jobs]
     try:
         for future in as_completed(running):
             yield future.result()
@@ -188,11 +177,10 @@ def _tables(
             future.cancel()
 
 
-def _doubts(experiment: Experiment, settings: Mapping[str, Any]) -> list[str]:
+def _doubts(state: LimitState, smallest: float) -> list[str]:
     """Compare the local criterion with equilibrium on samples at the end of the curve."""
-    if exact_counterpart(experiment) is None:
+    if exact_counterpart(state.experiment) is None:
         return []
-    state, smallest = _state(experiment, settings), settings["smallest"]
     tail = Tail([repetition(state, 0, smallest)])
     stress = tail.quantile(smallest)
     return exact_doubts(state, tail.repetitions[0].around(stress), stress, smallest)
