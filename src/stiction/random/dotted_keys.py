@@ -72,7 +72,7 @@ def full_key(key: str) -> str:
 
 
 def distributions_of(given: Mapping[str, Any], begin: str = "") -> dict[str, Any]:
-    """Return frozen distributions by the keys that were given; an `InputError` lists all faults.
+    """Return frozen distributions by the keys given, or raise one `InputError`.
 
     Full keys must begin with `begin`.
     """

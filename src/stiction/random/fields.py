@@ -495,16 +495,14 @@ class RandomInterface:
         (30, True)
         """
         with prefixed("uncertain"):
-            distributions = distributions_of(parameters, "random.")
-            if not distributions:
+            laws = distributions_of(parameters, "random.")
+            if not laws:
                 raise InputError("must map keys to distributions, got none")
         rng, found = np.random.default_rng([seed, 6]), []
-        cells = rng.permuted(np.tile(np.arange(count), (len(distributions), 1)), axis=1)
+        cells = rng.permuted(np.tile(np.arange(count), (len(laws), 1)), axis=1)
         shares = (cells + rng.random(cells.shape)) / count
-        rows = [
-            one.ppf(share) for one, share in zip(distributions.values(), shares, strict=True)
-        ]
-        own = [full_key(key).removeprefix("random.") for key in distributions]
+        rows = [law.ppf(share) for law, share in zip(laws.values(), shares, strict=True)]
+        own = [full_key(key).removeprefix("random.") for key in laws]
         for values in np.transpose(rows).tolist():
             pairs = dict(zip(own, values, strict=True))
             with prefixed(

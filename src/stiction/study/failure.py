@@ -37,11 +37,9 @@ class Repetitions:
 
     failed = ()  # none does
 
-    def __init__(
-        self, points: int, repetitions: int, only: Sequence[str] | None = None
-    ) -> None:
+    def __init__(self, points: int, count: int, only: Sequence[str] | None = None) -> None:
         self.only = only
-        self.done = np.zeros((points, repetitions), dtype=np.bool_)
+        self.done = np.zeros((points, count), dtype=np.bool_)
         self._found: dict[tuple[int, int], Descent] = {}
 
     def add(self, table: Table) -> None:
