@@ -236,7 +236,7 @@ def export(
     stored = open_run(run)
     stored.export(out)
     state = stored.status()
-    rest = "" if state.complete else "; the others are NaN"
+    rest = "" if state.complete else "; the others are missing"
     echo(f"{state.done} of {state.samples} {stored.counted} written to {out}{rest}")
 
 

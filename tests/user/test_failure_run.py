@@ -24,10 +24,11 @@ def study(**tables):
     return st.Study.from_dict(small_study(64, **{"sweep": SWEPT, **tables}))
 
 
+POWER, LONGER = {"type": "power_law", "correlation_length": 3e-3}, {"correlation_length": 7e-3}
 UNCERTAIN = {
     "count": 4,
     "random.strength.marginal.low": [0.58e6, 0.7e6],
-    "random.strength.marginal.high": {"type": "lognormal", "mean": 1.6e6, "cv": 0.1},
+    "random.strength.marginal.high": {"type": "truncated_normal", "mean": 1.6e6, "cv": 0.1},
 }
 
 
@@ -153,6 +154,13 @@ def test_uncertain_parameters_are_interfaces_that_are_equally_likely(
         ),
         (
             {"uncertain": {"correlation_length": [1e-3, 2e-3]}, "sweep": SWEPT},
+            "uncertain: random.strength.spectrum.correlation_length is swept, too",
+        ),
+        (
+            {
+                "uncertain": {"correlation_length": [1e-3, 2e-3]},
+                "sweep": [{"random.strength.spectrum": [POWER, POWER | LONGER]}],
+            },
             "uncertain: random.strength.spectrum.correlation_length is swept, too",
         ),
         (

@@ -62,9 +62,12 @@ def interpolate(z: Array, table: Array, out: Array) -> int:
     return missing
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=1024)
 def quantile_table(marginal: Any) -> Array:
-    """Return values of the map and slopes times the step, (4097, 2); NaN where scipy takes over."""
+    """Return values of the map and slopes times the step, (4097, 2); NaN where scipy takes over.
+
+    64 KiB each: as many are kept as a long list of equally likely interfaces has.
+    """
     distribution = marginal.distribution
     step = 2.0 * REACH / PIECES
     # Two nodes beyond each end, for central differences of fourth order.

@@ -115,8 +115,9 @@ class Answer:
     def band(self) -> tuple[float, float]:
         """90 % band of the probability over equally likely interfaces; NaN of a single one.
 
-        5 % of them have at most the one, 95 % at most the other. More tests make it narrower, more
-        samples do not: the sampling error is `interval`.
+        5 % of them have at most the one, 95 % at most the other. More tests make it narrower. It
+        is too wide by the sampling error of each interface, up to a factor of two or three of alike
+        ones: a smaller `target_cv` lowers that. The sampling error of the mean is `interval`.
         """
         return band_of(self.members)
 

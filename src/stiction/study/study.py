@@ -42,7 +42,7 @@ from stiction.random.dotted_keys import with_values
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 from stiction.reliability.answer import Probability
 from stiction.study.run import AnyPart, StoredRun, samples_of_part
-from stiction.study.sweep import Point, Sweep, Uncertain, grid_axes, with_first_values
+from stiction.study.sweep import Point, Sweep, Uncertain, grid_axes, varies, with_first_values
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -201,7 +201,8 @@ class Study(_Parts):
         """Return the equally likely interfaces of uncertain parameters."""
         parameters = dict(self.uncertain)
         count = parameters.pop("count")
-        swept = [key for axis in self.sweep for key in axis if key in parameters]
+        axes = [pair for axis in self.sweep for pair in axis.items()]
+        swept = [key for key in parameters if any(varies(key, *pair) for pair in axes)]
         if swept or isinstance(random, list):
             raise InputError(
                 f"uncertain: {swept[0]} is swept, too; take it out of one of them"

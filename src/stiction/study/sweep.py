@@ -15,7 +15,7 @@ from stiction.ensemble.dataset import Coordinates, GridAxes
 from stiction.errors import InputError, prefixed, unknown_name
 from stiction.model import Count, Real, at_least, check, describe, model, to_plain
 from stiction.random.dotted_keys import distributions_of, full_key
-from stiction.random.marginals import marginal_of
+from stiction.random.marginals import Marginal, marginal_of
 from stiction.variables import PROFILES, Variable
 
 INTERFACES = 30
@@ -187,9 +187,14 @@ def _read_uncertain(given: Any) -> dict[str, Any] | None:
         )
     rest = dict(given)
     found: dict[str, Any] = {"count": check("count", rest.pop("count", INTERFACES), Count)}
-    for key, one in distributions_of(_flat(rest, leaf=("low", "high", "type"))).items():
+    flat = _flat(rest, leaf=("low", "high", "type"))
+    for key, one in distributions_of(flat).items():
         try:
-            plain = marginal_of(one)
+            given = flat[key]
+            table = isinstance(given, Marginal) or (
+                isinstance(given, Mapping) and "type" in given
+            )
+            plain = marginal_of(given if table else one)
             found[full_key(key)] = plain.plain() if hasattr(plain, "plain") else to_plain(plain)
         except ValueError as error:
             raise InputError(f"{key}: {error}") from None
@@ -210,6 +215,18 @@ Uncertain: TypeAlias = Annotated[
     ),
 ]
 """Distributions by dotted key, and the number of interfaces."""
+
+
+def varies(key: str, swept: str, values: Sequence[Any]) -> bool:
+    """Whether a swept key is this one, or holds it with values that differ."""
+    if not f"{key}.".startswith(f"{swept}."):
+        return False
+    found = []
+    for one in values:
+        for step in key.removeprefix(swept).split(".")[1:]:
+            one = one.get(step) if isinstance(one, Mapping) else getattr(one, step, None)
+        found.append(one)
+    return key == swept or any(one != found[0] for one in found)
 
 
 def with_first_values(given: dict[str, Any]) -> dict[str, Any]:
