@@ -136,7 +136,11 @@ def add_curves(page: Page, run: StoredCurves) -> None:
         own = [one for one in curve.data_vars.values() if one.dims == ("point",)]
         factors, _, labels = zip(*map(scaled, own), strict=True)
         rows = np.transpose(own) * factors
-        page.table(f"Failure probability{where}", labels, rows)
+        mean = ""
+        if "members" in curve:
+            count = curve.sizes["member"]
+            mean = f", mean over {count} equally likely interfaces; the band holds 90 % of them"
+        page.table(f"Failure probability{where}{mean}", labels, rows)
 
 
 def add_figures(page: Page, result: xr.Dataset, dims: list[str]) -> None:

@@ -55,7 +55,15 @@ def test_a_wrong_prediction_is_seen_in_the_unit_of_the_peaks():
     (steps,) = [line for line in axes.lines if line.get_label() == "5 tests"]
     np.testing.assert_allclose(steps.get_xdata()[1:-1], np.sort(PEAKS) / 1e6)
     assert axes.get_xlabel() == "peak (MPa)"
+    area = 3.1e-4
+    forces = predicted(right).assign(critical_force=area * predicted(right).critical_stress)
+    found = st.statistics.agreement(forces, PEAKS * area / 1e3, unit="kN")
+    assert found.p_values == pytest.approx(agrees.p_values, abs=0.01)  # ties by round-off
+    assert st.plot.agreement(found).get_xlabel() == "peak (N)"
     for words, call in {
+        "has no critical_force": lambda: st.statistics.agreement(
+            predicted(right), PEAKS, unit="N"
+        ),
         "peaks: are needed": lambda: st.statistics.agreement(predicted(right)),
         "prediction: has no": lambda: st.statistics.agreement(xr.Dataset({"load": 1.0}), PEAKS),
         "no sample has a peak": lambda: st.statistics.agreement(predicted([np.nan]), PEAKS),
@@ -69,6 +77,10 @@ def posterior():
     strength = st.paper.strength(problem, correlation_ratio=0.5)
     prior = {"marginal.low": (0.5e6, 0.8e6)}
     return st.infer(problem, strength, PEAKS, prior=prior, method=LOCAL, samples=300)
+
+
+def test_forces_need_an_area(posterior):
+    refuses("need the area", lambda: st.statistics.agreement(posterior, PEAKS, unit="N"))
 
 
 def test_what_was_fitted_to_the_peaks_lies_nearer_than_chance(posterior):

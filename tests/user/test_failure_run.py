@@ -123,6 +123,9 @@ def test_uncertain_parameters_are_interfaces_that_are_equally_likely(
     )
     assert "the mean over 4 equally likely interfaces" in printed
     assert "band_high (1)" in printed
+    runs("report RUN")
+    page = (tmp_path / "RUN" / "report.html").read_text(encoding="utf-8")
+    assert "mean over 4 equally likely interfaces" in page
     found = st.open_run("RUN").dataset()
     xr.testing.assert_equal(computed(tmp_path / "list", one=again), found)
     for number, member in enumerate(likely):

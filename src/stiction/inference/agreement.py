@@ -144,6 +144,8 @@ def agreement(
         if load_cell_error:
             raise InputError("load_cell_error: the posterior has its own; leave it out")
         measured = prediction.peaks if peaks is None else make_peaks(peaks, unit)
+        problem, _ = prediction.at(0)
+        measured, _ = measured.in_stress(problem.interface.extent, problem.area, 0.0)
         return _with_posterior(prediction, measured, replicates, rng)
     if peaks is None:
         raise InputError("peaks: are needed beside a dataset")

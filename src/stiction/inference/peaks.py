@@ -62,7 +62,14 @@ class Peaks(NamedTuple):
     @property
     def variable(self) -> str:
         """Name of the measured quantity among the results of a method."""
+        if self.forces:
+            return "critical_force"
         return "friction_coefficient" if self.coefficients else "critical_stress"
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the peaks."""
+        return "N" if self.forces else "1" if self.coefficients else "Pa"
 
     def __str__(self) -> str:
         pairs = zip(self.lengths, self.values, strict=True)

@@ -243,7 +243,7 @@ def agreement(found: Agreement, *, ax: Axes | None = None) -> Axes:
     'peak (MPa)'
     """
     peaks = found.peaks
-    factor, unit = unit_for("1" if peaks.coefficients else "Pa", np.concatenate(peaks.values))
+    factor, unit = unit_for(peaks.unit, np.concatenate(peaks.values))
     ends: list[float] = []
     with on_axes(ax) as axes:
         for number, (length, values, (at, share)) in enumerate(
@@ -323,7 +323,7 @@ def _draw_peaks(figure: Any, found: Posterior) -> None:
     panels = figure.subplots(len(peaks.values), 1, squeeze=False)[:, 0]
     rows = zip(panels, peaks.lengths, peaks.values, found.predicted, strict=True)
     for axes, length, values, more in rows:
-        factor, unit = unit_for("1" if peaks.coefficients else "Pa", values)
+        factor, unit = unit_for(peaks.unit, values)
         ordered, expected = np.sort(values) * factor, np.quantile(more, LEVELS) * factor
         steps = (np.arange(ordered.size) + 0.5) / ordered.size
         axes.plot(expected, LEVELS, color=INK, label="predicted")
