@@ -84,8 +84,9 @@ def test_run_grow_look_export_report(runs, study):
     assert runs("export run result.nc") == "450 of 450 samples written to result.nc\n"
     with xr.open_dataset("result.nc") as result:
         assert result.load().identical(st.Study.from_toml(study).run())
-        rows = re.findall(r"150\.0 +(\S+) +(\S+) +\S+ +(\S+)", out)[:3]  # in MPa
-        for row, values in zip(rows, result.critical_stress.values * 1e-6, strict=True):
+        rows = re.findall(r"150\.0 +(\S+) +(\S+) +\S+ +(\S+)", out)  # in MPa, then coefficients
+        shown = [*result.critical_stress.values * 1e-6, *result.friction_coefficient.values]
+        for row, values in zip(rows, shown, strict=True):
             low = st.statistics.quantiles(values, 0.05).value[0]
             expected = [values.mean(), values.std(ddof=1), low]
             assert [*map(float, row)] == pytest.approx(expected, rel=1e-4)
