@@ -6,7 +6,7 @@ once for the mean over 30 equally likely interfaces (predictive). The true failu
 these stresses is then known. Its mean over the campaigns should be 1 %.
 
 Profiles are of one truth and are fitted by `fit_field`; the truths behind the peaks are drawn from
-the prior that `infer` is given. Twenty campaigns take about ten minutes on one free core.
+the prior that `infer` is given. Twenty campaigns take about five minutes on one free core.
 
 Run: ``python validation/decisions.py [CAMPAIGNS [FIGURE.png]]``
 """
