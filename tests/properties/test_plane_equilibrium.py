@@ -9,7 +9,7 @@ import stiction as st
 from stiction.criterion.average import _between_nodes, least_average
 from stiction.criterion.windows import ellipse_window
 from stiction.elasticity.operator import make_operator
-from stiction.equilibrium import relaxation, transforms
+from stiction.equilibrium import growing_patch, relaxation, transforms
 from stiction.equilibrium.relaxation import least_equilibrium
 from stiction.equilibrium.sample import Outcome
 from stiction.equilibrium.transforms import Plane, plane_onset
@@ -269,7 +269,7 @@ def test_a_growing_patch_stops_at_a_barrier_and_meets_others(monkeypatch, seed):
     assert len(exact) == len(ours)
     # Residuals of 1e-7 of the strength, over the lowest eigenvalue.
     assert apart(ours, exact) < 1e-5
-    monkeypatch.setattr(relaxation, "longest_step", lambda *_: 1.5)
+    monkeypatch.setattr(growing_patch, "longest_step", lambda *_: 1.5)
     passed = course()
     assert len(passed) < len(ours) or apart(passed[: len(ours)], ours) > 1e-2
 

@@ -150,8 +150,7 @@ class State:
     could be followed so far, `stuck` if the programme failed to find the next instability before.
     `peak` is the largest mean stress on the way there, over the mean of the load profile: the load
     itself (None), unless a machine drives; `back` is how far slip went back on the way, m. `ahead`
-    is what is known beyond: on lines K times the
-    direction, on planes the turn of the path.
+    is what is known beyond: on lines K times the direction, on planes the turn of the path.
     """
 
     load: float

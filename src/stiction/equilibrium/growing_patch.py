@@ -1,0 +1,168 @@
+"""A patch on a plane that grows by itself, followed by rough steps that pass no equilibrium."""
+
+import numpy as np
+
+from stiction.arrays import Array
+from stiction.elasticity.linear import SOLVED, Spring, inner, residual_of, solve_inside
+from stiction.elasticity.operator import Operator, filtered
+from stiction.equilibrium.held_equilibrium import ITERATIONS
+from stiction.equilibrium.sample import Sample, piece_at, present_pieces, start_of
+from stiction.jit import jit
+
+FIRST = 0.05
+"""Growth of a patch that is tried first, as a share of d_c."""
+ENDS = 2e-3
+"""Growth in a step, as a share of d_c, below which a patch is not followed any more."""
+QUICK = 0.7
+"""Growth up to which a step is expected to add more than the one before, as a share of d_c."""
+MOST = 0.98
+"""Largest share of the weakening in a step of a growing patch."""
+SPARED = 0.1
+"""Residual stress of such a step, as a share of the weakening left out."""
+HELD = 0.9
+"""Amplitude at which a spring holds a growing patch, as a share of that expected."""
+FREE = 0.3
+"""Share of the weakening up to which no spring holds the patch."""
+RUNS = -1.0
+"""Force of the spring, over that at rest, below which the patch outruns what was expected."""
+USED, LONGEST = 0.3, 1.5
+"""Share of a step that must be possible, or it has failed, and how much of it is made at most."""
+FAILURES = 3
+"""Failures in a row after which a growing patch is not followed any more."""
+
+
+@jit
+def longest_step(sample: Sample, rest: Array, slip: Array, move: Array, image: Array) -> float:
+    """Return the largest t at which no node that moves to slip + t `move` is held back.
+
+    `rest` is the overload at the slip (Pa), not negative where a node moves, and `image` K times
+    the move. Under a law that only flattens the overload is concave in t: it is not negative on the
+    way, either.
+    """
+    pieces = sample.pieces
+    longest = np.inf
+    for i in range(slip.size):
+        if not move[i] > 0.0:
+            continue
+        here, left = 0.0, rest[i]
+        piece = piece_at(pieces, sample.critical[i], slip[i])
+        while here < longest:
+            corner = np.inf
+            if piece < pieces.ends.shape[0]:
+                corner = (pieces.ends[piece] * sample.critical[i] - slip[i]) / move[i]
+            fall = image[i] - pieces.slopes[piece] * sample.rate[i] * move[i]
+            if fall > 0.0 and left < (corner - here) * fall:
+                longest = min(longest, here + max(left, 0.0) / fall)
+                break
+            if corner == np.inf:
+                break
+            left -= (corner - here) * fall
+            here = corner
+            piece += 1
+    return longest
+
+
+def _strength(sample: Sample, slip: Array) -> Array:
+    """Strength less initial stress after a slip, Pa."""
+    now = present_pieces(sample, slip)
+    return now.strength - now.rate * slip
+
+
+@jit
+def secants(sample: Sample, slip: Array, move: Array, rate: Array) -> float:
+    """`rate` = weakening on the way to slip + `move` (Pa/m); return the largest fall, Pa."""
+    pieces = sample.pieces
+    largest = 0.0
+    for i in range(slip.size):
+        piece = piece_at(pieces, sample.critical[i], slip[i])
+        rate[i] = pieces.slopes[piece] * sample.rate[i]
+        if move[i] > 0.0:
+            before = start_of(sample, i, piece) - rate[i] * slip[i]
+            there = slip[i] + move[i]
+            piece = piece_at(pieces, sample.critical[i], there)
+            after = start_of(sample, i, piece) - pieces.slopes[piece] * sample.rate[i] * there
+            rate[i] = (before - after) / move[i]
+            largest = max(largest, before - after)
+    return largest
+
+
+def _push(
+    operator: Operator, sample: Sample, rest: Array, slip: Array, growth: Array, share: float,
+    tolerance: float, residual: Array,
+) -> tuple[Array, float] | None:  # fmt: skip
+    """Slip that a growing patch adds where it is overloaded by `rest`; None if it has no bound.
+
+    Nodes weaken by a share of what they do on the way to the growth expected. A spring holds the
+    patch at an amplitude, as K less this weakening may have a direction of negative curvature: its
+    force is returned, too, as a share of that at no slip. `residual` is a workspace.
+    """
+    inside = rest >= 0.0
+    move = np.where(inside, growth, 0.0)
+    size = np.sqrt(inner(move, move))
+    if size == 0.0:
+        return None
+    rate = np.empty_like(slip)
+    fall = secants(sample, slip, move, rate)
+    stiffness = float(sample.rate.max()) if share > FREE else 0.0
+    spring = Spring(stiffness, move / size)
+    spared = max(SPARED * (1.0 - share) * fall, tolerance)
+    drive = rest - spared + (HELD * stiffness * size) * spring.shape
+    rate *= share
+    held = operator._replace(rate=rate)
+    residual_of(held, spring, drive, move, residual)
+    status, _ = solve_inside(
+        held, spring, inside, move, residual, np.empty((3, slip.size)), spared, ITERATIONS
+    )
+    force = HELD - inner(spring.shape, move) / size
+    return (np.maximum(move, 0.0), force) if status == SOLVED else None
+
+
+def grown(
+    operator: Operator,
+    sample: Sample,
+    load: float,
+    slip: Array,
+    growth: Array,
+    tolerance: float,
+) -> Array:
+    """Slip of a patch that grows by itself, from the growth in the step before.
+
+    Each step moves overloaded nodes alone, as far as all of them stay overloaded all the way, by
+    concavity (the law only flattens). So the first of them that came to its slip in the next
+    equilibrium would not be in balance there: that equilibrium is not passed, however
+    rough the step is. The load is lowered by the tolerance, which makes the overload positive.
+    """
+    weakens = sample.critical > 0.0
+    stress, image = np.empty((2, slip.size))
+    filtered(operator, operator.symbol, slip, stress)
+    share, failures = 1.0 - FIRST, 0
+    while failures < FAILURES:
+        rest = load * sample.profile - _strength(sample, slip) - tolerance
+        if float(rest.sum()) > 0.0:
+            break
+        rest -= stress
+        found = _push(operator, sample, rest, slip, growth, share, tolerance, image)
+        if found is None:
+            share, failures = 0.7 * share, failures + 1
+            continue
+        move, force = found
+        filtered(operator, operator.symbol, move, image)
+        step = min(longest_step(sample, rest, slip, move, image), LONGEST)
+        slip = slip + step * move
+        stress += step * image
+        size = float((move[weakens] / sample.critical[weakens]).max(initial=0.0))
+        if share > FREE and force < RUNS:
+            growth, share = move / max(size, 1.0), 0.5 * share
+            continue
+        if step < USED:
+            growth, failures = 0.5 * move, failures + 1
+            share *= 1.0 if force > 0.0 else 0.7
+            continue
+        if step * size < ENDS:
+            break
+        failures = 0
+        faster = 0.9 if force > 0.0 else 1.5 if force > -0.05 else 2.0
+        faster = min(faster if share > FREE else 1.2, max(QUICK / (step * size), 1.0))
+        growth = faster * step * move
+        share = min(max(1.0 - 0.7 * step * size, 0.0), MOST)
+    return slip
