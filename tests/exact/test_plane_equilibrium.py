@@ -8,6 +8,7 @@ from setups import RATE, exact_onset, make_problem, repeated, turns
 import stiction as st
 from stiction.criterion.windows import ellipse_window
 from stiction.elasticity.operator import make_operator, product
+from stiction.equilibrium.growing_patch import window_around
 from stiction.equilibrium.patches import labelled_patches, patch_of
 from stiction.equilibrium.transforms import Plane, doubled, halved, plane_onset
 
@@ -142,6 +143,27 @@ def test_symbol_of_single_waves():
         out = np.empty(wave.size)
         product(operator, wave.flatten(), out)
         assert np.abs(out - expected * wave.flatten()).max() < 1e-12 * expected
+
+
+def test_a_window_is_a_smaller_plane_around_a_patch():
+    shape, small = (64, 48), (16, 24)
+    rate = 1e8 * (1.0 + np.arange(64 * 48).reshape(shape))
+    operator = make_operator(Plane((2.0, 3.0), 1e9, 0.25).symbol(shape), rate, shape)
+    growth = np.zeros(shape)
+    growth[30, 40] = 0.9e-2  # too little to be part of the patch
+    growth[np.ix_([61, 62, 63, 0, 1], range(5, 15))] = 1.0
+    nodes, window = window_around(operator, growth.reshape(-1), 2.0)
+    # 2 times 5 and 10 nodes, at least 16: 64 over 4 and 48 over 2, around the middle.
+    assert window.transform.shape == small
+    expected = Plane((0.5, 1.5), 1e9, 0.25).symbol(small).reshape(-1)
+    np.testing.assert_allclose(window.symbol, expected, rtol=1e-14)
+    rows, columns = np.unravel_index(nodes, shape)
+    np.testing.assert_array_equal(rows.reshape(small)[:, 3], np.arange(56, 72) % 64)
+    np.testing.assert_array_equal(columns.reshape(small)[5], np.arange(46, 70) % 48)
+    assert (window.rate == rate[rows, columns]).all()
+    np.testing.assert_array_equal(window.inverse[0], operator.inverse[0])
+    nodes, plane = window_around(operator, growth.reshape(-1), 7.0)
+    assert (nodes, plane) == (slice(None), operator)
 
 
 def test_plane_too_small_for_a_patch_slides_near_the_mean():

@@ -1,21 +1,24 @@
 """A patch on a plane that grows by itself, followed by rough steps that pass no equilibrium."""
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from stiction.arrays import Array
 from stiction.elasticity.linear import SOLVED, Spring, inner, residual_of, solve_inside
-from stiction.elasticity.operator import Operator, filtered
+from stiction.elasticity.operator import Operator, filtered, make_transform
 from stiction.equilibrium.held_equilibrium import ITERATIONS
 from stiction.equilibrium.sample import Sample, piece_at, present_pieces, start_of
 from stiction.jit import jit
 
-FIRST = 0.05
+FIRST = 0.02
 """Growth of a patch that is tried first, as a share of d_c."""
 ENDS = 2e-3
 """Growth in a step, as a share of d_c, below which a patch is not followed any more."""
 QUICK = 0.7
 """Growth up to which a step is expected to add more than the one before, as a share of d_c."""
-MOST = 0.98
+MOST = 0.99
 """Largest share of the weakening in a step of a growing patch."""
 SPARED = 0.1
 """Residual stress of such a step, as a share of the weakening left out."""
@@ -29,6 +32,12 @@ USED, LONGEST = 0.3, 1.5
 """Share of a step that must be possible, or it has failed, and how much of it is made at most."""
 FAILURES = 3
 """Failures in a row after which a growing patch is not followed any more."""
+WIDE = 1.5
+"""Least size of a window around a patch, over that of the patch."""
+NARROWEST = 16
+"""Least nodes of a window along x and y."""
+PART = 0.01
+"""Growth from which a node is part of the patch, as a share of the largest."""
 
 
 @jit
@@ -86,17 +95,65 @@ def secants(sample: Sample, slip: Array, move: Array, rate: Array) -> float:
     return largest
 
 
+class Window(NamedTuple):
+    """Nodes of a part of the plane, and its operator as if it were a plane of its own."""
+
+    nodes: NDArray[np.int64] | slice
+    operator: Operator
+
+
+def _around(part: NDArray[np.bool_], wide: float) -> tuple[NDArray[np.int64], int]:
+    """Places along an axis around those of a patch, and how many times as long the axis is."""
+    nodes, here = part.size, np.flatnonzero(part)
+    gaps = np.diff(here, append=here[0] + nodes)
+    widest = int(np.argmax(gaps))
+    extent, ratio = nodes - int(gaps[widest]) + 1, 1
+    while nodes % (2 * ratio) == 0 and nodes >= 2 * ratio * max(wide * extent, NARROWEST):
+        ratio *= 2
+    size = nodes // ratio
+    first = here[(widest + 1) % here.size] - (size - extent) // 2
+    return (first + np.arange(size)) % nodes, ratio
+
+
+def window_around(operator: Operator, growth: Array, wide: float) -> Window:
+    """Return the window around a patch that grows, `wide` times as large, or the plane.
+
+    The wave vectors of a window are those of the plane, but for every second, fourth, ...
+    """
+    shape, half = operator.transform.shape, operator.transform.half
+    part = growth.reshape(shape) > PART * growth.max()
+    if not part.any():
+        return Window(slice(None), operator)
+    (rows, by_x), (columns, by_y) = (_around(part.any(axis=axis), wide) for axis in (1, 0))
+    if by_x * by_y == 1:
+        return Window(slice(None), operator)
+    nodes = (rows[:, None] * shape[1] + columns).reshape(-1)
+    symbol, inverse = (
+        field.reshape(half)[::by_x, ::by_y].flatten()
+        for field in (operator.symbol, operator.inverse)
+    )
+    transform = make_transform((rows.size, columns.size))
+    spectrum = np.empty(symbol.size, dtype=np.complex128)
+    rate, none = operator.rate[nodes], np.empty(0)
+    return Window(nodes, Operator(transform, symbol, inverse, rate, spectrum, none))
+
+
 def _push(
-    operator: Operator, sample: Sample, rest: Array, slip: Array, growth: Array, share: float,
-    tolerance: float, residual: Array,
+    window: Window, sample: Sample, rest: Array, slip: Array, growth: Array, share: float,
+    tolerance: float, workspace: Array,
 ) -> tuple[Array, float] | None:  # fmt: skip
     """Slip that a growing patch adds where it is overloaded by `rest`; None if it has no bound.
 
-    Nodes weaken by a share of what they do on the way to the growth expected. A spring holds the
-    patch at an amplitude, as K less this weakening may have a direction of negative curvature: its
-    force is returned, too, as a share of that at no slip. `residual` is a workspace.
+    Nodes in the window weaken by a share of what they do on the way to the growth expected. A
+    spring holds the patch at an amplitude, as K less this weakening may have a direction of
+    negative curvature: its force is returned, too, as a share of that at no slip.
     """
-    inside = rest >= 0.0
+    nodes, operator = window
+    every, (*fields, pieces) = slip.size, sample
+    excess, strength, profile, slope, critical = (field[nodes] for field in fields)
+    sample = Sample(excess, strength, profile, slope, critical, pieces)
+    rest, slip, growth = rest[nodes], slip[nodes], growth[nodes]
+    inside, residual = rest >= 0.0, workspace[: slip.size]
     move = np.where(inside, growth, 0.0)
     size = np.sqrt(inner(move, move))
     if size == 0.0:
@@ -113,8 +170,11 @@ def _push(
     status, _ = solve_inside(
         held, spring, inside, move, residual, np.empty((3, slip.size)), spared, ITERATIONS
     )
-    force = HELD - inner(spring.shape, move) / size
-    return (np.maximum(move, 0.0), force) if status == SOLVED else None
+    if status != SOLVED:
+        return None
+    pushed = np.zeros(every)
+    pushed[nodes] = np.maximum(move, 0.0)
+    return pushed, HELD - inner(spring.shape, move) / size
 
 
 def grown(
@@ -131,6 +191,8 @@ def grown(
     concavity (the law only flattens). So the first of them that came to its slip in the next
     equilibrium would not be in balance there: that equilibrium is not passed, however
     rough the step is. The load is lowered by the tolerance, which makes the overload positive.
+    So a step may be computed in a window around the patch, as if the plane were no larger; one
+    that fails is tried again in a wider window.
     """
     weakens = sample.critical > 0.0
     stress, image = np.empty((2, slip.size))
@@ -141,7 +203,9 @@ def grown(
         if float(rest.sum()) > 0.0:
             break
         rest -= stress
-        found = _push(operator, sample, rest, slip, growth, share, tolerance, image)
+        moving = np.where(rest >= 0.0, growth, 0.0)
+        window = window_around(operator, moving, WIDE * 2.0**failures)
+        found = _push(window, sample, rest, slip, growth, share, tolerance, image)
         if found is None:
             share, failures = 0.7 * share, failures + 1
             continue
