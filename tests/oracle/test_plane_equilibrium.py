@@ -18,7 +18,7 @@ from setups import (
 )
 
 import stiction as st
-from stiction.elasticity.linear import lowest_eigenvector
+from stiction.elasticity.linear import SOLVED, lowest_eigenvector, no_spring, solve_inside
 from stiction.elasticity.operator import make_operator
 from stiction.equilibrium.bracket import make_bracket
 from stiction.equilibrium.relaxation import least_equilibrium, stable_equilibrium
@@ -117,6 +117,42 @@ def test_lowest_eigenvector_equals_a_dense_one(size):
     value, _ = lowest_eigenvector(*given, 1e-10 * RATE, 500)
     assert value == pytest.approx(values[0], rel=1e-10, abs=1e-10 * RATE)
     assert np.abs(vector[inside] - np.abs(vectors[:, 0])).max() < 1e-7
+
+
+def test_a_slow_direction_saves_iterations():
+    """A with one eigenvalue that is far below all others, as close to a turning point."""
+    shape, inside = (20, 16), noise(4.0, 0, (20, 16)).reshape(-1) < 0.5
+    symbol = Plane((3.0 * LENGTH, 2.0 * LENGTH), 1e9, 0.33).symbol(shape)
+    nodes = np.flatnonzero(inside)
+    block = dense(symbol, shape)[np.ix_(nodes, nodes)]
+    (lowest, second), vectors = eigh(block, subset_by_index=[0, 1])
+    rate = lowest - 1e-4 * (second - lowest)
+    right = np.zeros(
+        inside.size
+    )  # the strength of one node falls, as where it reaches a corner
+    right[nodes[np.abs(vectors[:, 0]).argmax()]] = 1.0
+    exact = np.linalg.solve(block - rate * np.eye(nodes.size), right[nodes])
+    operator, taken = make_operator(symbol, rate, shape), []
+    rough = vectors[:, 0] + 0.003 * np.random.default_rng(3).standard_normal(nodes.size)
+    slow = np.zeros(inside.size)
+    slow[nodes] = rough / np.sqrt(rough @ block @ rough - rate * rough @ rough)
+    for each in (np.empty(0), slow):
+        x, residual, workspace = np.zeros(inside.size), right.copy(), np.empty((3, inside.size))
+        given = (
+            operator._replace(slow=each),
+            no_spring(inside.size),
+            inside,
+            x,
+            residual,
+            workspace,
+        )
+        status, iterations = solve_inside(*given, 0.02, 200)
+        taken.append(iterations)
+        status, _ = solve_inside(*given, 1e-10, 200)
+        assert status == SOLVED
+        # The residual over the lowest eigenvalue.
+        np.testing.assert_allclose(x[nodes], exact, rtol=1e-6)
+    assert taken[1] < taken[0]
 
 
 def relaxed(problem, strength, load, slip):

@@ -94,6 +94,7 @@ class Operator(NamedTuple):
     inverse: Array  # (modes,): 1/(K(k) + W/2) with the mean W
     rate: Array  # (nodes,): W, Pa/m, zero where the residual strength is reached
     spectrum: NDArray[np.complex128]  # (modes,): overwritten by each transform
+    slow: Array  # (nodes,): y with y^T (K - W) y about 1 that the inverse lacks, or empty
 
 
 def make_operator(symbol: Array, rate: Array | float, shape: tuple[int, ...]) -> Operator:
@@ -107,6 +108,7 @@ def make_operator(symbol: Array, rate: Array | float, shape: tuple[int, ...]) ->
         1.0 / (flat + 0.5 * typical),
         rates,
         np.empty(flat.shape, dtype=np.complex128),
+        np.empty(0),
     )
 
 

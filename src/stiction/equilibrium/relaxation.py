@@ -8,19 +8,19 @@ it, or slides (`least_equilibrium`, as `jump` with dense factors).
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction.arrays import Array
 from stiction.elasticity.linear import (
     EXHAUSTED,
     NEGATIVE,
     SOLVED,
+    inner,
     lowest_eigenvector,
     no_spring,
     residual_of,
     solve_inside,
 )
-from stiction.elasticity.operator import Operator
+from stiction.elasticity.operator import Operator, product
 from stiction.equilibrium.growing_patch import ENDS, FIRST, grown
 from stiction.equilibrium.held_equilibrium import ITERATIONS, equilibrate
 from stiction.equilibrium.sample import (
@@ -33,6 +33,10 @@ from stiction.equilibrium.sample import (
 )
 
 NEWTON = 100
+LOOSE = 0.03
+"""Factor by which a residual is reduced before the pieces of the law are revised."""
+CHECKED = 0.1
+"""Factor by which it is reduced where a matrix is looked through for negative curvature."""
 STEPS = 2000
 RELEVANT = 1e-5
 """Share of the largest value below which a node is not part of an unstable direction."""
@@ -69,12 +73,21 @@ def slip_under(
     return status, new
 
 
-def _definite(operator: Operator, rate: Array, inside: NDArray[np.bool_]) -> bool:
-    """Whether K - `rate` on some nodes shows no negative curvature as it is solved with."""
-    x, residual = np.zeros(rate.size), np.where(inside, 1.0, 0.0)
+def _definite(operator: Operator, rate: Array, growth: Array, slip: Array) -> bool:
+    """Whether K - `rate` on the nodes that slip shows no negative curvature.
+
+    It is looked for in the growth, which is close to the direction of a loss of stability,
+    and as the matrix is solved with.
+    """
+    x, image = np.zeros_like(slip), np.empty_like(slip)
+    operator, inside = operator._replace(rate=rate), slip > 0.0
+    product(operator, growth, image)
+    curvature = inner(growth, image)
+    if not curvature > 0.0:
+        return False
     status, _ = solve_inside(
-        operator._replace(rate=rate), no_spring(rate.size), inside, x, residual,
-        np.empty((3, rate.size)), 1e-4, ITERATIONS,
+        operator._replace(slow=growth / np.sqrt(curvature)), no_spring(slip.size), inside,
+        x, np.where(inside, 1.0, 0.0), np.empty((3, slip.size)), CHECKED, ITERATIONS,
     )  # fmt: skip
     return status == SOLVED
 
@@ -87,31 +100,34 @@ def stable_equilibrium(
     The guess is a slip there. None if that is not certain. It is if A is positive definite, on the
     nodes that slip at the end, with the steepest weakening that each passes on the way: then it is
     at each state on the way, and there is no other equilibrium. Newton's method finds the pieces at
-    the end; if no node comes to weaken more steeply, its first matrix is that A, and it comes from
-    above.
+    the end; until it knows them its solutions are rough.
     """
     tolerance = residual_tolerance(sample, load, accuracy)
-    pieces = sample.pieces
-    first = now = present_pieces(sample, slip)
-    new = guess
+    pieces, first = sample.pieces, present_pieces(sample, slip)
+    before, residual = first.piece, np.empty_like(slip)
+    new, rough = np.maximum(guess, slip), np.inf
     for _ in range(NEWTON):
-        drive = load * sample.profile - now.strength
-        status, found = slip_under(operator, drive, now.rate, new, tolerance)
+        now = present_pieces(sample, new)
+        if rough <= tolerance and np.array_equal(before, now.piece):
+            break
+        drive, before = load * sample.profile - now.strength, now.piece
+        if rough > tolerance:
+            present = operator._replace(rate=now.rate)
+            residual_of(present, no_spring(slip.size), drive, new, residual)
+            largest = np.where(new > 0.0, np.abs(residual), residual).max()
+            rough = max(tolerance, LOOSE * float(largest))
+        status, found = slip_under(operator, drive, now.rate, new, rough)
         if status != SOLVED:
             return None
         new = np.maximum(found, slip)
-        before, now = now, present_pieces(sample, new)
-        if np.array_equal(before.piece, now.piece):
-            break
     else:
         return None
-    if pieces.steepens and not np.array_equal(first.piece, now.piece):
+    steepest = first.rate
+    if pieces.steepens:
         piece = np.arange(pieces.slopes.size)[:, None]
         passed = (first.piece <= piece) & (piece <= now.piece)
         steepest = np.where(passed, pieces.slopes[:, None], 0.0).max(axis=0) * sample.rate
-        if not _definite(operator, steepest, new > 0.0):
-            return None
-    return new
+    return new if _definite(operator, steepest, new - slip, new) else None
 
 
 def _bound(

@@ -211,16 +211,6 @@ class Jump(NamedTuple):
     counts: bool = True
 
 
-def present_pieces(sample: Sample, slip: Array) -> Present:
-    """Return the pieces on which the nodes are after a slip."""
-    pieces = sample.pieces
-    corners = pieces.at_corner * (pieces.ends * sample.critical[:, None])
-    piece = np.count_nonzero(slip[:, None] >= corners, axis=1)
-    share = pieces.starts[piece]
-    strength = share * sample.excess + (1.0 - share) * sample.residual
-    return Present(piece, strength, pieces.slopes[piece] * sample.rate)
-
-
 def residual_nodes(sample: Sample, slip: Array) -> NDArray[np.bool_]:
     """Return which weakening nodes have reached their residual strength."""
     reached: NDArray[np.bool_] = slip >= sample.pieces.at_corner * sample.critical
@@ -258,6 +248,22 @@ def strength_at(sample: Sample, slip: Array, i: int) -> float:
     """Strength less initial stress of node i after some slip, Pa."""
     piece = piece_at(sample.pieces, sample.critical[i], slip[i])
     return start_of(sample, i, piece) - sample.pieces.slopes[piece] * sample.rate[i] * slip[i]
+
+
+@jit
+def _find_pieces(sample: Sample, slip: Array, present: Present) -> None:
+    for i in range(slip.size):
+        piece = piece_at(sample.pieces, sample.critical[i], slip[i])
+        present.piece[i] = piece
+        present.strength[i] = start_of(sample, i, piece)
+        present.rate[i] = sample.pieces.slopes[piece] * sample.rate[i]
+
+
+def present_pieces(sample: Sample, slip: Array) -> Present:
+    """Return the pieces on which the nodes are after a slip."""
+    present = Present(np.empty(slip.size, dtype=np.int64), *np.empty((2, slip.size)))
+    _find_pieces(sample, slip, present)
+    return present
 
 
 @jit

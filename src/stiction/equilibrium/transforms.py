@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stiction.arrays import Array
+from stiction.elasticity.linear import inner
 from stiction.elasticity.operator import Operator, make_operator, stiffness_symbol
 from stiction.equilibrium.bracket import Bracket, bisect, make_bracket
 from stiction.equilibrium.fold import Turn, follow_to_turn
@@ -41,10 +42,16 @@ ROUGH = 1e-4
 """Relative gap on coarse grids."""
 RETREATS = (0.0, 1e-5, 1e-4)
 """Shares of the load below its lower bound from which a path is followed to its turn."""
-FIRST_STEP = 1e-3
+FIRST_STEP = 1e-4
 """Step of the load where the path is followed in steps, as a share of the load."""
-ROUGHNESS = 0.01
+CLEARLY = 2.0
+"""Slip on a coarse grid, as a share of that to the first corner, beyond which a node reaches it."""
+AHEAD = 0.9
+"""Share of the way to the onset that would be without corners that is tried at once."""
+ROUGHNESS = 0.1
 """Largest residual stress after a step, as a share of the step."""
+ROUGHEST = 1e-5
+"""The same, as a share of the mean strength or load."""
 MOVED = 0.02
 """Slip, as a share of d_c, below which a jump is a long step of the stable path and no event."""
 AT_CORNER = 1.0 - 1e-9
@@ -126,14 +133,17 @@ def plane_onset(
     rate: Array,
     gap: float = 1e-6,
     slip: Array | None = None,
+    corner: Array | None = None,
 ) -> PlaneOnset:
     """Return the largest load with an equilibrium while no node has reached a corner of its law.
 
     All fields are (nx, ny), of a line (nodes,): peak strength less initial stress (Pa), load
     profile p > 0, weakening rate (Pa/m; zero where it is residual), slip (m) of an equilibrium at a
     lower load to start from instead of coarse grids. The bounds are closed to a relative gap.
+    The onset of a coarse grid is returned if a node there slips clearly beyond its corner (m).
     """
-    levels = [tuple(np.asarray(given, dtype=np.float64) for given in (excess, profile, rate))]
+    fields = (excess, profile, rate, np.full_like(excess, np.inf) if corner is None else corner)
+    levels = [tuple(np.asarray(given, dtype=np.float64) for given in fields)]
     while slip is None:
         shape = levels[-1][0].shape
         stiffest, weakest = float(plane.symbol(shape).max()), float(levels[-1][2].max())
@@ -145,7 +155,7 @@ def plane_onset(
     bend = 0.0
     for number in range(len(levels) - 1, -1, -1):
         goal = gap if number == 0 else max(ROUGH, gap)
-        strength, load_profile, weakening = levels[number]
+        strength, load_profile, weakening, end = levels[number]
         bracket = make_bracket(plane.symbol(strength.shape), weakening, strength, load_profile)
         if slip is not None:
             bracket.raise_slip(slip.flatten())
@@ -159,6 +169,8 @@ def plane_onset(
         if not closed:
             bend = _narrow(bracket, goal)
         coarse = bracket
+        if number > 0 and (bracket.slip > CLEARLY * end.reshape(-1)).any():
+            break
     return PlaneOnset(
         bracket.lower, bracket.upper, bracket.slip.reshape(strength.shape),
         bracket.multiplier.reshape(strength.shape), bracket.closed(gap),
@@ -189,24 +201,23 @@ class PlaneProgram(Program):
             self.plane.symbol(self.shape), sample.rate.reshape(self.shape), self.shape
         )
 
-    def solve(self, sample: Sample) -> PlaneOnset | None:
-        """Return the first instability if no node reaches a corner before it."""
-        excess, profile, rate = (
-            field.reshape(self.shape) for field in (sample.excess, sample.profile, sample.rate)
-        )
-        found = plane_onset(self.plane, excess, profile, rate, self.requested)
-        return None if exceeds(sample, found.slip.reshape(-1)) else found
-
     def next(self, sample: Sample, state: State | None = None) -> State:
         """Return the next instability on the path from a stable state or from rest."""
-        found = self.solve(sample) if state is None else None
-        if found is None:
-            return self._step_on(sample, state or self.at_rest(sample))
+        if state is not None:
+            return self._step_on(sample, state, FIRST_STEP * state.load)
+        ends = self.pieces.ends[0] * sample.critical
+        corner = np.where(sample.critical > 0.0, ends, np.inf)
+        fields = (sample.excess, sample.profile, sample.rate, corner)
+        excess, profile, rate, corner = (field.reshape(self.shape) for field in fields)
+        found = plane_onset(self.plane, excess, profile, rate, self.requested, corner=corner)
         slip, multiplier = found.slip.reshape(-1), found.multiplier.reshape(-1)
+        if slip.size < sample.excess.size or exceeds(sample, slip):
+            rest = self.at_rest(sample)
+            return self._step_on(sample, rest, AHEAD * (found.lower - rest.load))
         gap = found.upper - found.lower
         return State(found.lower, slip, np.zeros(slip.size), multiplier, gap)
 
-    def _step_on(self, sample: Sample, state: State) -> State:
+    def _step_on(self, sample: Sample, state: State, step: float) -> State:
         """Follow the stable path in steps of the load.
 
         A step is shortened if it may be unstable, which a long one may only because nodes begin to
@@ -214,10 +225,10 @@ class PlaneProgram(Program):
         """
         load, slip, gap = state.load, state.slip, self.requested
         operator = self._operator(sample)
-        step = FIRST_STEP * load
         passed = [(load, slip)]
         while True:
-            accuracy = max(0.1 * gap, ROUGHNESS * step / abs(load))
+            rough = min(ROUGHNESS * step / abs(load), ROUGHEST)
+            accuracy = max(0.1 * gap, rough)
             guess = slip
             if len(passed) > 1:
                 below, less = passed[-2]
@@ -238,6 +249,10 @@ class PlaneProgram(Program):
                 if turn.direction.any():
                     return _turned(turn, state, beyond, certified=False)
                 there = turn.slip
+            growth = there - slip
+            work = step * inner(sample.profile, growth)
+            if work > 0.0:  # A times the growth is about the step of the load
+                operator = operator._replace(slow=growth / np.sqrt(work))
             load, slip, step = beyond, there, 1.5 * step
             passed = [*passed[-3:], (load, slip)]
 
