@@ -44,8 +44,6 @@ RETREATS = (0.0, 1e-5, 1e-4)
 """Shares of the load below its lower bound from which a path is followed to its turn."""
 FIRST_STEP = 1e-4
 """Step of the load where the path is followed in steps, as a share of the load."""
-CLEARLY = 2.0
-"""Slip on a coarse grid, as a share of that to the first corner, beyond which a node reaches it."""
 AHEAD = 0.9
 """Share of the way to the onset that would be without corners that is tried at once."""
 ROUGHNESS = 0.1
@@ -140,7 +138,7 @@ def plane_onset(
     All fields are (nx, ny), of a line (nodes,): peak strength less initial stress (Pa), load
     profile p > 0, weakening rate (Pa/m; zero where it is residual), slip (m) of an equilibrium at a
     lower load to start from instead of coarse grids. The bounds are closed to a relative gap.
-    The onset of a coarse grid is returned if a node there slips clearly beyond its corner (m).
+    The onset of a coarse grid is returned if a node there slips beyond its corner (m).
     """
     fields = (excess, profile, rate, np.full_like(excess, np.inf) if corner is None else corner)
     levels = [tuple(np.asarray(given, dtype=np.float64) for given in fields)]
@@ -169,7 +167,7 @@ def plane_onset(
         if not closed:
             bend = _narrow(bracket, goal)
         coarse = bracket
-        if number > 0 and (bracket.slip > CLEARLY * end.reshape(-1)).any():
+        if number > 0 and (bracket.slip > end.reshape(-1)).any():
             break
     return PlaneOnset(
         bracket.lower, bracket.upper, bracket.slip.reshape(strength.shape),
@@ -209,11 +207,16 @@ class PlaneProgram(Program):
         corner = np.where(sample.critical > 0.0, ends, np.inf)
         fields = (sample.excess, sample.profile, sample.rate, corner)
         excess, profile, rate, corner = (field.reshape(self.shape) for field in fields)
-        found = plane_onset(self.plane, excess, profile, rate, self.requested, corner=corner)
-        slip, multiplier = found.slip.reshape(-1), found.multiplier.reshape(-1)
-        if slip.size < sample.excess.size or exceeds(sample, slip):
-            rest = self.at_rest(sample)
-            return self._step_on(sample, rest, AHEAD * (found.lower - rest.load))
+        rest = self.at_rest(sample)
+        for end in (corner, None):
+            found = plane_onset(self.plane, excess, profile, rate, self.requested, corner=end)
+            slip, multiplier = found.slip.reshape(-1), found.multiplier.reshape(-1)
+            coarse = slip.size < sample.excess.size
+            if not coarse and not exceeds(sample, slip):
+                break
+            reached = self._step_on(sample, rest, AHEAD * (found.lower - rest.load))
+            if not coarse or exceeds(sample, reached.slip):
+                return reached
         gap = found.upper - found.lower
         return State(found.lower, slip, np.zeros(slip.size), multiplier, gap)
 
