@@ -214,7 +214,8 @@ class PlaneProgram(Program):
             coarse = slip.size < sample.excess.size
             if not coarse and not exceeds(sample, slip):
                 break
-            reached = self._step_on(sample, rest, AHEAD * (found.lower - rest.load))
+            step = max(AHEAD * (found.lower - rest.load), FIRST_STEP * rest.load)
+            reached = self._step_on(sample, rest, step)
             if not coarse or exceeds(sample, reached.slip):
                 return reached
         gap = found.upper - found.lower
