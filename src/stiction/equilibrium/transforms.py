@@ -138,9 +138,9 @@ def plane_onset(
     All fields are (nx, ny), of a line (nodes,): peak strength less initial stress (Pa), load
     profile p > 0, weakening rate (Pa/m; zero where it is residual), slip (m) of an equilibrium at a
     lower load to start from instead of coarse grids. The bounds are closed to a relative gap.
-    The onset of a coarse grid is returned if a node there slips beyond its corner (m).
+    The onset of a coarse grid is returned if a node there slips beyond its corner (m; 0 for none).
     """
-    fields = (excess, profile, rate, np.full_like(excess, np.inf) if corner is None else corner)
+    fields = (excess, profile, rate, np.zeros_like(excess) if corner is None else corner)
     levels = [tuple(np.asarray(given, dtype=np.float64) for given in fields)]
     while slip is None:
         shape = levels[-1][0].shape
@@ -153,13 +153,13 @@ def plane_onset(
     bend = 0.0
     for number in range(len(levels) - 1, -1, -1):
         goal = gap if number == 0 else max(ROUGH, gap)
-        strength, load_profile, weakening, end = levels[number]
+        strength, load_profile, weakening, end = levels.pop()
         bracket = make_bracket(plane.symbol(strength.shape), weakening, strength, load_profile)
         if slip is not None:
             bracket.raise_slip(slip.flatten())
         closed = False
         if coarse is not None:
-            below = levels[number + 1][0].shape
+            below = tuple(nodes // 2 for nodes in strength.shape)
             guess = doubled(coarse.slip.reshape(below)).flatten()
             held = doubled(coarse.multiplier.reshape(below)).flatten()
             held *= 1.0 / np.sqrt((held**2).sum())
@@ -167,7 +167,8 @@ def plane_onset(
         if not closed:
             bend = _narrow(bracket, goal)
         coarse = bracket
-        if number > 0 and (bracket.slip > end.reshape(-1)).any():
+        end = end.reshape(-1)
+        if number > 0 and ((bracket.slip > end) & (end > 0.0)).any():
             break
     return PlaneOnset(
         bracket.lower, bracket.upper, bracket.slip.reshape(strength.shape),
@@ -203,8 +204,8 @@ class PlaneProgram(Program):
         """Return the next instability on the path from a stable state or from rest."""
         if state is not None:
             return self._step_on(sample, state, FIRST_STEP * state.load)
-        ends = self.pieces.ends[0] * sample.critical
-        corner = np.where(sample.critical > 0.0, ends, np.inf)
+        first = float(self.pieces.ends[0])
+        corner = sample.critical if first == 1.0 else first * sample.critical
         fields = (sample.excess, sample.profile, sample.rate, corner)
         excess, profile, rate, corner = (field.reshape(self.shape) for field in fields)
         rest = self.at_rest(sample)
