@@ -241,11 +241,11 @@ def test_path_is_the_slip_at_onset_just_below_it():
     assert np.abs(slips[3].reshape(SHAPE) - found.slip).max() < 0.01 * found.slip.max()
 
 
-def walled(seed):
+def walled(seed, shape=SHAPE):
     """A weak patch behind a barrier around it, with other weak patches beyond."""
     rng = np.random.default_rng(seed)
-    strength = 0.5e6 + 2.5e6 * smooth(rng, 3.0, SHAPE)
-    x, y = np.ogrid[: SHAPE[0], : SHAPE[1]]
+    strength = 0.5e6 + 2.5e6 * smooth(rng, 3.0, shape)
+    x, y = np.ogrid[: shape[0], : shape[1]]
     far = np.hypot(x - rng.uniform(12, 28), y - rng.uniform(10, 20))
     wall, thick = rng.uniform(6, 9), rng.uniform(1.5, 4.0)
     strength[far < wall] *= 0.6
@@ -253,11 +253,17 @@ def walled(seed):
     return plane_sample(strength, 3e5 * rng.uniform(0.5, 1.0), RATE)
 
 
-@pytest.mark.parametrize("seed", [13, 19])
-def test_a_growing_patch_stops_at_a_barrier_and_meets_others(monkeypatch, seed):
-    """As with steps that solve for the least equilibrium of bounds; not if nothing is checked."""
-    sample = walled(seed)
-    operator = make_operator(PLANES["lattice"].symbol(SHAPE), RATE, SHAPE)
+@pytest.mark.parametrize(("seed", "times"), [(13, 1), (19, 1), (4, 2), (1, 3), (4, 3)])
+def test_a_growing_patch_stops_at_a_barrier_and_meets_others(monkeypatch, seed, times):
+    """As with steps that solve for the least equilibrium of bounds; not if nothing is checked.
+
+    On large planes some steps are made in windows, which the patch comes to fill.
+    """
+    shape = (times * SHAPE[0], times * SHAPE[1])
+    sample = walled(seed, shape)
+    lattice = PLANES["lattice"]
+    lengths = tuple(times * length for length in lattice.lengths)
+    operator = make_operator(lattice._replace(lengths=lengths).symbol(shape), RATE, shape)
     loads = sample.excess.min() * np.linspace(1.1, 3.0, 12)
 
     def course():
@@ -272,8 +278,18 @@ def test_a_growing_patch_stops_at_a_barrier_and_meets_others(monkeypatch, seed):
     def apart(first, second):
         return np.abs(first - second).max() / sample.critical.max()
 
+    around, windows = growing_patch.window_around, []
+
+    def counted(*given):
+        windows.append(around(*given))
+        return windows[-1]
+
+    monkeypatch.setattr(growing_patch, "window_around", counted)
     ours = course()
     assert 5 < len(ours) < len(loads)
+    sizes = {window.operator.rate.size for window in windows}
+    assert (min(sizes) < sample.excess.size) == (times > 1)
+    assert max(sizes) == sample.excess.size
     with monkeypatch.context() as patch:
         patch.setattr(relaxation, "ENDS", np.inf)  # no patch is followed as it grows
         exact = course()
