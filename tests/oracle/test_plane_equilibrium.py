@@ -127,9 +127,8 @@ def test_a_slow_direction_saves_iterations():
     block = dense(symbol, shape)[np.ix_(nodes, nodes)]
     (lowest, second), vectors = eigh(block, subset_by_index=[0, 1])
     rate = lowest - 1e-4 * (second - lowest)
-    right = np.zeros(
-        inside.size
-    )  # the strength of one node falls, as where it reaches a corner
+    # The strength of one node falls, as where it reaches a corner.
+    right = np.zeros(inside.size)
     right[nodes[np.abs(vectors[:, 0]).argmax()]] = 1.0
     exact = np.linalg.solve(block - rate * np.eye(nodes.size), right[nodes])
     operator, taken = make_operator(symbol, rate, shape), []
@@ -138,17 +137,10 @@ def test_a_slow_direction_saves_iterations():
     slow[nodes] = rough / np.sqrt(rough @ block @ rough - rate * rough @ rough)
     for each in (np.empty(0), slow):
         x, residual, workspace = np.zeros(inside.size), right.copy(), np.empty((3, inside.size))
-        given = (
-            operator._replace(slow=each),
-            no_spring(inside.size),
-            inside,
-            x,
-            residual,
-            workspace,
-        )
-        status, iterations = solve_inside(*given, 0.02, 200)
+        given = operator._replace(slow=each), no_spring(inside.size), inside, x, residual
+        _, iterations = solve_inside(*given, workspace, 0.02, 200)
         taken.append(iterations)
-        status, _ = solve_inside(*given, 1e-10, 200)
+        status, _ = solve_inside(*given, workspace, 1e-10, 200)
         assert status == SOLVED
         # The residual over the lowest eigenvalue.
         np.testing.assert_allclose(x[nodes], exact, rtol=1e-6)

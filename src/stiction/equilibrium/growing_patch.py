@@ -9,6 +9,7 @@ from stiction.arrays import Array
 from stiction.elasticity.linear import SOLVED, Spring, inner, residual_of, solve_inside
 from stiction.elasticity.operator import Operator, filtered, make_transform
 from stiction.equilibrium.held_equilibrium import ITERATIONS
+from stiction.equilibrium.patches import span
 from stiction.equilibrium.sample import Sample, piece_at, present_pieces, start_of
 from stiction.jit import jit
 
@@ -104,14 +105,12 @@ class Window(NamedTuple):
 
 def _around(part: NDArray[np.bool_], wide: float) -> tuple[NDArray[np.int64], int]:
     """Places along an axis around those of a patch, and how many times as long the axis is."""
-    nodes, here = part.size, np.flatnonzero(part)
-    gaps = np.diff(here, append=here[0] + nodes)
-    widest = int(np.argmax(gaps))
-    extent, ratio = nodes - int(gaps[widest]) + 1, 1
+    nodes, ratio = part.size, 1
+    start, extent = span(part, 0)
     while nodes % (2 * ratio) == 0 and nodes >= 2 * ratio * max(wide * extent, NARROWEST):
         ratio *= 2
     size = nodes // ratio
-    first = here[(widest + 1) % here.size] - (size - extent) // 2
+    first = start - (size - extent) // 2
     return (first + np.arange(size)) % nodes, ratio
 
 

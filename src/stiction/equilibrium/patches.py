@@ -100,9 +100,11 @@ def labelled_patches(mask: Mask) -> tuple[NDArray[np.int64], int]:
     return order[numbers][pieces], patches - 1
 
 
-def _span(occupied: Mask, peak: int) -> tuple[int, int]:
-    """First place and length of the shortest arc that holds all places; if none is empty, of
-    the whole circle from the far side of the peak."""
+def span(occupied: Mask, peak: int) -> tuple[int, int]:
+    """Return the first place and the length of the shortest arc that holds all places.
+
+    If none is empty it is the whole circle from the far side of the peak.
+    """
     n = occupied.size
     places = np.flatnonzero(occupied)
     if places.size == n:
@@ -117,7 +119,7 @@ def patch_of(mask: Mask, weight: Array, spacings: tuple[float, ...]) -> Patch:
     peak = np.unravel_index(int(np.argmax(np.where(mask, weight, -np.inf))), mask.shape)
     centre, extents = [], []
     for axis in (0, 1):
-        start, length = _span(np.any(mask, axis=1 - axis), int(peak[axis]))
+        start, length = span(np.any(mask, axis=1 - axis), int(peak[axis]))
         profile = np.where(mask, weight, 0.0).sum(axis=1 - axis)
         n = mask.shape[axis]
         along = profile[(start + np.arange(length)) % n]

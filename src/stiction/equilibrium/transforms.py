@@ -232,8 +232,7 @@ class PlaneProgram(Program):
         operator = self._operator(sample)
         passed = [(load, slip)]
         while True:
-            rough = min(ROUGHNESS * step / abs(load), ROUGHEST)
-            accuracy = max(0.1 * gap, rough)
+            accuracy = max(0.1 * gap, min(ROUGHNESS * step / abs(load), ROUGHEST))
             guess = slip
             if len(passed) > 1:
                 below, less = passed[-2]
