@@ -1,16 +1,20 @@
 """Probabilities that are exactly zero or one, intervals, and the error estimates themselves."""
 
+import dataclasses
 import math
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from refusals import refuses
 from scipy.stats import binom, nbinom
-from setups import LOCAL, ensemble, local_onset, turns
+from setups import EXACT, LOCAL, ensemble, local_onset, turns
 
 import stiction as st
 from stiction.progress import SILENT
 from stiction.reliability.counting import Count, count_failures
+from stiction.reliability.failure import curve_of
+from stiction.reliability.subset import Descent, Population
 from stiction.reliability.tail import Tail, repeat_until_precise
 from stiction.reliability.uncertainty import (
     ancestral_variance,
@@ -56,6 +60,95 @@ def test_nothing_is_below_the_bound_where_the_local_criterion_rings():
     assert float(found["critical_stress"].min()) >= 0.66e6 * (1.0 - 1e-15)
     state = st.external.limit_state(PROBLEM, field, LOCAL)
     assert state(state.draws(0, 0, 200)).min() == 0.66e6
+
+
+def rigid(marginal, rate):
+    """A strip whose drive is held: slip lowers the mean stress before anything is unstable."""
+    problem = st.Problem(
+        st.Solid(shear_modulus=1e9, poisson_ratio=0.3, density=1200.0),
+        st.Interface(length=0.1, nodes=40),
+        st.LinearWeakening(weakening_rate=rate * 1e9 / 0.06),
+        mode="III",
+        specimen=st.Blocks(height=0.03, thickness=6e-3, drive=st.Platen(stiffness=math.inf)),
+    )
+    return problem, st.RandomField(marginal, st.SquaredExponentialSpectrum(0.02), True)
+
+
+FIRST = {"event": "first_instability", "method": EXACT, "progress": False}
+
+
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+def test_the_first_instability_behind_a_machine_may_lie_below_the_strength():
+    system = rigid(st.Beta(alpha=1.0, beta=4.0, low=1e6, high=1.6e6), 1.2)
+    found = st.failure_probability(*system, 0.99e6, **FIRST, target_cv=0.2)
+    assert found.lower_bound == -math.inf
+    plain = ensemble(*system, 400, method=EXACT, seed=9).first_instability.values
+    share = np.mean(plain < 0.99e6)
+    assert 0.1 < share < 0.6
+    # Three standard errors of 400 samples.
+    assert found.probability == pytest.approx(share, abs=3.0 * math.sqrt(0.25 / 400))
+    assert "bound" not in str(found)
+
+
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+@pytest.mark.filterwarnings("ignore::stiction.UnitWarning")
+def test_what_survives_counts_as_survived():
+    """A quarter slides stably: counted, by levels, of two members, and as a curve."""
+    problem, field = rigid(st.Lognormal(mean=1e6, cv=0.12), 1.05)
+    problem = dataclasses.replace(problem, load=st.Load(normal_pressure=2.7e6))
+    steep = dataclasses.replace(field, marginal=st.Lognormal(mean=0.97e6, cv=0.1))
+    likely = [field, steep]
+    plain = ensemble(problem, likely, 600, method=EXACT, seed=5).first_instability.values
+    lost = np.isnan(plain).mean()
+    assert 0.1 < lost < 0.5
+    error = 3.0 * math.sqrt(0.25 / 600)
+    options = FIRST | {"target_cv": 0.3, "max_evaluations": 20_000}
+    design = st.design_stress(problem, likely, probability=0.1, **options)
+    assert design.survived == pytest.approx(lost, abs=error)
+    assert f"{design.survived:.3g} of plain samples survive" in str(design)
+    below = np.sum(plain < np.array(design.interval)[:, None], axis=1) / plain.size
+    assert below[0] - error < 0.1 < below[1] + error
+    for algorithm in ("plain", "subset"):
+        found = st.failure_probability(
+            problem, likely, design.stress, **options, algorithm=algorithm
+        )
+        assert found.survived == pytest.approx(lost, abs=error)
+        share = np.mean(plain < design.stress)
+        assert found.probability == pytest.approx(share, abs=4.0 * found.cv * share + error)
+    pressed = st.failure_probability(
+        problem, likely, friction_coefficient=9.9, **options, algorithm="plain"
+    )
+    # Whatever the stress, no more than those that have an instability.
+    assert pressed.probability == pytest.approx(1.0 - lost, abs=error)
+    refuses("need not happen", lambda: st.failure_probability(
+        problem, likely, 0.5e6, **options, algorithm="two_level"
+    ))  # fmt: skip
+    never = st.design_stress(problem, likely, probability=0.97, **options)
+    assert never.stress == math.inf
+    assert "no stress has that probability" in never.warnings[0]
+    curve = st.failure_curve(problem, likely, smallest=0.02, **options)
+    assert curve.survived == pytest.approx(lost, abs=error)
+    assert np.isfinite(curve.stress).all()
+
+
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+def test_where_most_survive_a_curve_begins_later():
+    """Onsets above a third of all samples do not happen: there is no median stress."""
+    draws = np.arange(900.0)
+    values = np.where(draws < 300, draws, math.inf)
+    descent = Descent(
+        900, [Population(math.inf, 0.0, values, np.arange(900), np.zeros(900, int), draws)],
+        1.0, 900, True,
+    )  # fmt: skip
+    tail = Tail([descent])
+    assert tail.survived == pytest.approx(2.0 / 3.0)
+    assert tail.quantile(0.5) == math.inf
+    assert tail.quantile(0.3) == pytest.approx(269.0, abs=1.0)
+    state = st.external.limit_state(PROBLEM, STRENGTH, LOCAL)
+    curve = curve_of(tail, state, np.array([0.5, 0.2, 0.1]), {})
+    assert np.isfinite(curve.stress.values).tolist() == [False, True, True]
+    assert np.isnan(curve.to_array().values[:, 0]).all()
+    st.plot.failure_curve(curve)
 
 
 def test_binomial_interval_has_its_coverage():

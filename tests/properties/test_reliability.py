@@ -1,12 +1,20 @@
 """What holds for every estimate: reproducibility, symmetry, and visits to every weak place."""
 
+import dataclasses
+import itertools
 import math
 
 import numpy as np
 import pytest
-from setups import EXACT, LOCAL, ensemble, local_onset
+from crooked import uneven
+from hypothesis import given, settings
+from hypothesis import strategies as of
+from setups import EXACT, LOCAL, SOLID, ensemble, local_onset
 
 import stiction as st
+from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.limit_state import LimitState
+from stiction.errors import collect_warnings
 from stiction.reliability.subset import descend
 from stiction.reliability.uncertainty import generator
 
@@ -119,3 +127,82 @@ def test_more_that_is_random_is_sampled_with_it():
     rare = tail(0.68e6, target_cv=0.15, random=random)
     error = math.hypot(rare.cv, result.cv)
     assert abs(math.log(rare.probability / result.probability)) < 4.0 * error
+
+
+INTERFACES = {"line": st.Interface(0.036, 72), "plane": st.Interface((0.02, 0.017), (16, 22))}
+DRIVES = {
+    "dead load": st.Platen(),
+    "machine": st.Pusher(height=0.009, width=0.011, side="both", stiffness=2e8),
+    "rigid": st.Platen(stiffness=math.inf),
+}
+EVENTS = ["critical_stress", "first_instability"]
+METHODS = {
+    "local": LOCAL,
+    "exact": EXACT,
+    "rate": st.Rupture(loading_rate=3e9, start="rest", stop="onset"),
+    "up and down": st.Rupture(load=([0.0, 1e-3, 1.3e-3, 5e-3], [2e5, 8e5, 1e5, 3e6])),
+}
+
+
+def random_of(low, tail, initial, pressed, between):
+    """Strength with a lower end, perhaps as coefficients under a random pressure, and more."""
+    spectrum = st.SquaredExponentialSpectrum(4e-3)
+    unit = 2.1e6 if pressed else 1.0
+
+    def field(low, high, shape, **options):
+        marginal = st.Beta(alpha=0.6, beta=shape, low=low, high=high)
+        return st.RandomField(marginal, spectrum, True, **options)
+
+    of_what = {"of": "friction_coefficient"} if pressed else {}
+    found = {"strength": field(low / unit, (low + 8e5) / unit, tail, **of_what)}
+    if pressed:
+        found["normal_pressure"] = field(1.6e6, 3.1e6, 1.3)
+    if initial:
+        found["initial_stress"] = field(-initial, 0.7 * initial, 1.1)
+    spread = {"strength": st.Beta(alpha=2.0, beta=2.0, low=0.8, high=1.2)} if between else None
+    return st.RandomInterface(**found, between=spread)
+
+
+SYSTEMS = [
+    *itertools.product(["line", "dead load", "rigid"], ["local", "exact"]),
+    *(("machine", "exact"), ("plane", "local"), ("line", "rate"), ("line", "up and down")),
+]
+
+
+@pytest.mark.parametrize(("system", "method"), SYSTEMS)
+@settings(max_examples=4, deadline=None)
+@given(
+    low=of.floats(4e5, 9e5), tail=of.floats(0.7, 6.0),
+    initial=of.sampled_from([0.0, 1e5, 3e5]), pressed=of.booleans(), between=of.booleans(),
+    per_pressure=of.booleans(), seed=of.integers(0, 99),
+)  # fmt: skip
+def test_no_sample_lies_beyond_the_bounds(
+    system, method, low, tail, initial, pressed, between, per_pressure, seed
+):
+    """Whatever is driven, random and asked for; what need not happen has no upper bound."""
+    blocks, interface = DRIVES.get(system), INTERFACES.get(system, INTERFACES["line"])
+    load = st.Load(
+        profile=1.0 if blocks else 1.2 + 0.4 * uneven(interface, seed=seed),
+        initial_stress=-4e4 + 9e4 * uneven(interface, seed=seed + 1),
+        normal_pressure=2.3e6,
+    )
+    specimen = blocks and st.Blocks(height=0.019, thickness=0.006, drive=blocks)
+    # A little steeper than a strip unloads: much of the specimen slips before the instability.
+    rate = 3.4e10 if blocks else 0.3e12
+    law = st.LinearWeakening(weakening_rate=rate, residual_strength=1e5)
+    with collect_warnings():
+        mode = "III" if system == "rigid" else "II"
+        problem = st.Problem(SOLID, interface, law, load, mode=mode, specimen=specimen)
+        random = random_of(low, tail, initial, pressed, between)
+        experiment = Experiment(problem, random, METHODS[method])
+        state = LimitState(experiment, "critical_stress", per_pressure)
+        draws = state.draws(seed, 0, 24 if method in ("local", "exact") else 3)
+        draws[: len(draws) // 2] *= 2.5  # near the ends of the marginals
+        for event in EVENTS:
+            own = dataclasses.replace(state, event=event)
+            found, (least, most) = own._stress(draws), own.bounds
+            error = 1e-9 * np.abs(found)
+            assert not (found < least - error).any()
+            assert most == np.inf or (found <= most + error).all()
+            if blocks is None and method == "exact":
+                assert -np.inf < least < most < np.inf

@@ -80,7 +80,10 @@ class LimitState:
         return self.experiment.profiles(draws)
 
     def __call__(self, draws: Array) -> Array:
-        """Return the stress at onset, Pa, of finite draws (samples, dimension) or (dimension,)."""
+        """Return the stress at onset, Pa, of finite draws (samples, dimension) or (dimension,).
+
+        Infinite where the event does not happen: such a sample survives any stress.
+        """
         given, experiment = check("draws", draws, Numbers), self.experiment
         if given.ndim not in (1, 2) or given.shape[-1] != self.dimension:
             raise InputError(
@@ -96,6 +99,7 @@ class LimitState:
             found = self._stress(rows)
         else:
             found = np.concatenate(in_threads(self._stress, parts, self.workers))
+        found = np.where(np.isnan(found), np.inf, found)
         found = np.maximum(found, self.bounds[0])  # rounding may leave a stress slightly below
         return found if given.ndim == 2 else found[0]
 
@@ -108,14 +112,41 @@ class LimitState:
         self.meter.advance(draws.shape[0])
         return found
 
+    @property
+    def may_survive(self) -> bool:
+        """Whether slip lowers the mean stress before the event, which need not happen at all."""
+        specimen = self.experiment.problem.specimen
+        machine = specimen is not None and specimen.drive.stiffness > 0.0
+        return machine and self.event == "first_instability"
+
+    @property
+    def _bounded(self) -> tuple[bool, bool]:
+        """Whether the strength bounds the stress at onset from below, and from above.
+
+        From below: nothing slips at a load below min (tau_p - tau_i)/p, where the mean stress is
+        <tau_i> + load <p>. Slip lowers it only behind a machine, and then the largest on the way,
+        `critical_stress`, is no lower. A rupture under a load that falls may begin at any stress,
+        and of other methods nothing is known. The weights of the local criterion are positive, but
+        behind a machine it knows no slip.
+
+        From above: in equilibrium stress is nowhere above strength, nor is its mean above the mean
+        strength. By the local criterion load <g, p> <= <g, tau_p - tau_i> at each place, and
+        between half-spaces the mean over places makes that load <p> <= <tau_p - tau_i>. What need
+        not happen has no bound.
+        """
+        experiment, method = self.experiment, self.experiment.method
+        specimen = experiment.problem.specimen
+        if method.type == "equilibrium":
+            return not self.may_survive, not self.may_survive
+        if method.type == "local_criterion":
+            return specimen is None or specimen.drive.stiffness == 0.0, specimen is None
+        history = getattr(method, "load", None)
+        rises = history is None or bool((np.diff(history.values) >= 0.0).all())
+        return method.type == "rupture" and rises, False
+
     @cached_property
     def bounds(self) -> tuple[float, float]:
-        """Stresses below and above which no sample can slide, Pa.
-
-        Nothing slips, and so nothing can become unstable, while the stress is below the strength at
-        every node; and the mean stress of an interface whose slip sums to no net force is at most
-        the mean of its strength. Both hold for every method and every sample.
-        """
+        """Stresses below and above which no sample can slide, Pa; infinite where none is known."""
         return self.likely_bounds(0.0)
 
     def likely_bounds(self, negligible: float) -> tuple[float, float]:
@@ -132,8 +163,6 @@ class LimitState:
         problem = self.experiment.problem
         if any(field.conditions is not None for field in random.properties.values()):
             negligible = 0.0  # what was measured may be rarer
-        if self._random_pressure and not negligible:
-            return 0.0, math.inf
         chance = negligible / (8 * problem.interface.size)  # eight random factors, at each node
         low, high = support_in_stress(problem, random, "strength", chance)
         profile = np.broadcast_to(problem.load_profile, problem.interface.shape)
@@ -146,9 +175,11 @@ class LimitState:
         low = float(initial + np.min((low - most) / profile) * np.mean(profile))
         if self._random_pressure:
             ends = support_in_stress(problem, random, "normal_pressure", chance)
-            ratios = [self.experiment.pressure / end for end in ends]
-            low, high = min(low * one for one in ratios), max(high * one for one in ratios)
-        return low, high
+            mean = self.experiment.pressure
+            ratios = mean / ends[1], mean / ends[0] if ends[0] > 0.0 else math.inf
+            low, high = low * ratios[low < 0.0], high * ratios[1]
+        below, above = self._bounded
+        return low if below else -math.inf, high if above else math.inf
 
 
 def weakest_first(state: LimitState) -> LimitState:
@@ -167,6 +198,7 @@ def weakest_first(state: LimitState) -> LimitState:
     draws = np.repeat(state.draws(0, 0, RANKED), count, axis=0)
     draws[:, 0] = np.tile(ndtri((np.arange(count) + 0.5) / count), RANKED)
     onset = by(draws).reshape(RANKED, count)
+    onset = np.minimum(onset, onset.max(where=np.isfinite(onset), initial=0.0))
     lowest = np.array(state.bounds_of_members())[:, 0]
     weak = np.maximum(onset.mean(axis=0) - LOW * onset.std(axis=0), lowest)
     order = replace(random, order=tuple(np.argsort(weak, kind="stable").tolist()))

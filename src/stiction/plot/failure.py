@@ -61,6 +61,7 @@ def failure_curve(
         If the dataset is not a failure curve.
     """
     need(curve, "stress", "probability", "probability_low", "probability_high")
+    curve = curve.isel(point=np.isfinite(curve["stress"].values))
     bound, chance = float(curve.attrs["lower_bound"]), curve["probability"].values
     factor, unit = unit_for("Pa", curve["stress"].values)
     x = curve["stress"].values * factor

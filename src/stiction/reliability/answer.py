@@ -51,13 +51,16 @@ class Answer:
     evaluations, first_stage_evaluations : int
         Samples solved by the method, and by its less expensive first stage only.
     lower_bound, stress_above_bound : float
-        Pa; no sample slides below `lower_bound`.
+        Pa; no sample slides below `lower_bound`, which is minus infinity where none is known.
     algorithm, reason : str
         'plain', 'subset', 'two_level' or 'exact' (nothing had to be sampled), and why.
     members : (members,) array
         Of a list of equally likely interfaces: the probability of each. `probability` is their
         mean, the predictive probability: the one to decide with. Where no sample of an interface
         slides below the stress, its entry is what one would stand for, about an upper bound.
+    survived : float
+        Share of plain samples in which the event does not happen, at any stress: behind a stiff
+        machine nothing need become unstable, and a load that holds need not break anything.
     warnings : tuple of str
         Reasons not to trust the answer; empty if there are none.
     normal_pressure, friction_coefficient : float
@@ -82,6 +85,7 @@ class Answer:
     lower_bound: float
     algorithm: str
     reason: str
+    survived: float = 0.0
     warnings: tuple[str, ...]
     normal_pressure: float
     area: float = math.nan
@@ -140,6 +144,8 @@ class Answer:
             result += f" (force {self.force:.4g} N)"
         if bounded(self.lower_bound):
             result += f", {self.stress_above_bound / 1e3:.4g} kPa above the bound"
+        if self.survived:
+            result += f"; {self.survived:.3g} of plain samples survive any stress"
         if self.members.size:
             low, high = self.band
             result += f"; the mean over {self.members.size} equally likely interfaces, of which"

@@ -245,6 +245,7 @@ def _by_counting(
         "cv": count.cv,
         "interval": count.interval(),
         "evaluations": start + stresses.size,
+        "survived": counted.survived,
         "members": members_of(state, Tail([counted]), stress),
         "failing_profiles": _profiles(state, drawn(failed[:SHOWN])),
         "doubts": doubts,
@@ -369,6 +370,11 @@ def design_stress(
         if tail.complete:
             stress, least = tail.quantile(probability), math.nextafter(lowest, math.inf)
             cv, on_it = tail.cv(stress), tail.probability(least)
+            if math.isinf(stress):
+                doubts.append(
+                    f"the event happens in {1.0 - tail.survived:.3g} of all samples, less than"
+                    f" P = {probability:g}: no stress has that probability"
+                )
             if on_it >= probability:
                 stress, cv = lowest, tail.cv(least)
                 doubts.append(
@@ -497,6 +503,9 @@ def curve_of(
         rows.append((*values, found, *ends, cv, *sides, *band_of(members[-1])))
     table: dict[str, Any] = dict(zip(CURVE, np.array(rows).T, strict=False))
     table["members"] = np.array(members)
+    survive = np.isinf(table["stress"])  # so many that no stress has this probability
+    for values in table.values():
+        values[survive] = np.nan
     if not table["members"].size:
         del table["band_low"], table["band_high"], table["members"]
     if not np.isfinite(pressure):
@@ -507,5 +516,6 @@ def curve_of(
         "lower_bound": lowest,
         "event": state.event,
         "method": state.experiment.method.type,
+        "survived": tail.survived,
     }
     return to_dataset(table, CURVE, {}, {**attributes, **about})

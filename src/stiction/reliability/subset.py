@@ -63,8 +63,14 @@ class Descent(NamedTuple):
 
     @property
     def extent(self) -> tuple[float, float]:
-        """Lowest and highest value of the samples."""
-        return float(self.populations[-1].values.min()), float(self.populations[0].values.max())
+        """Lowest and highest finite value of the samples; without any, plus and minus infinity."""
+        lowest, plain = self.populations[-1].values, self.populations[0].values
+        return float(lowest.min()), float(plain.max(where=plain < math.inf, initial=-math.inf))
+
+    @property
+    def survived(self) -> float:
+        """Share of infinite values among plain samples."""
+        return float(np.isinf(self.populations[0].values).mean())
 
     def light(self) -> Self:
         """Return the same repetition without draws."""

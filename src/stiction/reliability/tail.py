@@ -48,6 +48,8 @@ class Tail(NamedTuple):
 
     def short_of(self, goal: str) -> str:
         """Return a message that the tail does not reach the requested level."""
+        if self.survived == 1.0:
+            return f"the event happens in none of {self.spent} samples"
         text = f"{self.spent} evaluations do not reach {goal}"
         if self.algorithm == "subset":
             chance = self.probability(self.reached)
@@ -68,7 +70,14 @@ class Tail(NamedTuple):
             "first_stage_evaluations": sum(o.first_stage_evaluations for o in self.repetitions),
             "algorithm": self.algorithm,
             "reason": self.reason,
+            "survived": self.survived,
         }
+
+    @property
+    def survived(self) -> float:
+        """Share of plain samples in which the event does not happen."""
+        sizes = [one.samples for one in self.repetitions]
+        return float(np.average([one.survived for one in self.repetitions], weights=sizes))
 
     def _parts(self, stress: float) -> list[float]:
         """Each repetition's part in the mean, by its size: that does not depend on its outcome."""
@@ -103,7 +112,12 @@ class Tail(NamedTuple):
         return np.minimum(np.where(found > 0.0, found, single), 1.0)
 
     def quantile(self, probability: float) -> float:
-        """Return the stress below which the onset lies with this probability."""
+        """Return the stress below which the onset lies with this probability.
+
+        Infinite where the event is not so frequent.
+        """
+        if probability > 1.0 - self.survived:
+            return math.inf
         low, high = self.extent
         for _ in range(80):
             middle = 0.5 * (low + high)
@@ -166,6 +180,8 @@ def repeat_until_precise(
 def two_levels_refused(state: LimitState) -> str | None:
     """Return why two levels are not possible, or None if they are."""
     experiment = state.experiment
+    if state.may_survive:
+        return "behind a machine, the first instability need not happen"
     if getattr(experiment.method, "first_stage", None) is None:
         return f"{experiment.method.type!r} names no less expensive method as its first stage"
     return no_single_length(experiment.problem, experiment.random)

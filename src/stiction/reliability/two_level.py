@@ -51,6 +51,9 @@ class Bridge(NamedTuple):
     last_variance: float = 0.0  # squared coefficient of variation of its estimate
     draws: Array = np.zeros((0, 0))  # of failing samples
     stresses: Array = np.zeros(0)  # theirs
+    survived: float = (
+        0.0  # share of plain samples; where samples may survive there is one level
+    )
 
     def light(self) -> Self:
         """Return the same; nothing in it is large."""
