@@ -519,7 +519,7 @@ class RandomInterface:
             known.warn()
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=2048)
 def layout(random: RandomInterface, interface: Interface) -> list[Stream]:
     """Draws of each property, and of each factor between specimens."""
     fields = list(random.properties.values())
@@ -550,7 +550,10 @@ def _conditioned(
 
     The last column is that of the factor between specimens on which it depends, if any.
     """
-    streams, fields = layout(random, interface), list(random.properties.values())
+    fields = list(random.properties.values())
+    if all(field.conditions is None for field in fields):
+        return []
+    streams = layout(random, interface)
     columns, between = [np.r_[stream.columns] for stream in streams], random.between or {}
     factor, found = lower_factor(random.matrix), []
     for group in np.unique(random.linked, axis=0):

@@ -2,10 +2,10 @@
 correlation.
 
 The map is tabulated, which is a thousand times faster than scipy's quantile: cubic Hermite
-pieces on a uniform grid of [-8, 8]. Every piece is checked when the table is built; those
-that miss the tolerance (at a kink of the density, say) and all z outside are left to
-scipy. So the result is accurate everywhere: to 1e-9 of the value, or of a millionth of the
-standard deviation where the value is smaller than that.
+pieces on a uniform grid of [-8, 8], those beyond [-4, 4] only once they are needed. Every piece
+is checked when the table is built; those that miss the tolerance (at a kink of the density, say)
+and all z outside are left to scipy. So the result is accurate everywhere: to 1e-9 of the value,
+or of a millionth of the standard deviation where the value is smaller than that.
 """
 
 from functools import lru_cache
@@ -18,7 +18,10 @@ from stiction.arrays import Array
 from stiction.errors import InputError
 from stiction.jit import jit
 
-REACH, PIECES = 8.0, 4096
+REACH, MOSTLY = 8.0, 4.0
+"""Reach of a whole table, and of the part that most samples need."""
+PER_UNIT = 256
+"""Pieces per unit of z."""
 TOLERANCE = 2e-10  # relative; the promise is 1e-9
 TERMS, MOST_TERMS, STEP = 40, 1000, 0.0025
 SMALL = 1e-6  # share of the variance
@@ -30,20 +33,19 @@ def quantile_of_normal(distribution: Any, z: Array) -> Array:
     Phi(z) rounds to 1 long before z = 8. The upper tail keeps its digits only through
     Phi(-z), and only where scipy inverts the survival function of the family directly.
     """
-    tail = ndtr(-np.abs(z))
-    lower = distribution.ppf(np.where(z < 0.0, tail, 0.5))
-    upper = distribution.isf(np.where(z < 0.0, 0.5, tail))
-    return np.where(z < 0.0, lower, upper)
+    tail, lower, found = ndtr(-np.abs(z)), z < 0.0, np.empty_like(z)
+    found[lower], found[~lower] = distribution.ppf(tail[lower]), distribution.isf(tail[~lower])
+    return found
 
 
 @jit
 def interpolate(z: Array, table: Array, out: Array) -> int:
     """Fill `out` with the tabulated map of `z` (flat arrays); NaN and counted where it has none."""
     pieces = table.shape[0] - 1
-    scale = pieces / 16.0  # nodes per unit of z on [-8, 8]
+    first = 2048.0 - 0.5 * pieces  # of those of [-8, 8], 256 per unit of z
     missing = 0
     for i in range(z.size):
-        position = (z[i] + 8.0) * scale
+        position = (z[i] + 8.0) * 256.0 - first
         piece = int(position) if 0.0 <= position < pieces else -1
         if piece < 0:
             out[i] = np.nan
@@ -62,16 +64,16 @@ def interpolate(z: Array, table: Array, out: Array) -> int:
     return missing
 
 
-@lru_cache(maxsize=1024)
-def quantile_table(marginal: Any) -> Array:
-    """Return values of the map and slopes times the step, (4097, 2); NaN where scipy takes over.
+@lru_cache(maxsize=2048)
+def quantile_table(marginal: Any, reach: float = REACH) -> Array:
+    """Return values of the map and slopes times the step, (nodes, 2); NaN where scipy takes over.
 
-    64 KiB each: as many are kept as a long list of equally likely interfaces has.
+    Most have 32 KiB: as many are kept as a long list of equally likely interfaces has.
     """
     distribution = marginal.distribution
-    step = 2.0 * REACH / PIECES
+    step, pieces = 1.0 / PER_UNIT, round(2.0 * reach * PER_UNIT)
     # Two nodes beyond each end, for central differences of fourth order.
-    z = -REACH + step * np.arange(-2, PIECES + 3)
+    z = -reach + step * np.arange(-2, pieces + 3)
     value = quantile_of_normal(distribution, z)
     slope = (8.0 * (value[3:-1] - value[1:-3]) - (value[4:] - value[:-4])) / 12.0
     table = np.ascontiguousarray(np.stack([value[2:-2], slope], axis=1))
@@ -94,9 +96,13 @@ def from_normal(marginal: Any, z: Array) -> Array:
     """Compute F^-1(Phi(z)) for an array of any shape, to 1e-9 relative (Grigoriu, 1995)."""
     flat = np.ascontiguousarray(z, dtype=np.float64).ravel()
     out = np.empty_like(flat)
-    if interpolate(flat, quantile_table(marginal), out):
+    if interpolate(flat, quantile_table(marginal, MOSTLY), out):
         missing = np.isnan(out)
-        out[missing] = quantile_of_normal(marginal.distribution, flat[missing])
+        rest, found = flat[missing], out[missing]
+        if interpolate(rest, quantile_table(marginal, REACH), found):
+            never = np.isnan(found)
+            found[never] = quantile_of_normal(marginal.distribution, rest[never])
+        out[missing] = found
     return out.reshape(np.shape(z))
 
 

@@ -77,7 +77,7 @@ class Modes:
         return phi
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=2048)
 def make_modes(
     spectrum: Any, mean_mode: bool, anisotropy: float, interface: Interface
 ) -> Modes:
