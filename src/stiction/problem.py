@@ -367,9 +367,13 @@ class Problem:
     def normal_pressure(self) -> Any:
         """Normal pressure, Pa: a number, an array at the nodes, or None."""
         pressure = self.load.normal_pressure
-        if self.specimen is None or pressure is None or self.specimen.pressing != "glued":
-            return pressure
-        return pressure * self.blocks.pressure
+        return pressure if pressure is None else pressure * self.pressing
+
+    @property
+    def pressing(self) -> Any:
+        """Normal pressure at the nodes over the given one: 1, but of glued blocks (nodes,)."""
+        glued = self.specimen is not None and self.specimen.pressing == "glued"
+        return self.blocks.pressure if glued else 1.0
 
     @property
     def load_profile(self) -> Any:
@@ -468,7 +472,8 @@ class Problem:
             Peak strength tau_p (Pa), of shape (samples, *shape) or (*shape); or profiles by
             name: 'strength' and any others of `PROFILES`, but only one of 'weakening_rate',
             'critical_slip' and 'fracture_energy'. They replace the problem's own; all but the
-            strength may also be (samples, 1) or a number.
+            strength may also be (samples, 1) or a number: of 'normal_pressure' the mean, which
+            glued blocks distribute.
         accept : collection of {"barriers", "overstress", "constant"}
             What the method accepts: infinite strength where nothing breaks; initial stress
             above the strength; nodes that do not weaken, of which the caller has warned.
@@ -532,6 +537,9 @@ class Problem:
         pressure = np.broadcast_to(np.nan, (samples, *interface.shape))
         if self.load.normal_pressure is not None or "normal_pressure" in given:
             pressure = read("normal_pressure", self.normal_pressure, samples)
+            own = np.shape(given.get("normal_pressure", pressure))
+            if own in ((), (samples, 1)):  # that of each sample, which its blocks distribute
+                pressure = pressure * self.pressing
         scale, value = friction.scale
         scale = scales[0] if scales else scale
         value = read(scale, value, samples)

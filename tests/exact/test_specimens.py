@@ -16,6 +16,7 @@ from specimens import crooked, rough
 import stiction as st
 from stiction.elasticity.places import places_of
 from stiction.equilibrium.blocks import BlockProgram
+from stiction.random.stresses import mean_in_stress, support_in_stress
 
 INF = float("inf")
 VALIDATION = Path(__file__).parents[2] / "validation" / "specimens.py"
@@ -233,6 +234,33 @@ def test_forces_travel_and_pressure():
     )
     mu = coefficient.sample(pressed.interface, samples=2)
     np.testing.assert_allclose(found.strength, mu * p)
+    # A pressure of each sample is distributed alike, in every place that it enters.
+    pressure = st.Beta(alpha=1.3, beta=1.95, low=1.5e6, high=2.4e6)
+    scattered = st.RandomField(pressure, st.PowerLawSpectrum(correlation_length=3e-3))
+    drawn = st.RandomInterface(strength=coefficient, normal_pressure=scattered)
+    found = st.monte_carlo(
+        pressed, drawn, method=st.Equilibrium(), samples=3, keep=("strength", "normal_pressure")
+    )
+    field = drawn.from_draws(
+        pressed.interface, drawn.draws(pressed.interface, samples=3, seed=0, first=0)
+    )
+    p = field["normal_pressure"] * p / 2e6
+    np.testing.assert_allclose(found.normal_pressure, p)
+    np.testing.assert_allclose(found.strength, field["strength"] * p)
+    np.testing.assert_allclose(
+        found.friction_coefficient, found.critical_stress / p.mean(axis=1), rtol=1e-12
+    )
+    share = pressed.pressing.min(), pressed.pressing.max()
+    assert share[0] < 0.9 < 1.0 < share[1]
+    bounds = support_in_stress(pressed, drawn, "normal_pressure")
+    np.testing.assert_allclose(bounds, (1.5e6 * share[0], 2.4e6 * share[1]))
+    assert mean_in_stress(pressed, drawn, "strength") == pytest.approx(0.5 * 1.86e6, rel=0.01)
+    each = {
+        "strength": found.strength.values,
+        "normal_pressure": np.array([[1e6], [3e6], [2e6]]),
+    }
+    placed = pressed.sample(each).normal_pressure
+    np.testing.assert_allclose(placed, each["normal_pressure"] * pressed.pressing)
 
 
 def plane(**given):

@@ -36,9 +36,14 @@ def check_pressure(problem: Problem, random: RandomInterface) -> None:
 def profiles_in_stress(
     problem: Problem, random: RandomInterface, profiles: Mapping[str, Array]
 ) -> dict[str, Array]:
-    """Return sampled profiles with coefficients multiplied by the pressure at each node."""
-    pressure = profiles.get("normal_pressure", problem.normal_pressure)
-    return {**profiles, **{name: profiles[name] * pressure for name in coefficients_of(random)}}
+    """Return sampled profiles with coefficients multiplied by the pressure at each node.
+
+    A sampled pressure is multiplied by that of glued blocks over its mean.
+    """
+    found, pressure = dict(profiles), problem.normal_pressure
+    if "normal_pressure" in found:
+        pressure = found["normal_pressure"] = found["normal_pressure"] * problem.pressing
+    return found | {name: found[name] * pressure for name in coefficients_of(random)}
 
 
 def support_in_stress(
@@ -56,6 +61,8 @@ def support_in_stress(
 
     low, high = extremes(field.marginal)
     factors = [extremes(between[name])] if name in between else []
+    if name == "normal_pressure":
+        factors.append((np.min(problem.pressing), np.max(problem.pressing)))
     if field.of is not None and "normal_pressure" in random.names:
         factors.append(support_in_stress(problem, random, "normal_pressure", chance))
     elif field.of is not None:
@@ -74,9 +81,11 @@ def _equally_likely(marginal: Any, count: int) -> Array:
 
 def _pressures(problem: Problem, random: RandomInterface) -> Array:
     """Pressures that a point may have, equally likely."""
+    pressure = problem.normal_pressure
     if "normal_pressure" in random.names:
-        return _equally_likely(random.properties["normal_pressure"].marginal, PRESSURES)
-    flat = np.sort(np.ravel(problem.normal_pressure))
+        known = _equally_likely(random.properties["normal_pressure"].marginal, PRESSURES)
+        pressure = np.multiply.outer(known, problem.pressing)
+    flat = np.sort(np.ravel(pressure))
     return flat[np.linspace(0, flat.size - 1, min(flat.size, PRESSURES)).round().astype(int)]
 
 
