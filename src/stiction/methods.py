@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
-from stiction.errors import InputError
+from stiction.errors import InputError, collect_warnings, warn_accuracy
 from stiction.kinds import Kinds
 from stiction.model import Progress, checked, is_finite
 from stiction.problem import Problem, Sample, refusals
@@ -32,6 +32,10 @@ if TYPE_CHECKING:
 
 TICK, MOST = 0.5, 512
 """Seconds of work, and most samples, that are solved at once."""
+COMPARED, SECONDS = 32, 2.0
+"""Most samples that are solved exactly beside the local criterion, and the seconds for them."""
+WORTH_A_WARNING = 1.0
+"""Mean or scatter of their differences, per cent, above which there is a warning."""
 
 Values = dict[str, NDArray[Any]]
 Solver = Callable[[Sample], Mapping[str, NDArray[Any]]]
@@ -50,10 +54,10 @@ class Method(Protocol):
 
     Any frozen dataclass with these members serves `stiction.onset` and `stiction.monte_carlo`, and
     study files too if `stiction.kinds.register` or an entry point makes its `type` known.
-    Three more members are optional: `warn_of(problem, sample, values)`, called once with what the
-    solver returned; `accepts`, of "barriers" and "overstress" (see `Problem.sample`); and
-    `first_stage`, the type of a faster method with similar onsets, by which rare failures are found
-    first.
+    Three more members are optional: `seconds_per_rate(problem)`, how much longer a sample takes
+    with a weakening rate of its own; `accepts`, of "barriers" and "overstress" (see
+    `Problem.sample`); and `first_stage`, the type of a faster method with similar onsets, by which
+    rare failures are found first.
     """
 
     @property
@@ -139,9 +143,14 @@ def _check_values(
             )
 
 
-def seconds_per_sample(problem: Problem, method: Method) -> float:
-    """Return about how long a sample takes, s, at least a nanosecond; refuse what is no time."""
+def seconds_per_sample(problem: Problem, method: Method, own_rate: bool = False) -> float:
+    """Return about how long a sample takes, s, at least a nanosecond; refuse what is no time.
+
+    `own_rate`: if each sample has a weakening rate of its own.
+    """
     seconds = method.seconds_per_sample(problem)
+    if own_rate and hasattr(method, "seconds_per_rate"):
+        seconds += method.seconds_per_rate(problem)
     if not (is_finite(seconds) and seconds >= 0.0):
         raise InputError(
             f"method: seconds_per_sample of {method.label} must return a number of seconds, zero"
@@ -150,9 +159,9 @@ def seconds_per_sample(problem: Problem, method: Method) -> float:
     return max(float(seconds), 1e-9)
 
 
-def batch_size(problem: Problem, method: Method) -> int:
+def batch_size(problem: Problem, method: Method, own_rate: bool = False) -> int:
     """Return how many samples to solve at once: half a second of work, at most 512."""
-    return max(1, min(MOST, int(TICK / seconds_per_sample(problem, method))))
+    return max(1, min(MOST, int(TICK / seconds_per_sample(problem, method, own_rate))))
 
 
 def variables_of(
@@ -178,6 +187,29 @@ def label(
     coordinates = {"sample": (samples, SAMPLE)}
     return to_dataset(
         values, variables | dict(more_variables), coordinates, attributes, problem.interface
+    )
+
+
+def _doubt(problem: Problem, method: Method, sample: Sample, values: Values) -> str | None:
+    """Return a warning if the local criterion is off in the first samples; None if it is not.
+
+    As many are solved by `Equilibrium` as take two seconds.
+    """
+    exact = METHODS["equilibrium"]()
+    if method.type != "local_criterion" or exact.supports(problem):
+        return None
+    count = min(sample.samples, COMPARED, int(SECONDS / seconds_per_sample(problem, exact)))
+    if not count:
+        return None
+    with collect_warnings():
+        true = prepared(problem, exact)(sample.part(slice(0, count)))["critical_stress"]
+    off = 100.0 * (values["critical_stress"][:count] / true - 1.0)
+    if not max(abs(off.mean()), off.std()) > WORTH_A_WARNING:
+        return None
+    return (
+        f"the local criterion differs from the exact onset by {off.mean():+.2g} % on average, in"
+        f" one by {off[np.abs(off).argmax()]:+.2g} %, in the first {count} of {sample.samples}"
+        " samples; method=st.Equilibrium() has no such error"
     )
 
 
@@ -226,7 +258,8 @@ def onset(
     Warns
     -----
     AccuracyWarning
-        If gaps are filled, or the onset lies in one.
+        If gaps are filled, or the onset lies in one; if the local criterion is off by more than
+        1 % in the first samples, at most 32, that `Equilibrium` solves in two seconds.
     UnitWarning
         If a value is so far from what solids have that its unit is in doubt.
 
@@ -244,14 +277,15 @@ def onset(
     attributes = study_attributes(problem=problem, method=method)
     sample, measured = problem.placed_sample(profiles, getattr(method, "accepts", ()), gaps)
     problem.warn_of_units(sample.mean_strength, float(sample.residual_strength.mean()))
-    solver, parts, size = prepared(problem, method), [], batch_size(problem, method)
+    own_rate = bool(np.ptp(sample.weakening_rate[:, *np.zeros(len(sample.shape), int)]))
+    solver, parts, size = prepared(problem, method), [], batch_size(problem, method, own_rate)
     with Meter(f"onset by {method.label}", sample.samples, progress) as meter:
         for start in range(0, sample.samples, size):
             part = sample.part(slice(start, start + size))
             parts.append(solver(part))
             meter.advance(part.samples)
     values = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
-    if hasattr(method, "warn_of"):
-        method.warn_of(problem, sample, values)
+    if text := _doubt(problem, method, sample, values):
+        warn_accuracy(text)
     result = label(problem, method, values, np.arange(sample.samples), attributes)
     return with_gaps(problem, result, measured)

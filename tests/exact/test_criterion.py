@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-import scipy.linalg
-from scipy.special import eval_jacobi, gammaln, jv
+from scipy.special import jv
 from setups import QUARTER, ROUND_OFF, SOLID, local_onset, make_problem, turns
 
 import stiction as st
@@ -15,7 +14,6 @@ from stiction.criterion.eigenfunction import (
     odd_bessel,
     weight,
 )
-from stiction.criterion.local import SLIP
 from stiction.criterion.windows import windows_of
 from stiction.friction.parameters import SMALLEST_EIGENVALUE
 
@@ -225,39 +223,3 @@ def test_odd_bessel_functions_by_recurrence():
     # Absolute, as the sum over orders needs it.
     expected = jv(np.arange(1, 80, 2)[:, None], z)
     np.testing.assert_allclose(odd_bessel(z, 40), expected, atol=2e-13)
-
-
-@pytest.mark.parametrize(("dimension", "eigenvalue"), [(1, 0.5788869), (2, 2.0061 / 2.0)])
-def test_slip_of_a_critical_patch_of_parabolic_strength(dimension, eigenvalue):
-    """(K - W) slip = tau_0 - r^2 on the unit ball by Galerkin's method, without a singular rim.
-
-    The functions (1 - r^2)^(1/2) P_n^(1/2, d/2 - 1)(2 r^2 - 1) are mapped to multiples of the
-    polynomials by the square root of the Laplacian (Dyda, Kuznetsov and Kwasnicki, 2017).
-    """
-    n, half = np.arange(24), 0.5 * dimension
-    factors = 2.0 * np.exp(
-        gammaln(1.5 + n) + gammaln(0.5 + half + n) - gammaln(n + 1) - gammaln(half + n)
-    )
-    t, measure = np.polynomial.legendre.leggauss(300)
-    r = np.sin((t + 1.0) * np.pi / 4.0)
-    root = np.sqrt(1.0 - r * r)
-    measure = measure * np.pi / 4.0 * root * r ** (dimension - 1)
-    poly = np.array([eval_jacobi(k, 0.5, half - 1.0, 2.0 * r * r - 1.0) for k in n])
-    stiffness = (poly * measure * root) @ (poly * factors[:, None]).T
-    mass = (poly * measure * root**2) @ poly.T
-    inverse = scipy.linalg.eigh(mass, 0.5 * (stiffness + stiffness.T), eigvals_only=True)[-1]
-    assert 0.5 / inverse == pytest.approx(eigenvalue, rel=2e-5)
-    uniform, parabola = (
-        (poly * measure * root) @ values for values in (np.ones_like(r), r * r)
-    )
-    rim = np.array([eval_jacobi(k, 0.5, half - 1.0, 1.0) for k in n])
-    system = np.block([[stiffness * inverse - mass, -uniform[:, None]], [rim[None], 0.0]])
-    found = np.linalg.solve(system, np.append(-parabola, 0.0))[:-1]  # W slip
-
-    def slip(at):
-        values = [eval_jacobi(k, 0.5, half - 1.0, 2.0 * at * at - 1.0) for k in n]
-        return np.sqrt(1.0 - at * at) * (found @ values)
-
-    assert slip(0.0) == pytest.approx(SLIP[dimension], rel=1e-4)
-    for at in (0.3, 0.6, 0.8):
-        assert slip(at) == pytest.approx(SLIP[dimension] * (1.0 - at * at) ** 1.6, rel=0.1)

@@ -21,7 +21,6 @@ from setups import exact_onset, local_onset
 
 import stiction as st
 from stiction.criterion.eigenfunction import weight
-from stiction.criterion.local import beyond_residual
 from stiction.criterion.windows import STRETCHES
 from stiction.theory import energy_release_rate, griffith_length
 
@@ -238,18 +237,3 @@ def test_bounds_and_gradient_have_no_unit_of_load(problem, strength, gap):
     np.testing.assert_allclose(2.0 * other.critical_load, one.critical_load, rtol=1e-9)
     profile = np.broadcast_to(problem.load.profile, strength.shape)
     assert (one.sensitivity.values[0] * profile).sum() == pytest.approx(profile.mean())
-
-
-def test_estimate_of_what_the_residual_strength_takes_has_no_unit_of_load():
-    residual = LINE.friction.residual_strength + 3.8e5
-    friction = dataclasses.replace(LINE.friction, residual_strength=residual)
-    estimates = []
-    for each in (LINE, doubled_profile(LINE)):
-        problem = dataclasses.replace(each, friction=friction)
-        found = local_onset(problem, LINE_STRENGTH)
-        estimates.append(beyond_residual(problem, problem.sample(LINE_STRENGTH), dict(found)))
-    (reached, missing), (again, same) = estimates
-    assert reached.all()
-    assert again.all()
-    assert missing > 0.0
-    assert same == pytest.approx(missing, rel=1e-9)

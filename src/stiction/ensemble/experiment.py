@@ -15,6 +15,7 @@ from pydantic import Field
 
 from stiction.arrays import Array
 from stiction.errors import InputError, UnitWarning, unknown_name, warn_user
+from stiction.friction import SCALES
 from stiction.methods import (
     Solver,
     Values,
@@ -111,7 +112,13 @@ class Experiment:
     @property
     def seconds(self) -> float:
         """About how long the method takes for a sample on one core, s."""
-        return seconds_per_sample(self.problem, self.method)
+        return seconds_per_sample(self.problem, self.method, self._own_rate)
+
+    @property
+    def _own_rate(self) -> bool:
+        """Whether samples have weakening rates of their own."""
+        friction, names = self.problem.friction, self.random.names
+        return friction.weakening_rate is None or not {*SCALES}.isdisjoint(names)
 
     @property
     def pressure(self) -> float:
@@ -170,7 +177,10 @@ class Experiment:
     @property
     def batch(self) -> int:
         """Number of samples to solve at once: suited to the method, on planes to the memory."""
-        interface, size = self.problem.interface, batch_size(self.problem, self.method)
+        interface, size = (
+            self.problem.interface,
+            batch_size(self.problem, self.method, self._own_rate),
+        )
         if not interface.is_plane:  # draws come in blocks: a part is as expensive as the whole
             return size
         # A rough field has hundreds of draws for each node.
