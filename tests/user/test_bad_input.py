@@ -24,6 +24,7 @@ LINE = st.Interface(length=0.1, nodes=256)
 PLANE = st.Interface(length=(0.5, 0.5), nodes=(4096, 4096))
 PROBLEM, RATIO = make_problem(), make_problem(residual_ratio=0.5)
 ONE, TEN = np.full(256, 1e6), np.arange(10.0)
+FALLING = st.ExponentialWeakening(weakening_rate=RATE)
 
 
 def make_strength(correlation_length=2e-3, **options):
@@ -260,6 +261,9 @@ test_what_the_local_criterion_cannot_take = refusals({
 })  # fmt: skip
 
 test_profiles_and_loads = refusals({
+    "friction: ... ExponentialWeakening has none": lambda: st.equilibrium_path(
+        make_problem((32, 32), (0.01, 0.01), friction=FALLING), np.full((32, 32), 1e6), [1e5]
+    ),
     "profile ... (2, 2)": lambda: loaded(np.ones((2, 2))),
     "load.profile ... 256 ... (10,)": lambda: loaded(np.ones(10)),
     "load.profile": lambda: st.theory.nucleation_statistics(

@@ -33,12 +33,10 @@ from stiction.equilibrium.sample import (
     multiplier_of,
     pieces_of,
     present_pieces,
-    refused,
 )
 from stiction.equilibrium.stable_path import REACHED, UNSTABLE, advance
 from stiction.equilibrium.transforms import Plane, plane_onset
 from stiction.equilibrium.windows import Windows, exact_window, window_bound, windows_between
-from stiction.errors import InputError
 from stiction.problem import Problem
 
 LONGEST_RUN = 2048
@@ -70,8 +68,6 @@ class LineProgram(Program):
     own: Any
 
     def __init__(self, problem: Problem) -> None:
-        if reasons := refused(problem.friction):
-            raise InputError(reasons)
         self.problem = problem
         self.pieces = pieces_of(problem.friction)
         self.nodes = problem.interface.size
