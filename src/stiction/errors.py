@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from difflib import get_close_matches
-from typing import TypeAlias
+from typing import Any, NamedTuple
 
 _SYMBOLS = {"E": "youngs_modulus", "nu": "poisson_ratio", "rho": "density"}
-_OURS = ("stiction", "pydantic", "dataclasses", "functools", "concurrent", "threading")
+_OURS = (
+    "stiction", "pydantic", "dataclasses", "functools", "concurrent", "threading", "contextlib"
+)  # fmt: skip
+LISTED = 5
+"""Samples whose numbers a warning lists."""
+_FIGURES = r"[-+]?\d+(?:,\d{3})*(?:\.\d+)?(?:e[-+]?\d+)?"
+_NUMBER = re.compile(rf"(?<![\w.]){_FIGURES}(?: to {_FIGURES})?")
+"""Numbers and ranges in a warning."""
 
 
 class InputError(ValueError):
@@ -84,8 +92,33 @@ def warn_accuracy(message: str) -> None:
     warn_user(message, AccuracyWarning)
 
 
-Warned: TypeAlias = tuple[str, type[Warning]]
-"""A warning that was collected instead of issued."""
+class Warned(NamedTuple):
+    """A warning that was collected instead of issued: one of samples has a `total` above zero."""
+
+    text: str  # with {samples} and {worst} if it is one of samples
+    category: type[Warning]
+    total: int = 0
+    affected: int = 0
+    numbers: tuple[int, ...] = ()  # of the first of these, if samples have numbers
+    worst: float = 0.0
+
+    def __str__(self) -> str:
+        if not self.total:
+            return self.text
+        which = ", ".join(map(str, self.numbers))
+        which += ", ..." * (self.affected > len(self.numbers))
+        shown = f"{self.affected} of {self.total} samples" + f" ({which})" * bool(self.numbers)
+        return self.text.format(samples=shown, worst=self.worst)
+
+    def after(self, first: int) -> Warned:
+        """Return it with the numbers that its samples have if the first has this one."""
+        return self._replace(numbers=tuple(first + number for number in self.numbers))
+
+    def unnumbered(self) -> Warned:
+        """Return it without numbers of samples, which count within a part only."""
+        return self._replace(numbers=())
+
+
 _collected: ContextVar[list[Warned] | None] = ContextVar("collected", default=None)
 
 
@@ -103,12 +136,96 @@ def collect_warnings() -> Iterator[list[Warned]]:
         _collected.reset(token)
 
 
+@contextmanager
+def merge_warnings() -> Iterator[list[Warned]]:
+    """Collect warnings and issue them at the end, those of one doubt as one."""
+    caught: list[Warned] = []
+    try:
+        with collect_warnings() as caught:
+            yield caught
+    finally:
+        for one in merged(caught):
+            issue(one)
+
+
+def merged(caught: Iterable[Warned]) -> list[Warned]:
+    """Return warnings without repetition: texts that differ only in numbers are one, with ranges.
+
+    Those of samples are one that counts the samples of all.
+    """
+    groups: dict[tuple[str, type[Warning], bool], list[Warned]] = {}
+    for one in caught:
+        key = one.text if one.total else _NUMBER.sub("0", one.text)
+        groups.setdefault((key, one.category, one.total > 0), []).append(one)
+    return [
+        Warned(
+            group[0].text if of_samples else _with_ranges([one.text for one in group]),
+            category,
+            sum(one.total for one in group),
+            sum(one.affected for one in group),
+            tuple(sorted({number for one in group for number in one.numbers})[:LISTED]),
+            max(one.worst for one in group),
+        )
+        for (_, category, of_samples), group in groups.items()
+    ]
+
+
+def texts_of(caught: Iterable[Warned]) -> list[str]:
+    """Return the texts of collected warnings, without repetition."""
+    return [str(one) for one in merged(caught) if one.affected or not one.total]
+
+
+def _with_ranges(texts: Sequence[str]) -> str:
+    """Return texts that differ only in numbers as one: '3 to 5 m' for '3 m' and '5 m'."""
+    between, found = _NUMBER.split(texts[0]), ""
+    for start, *numbers in zip(between, *map(_NUMBER.findall, texts), strict=False):
+        ends = sorted({end for one in numbers for end in one.split(" to ")}, key=_value)
+        same = len({*numbers}) == 1
+        found += start + (numbers[0] if same else f"{ends[0]} to {ends[-1]}")
+    return found + between[-1]
+
+
+def _value(number: str) -> float:
+    return float(number.replace(",", ""))
+
+
+def warn_of_samples(text: str, which: Any, sizes: Any = ()) -> None:
+    """Issue an `AccuracyWarning` of some of the samples that are computed together.
+
+    Call it even if it concerns none of them: samples are counted over all that are computed.
+
+    Parameters
+    ----------
+    text : str
+        With ``{samples}`` for '3 of 40 samples (1, 4, 7)'; ``{worst}`` is the largest size.
+    which : array of bool
+        Whether it concerns each sample.
+    sizes : array, optional
+        Of the error of each sample.
+    """
+    each = [bool(one) for one in which]
+    numbers = [number for number, one in enumerate(each) if one]
+    worst = (
+        max((float(sizes[number]) for number in numbers), default=0.0) if len(sizes) else 0.0
+    )
+    some = tuple(numbers[:LISTED])
+    issue(Warned(text, AccuracyWarning, len(each), len(numbers), some, worst))
+
+
 def warn_user(message: str, category: type[Warning]) -> None:
     """Issue a warning that points at the caller's own line, outside this package."""
+    issue(Warned(message, category))
+
+
+def issue(one: Warned) -> None:
+    """Issue a warning at the caller's own line, or collect it."""
     collected = _collected.get()
     if collected is not None:
-        collected.append((message, category))
+        collected.append(one)
         return
+    if one.total and not one.affected:
+        return
+    message, category = str(one), one.category
     level = 1
     frame = sys._getframe(1)
     # Objects are validated by pydantic, whose frames lie between ours.

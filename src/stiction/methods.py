@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
-from stiction.errors import InputError, collect_warnings, warn_accuracy
+from stiction.errors import InputError, collect_warnings, merge_warnings, warn_accuracy
 from stiction.kinds import Kinds
 from stiction.model import Progress, checked, is_finite
 from stiction.problem import Problem, Sample, refusals
@@ -279,10 +279,13 @@ def onset(
     problem.warn_of_units(sample.mean_strength, float(sample.residual_strength.mean()))
     own_rate = bool(np.ptp(sample.weakening_rate[:, *np.zeros(len(sample.shape), int)]))
     solver, parts, size = prepared(problem, method), [], batch_size(problem, method, own_rate)
-    with Meter(f"onset by {method.label}", sample.samples, progress) as meter:
+    meter = Meter(f"onset by {method.label}", sample.samples, progress)
+    with meter, merge_warnings() as warned:
         for start in range(0, sample.samples, size):
             part = sample.part(slice(start, start + size))
-            parts.append(solver(part))
+            with collect_warnings() as own:
+                parts.append(solver(part))
+            warned += (one.after(start) for one in own)
             meter.advance(part.samples)
     values = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     if text := _doubt(problem, method, sample, values):

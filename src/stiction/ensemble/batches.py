@@ -1,7 +1,6 @@
 """Samples computed in batches, by threads or any executor: the same numbers from each."""
 
 import os
-import re
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Mapping, Sequence
@@ -19,7 +18,14 @@ from numpy.typing import NDArray
 from stiction import __version__
 from stiction.arrays import one_blas_thread
 from stiction.ensemble.experiment import Experiment
-from stiction.errors import InputError, Warned, WorkerError, collect_warnings, warn_user
+from stiction.errors import (
+    InputError,
+    Warned,
+    WorkerError,
+    collect_warnings,
+    merge_warnings,
+    merged,
+)
 from stiction.random.synthesis import BLOCK, block_of
 
 POINT, NUMBER = "_point", "_sample"
@@ -28,8 +34,6 @@ SECONDS = 0.5
 """Duration of a piece of work."""
 MOST_BYTES = 16 * 2**20
 """Largest size of the values of a piece of work."""
-FIGURES = re.compile(r"[\d.]+(e[-+]?\d+)?")
-"""Numbers in a warning, which differ between samples."""
 TICK = 1.0
 """Seconds after which workers are counted again; Windows lets nothing interrupt a longer wait."""
 
@@ -67,6 +71,7 @@ class Table(NamedTuple):
     failures: tuple[Failure, ...]
     seconds: float  # of one core
     versions: str  # of the packages that computed them
+    warned: tuple[Warned, ...] = ()  # which a store does not keep
 
     @property
     def size(self) -> int:
@@ -94,11 +99,10 @@ def usable_cores() -> int:
 
 def in_threads(function: Callable[[Any], Any], jobs: Sequence[Any], workers: int) -> list[Any]:
     """Return results of a function for all jobs; warnings come once, at the caller's line."""
-    with collect_warnings() as caught, ThreadPoolExecutor(workers) as pool:
+    with merge_warnings() as caught, ThreadPoolExecutor(workers) as pool:
         contexts = [copy_context() for _ in jobs]
         found = list(pool.map(Context.run, contexts, repeat(function), jobs))
-    for text, category in dict.fromkeys(caught):
-        warn_user(text, category)
+        caught[:] = map(Warned.unnumbered, caught)
     return found
 
 
@@ -113,7 +117,7 @@ def solve_span(experiment: Experiment, span: Span) -> Table:
     begin = time.perf_counter()
     parts: list[NDArray[Any]] = []
     failures: list[Failure] = []
-    alike: dict[str, Warned] = {}
+    warned: list[Warned] = []
     waiting = deque(experiment.batches(span.first, span.samples))
     while waiting:
         first, count = waiting.popleft()
@@ -130,12 +134,10 @@ def solve_span(experiment: Experiment, span: Span) -> Table:
             text = text.replace("\n", " / ")
             failures.append(Failure(span.point, first, experiment.seed, text, known))
             continue
-        for text, category in caught:  # once of samples that are solved one by one
-            alike.setdefault(text if count > 1 else FIGURES.sub("", text), (text, category))
-    for text, category in alike.values():
-        warn_user(text, category)
+        warned += (one.after(first) for one in caught)
     rows = np.concatenate(parts or [_rows(span.point, 0, {})])
-    return Table(rows, tuple(failures), time.perf_counter() - begin, versions())
+    seconds = time.perf_counter() - begin
+    return Table(rows, tuple(failures), seconds, versions(), tuple(merged(warned)))
 
 
 def piece_size(

@@ -15,7 +15,7 @@ from stiction.ensemble.dataset import Gathered, GridAxes, distinct
 from stiction.ensemble.experiment import Ensemble, Experiment
 from stiction.ensemble.pilot import compare, doubt
 from stiction.ensemble.store import Store
-from stiction.errors import InputError, RunError, collect_warnings, warn_accuracy, warn_user
+from stiction.errors import InputError, RunError, Warned, merge_warnings, warn_accuracy
 from stiction.methods import MethodObject
 from stiction.model import Count, Flag, Names, Number, Progress, checked
 from stiction.problem import Problem
@@ -26,23 +26,17 @@ from stiction.results import study_attributes
 if TYPE_CHECKING:
     import xarray as xr
 
-FEW, SHOWN = 4, 3
-"""Number of warnings and failures that are reported one by one."""
+SHOWN = 3
+"""Number of failures that are reported one by one."""
 HOPELESS = 16
 """Failed samples, with none solved, after which the whole ensemble is given up."""
 
 
 def check_fields(points: Sequence[Experiment]) -> None:
     """Warn of fields that do not suit the grid, the interface or their units, once each."""
-    with collect_warnings() as caught:
+    with merge_warnings():
         for point in distinct(points, "random", "problem"):
             point.check_fields()
-    found = list(dict.fromkeys(caught))
-    for text, category in found[:FEW]:
-        warn_user(text, category)
-    if len(found) > FEW:
-        more = f"{len(found) - FEW} more warnings like these"
-        warn_accuracy(more)
 
 
 def gather(
@@ -75,12 +69,14 @@ def gather(
     with ExitStack() as stack:
         if store:  # also on Ctrl-C, and when workers are lost: what is done is kept
             stack.callback(store.save)
+        warned = stack.enter_context(merge_warnings())  # of samples: one for all batches
         meter = stack.enter_context(Meter(label, total, progress))
         work = solve_spans(points, spans, executor=executor, workers=workers or usable_cores())
         for table in stack.enter_context(closing(work)):
             if store:
                 store.add(table)
             rows.add(table)
+            warned += table.warned if len(points) == 1 else map(Warned.unnumbered, table.warned)
             meter.advance(table.size)
             lost += len(table.failures)
             if lost >= min(HOPELESS, total) and not rows.done.any():

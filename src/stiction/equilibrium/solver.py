@@ -27,7 +27,7 @@ from stiction.equilibrium.sample import (
     sample_of,
 )
 from stiction.equilibrium.transforms import PlaneProgram
-from stiction.errors import warn_accuracy
+from stiction.errors import warn_of_samples
 from stiction.interface import Interface
 from stiction.problem import Problem
 from stiction.problem import Sample as Samples
@@ -161,13 +161,6 @@ def peak_of(state: State) -> float:
     return state.load if state.peak is None else state.peak
 
 
-def listed(numbers: NDArray[np.int64], most: int = 5) -> str:
-    """Return 'samples 0, 4 and 3 more'."""
-    shown = ", ".join(map(str, numbers[:most]))
-    more = f" and {numbers.size - most} more" if numbers.size > most else ""
-    return f"sample{'s' * (numbers.size > 1)} {shown}{more}"
-
-
 def make_program(problem: Problem, gap: float = 1e-6) -> AnyProgram:
     """Return the programme that finds equilibria of a problem."""
     if problem.specimen is not None:
@@ -271,33 +264,30 @@ class OnsetSolver:
     ) -> None:
         """Warn where bounds are wide or absent, or where a path was not followed to its end."""
         share = gap / np.maximum(np.abs(load), 1e-300)
-        wide = np.flatnonzero(~unproved & ~(share <= self.program.widest_gap))
-        if wide.size:
-            warn_accuracy(
-                f"the bounds of the first instability did not close to {self.program.widest_gap:g}"
-                f" of it in {wide.size} of {gap.size} samples ({listed(wide)}): they hold, and are"
-                f" up to {share[wide].max():.2g} of it apart; take more nodes"
-            )
-        free = np.flatnonzero(unproved)
-        if free.size and self.problem.interface.is_plane:
-            warn_accuracy(
+        warn_of_samples(
+            f"the bounds of the first instability did not close to {self.program.widest_gap:g} of"
+            " it in {samples}: they hold, and are up to {worst:.2g} of it apart; take more nodes",
+            ~unproved & ~(share <= self.program.widest_gap),
+            share,
+        )
+        if self.problem.interface.is_plane:
+            warn_of_samples(
                 "nodes reach a corner of the law or their residual strength before the first"
-                f" instability in {free.size} of {gap.size} samples ({listed(free)}): it was found"
-                f" by following equilibria, to {share[free].max():.2g} of it, and has no"
-                " certificate"
+                " instability in {samples}: it was found by following equilibria, to {worst:.2g}"
+                " of it, and has no certificate",
+                unproved,
+                share,
             )
-        stable = int(np.isnan(load).sum())
-        if stable:
-            warn_accuracy(
-                f"no patch becomes unstable in {stable} of {gap.size} samples: behind so stiff a"
-                " machine their interface slides stably, and first_instability is NaN"
-            )
-        if lost.any():
-            warn_accuracy(
-                f"a jump was not followed to its end in {lost.sum()} of {gap.size}"
-                f" samples ({listed(np.flatnonzero(lost))}): their critical load is the"
-                " last with a known equilibrium, a lower bound"
-            )
+        warn_of_samples(
+            "no patch becomes unstable in {samples}: behind so stiff a machine their interface"
+            " slides stably, and first_instability is NaN",
+            np.isnan(load),
+        )
+        warn_of_samples(
+            "a jump was not followed to its end in {samples}: their critical load is the last with"
+            " a known equilibrium, a lower bound",
+            lost,
+        )
 
 
 def _sensitivity(sample: Sample, state: State) -> Array:
@@ -315,22 +305,21 @@ def _sensitivity(sample: Sample, state: State) -> Array:
 
 def warn_if_back(back: Array) -> None:
     """Warn where slip goes back, by a share of the largest in each sample."""
-    where = np.flatnonzero(back > BACK)
-    if where.size:
-        warn_accuracy(
-            f"slip goes back by up to {back.max():.1g} of the largest in {where.size} of"
-            f" {back.size} samples ({listed(where)}): behind so stiff a machine slip at one place"
-            " unloads another, where it should stop, which is not modelled; their loads and events"
-            " are approximate (docs/specimens.md); under dead load this does not happen"
-        )
+    warn_of_samples(
+        "slip goes back by up to {worst:.1g} of the largest in {samples}: behind so stiff a machine"
+        " slip at one place unloads another, where it should stop, which is not modelled; their"
+        " loads and events are approximate (docs/specimens.md); under dead load this does not"
+        " happen",
+        back > BACK,
+        back,
+    )
 
 
 def _warn_if_lost(sensitivity: Array) -> None:
     """Warn where a first instability has no derivative."""
-    lost = int(np.isnan(sensitivity).reshape(len(sensitivity), -1).any(axis=1).sum())
-    if lost:
-        warn_accuracy(
-            f"the first instability has no known derivative in {lost} of {len(sensitivity)}"
-            " samples, so sensitivity is NaN: nodes pass a corner from which their law falls more"
-            " steeply, or the turning point was not resolved"
-        )
+    warn_of_samples(
+        "the first instability has no known derivative in {samples}, so sensitivity is NaN: nodes"
+        " pass a corner from which their law falls more steeply, or the turning point was not"
+        " resolved",
+        np.isnan(sensitivity).reshape(len(sensitivity), -1).any(axis=1),
+    )

@@ -1,0 +1,89 @@
+"""Warnings: one for one doubt, however the samples were computed."""
+
+import warnings
+from concurrent.futures import ProcessPoolExecutor
+
+import numpy as np
+import pytest
+
+import stiction as st
+from stiction.errors import collect_warnings, merge_warnings, warn_of_samples, warn_user
+
+STIFF = float("inf")
+
+
+def joint(samples, **options):
+    """Samples of a lap joint behind a stiff machine, in which slip goes back in many."""
+    solid = st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress")
+    drive = st.Pusher(height=0.01, width=0.004, side="both", stiffness=STIFF)
+    problem = st.Problem(
+        solid,
+        st.Interface(length=0.1, nodes=48),
+        st.LinearWeakening(weakening_rate=0.06e12, residual_strength=0.2e6),
+        specimen=st.Blocks(height=0.05, thickness=0.006, drive=drive),
+    )
+    marginal = st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6)
+    strength = st.RandomField(marginal, st.PowerLawSpectrum(1.75e-3))
+    given = {"method": st.Equilibrium(), "samples": samples, "progress": False} | options
+    with pytest.warns(st.AccuracyWarning) as caught:
+        st.monte_carlo(problem, strength, **given)
+    return [str(one.message) for one in caught if "goes back" in str(one.message)]
+
+
+def test_one_warning_for_all_batches_threads_and_processes(monkeypatch):
+    (whole,) = joint(16)
+    monkeypatch.setattr("stiction.ensemble.experiment.Experiment.batch", 7)
+    monkeypatch.setattr("stiction.ensemble.batches.SECONDS", 1e-3)  # pieces as small as can be
+    assert " of 16 samples (" in whole
+    assert joint(16) == [whole] == joint(16, workers=2)
+    with ProcessPoolExecutor(1) as pool:
+        assert joint(16, executor=pool) == [whole]
+    (later,) = joint(10, first=6)  # samples have their own numbers, not those in a batch
+    numbers = [int(one) for one in whole.split("(")[1].split(", ...")[0].split(",")]
+    later_numbers = [int(one) for one in later.split("(")[1].split(", ...")[0].split(",")]
+    assert set(numbers) - set(range(6)) <= set(later_numbers)
+    assert min(later_numbers) >= 6
+
+
+def merging(*work):
+    """Texts of the warnings that are issued after all work."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        with merge_warnings() as found:
+            for one in work:
+                one(found)
+    return [str(one.message) for one in caught]
+
+
+def test_texts_that_differ_in_numbers_are_one_with_their_range():
+    def work(_):
+        for size, count in ((2.5, 3), (1e-3, 1_200), (-4.0, 3)):
+            warn_user(f"law1: off by {size:g} m at {count:,} nodes", st.UnitWarning)
+            warn_user(f"law1: off by {size:g} m at {count:,} nodes", st.AccuracyWarning)
+        warn_user("law2: off by 3 m at 1 nodes", st.UnitWarning)
+        with merge_warnings():  # a range within a range
+            warn_user("law2: off by 5 m at 1 nodes", st.UnitWarning)
+            warn_user("law2: off by 7 m at 1 nodes", st.UnitWarning)
+
+    one = "law1: off by -4 to 2.5 m at 3 to 1,200 nodes"
+    assert merging(work) == [one, one, "law2: off by 3 to 7 m at 1 nodes"]
+
+
+def test_samples_are_counted_over_those_without_the_doubt_too():
+    def batch(first, *which):
+        def work(found):
+            with collect_warnings() as own:
+                sizes = 0.25 / (1 + first * np.arange(len(which)))
+                warn_of_samples("off by {worst:.2g} in {samples}", np.array(which), sizes)
+            found += [one.after(first) for one in own]
+
+        return work
+
+    some = (
+        batch(1, True, False, True),
+        batch(9, False, False, False, False),
+        batch(4, False, True),
+    )
+    assert merging(*some) == ["off by 0.25 in 3 of 9 samples (1, 3, 5)"]
+    assert merging(some[1]) == []
+    assert merging(some[2]) == ["off by 0.05 in 1 of 2 samples (5)"]
