@@ -192,6 +192,15 @@ def test_a_folder_of_other_settings_and_what_cannot_be_sampled_are_refused(tmp_p
     assert not (tmp_path / "x").exists()
 
 
+def test_fewer_repetitions_after_the_study_was_lost_are_the_first_ones(tmp_path):
+    one = study(sweep=lengths(3e-3, 7e-3))
+    one.failure_curve(out=tmp_path / "run", repetitions=3, smallest=0.1)
+    (tmp_path / "run" / "study.json").unlink()
+    with pytest.warns(UserWarning, match="study.json is damaged or missing"):
+        fewer = one.failure_curve(out=tmp_path / "run", repetitions=2, smallest=0.1)
+    assert fewer.equals(one.failure_curve(out=tmp_path / "two", repetitions=2, smallest=0.1))
+
+
 def test_the_local_criterion_is_compared_with_equilibrium_once(tmp_path):
     """Where residual strengths are high, equilibrium finds other probabilities."""
     plain = small_study(correlation_length=8e-3)
@@ -203,6 +212,17 @@ def test_the_local_criterion_is_compared_with_equilibrium_once(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error", st.AccuracyWarning)
         computed(tmp_path / "run", 1, one)
+
+
+@pytest.mark.parametrize("line", [
+    "onset study.toml --strength p.npy", "check study.toml",
+    "rupture study.toml --out out --strength p.npy", "run study.toml --out out --no-pilot",
+])  # fmt: skip
+def test_uncertain_parameters_in_every_command(runs, tmp_path, monkeypatch, line):
+    monkeypatch.chdir(tmp_path)
+    study(uncertain=UNCERTAIN, ensemble={"samples": 8, "seed": 3}).to_toml("study.toml")
+    np.save("p.npy", study().random.strength.sample(study().problem.interface, seed=8)[0])
+    runs(line)
 
 
 def test_commands_print_export_and_report_its_numbers(runs, tmp_path, monkeypatch):

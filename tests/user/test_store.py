@@ -397,6 +397,19 @@ def test_the_pilot_looks_at_the_weakest_samples():
     assert max(abs(found.attrs[f"pilot_{name}"]) for name in ("bias", "scatter")) < 0.01
 
 
+def test_the_pilot_has_the_workers_of_the_run(monkeypatch):
+    seen, through = set(), pilot.in_threads
+
+    def in_threads(function, jobs, workers):
+        seen.add(workers)
+        return through(function, jobs, workers)
+
+    monkeypatch.setattr(pilot, "in_threads", in_threads)
+    st.Study.from_dict(small_study()).run(workers=3)
+    assert 3 in seen
+    assert seen <= {1, 3}  # 1: samples that failed together
+
+
 def test_the_pilot_of_a_sweep_reports_its_largest_difference_with_its_sign(monkeypatch):
     own = {0: {"pilot": np.array([-0.06, -0.04])}, 1: {"pilot": np.array([0.01, 0.02])}}
     monkeypatch.setattr(pilot, "_differences", lambda point, *_: own[point])

@@ -84,7 +84,7 @@ def gather(
                 raise (InputError if failure.input else RunError)(str(failure))
     found = store.pilot if store else None
     if found is None and pilot:
-        found = compare(points, ensemble.first, ensemble.samples, progress is True)
+        found = compare(points, ensemble.first, ensemble.samples, progress is True, workers)
         where = " at the worst point of the sweep" if len(points) > 1 else ""
         if text := doubt(found, where):
             warn_accuracy(text)

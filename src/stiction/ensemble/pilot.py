@@ -33,7 +33,11 @@ def exact_counterpart(experiment: Experiment) -> Experiment | None:
 
 
 def compare(
-    points: Sequence[Experiment], first: int = 0, most: int = ON_A_LINE, show: bool = False
+    points: Sequence[Experiment],
+    first: int = 0,
+    most: int = ON_A_LINE,
+    show: bool = False,
+    workers: int | None = None,
 ) -> dict[str, Any]:
     """Solve samples of at most eight points by their method and by its exact counterpart.
 
@@ -45,7 +49,9 @@ def compare(
     parts: dict[str, list[Array]] = {}
     with Meter("comparing with the exact onset", len(chosen), show, unit="points") as meter:
         for number in chosen.tolist():
-            for name, relative in _differences(points[number], first, most).items():
+            for name, relative in _differences(
+                points[number], first, most, workers or usable_cores()
+            ).items():
                 if relative.size > 1:
                     parts.setdefault(name, []).append(relative)
             meter.advance()
@@ -57,7 +63,9 @@ def compare(
     return found
 
 
-def _differences(experiment: Experiment, first: int, most: int) -> dict[str, Array]:
+def _differences(
+    experiment: Experiment, first: int, most: int, workers: int
+) -> dict[str, Array]:
     """Return the differences to the exact onset, relative to its mean; none if there is no such."""
     exact = exact_counterpart(experiment)
     if exact is None:
@@ -66,13 +74,13 @@ def _differences(experiment: Experiment, first: int, most: int) -> dict[str, Arr
     with collect_warnings():  # the ensemble itself warns
         looked_at = max(size, min(LOOKED_AT, int(SECONDS / experiment.seconds)))
         draws = experiment.draws(first, min(looked_at, most))
-        near = _onsets(experiment, draws, BATCH)
+        near = _onsets(experiment, draws, BATCH, workers)
         chosen = {"pilot": np.arange(min(size, most))}
         if most > size:
             chosen["pilot_weakest"] = np.argsort(near)[:size]
         some = np.unique(np.concatenate(list(chosen.values())))
         true = np.full(near.size, np.nan)
-        true[some] = _onsets(exact, draws[some], 1)
+        true[some] = _onsets(exact, draws[some], 1, workers)
     found = {}
     for name, rows in chosen.items():
         rows = rows[np.isfinite(near[rows]) & np.isfinite(true[rows])]
@@ -80,7 +88,7 @@ def _differences(experiment: Experiment, first: int, most: int) -> dict[str, Arr
     return found
 
 
-def _onsets(experiment: Experiment, draws: Array, batch: int) -> Array:
+def _onsets(experiment: Experiment, draws: Array, batch: int, workers: int) -> Array:
     """Return the stress at onset of each row of draws, NaN where it cannot be solved."""
 
     def solve(rows: Array) -> Array:
@@ -88,11 +96,11 @@ def _onsets(experiment: Experiment, draws: Array, batch: int) -> Array:
             found: Array = experiment.onset(experiment.profiles(rows))["critical_stress"]
         except (InputError, RuntimeError, ArithmeticError):
             alone = len(rows) == 1
-            return np.full(1, np.nan) if alone else _onsets(experiment, rows, 1)
+            return np.full(1, np.nan) if alone else _onsets(experiment, rows, 1, 1)
         return found
 
     parts = np.split(draws, range(batch, len(draws), batch))
-    return np.concatenate(in_threads(solve, parts, usable_cores()))
+    return np.concatenate(in_threads(solve, parts, workers))
 
 
 def doubt(found: dict[str, Any], where: str = "") -> str | None:

@@ -43,10 +43,11 @@ class Repetitions:
         self._found: dict[tuple[int, int], Descent] = {}
 
     def add(self, table: Table) -> None:
-        """Take the repetitions of a table."""
+        """Take the repetitions of a table; those beyond the number are left out."""
         for point, number, found in repetitions_in(table.rows):
-            self._found[point, number] = found
-            self.done[point, number] = True
+            if number < self.done.shape[1]:
+                self._found[point, number] = found
+                self.done[point, number] = True
 
     def tail(self, point: int) -> Tail | None:
         """Return the tail of a point from all of its repetitions; None without any."""

@@ -410,15 +410,11 @@ def study_schema() -> dict[str, Any]:
 
 @model(kw_only=True)
 class Setup:
-    """The interface that a study file describes, without its random properties."""
+    """The interface that a study file describes, without what else a study has."""
 
     problem: Problem
     method: AnyMethod | None = None
     save: Save | None = None
-    random: Any = None
-    ensemble: Any = None
-    sweep: Any = ()
-    title: Any = ""
 
 
 def read_setup(path: Path) -> Setup:
@@ -443,6 +439,9 @@ def _read(cls: type[T], given: dict[str, Any], folder: str | Path | None) -> T:
         place = check("folder", folder, FilePath)
         context["read"] = lambda profile, name: profile_in_file(profile, name, place)
     plain = with_first_values(given)
+    if cls is Setup:
+        rest = {*Study.__dataclass_fields__} - {*Setup.__dataclass_fields__}
+        plain = {name: one for name, one in plain.items() if name not in rest}
     try:
         return pydantic.TypeAdapter(cls).validate_python(plain, context=context)
     except pydantic.ValidationError as error:
