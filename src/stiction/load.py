@@ -131,6 +131,9 @@ class Load:
         tau_i, Pa, below the peak strength everywhere.
     normal_pressure : float or (nodes,) array, optional
         Pa, positive on average. Every onset then has a `friction_coefficient`.
+    pressing_force : float, optional
+        Instead of `normal_pressure`: N, positive. Over the area of the interface, which must be
+        known, it is the pressure, uniform or the mean between glued plates.
 
     Examples
     --------
@@ -141,6 +144,7 @@ class Load:
     profile: Annotated[Profile, OneOf(LOADS, _shape, PROFILE_SCHEMA)] = 1.0
     initial_stress: Profile = 0.0
     normal_pressure: OptionalProfile = None
+    pressing_force: Positive | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> Load:
@@ -151,6 +155,10 @@ class Load:
             mean = np.mean(pressure)
             problems.append(
                 f"normal_pressure must be positive on average, its mean is {mean:g}"
+            )
+        if pressure is not None and self.pressing_force is not None:
+            problems.append(
+                "pressing_force: give either normal_pressure (Pa) or pressing_force (N), not both"
             )
         if problems:
             raise InputError(problems)

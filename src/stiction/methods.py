@@ -169,7 +169,7 @@ def variables_of(
 ) -> dict[str, Variable]:
     """Return the variables of a prepared solver; `pressure`: if that differs by sample."""
     variables = dict(method.variables(problem))
-    if pressure or problem.load.normal_pressure is not None:
+    if pressure or problem.given_pressure is not None:
         variables["friction_coefficient"] = FRICTION_COEFFICIENT
     return variables if problem.area is None else variables | force_variables(variables)
 

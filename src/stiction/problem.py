@@ -47,6 +47,11 @@ FLATTEST, HIGHEST = 0.025, 10.0
 """Height of blocks over their length between which their response takes seconds and below 1 GB."""
 AT_END = {"II": 0.445 / 1.158, "III": 0.5}
 """Nucleation length at a free end as a share of that in the middle."""
+NO_AREA = (
+    "a force needs the area of the interface: give specimen=st.Blocks(thickness=...), or"
+    " st.Interface(width=...) of a line (m)"
+)
+"""What to do with a force where the area is unknown."""
 BARRIER = 10.0
 """A node is a barrier where tau_p - tau_r is above so many times its lower quartile, of nodes that
 weaken."""
@@ -190,6 +195,8 @@ class Problem:
                 "mode: on a plane, slip along x is mode II along x and mode III along y;"
                 f" leave mode = 'II', got {self.mode!r}"
             )
+        if self.load.pressing_force is not None and self.area is None:
+            problems.append(f"load.pressing_force: {NO_AREA}, or load.normal_pressure in Pa")
         problems += [f"friction: {text}" for text in contradictions(self.friction)]
         if problems:
             raise InputError(problems)
@@ -318,7 +325,7 @@ class Problem:
 
     def warn_of_units(self, strength: float, residual: float = 0.0) -> None:
         """Warn if mean peak and residual strengths (Pa) do not fit the rest of the problem."""
-        modulus, pressure = self.solid.shear_modulus, self.load.normal_pressure
+        modulus, pressure = self.solid.shear_modulus, self.given_pressure
         doubts = [("strength", strength, "shear modulus", modulus, RIGIDITY)]
         if pressure is not None:
             mean = float(np.mean(pressure))
@@ -356,6 +363,20 @@ class Problem:
             return interface.extent
         return None if depth is None else interface.extent * depth
 
+    def stress_of(self, name: str, force: float) -> float:
+        """Return a force, N, over the area of the interface, Pa; `name` begins its refusal."""
+        if self.area is None:
+            raise InputError(f"{name}: {NO_AREA}")
+        return force / self.area
+
+    @property
+    def given_pressure(self) -> Any:
+        """Normal pressure as given, Pa, a force over the area: a number, an array or None."""
+        force = self.load.pressing_force
+        if force is None:
+            return self.load.normal_pressure
+        return self.stress_of("load.pressing_force", force)
+
     def refuse_specimen(self, what: str, instead: str) -> None:
         """Raise an `InputError` if the problem has a specimen, with what to do instead."""
         if self.specimen is not None:
@@ -366,7 +387,7 @@ class Problem:
     @property
     def normal_pressure(self) -> Any:
         """Normal pressure, Pa: a number, an array at the nodes, or None."""
-        pressure = self.load.normal_pressure
+        pressure = self.given_pressure
         return pressure if pressure is None else pressure * self.pressing
 
     @property
@@ -535,7 +556,7 @@ class Problem:
         residual = read("residual_strength", residual, samples)
         initial = read("initial_stress", self.load.initial_stress, samples)
         pressure = np.broadcast_to(np.nan, (samples, *interface.shape))
-        if self.load.normal_pressure is not None or "normal_pressure" in given:
+        if self.given_pressure is not None or "normal_pressure" in given:
             pressure = read("normal_pressure", self.normal_pressure, samples)
             own = np.shape(given.get("normal_pressure", pressure))
             if own in ((), (samples, 1)):  # that of each sample, which its blocks distribute

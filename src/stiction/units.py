@@ -1,9 +1,11 @@
 """Units that measured data state, and their factors to SI: nothing is converted by guessing."""
 
 import re
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from stiction.errors import InputError
+import numpy as np
+
+from stiction.errors import InputError, UnitWarning, warn_user
 
 
 class Unit(NamedTuple):
@@ -44,6 +46,13 @@ for (_short, _long), _scale in _PREFIXES.items():
         for _name in (_short + _symbol, *(_long + word for word in _words)):
             _UNITS[_name] = Unit(_scale * _unit.factor, _unit.powers)
 _COMMON = "m, cm, mm, um, nm, km, in, Pa, kPa, MPa, GPa, bar, psi, ksi, N, kN, s, ms"
+_MULTIPLES: dict[str, tuple[float, dict[str, float]]] = {
+    "m": (1.0, {"km": 1e-3, "m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}),
+    "s": (1.0, {"s": 1.0, "ms": 1e3, "µs": 1e6, "ns": 1e9}),
+    "Pa": (0.1, {"MPa": 1e-6, "kPa": 1e-3, "Pa": 1.0}),
+    "N": (1.0, {"MN": 1e-6, "kN": 1e-3, "N": 1.0}),
+}
+"""Largest value on a scale from which on a unit is used, in that unit; units and their factors."""
 _SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴", "-01234")
 _POWER = re.compile(r"([^\W\d_]+|%|1(?!\d))(?:\^?([+-]?\d))?$")
 
@@ -92,3 +101,32 @@ def factor_to(si: str, text: str) -> float:
     if given.powers != wanted.powers:
         raise InputError(f"is in {text}, which cannot be converted to {si}")
     return given.factor / wanted.factor
+
+
+def unit_for(units: str, values: Any) -> tuple[float, str]:
+    """Return the factor and name of the unit that suits the size of SI values."""
+    if units not in _MULTIPLES:
+        return 1.0, "" if units == "1" else units
+    array = np.asarray(values, dtype=np.float64)
+    largest = float(np.max(np.abs(array[np.isfinite(array)]), initial=0.0))
+    least, multiples = _MULTIPLES[units]
+    suited = [unit for unit, f in multiples.items() if largest * f >= least * (1.0 - 1e-9)]
+    unit = suited[0] if suited else list(multiples)[-1 if largest else 0]
+    return multiples[unit], unit
+
+
+def in_words(units: str, value: float, digits: int = 3) -> str:
+    """Return an SI value in the unit that suits its size, such as '40 kN'."""
+    value = float(f"{value:.{digits}g}")  # 999.6 N are 1 kN
+    factor, unit = unit_for(units, value)
+    return f"{value * factor:.{digits}g} {unit}".rstrip()
+
+
+def doubt_unit(
+    text: str, ratio: float, *, usual: tuple[float, float], possible: tuple[float, float]
+) -> None:
+    """Warn of a value whose ratio to another is not usual; refuse it if it is not possible."""
+    if not possible[0] < ratio < possible[1]:
+        raise InputError(text)
+    if not usual[0] <= ratio <= usual[1]:
+        warn_user(text, UnitWarning)

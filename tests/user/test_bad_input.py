@@ -415,7 +415,7 @@ DOUBTS = {
     "each sample is uniform; check its unit": lambda: monte_carlo(
         random=st.RandomField(FIELD.marginal, st.PowerLawSpectrum(4.0), mean_mode=True)
     ),
-    "friction_coefficient: 8e.07 Pa is 81 times": lambda: st.failure_probability(
+    "friction_coefficient: 40 is 81 times the mean strength": lambda: st.failure_probability(
         scaled(pressure=2e6), FIELD, friction_coefficient=40, method=LOCAL
     ),
     "residual_strength: its mean, 0.45 Pa": lambda: PROBLEM.warn_of_units(1e6, 0.45),

@@ -1,5 +1,6 @@
 """Joints in engineers' terms: Young's modulus, friction coefficients, safety factors."""
 
+import dataclasses
 from functools import partial
 
 import numpy as np
@@ -33,6 +34,12 @@ FREE, PRESSED = joint(), joint(PRESSURE)
 UNDER_RANDOM_PRESSURE = st.RandomInterface(
     strength=COEFFICIENT, normal_pressure=lognormal(PRESSURE, cv=0.1)
 )
+LAP = dataclasses.replace(
+    FREE,
+    interface=st.Interface(length=0.1, nodes=256, width=0.03),
+    load=st.Load(pressing_force=6e3),
+)
+"""3,000 mm² under the same pressure."""
 counted = partial(st.failure_probability, method=LOCAL, algorithm="plain")
 
 
@@ -52,7 +59,25 @@ test_what_is_contradicting_or_missing_is_refused = refusals({
         lambda: st.monte_carlo(FREE, COEFFICIENT, method=LOCAL, samples=2),
     "friction_coefficient: needs a normal pressure":
         lambda: counted(FREE, STRENGTH, friction_coefficient=0.3),
-    "either stress ... or friction_coefficient": lambda: counted(PRESSED, STRENGTH),
+    "one of stress (Pa), force (N) and friction_coefficient, got none":
+        lambda: counted(PRESSED, STRENGTH),
+    "got stress and force": lambda: counted(LAP, COEFFICIENT, 1e6, force=1e3),
+    "force: a force needs the area ... thickness ... width":
+        lambda: counted(PRESSED, STRENGTH, force=1e3),
+    "either normal_pressure (Pa) or pressing_force (N)":
+        lambda: st.Load(normal_pressure=5e6, pressing_force=4e3),
+    "load.pressing_force: a force needs the area ... load.normal_pressure":
+        lambda: dataclasses.replace(PRESSED, load=st.Load(pressing_force=4e3)),
+    "pressing_force: must be greater than 0": lambda: st.Load(pressing_force=-4e3),
+    # kN for N, MPa for Pa, and a force for a stress.
+    "force: 1.2 N is 0.0004 times the mean strength, 3e+03 N; check the units":
+        lambda: counted(LAP, COEFFICIENT, force=1.2),
+    "stress: 0.4 Pa": lambda: counted(PRESSED, STRENGTH, 0.4),
+    "another pressure; give Load(normal_pressure=...)":
+        lambda: st.infer(
+            LAP, COEFFICIENT, {0.2: [0.4, 0.41, 0.42]}, unit="1", method=LOCAL,
+            prior={"marginal.mean": (0.3, 0.6)},
+        ),
     "critical_slip: of = 'friction_coefficient'":
         lambda: st.RandomInterface(strength=STRENGTH, critical_slip=COEFFICIENT),
 })  # fmt: skip
@@ -101,3 +126,61 @@ def test_failure_under_a_random_pressure_counts_each_samples_own():
     )
     # Both scatter: 0.05 by 7 % from 4,000 samples, the estimate by 10 %.
     assert found.probability == pytest.approx(0.05, rel=0.35)
+
+
+def test_a_pressing_force_is_a_pressure_over_the_area():
+    """Between glued plates, as a sweep of the force and of the length, and from a study file."""
+    found, same = (
+        st.monte_carlo(problem, COEFFICIENT, method=LOCAL, samples=5, seed=1)
+        for problem in (LAP, PRESSED)
+    )
+    for name in ("critical_stress", "friction_coefficient"):
+        np.testing.assert_allclose(found[name], same[name], rtol=1e-12)
+    np.testing.assert_allclose(found.critical_force, 3e-3 * same.critical_stress, rtol=1e-12)
+    glued = st.Blocks(height=0.05, thickness=0.006, pressing="glued")
+    block = dataclasses.replace(LAP, interface=st.Interface(0.1, 256), specimen=glued)
+    assert float(np.mean(block.normal_pressure)) == pytest.approx(1e7, rel=1e-12)
+    assert np.ptp(block.normal_pressure) > 1e5
+    study = st.Study(
+        problem=LAP, random=COEFFICIENT, method=LOCAL, ensemble=st.Ensemble(samples=3),
+        sweep=[
+            {"problem.load.pressing_force": [3e3, 6e3]}, {"problem.interface.width": [0.02, 0.03]}
+        ],
+    )  # fmt: skip
+    study = st.Study.from_dict(study.to_dict())
+    result = study.run(progress=False)
+    assert result.pressing_force.attrs["units"] == "N"
+    pressures = result.critical_stress / result.friction_coefficient
+    wanted = np.array([[3e3 / 2e-3, 3e3 / 3e-3], [6e3 / 2e-3, 6e3 / 3e-3]])
+    np.testing.assert_allclose(pressures, wanted[..., None] * np.ones(3), rtol=1e-12)
+
+
+def test_an_answer_begins_with_what_was_asked():
+    """In newtons or kN with three digits; the others after it, each of the one stress."""
+    options = {"target_cv": 0.3, "seed": 4}
+    by_force, by_stress, by_coefficient = (
+        counted(LAP, COEFFICIENT, **one, **options)
+        for one in ({"force": 2412.0}, {"stress": 0.804e6}, {"friction_coefficient": 0.402})
+    )
+    assert by_force.probability == by_stress.probability == by_coefficient.probability > 0.0
+    assert by_force.stress == pytest.approx(0.804e6)
+    texts = map(str, (by_force, by_stress, by_coefficient))
+    named = (
+        "force 2.41 kN (0.804 MPa, friction coefficient 0.402)",
+        "0.804 MPa (force 2.41 kN, friction coefficient 0.402)",
+        "friction coefficient 0.402 (0.804 MPa, force 2.41 kN)",
+    )
+    for text, words in zip(texts, named, strict=True):
+        assert f") below {words}" in text
+    design = st.design_stress(
+        LAP, COEFFICIENT, probability=0.03, method=LOCAL, target_cv=0.3, seed=1
+    )
+    low, high = (end * 3e-3 * 1e-3 for end in design.interval)
+    kilo = (
+        f"force {design.force * 1e-3:.3g} kN (95 %: {low:.3g} kN to {high:.3g} kN) at P = 0.03"
+    )
+    assert str(design).startswith(
+        f"{kilo} ({design.stress * 1e-6:.7g} MPa, friction coefficient"
+    )
+    grams = dataclasses.replace(design, area=999.7 / design.stress)
+    assert str(grams).startswith("force 1 kN (")

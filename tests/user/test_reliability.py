@@ -198,9 +198,9 @@ def test_small_runs_whose_states_tie(seed):
     assert found.interval[0] < 1e-12 < found.interval[1]
 
 
-@pytest.mark.parametrize("stress", [0.16, 12.8, 100e3])
+@pytest.mark.parametrize("stress", [1.6e3, 100e3])
 def test_a_stress_in_another_unit_is_answered_without_sampling(stress):
-    """A coefficient, MPa, or a force: 37,000 evaluations gave P = 0 without a warning."""
+    """Such as a force: 37,000 evaluations gave P = 0 without a warning."""
     field = st.RandomField(st.Lognormal(mean=1e6, cv=0.12), FIELD.spectrum)
     with warnings.catch_warnings(record=True, action="always") as caught:
         found = failure(stress, system=(PROBLEM, field))

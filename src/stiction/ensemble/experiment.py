@@ -126,7 +126,7 @@ class Experiment:
         if "normal_pressure" in self.random.names:
             each = [one.properties["normal_pressure"].mean for one in self.random.members]
             return float(np.mean(each))
-        given = self.problem.load.normal_pressure
+        given = self.problem.given_pressure
         return float("nan") if given is None else float(np.mean(given))
 
     @property

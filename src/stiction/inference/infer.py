@@ -135,7 +135,7 @@ def infer(
     """
     measured = make_peaks(peaks, unit)
     parameters = make_prior(problem, random, prior)
-    pressed = problem.load.normal_pressure is not None
+    pressed = problem.given_pressure is not None
     if measured.coefficients and not (pressed or "normal_pressure" in parameters.random.names):
         raise InputError(
             "peaks: are coefficients of friction, which need a normal pressure: give"

@@ -98,6 +98,11 @@ def experiments_at(
             )
         with prior.named(theta):
             if length is not None and not np.isclose(length, own.extent, rtol=1e-9):
+                if problem.load.pressing_force is not None:
+                    raise InputError(
+                        "peaks: on specimens of another length the pressing force is another"
+                        " pressure; give Load(normal_pressure=...) in Pa"
+                    )
                 nodes = 2 * max(4, round(0.5 * length / own.spacing))
                 problem = replace(problem, interface=replace(own, length=length, nodes=nodes))
             found.append(Experiment(problem, random, method))

@@ -30,7 +30,7 @@ from stiction.random.dotted_keys import full_key
 from stiction.random.marginals import affine_parameters
 
 MARGINAL = "random.strength.marginal."
-PRESSURE = "problem.load.normal_pressure"
+PRESSURE = {"problem.load.normal_pressure", "problem.load.pressing_force"}
 SLOPES = {"low": (1, -1), "high": (0, 1), "loc": (1, 0), "scale": (0, 1), "mean": (0, 1)}
 """Derivatives of location and scale of a marginal, see `affine_parameters`."""
 
@@ -54,7 +54,7 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
     problem, random = prior.at(middle)
     none = Scaling((), middle, np.zeros((0, 2)))
     field, full = random.strength, [full_key(name) for name in prior.names]
-    if not _may_scale(problem, random, method) or PRESSURE in full:
+    if not _may_scale(problem, random, method) or PRESSURE & {*full}:
         return none
     names, location, scale = affine_parameters(field.marginal)
     if "mean" in names and {MARGINAL + "low", MARGINAL + "high"} & set(full):

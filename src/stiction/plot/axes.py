@@ -14,27 +14,8 @@ from stiction.errors import InputError
 from stiction.model import check
 from stiction.plot.style import COLUMN, paper_style
 from stiction.problem import Problem
+from stiction.units import unit_for
 from stiction.variables import FRICTION_COEFFICIENT
-
-_MULTIPLES: dict[str, tuple[float, dict[str, float]]] = {
-    "m": (1.0, {"km": 1e-3, "m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}),
-    "s": (1.0, {"s": 1.0, "ms": 1e3, "µs": 1e6, "ns": 1e9}),
-    "Pa": (0.1, {"MPa": 1e-6, "kPa": 1e-3, "Pa": 1.0}),
-    "N": (1.0, {"MN": 1e-6, "kN": 1e-3, "N": 1.0}),
-}
-"""Largest value on a scale from which on a unit is used, in that unit; units and their factors."""
-
-
-def unit_for(units: str, values: Any) -> tuple[float, str]:
-    """Return the factor and name of the unit that suits the size of SI values."""
-    if units not in _MULTIPLES:
-        return 1.0, "" if units == "1" else units
-    array = np.asarray(values, dtype=np.float64)
-    largest = float(np.max(np.abs(array[np.isfinite(array)]), initial=0.0))
-    least, multiples = _MULTIPLES[units]
-    suited = [unit for unit, f in multiples.items() if largest * f >= least * (1.0 - 1e-9)]
-    unit = suited[0] if suited else list(multiples)[-1 if largest else 0]
-    return multiples[unit], unit
 
 
 def with_unit(name: str, unit: str) -> str:
@@ -129,9 +110,9 @@ def add_friction_scale(axes: Axes, problem: Problem, which: str, factor: float) 
 
     `which` is the scale of stresses, "x" or "y", and `factor` that of its unit.
     """
-    if problem.load.normal_pressure is None:
+    if problem.given_pressure is None:
         return
-    pressure = float(np.mean(problem.load.normal_pressure)) * factor
+    pressure = float(np.mean(problem.given_pressure)) * factor
     add_scale(axes, which, 1.0 / pressure, r"$\tau / \langle p \rangle$")
 
 

@@ -14,12 +14,12 @@ from stiction.plot.axes import (
     need,
     on_axes,
     problem_of,
-    unit_for,
     with_unit,
 )
 from stiction.plot.style import ACCENT, BAND, COLUMN, INK, PALE, QUIET
 from stiction.problem import Problem
 from stiction.reliability.answer import Answer, bounded
+from stiction.units import unit_for
 
 TINY = 1e-300
 """Probability that stands for none on a logarithmic scale."""

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 from stiction.errors import InputError
 from stiction.interface import Interface
 from stiction.model import check
-from stiction.plot.axes import add_friction_scale, on_axes, unit_for, with_unit
+from stiction.plot.axes import add_friction_scale, on_axes, with_unit
 from stiction.plot.style import INK, PAGE, color, series
 from stiction.problem import Problem
 from stiction.random.fields import RandomField
+from stiction.units import unit_for
 from stiction.variables import PROFILES
 
 MOST_LINES = 6

@@ -15,7 +15,7 @@ from stiction.inference.bootstrap import bands
 from stiction.inference.fit import FieldFit
 from stiction.inference.posterior import Posterior
 from stiction.inference.whittle import Observed, observe
-from stiction.plot.axes import on_axes, unit_for, with_unit
+from stiction.plot.axes import on_axes, with_unit
 from stiction.plot.style import (
     ACCENT,
     INK,
@@ -26,6 +26,7 @@ from stiction.plot.style import (
     panel,
     paper_style,
 )
+from stiction.units import unit_for
 from stiction.variables import QUANTITIES
 
 Array = NDArray[np.float64]

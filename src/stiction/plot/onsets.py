@@ -21,13 +21,13 @@ from stiction.plot.axes import (
     need,
     on_axes,
     problem_of,
-    unit_for,
     with_unit,
 )
 from stiction.plot.fields import draw_map, draw_outline, map_height, name_line, rows_of
 from stiction.plot.style import ACCENT, PAGE, PALE, QUIET, color, series
 from stiction.problem import Problem
 from stiction.profiles.placing import IN_GAP, MEASURED
+from stiction.units import unit_for
 
 Array = NDArray[np.float64]
 

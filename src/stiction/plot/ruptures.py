@@ -15,11 +15,12 @@ from PIL import Image
 
 from stiction.errors import InputError
 from stiction.model import FilePath, at_least, check
-from stiction.plot.axes import need, on_axes, problem_of, unit_for, with_unit
+from stiction.plot.axes import need, on_axes, problem_of, with_unit
 from stiction.plot.fields import draw_map, map_height, name_line
 from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, paper_style
 from stiction.problem import Problem
 from stiction.progress import Meter, Show
+from stiction.units import unit_for
 
 Array = NDArray[np.float64]
 Moving = list[tuple[Any, str, Any]]

@@ -10,11 +10,12 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from stiction.model import check
-from stiction.plot.axes import need, on_axes, problem_of, unit_for, with_unit
+from stiction.plot.axes import need, on_axes, problem_of, with_unit
 from stiction.plot.fields import rows_of
 from stiction.plot.style import ACCENT, COLUMN, PALE, QUIET, paper_style, series
 from stiction.problem import Problem
 from stiction.specimen import Pusher
+from stiction.units import unit_for
 
 Array = NDArray[np.float64]
 

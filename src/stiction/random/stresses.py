@@ -26,10 +26,10 @@ def coefficients_of(random: RandomInterface) -> list[str]:
 def check_pressure(problem: Problem, random: RandomInterface) -> None:
     """Raise an `InputError` if coefficients are given without a normal pressure."""
     names = coefficients_of(random)
-    if names and problem.load.normal_pressure is None and "normal_pressure" not in random.names:
+    if names and problem.given_pressure is None and "normal_pressure" not in random.names:
         raise InputError(
             f"{names[0]}: is given as friction coefficients, which need a normal pressure"
-            " (load.normal_pressure, Pa)"
+            " (load.normal_pressure, Pa, or load.pressing_force, N)"
         )
 
 

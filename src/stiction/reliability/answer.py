@@ -20,6 +20,7 @@ from stiction.errors import InputError, collect_warnings, warn_accuracy
 from stiction.model import Real, at_least
 from stiction.progress import Meter
 from stiction.reliability.tail import Tail, two_levels_refused
+from stiction.units import in_words
 
 TargetCv: TypeAlias = Annotated[Real, Field(ge=1e-6, le=1)]
 """A smaller coefficient of variation would take more than 1e12 failures; a larger is no answer."""
@@ -74,6 +75,9 @@ class Answer:
         `critical_position`, ...
     of_stress : bool
         Whether the stress is estimated, as by `design_stress`, or the probability.
+    quantity : str
+        What the text of the answer begins with: 'stress', 'force' or 'friction_coefficient', as was
+        asked; of `design_stress` the force where the area is known.
     """
 
     stress: float
@@ -92,6 +96,7 @@ class Answer:
     members: Array = field(default_factory=lambda: np.zeros(0), repr=False)
     failing_profiles: xr.Dataset = field(default_factory=xr.Dataset, repr=False)
     of_stress: bool = False
+    quantity: str = "stress"
 
     @classmethod
     def of(cls, state: LimitState, *, doubts: Sequence[str] = (), **values: Any) -> Self:
@@ -132,16 +137,22 @@ class Answer:
 
     def __str__(self) -> str:
         low, high = self.interval
+        known = {
+            "stress": f"{self.stress / 1e6:.7g} MPa",
+            "force": f"force {in_words('N', self.force)}",
+            "friction_coefficient": f"friction coefficient {self.friction_coefficient:.4g}",
+        }
+        result = known.pop(self.quantity)
         if self.of_stress:
-            result = f"{self.stress / 1e6:.7g} MPa (95 %: {low / 1e6:.7g} to {high / 1e6:.7g})"
-            result += f" at P = {self.probability:g}"
+            ends = f"{low / 1e6:.7g} to {high / 1e6:.7g}"
+            if self.quantity == "force":
+                ends = " to ".join(in_words("N", end * self.area) for end in (low, high))
+            result += f" (95 %: {ends}) at P = {self.probability:g}"
         else:
-            result = f"P = {self.probability:.3g} (95 %: {low:.3g} to {high:.3g},"
-            result += f" c.o.v. {self.cv:.2g}) below {self.stress / 1e6:.6g} MPa"
-        if math.isfinite(self.normal_pressure):
-            result += f" (friction coefficient {self.friction_coefficient:.4g})"
-        if math.isfinite(self.area):
-            result += f" (force {self.force:.4g} N)"
+            chance = f"P = {self.probability:.3g} (95 %: {low:.3g} to {high:.3g},"
+            result = f"{chance} c.o.v. {self.cv:.2g}) below {result}"
+        others = [text for name, text in known.items() if math.isfinite(getattr(self, name))]
+        result += f" ({', '.join(others)})" if others else ""
         if bounded(self.lower_bound):
             result += f", {self.stress_above_bound / 1e3:.4g} kPa above the bound"
         if self.survived:
@@ -185,7 +196,8 @@ def prepare(
     problems = []
     if per_pressure and not experiment.pressure > 0.0:
         problems.append(
-            "friction_coefficient: needs a normal pressure (load.normal_pressure, Pa)"
+            "friction_coefficient: needs a normal pressure (load.normal_pressure, Pa, or"
+            " load.pressing_force, N)"
         )
     if algorithm in ("subset", "two_level") and (slow := too_slow(experiment, max_evaluations)):
         problems.append(f"method: {slow}")

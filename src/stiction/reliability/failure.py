@@ -10,7 +10,7 @@ import xarray as xr
 from stiction.arrays import Array
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import Event, LimitState
-from stiction.errors import InputError, UnitWarning, warn_accuracy, warn_user
+from stiction.errors import InputError, warn_accuracy
 from stiction.methods import MethodObject, label
 from stiction.model import Count, Number, Positive, Progress, Real, checked
 from stiction.problem import Problem
@@ -33,6 +33,7 @@ from stiction.reliability.counting import count_failures
 from stiction.reliability.tail import Tail, sample_tail
 from stiction.reliability.uncertainty import generator, lognormal_interval
 from stiction.results import along, study_attributes, to_dataset
+from stiction.units import doubt_unit
 from stiction.variables import ONSET_VARIABLES, PROFILES, Variable
 
 PILOT = 1_000
@@ -80,6 +81,7 @@ def failure_probability(
     *,
     method: MethodObject,
     friction_coefficient: Positive | None = None,
+    force: Positive | None = None,
     algorithm: Literal["auto", "plain", "subset", "two_level"] = "auto",
     target_cv: TargetCv = 0.1,
     seed: Number = 0,
@@ -105,6 +107,8 @@ def failure_probability(
     friction_coefficient : float, optional
         Instead of `stress`: ratio of mean shear stress to mean normal pressure that it must
         carry. If the pressure is random, each sample's own pressure counts.
+    force : float, optional
+        Instead of `stress`: shear force to carry, N. The area of the interface must be known.
     algorithm : {"auto", "plain", "subset", "two_level"}
         Plain Monte Carlo, subset simulation, or subset simulation by the local criterion with
         equilibrium as the last level; page 'Failure probability' of the documentation has their
@@ -138,7 +142,8 @@ def failure_probability(
         the local criterion, some samples near the stress are also solved by equilibrium,
         and both probabilities are given if they differ by more than their error.
     UnitWarning
-        If the stress is below a fiftieth or above fifty times of the mean strength.
+        If the stress is below a fiftieth or above fifty times of the mean strength; a thousand
+        times is an `InputError`.
 
     Examples
     --------
@@ -150,8 +155,16 @@ def failure_probability(
     >>> bool(0.0 < low < found.probability < high < 1.0)
     True
     """
-    if (stress is None) == (friction_coefficient is None):
-        raise InputError("stress: give either stress (Pa) or friction_coefficient")
+    given = {"stress": stress, "force": force, "friction_coefficient": friction_coefficient}
+    asked = [name for name, one in given.items() if one is not None]
+    if len(asked) != 1:
+        raise InputError(
+            "stress: give one of stress (Pa), force (N) and friction_coefficient, got"
+            f" {' and '.join(asked) or 'none'}"
+        )
+    [name] = asked
+    if force is not None:
+        stress = problem.stress_of("force", force)
     experiment = Experiment(problem, random, method, seed=seed)
     meter = Meter("failure_probability", show=progress)
     state, budget = prepare(
@@ -161,18 +174,11 @@ def failure_probability(
     if stress is None:
         stress = float((friction_coefficient or 0.0) * experiment.pressure)
     likely = state.likely_bounds(NEGLIGIBLE)
-    mean = experiment.mean_strength
-    if max(state.bounds[0], 0.0) < stress < DOUBTFUL * mean or stress > mean / DOUBTFUL:
-        name = "stress" if friction_coefficient is None else "friction_coefficient"
-        warn_user(
-            f"{name}: {stress:g} Pa is {stress / mean:.2g} times the mean strength, {mean:.3g} Pa;"
-            " check the units (stress in Pa, friction_coefficient without unit)",
-            UnitWarning,
-        )
+    _check_unit(state, name, given[name] or 0.0, stress)
     with meter:
         if not likely[0] < stress < likely[1]:
             found = _certain(state, stress, likely)
-            return Answer.of(state, stress=stress, **found)
+            return Answer.of(state, stress=stress, quantity=name, **found)
         reason, pilot, least = "as requested", None, min(PILOT, max(budget // 5, 50))
         if algorithm == "auto" and (slow := too_slow(experiment, max_evaluations)):
             algorithm, reason = "plain", slow
@@ -194,7 +200,23 @@ def failure_probability(
                 stress=stress, reason=reason, pilot=pilot,
             )  # fmt: skip
             found = _by_tail(state, stress, tail, target_cv)
-    return Answer.of(state, stress=stress, **found)
+    return Answer.of(state, stress=stress, quantity=name, **found)
+
+
+def _check_unit(state: LimitState, name: str, given: float, stress: float) -> None:
+    """Doubt a demand that is far off the mean strength, and refuse it a thousand times off."""
+    ratio, unit = (
+        stress / state.experiment.mean_strength,
+        f" {CURVE[name].units}".removesuffix(" 1"),
+    )
+    least = 0.0 if stress <= max(state.bounds[0], 0.0) else DOUBTFUL
+    if ratio > 0.0:
+        doubt_unit(
+            f"{name}: {given:g}{unit} is {ratio:.2g} times the mean strength,"
+            f" {given / ratio:.3g}{unit}; check the units (stress in Pa, force in N,"
+            " friction_coefficient without unit)",
+            ratio, usual=(least, 1.0 / DOUBTFUL), possible=(1e-3, 1e3),
+        )  # fmt: skip
 
 
 def _certain(state: LimitState, stress: float, likely: tuple[float, float]) -> dict[str, Any]:
@@ -395,6 +417,7 @@ def design_stress(
     return Answer.of(
         state, stress=stress, probability=probability, cv=cv, interval=interval,
         members=members_of(state, tail, stress), of_stress=True, doubts=doubts,
+        quantity="stress" if problem.area is None else "force",
         **tail.attributes,
     )  # fmt: skip
 

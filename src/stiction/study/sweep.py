@@ -35,6 +35,7 @@ _UNITS = {name: variable.units for name, variable in PROFILES.items()} | {
     "youngs_modulus": "Pa",
     "density": "kg m-3",
     "loading_rate": "Pa s-1",
+    "pressing_force": "N",
     "end_time": "s",
 }
 _OF_THE_FIELD = ("mean", "low", "high", "loc", "scale", "noise")
