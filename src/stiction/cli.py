@@ -385,6 +385,10 @@ def onset(
     x_unit: Annotated[str | None, Option(help="Unit of x in PROFILE, such as mm.")] = None,
     value: Annotated[str | None, Option(help="Column of the values: name or number.")] = None,
     x: Annotated[str | None, Option(help="Column of x: name, or number from 0.")] = None,
+    quantity: Annotated[
+        Literal["strength", "friction_coefficient"],
+        Option(help="What PROFILE holds; coefficients need a normal pressure."),
+    ] = "strength",
     interpolate: Annotated[bool, Option("--interpolate", help="Interpolate to nodes.")] = False,
     gaps: Annotated[Literal["refuse", "fill"], Option(help="Missing values.")] = "refuse",
 ) -> None:
@@ -410,7 +414,7 @@ def onset(
         raise InputError([unknown_name("--method", name, METHODS) for name in unknown])
     profile = read_profile(
         strength, interface=problem.interface, unit=unit, x_unit=x_unit, interpolate=interpolate,
-        gaps=gaps, value=_column(value), x=_column(x),
+        gaps=gaps, value=_column(value), x=_column(x), quantity=quantity,
     )  # fmt: skip
     # Each method refuses, and warns, for itself.
     problem.sample(profile, accept=("barriers", "overstress", "constant"))

@@ -233,7 +233,9 @@ def onset(
         ..., "residual_strength": ...}``, which replace the problem's own; see
         `Problem.sample`. In a DataArray or Dataset, the dimension 'x' runs along the
         interface (on a plane 'x' and 'y'), its coordinate (m) gives the position of each
-        value, and stated `units` are converted; see `stiction.read_profile`.
+        value, and stated `units` are converted; see `stiction.read_profile`. A DataArray in the
+        unit 1, or the name 'friction_coefficient', holds friction coefficients, which times the
+        normal pressure are the strength.
     method : LocalCriterion, Equilibrium or Rupture
         The method; there is no default.
     gaps : {"refuse", "fill"}

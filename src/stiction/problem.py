@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Collection, Mapping
 from functools import reduce
 from typing import Any, NamedTuple
@@ -26,19 +27,23 @@ from stiction.interface import Interface
 from stiction.load import Load, LoadShape
 from stiction.model import Mode, as_numbers, describe, is_unplaced, model
 from stiction.profiles.placing import Gaps, turned
-from stiction.profiles.reading import at_nodes
+from stiction.profiles.reading import at_nodes, is_coefficient
 from stiction.solid import Solid
 from stiction.specimen import Blocks
-from stiction.variables import PROFILES
+from stiction.units import Doubt, doubt_units, in_words
+from stiction.variables import PROFILES, QUANTITIES
 
 FEWEST_NODES = 4
 """Nodes in a nucleation length."""
 LARGEST = 1e100
 """Of a profile, in SI units; sums and products of larger numbers overflow."""
-RIGIDITY = (1e-8, 1.0)
-"""Strength over shear modulus; steel (8e10 Pa) under 10 kPa at a coefficient of 0.1 has 1e-8."""
-FRICTION = (1e-3, 10.0)
+RIGIDITY = (1e-8, 1.0), (0.0, math.inf)
+"""Strength over shear modulus that is usual, and what is possible; steel (8e10 Pa) under 10 kPa at
+a coefficient of 0.1 has 1e-8."""
+FRICTION = (1e-3, 10.0), (1e-4, 100.0)
 """Mean strength over normal pressure, from superlubricity to adhesive gels."""
+SLIP = (1e-8, math.inf), (1e-10, math.inf)
+"""Slip over which strength falls, m; an atom measures 1e-10 m."""
 SHORT = 4.0
 """Nucleation lengths: on shorter lines free ends change the mean onset by more than about 1 %."""
 SOFTEST = 1e-4
@@ -324,27 +329,62 @@ class Problem:
             )
 
     def warn_of_units(self, strength: float, residual: float = 0.0) -> None:
-        """Warn if mean peak and residual strengths (Pa) do not fit the rest of the problem."""
+        """Doubt mean peak and residual strengths (Pa) that do not fit the rest of the problem.
+
+        It is an `InputError` if they cannot, or if a normal pressure is rather a force.
+        """
         modulus, pressure = self.solid.shear_modulus, self.given_pressure
-        doubts = [("strength", strength, "shear modulus", modulus, RIGIDITY)]
+        compared = [("strength", strength, "shear modulus", modulus, RIGIDITY)]
+        rate, slip = self.friction.weakening_rate, math.inf
+        if rate is not None and (drop := self._mean_drop(strength)) > 0.0:
+            slip = drop / float(np.median(rate))
         if pressure is not None:
             mean = float(np.mean(pressure))
-            doubts.append(("strength", strength, "normal pressure", mean, FRICTION))
+            self._refuse_force(mean, strength / mean, slip)
+            compared.append(("strength", strength, "normal pressure", mean, FRICTION))
         if residual:
-            doubts.append(("residual_strength", residual, "shear modulus", modulus, RIGIDITY))
-        for name, mean, what, of, (least, most) in doubts:
-            if not least * of <= mean <= most * of:
-                warn_user(
-                    f"{name}: its mean, {mean:.4g} Pa, is {mean / of:.2g} of the {what}; check the"
-                    " units of both (all in Pa; coefficients are fractions, not percentages, and"
-                    " need of='friction_coefficient')",
-                    UnitWarning,
-                )
-                return
+            compared.append(("residual_strength", residual, "shear modulus", modulus, RIGIDITY))
+        doubts = [
+            Doubt(
+                f"{name}: its mean, {mean:.4g} Pa, is {mean / of:.2g} of the {what}; check the"
+                " units of both (all in Pa; coefficients are fractions, not percentages, and"
+                " need of='friction_coefficient')",
+                mean / of,
+                *limits,
+            )
+            for name, mean, what, of, limits in compared
+        ]
+        text = (
+            f"strength: its mean, {strength:.4g} Pa, falls within a slip of {slip:.2g} m, that of a"
+            " few atoms; check the units of strength or normal pressure (Pa) and weakening_rate"
+            " (Pa/m)"
+        )
+        if doubt_units([*doubts, Doubt(text, slip, *SLIP)]):
+            return
         if self.friction.weakening_rate is None:  # otherwise warned of with the problem
             scale, value = self.friction.scale
             rate = self.friction.rate(np.array(strength - residual), scale, np.median(value))
             self._warn_if_short(max(float(rate), 1e-300))
+
+    def _mean_drop(self, strength: float) -> float:
+        """Return how far a strength falls, Pa."""
+        return strength - float(np.mean(self.friction.residual(np.array(strength))))
+
+    def _refuse_force(self, pressure: float, coefficient: float, slip: float) -> None:
+        """Refuse a normal pressure that makes sense only if it is a force, N, on a known area."""
+        if self.area is None or self.load.normal_pressure is None:
+            return
+        meant, (least, most) = pressure / self.area, FRICTION[0]
+        if coefficient > most:  # of a strength in Pa
+            fits = least <= coefficient * self.area <= most
+        else:  # of coefficients, with which the slip grows
+            fits = slip < SLIP[0][0] <= slip / self.area
+        if fits:
+            raise InputError(
+                f"load.normal_pressure: {pressure:.4g} Pa is too low for this strength; if it is a"
+                f" force, {pressure:.4g} N over {self.area:.3g} m2 are {in_words('Pa', meant)}:"
+                f" give Load(pressing_force={pressure:g})"
+            )
 
     @property
     def blocks(self) -> Driven:
@@ -494,7 +534,8 @@ class Problem:
             name: 'strength' and any others of `PROFILES`, but only one of 'weakening_rate',
             'critical_slip' and 'fracture_energy'. They replace the problem's own; all but the
             strength may also be (samples, 1) or a number: of 'normal_pressure' the mean, which
-            glued blocks distribute.
+            glued blocks distribute. A 'friction_coefficient' in the place of the strength, or a
+            DataArray that states the unit 1, is multiplied by the pressure.
         accept : collection of {"barriers", "overstress", "constant"}
             What the method accepts: infinite strength where nothing breaks; initial stress
             above the strength; nodes that do not weaken, of which the caller has warned.
@@ -531,7 +572,8 @@ class Problem:
                 )
             return profiles, True
         given = named_profiles(profiles)
-        if "strength" not in given:
+        of = "strength" if "strength" in given else "friction_coefficient"
+        if of not in given:
             raise InputError("strength: missing among the profiles")
         problems: list[str] = []
         measured = [np.ones((1, *interface.shape), dtype=bool)]
@@ -548,19 +590,22 @@ class Problem:
                     return _rows(name, value, interface, samples, "barriers" in accept)
             except InputError as error:
                 problems.extend(error.problems)
-                return np.ones(1)
+                return np.ones((samples or 1, *interface.shape))
 
-        strength = read("strength", None, None)
+        strength = read(of, None, None)
         samples = len(strength)
-        residual = friction.residual(np.where(np.isinf(strength), 0.0, strength))
-        residual = read("residual_strength", residual, samples)
-        initial = read("initial_stress", self.load.initial_stress, samples)
         pressure = np.broadcast_to(np.nan, (samples, *interface.shape))
         if self.given_pressure is not None or "normal_pressure" in given:
             pressure = read("normal_pressure", self.normal_pressure, samples)
             own = np.shape(given.get("normal_pressure", pressure))
             if own in ((), (samples, 1)):  # that of each sample, which its blocks distribute
                 pressure = pressure * self.pressing
+        if of != "strength":
+            problems += _no_coefficients(strength, pressure)
+            strength = strength * pressure
+        residual = friction.residual(np.where(np.isinf(strength), 0.0, strength))
+        residual = read("residual_strength", residual, samples)
+        initial = read("initial_stress", self.load.initial_stress, samples)
         scale, value = friction.scale
         scale = scales[0] if scales else scale
         value = read(scale, value, samples)
@@ -652,7 +697,7 @@ def _rows(
         entry = tuple(np.argwhere(bad)[0].tolist())
         given = f"{array[entry]:g} (at most {LARGEST:g})"
         raise InputError(f"must be finite; entry {entry} is {given}")
-    least = f"{array.min():g} {PROFILES[name].units}"
+    least = f"{array.min():g} {QUANTITIES[name].units}"
     if name in SCALES and array.min() <= 0.0:
         raise InputError(f"must be positive, got {least}")
     if name == "residual_strength" and array.min() < 0.0:
@@ -662,18 +707,36 @@ def _rows(
     return np.broadcast_to(array, (samples, *shape))
 
 
-def named_profiles(given: Any) -> dict[str, Any]:
-    """Return profiles by name: of a mapping or dataset, or of the strength alone."""
-    if isinstance(given, Mapping):  # a Dataset is one too
-        unknown = [
-            unknown_name("profiles", str(name), PROFILES)
-            for name in given
-            if name not in PROFILES
+def _no_coefficients(values: Array, pressure: Array) -> list[str]:
+    """Return why values are no friction coefficients, or what they lack."""
+    if np.isnan(pressure).all():
+        return [
+            "friction_coefficient: needs a normal pressure (load.normal_pressure, Pa, or"
+            " load.pressing_force, N)"
         ]
-        if unknown and not hasattr(given, "data_vars"):
-            raise InputError(unknown)
-        return {name: given[name] for name in given if name in PROFILES}
-    return {"strength": given}
+    mean = float(np.mean(values))
+    large = (
+        f"friction_coefficient: its mean is {mean:.3g}; if that is a strength, state its unit,"
+    )
+    return [f"{large} as .assign_attrs(units='Pa') does"] * (mean >= FRICTION[1][1])
+
+
+def named_profiles(given: Any) -> dict[str, Any]:
+    """Return profiles by name: of a mapping or dataset, or of the strength alone.
+
+    The strength may be given as friction coefficients: by this name, or by the unit that it states.
+    """
+    if not isinstance(given, Mapping):  # a Dataset is one too
+        return {"friction_coefficient" if is_coefficient(given) else "strength": given}
+    known = (*PROFILES, "friction_coefficient")
+    unknown = [
+        unknown_name("profiles", str(name), known) for name in given if name not in known
+    ]
+    if "strength" in given and "friction_coefficient" in given:
+        unknown.append("profiles: give either strength (Pa) or friction_coefficient (1)")
+    if unknown and not hasattr(given, "data_vars"):
+        raise InputError(unknown)
+    return {name: given[name] for name in given if name in known}
 
 
 def refusals(problem: Problem, method: Any) -> list[str]:

@@ -1,6 +1,7 @@
 """Units that measured data state, and their factors to SI: nothing is converted by guessing."""
 
 import re
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -122,11 +123,23 @@ def in_words(units: str, value: float, digits: int = 3) -> str:
     return f"{value * factor:.{digits}g} {unit}".rstrip()
 
 
-def doubt_unit(
-    text: str, ratio: float, *, usual: tuple[float, float], possible: tuple[float, float]
-) -> None:
-    """Warn of a value whose ratio to another is not usual; refuse it if it is not possible."""
-    if not possible[0] < ratio < possible[1]:
-        raise InputError(text)
-    if not usual[0] <= ratio <= usual[1]:
-        warn_user(text, UnitWarning)
+class Doubt(NamedTuple):
+    """A ratio of two values that shows whether both are in the units assumed."""
+
+    text: str
+    ratio: float
+    usual: tuple[float, float]
+    possible: tuple[float, float]
+
+
+def doubt_units(doubts: Iterable[Doubt]) -> bool:
+    """Warn of the first ratio that is not usual, and return whether there is one.
+
+    If one is not possible, all that are not usual are an `InputError`.
+    """
+    unusual = [one for one in doubts if not one.usual[0] <= one.ratio <= one.usual[1]]
+    if any(not one.possible[0] <= one.ratio <= one.possible[1] for one in unusual):
+        raise InputError(one.text for one in unusual)
+    if unusual:
+        warn_user(unusual[0].text, UnitWarning)
+    return bool(unusual)

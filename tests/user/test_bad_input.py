@@ -407,9 +407,12 @@ DOUBTS = {
     "shear wave speed is 0.02924 m/s, which no solid has": lambda: st.Solid(1.0, 0.33, 1170.0),
     "fills the interface": lambda: scaled(critical_slip=2.0).warn_of_units(1e6),
     "is 1e.03 of the shear modulus": lambda: scaled(critical_slip=2.0).warn_of_units(1e12),
-    "its mean, 1 Pa, is 1e-09 of the shear modulus":
-        lambda: st.onset(PROBLEM, np.ones(256), method=LOCAL),
-    "2e-06 of the normal pressure": lambda: scaled(pressure=5e11).warn_of_units(1e6),
+    "its mean, 6 Pa, is 6e-09 of the shear modulus":
+        lambda: st.onset(scaled(weakening_rate=2e9, length=10.0), np.full(256, 6.0), method=LOCAL),
+    "0.0002 of the normal pressure": lambda: scaled(pressure=5e9).warn_of_units(1e6),
+    "1e.06 Pa, falls within a slip of 5e.09 m": lambda: scaled(
+        length=4e-4, weakening_rate=2e14
+    ).warn_of_units(1e6),
     "percentages": lambda: scaled(pressure=5e4).warn_of_units(1e6),
     "for 2 % give 0.02": lambda: st.Lognormal(mean=1e6, cv=2),
     "each sample is uniform; check its unit": lambda: monte_carlo(
@@ -419,10 +422,30 @@ DOUBTS = {
         scaled(pressure=2e6), FIELD, friction_coefficient=40, method=LOCAL
     ),
     "residual_strength: its mean, 0.45 Pa": lambda: PROBLEM.warn_of_units(1e6, 0.45),
-    "of the shear modulus": lambda: monte_carlo(
+}  # fmt: skip
+
+
+LAID = dataclasses.replace(
+    make_problem(residual_ratio=0.7, load=st.Load(normal_pressure=4000.0)),
+    interface=dataclasses.replace(LINE, width=0.006),
+)
+test_a_unit_that_cannot_be_is_refused = refusals({
+    "2e-06 of the normal pressure": lambda: scaled(pressure=5e11).warn_of_units(1e6),
+    "2.5e+02 of the normal pressure": lambda: scaled(pressure=4000.0).warn_of_units(1e6),
+    "30 Pa, falls within a slip of 6e-11 m": lambda: PROBLEM.warn_of_units(30.0),
+    "0.4 Pa, is 4e-10 of the shear modulus ... need of='friction_coefficient'": lambda: monte_carlo(
         random=st.RandomField(scipy.stats.uniform(0.3, 0.2), FIELD.spectrum)
     ),
-}  # fmt: skip
+    # A pressing force, N: of a strength in Pa, and of coefficients.
+    "load.normal_pressure: 4000 Pa ... N over 0.0006 m2 are 6.67 MPa ... pressing_force=4000":
+        lambda: local_onset(LAID, np.full(256, 0.9e6)),
+    "give Load(pressing_force=4000)": lambda: monte_carlo(
+        problem=LAID,
+        random=st.RandomField(
+            st.Gamma(mean=0.6, cv=0.1), FIELD.spectrum, of="friction_coefficient"
+        ),
+    ),
+})  # fmt: skip
 
 
 @pytest.mark.parametrize("words", DOUBTS)

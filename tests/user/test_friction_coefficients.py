@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 from refusals import refusals
-from setups import make_problem
+from setups import beta_strength, make_problem
 
 import stiction as st
 
@@ -73,6 +73,7 @@ test_what_is_contradicting_or_missing_is_refused = refusals({
     "force: 1.2 N is 0.0004 times the mean strength, 3e+03 N; check the units":
         lambda: counted(LAP, COEFFICIENT, force=1.2),
     "stress: 0.4 Pa": lambda: counted(PRESSED, STRENGTH, 0.4),
+    "stress: 700 Pa": lambda: counted(PRESSED, beta_strength(2e-3), 700.0),  # below its bound
     "another pressure; give Load(normal_pressure=...)":
         lambda: st.infer(
             LAP, COEFFICIENT, {0.2: [0.4, 0.41, 0.42]}, unit="1", method=LOCAL,

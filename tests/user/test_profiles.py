@@ -224,6 +224,7 @@ def test_a_spreadsheet_as_it_comes(tmp_path, monkeypatch):
 def test_heights_without_a_unit_are_not_metres_in_silence(tmp_path, ending):
     """Of a matrix, which as text has its rows along x, as the array has."""
     path, heights = tmp_path / f"h.{ending}", 1e-3 * np.cos(np.arange(96.0)).reshape(12, 8)
+    heights[5, 3] = np.nan
     np.save(path, heights) if ending == "npy" else np.savetxt(path, heights)
     with pytest.warns(
         st.UnitWarning, match=r"height: has no unit, .* over 0.00\d+ m; give unit=.um"
@@ -243,6 +244,50 @@ def test_heights_without_a_unit_are_not_metres_in_silence(tmp_path, ending):
     refuses(
         "swapped", lambda: st.read_profile(path, interface=plane, quantity="height", unit="um")
     )
+
+
+COEFFICIENTS = {  # as a laboratory exports them, and the scale of x
+    "Weg [mm];Reibzahl [-]": (MM, 1.0),
+    "Reibzahl [1];Weg [mm]": (MM, 1.0),
+    "x;COF (dimensionless)": (1.0, 1.0),
+    "Weg;mu\nmm;-": (MM, 1.0),
+    "x (mm);Reibzahl [%]": (MM, 100.0),
+}
+
+
+@pytest.mark.parametrize("head", COEFFICIENTS)
+def test_coefficients_are_known_by_their_unit(tmp_path, head):
+    """And times the pressure they are the strength: 2 MPa, and more in the middle."""
+    x_scale, scale = COEFFICIENTS[head]
+    columns = [X * x_scale, scale * STRENGTH / 2e6]
+    path = tmp_path / "p.csv"
+    path.write_text(text_of(columns[::-1] if head.startswith("Reib") else columns, head=head))
+    with warnings.catch_warnings(action="error"):
+        mu = st.read_profile(path, quantity="friction_coefficient")
+    np.testing.assert_allclose(mu, STRENGTH / 2e6, rtol=1e-9)
+    np.testing.assert_allclose(mu.x, X, atol=1e-12)
+    refuses(
+        "no variable that is clearly the strength ... quantity='friction_coefficient'",
+        lambda: st.read_profile(path),
+    )
+    pressure = 2e6 + 3e5 * np.cos(2.0 * np.pi * X / 0.1)
+    pressed = dataclasses.replace(SYSTEM, load=st.Load(normal_pressure=pressure))
+    expected = onset(mu.values * pressure, pressed)
+    rows = {"residual_strength": 2e4}
+    for given in (mu, mu[::-1], {"friction_coefficient": mu.values}):
+        assert onset(given, pressed).equals(expected)
+    expected = onset({"strength": mu.values * pressure, **rows}, pressed)
+    assert onset({"friction_coefficient": mu, **rows}, pressed).equals(expected)
+    # Their product with the pressure may have kept the unit of the coefficients.
+    product = (mu * pressure).assign_attrs(units="1")
+    law = st.LinearWeakening(weakening_rate=0.15e12, residual_ratio=0.1)
+    steep = dataclasses.replace(pressed, friction=law)
+    words = r"its mean is .*e\+06; if that is a strength"
+    with pytest.raises(st.InputError, match=words) as own:
+        onset(product, steep)
+    assert len(own.value.problems) == 1
+    both = {"strength": STRENGTH, "friction_coefficient": mu}
+    refuses("either strength (Pa) or friction_coefficient", lambda: onset(both, pressed))
 
 
 @pytest.fixture
@@ -303,6 +348,21 @@ def test_heights_are_no_strength(tmp_path, head):
         st.read_profile(path, value=1, unit="um")
 
 
+def test_missing_values_are_no_headings(tmp_path):
+    """In the first row, below units; and of several comments the last one names the columns."""
+    for text, wanted in {
+        "strength [MPa]\n-\n0.7\n0.8\n": [np.nan, 7e5, 8e5],
+        "x [mm];strength [MPa];note\n10;-;-\n20;0.7;a\n30;nan;b\n": [np.nan, 7e5, np.nan],
+        "x [mm];strength [MPa]\n10;\n20;0.7\n": [np.nan, 7e5],
+        "# rig 4, 12 MPa\n# strength [MPa]\n0.6\n0.7\n": [6e5, 7e5],
+    }.items():
+        (tmp_path / "p.csv").write_text(text)
+        found = st.read_profile(tmp_path / "p.csv")
+        np.testing.assert_allclose(found, wanted, rtol=1e-14)
+        if "x [" in text:
+            np.testing.assert_allclose(found.x, 0.01 * (1 + np.arange(len(wanted))), rtol=1e-14)
+
+
 TEXTS = {
     "1,5\n2,6\n": "may be one number or two",
     "x;tau\n0;1e6\n0.05;strong\n": "line 3: 'strong' is not a number",
@@ -342,7 +402,9 @@ STRENGTHS = {
     "strength is in um, which cannot be converted to Pa": labelled(units="um"),
     "unknown unit 'mpa'; did you mean MPa?": labelled(units="mpa"),
     "unknown unit 'V'": labelled(units="V"),
-    "cannot be converted to Pa": labelled(units="1"),
+    "friction_coefficient: needs a normal pressure ... load.pressing_force": labelled(
+        units="1"
+    ),
     "unknown unit": labelled(units="m/s/s/"),
     "unknown unit 'MPa999'": labelled(units="MPa999"),
     # Names

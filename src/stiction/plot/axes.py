@@ -15,7 +15,7 @@ from stiction.model import check
 from stiction.plot.style import COLUMN, paper_style
 from stiction.problem import Problem
 from stiction.units import unit_for
-from stiction.variables import FRICTION_COEFFICIENT
+from stiction.variables import DIRECTION, FRICTION_COEFFICIENT
 
 
 def with_unit(name: str, unit: str) -> str:
@@ -86,11 +86,14 @@ def named(results: Any) -> dict[str, xr.Dataset]:
 
 
 def shown_quantity(result: xr.Dataset, quantity: str | None = None) -> str:
-    """Return what of an onset is drawn: the coefficient if there is a pressure, else the stress."""
+    """Return what of an onset is drawn: the force, else the coefficient, else the stress.
+
+    On a plane, whose area is always known, forces are drawn on request only.
+    """
     if quantity is None:
-        name = "friction_coefficient"
-        has_pressure = name in result and bool(np.isfinite(result[name]).any())
-        quantity = name if has_pressure else "critical_stress"
+        names = ["critical_force"] * (DIRECTION not in result.dims) + ["friction_coefficient"]
+        known = [name for name in names if name in result and np.isfinite(result[name]).any()]
+        quantity = (*known, "critical_stress")[0]
     need(result, quantity)
     return quantity
 

@@ -12,9 +12,10 @@ from stiction.model import check
 from stiction.plot.axes import add_friction_scale, on_axes, with_unit
 from stiction.plot.style import INK, PAGE, color, series
 from stiction.problem import Problem
+from stiction.profiles.reading import is_coefficient
 from stiction.random.fields import RandomField
 from stiction.units import unit_for
-from stiction.variables import PROFILES
+from stiction.variables import PROFILES, QUANTITIES
 
 MOST_LINES = 6
 
@@ -23,7 +24,7 @@ def field(
     where: Problem | Interface,
     profile: Any,
     *,
-    quantity: str = "strength",
+    quantity: str | None = None,
     ax: Axes | None = None,
 ) -> Axes:
     """Draw a profile or a partly measured field: lines along x, on a plane a map.
@@ -35,8 +36,9 @@ def field(
         Shape (nodes,) or (samples, nodes); the first six samples are drawn. On a plane,
         (nx, ny) or (samples, nx, ny); the first is drawn. For a field, its median, on a
         line its central 90 % band, and the measured values (`RandomField.given`) are drawn.
-    quantity : str
-        Name of the property, as `RandomInterface` uses it; 'strength' (Pa) by default.
+    quantity : str, optional
+        Name of the property, as `RandomInterface` uses it, or 'friction_coefficient'. By default
+        'friction_coefficient' of a field of such, or a DataArray in the unit 1, else 'strength'.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on; new ones by default.
 
@@ -59,11 +61,15 @@ def field(
     """
     check("where", where, Problem | Interface)
     interface = where.interface if isinstance(where, Problem) else where
-    if quantity not in PROFILES:
-        raise InputError(f"quantity: must be one of {', '.join(PROFILES)}, got {quantity!r}")
     of_field = isinstance(profile, RandomField)
+    if quantity is None:
+        pure = profile.of if of_field else is_coefficient(profile)
+        quantity = "friction_coefficient" if pure else "strength"
+    if quantity not in (known := (*PROFILES, "friction_coefficient")):
+        raise InputError(f"quantity: must be one of {', '.join(known)}, got {quantity!r}")
+    si = QUANTITIES[quantity].units
     rows = rows_of(interface, profile.quantile(interface, 0.5) if of_field else profile)
-    factor, unit = unit_for(PROFILES[quantity].units, rows)
+    factor, unit = unit_for(si, rows)
     text = with_unit(quantity.replace("_", " "), unit)
     scale, _ = unit_for("m", interface.lengths)
     conditions = profile.conditions if of_field else None
@@ -85,7 +91,7 @@ def field(
             place, values = scale * conditions.places[0], conditions.values * factor
             axes.plot(place, values, ".", color=color(1), markersize=3.0)
         name_line(axes, interface, text)
-        if isinstance(where, Problem) and PROFILES[quantity].units == "Pa":
+        if isinstance(where, Problem) and si == "Pa":
             add_friction_scale(axes, where, "y", factor)
     return axes
 

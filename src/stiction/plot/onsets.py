@@ -27,6 +27,7 @@ from stiction.plot.fields import draw_map, draw_outline, map_height, name_line, 
 from stiction.plot.style import ACCENT, PAGE, PALE, QUIET, color, series
 from stiction.problem import Problem
 from stiction.profiles.placing import IN_GAP, MEASURED
+from stiction.profiles.reading import is_coefficient
 from stiction.units import unit_for
 
 Array = NDArray[np.float64]
@@ -50,6 +51,7 @@ def onset(
         with ``slip=True`` and ``sensitivity=True``, the slipping patches at the onset.
     strength : array
         tau_p, Pa, of shape (nodes,) or (samples, nodes); on a plane (nx, ny) or (samples, nx, ny).
+        A DataArray of friction coefficients (unit 1) is multiplied by the normal pressure.
     problem : Problem, optional
         Needed only if the result does not hold it.
     sample : int
@@ -81,6 +83,8 @@ def onset(
         need(one, "critical_load", "critical_position")
     problem = problem_of(next(iter(results.values())), problem)
     rows = rows_of(problem.interface, strength)
+    if is_coefficient(strength) and problem.given_pressure is not None:
+        rows = rows * problem.normal_pressure
     counts = {rows.shape[0], *(one.sizes["sample"] for one in results.values())}
     if len(counts) > 1 or not 0 <= sample < min(counts):
         raise InputError(

@@ -174,6 +174,11 @@ def is_labelled(value: Any) -> bool:
     return hasattr(value, "dims") and hasattr(value, "coords")
 
 
+def is_coefficient(value: Any) -> bool:
+    """Whether a labelled array states that it holds pure numbers: friction coefficients."""
+    return is_labelled(value) and is_in(_unit_of(value), "1")
+
+
 def simplified(value: Any, quantity: str) -> Any:
     """Return `value` as labelled, a pandas Series over positions too, or as numbers in SI."""
     si = QUANTITIES[quantity].units
@@ -257,8 +262,8 @@ def labelled(
     if len(dims) == 2:
         places = {_plain(name): name for name in along if _plain(name) in dims}
     else:
-        name = _choose(data, [name for name in along if name in data.dims], PLACES, "1")
-        name = name or _choose(data, along, PLACES, "m" if table and si != "m" else "1")
+        name = _choose(data, [name for name in along if name in data.dims], PLACES)
+        name = name or _choose(data, along, PLACES, "m" if table and si != "m" else "")
         if name is None and table and len(names) == 2 and _plain(names[0]) not in words:
             name = names[0] if names[0] != chosen else None
         places = {} if name is None else {"x": name}
@@ -318,15 +323,12 @@ def _is_map(data: Any) -> bool:
     return both and np.unique(columns["x"]).size < columns["x"].size
 
 
-def _choose(data: Any, names: list[Any], called: tuple[str, ...], si: str) -> Any:
-    """Return the variable with one of several names, or else the only one in a unit, or None.
-
-    Any number is dimensionless: such a quantity is not recognised by its unit.
-    """
+def _choose(data: Any, names: list[Any], called: tuple[str, ...], si: str = "") -> Any:
+    """Return the variable with one of several names, or else the only one that states a unit."""
     for word in called:
         if found := [name for name in names if _plain(name) == word]:
             return found[0]
-    fitting = [name for name in names if si != "1" and is_in(_unit_of(data[name]), si)]
+    fitting = [name for name in names if is_in(_unit_of(data[name]), si)]
     return fitting[0] if len(fitting) == 1 else None
 
 
@@ -350,7 +352,11 @@ def _unclear(data: Any, names: list[Any], quantity: str, dims: tuple[str, ...]) 
     return (
         f"holds no variable that is clearly the {quantity} ({QUANTITIES[quantity].units}): got"
         f" {listed}. Call it {quantity!r}, state its unit, or give x=..., value=... and unit=..."
-        + "; heights are read with quantity='height'" * (quantity == "strength")
+        + (
+            "; heights are read with quantity='height', friction coefficients with"
+            " quantity='friction_coefficient'"
+        )
+        * (quantity == "strength")
         + OF_A_PLANE * (len(data.data_vars) != 2)
     )
 

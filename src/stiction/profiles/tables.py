@@ -98,6 +98,8 @@ def read_table(path: Path) -> xr.Dataset:
     header: list[tuple[int, list[str]]] = []
     numeric = [_number(cell, separator) is not None for cell in rows[-1][1]] if rows else []
     while rows and _is_heading(rows[0][1], numeric, separator):
+        if header and _states(header[-1][1]) and _is_gap(rows[0][1]):
+            break  # below units: a row of missing values
         header.append(rows.pop(0))
     while header and _has_number(header[-1][1], separator):  # refused below
         rows.insert(0, header.pop())
@@ -165,6 +167,11 @@ def _is_heading(cells: list[str], numeric: list[bool], separator: str) -> bool:
         n and c.lower() not in _EMPTY and _number(c, separator) is None for c, n in pairs
     )
     return text or not _has_number(cells, separator)
+
+
+def _is_gap(cells: list[str]) -> bool:
+    """Whether a row says that its values are missing, as '-' or 'nan' do."""
+    return any(cells) and all(cell.lower() in _EMPTY for cell in cells)
 
 
 def _has_number(cells: list[str], separator: str = "") -> bool:

@@ -38,6 +38,7 @@ from stiction.random.marginals import AnyMarginal
 from stiction.random.modes import Modes, make_modes
 from stiction.random.spectra import Share, Spectrum, lag_of_correlation
 from stiction.random.synthesis import BLOCK, Stream, block_of
+from stiction.units import is_in
 from stiction.variables import PROFILES
 
 NAMES = tuple(PROFILES)
@@ -144,6 +145,12 @@ class RandomField:
         """
         if self.conditions is not None:
             raise InputError("profile: the field already has one; join both into one")
+        stated = str(getattr(profile, "attrs", {}).get("units") or "")
+        if stated and is_in(stated, "1") != (self.of is not None):
+            raise InputError(
+                f"profile: is in the unit {stated}; one of friction coefficients conditions a field"
+                " with of='friction_coefficient', and no other does"
+            )
         known: Any = {"profile": profile, "noise": noise}
         return dataclasses.replace(self, conditions=known)
 

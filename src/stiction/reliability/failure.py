@@ -33,7 +33,7 @@ from stiction.reliability.counting import count_failures
 from stiction.reliability.tail import Tail, sample_tail
 from stiction.reliability.uncertainty import generator, lognormal_interval
 from stiction.results import along, study_attributes, to_dataset
-from stiction.units import doubt_unit
+from stiction.units import Doubt, doubt_units
 from stiction.variables import ONSET_VARIABLES, PROFILES, Variable
 
 PILOT = 1_000
@@ -46,6 +46,8 @@ NEGLIGIBLE = 1e-15
 """Probability of failing, or of holding, below which no sample is drawn."""
 DOUBTFUL = 0.02
 """Share of the mean strength below which a stress is probably in another unit."""
+THOUSAND = 1e3
+"""Factor off the mean strength from which on a stress is in another unit: kN for N, MPa for Pa."""
 SHOWN = 20
 """Failing profiles kept."""
 CHECKED = 32
@@ -205,18 +207,17 @@ def failure_probability(
 
 def _check_unit(state: LimitState, name: str, given: float, stress: float) -> None:
     """Doubt a demand that is far off the mean strength, and refuse it a thousand times off."""
-    ratio, unit = (
-        stress / state.experiment.mean_strength,
-        f" {CURVE[name].units}".removesuffix(" 1"),
-    )
-    least = 0.0 if stress <= max(state.bounds[0], 0.0) else DOUBTFUL
+    ratio = stress / state.experiment.mean_strength
+    unit = f" {CURVE[name].units}".removesuffix(" 1")
+    possible = 1.0 / THOUSAND, THOUSAND
+    least = possible[0] if stress <= state.bounds[0] else DOUBTFUL
     if ratio > 0.0:
-        doubt_unit(
+        text = (
             f"{name}: {given:g}{unit} is {ratio:.2g} times the mean strength,"
             f" {given / ratio:.3g}{unit}; check the units (stress in Pa, force in N,"
-            " friction_coefficient without unit)",
-            ratio, usual=(least, 1.0 / DOUBTFUL), possible=(1e-3, 1e3),
-        )  # fmt: skip
+            " friction_coefficient without unit)"
+        )
+        doubt_units([Doubt(text, ratio, (least, 1.0 / DOUBTFUL), possible)])
 
 
 def _certain(state: LimitState, stress: float, likely: tuple[float, float]) -> dict[str, Any]:
