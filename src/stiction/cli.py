@@ -61,6 +61,8 @@ def echo(text: Any = "", *, err: bool = False) -> None:
 
 def in_options(text: str, command: Callable[..., Any]) -> str:
     """Return a message in the words of a command: ``--gaps fill`` for ``gaps="fill"``."""
+    methods = r"(?:\bmethod=)?st\.(LocalCriterion|Equilibrium|Rupture)\([^)]*\)"
+    text = re.sub(methods, _method, text)
     for name, parameter in inspect.signature(command, eval_str=True).parameters.items():
         extras = getattr(parameter.annotation, "__metadata__", ())
         if any(isinstance(extra, OptionInfo) for extra in extras):
@@ -69,7 +71,7 @@ def in_options(text: str, command: Callable[..., Any]) -> str:
             value = r"[\"']?([^\s\"',;)]*)[\"']?(?: to st\.\w+(?: or st\.\w+)*)?"
             text = re.sub(rf"{argument}={value}", rf"{option} \1", text)
             text = re.sub(rf"^{name}(?=:| must)", option, text)
-    return re.sub(r"st\.(LocalCriterion|Equilibrium|Rupture)\([^)]*\)", _method, text)
+    return text
 
 
 def _method(match: re.Match[str]) -> str:
@@ -504,14 +506,28 @@ def _summary(result: Any) -> str:
 
 def reliability(
     study: StudyFile,
-    out: Annotated[Path, Option(metavar="RUN", help="Folder in which repetitions are stored.")],
+    force: Annotated[float | None, Option(help="Shear force to carry, N.")] = None,
+    stress: Annotated[float | None, Option(help="Mean shear stress to carry, Pa.")] = None,
+    friction_coefficient: Annotated[
+        float | None, Option(help="Shear stress over normal pressure to carry.")
+    ] = None,
+    probability: Annotated[float | None, Option(help="Probability of a design.")] = None,
+    out: Annotated[
+        Path | None,
+        Option(metavar="RUN", help="Compute the curve; repetitions are stored in this folder."),
+    ] = None,
     smallest: Annotated[float, Option(help="Smallest probability of the curve.")] = 1e-9,
     repetitions: Annotated[int, Option(help="Independent repetitions.", min=1)] = 8,
     workers: Workers = None,
     scheduler: Scheduler = None,
     part: Part = None,
 ) -> None:
-    """Compute the failure probability of a study's interface, decade by decade.
+    """Compute how likely a study's interface is to slide below a demand, or its design.
+
+    One line answers at each point of the sweep: to `--force`, `--stress` or
+    `--friction-coefficient` with a probability, to `--probability` with the design; without an
+    option, to the table [reliability] of the study. With `--out` it is the whole curve, decade by
+    decade.
 
     Problem, strength, method, seed and sweep come from the study file; its number of samples is
     not used. The stress is the mean shear stress on the interface; failure means that the
@@ -524,6 +540,23 @@ def reliability(
     from stiction.study.study import Study, open_run
 
     loaded = Study.from_toml(study)
+    options = {
+        "force": force, "stress": stress, "friction_coefficient": friction_coefficient,
+        "probability": probability,
+    }  # fmt: skip
+    asked = {name: one for name, one in options.items() if one is not None}
+    if out is None:
+        needs = [name for name, one in (("part", part), ("scheduler", scheduler)) if one]
+        if needs:
+            raise InputError(
+                [f"--{name}: shares the work of a curve; give --out" for name in needs]
+            )
+        _answer(loaded, asked, workers)
+        return
+    if asked:
+        raise InputError(
+            f"--out: is for the whole curve; leave out {' and '.join(asked)}, or --out"
+        )
     with _resumable(out), _executor(scheduler) as executor:
         curve = loaded.failure_curve(
             out=out, repetitions=repetitions, smallest=smallest, workers=workers,
@@ -540,6 +573,28 @@ def reliability(
     echo(
         f"part {part}: " * bool(part) + f"{state.done} of {state.samples} repetitions in {out}"
     )
+
+
+def _answer(study: Any, asked: dict[str, float], workers: int | None) -> None:
+    """Print the answer to what was asked, or else to the question of the study, at each point."""
+    from stiction.study.question import Question
+
+    question = study.reliability
+    if asked:
+        given = {} if question is None else {"target_cv": question.target_cv}
+        try:
+            question = Question(**given, **asked)
+        except InputError as error:
+            texts = (text.partition("Question")[2].lstrip(".: ") for text in error.problems)
+            raise InputError(texts) from None
+    if question is None:
+        raise InputError(
+            "--out: give the folder of a curve, or ask for one answer with --force, --stress,"
+            " --friction-coefficient or --probability, or in the table [reliability] of the study"
+        )
+    for point, experiment in zip(study.points, study.experiments, strict=True):
+        where = f"{point}: " if point.values else ""
+        echo(f"{where}{question.answer(experiment, workers)}")
 
 
 # -- the program ---------------------------------------------------------------------------------

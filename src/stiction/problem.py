@@ -53,8 +53,8 @@ FLATTEST, HIGHEST = 0.025, 10.0
 AT_END = {"II": 0.445 / 1.158, "III": 0.5}
 """Nucleation length at a free end as a share of that in the middle."""
 NO_AREA = (
-    "a force needs the area of the interface: give specimen=st.Blocks(thickness=...), or"
-    " st.Interface(width=...) of a line (m)"
+    "a force needs the area of the interface: give the thickness of the specimen, or"
+    " interface.width of a line (m)"
 )
 """What to do with a force where the area is unknown."""
 BARRIER = 10.0
@@ -383,7 +383,7 @@ class Problem:
             raise InputError(
                 f"load.normal_pressure: {pressure:.4g} Pa is too low for this strength; if it is a"
                 f" force, {pressure:.4g} N over {self.area:.3g} m2 are {in_words('Pa', meant)}:"
-                f" give Load(pressing_force={pressure:g})"
+                f" give load.pressing_force = {pressure:g}"
             )
 
     @property

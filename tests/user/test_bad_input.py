@@ -437,9 +437,9 @@ test_a_unit_that_cannot_be_is_refused = refusals({
         random=st.RandomField(scipy.stats.uniform(0.3, 0.2), FIELD.spectrum)
     ),
     # A pressing force, N: of a strength in Pa, and of coefficients.
-    "load.normal_pressure: 4000 Pa ... N over 0.0006 m2 are 6.67 MPa ... pressing_force=4000":
+    "load.normal_pressure: 4000 Pa ... over 0.0006 m2 are 6.67 MPa ... pressing_force = 4000":
         lambda: local_onset(LAID, np.full(256, 0.9e6)),
-    "give Load(pressing_force=4000)": lambda: monte_carlo(
+    "give load.pressing_force = 4000": lambda: monte_carlo(
         problem=LAID,
         random=st.RandomField(
             st.Gamma(mean=0.6, cv=0.1), FIELD.spectrum, of="friction_coefficient"

@@ -218,6 +218,47 @@ def test_onset_of_ones_own_profile(runs, study):
     runs(OWN, "problem: missing", "unknown 'randon'; did you mean 'random'?", code=2)
 
 
+def test_coefficients_of_ones_own_are_a_strength(runs):
+    """From a heading in another language; the pressure is that of the study, 5 MPa."""
+    table = np.column_stack([LOADED.problem.interface.x * 1e3, PROFILE / 5e6])
+    np.savetxt("p.csv", table, delimiter=";", header="Weg [mm];Reibzahl [-]", comments="")
+    own = OWN.replace("npy", "csv")
+    runs(own, "--quantity friction_coefficient", code=2)
+    assert runs(f"{own} --quantity friction_coefficient") == runs(OWN)
+
+
+def test_one_line_answers_at_each_point(runs, study):
+    """By options, or by the study's own question, whose runs are the same without it."""
+    text = TEXT.replace("nodes = 256", "nodes = 256\nwidth = 0.006")
+    study.write_text(f"{text}\n[reliability]\nforce = 420.0\ntarget_cv = 0.4\n")
+    loaded = st.Study.from_toml(study)
+    assert st.Study.from_dict(loaded.to_dict()) == loaded
+    point, area = loaded.experiments[2], 6e-4
+    given = {"method": point.method, "target_cv": 0.4, "seed": 3}
+    wanted = {
+        "": st.failure_probability(point.problem, point.given, force=420.0, **given),
+        "--probability 0.02": st.design_stress(
+            point.problem, point.given, probability=0.02, **given
+        ),
+        "--friction-coefficient 0.14": st.failure_probability(
+            point.problem, point.given, 0.7e6, **given
+        ),
+    }
+    for options, answer in wanted.items():
+        lines = runs(f"reliability study.toml {options}".rstrip()).splitlines()
+        assert len(lines) == 3
+        *_, last = lines
+        assert last.startswith(
+            "point 2 (random.strength.spectrum.correlation_length = 0.008): "
+        )
+        shown = str(answer).partition(" below ")
+        assert (shown[0] if options.startswith("--f") else str(answer)) in last
+    assert f"below friction coefficient 0.14 (0.7 MPa, force {0.7e6 * area:.3g} N)" in last
+    runs("run study.toml --out run --workers 1")
+    study.write_text(text)
+    runs("run study.toml --out run --workers 1", "300 of 300")
+
+
 def test_messages_are_in_the_words_of_the_command_line(runs):
     holes = PROFILE.copy()
     holes[20:31] = np.nan
@@ -231,7 +272,7 @@ def test_messages_are_in_the_words_of_the_command_line(runs):
     runs("onset study.toml --strength three.csv", "give --x, --value", code=2)
     said = in_options('pass gaps="skip" or interpolate=True', onset)
     assert said == "pass --gaps skip or --interpolate"
-    said = in_options("use st.Rupture(loading_rate=...) or st.LocalCriterion()", onset)
+    said = in_options("use method=st.Rupture(loading_rate=...) or st.LocalCriterion()", onset)
     assert said == "use the method rupture or the method local_criterion"
     runs("run study.toml --out run --part 65/64", "K from 1 to N, such as '3/100'", code=2)
 
@@ -263,7 +304,18 @@ MISTAKES = {
     "onset study.toml --strength p.npy --method local": (2, "local_criterion"),
     "rupture study.toml --out study.toml": (1, "File exists"),
     "rupture study.toml --sample -1": (2, "--sample"),
-    "reliability study.toml": (2, "--out"),
+    "reliability study.toml": (
+        2,
+        "--out: give the folder of a curve, or ask for one answer with",
+    ),
+    "reliability study.toml --out run --stress 7e5": (2, "leave out stress, or --out"),
+    "reliability study.toml --part 1/3 --stress 7e5": (2, "--part: shares the work of a curve"),
+    "reliability study.toml --force 7e3": (
+        2,
+        "--force: a force needs the area of the interface",
+    ),
+    "reliability study.toml --stress 7e5 --force 7e3": (2, "got stress and force"),
+    "reliability study.toml --probability 2": (2, "--probability: must be less than 1, got 2"),
     "nothing": (2, "nothing"),
 }
 

@@ -70,7 +70,7 @@ test_what_is_contradicting_or_missing_is_refused = refusals({
         lambda: dataclasses.replace(PRESSED, load=st.Load(pressing_force=4e3)),
     "pressing_force: must be greater than 0": lambda: st.Load(pressing_force=-4e3),
     # kN for N, MPa for Pa, and a force for a stress.
-    "force: 1.2 N is 0.0004 times the mean strength, 3e+03 N; check the units":
+    "force: 1.2 N is 0.0004 times the mean strength, 3 kN; check the units":
         lambda: counted(LAP, COEFFICIENT, force=1.2),
     "stress: 0.4 Pa": lambda: counted(PRESSED, STRENGTH, 0.4),
     "stress: 700 Pa": lambda: counted(PRESSED, beta_strength(2e-3), 700.0),  # below its bound

@@ -75,7 +75,7 @@ def read_profile(
     x, value : str or int, optional
         Name, heading or number (from 0) of the column, coordinate or variable. By default the one
         with such a name (``x``, ``position``; ``strength``, ``tau_p``), the only one in a unit of
-        length or of `quantity`, or the first and second of two columns.
+        length or of `quantity`, or, without headings, the first and second of two columns.
     unit, x_unit : str, optional
         Units of the values and of positions if the source states none; SI by default.
     quantity : str

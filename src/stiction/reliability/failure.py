@@ -33,7 +33,7 @@ from stiction.reliability.counting import count_failures
 from stiction.reliability.tail import Tail, sample_tail
 from stiction.reliability.uncertainty import generator, lognormal_interval
 from stiction.results import along, study_attributes, to_dataset
-from stiction.units import Doubt, doubt_units
+from stiction.units import Doubt, doubt_units, in_words
 from stiction.variables import ONSET_VARIABLES, PROFILES, Variable
 
 PILOT = 1_000
@@ -214,8 +214,8 @@ def _check_unit(state: LimitState, name: str, given: float, stress: float) -> No
     if ratio > 0.0:
         text = (
             f"{name}: {given:g}{unit} is {ratio:.2g} times the mean strength,"
-            f" {given / ratio:.3g}{unit}; check the units (stress in Pa, force in N,"
-            " friction_coefficient without unit)"
+            f" {in_words(CURVE[name].units, given / ratio)}; check the units (stress in Pa, force"
+            " in N, friction_coefficient without unit)"
         )
         doubt_units([Doubt(text, ratio, (least, 1.0 / DOUBTFUL), possible)])
 

@@ -41,6 +41,7 @@ from stiction.profiles.reading import profile_in_file
 from stiction.random.dotted_keys import with_values
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 from stiction.reliability.answer import Probability
+from stiction.study.question import Question
 from stiction.study.run import AnyPart, StoredRun, samples_of_part
 from stiction.study.sweep import Point, Sweep, Uncertain, grid_axes, varies, with_first_values
 
@@ -108,6 +109,9 @@ class Study(_Parts):
         likely. `failure_curve` gives their mean and band; `run` samples over them.
     save : Save, optional
         Results that `stiction rupture` keeps, and the places of its stations.
+    reliability : Question, optional
+        What `stiction reliability` answers: a ``force`` (N), ``stress`` (Pa) or
+        ``friction_coefficient`` to carry, or the ``probability`` of a design; and ``target_cv``.
     title : str
         Title of the study, for readers.
 
@@ -137,6 +141,7 @@ class Study(_Parts):
     sweep: Sweep = ()
     uncertain: Uncertain = None
     save: Save | None = None
+    reliability: Question | None = None
     title: Text = ""
 
     @model_validator(mode="after")
