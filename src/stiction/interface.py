@@ -180,6 +180,13 @@ class Interface:
         """Node positions along x in [0, L), shape (nodes,), m."""
         return self.coordinates["x"]
 
+    @property
+    def y(self) -> Array:
+        """Node positions along y of a plane, shape (nodes,), m."""
+        if not self.is_plane:
+            raise InputError("y: the interface is a line along x; only a plane has y")
+        return self.coordinates["y"]
+
     def describe_node(self, node: int) -> str:
         """Return the position of a node of the flat profile in words."""
         entry = np.unravel_index(int(node), self.shape)

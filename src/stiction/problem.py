@@ -25,7 +25,7 @@ from stiction.friction import SCALES, Friction, contradictions
 from stiction.friction.parameters import SMALLEST_EIGENVALUE
 from stiction.interface import Interface
 from stiction.load import Load, LoadShape
-from stiction.model import Mode, as_numbers, describe, is_unplaced, model
+from stiction.model import Mode, as_numbers, describe, differing, is_unplaced, model
 from stiction.profiles.placing import Gaps, turned
 from stiction.profiles.reading import at_nodes, is_coefficient
 from stiction.solid import Solid
@@ -79,8 +79,6 @@ def steepest_rate(strength: Array, residual: Array, rate: Array) -> float:
 class Sample(NamedTuple):
     """One interface or many: the profiles that every method starts from.
 
-    A NamedTuple of arrays, so that compiled kernels take it as it is.
-
     Attributes
     ----------
     strength, residual_strength, weakening_rate, initial_stress : (samples, *shape) arrays
@@ -91,6 +89,8 @@ class Sample(NamedTuple):
         p, dimensionless, positive.
     normal_pressure : (samples, *shape) array
         Pa; NaN where the problem has none.
+    problem : Problem, optional
+        That made it, and the only one that takes it; None if it was put together by hand.
     """
 
     strength: Array
@@ -99,6 +99,7 @@ class Sample(NamedTuple):
     initial_stress: Array
     load_profile: Array
     normal_pressure: Array
+    problem: Problem | None = None
 
     @property
     def samples(self) -> int:
@@ -328,10 +329,13 @@ class Problem:
                 UnitWarning,
             )
 
-    def warn_of_units(self, strength: float, residual: float = 0.0) -> None:
+    def warn_of_units(
+        self, strength: float, residual: float = 0.0, scales: Mapping[str, Any] | None = None
+    ) -> None:
         """Doubt mean peak and residual strengths (Pa) that do not fit the rest of the problem.
 
-        It is an `InputError` if they cannot, or if a normal pressure is rather a force.
+        It is an `InputError` if they cannot, if a normal pressure is rather a force, or if scales
+        of slip by name are not resolved at these strengths.
         """
         modulus, pressure = self.solid.shear_modulus, self.given_pressure
         compared = [("strength", strength, "shear modulus", modulus, RIGIDITY)]
@@ -361,10 +365,13 @@ class Problem:
         )
         if doubt_units([*doubts, Doubt(text, slip, *SLIP)]):
             return
-        if self.friction.weakening_rate is None:  # otherwise warned of with the problem
-            scale, value = self.friction.scale
-            rate = self.friction.rate(np.array(strength - residual), scale, np.median(value))
-            self._warn_if_short(max(float(rate), 1e-300))
+        own = dict([self.friction.scale]) if self.friction.weakening_rate is None else {}
+        for scale, value in (own if scales is None else scales).items():
+            drop = np.array(strength - residual)
+            rate = max(float(self.friction.rate(drop, scale, np.median(value))), 1e-300)
+            self._warn_if_short(rate)
+            if scales is not None:
+                self._check_resolution(rate)
 
     def _mean_drop(self, strength: float) -> float:
         """Return how far a strength falls, Pa."""
@@ -538,13 +545,14 @@ class Problem:
             DataArray that states the unit 1, is multiplied by the pressure.
         accept : collection of {"barriers", "overstress", "constant"}
             What the method accepts: infinite strength where nothing breaks; initial stress
-            above the strength; nodes that do not weaken, of which the caller has warned.
+            above the strength; nodes that do not weaken, of which the caller has warned; fewer
+            than four nodes in the nucleation length of the steepest ones.
 
         Raises
         ------
         InputError
             If a name, shape or value is invalid, a strength is not above the initial stress, no
-            strength is above the residual strength, or a `Sample` was made for another specimen;
+            strength is above the residual strength, or a `Sample` was made by another problem;
             the message lists every problem.
 
         Notes
@@ -561,16 +569,7 @@ class Problem:
         """Return a sample, and a mask of where all of its profiles were measured, or True."""
         friction, interface = self.friction, self.interface
         if isinstance(profiles, Sample):
-            if profiles.shape != interface.shape:
-                shapes = f"shape {profiles.shape}, the interface {interface.shape}"
-                raise InputError(f"profiles: the sample has {shapes}")
-            drive = self.load_profile
-            if interface.is_free and not np.allclose(profiles.load_profile, drive, rtol=1e-6):
-                raise InputError(
-                    "profiles: the sample has another load profile than the drive of the specimen:"
-                    " it was made for another problem; make it with problem.sample(strength)"
-                )
-            return profiles, True
+            profiles, accept = self._given_sample(profiles), {*accept, "constant"}
         given = named_profiles(profiles)
         of = "strength" if "strength" in given else "friction_coefficient"
         if of not in given:
@@ -631,22 +630,46 @@ class Problem:
                 " of the nodes; they would slip in reverse, which is not modelled, and are held"
             )
         load_shape = np.array(np.broadcast_to(self.load_profile, interface.shape), dtype=float)
-        sample = Sample(strength, residual, rates, initial, load_shape, pressure)
-        self._check_resolution(sample.steepest_rate)
+        sample = Sample(strength, residual, rates, initial, load_shape, pressure, self)
+        if "steep" not in accept:
+            self._check_resolution(sample.steepest_rate)
         return sample, reduce(np.logical_and, measured)
+
+    def _given_sample(self, sample: Sample) -> dict[str, Array]:
+        """Return the profiles of a ready-made sample by name; refuse one of another problem."""
+        if sample.shape != self.interface.shape:
+            shapes = f"shape {sample.shape}, the interface {self.interface.shape}"
+            raise InputError(f"profiles: the sample has {shapes}")
+        others = [] if sample.problem is None else differing(self, sample.problem)
+        if not (others or np.allclose(sample.load_profile, self.load_profile, rtol=1e-6)):
+            others = ["load_profile"]
+        if others:
+            raise InputError(
+                f"profiles: the sample was made by a problem with another {', '.join(others)};"
+                " make it with problem.sample(strength)"
+            )
+        given = {name: rows for name, rows in sample._asdict().items() if name in PROFILES}
+        if np.isnan(sample.normal_pressure).all():
+            del given["normal_pressure"]
+        return given
 
     def _impossible(
         self, strength: Array, residual: Array, initial: Array, accept: Collection[str]
     ) -> list[str]:
         """Return what is wrong with profiles that are in order one by one."""
         along, problems = self.interface.axes, []
-        if "overstress" not in accept and np.any(strength <= initial):
-            where = np.unravel_index(int(np.argmin(strength - initial)), strength.shape)
-            node = ", ".join(map(str, where[1:]))
+        over = (strength <= initial).reshape(len(strength), -1)
+        if "overstress" not in accept and over.any():
+            number = int(over.any(axis=1).argmax())
+            node = int(over[number].argmax())
+            most, least = initial[number].flat[node], strength[number].flat[node]
+            others = int(over.any(axis=1).sum()) - 1
             problems.append(
-                f"strength: must be above initial_stress everywhere; sample {where[0]},"
-                f" node {node}: {strength[where]:g} against {initial[where]:g} Pa; only"
-                " st.Rupture() accepts stress above the strength"
+                f"strength: must be above initial_stress everywhere; it is not at"
+                f" {over[number].sum()} of {over.shape[1]} nodes of sample {number}, the first at"
+                f" {self.interface.describe_node(node)}: {least:g} against {most:g} Pa"
+                f"{f', and in {others} more samples' * (others > 0)}; only st.Rupture() accepts"
+                " stress above the strength"
             )
         nowhere = ~((strength > residual) & np.isfinite(strength)).any(axis=along)
         if nowhere.any():

@@ -84,6 +84,8 @@ def test_mean_and_variance_of_the_nucleation_stress(problem, make_strength, rati
     strength = make_strength(ratio)
     tau_p = strength.sample(problem.interface, samples=4096, seed=3)
     tau_n = st.theory.nucleation_stress(problem, tau_p)
+    for one in (tau_p[1], {"strength": tau_p[1]}):
+        np.testing.assert_array_equal(st.theory.nucleation_stress(problem, one), tau_n[1])
     spectrum = np.fft.fft(strength.correlation(problem.interface)).real / 256.0
     variance = strength.standard_deviation**2 * np.sum(spectrum * multiplier**2)
     assert_mean(tau_n.mean(axis=1), strength.mean, errors=4.0)

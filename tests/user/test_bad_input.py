@@ -23,6 +23,7 @@ from stiction.theory import energy_release_rate, griffith_length, nucleation_sta
 LINE = st.Interface(length=0.1, nodes=256)
 PLANE = st.Interface(length=(0.5, 0.5), nodes=(4096, 4096))
 PROBLEM, RATIO = make_problem(), make_problem(residual_ratio=0.5)
+OTHER = make_problem(weakening_rate=0.9 * RATE, load=st.Load(initial_stress=3e4))
 ONE, TEN = np.full(256, 1e6), np.arange(10.0)
 FALLING = st.ExponentialWeakening(weakening_rate=RATE)
 
@@ -282,8 +283,28 @@ test_profiles_and_loads = refusals({
         lambda: onset(ONE, residual_strength=2e6),
     "initial_stress ... (2, 256) ... (3, 256)":
         lambda: onset(np.ones((3, 256)), initial_stress=np.zeros((2, 256))),
-    "strength ... initial_stress ... sample 0, node 77":
-        lambda: onset(ONE, initial_stress=2e6 * (np.arange(256) == 77)),
+    "initial_stress ... at 3 of 256 nodes of sample 1, the first at x = 0.0300781 m: 1e+06 ... 2e":
+        lambda: onset(
+            np.stack([3.0 * ONE, ONE]), initial_stress=2e6 * (abs(np.arange(256) - 78) < 2)
+        ),
+    "initial_stress ... at 1 of 256 nodes of sample 1, ... and in 1 more samples":
+        lambda: onset(np.stack([3.0 * ONE, ONE, ONE]), initial_stress=2e6 * (np.arange(256) == 7)),
+    "another friction.weakening_rate, load.initial_stress;": lambda: onset(OTHER.sample(ONE)),
+    "another load_profile": lambda: onset(
+        PROBLEM.sample(ONE)._replace(problem=None, load_profile=np.linspace(0.9, 1.1, 256))
+    ),
+    "strength: must be finite; entry (0, 3)": lambda: onset(
+        PROBLEM.sample(np.where(np.arange(256) == 3, np.inf, ONE), accept=("barriers",)),
+        st.Equilibrium(),
+    ),
+    "at 2 of 256 nodes of sample 0": lambda: onset(
+        PROBLEM.sample(
+            {"strength": ONE, "initial_stress": 2e6 * (np.arange(256) < 2)}, accept=("overstress",)
+        )
+    ),
+    "residual_strength: must not be negative": lambda: onset(
+        PROBLEM.sample(ONE)._replace(residual_strength=-ONE[None])
+    ),
     "weakening_rate ... must be finite":
         lambda: onset(ONE, st.Equilibrium(), weakening_rate=np.nan),
     "strength ... residual_strength ... initial_stress ... weakening_rate": lambda: onset(
@@ -510,6 +531,26 @@ def test_harmless_forms_are_taken():
     np.testing.assert_array_equal(result["strength"], expected)
     assert st.Interface(length=0.1, nodes=256.0).nodes == 256
     assert st.Ensemble(samples=1e4, keep="strength").keep == ("strength",)
+
+
+def test_a_ready_made_sample_gives_what_its_profiles_give():
+    load = st.Load(initial_stress=3e4, normal_pressure=7e6)
+    problem = make_problem(residual_ratio=0.3, load=load)
+    strength = np.stack(
+        [1.0 + 0.2 * np.sin(np.arange(256)), 1.1 + 0.1 * np.cos(np.arange(256))]
+    )
+    given = {"residual_strength": 2e5, "critical_slip": np.array([[5e-6], [6e-6]])}
+    given |= {"strength": 1e6 * strength, "normal_pressure": np.array([[6e6], [4e6]])}
+    for other in (problem, dataclasses.replace(problem, load=st.Load())):
+        found = st.onset(other, other.sample(given), method=st.Equilibrium(slip=True))
+        assert found.equals(st.onset(other, given, method=st.Equilibrium(slip=True)))
+
+
+def test_nodes_of_a_plane_have_a_y():
+    plane = st.Interface(length=(0.3, 0.2), nodes=(16, 10))
+    np.testing.assert_allclose(plane.y, 0.02 * np.arange(10))
+    with pytest.raises(st.InputError, match="only a plane has y"):
+        _ = LINE.y
 
 
 def test_representations_fit_on_a_screen():

@@ -431,16 +431,27 @@ def test_a_dask_scheduler(tmp_path, command):
     assert st.open_run(tmp_path / "run").dataset().identical(reference)
 
 
-def test_samples_solved_one_by_one_warn_once():
-    """Where some are refused: here their nucleation length spans fewer than four nodes."""
+@pytest.mark.parametrize("refused", [False, True])
+def test_samples_solved_one_by_one_warn_once(refused):
+    """Steep samples, below four nodes in a nucleation length, are solved: others are selected."""
     law = st.LinearWeakening(critical_slip=5.93e-6, residual_strength=0.1e6)
-    problem = st.Problem(st.Solid(1e9, 0.3, 1200.0), st.Interface(0.064, 64), law)
+    load = st.Load(initial_stress=0.52e6 if refused else 0.07e6)
+    problem = st.Problem(st.Solid(1e9, 0.3, 1200.0), st.Interface(0.064, 64), law, load)
     random = st.RandomField(st.Lognormal(mean=1.2e6, cv=0.35), st.PowerLawSpectrum(0.01))
     with pytest.warns(st.AccuracyWarning) as caught:
-        st.monte_carlo(problem, random, method=st.Equilibrium(), samples=20, progress=False)
+        found = st.monte_carlo(
+            problem, random, method=st.Equilibrium(), samples=20, progress=False
+        )
     texts = [str(warning.message) for warning in caught]
     assert sum("are recommended" in text for text in texts) == 1, texts
-    assert sum("could not be solved" in text for text in texts) == 1, texts
+    assert sum("could not be solved" in text for text in texts) == refused, texts
+    lost = np.isnan(found.critical_stress.values)
+    strength = random.sample(problem.interface, samples=20, seed=0)
+    np.testing.assert_array_equal(lost, strength.min(axis=1) <= 0.52e6 if refused else False)
+    assert lost.any() == refused
+    steepest = (strength.max(axis=1) - 0.1e6) / 5.93e-6
+    nodes = np.array([problem.nodes_in_nucleation_length(one)[0] for one in steepest])
+    assert 0 < np.count_nonzero(nodes < 4.0) < 20
 
 
 def test_a_file_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch):

@@ -148,7 +148,15 @@ class Experiment:
                         UnitWarning,
                     )
             check_residual(self.problem, one)
-        self.problem.warn_of_units(self.mean_strength)
+            means = {name: mean_in_stress(self.problem, one, name) for name in one.names}
+            friction = self.problem.friction
+            residual = float(friction.residual(np.array(means["strength"])).mean())
+            scales: dict[str, Any] = {name: means[name] for name in SCALES if name in means}
+            if not scales and friction.weakening_rate is None:
+                scales = dict([friction.scale])
+            self.problem.warn_of_units(
+                means["strength"], means.get("residual_strength", residual), scales
+            )
 
     def draws(self, first: int, count: int) -> Array:
         """Return standard normal draws (count, dimension) of samples first, first + 1, ..."""
@@ -161,8 +169,8 @@ class Experiment:
 
     def onset(self, profiles: Mapping[str, Array]) -> Values:
         """Solve profiles by name, (samples, *shape) each; no sample depends on the others."""
-        # `check_fields` has warned of nodes of constant strength.
-        accept = (*getattr(self.method, "accepts", ()), "constant")
+        # `check_fields` has looked at both; a refusal of single samples would select the others.
+        accept = (*getattr(self.method, "accepts", ()), "constant", "steep")
         return dict(self.prepare()(self.problem.sample(profiles, accept=accept)))
 
     def prepare(self) -> Solver:

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from stiction.arrays import Array
 from stiction.elasticity.linear import inner
-from stiction.errors import InputError
 from stiction.friction import FrictionLaw
 from stiction.friction.parameters import Linear, Polygon
 from stiction.jit import jit, jit_inside
@@ -62,9 +61,7 @@ def refused(law: FrictionLaw) -> list[str]:
 
 
 def pieces_of(law: FrictionLaw) -> Pieces:
-    """Return the pieces of a law, or raise an `InputError` if it has none."""
-    if reasons := refused(law):
-        raise InputError(reasons)
+    """Return the pieces of a law for which `refused` returns no reason."""
     parameters = law.parameters
     if not isinstance(parameters, Polygon):
         return LINEAR

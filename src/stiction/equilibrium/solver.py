@@ -22,12 +22,13 @@ from stiction.equilibrium.sample import (
     State,
     multiplier_of,
     present_pieces,
+    refused,
     residual_nodes,
     row_of,
     sample_of,
 )
 from stiction.equilibrium.transforms import PlaneProgram
-from stiction.errors import warn_of_samples
+from stiction.errors import InputError, warn_of_samples
 from stiction.interface import Interface
 from stiction.problem import Problem
 from stiction.problem import Sample as Samples
@@ -162,7 +163,9 @@ def peak_of(state: State) -> float:
 
 
 def make_program(problem: Problem, gap: float = 1e-6) -> AnyProgram:
-    """Return the programme that finds equilibria of a problem."""
+    """Return the programme that finds equilibria of a problem, or raise an `InputError`."""
+    if reasons := refused(problem.friction):
+        raise InputError(reasons)
     if problem.specimen is not None:
         return BlockProgram(problem)
     return PlaneProgram(problem, gap) if problem.interface.is_plane else LineProgram(problem)
