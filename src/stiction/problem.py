@@ -367,11 +367,11 @@ class Problem:
             return
         own = dict([self.friction.scale]) if self.friction.weakening_rate is None else {}
         for scale, value in (own if scales is None else scales).items():
-            drop = np.array(strength - residual)
-            rate = max(float(self.friction.rate(drop, scale, np.median(value))), 1e-300)
-            self._warn_if_short(rate)
+            fall = np.array(strength - residual)
+            steep = max(float(self.friction.rate(fall, scale, np.median(value))), 1e-300)
+            self._warn_if_short(steep)
             if scales is not None:
-                self._check_resolution(rate)
+                self._check_resolution(steep)
 
     def _mean_drop(self, strength: float) -> float:
         """Return how far a strength falls, Pa."""
