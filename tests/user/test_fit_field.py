@@ -59,7 +59,7 @@ def test_what_it_finds_is_what_was_put_in(plain):
 def test_intervals_are_those_of_three_sets_of_repetitions(plain):
     """By hand: errors in units of root length; the ends from fields of either length."""
     name, truth = "spectrum.correlation_length", plain.parameters
-    sets = bootstrapped(plain._estimate, 20, 0.9, 0, False)
+    sets, _ = bootstrapped(plain._estimate, 20, 0.9, 0, False)
 
     def end(of, share):
         true = of.truth.parameters[name]

@@ -11,8 +11,8 @@ from scipy.stats import t as student
 from stiction.arrays import Array
 from stiction.errors import InputError
 
-MOST_SCATTER = 9.0
-"""Largest variance between records of the logarithm that is searched."""
+MOST_SCATTER = math.log(2.0)
+"""Largest variance between specimens of the logarithm that is searched: a factor of cv 1."""
 
 
 def levels_of(rows: Sequence[Array]) -> Array:
@@ -43,6 +43,13 @@ def as_of_one(rows: Sequence[Array], within: Array) -> list[Array]:
     return [row * factor for row, factor in zip(rows, factors, strict=True)]
 
 
+def _weighed(logarithms: Array, within: Array, s: float) -> tuple[float, float, float]:
+    """Mean of the logarithms at a variance s between records, its variance, and Q(s)."""
+    weight = 1.0 / (s + within)
+    middle = float(weight @ logarithms / weight.sum())
+    return middle, 1.0 / float(weight.sum()), float(weight @ (logarithms - middle) ** 2)
+
+
 def variance_between(logarithms: Array, within: Array, level: float) -> float:
     """Return the variance s between records at which Q(s) is as large as `level`.
 
@@ -53,15 +60,33 @@ def variance_between(logarithms: Array, within: Array, level: float) -> float:
     """
 
     def excess(s: float) -> float:
-        weight = 1.0 / (s + within)
-        middle = float(weight @ logarithms / weight.sum())
-        return float(weight @ (logarithms - middle) ** 2) - level
+        return _weighed(logarithms, within, s)[2] - level
 
     if excess(0.0) <= 0.0:
         return 0.0
     if excess(MOST_SCATTER) >= 0.0:
         return MOST_SCATTER
     return float(brentq(excess, 0, MOST_SCATTER))
+
+
+def likely_between(
+    logarithms: Array, within: Array, count: int, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Draw likely variances between records, and the logarithm of the mean with each, (count,).
+
+    Levels of Q are those of chi-square that `MOST_SCATTER` leaves; given s, the mean logarithm is
+    normal. Factors are log-normal with mean 1.
+    """
+    freedom = logarithms.size - 1
+    least = chi2.cdf(_weighed(logarithms, within, MOST_SCATTER)[2], freedom)
+    levels = chi2.ppf(least + (1.0 - least) * rng.random(count), freedom)
+    found = np.array([variance_between(logarithms, within, float(level)) for level in levels])
+    middles = [_weighed(logarithms, within, float(s))[:2] for s in found]
+    means = [
+        m + math.sqrt(v) * z
+        for (m, v), z in zip(middles, rng.standard_normal(count), strict=True)
+    ]
+    return found, np.array(means) + 0.5 * (found + within.mean())
 
 
 def scatter_between(

@@ -1,6 +1,7 @@
 """Fits of a marginal, a spectrum and noise, and intervals from fits to simulated records."""
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -43,6 +44,8 @@ SIDES = {"marginal.low": -1.0, "marginal.high": 1.0}
 """Side of the mean on which a bound lies."""
 SAME = 1e-3
 """Distance within which an interval is uninformative, as a share of an end of a range."""
+LEAST_LEFT = 0.2
+"""Least share of the variance that is taken to be left by mean and trend."""
 ROUNDS = 2
 """In each, the error of the field's share in the scatter of means falls to that share of it."""
 
@@ -62,7 +65,8 @@ class Estimate:
     """The result of one fit."""
 
     setting: FitSetting
-    marginal: Any
+    marginal: Any  # of the field
+    own: Any  # of the values, from which mean and trend have taken variance
     model: Model
     distance: float  # Kolmogorov's, between values and marginal
     roughness: float  # mean square of log(periodogram/expectation), both averaged over bands
@@ -111,17 +115,34 @@ class Estimate:
             rows.append(window.without_trend(field + noise))
         if not self.between:
             return rows
-        scatter = math.sqrt(math.log1p(self.between**2)) * rng.standard_normal(len(rows))
+        variance = math.log1p(self.between**2)
+        scatter = math.sqrt(variance) * rng.standard_normal(len(rows)) - 0.5 * variance
         return [row * factor for row, factor in zip(rows, np.exp(scatter), strict=True)]
 
     @property
     def within(self) -> Array:
         """Variance of the logarithm of the mean of each record from the field alone."""
-        windows = self.setting.windows
-        shares = {w: w.variance_of_mean(self.model.correlation(w)) for w in set(windows)}
         own = self.parameters["standard_deviation"] / self.parameters["mean"]
+        windows, model = self.setting.windows, self.model
+        shares = {w: w.variance_of_mean(model.correlation(w)) for w in set(windows)}
         result: Array = np.log1p(own**2 * np.array([shares[window] for window in windows]))
         return result
+
+    @property
+    def independent(self) -> float:
+        """Number of independent values that tell families of the marginal apart as well.
+
+        Families fitted to the same values agree in about mean and variance; the logarithm of the
+        ratio of their densities then has Hermite orders of z from 3 on. Its sum over N values with
+        correlations rho_ij has mean and variance of that over N^2/sum rho_ij^3 independent ones.
+        """
+        points, alike = 0.0, 0.0
+        for window, count in Counter(self.setting.windows).items():
+            rho = (1.0 - self.model.noise_share) * self.model.correlation(window)
+            rho.flat[0] = 1.0
+            points += count * float(window.measured.sum())
+            alike += count * float(np.sum(window.pairs * rho**3))
+        return points**2 / max(alike, points)
 
     def as_of_one(self, rows: Sequence[Array]) -> list[Array]:
         """Return records without the scatter between specimens, if that is estimated."""
@@ -160,7 +181,7 @@ def _estimate(rows: Sequence[Array], setting: FitSetting, start: Estimate | None
         vector = family.vector_of(start.model)
         marginal, noise = start.marginal, start.model.noise
     for _ in range(2):
-        marginal = setting.marginal.fit(values, noise, marginal)
+        marginal = own = setting.marginal.fit(values, noise, marginal)
         likelihood = Whittle(family, hermite_shares(marginal), observed)
         vector = likelihood.fit(likelihood.coarse() if vector is None else vector)
         model = family.model(vector, likelihood.shares)
@@ -177,12 +198,28 @@ def _estimate(rows: Sequence[Array], setting: FitSetting, start: Estimate | None
     ]
     return Estimate(
         setting=setting,
-        marginal=marginal,
+        marginal=setting.marginal.widened(own, _left(setting.windows, model) ** -0.5),
+        own=own,
         model=model,
-        distance=distance(marginal, setting.marginal.quiet(values, model.noise)),
+        distance=distance(own, setting.marginal.quiet(values, model.noise)),
         roughness=float(np.mean(np.square(ratios))),
         noise=likelihood.noise_variance(vector) if family.noise is None else (0.0, 0.0),
     )
+
+
+def _left(windows: Sequence[RecordWindow], model: Model) -> float:
+    """Return the share of its variance that a field is expected to show about mean and trend.
+
+    Of N values v with correlation R it is tr(M R)/N, with M the projection that takes the trend of
+    each record, and the mean of all, from them.
+    """
+    taken, mean, points = 0.0, 0.0, 0.0
+    for window, count in Counter(windows).items():
+        correlation, size = model.correlation(window), float(window.measured.sum())
+        points += count * size
+        taken += count * window.taken_by_trend(correlation)
+        mean += count * size**2 * window.variance_of_mean(correlation)
+    return max(1.0 - (taken + mean / points) / points, LEAST_LEFT)
 
 
 def bands(one: Observed, expected: Array, per_octave: int = 3) -> Array:
@@ -205,38 +242,46 @@ class Repetitions(NamedTuple):
 
 
 def bootstrapped(
-    found: Estimate, count: int, confidence: float, seed: int, progress: Show
-) -> list[Repetitions]:
+    found: Estimate,
+    count: int,
+    confidence: float,
+    seed: int,
+    progress: Show,
+    workers: int | None = None,
+    others: Sequence[tuple[Estimate, int]] = (),
+) -> tuple[list[Repetitions], list[Repetitions]]:
     """Fit records simulated from an estimate, and from it `at_ends` of its correlation length.
 
-    Repetitions to which the family cannot be fitted are missing.
+    Also from `others`, each with its own number of repetitions. Those to which the family cannot
+    be fitted are missing.
     """
 
-    def repeat(truth: Estimate) -> Repetitions:
+    def repeat(truth: Estimate, count: int = count) -> Repetitions:
         def one(number: int) -> Estimate | None:
             rng = np.random.default_rng([seed, number])
             try:
-                again = estimate(truth.simulate(rng), found.setting, truth)
+                again = estimate(truth.simulate(rng), truth.setting, truth)
             except InputError:
                 return None
             meter.advance()
             return again
 
-        results = in_threads(one, range(count), usable_cores())
+        results = in_threads(one, range(count), workers or usable_cores())
         fits = [result for result in results if result is not None]
         if len(fits) < FEWEST:
             raise InputError(
-                f"marginal: {found.setting.marginal.name!r} could be fitted to only {len(fits)} of"
+                f"marginal: {truth.setting.marginal.name!r} could be fitted to only {len(fits)} of"
                 f" {count} repetitions; take another marginal"
             )
         return Repetitions(truth, fits)
 
     ends = "correlation_length" in found.setting.spectrum.free
-    with Meter("fit_field", 3 * count if ends else count, progress) as meter:
+    total = (3 if ends else 1) * count + sum(number for _, number in others)
+    with Meter("fit_field", total, progress) as meter:
         repeated = [repeat(found)]
         if ends:
             repeated += [repeat(truth) for truth in at_ends(repeated[0], confidence)]
-    return repeated
+        return repeated, [repeat(*other) for other in others]
 
 
 def at_ends(around: Repetitions, confidence: float) -> list[Estimate]:

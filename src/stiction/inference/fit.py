@@ -3,16 +3,16 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import BeforeValidator, Field
-from scipy.stats import chi2
 from scipy.stats import t as student
 
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name, warn_accuracy
-from stiction.inference.between import scatter_between, variance_between
+from stiction.inference.between import likely_between, scatter_between
 from stiction.inference.bootstrap import (
     FEWEST,
     Estimate,
@@ -23,7 +23,7 @@ from stiction.inference.bootstrap import (
     intervals,
     likely,
 )
-from stiction.inference.marginal_fit import Family, family_of, mean_log_likelihood
+from stiction.inference.marginal_fit import Family, family_of, mean_log_likelihood, multiplied
 from stiction.inference.records import Record, records_of
 from stiction.inference.whittle import SpectrumFamily, spectrum_of
 from stiction.inference.window import RecordWindow
@@ -45,6 +45,11 @@ ADVICE = {
     "marginal": "the values are far from its family; compare families",
     "spectrum": "the periodogram is far from its family; take another spectrum or a higher detrend",
 }
+TOLD = 2.0
+"""Difference of scores from which data tell two families apart."""
+DRAWN = 5.0
+"""Difference of scores from which a family is not drawn any more: weights below 1 %."""
+FEW_SPECIMENS = 5
 LEAST_SCATTER = 1e-8
 """Variance of the logarithm of a factor that stands for none."""
 STRESSES = ("mean", "standard_deviation", "noise", "low", "high", "loc", "scale")
@@ -67,14 +72,17 @@ Spectrum = Annotated[Any, BeforeValidator(spectrum_of), DEFAULT_TOO]
 class Goodness(NamedTuple):
     """Quality of a family of marginals: its best member, and two measures of the fit.
 
-    `distance` is Kolmogorov's. `score` is the log likelihood of as many independent values as the
-    records hold correlation lengths, less the number of parameters, and less that of the best
-    family; differences below about 2 are not significant.
+    `distance` is Kolmogorov's. `score` is the log likelihood of so many independent values as tell
+    families apart as well as the correlated ones of the records do, less the number of estimated
+    parameters (Akaike, 1974), less that of the best family: 0 for the best, negative for the
+    others. Differences below 2 do not tell families apart. `weight` is the share of members
+    that `FieldFit.interfaces` draws from the family, in proportion to exp(score).
     """
 
     marginal: Any
     distance: float
     score: float
+    weight: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +107,9 @@ class FieldFit:
     repetitions : tuple of RandomField
         The fits to records simulated from `field`: what another measurement might have given.
     families : dict of str to Goodness
-        Quality of every requested family of marginals.
+        Quality of every requested family of marginals, the best first.
+    independent : float
+        Number of independent values in the scores of families.
     p_values : dict of str to float
         Probability of records as far from their own marginal, and spectrum, as the data are
         from the fitted ones, from the repetitions; small if a family does not fit.
@@ -117,30 +127,45 @@ class FieldFit:
     confidence: float
     repetitions: tuple[RandomField, ...]
     families: Mapping[str, Goodness]
+    independent: float
     p_values: Mapping[str, float]
     lengths_held: float
     missing: tuple[int, int]
     quantity: str
     doubts: tuple[str, ...]
-    _repeated: Repetitions
+    _repeated: Sequence[Repetitions]  # of the field, and of other families that may be drawn
     _rows: Sequence[Array]
     _levels: Array
 
     @property
     def _estimate(self) -> Estimate:
-        return self._repeated.truth
+        return self._repeated[0].truth
+
+    @property
+    def tied(self) -> tuple[str, ...]:
+        """Names of the families that the records do not tell from the best, and of this one."""
+        return tuple(name for name, one in self.families.items() if one.score > -TOLD)
+
+    @cached_property
+    def _likely(self) -> list[list[RandomField]]:
+        values = np.concatenate(self._rows)
+        return [
+            [one.field(self.quantity) for one in likely(own, values)] for own in self._repeated
+        ]
 
     @checked
     def interfaces(self, count: Count, seed: Number = 0) -> list[RandomInterface]:
         """Return equally likely random interfaces, for a failure probability under all of them.
 
         Each is the estimate less the error of one repetition, so that bias and scatter are those
-        of the intervals; with `between`, each has a factor of its own likely scatter.
+        of the intervals. Families of the marginal have shares by their `weight` (Burnham and
+        Anderson, 2002, section 4.2). With `between`, each has a factor of its own likely scatter,
+        of a coefficient of variation of at most 1, and a likely mean with that scatter.
 
         Parameters
         ----------
         count : int
-            Their number; at most as many as `repetitions` differ.
+            Their number; of each family at most as many differ as it has repetitions.
         seed : int
             Not negative.
 
@@ -165,20 +190,29 @@ class FieldFit:
                 f"interfaces: need a strength, and the fit is of {self.quantity}; put"
                 " `repetitions` into random interfaces of your own"
             )
-        fields = likely(self._repeated, np.concatenate(self._rows))
         rng = np.random.default_rng([seed, 5])
-        chosen = rng.choice(len(fields), count, replace=count > len(fields))
-        found = [RandomInterface(strength=fields[i].field(self.quantity)) for i in chosen]
+        ends = np.cumsum([one.weight for one in self.families.values() if one.weight > 0.0])
+        places = (rng.permutation(count) + rng.random()) / count * ends[-1]
+        family = np.minimum(np.searchsorted(ends, places), ends.size - 1)
+        chosen = [self._likely[0][0]] * count
+        for number, fields in enumerate(self._likely):
+            own = np.flatnonzero(family == number)
+            for place, i in zip(
+                own, np.resize(rng.permutation(len(fields)), own.size), strict=True
+            ):
+                chosen[place] = fields[i]
         if "between" not in self.parameters:
-            return found
-        levels = chi2.rvs(self._levels.size - 1, size=count, random_state=rng)
-        logarithms, within = np.log(self._levels), self._estimate.within
-        variances = [variance_between(logarithms, within, float(level)) for level in levels]
-        cvs = [math.sqrt(math.expm1(max(s, LEAST_SCATTER))) for s in variances]
-        return [
-            replace(one, between={"strength": Lognormal(mean=1.0, cv=cv)})
-            for one, cv in zip(found, cvs, strict=True)
-        ]
+            return [RandomInterface(strength=field) for field in chosen]
+        drawn = likely_between(np.log(self._levels), self._estimate.within, count, rng)
+        found = []
+        for field, variance, mean in zip(chosen, *drawn, strict=True):
+            marginal = multiplied(field.marginal, math.exp(mean) / field.mean)
+            cv = math.sqrt(math.expm1(max(variance, LEAST_SCATTER)))
+            factor = {"strength": Lognormal(mean=1.0, cv=cv)}
+            found.append(
+                RandomInterface(strength=replace(field, marginal=marginal), between=factor)
+            )
+        return found
 
     def __str__(self) -> str:
         marginal = getattr(self.field.marginal, "type", "marginal").replace("_", " ")
@@ -199,6 +233,10 @@ class FieldFit:
             line = f"  {name:{width}s}  {value:<11.5g} {low:.4g} to {high:.4g}"
             lines.append(line if unit == "1" else f"{line} {unit}")
         p_values = ", ".join(f"{name} {p:.3g}" for name, p in self.p_values.items())
+        if len(self.families) > 1:
+            told = f" ({', '.join(self.tied)} are not told apart)" if len(self.tied) > 1 else ""
+            scores = ", ".join(f"{name} {one.score:.1f}" for name, one in self.families.items())
+            lines.append(f"  scores of families: {scores}{told}")
         lines.append(f"  p-values: {p_values} ({len(self.repetitions)} repetitions)")
         return "\n".join([*lines, *(f"  ! {doubt}" for doubt in self.doubts)])
 
@@ -220,6 +258,7 @@ def fit_field(
     bootstrap: at_least(FEWEST) = 200,  # type: ignore[valid-type]
     confidence: Share = 0.9,
     seed: Number = 0,
+    workers: Count | None = None,
     progress: Progress = True,
 ) -> FieldFit:
     """Fit a random field to measured profiles, with an interval for every parameter.
@@ -268,6 +307,8 @@ def fit_field(
         Of the intervals.
     seed : int
         Seed of the repetitions.
+    workers : int, optional
+        Number of threads; all cores if left out. Results do not depend on it.
     progress : bool or callable
         As in `stiction.monte_carlo`.
 
@@ -324,11 +365,24 @@ def fit_field(
     (name, fixed), deviation = spectrum, None if noise is True else float(noise)
     family = SpectrumFamily(name, fixed, ratio, deviation, (spacing, 2.0 * float(longest)))
     windows, rows = _windowed(records, detrend)
-    found, compared = _best(
+    estimates, compared, independent = _compared(
         [FitSetting(windows, one, family, between) for one in marginal], rows
     )
+    found, *others = estimates
     levels, rows = np.array([row.mean() for row in rows]), found.as_of_one(rows)
-    repeated = bootstrapped(found, bootstrap, confidence, seed, progress)
+    best, *weights = (one.weight for one in compared.values())
+    counts = [
+        max(FEWEST, round(bootstrap * weight / best)) for weight in weights if weight > 0.0
+    ]
+    repeated, drawn = bootstrapped(
+        found,
+        bootstrap,
+        confidence,
+        seed,
+        progress,
+        workers,
+        list(zip(others, counts, strict=False)),
+    )
     tests = {"marginal": "distance", "spectrum": "roughness"}
     p_values = {name: _p_value(of, *repeated[0]) for name, of in tests.items()}
     failed = len(repeated) * bootstrap - sum(len(one.fits) for one in repeated)
@@ -347,12 +401,13 @@ def fit_field(
         confidence=confidence,
         repetitions=tuple(one.field(quantity) for one in repeated[0].fits),
         families=compared,
+        independent=independent,
         p_values=p_values,
         lengths_held=_lengths_held(found),
         missing=(points - sum(row.size for row in rows), points),
         quantity=quantity,
         doubts=tuple(_doubts(found, p_values, failed)),
-        _repeated=repeated[0],
+        _repeated=[repeated[0], *drawn],
         _rows=rows,
         _levels=levels,
     )
@@ -380,10 +435,10 @@ def _windowed(
     return tuple(windows), rows
 
 
-def _best(
+def _compared(
     settings: Sequence[FitSetting], rows: Sequence[Array]
-) -> tuple[Estimate, dict[str, Goodness]]:
-    """The family that describes the values best, and how well each does."""
+) -> tuple[list[Estimate], dict[str, Goodness], float]:
+    """Estimates with each family, the best first, how good each is, and for how many values."""
     fitted: list[tuple[float, Estimate]] = []
     problems: list[str] = []
     for setting in settings:
@@ -395,17 +450,26 @@ def _best(
             problems += error.problems
             continue
         values = np.concatenate(found.as_of_one(rows))
-        independent = min(_lengths_held(found), values.size)
-        score = independent * mean_log_likelihood(found.marginal, values, found.model.noise)
-        fitted.append((score - len(setting.marginal.parameters(found.marginal)), found))
+        fitted.append((mean_log_likelihood(found.own, values, found.model.noise), found))
     if not fitted:
         raise InputError(problems)
-    top, best = max(fitted, key=lambda one: one[0])
+    independent = max(fitted, key=lambda one: one[0])[1].independent
+    scored = [
+        (independent * mean - len(found.setting.marginal.parameters(found.own)), found)
+        for mean, found in fitted
+    ]
+    scored.sort(key=lambda one: -one[0])
+    scores = np.array([score for score, _ in scored]) - scored[0][0]
+    weights = np.where(scores > -DRAWN, np.exp(scores), 0.0)
     compared = {
-        found.setting.marginal.name: Goodness(found.marginal, found.distance, score - top)
-        for score, found in fitted
+        found.setting.marginal.label: Goodness(
+            found.marginal, found.distance, float(score), float(weight)
+        )
+        for (_, found), score, weight in zip(
+            scored, scores, weights / weights.sum(), strict=True
+        )
     }
-    return best, compared
+    return [found for _, found in scored], compared, independent
 
 
 def _lengths_held(found: Estimate) -> float:

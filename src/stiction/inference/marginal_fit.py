@@ -35,6 +35,10 @@ NEGLIGIBLE = 1e-4
 INSIDE = 1e-2
 """Least distance of noisy values from a bound for a first guess, as a share of their range."""
 MOST_NOISE = 0.95
+LEAST_TOTAL = 0.2
+"""Least sum of the shapes of 'beta' where moments determine them."""
+SCALED = {"mean", "low", "high", "loc", "scale"}
+"""Parameters that grow with the values."""
 
 
 def _positive(u: Array) -> Array:
@@ -83,6 +87,12 @@ class Family:
 
     name: str
     fixed: dict[str, float]
+
+    @property
+    def label(self) -> str:
+        """Name, with what was fixed."""
+        fixed = {k: v for k, v in self.fixed.items() if (k, v) != ("low", 0.0)}
+        return ", ".join([self.name, *(f"{key} {value:g}" for key, value in fixed.items())])
 
     def fit(self, values: Array, noise: float = 0.0, start: Any = None) -> Any:
         """Return the marginal of values that carry noise of this deviation, from a first guess."""
@@ -145,9 +155,28 @@ class Family:
 
     def parameters(self, marginal: Any) -> dict[str, float]:
         """Return what was estimated, by name."""
-        own = marginal.parameters if isinstance(marginal, ScipyMarginal) else vars(marginal)
-        known = {"type", "distribution", *self.fixed}
-        return {n: float(v) for n, v in dict(own).items() if v is not None and n not in known}
+        return {n: v for n, v in _all_parameters(marginal).items() if n not in self.fixed}
+
+    def widened(self, marginal: Any, factor: float) -> Any:
+        """Return the marginal of the same mean with `factor` times the standard deviation.
+
+        What is fixed stays; one of scipy stays as it is if its loc or scale is fixed.
+        """
+        free, mean = self.parameters(marginal), float(marginal.distribution.mean())
+        moved: dict[str, Any] = {
+            n: mean + factor * (free[n] - mean) for n in ("low", "high", "loc") if n in free
+        }
+        if isinstance(marginal, ScipyMarginal):
+            if "loc" not in free or "scale" not in free:
+                return marginal
+            return with_parameters(marginal, moved | {"scale": factor * free["scale"]})
+        if not isinstance(marginal, Beta):
+            return replace(marginal, cv=factor * marginal.cv)
+        wider = replace(marginal, **moved)
+        u = (mean - wider.low) / (wider.high - wider.low)
+        deviation = factor * float(marginal.distribution.std()) / (wider.high - wider.low)
+        total = max(u * (1.0 - u) / deviation**2 - 1.0, LEAST_TOTAL)
+        return replace(wider, alpha=total * u, beta=total * (1.0 - u))
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -164,6 +193,18 @@ class Family:
                 f" and {high:.6g}; give others, as in {{'type': {self.name!r}, 'low': ...}}, or"
                 " noise=True if measurement noise carries them there"
             )
+
+
+def _all_parameters(marginal: Any) -> dict[str, float]:
+    own = marginal.parameters if isinstance(marginal, ScipyMarginal) else vars(marginal)
+    names = {"type", "distribution"}
+    return {n: float(v) for n, v in dict(own).items() if v is not None and n not in names}
+
+
+def multiplied(marginal: Any, factor: float) -> Any:
+    """Return the marginal of values times a factor."""
+    own = _all_parameters(marginal)
+    return with_parameters(marginal, {n: factor * own[n] for n in own.keys() & SCALED})
 
 
 def with_parameters(marginal: Any, parameters: Mapping[str, float]) -> Any:
@@ -239,7 +280,7 @@ def _beta(family: Family, values: Array, quiet: Array, noise: float, start: Any)
     if start is None:
         ends = ends_at(1.1 * room[name] for name in sides)
         u = (quiet - ends["low"]) / (ends["high"] - ends["low"])
-        total = max(u.mean() * (1.0 - u.mean()) / u.var() - 1.0, 0.2)
+        total = max(u.mean() * (1.0 - u.mean()) / u.var() - 1.0, LEAST_TOTAL)
         start = Beta(alpha=total * u.mean(), beta=total * (1.0 - u.mean()), **ends)
     # Below 1 a shape makes the likelihood grow without bound as its bound nears a value.
     limits = [(math.log(0.05) if end in fixed else 0.0, 12.0) for end in ("low", "high")]
@@ -275,9 +316,16 @@ def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], 
 
 
 def mean_log_likelihood(marginal: Any, values: Array, noise: float) -> float:
-    """Return the mean log likelihood of values in bins with noise, without the bin width."""
+    """Return the mean logarithm of the density of values that carry noise.
+
+    With noise it is the probability of a bin over its width. A family to which a value is all but
+    impossible has a low one, and not none.
+    """
+    if noise**2 <= NEGLIGIBLE * values.var():
+        least = math.log(LEAST / float(np.ptp(values)))
+        return float(np.maximum(marginal.distribution.logpdf(values), least).mean())
     counts, at, probabilities = _bins(values, noise)
-    expected = probabilities(marginal.distribution.cdf(at))
+    expected = probabilities(marginal.distribution.cdf(at)) * (BINS / float(np.ptp(values)))
     return float(counts @ np.log(expected) / values.size)
 
 

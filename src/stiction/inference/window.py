@@ -65,6 +65,10 @@ class RecordWindow:
         )
         # Orthonormal polynomials of the trend, (points, terms).
         self.basis = _polynomials(measured, degree)
+        ones = np.ones(int(measured.sum()))
+        self.pairs = self._pairs(ones)  # of measured points, by their lag
+        trend = np.zeros_like(self.pairs)
+        self._of_trend = sum((self._pairs(one) for one in self.basis.T[1:]), start=trend)
         tapers = np.ix_(*[tukey(2 * n + 1, TAPERED)[1::2] for n in self.shape])  # nowhere zero
         self.taper = np.prod(np.broadcast_arrays(measured, *tapers), axis=0)
         self.taper /= np.sqrt(np.sum(self.taper**2))
@@ -83,6 +87,13 @@ class RecordWindow:
         self.weights = np.ones(self.white.shape)
         self.weights[..., [0, -1] if self.shape[-1] % 2 == 0 else 0] = 0.5
         self.weights[(0,) * unit.ndim] = 0.0
+
+    def _pairs(self, weights: Array) -> Array:
+        """Sum of w_i w_j over pairs of measured points at each lag, for weights (points,)."""
+        field, lags = np.zeros(self.shape), tuple(2 * n for n in self.shape)
+        field[self.measured] = weights
+        result: Array = fft.irfftn(np.abs(fft.rfftn(field, lags)) ** 2, lags)
+        return result
 
     def _autocorrelation(self, wave: NDArray[np.int64]) -> Array:
         """a_k at all lags, flat."""
@@ -158,9 +169,11 @@ class RecordWindow:
 
     def variance_of_mean(self, covariance: Array) -> float:
         """Return the variance of the mean of the measured values from the covariance."""
-        lags = self._spread.shape
-        pairs = fft.irfftn(np.abs(fft.rfftn(self.measured, lags)) ** 2, lags)
-        return float(np.sum(pairs * covariance) / np.sum(self.measured) ** 2)
+        return float(np.sum(self.pairs * covariance) / np.sum(self.measured) ** 2)
+
+    def taken_by_trend(self, covariance: Array) -> float:
+        """Return the expected sum of squares that `without_trend` takes from the field."""
+        return float(np.sum(self._of_trend * covariance))
 
     def correlation(self, power: Array) -> Array:
         """Return the correlation of z at all lags."""
