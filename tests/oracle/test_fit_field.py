@@ -9,8 +9,11 @@ import scipy.stats
 from scipy.stats import binom
 
 import stiction as st
-from stiction.inference.between import scatter_between
-from stiction.inference.marginal_fit import family_of
+from stiction.inference.between import likely_between, scatter_between
+from stiction.inference.bootstrap import FitSetting, estimate
+from stiction.inference.marginal_fit import family_of, mean_log_likelihood
+from stiction.inference.whittle import SpectrumFamily
+from stiction.inference.window import RecordWindow
 
 VALUES = st.Lognormal(mean=1e6, cv=0.25, low=0.2e6).distribution.rvs(800, random_state=1)
 SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in ("weibull", "gamma")]
@@ -59,6 +62,39 @@ def test_noise_is_taken_out_of_a_marginal(name):
     assert again.distribution.std() == pytest.approx(found.distribution.std(), rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    "given",
+    ["gamma", {"type": "beta", "low": 1e5}, {"type": "beta", "low": 1e5, "high": 4e6}, "norm"],
+)
+def test_a_wider_marginal_keeps_its_mean_and_what_is_fixed(given):
+    family = family_of(given)
+    found = family.fit(VALUES)
+    wider = family.widened(found, 1.2)
+    assert wider.distribution.mean() == pytest.approx(found.distribution.mean(), rel=1e-9)
+    assert wider.distribution.std() == pytest.approx(1.2 * found.distribution.std(), rel=1e-9)
+    for name, value in family.fixed.items():
+        assert getattr(wider, name) == value
+
+
+@pytest.mark.parametrize("noise", [0.0, 8e4])
+def test_the_likelihood_is_that_of_values(noise):
+    """The density of the sum with the noise by quadrature, whatever the bins."""
+    marginal = st.Gamma(mean=1e6, cv=0.25)
+    values = VALUES + noise * np.random.default_rng(2).standard_normal(VALUES.size)
+    density = marginal.distribution.pdf
+    if noise:
+        e = np.linspace(-6.0, 6.0, 2001) * noise
+        kernel = scipy.stats.norm.pdf(e, scale=noise) * (e[1] - e[0])
+        exact = np.log(density(values[:, None] - e) @ kernel).mean()
+    else:
+        exact = marginal.distribution.logpdf(values).mean()
+    assert mean_log_likelihood(marginal, values, noise) == pytest.approx(exact, abs=1e-3)
+    # A value that the family all but excludes weighs much, but leaves a number.
+    bounded = st.Beta(alpha=2.0, beta=3.0, low=0.0, high=4e6)
+    worse = mean_log_likelihood(bounded, np.append(values, 9e6), noise)
+    assert -10.0 < worse - mean_log_likelihood(bounded, values, noise) < -0.02
+
+
 def test_correlation_length_against_a_variogram():
     """GSTools fits the same record by least squares on a variogram: two estimates, one truth."""
     # Both take the spectrum as whole.
@@ -98,6 +134,22 @@ def test_intervals_hold_the_truth_whatever_the_number_of_records(records, cv):
     assert binom.sf(held, 400, 0.9) > 1e-3
     if records == 20:
         assert np.median([one[0] for one in found]) == pytest.approx(cv, rel=0.25)
+
+
+@pytest.mark.parametrize("records", [2, 3, 7])
+def test_likely_scatter_and_mean_predict_another_specimen(records):
+    """Whatever the number of records: the next level is as likely in each fifth of its forecast."""
+    rng, held, within = np.random.default_rng(records), [], np.full(records, 0.04**2)
+    for _ in range(200):
+        levels = 13.8 + np.hypot(0.1, 0.04) * rng.standard_normal(records + 1)
+        found, means = likely_between(levels[:-1], within, 25, rng)
+        assert found.max() <= np.log(2.0) * (1.0 + 1e-9)  # a coefficient of variation of 1
+        forecast = means - 0.5 * (found + 0.04**2)
+        forecast += np.sqrt(found + 0.04**2) * rng.standard_normal(25)
+        held.append((forecast < levels[-1]).mean())
+    # What is cut off beyond a cv of 1 would make forecasts of two records wider still.
+    counts = np.histogram(held, [0.0, 0.2, 0.4, 0.6, 0.8, 1.01])[0]
+    assert scipy.stats.chisquare(counts).pvalue > 1e-3, counts
 
 
 PIECE = st.Interface(length=0.05, nodes=64)
@@ -153,6 +205,71 @@ def test_a_factor_between_short_records_leaves_the_field_as_it_is():
     spread = np.log1p(0.3**2) ** 0.5
     assert logarithms.std() == pytest.approx(spread, rel=0.15)  # four errors of 400
     assert logarithms.mean() == pytest.approx(0.0, abs=4.0 * spread / 20)
+
+
+def test_families_are_compared_by_one_number_of_independent_values():
+    """Scores by hand, from the sum over all pairs of points; `interfaces` draws by weights."""
+    spectrum = st.PowerLawSpectrum(1e-2, exponent=2.0)
+    field = st.RandomField(st.Weibull(mean=1e6, cv=0.25), spectrum, mean_mode=True)
+    line = st.Interface(length=21 * 0.05, nodes=21 * 64)
+    rows = field.sample(line, samples=3, seed=2)[:, :64]
+    several = SIMPLE | {
+        "marginal": ["lognormal", "gamma", "weibull", {"type": "beta", "low": 0.0}]
+    }
+    fit = st.fit_field(rows, PIECE, **several)
+    [window] = set(fit._estimate.setting.windows)
+    # By the best family's own correlation, which is next to that of any other.
+    rho = fit._estimate.model.correlation(window)[:64]
+    places = np.arange(64)
+    independent = 3 * 64**2 / np.sum(rho[abs(places[:, None] - places)] ** 3)
+    assert fit.independent == pytest.approx(independent, rel=0.01)
+    scores = {}
+    for given, parameters in zip(several["marginal"], (2, 2, 2, 3), strict=True):
+        family = family_of(given)
+        likelihood = family.fit(rows.ravel()).distribution.logpdf(rows.ravel()).mean()
+        scores[family.label] = fit.independent * likelihood - parameters
+    best = max(scores.values())
+    found = {name: one.score for name, one in fit.families.items()}
+    assert found == pytest.approx({n: s - best for n, s in scores.items()}, abs=0.01)
+    assert min(found.values()) < -1.0 < max(found.values()) == 0.0 == next(iter(found.values()))
+    assert fit.tied == tuple(name for name, score in found.items() if score > -2.0)
+    weights = {name: one.weight for name, one in fit.families.items() if one.weight}
+    assert sum(weights.values()) == pytest.approx(1.0)
+    assert len(weights) > len(fit.tied) > 1
+    assert f"{fit.tied[1]} {found[fit.tied[1]]:.1f}" in str(fit)
+    assert f"({', '.join(fit.tied)} are not told apart)" in str(fit)
+    types = [one.strength.marginal.type for one in fit.interfaces(400, seed=3)]
+    for name, weight in weights.items():
+        assert types.count(name.partition(",")[0]) == pytest.approx(400 * weight, abs=1.0)
+
+
+def test_what_mean_and_trend_take_is_given_back():
+    """By traces of matrices; records of ten lengths show two thirds of the variance."""
+    gaps = np.ones(64, dtype=bool)
+    gaps[[3, 4, 50]] = False
+    windows = [RecordWindow((0.05 / 64,), kept, 3) for kept in (np.ones(64, dtype=bool), gaps)]
+    spectrum = st.PowerLawSpectrum(5e-3, exponent=2.0)
+    rows = records_of(spectrum, 5, 16)
+    family = SpectrumFamily("power_law", {"exponent": 2.0}, 1.0, 0.0, (1e-3, 0.1))
+    setting = FitSetting(
+        tuple(windows[i % 2] for i in range(16)), family_of("lognormal"), family
+    )
+    used = [w.without_trend(r[w.measured]) for r, w in zip(rows, setting.windows, strict=True)]
+    found = estimate(used, setting)
+    sizes = [row.size for row in used]
+    total = np.zeros((sum(sizes),) * 2)
+    keep, ends = np.zeros_like(total), np.cumsum([0, *sizes])
+    for window, start, end in zip(setting.windows, ends, ends[1:], strict=False):
+        places = np.flatnonzero(window.measured)
+        own = np.s_[start:end, start:end]
+        total[own] = found.model.correlation(window)[abs(places[:, None] - places)]
+        keep[own] = np.eye(end - start) - window.basis @ window.basis.T + 1.0 / (end - start)
+    centre = np.eye(len(total)) - 1.0 / len(total)
+    share = np.sum((centre @ keep) * (keep @ total).T) / len(total)
+    assert 0.5 < share < 0.85
+    wider = found.marginal.cv / found.own.cv
+    assert wider == pytest.approx(share**-0.5, rel=1e-6)
+    assert found.parameters["standard_deviation"] == pytest.approx(0.2e6, rel=0.12)
 
 
 def test_a_truncation_that_is_given_is_where_the_spectrum_ends():

@@ -228,6 +228,28 @@ def test_doubtful_records_are_warned_of(words):
         fitted(record, **options)
 
 
+@pytest.mark.parametrize("records", [2, 3])
+@pytest.mark.filterwarnings("error::stiction.errors.UnitWarning")
+def test_two_specimens_leave_a_wide_but_finite_scatter(records):
+    rows = [
+        labelled(VALUES[i * 100 : i * 100 + 100] * f, PIECE.x[:100])
+        for i, f in enumerate((1.0, 1.6, 0.8)[:records])
+    ]
+    with pytest.warns(
+        st.AccuracyWarning, match=f"{records} specimens leave .* measure at least 5"
+    ):
+        fit = fitted(rows, between=True)
+    low, high = fit.interval["between"]
+    assert 0.0 <= low < fit.parameters["between"] < high <= 1.0
+    members = fit.interfaces(200, seed=4)
+    cvs = np.array([one.between["strength"].cv for one in members])
+    assert np.quantile(cvs, 0.05) < fit.parameters["between"] < np.quantile(cvs, 0.9)
+    assert cvs.max() <= 1.0 + 1e-9
+    # A mean of two scatters as a specimen does.
+    means = np.log([one.strength.mean for one in members])
+    assert means.std() > 0.5 * np.log1p(np.median(cvs) ** 2) ** 0.5
+
+
 def test_no_noise_found_is_not_no_noise():
     """Of this rough record none is the best estimate; the noise was a tenth of the deviation.
 

@@ -50,6 +50,7 @@ TOLD = 2.0
 DRAWN = 5.0
 """Difference of scores from which a family is not drawn any more: weights below 1 %."""
 FEW_SPECIMENS = 5
+"""Specimens below which the scatter between them decides what is rare."""
 LEAST_SCATTER = 1e-8
 """Variance of the logarithm of a factor that stands for none."""
 STRESSES = ("mean", "standard_deviation", "noise", "low", "high", "loc", "scale")
@@ -100,8 +101,8 @@ class FieldFit:
         measurement noise; and ``between``, the coefficient of variation between specimens.
     interval : dict of str to (float, float)
         Bootstrap interval of each parameter. The interval of the noise may begin at zero;
-        those of bounds of the marginal end outside the values; those of an exponent and of
-        an anisotropy end at the searched ranges, 0.65 to 16 and 0.05 to 20.
+        those of bounds of the marginal end outside the values; those of an exponent, of an
+        anisotropy and of `between` end at the searched ranges, 0.65 to 16, 0.05 to 20, 0 to 1.
     confidence : float
         Confidence level of the intervals.
     repetitions : tuple of RandomField
@@ -285,9 +286,9 @@ def fit_field(
         as ``{"type": "power_law", "exponent": 4.0}``. Its end is seen in the record only if
         ``"truncation"`` or ``"power_kept"`` is given; the field has the usual one otherwise.
     detrend : int
-        Degree of the polynomial trend that is removed, 0 to 3. The mean is always kept. A trend
-        takes scatter with it, which the interval includes and the estimate does not: of a record of
-        30 correlation lengths 4, 7 and 13 % of the standard deviation with degrees 0, 1 and 3.
+        Degree of the polynomial trend that is removed, 0 to 3. The mean is always kept. The
+        scatter that mean and trend take with them on average is added to the estimate (not to
+        families of `scipy.stats` whose loc or scale is fixed).
     noise : bool or float
         Whether to estimate white, normal measurement noise along with the field; or its
         standard deviation, if known (SI).
@@ -295,7 +296,8 @@ def fit_field(
         Ratio of the correlation lengths of maps along y and x. False: 1; True: estimated.
     between : bool
         Whether records come from different specimens, each with its own factor. The coefficient
-        of variation ``between`` of this factor is then estimated, for `RandomInterface`.
+        of variation ``between`` of this factor, at most 1, is then estimated, for
+        `RandomInterface`. Two to four specimens say little of it, which a warning states.
     quantity : str
         Measured quantity, for its unit: 'strength', 'normal_pressure',
         'friction_coefficient', ... The fitted field of friction coefficients has
@@ -328,7 +330,8 @@ def fit_field(
     AccuracyWarning
         If values are outliers, and for each reason in `doubts`: records hold fewer than ten
         correlation lengths, a p-value is below 1 %, the noise hides the cut-off of the
-        spectrum, or a parameter lies at the end of the range that is searched.
+        spectrum, a parameter lies at the end of the range that is searched, or fewer than five
+        specimens are to tell the scatter between them.
 
     Notes
     -----
@@ -337,6 +340,11 @@ def fit_field(
     taper, gaps, detrending, aliasing, and a truncation of the spectrum if one is given
     (Sykulski et al., 2019; Guillaumin et al., 2022). Correlations of values follow from
     those of the Gaussian field z by Hermite expansion (Grigoriu, 1995).
+
+    Families are compared by Akaike's criterion for one number of independent values. Fitted to the
+    same values, they agree in about mean and variance, so that the logarithm of the ratio of their
+    densities has Hermite orders of z from 3 on: its sum over N values of correlations rho_ij has
+    mean and variance of that over N^2/sum rho_ij^3 independent ones.
 
     Intervals come from a studentised bootstrap (Davison and Hinkley, 1997, section 5.2), their
     upper and lower ends from fields of longer and shorter correlation (Carpenter, 1999).
@@ -394,6 +402,15 @@ def fit_field(
         for name in {"mean", "marginal.mean"} & parameters.keys():  # of other specimens, too
             ends[name] = parameters[name] * math.exp(-width), parameters[name] * math.exp(width)
         parameters["between"] = cv
+    doubts = _doubts(found, p_values, failed)
+    if between and len(rows) < FEW_SPECIMENS:
+        low, high = ends["between"]
+        doubts.append(
+            f"{len(rows)} specimens leave the coefficient of variation between them at {low:.2g} to"
+            f" {high:.2g}, which decides small probabilities under `interfaces`: measure at least"
+            f" {FEW_SPECIMENS}, or state it, as in RandomInterface(strength=fit.field,"
+            " between={'strength': Lognormal(mean=1.0, cv=0.1)})"
+        )
     fit = FieldFit(
         field=found.field(quantity),
         parameters=parameters,
@@ -406,7 +423,7 @@ def fit_field(
         lengths_held=_lengths_held(found),
         missing=(points - sum(row.size for row in rows), points),
         quantity=quantity,
-        doubts=tuple(_doubts(found, p_values, failed)),
+        doubts=tuple(doubts),
         _repeated=[repeated[0], *drawn],
         _rows=rows,
         _levels=levels,
