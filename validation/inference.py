@@ -117,8 +117,8 @@ def ranks(campaigns, tests=None, seed=0, samples=None, points=POINTS, case=None)
     tests, area = tests or case.tests, case.problem.area if case.unit == "N" else 1.0
     prior = make_prior(case.problem, case.random, case.prior)
     simulated = make_likelihood(
-        prior, method=case.method, lengths=case.lengths, error=case.error / area, samples=samples,
-        seed=0, variable=case.variable, meter=SILENT,
+        prior, method=case.method, lengths=case.lengths, error=case.error, samples=samples,
+        seed=0, variable="critical_force" if case.unit == "N" else case.variable, meter=SILENT,
     )  # fmt: skip
     rng = np.random.default_rng(seed)
     truth = rng.random((campaigns, prior.dimension))
@@ -132,8 +132,7 @@ def ranks(campaigns, tests=None, seed=0, samples=None, points=POINTS, case=None)
                 variable=case.variable, meter=SILENT,
             )  # fmt: skip
             read = area * onsets[0] + case.error * rng.standard_normal(tests)
-            measured = make_peaks(read, case.unit)
-            peaks += measured.in_stress(case.problem.interface.extent, area, 0.0)[0].values
+            peaks += make_peaks(read, case.unit).values
         likelihood = simulated.of(peaks)
         grid = grid_of(likelihood, likelihood.box, points=points)
         draws = grid.draws(DRAWS, i)

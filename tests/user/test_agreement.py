@@ -35,6 +35,9 @@ def test_p_values_are_those_of_all_permutations():
     here = np.array(distance(np.arange(3)))
     exact = np.mean(all_of_them >= here * (1 - 1e-9), axis=0)
     found = st.statistics.agreement(predicted(others), own, replicates=8000)
+    ((at, share),) = found.predicted
+    assert share[[0, 3, -1]] == pytest.approx([1 / 6, 3 / 6, 1.0])  # up to 1, 4 and 9
+    assert np.interp(6.0, at, share) == pytest.approx(4.5 / 6)  # 4 of 6 up to 5, and 5 up to 7
     assert (found.cramer_von_mises, found.largest_deviation) == pytest.approx(tuple(here))
     error = np.sqrt(exact * (1.0 - exact) / 8000)
     assert np.all(np.abs(np.array(list(found.p_values.values())) - exact) < 4.0 * error + 2e-4)
@@ -61,6 +64,9 @@ def test_a_wrong_prediction_is_seen_in_the_unit_of_the_peaks():
     assert found.p_values == pytest.approx(agrees.p_values, abs=0.01)  # ties by round-off
     assert st.plot.agreement(found).get_xlabel() == "peak (N)"
     for words, call in {
+        "about 1.02e+03 Pa, predictions 7.08e+05 ... unit=": lambda: st.statistics.agreement(
+            predicted(right), [1015.0, 998.0, 1031.0]
+        ),
         "has no critical_force": lambda: st.statistics.agreement(
             predicted(right), PEAKS, unit="N"
         ),
@@ -81,6 +87,7 @@ def posterior():
 
 def test_forces_need_an_area(posterior):
     refuses("need the area", lambda: st.statistics.agreement(posterior, PEAKS, unit="N"))
+    refuses("0.71 Pa ... unit=", lambda: st.statistics.agreement(posterior, PEAKS / 1e6))
 
 
 def test_what_was_fitted_to_the_peaks_lies_nearer_than_chance(posterior):

@@ -7,7 +7,7 @@ each campaign that is drawn from it is fitted as well (a bootstrap of the poster
 check, whose own p-values crowd around one half; Robins, van der Vaart and Ventura, 2000).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ import xarray as xr
 from stiction.arrays import Array
 from stiction.errors import InputError, warn_accuracy
 from stiction.inference.grid import grid_of
+from stiction.inference.likelihood import area_of, variable_of
 from stiction.inference.peaks import Peaks, factor_of, make_peaks
 from stiction.inference.posterior import Posterior
 from stiction.load import NotNegative
@@ -113,7 +114,7 @@ def agreement(
     ------
     InputError
         If the prediction lacks the quantity that was measured, is swept, or is of one kind of
-        specimen where several were tested.
+        specimen where several were tested; or peaks are fifty times those predicted, or a fiftieth.
 
     Warns
     -----
@@ -144,8 +145,7 @@ def agreement(
         if load_cell_error:
             raise InputError("load_cell_error: the posterior has its own; leave it out")
         measured = prediction.peaks if peaks is None else make_peaks(peaks, unit)
-        problem, _ = prediction.at(0)
-        measured, _ = measured.in_stress(problem.interface.extent, problem.area, 0.0)
+        measured = _as_fitted(prediction, measured)
         return _with_posterior(prediction, measured, replicates, rng)
     if peaks is None:
         raise InputError("peaks: are needed beside a dataset")
@@ -154,6 +154,24 @@ def agreement(
     factor = 1.0 if isinstance(peaks, Peaks) else factor_of(unit)
     values = values + factor * load_cell_error * rng.standard_normal(values.size)
     return _with_sample(values, measured, replicates, rng)
+
+
+def _as_fitted(posterior: Posterior, measured: Peaks) -> Peaks:
+    """Return peaks as forces, or stresses, as those are that the posterior was fitted to."""
+    if measured.coefficients or posterior.peaks.coefficients:
+        return measured
+    if measured.forces == posterior.peaks.forces:
+        return measured
+    prior, method = posterior.prior, posterior.likelihood.method
+    variable_of(prior, "N")
+    areas = [area_of(prior, method, length) for length in measured.lengths]
+    if any(area.powers.any() for area in areas):
+        names = [n for n, p in zip(prior.names, areas[0].powers, strict=True) if p]
+        raise InputError(
+            f"peaks: are in {measured.unit}, those of the posterior in {posterior.peaks.unit}, and"
+            f" the area between the two is uncertain ({', '.join(names)}); give both in one unit"
+        )
+    return measured.over([area.unit for area in areas])
 
 
 def _values(prediction: xr.Dataset, measured: Peaks) -> Array:
@@ -181,6 +199,7 @@ def _values(prediction: xr.Dataset, measured: Peaks) -> Array:
 def _with_sample(values: Array, measured: Peaks, replicates: int, rng: Any) -> Agreement:
     """Permutation test: which of all values are the measured ones?"""
     (own,) = measured.values
+    measured.refuse_far([values])
     at, place, counts = np.unique(
         np.concatenate([own, values]), return_inverse=True, return_counts=True
     )
@@ -205,6 +224,8 @@ def _with_posterior(
         fitted.lengths
     ):
         raise InputError(f"peaks: the posterior predicts {fitted}, got {measured}")
+    kinds = [fitted.lengths.index(length) for length in measured.lengths]
+    measured.refuse_far([posterior.predicted[kind] for kind in kinds])
     again = measured.lengths == fitted.lengths and all(
         map(np.array_equal, measured.values, fitted.values)
     )
@@ -221,8 +242,8 @@ def _with_posterior(
     weight = np.exp((1.0 - power) * (value - value.max()))
     weight /= weight.sum()
     laws = [
-        _law(posterior, fitted.lengths.index(length), u, peaks)
-        for length, peaks in zip(measured.lengths, measured.values, strict=True)
+        _law(posterior, kind, u, peaks)
+        for kind, peaks in zip(kinds, measured.values, strict=True)
     ]
     found, mixed = np.empty((replicates + 1, 2)), weight
     for row in reversed(range(replicates + 1)):  # the measured campaign last
@@ -272,8 +293,7 @@ def _law(posterior: Posterior, kind: int, u: Array, peaks: Array) -> _Law:
     every = np.concatenate([posterior.predicted[kind], peaks])
     margin = MARGIN * float(np.ptp(every))
     at = np.linspace(every.min() - margin, every.max() + margin, VALUES)
-    known = [posterior.likelihood.densities[kind]]
-    density = np.exp(replace(posterior.likelihood, densities=known, peaks=[at]).parts(u))
+    density = np.exp(posterior.likelihood.of([at], [kind]).parts(u))
     between = 0.5 * (density[:, 1:] + density[:, :-1])
     share = np.cumsum(np.pad(between, ((0, 0), (1, 0))), axis=1)
     return _Law(at, density, share / np.maximum(share[:, -1:], 1e-300))

@@ -1,7 +1,6 @@
 """Designs of tests: the information expected from each before any test is made."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -11,11 +10,12 @@ import xarray as xr
 from stiction.arrays import Array
 from stiction.errors import InputError, unknown_name
 from stiction.inference.grid import grid_of
-from stiction.inference.likelihood import Likelihood, make_likelihood
+from stiction.inference.likelihood import Likelihood, make_likelihood, variable_of
+from stiction.inference.peaks import factor_of
 from stiction.inference.prior import make_prior
 from stiction.load import NotNegative
 from stiction.methods import MethodObject
-from stiction.model import Names, Progress, at_least, check, checked, is_whole
+from stiction.model import Count, Names, Progress, at_least, check, checked, is_whole
 from stiction.problem import Problem
 from stiction.progress import Meter
 from stiction.random.fields import RandomField, RandomInterface
@@ -24,6 +24,8 @@ from stiction.variables import Variable
 
 POINTS = 8_000
 """Number of points of the grid of each posterior."""
+TINY = 1e-12
+"""Width of a box, as a share of the prior, in which rounding hides the posterior."""
 VARIABLES = {
     "information": "expected information about a parameter, nats",
     "standard_error": "standard error of the information, nats",
@@ -39,23 +41,27 @@ def design_of_tests(
     designs: dict[str, Any],
     method: MethodObject,
     load_cell_error: NotNegative = 0.0,
+    unit: str = "Pa",
     repetitions: at_least(10) = 60,  # type: ignore[valid-type]
     samples: at_least(100) | None = None,  # type: ignore[valid-type]
     seed: at_least(0) = 0,  # type: ignore[valid-type]
+    workers: Count | None = None,
     progress: Progress = True,
 ) -> xr.Dataset:
     """Estimate the information that each design of tests will give on each parameter.
 
     Parameters
     ----------
-    problem, random, prior, method, samples, seed, progress
+    problem, random, prior, method, samples, seed, workers, progress
         As in `infer`.
     designs : mapping
         Designs by name: a number of tests, a mapping of lengths (m) to numbers of tests, or
         a table ``{"tests": ..., "known": [...]}`` in which ``known`` lists parameters of
         the prior that are known from elsewhere, such as a marginal that was measured.
     load_cell_error : float
-        Pa.
+        Standard deviation of the error of a peak, in `unit`.
+    unit : str
+        Unit of what the tests measure, as in `infer`: "N" where the prior varies the area.
     repetitions : int
         Simulated campaigns of each design.
 
@@ -95,18 +101,19 @@ def design_of_tests(
     True
     """
     parameters = make_prior(problem, random, prior)
+    variable = variable_of(parameters, unit)
     plans = _plans(designs, parameters.names)
     lengths = list(dict.fromkeys(length for tests, _ in plans for length in tests))
     with Meter("design of tests", show=progress) as meter:
         simulated = make_likelihood(
-            parameters, method=method, lengths=lengths, error=load_cell_error, samples=samples,
-            seed=seed, variable="critical_stress", meter=meter,
+            parameters, method=method, lengths=lengths, error=load_cell_error * factor_of(unit),
+            samples=samples, seed=seed, variable=variable, workers=workers, meter=meter,
         )  # fmt: skip
         meter.stage("simulated campaigns", repetitions * len(plans))
         rows = []
         for tests, free in plans:
             kinds = [lengths.index(length) for length in tests]
-            own = replace(simulated, densities=[simulated.densities[kind] for kind in kinds])
+            own = simulated.of((), kinds)
             rows.append(_expected(own, list(tests.values()), free, repetitions, seed, meter))
     dims = ("design", "parameter")
     variables = {name: Variable("1", text, dims) for name, text in VARIABLES.items()}
@@ -166,13 +173,16 @@ def _expected(
         likelihood = simulated.of(peaks)
         box = simulated.box[:, free]
         given = partial(_given_the_rest, likelihood, truth, free)
-        # A posterior may fall between the points of a coarse grid.
-        grid = grid_of(given, box, POINTS) or grid_of(given, box, 50 * POINTS)
+        while (grid := grid_of(given, box, POINTS)) is None and np.ptp(
+            box, axis=0
+        ).min() > TINY:
+            # The posterior lies between the points of a coarse grid, and the truth in it.
+            box = 0.75 * truth[free] + 0.25 * box
         if grid is not None:
             gains[row, free] = [grid.information(place) for place in range(len(free))]
         meter.advance()
-    error = gains.std(axis=0) / np.sqrt(repetitions)
-    return np.stack([gains.mean(axis=0), error])
+    found = gains[np.isfinite(gains).any(axis=1)]
+    return np.stack([found.mean(axis=0), found.std(axis=0) / np.sqrt(len(found))])
 
 
 def _given_the_rest(likelihood: Likelihood, truth: Array, free: list[int], v: Array) -> Array:

@@ -17,13 +17,14 @@ from stiction.inference.likelihood import (
     experiments_at,
     make_likelihood,
     out_of_reach,
+    variable_of,
 )
 from stiction.inference.peaks import Peaks, factor_of, make_peaks
 from stiction.inference.posterior import Posterior
 from stiction.inference.prior import Prior, make_prior
 from stiction.load import NotNegative
 from stiction.methods import MethodObject
-from stiction.model import Progress, at_least, checked
+from stiction.model import Count, Progress, at_least, checked
 from stiction.problem import Problem
 from stiction.progress import Meter
 from stiction.random.fields import RandomField, RandomInterface
@@ -54,6 +55,7 @@ def infer(
     unit: str = "Pa",
     samples: at_least(100) | None = None,  # type: ignore[valid-type]
     seed: at_least(0) = 0,  # type: ignore[valid-type]
+    workers: Count | None = None,
     progress: Progress = True,
 ) -> Posterior:
     """Infer parameters of the random strength from the peak stresses of repeated tests.
@@ -89,7 +91,7 @@ def infer(
         equilibrium.
     seed : int
         Not negative. The same samples are used at every point, so that the likelihood is smooth.
-    progress : bool or callable
+    workers, progress
         As in `monte_carlo`.
 
     Returns
@@ -135,20 +137,14 @@ def infer(
     """
     measured = make_peaks(peaks, unit)
     parameters = make_prior(problem, random, prior)
-    pressed = problem.given_pressure is not None
-    if measured.coefficients and not (pressed or "normal_pressure" in parameters.random.names):
-        raise InputError(
-            "peaks: are coefficients of friction, which need a normal pressure: give"
-            " Load(normal_pressure=...) in Pa, or peaks as stresses with their unit"
-        )
+    variable = variable_of(parameters, measured.unit)
     error = load_cell_error * (1.0 if isinstance(peaks, Peaks) else factor_of(unit))
     if error > np.concatenate(measured.values).max():
         raise InputError(
             f"load_cell_error: {load_cell_error:g} {unit} is more than the largest peak; it is a"
             " standard deviation in the unit of the peaks"
         )
-    measured, error = measured.in_stress(problem.interface.extent, problem.area, error)
-    (own,) = experiments_at(parameters, parameters.middle[None], method)
+    (own,) = experiments_at(parameters, parameters.middle, method)
     own.problem.warn_of_units(mean_in_stress(own.problem, own.random, "strength"))
     _check_reach(parameters, method, measured, error)
     with Meter("infer", show=progress) as meter:
@@ -156,7 +152,7 @@ def infer(
         def likelihood_of(method: Any, samples: int | None, box: Array) -> Likelihood:
             return make_likelihood(
                 parameters, box, method=method, lengths=measured.lengths, error=error,
-                samples=samples, seed=seed, variable=measured.variable, meter=meter,
+                samples=samples, seed=seed, variable=variable, workers=workers, meter=meter,
             ).of(measured.values)  # fmt: skip
 
         whole = box = parameters.whole

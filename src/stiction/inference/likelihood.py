@@ -1,6 +1,7 @@
 """Likelihood of measured peaks: simulated onsets on a grid of parameters, and their densities."""
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Self
@@ -18,7 +19,9 @@ from stiction.inference.density import ERRORS, Densities, log_likelihoods, tabul
 from stiction.inference.prior import Prior
 from stiction.inference.scaling import Scaling, find_scaling
 from stiction.progress import SILENT, Meter
+from stiction.random.dotted_keys import full_key
 from stiction.random.synthesis import BLOCK
+from stiction.units import is_in
 
 NODES = {0: 1, 1: 25, 2: 11, 3: 7, 4: 5}
 """Nodes along each simulated parameter, by the number of these parameters."""
@@ -89,7 +92,7 @@ def experiments_at(
     The node spacing is that of the problem.
     """
     found = []
-    for theta in thetas:
+    for theta in np.atleast_2d(thetas):
         problem, random = prior.at(theta)
         own = problem.interface
         if length is not None and own.is_plane:
@@ -116,6 +119,7 @@ def simulate(
     first: int,
     seed: int,
     variable: str,
+    workers: int | None = None,
     meter: Meter = SILENT,
 ) -> Array:
     """Return onsets of samples first, ... of some experiments, (experiments, samples).
@@ -135,13 +139,61 @@ def simulate(
         peaks[number, start - first : start - first + count] = values[variable]
         meter.advance(count)
 
-    in_threads(work, jobs, usable_cores())
+    in_threads(work, jobs, workers or usable_cores())
     return peaks
+
+
+class Area(NamedTuple):
+    """Area of one kind of specimen, m²: a product of powers of parameters."""
+
+    unit: float  # where all of them are 1
+    powers: Array  # (parameters,)
+
+    def at(self, theta: Array) -> Array:
+        """Return the area at points (points, parameters)."""
+        return self.unit * np.prod(theta**self.powers, axis=1)
+
+
+def area_of(prior: Prior, method: Any, length: float | None) -> Area:
+    """Return the area of specimens of a length, m; None stands for the problem's own."""
+    powers, middle = np.zeros(prior.dimension), prior.middle
+    for i, name in enumerate(prior.names):
+        if full_key(name).startswith(("problem.interface.", "problem.specimen.")):
+            points = np.tile(middle, (2, 1))
+            points[:, i] = ends = prior.ends[:, i]
+            powers[i] = np.log(np.divide(*_areas(prior, points, method, length)))
+            powers[i] = round(powers[i] / np.log(ends[0] / ends[1]), 9) if powers[i] else 0.0
+    (area,) = _areas(prior, middle, method, length)
+    return Area(float(area / np.prod(middle**powers)), powers)
+
+
+def _areas(prior: Prior, points: Array, method: Any, length: float | None) -> list[Any]:
+    return [own.problem.area for own in experiments_at(prior, points, method, length)]
+
+
+def variable_of(prior: Prior, unit: str) -> str:
+    """Return the name of what tests measure in a unit, if the problem says enough for it."""
+    problem, random = prior.at(prior.middle)
+    if is_in(unit, "N"):
+        if problem.area is None:
+            raise InputError(
+                "peaks: are forces, which need the area of the interface: give"
+                " Blocks(thickness=...), or Interface(width=...) of a line"
+            )
+        return "critical_force"
+    if not is_in(unit, "1"):
+        return "critical_stress"
+    if problem.given_pressure is None and "normal_pressure" not in random.names:
+        raise InputError(
+            "peaks: are coefficients of friction, which need a normal pressure: give"
+            " Load(normal_pressure=...) in Pa, or peaks as stresses with their unit"
+        )
+    return "friction_coefficient"
 
 
 @dataclass(frozen=True, eq=False)
 class Likelihood:
-    """Simulated onsets, in the unit of the peaks, and the likelihood of measured peaks."""
+    """Simulated onsets, and the likelihood of measured peaks; forces are onsets times areas."""
 
     prior: Prior
     method: Any
@@ -149,20 +201,28 @@ class Likelihood:
     axes: tuple[Axis, ...]  # of the parameters that are simulated
     error: float  # standard deviation of the load cell
     densities: Sequence[Densities]  # for every kind of specimen
+    areas: Sequence[Area]  # of every kind, if peaks are forces; else of 1
     samples: float  # independent ones that these are worth
     box: Array  # (2, parameters): corners, as u, between which onsets are simulated
     peaks: Sequence[Array] = ()
 
-    def of(self, peaks: Sequence[Array]) -> Self:
-        """Return the same of other peaks."""
-        return replace(self, peaks=peaks)
+    def of(self, peaks: Sequence[Array], kinds: Sequence[int] | None = None) -> Self:
+        """Return the same of other peaks, of some kinds of specimens if not of all."""
+        kinds = range(len(self.densities)) if kinds is None else kinds
+        densities, areas = [self.densities[k] for k in kinds], [self.areas[k] for k in kinds]
+        return replace(self, peaks=peaks, densities=densities, areas=areas)
+
+    def scales(self, kind: int, theta: Array) -> Array:
+        """Return by what simulated onsets are shifted and stretched, (2, points)."""
+        return self.scaling.of(theta) * self.areas[kind].at(theta)
 
     def parts(self, u: Array) -> Array:
         """Return logarithms of the likelihood of each test at points u, (points, tests)."""
         theta, parts = self.prior.theta(u), []
-        (index, weight), scales = corners(self.axes, theta), self.scaling.of(theta)
-        for known, peaks in zip(self.densities, self.peaks, strict=True):
-            of_v, out = known.between(index, weight), np.empty((u.shape[0], peaks.size))
+        index, weight = corners(self.axes, theta)
+        for kind, (known, peaks) in enumerate(zip(self.densities, self.peaks, strict=True)):
+            of_v, scales = known.between(index, weight), self.scales(kind, theta)
+            out = np.empty((u.shape[0], peaks.size))
             log_likelihoods(known.table, index, weight, of_v, scales, self.error, peaks, out)
             parts.append(out)
         return np.concatenate(parts, axis=1)
@@ -178,12 +238,12 @@ class Likelihood:
             result[inside] = self.parts(u[inside]).sum(axis=1)
         return result
 
-    def predicted(self, number: int, u: Array, seed: int) -> Array:
-        """Draw a peak of specimen `number` at each of some points u (points, parameters)."""
-        rng = np.random.default_rng([seed, 1])
+    def predicted(self, kind: int, u: Array, seed: int) -> Array:
+        """Draw a peak of a kind of specimen at each of some points u (points, parameters)."""
+        rng = np.random.default_rng([seed, 1, kind])
         theta = self.prior.theta(u)
-        shift, stretch = self.scaling.of(theta)
-        known = self.densities[number]
+        shift, stretch = self.scales(kind, theta)
+        known = self.densities[kind]
         index, weight = corners(self.axes, theta)
         corner = (weight.cumsum(axis=1) < rng.random((u.shape[0], 1))).sum(axis=1)
         node = index[np.arange(u.shape[0]), np.minimum(corner, index.shape[1] - 1)]
@@ -197,9 +257,9 @@ class Likelihood:
         ends = self.prior.theta(self.box).T
         scaled = [Axis(i, ends[i], np.positive) for i in self.scaling.keys]
         points = nodes_of([*self.axes, *scaled], self.scaling.reference)
-        shift, stretch = self.scaling.of(points)
         texts = []
-        for known, peaks in zip(self.densities, self.peaks, strict=True):
+        for kind, (known, peaks) in enumerate(zip(self.densities, self.peaks, strict=True)):
+            shift, stretch = self.scales(kind, points)
             room = BEYOND * known.onsets.std(axis=1)
             lowest = np.maximum(known.onsets.min(axis=1) - room, known.bound)
             reach = np.stack([lowest, known.onsets.max(axis=1) + room])
@@ -225,7 +285,8 @@ def out_of_reach(
         f"peaks: {far.sum()} of {far.size} are out of reach, such as {value:g}, which lies"
         f" {'below' if value < low else 'above'} all that the prior can produce, {low:g} to"
         f" {high:g} (the lowest come from {lowest}, the highest come from {highest}); widen the"
-        " prior, check the unit, or leave out tests of another kind of specimen"
+        " prior, state the unit of the peaks (unit='kPa'), or leave out tests of another kind of"
+        " specimen"
     ]
 
 
@@ -239,6 +300,7 @@ def make_likelihood(
     samples: int | None,
     seed: int,
     variable: str,
+    workers: int | None = None,
     meter: Meter = SILENT,
 ) -> Likelihood:
     """Simulate the onsets that the likelihood needs.
@@ -248,6 +310,8 @@ def make_likelihood(
     part of the prior that matters, (2, parameters) as u; all of it if left out.
     """
     box = prior.whole if box is None else box
+    forces = variable == "critical_force"
+    variable = "critical_stress" if forces else variable
     scaling = find_scaling(prior, method, variable)
     axes = make_axes(prior, scaling, box)
     thetas = nodes_of(axes, scaling.reference)
@@ -260,6 +324,7 @@ def make_likelihood(
         for end in (experiments[0], experiments[-1]):
             end.random.warn_if_inaccurate(end.problem.interface)
         options: Any = {"first": number * SPECIMEN, "seed": seed, "variable": variable}
+        options["workers"] = workers
         found = simulate(experiments, samples=count, meter=meter, **options)
         if guided:
             others = [own.by(LocalCriterion()) for own in experiments]
@@ -267,7 +332,9 @@ def make_likelihood(
             found, worth = moved(found, local)
         bounds = [bounds_of(own, variable)[0] for own in experiments]
         densities.append(tabulate(found, np.array(bounds)))
-    return Likelihood(prior, method, scaling, axes, error, densities, worth, box)
+    none = Area(1.0, np.zeros(prior.dimension))
+    areas = [area_of(prior, method, length) if forces else none for length in lengths]
+    return Likelihood(prior, method, scaling, axes, error, densities, areas, worth, box)
 
 
 def moved(few: Array, many: Array) -> tuple[Array, float]:
@@ -292,6 +359,9 @@ def bounds_of(
 ) -> tuple[float, float]:
     """Return the least and greatest possible peak, but for a share that is negligible."""
     low, high = LimitState(experiment).likely_bounds(negligible)
+    if variable == "critical_force":
+        area = experiment.problem.area or math.nan
+        return low * area, high * area
     if variable != "friction_coefficient":
         return low, high
     if "normal_pressure" in experiment.random.names:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,6 +16,8 @@ from stiction.units import factor_to, is_in
 
 FEWEST = 3
 """Fewest peaks in all: of two numbers, one may be a mistake."""
+FAR = 50.0
+"""Ratio of measured and predicted peaks that no experiment explains: their unit is wrong."""
 PEAK = ("peak", "tau", "stress", "strength", "force", "friction")
 LENGTH = ("length", "specimen")
 
@@ -38,26 +40,21 @@ class Peaks(NamedTuple):
     coefficients: bool
     forces: bool = False
 
-    def in_stress(self, length: float, area: float | None, error: float) -> tuple[Peaks, float]:
-        """Return the peaks, and the error of a peak, as stresses if they are forces.
+    def over(self, areas: Sequence[float]) -> Peaks:
+        """Return forces as stresses, and stresses as forces, on areas (m²) of each kind."""
+        factors = [1.0 / area if self.forces else area for area in areas]
+        values = tuple(v * one for v, one in zip(self.values, factors, strict=True))
+        return self._replace(values=values, forces=not self.forces)
 
-        `area` (m²) is that of a specimen of `length` (m); None if it is unknown.
-        """
-        if not self.forces:
-            return self, error
-        if area is None:
-            raise InputError(
-                "peaks: are forces, which need the area of the interface: give"
-                " Blocks(thickness=...), or Interface(width=...) of a line"
-            )
-        areas = [area * (one or length) / length for one in self.lengths]
-        if error and len(areas) > 1:
-            raise InputError(
-                "load_cell_error: as a force it is another stress on each length of specimens; give"
-                " peaks and error as stresses"
-            )
-        values = tuple(v / a for v, a in zip(self.values, areas, strict=True))
-        return Peaks(self.lengths, values, False), error / areas[0]
+    def refuse_far(self, predicted: Sequence[Array]) -> None:
+        """Refuse peaks so far from those predicted of each kind that their unit must be wrong."""
+        for values, others in zip(self.values, predicted, strict=True):
+            own, other = np.median(values), np.median(others)
+            if not 1.0 / FAR < own / other < FAR:
+                raise InputError(
+                    f"peaks: are about {own:.3g} {self.unit}, predictions {other:.3g} {self.unit}:"
+                    " another unit? state it, as in unit='kPa' or unit='N'"
+                )
 
     @property
     def variable(self) -> str:

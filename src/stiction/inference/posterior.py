@@ -18,6 +18,9 @@ from stiction.random.dotted_keys import full_key
 from stiction.random.fields import RandomInterface
 from stiction.random.spectra import Share
 
+CHAINS = 4
+"""Number of chains into which independent draws are cut for ArviZ."""
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Posterior:
@@ -173,7 +176,10 @@ class Posterior:
         return tuple(self.likelihood.predicted(i, self.u, self.seed) for i in kinds)
 
     def to_arviz(self) -> Any:
-        """Return an `arviz.InferenceData`: posterior, prior, log-likelihood, prediction, data.
+        """Return posterior, prior, log-likelihood, prediction and data as ArviZ has them.
+
+        An `arviz.InferenceData`, or a `DataTree` from ArviZ 1 on. The draws are independent; they
+        are cut into four chains only because ArviZ compares chains.
 
         Raises
         ------
@@ -188,18 +194,26 @@ class Posterior:
             ) from None
         before = self.prior.theta(np.random.default_rng(self.seed).random(self.u.shape))
         measured = np.concatenate(self.peaks.values)
-        sizes = [own.size for own in self.peaks.values]
-        predicted = np.repeat(np.stack(self.predicted, axis=1), sizes, axis=1)
         name = "friction_coefficient" if self.peaks.coefficients else "peak"
-        return arviz.from_dict(
-            posterior={key: own[None] for key, own in self.draws.items()},
-            prior={key: before[None, :, i] for i, key in enumerate(self.names)},
-            log_likelihood={name: self.likelihood.parts(self.u)[None]},
-            posterior_predictive={name: predicted[None]},
-            observed_data={name: measured},
-            coords={"test": np.arange(measured.size)},
-            dims={name: ["test"]},
-        )
+        groups = {
+            "posterior": {key: _in_chains(own) for key, own in self.draws.items()},
+            "prior": {key: _in_chains(before[:, i]) for i, key in enumerate(self.names)},
+            "log_likelihood": {name: _in_chains(self.likelihood.parts(self.u))},
+            "posterior_predictive": {name: _in_chains(self._campaigns())},
+            "observed_data": {name: measured},
+        }
+        of: Any = {"coords": {"test": np.arange(measured.size)}, "dims": {name: ["test"]}}
+        if "InferenceData" in vars(arviz):  # before its version 1
+            return arviz.from_dict(**groups, **of)
+        return arviz.from_dict(groups, **of)
+
+    def _campaigns(self) -> Array:
+        """Draw as many independent tests as were made for each draw, (draws, tests)."""
+        parts = [
+            self.likelihood.predicted(kind, np.repeat(self.u, own.size, axis=0), self.seed)
+            for kind, own in enumerate(self.peaks.values)
+        ]
+        return np.concatenate([part.reshape(len(self.u), -1) for part in parts], axis=1)
 
     def __str__(self) -> str:
         width = max(map(len, self.names))
@@ -213,3 +227,8 @@ class Posterior:
             )
         lines += [f"  {note}" for note in self.notes]
         return "\n".join(lines)
+
+
+def _in_chains(values: Array) -> Array:
+    """Cut draws (draws, ...) into chains (chains, draws, ...)."""
+    return values.reshape(CHAINS, -1, *values.shape[1:])
