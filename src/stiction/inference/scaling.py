@@ -56,7 +56,9 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
     field, full = random.strength, [full_key(name) for name in prior.names]
     if not _may_scale(problem, random, method) or PRESSURE & {*full}:
         return none
-    of_area = [key for key in full if key.startswith(("problem.interface.", "problem.specimen."))]
+    of_area = [
+        key for key in full if key.startswith(("problem.interface.", "problem.specimen."))
+    ]
     if of_area and problem.load.pressing_force is not None:
         return none  # a force over an area that varies
     names, location, scale = affine_parameters(field.marginal)
