@@ -83,8 +83,10 @@ def test_a_stiff_machine_on_a_short_specimen_slides_stably():
     )
     strength = rough(soft, 5, 1, 0.02)
     free = st.onset(soft, strength, method=st.Equilibrium())
-    with pytest.warns(st.AccuracyWarning, match="slides stably"):
-        held = st.onset(stiff, strength, method=st.Equilibrium())
+    with pytest.warns(st.AccuracyWarning, match="slides stably") as caught:
+        held = st.onset(stiff, strength, method=st.Equilibrium(sensitivity=True))
+    assert not any("derivative" in str(one.message) for one in caught)
+    assert np.isnan(held.sensitivity).all()
     assert np.isnan(held.first_instability.item())
     assert np.isnan(held.critical_position.item())
     assert held.critical_stress.item() == pytest.approx(free.critical_stress.item(), rel=1e-9)
@@ -198,6 +200,25 @@ def test_fields_end_with_the_specimen():
     given = field.given(xr.DataArray([0.8e6, 1.3e6], {"x": x}, "x"), noise=10.0)
     met = given.sample(problem.interface, samples=3, seed=1)[:, [5, 40]]
     np.testing.assert_allclose(met, np.broadcast_to([0.8e6, 1.3e6], (3, 2)), rtol=1e-4)
+
+
+@pytest.mark.parametrize("name", DRIVES)
+@pytest.mark.parametrize(("mode", "residual"), [("II", 0.52e6), ("III", 0.1e6)])
+def test_sensitivity_is_that_of_the_mean_stress(name, mode, residual):
+    """By difference quotients along random directions; the path is straight, round-off is 1e-6."""
+    problem = crooked(drive=DRIVES[name], mode=mode, residual=residual)
+    strength = rough(problem, 7, 2)
+    if name == "both":  # the first of them slides back in mode III
+        strength = strength[1:]
+    change = np.random.default_rng(3).normal(size=strength.shape) * 20.0
+    found = st.onset(problem, strength, method=st.Equilibrium(sensitivity=True))
+    above, below = (
+        st.onset(problem, strength + step, method=st.Equilibrium()).first_instability.values
+        for step in (change, -change)
+    )
+    expected = 0.5 * (above - below)
+    along = (found.sensitivity.values * change).sum(axis=1)
+    np.testing.assert_allclose(along, expected, rtol=1e-6, atol=1e-6 * 20.0)
 
 
 def test_forces_travel_and_pressure():

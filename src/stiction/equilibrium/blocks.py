@@ -18,6 +18,7 @@ from stiction.equilibrium.sample import (
     Outcome,
     Sample,
     State,
+    present_pieces,
     step_to_corner,
 )
 from stiction.errors import warn_accuracy
@@ -26,6 +27,8 @@ from stiction.problem import Problem
 RUNG = 1.5
 """Ratio of successive weakening rates whose windows are tried where the rate varies."""
 MOST_RUNGS = 12
+AT_REST = 1e-6
+"""Share of the strength by which the stress at a node that slips may be off."""
 
 
 class BlockProgram(LineProgram):
@@ -57,6 +60,23 @@ class BlockProgram(LineProgram):
     def relief(self, slip: Array) -> float:
         """Return by how much slip lowers the mean stress of the interface, Pa."""
         return float(self.blocks.mean_relief(slip))
+
+    def of_stress(self, sample: Sample, state: State, y: Array) -> Array:
+        """Return the derivative of the mean stress at an instability from y, that of its drive.
+
+        Until the instability (K - W) d = D q - s on the nodes that slip; NaN if one is at rest.
+        """
+        if not self.machine:
+            return y
+        _, strength, rate = present_pieces(sample, state.slip)
+        slips, q = state.slip > 0.0, sample.profile
+        missing = state.load * q - state.stiff - strength + rate * state.slip
+        if slips.any() and np.abs(missing[slips]).max() > AT_REST * np.abs(strength).max():
+            return np.full(y.size, np.nan)
+        moved = np.zeros(y.size)  # d' of a rise of the drive
+        block = self.blocks.stiffness[np.ix_(slips, slips)] - np.diag(rate[slips])
+        moved[slips] = np.linalg.solve(block, q[slips])
+        return y - self.blocks.relief / y.size * ((q @ moved) * y - moved)
 
     def travel(self, load: float, slip: Array) -> float:
         """Return the travel of both drives together from the unloaded state, m."""

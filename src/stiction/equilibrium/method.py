@@ -62,8 +62,8 @@ class Equilibrium:
     ----------
     sensitivity : bool
         Also return d first_instability / d tau_p at every node, at fixed weakening rates. NaN
-        where a law steepens and a node passes a corner before the first instability, or where
-        the turning point of a plane is not found.
+        where a law steepens and a node passes a corner before the first instability, where a node
+        slipped and is at rest again, or where the turning point of a plane is not found.
     slip : bool
         Also return the slip at the first instability.
     events : int

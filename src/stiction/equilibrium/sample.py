@@ -185,6 +185,10 @@ class Program:
         """Return an instability with its exact direction, as it is on lines."""
         return state
 
+    def of_stress(self, sample: Sample, state: State, y: Array) -> Array:
+        """Return the derivative of the mean stress at an instability from y, that of its load."""
+        return y
+
     def relief(self, slip: Array) -> float:
         """Return by how much slip lowers the load that the interface carries, Pa."""
         return 0.0

@@ -204,7 +204,7 @@ class OnsetSolver:
         if self.problem.interface.is_plane:
             values["certified"] = proved
         if self.options.sensitivity:
-            _warn_if_lost(values["sensitivity"])
+            _warn_if_lost(values["sensitivity"], np.isfinite(at_first))
         return values
 
     def _values(self, rows: Samples, row: int, sample: Sample, path: Path) -> dict[str, Any]:
@@ -247,7 +247,9 @@ class OnsetSolver:
             values["slip"] = first.slip.reshape(shape)
         if self.options.sensitivity:
             turn = self.program.at_turn(sample, first)
-            derivative = _sensitivity(sample, turn) * rows.load_profile.mean()
+            derivative = _sensitivity(self.program, sample, turn) * rows.load_profile.mean()
+            if path.known and not first.unstable:
+                derivative[:] = np.nan
             values["sensitivity"] = derivative.reshape(shape)
         if most := self.options.events:
             events = event_table(self.problem, self.program, rows, row, path.events[:most])
@@ -293,14 +295,15 @@ class OnsetSolver:
         )
 
 
-def _sensitivity(sample: Sample, state: State) -> Array:
-    """Derivative of the load of an instability by the peak strengths, from its multiplier.
+def _sensitivity(program: AnyProgram, sample: Sample, state: State) -> Array:
+    """Derivative of the stress of an instability by the peak strengths, from its multiplier.
 
-    NaN where a node passed a corner beyond which it weakens more steeply.
+    NaN where a node passed a corner beyond which it weakens more steeply, or slips no more.
     """
     pieces, y = sample.pieces, multiplier_of(sample, state)
     if pieces.steepens and not state.certified:
         return np.full(y.size, np.nan)
+    y = program.of_stress(sample, state, y)
     # A piece starts from share tau_p + (1 - share) tau_r; the share of the last piece is 0.
     piece = present_pieces(sample, state.slip).piece
     return y * np.where(sample.critical > 0.0, pieces.starts[piece], 1.0)
@@ -318,11 +321,11 @@ def warn_if_back(back: Array) -> None:
     )
 
 
-def _warn_if_lost(sensitivity: Array) -> None:
+def _warn_if_lost(sensitivity: Array, unstable: NDArray[np.bool_]) -> None:
     """Warn where a first instability has no derivative."""
     warn_of_samples(
         "the first instability has no known derivative in {samples}, so sensitivity is NaN: nodes"
-        " pass a corner from which their law falls more steeply, or the turning point was not"
-        " resolved",
-        np.isnan(sensitivity).reshape(len(sensitivity), -1).any(axis=1),
+        " pass a corner from which their law falls more steeply, a node that slipped is at rest, or"
+        " the turning point was not resolved",
+        unstable & np.isnan(sensitivity).reshape(len(sensitivity), -1).any(axis=1),
     )
