@@ -196,20 +196,23 @@ def status(
         int | None, Option(metavar="N", help="Name those of N parts that are missing.", min=1)
     ] = None,
 ) -> None:
-    """Show the completed, failed and damaged parts of a run."""
+    """Show the completed, failed and damaged parts of a run.
+
+    Exit code 0: complete; 1: samples are missing, failed or damaged, or the run cannot be read.
+    """
     from stiction.study.study import open_run
 
     stored = open_run(run)
-    state, study = stored.status(), stored.study
-    each = study.ensemble.samples
-    echo(f"{run}: {' '.join(study.title.split())}".removesuffix(": "))
+    state, points = stored.status(), stored.points
+    each = state.samples // len(points)
+    echo(f"{run}: {' '.join(stored.title.split())}".removesuffix(": "))
     share = 100.0 * state.done / state.samples
     echo(f"  {stored.counted:11s} {state.done} of {state.samples} ({share:.1f} %)")
     echo(f"  chunks      {state.chunks}")
     echo(f"  computed    {duration(state.seconds)} of one core")
-    counts = zip(study.points, state.done_by_point, strict=True)
+    counts = zip(points, state.done_by_point, strict=True)
     behind = [f"{one}: {done} of {each}" for one, done in counts if done < each]
-    _show_some(behind if study.sweep else [], "  ")
+    _show_some(behind if len(points) > 1 else [], "  ")
     if parts is not None:
         missing = stored.missing_parts(parts)
         names = ", ".join(f"{k}/{parts}" for k in missing)
@@ -222,21 +225,27 @@ def status(
     if state.failures:
         echo(f"  failed      {len(state.failures)}; `stiction run` computes them again:")
         _show_some(state.failures, "    ")
+    if state.damaged or not state.complete:
+        raise typer.Exit(1)
 
 
 def export(
     run: RunPath,
     out: Annotated[Path, Argument(metavar="RESULT", help=".nc (NetCDF) or .csv.")],
+    partial: Annotated[
+        bool, Option("--partial", help="Write what is there of a run that is not complete.")
+    ] = False,
 ) -> None:
-    """Write a run as one file over the sweep and the samples; missing samples are NaN.
+    """Write a run as one file over the sweep and the samples.
 
     A table (.csv) has one row for each sample and columns named `name (unit)`; it leaves out
-    profiles along the interface.
+    profiles along the interface and events. Exit code 1: samples are missing, and nothing is
+    written; with --partial they are NaN.
     """
     from stiction.study.study import open_run
 
     stored = open_run(run)
-    stored.export(out)
+    stored.export(out, partial=partial)
     state = stored.status()
     rest = "" if state.complete else "; the others are missing"
     echo(f"{state.done} of {state.samples} {stored.counted} written to {out}{rest}")
@@ -420,7 +429,9 @@ def onset(
     )  # fmt: skip
     # Each method refuses, and warns, for itself.
     problem.sample(profile, accept=("barriers", "overstress", "constant"))
-    printed = (*ONSET_VARIABLES, "friction_coefficient", "critical_force")
+    printed = (
+        *ONSET_VARIABLES, "friction_coefficient", "critical_force", "first_instability_force"
+    )  # fmt: skip
     rows: dict[str, dict[str, float]] = {}
     refused: list[str] = []
     for name in method or METHODS.usable():
@@ -428,7 +439,8 @@ def onset(
         try:
             one = own if own is not None and own.type == name else METHODS[name](**options)
             with Meter(f"onset by {name}"):
-                found = table_of(find(problem, profile, method=one))
+                result = find(problem, profile, method=one)
+            found = table_of(result[[key for key in printed if key in result]])
             rows[name] = {key: v[0] for key, v in found.items() if key.startswith(printed)}
         except (InputError, TypeError) as error:  # TypeError: it has options without defaults
             refused.append(f"{name} does not apply: {error}")
@@ -636,6 +648,8 @@ def _command(function: Callable[..., None]) -> Callable[..., None]:
             function(*args, **kwargs)
         except InputError as error:
             raise InputError([in_options(text, function) for text in error.problems]) from None
+        except RunError as error:
+            raise type(error)(in_options(str(error), function)) from None
         except KeyboardInterrupt:
             echo("interrupted", err=True)
             raise typer.Exit(130) from None

@@ -86,6 +86,8 @@ def shown(entry: Any) -> str:
 
 def write_report(run: StoredRun, path: Path) -> None:
     """Write a page about a run: figures, tables, failed samples, the study and versions."""
+    if run.study is None:
+        raise InputError(f"{run.path}: a report needs the study, which cannot be read")
     state = run.status()
     if not state.done:
         raise InputError(f"{run.path}: no sample is stored yet")

@@ -54,6 +54,14 @@ def coordinate(interface: Interface, dim: str) -> tuple[NDArray[Any], Variable]:
     return interface.coordinates[dim], Variable("m", what, (dim,))
 
 
+def as_text(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return attributes other than strings and numbers as JSON."""
+    return {
+        name: value if isinstance(value, str | int | float) else json.dumps(value)
+        for name, value in attributes.items()
+    }
+
+
 def to_dataset(
     values: Mapping[str, NDArray[Any]],
     variables: Mapping[str, Variable],
@@ -73,8 +81,7 @@ def to_dataset(
 
     attrs: dict[str, Any] = {"stiction_version": __version__}
     attrs |= {f"{library}_version": version(library) for library in ("numpy", "numba")}
-    for name, value in attributes.items():
-        attrs[name] = value if isinstance(value, str | int | float) else json.dumps(value)
+    attrs |= as_text(attributes)
     coordinates = dict(coordinates)
     if interface is not None:
         used = {dim for name in values for dim in variables[name].dims}

@@ -230,7 +230,7 @@ def test_commands_print_export_and_report_its_numbers(runs, tmp_path, monkeypatc
     study().to_toml("study.toml")
     line = f"reliability study.toml --out RUN --smallest {SMALLEST}"
     runs(f"{line} --repetitions 1 --part 1/3", "part 1/3: 1 of 3 repetitions in RUN")
-    runs("status RUN --parts 3", "1 of 3", "missing     parts 2/3, 3/3")
+    runs("status RUN --parts 3", "1 of 3", "missing     parts 2/3, 3/3", code=1)
     printed = runs(f"{line} --repetitions 2", "6 of 6 repetitions in RUN")
     found = st.open_run("RUN").dataset()
     last = found.isel(correlation_length=2, point=-1)

@@ -55,9 +55,14 @@ class Failure(NamedTuple):
     error: str  # the message of the solver
     input: bool = False  # an `InputError`: the sample does not fit the method or the grid
 
-    def __str__(self) -> str:
+    @property
+    def name(self) -> str:
+        """What failed, such as 'sample 3 of point 2 (seed 5)'."""
         where = f" of point {self.point}" if self.point else ""
-        return f"sample {self.sample}{where} (seed {self.seed}): {self.error}"
+        return f"sample {self.sample}{where} (seed {self.seed})"
+
+    def __str__(self) -> str:
+        return f"{self.name}: {' / '.join(self.error.splitlines())}"
 
 
 class Table(NamedTuple):
@@ -131,7 +136,6 @@ def solve_span(experiment: Experiment, span: Span) -> Table:
                 continue
             known = isinstance(error, InputError)
             text = str(error) if known else f"{type(error).__name__}: {error}"
-            text = text.replace("\n", " / ")
             failures.append(Failure(span.point, first, experiment.seed, text, known))
             continue
         warned += (one.after(first) for one in caught)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from stiction.ensemble.batches import missing_spans, solve_spans, usable_cores
-from stiction.ensemble.dataset import Gathered, GridAxes, distinct
+from stiction.ensemble.dataset import Gathered, GridAxes, distinct, labels_of
 from stiction.ensemble.experiment import Ensemble, Experiment
 from stiction.ensemble.pilot import compare, doubt
 from stiction.ensemble.store import Store
@@ -81,7 +81,8 @@ def gather(
             lost += len(table.failures)
             if lost >= min(HOPELESS, total) and not rows.done.any():
                 failure = table.failures[0]
-                raise (InputError if failure.input else RunError)(str(failure))
+                texts = [f"{failure.name}: {text}" for text in failure.error.splitlines()]
+                raise InputError(texts) if failure.input else RunError("\n".join(texts))
     found = store.pilot if store else None
     if found is None and pilot:
         found = compare(points, ensemble.first, ensemble.samples, progress is True, workers)
@@ -91,6 +92,8 @@ def gather(
         if store:
             store.note_pilot(found)
     result = rows.dataset({**attributes, **(found or {})}, axes)
+    if store:
+        store.note_labels(labels_of(result, (*axes, "sample"), rows.lacks))
     if failed := rows.failed:
         some = "; ".join(str(failure) for failure in failed[:SHOWN])
         more = f"; and {len(failed) - SHOWN} more" if len(failed) > SHOWN else ""

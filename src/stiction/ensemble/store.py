@@ -28,7 +28,7 @@ from stiction.files import PART, cannot, write_whole
 from stiction.model import describe
 
 FORMAT = 5
-STUDY, PILOT, CHUNKS = "study.json", "pilot.json", "chunks"
+STUDY, PILOT, LABELS, CHUNKS = "study.json", "pilot.json", "labels.json", "chunks"
 NAME = re.compile(r"[0-9a-f]{32}\.npz")
 SAVE_SECONDS = 10.0
 """A chunk holds the samples of this time."""
@@ -40,15 +40,17 @@ class Damaged(StoreError):
 
 
 class Store:
-    """The folder of a run: samples of a study, which is given in plain form.
+    """The folder of a run: samples of a study, given in plain form, or of whatever study is there.
 
     Of the chunks that were read, `damage` gives the defects of damaged ones, by name; `seconds`
     (of one core, for each) and `versions` are those of the others.
     """
 
-    def __init__(self, path: Path, study: dict[str, Any]) -> None:
+    def __init__(self, path: Path, study: dict[str, Any] | None) -> None:
         self.path = path
-        self._mark = digest(json.dumps(_identity(study), sort_keys=True).encode())
+        self._mark = None
+        if study is not None:
+            self._mark = digest(json.dumps(_identity(study), sort_keys=True).encode())
         self.damage: dict[str, str] = {}
         self.seconds: list[float] = []
         self.versions: dict[str, None] = {}
@@ -75,6 +77,7 @@ class Store:
             if list(store.chunks()) or STUDY in others:
                 store.warn(f"{STUDY} is damaged or missing; it is rebuilt from the given study")
         if before != study:
+            (path / LABELS).unlink(missing_ok=True)
             if before and before["ensemble"]["samples"] < LOOKED_AT:  # a pilot of fewer samples
                 (path / PILOT).unlink(missing_ok=True)
             _write_json(path / STUDY, study)
@@ -101,8 +104,9 @@ class Store:
                 continue
             with np.load(io.BytesIO(data), max_header_size=len(data)) as archive:
                 mark, made_by, seconds, failed = json.loads(archive["about"].tobytes())
-                if mark != self._mark:
+                if mark != (self._mark or mark):
                     raise StoreError(f"{folder / name}: belongs to another study")
+                self._mark = mark
                 failures = tuple(Failure(*one) for one in failed)
                 self.seconds.append(seconds)
                 self.versions[made_by] = None
@@ -128,13 +132,26 @@ class Store:
     @property
     def pilot(self) -> dict[str, Any] | None:
         """Result of the pilot; None if there was none."""
+        return self._noted(PILOT)
+
+    @property
+    def labels(self) -> dict[str, Any] | None:
+        """Coordinates and variables of the result without their values; None before its end."""
+        return self._noted(LABELS)
+
+    def _noted(self, name: str) -> dict[str, Any] | None:
         with suppress(Damaged):
-            return read_json(self.path / PILOT)
+            return read_json(self.path / name)
         return None
 
     def note_pilot(self, attributes: Mapping[str, Any]) -> None:
         """Store the result of the pilot."""
         _write_json(self.path / PILOT, attributes)
+
+    def note_labels(self, labels: Mapping[str, Any]) -> None:
+        """Store what names the numbers, for readers without the classes of the study."""
+        if labels != self.labels:
+            _write_json(self.path / LABELS, labels)
 
     def add(self, table: Table) -> None:
         """Take a table, and store all that were taken if it is time or they are large."""
@@ -169,7 +186,10 @@ def _read(file: Path) -> bytes:
     try:
         return file.read_bytes()
     except FileNotFoundError:
-        raise Damaged(f"{file.parent}: there is no run here") from None
+        what = "there is no run here"
+        if file.name == STUDY and (file.parent / CHUNKS).is_dir():
+            what = f"{STUDY} is missing; run the study again into the folder to restore it"
+        raise Damaged(f"{file.parent}: {what}") from None
     except OSError as error:
         raise cannot("read", file, error) from error
 
@@ -200,7 +220,9 @@ def read_study(folder: Path) -> dict[str, Any]:
     """Return the study of a run, or raise a `StoreError`."""
     found = read_json(folder / STUDY)
     if "ensemble" not in found:
-        raise Damaged(f"{folder / STUDY}: is damaged: it is another file of a run")
+        raise Damaged(
+            f"{folder / STUDY}: is damaged: it is another file of a run; run the study again to repair it"
+        )
     return found
 
 

@@ -56,11 +56,15 @@ def table_of(result: xr.Dataset) -> pd.DataFrame:
     of equally likely interfaces are left out, their band is not.
     """
     result = result.drop_dims("member", errors="ignore")  # their band stays
-    wide = sorted(str(n) for n, v in result.data_vars.items() if {"x", "y"} & set(v.dims))
+    dims = {name: list(map(str, one.dims)) for name, one in result.data_vars.items()}
+    inner = {
+        n: each[each.index("sample") + 1 :] for n, each in dims.items() if "sample" in each
+    }
+    wide = sorted(str(name) for name, each in inner.items() if {*each} - {DIRECTION})
     if wide:
         warn_accuracy(
-            f"{', '.join(wide)}: profiles along the interface do not fit into a table of samples"
-            " and are left out; .nc holds them"
+            f"{', '.join(wide)}: more than one number a sample does not fit into a table with one"
+            " row a sample and is left out; .nc holds it"
         )
     narrow = result.drop_vars(wide)
     for name, values in narrow.data_vars.items():
@@ -69,9 +73,9 @@ def table_of(result: xr.Dataset) -> pd.DataFrame:
                 f"{name}_{c.item()}": values.sel({DIRECTION: c}) for c in values[DIRECTION]
             }
             narrow = narrow.drop_vars([name]).assign(parts)
-    narrow = narrow.drop_dims(["x", "y", DIRECTION], errors="ignore")
-    dims = list(dict.fromkeys(dim for v in narrow.data_vars.values() for dim in v.dims))
-    names = dict.fromkeys([*narrow.coords, *dims, *narrow.data_vars])
+    rows = list(dict.fromkeys(dim for v in narrow.data_vars.values() for dim in v.dims))
+    narrow = narrow.drop_dims({*narrow.dims} - {*rows})
+    names = dict.fromkeys([*narrow.coords, *rows, *narrow.data_vars])
     units = {name: narrow[name].attrs.get("units", "1") for name in names}
-    frame = narrow.to_dataframe(dim_order=dims).reset_index()[list(names)]
+    frame = narrow.to_dataframe(dim_order=rows).reset_index()[list(names)]
     return frame.rename(columns={name: f"{name} ({unit})" for name, unit in units.items()})

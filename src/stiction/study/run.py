@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,8 +14,10 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
 from stiction.ensemble.batches import Failure
-from stiction.ensemble.dataset import Gathered
+from stiction.ensemble.dataset import Gathered, with_labels
+from stiction.ensemble.experiment import Ensemble
 from stiction.ensemble.store import Store
+from stiction.errors import RunError
 from stiction.model import FilePath, brief, check
 from stiction.random.synthesis import BLOCK
 from stiction.study.export import export
@@ -76,6 +79,7 @@ class StoredRun:
     ----------
     path : Path
     study : Study
+        None if this installation cannot make it: the numbers can be read all the same.
     counted : str
         What is stored: samples, or repetitions of failure curves.
     """
@@ -84,6 +88,27 @@ class StoredRun:
 
     def __init__(self, store: Store, study: Any) -> None:
         self.path, self.study, self._store = store.path, study, store
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({str(self.path)!r}, {self._what})"
+
+    @property
+    def title(self) -> str:
+        """Title of the study."""
+        return str(self.study.title)
+
+    @property
+    def points(self) -> list[str]:
+        """Names of the points of the sweep."""
+        return list(map(str, self.study.points))
+
+    @property
+    def _what(self) -> str:
+        methods = " and ".join(
+            dict.fromkeys(one.method.label for one in self.study.experiments)
+        )
+        points, each = len(self.study.experiments), self.study.ensemble.samples
+        return f"{points} x {each} {self.counted} by {methods}"
 
     def status(self) -> Status:
         """Return the state of the run, after a comparison of all chunks with their checksums.
@@ -118,7 +143,9 @@ class StoredRun:
         UserWarning
             If a chunk is damaged.
         """
-        rows = self._read(only)
+        return self._checked(self._read(only))
+
+    def _checked(self, rows: Any) -> xr.Dataset:
         for name, text in self._store.damage.items():
             self._store.warn(
                 f"{name}: {text}; its {self.counted} are missing; run the study again"
@@ -146,8 +173,14 @@ class StoredRun:
             rows.add(table)
         return rows
 
-    def export(self, path: str | Path) -> None:
+    def export(self, path: str | Path, *, partial: bool = False) -> None:
         """Write `dataset` in the format of its suffix (.nc or .csv), whole or not at all.
+
+        Parameters
+        ----------
+        path : path
+        partial : bool
+            Whether to write what is there of a run that is not complete.
 
         Raises
         ------
@@ -155,5 +188,48 @@ class StoredRun:
             If the suffix is neither.
         StoreError
             If the file cannot be written.
+        RunError
+            If the run is not complete, and `partial` is False.
         """
-        export(self.dataset(), check("path", path, FilePath))
+        rows, place = self._read(None), check("path", path, FilePath)
+        if not (partial or rows.done.all()):
+            raise RunError(
+                f"{self.path}: {int(rows.done.sum())} of {rows.done.size} {self.counted} are there;"
+                " run the study again to compute the others, or write what is there with"
+                " partial=True"
+            )
+        export(self._checked(rows), place)
+
+
+class PlainRun(StoredRun):
+    """A run on disk whose study this installation cannot make: its numbers, for reading."""
+
+    def __init__(self, store: Store, labels: dict[str, Any]) -> None:
+        super().__init__(store, None)
+        self._labels = labels
+
+    @property
+    def title(self) -> str:
+        """Title of the study."""
+        return str(self._labels["attrs"].get("title", ""))
+
+    @property
+    def points(self) -> list[str]:
+        """Names of the points of the sweep."""
+        *axes, _ = self._labels["sizes"].values()
+        return [f"point {number}" for number in range(math.prod(axes))]
+
+    @property
+    def _what(self) -> str:
+        return f"sizes {self._labels['sizes']}, without its study"
+
+    def labelled(self, rows: Any) -> xr.Dataset:
+        """Return what was read as a dataset."""
+        return with_labels(rows, self._labels)
+
+    def _rows(self, only: Sequence[str] | None) -> Any:
+        samples = self._labels["sizes"]["sample"]
+        first = self._labels["coords"]["sample"]["data"][0]
+        points: Any = self.points
+        ensemble = Ensemble(samples=samples, first=first)
+        return Gathered(points, ensemble, self._labels["variables"] if only is None else only)

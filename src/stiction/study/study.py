@@ -20,7 +20,7 @@ from stiction.ensemble.dataset import GridAxes, variables_in
 from stiction.ensemble.experiment import Ensemble, Experiment
 from stiction.ensemble.limit_state import Event
 from stiction.ensemble.monte_carlo import gather
-from stiction.ensemble.store import Store, read_study
+from stiction.ensemble.store import Damaged, Store, read_study
 from stiction.errors import InputError, StoreError
 from stiction.kinds import OneOf
 from stiction.methods import METHODS, as_method
@@ -42,7 +42,7 @@ from stiction.random.dotted_keys import with_values
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 from stiction.reliability.answer import Probability
 from stiction.study.question import Question
-from stiction.study.run import AnyPart, StoredRun, samples_of_part
+from stiction.study.run import AnyPart, PlainRun, StoredRun, samples_of_part
 from stiction.study.sweep import Point, Sweep, Uncertain, grid_axes, varies, with_first_values
 
 if TYPE_CHECKING:
@@ -415,11 +415,16 @@ def study_schema() -> dict[str, Any]:
 
 @model(kw_only=True)
 class Setup:
-    """The interface that a study file describes, without what else a study has."""
+    """The interface that a study file describes, without its random properties."""
 
     problem: Problem
     method: AnyMethod | None = None
     save: Save | None = None
+    random: Any = None
+    uncertain: Any = None
+    ensemble: Any = None
+    sweep: Any = ()
+    title: Any = ""
 
 
 def read_setup(path: Path) -> Setup:
@@ -444,9 +449,6 @@ def _read(cls: type[T], given: dict[str, Any], folder: str | Path | None) -> T:
         place = check("folder", folder, FilePath)
         context["read"] = lambda profile, name: profile_in_file(profile, name, place)
     plain = with_first_values(given)
-    if cls is Setup:
-        rest = {*Study.__dataclass_fields__} - {*Setup.__dataclass_fields__}
-        plain = {name: one for name, one in plain.items() if name not in rest}
     try:
         return pydantic.TypeAdapter(cls).validate_python(plain, context=context)
     except pydantic.ValidationError as error:
@@ -464,7 +466,9 @@ def open_run(path: Any) -> StoredRun:
     Returns
     -------
     StoredRun
-        With `study`, `status()`, `dataset()` and `export(path)`.
+        With `study`, `status()`, `dataset()` and `export(path)`. If the study cannot be read,
+        because its file is lost or a class of somebody else is not installed, `study` is None: a
+        warning says so, and the samples of a run that came to its end are read all the same.
 
     Raises
     ------
@@ -472,17 +476,27 @@ def open_run(path: Any) -> StoredRun:
         If `path` is not a path.
     StoreError
         If the folder holds no run, or the run cannot be read.
+
+    Warns
+    -----
+    UserWarning
+        If the study cannot be read.
     """
     from stiction.study.failure import CURVES, StoredCurves
 
     place = check("path", path, FilePath)
-    study = read_study(place)
-    store, settings = Store(place, study), study.pop(CURVES, None)
+    store = Store(place, None)
     try:
-        found = Study.from_dict(study)
+        plain = read_study(place)
+        store, settings = Store(place, plain), plain.pop(CURVES, None)
+        found = Study.from_dict(plain)
         return StoredCurves(store, found, settings) if settings else StoredRun(store, found)
-    except InputError as error:
-        raise StoreError(
-            f"{place}: its study cannot be read by this installation (if classes of your own are"
-            f" named, import their module first): {'; '.join(error.problems)}"
-        ) from None
+    except (InputError, Damaged) as error:
+        texts, labels = getattr(error, "problems", [str(error)]), store.labels
+        if labels is None and isinstance(error, Damaged):
+            raise
+        text = "\n  ".join(["its study cannot be read by this installation:", *texts])
+        if labels is None:
+            raise StoreError(f"{place}: {text}") from None
+        store.warn(f"{text}\nits numbers can be read and exported, but not continued")
+        return PlainRun(store, labels)
