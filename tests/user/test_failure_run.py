@@ -15,6 +15,7 @@ from small_study import lengths, small_study
 import stiction as st
 from stiction.reliability import repetitions
 from stiction.reliability.repetitions import SAMPLES
+from stiction.study.study import Setup
 
 SWEPT = lengths(3e-3, 7e-3, 5e-3)
 SMALLEST = 1e-3
@@ -219,6 +220,7 @@ def test_the_local_criterion_is_compared_with_equilibrium_once(tmp_path):
     "rupture study.toml --out out --strength p.npy", "run study.toml --out out --no-pilot",
 ])  # fmt: skip
 def test_uncertain_parameters_in_every_command(runs, tmp_path, monkeypatch, line):
+    assert {*st.Study.__dataclass_fields__} == {*Setup.__dataclass_fields__}
     monkeypatch.chdir(tmp_path)
     study(uncertain=UNCERTAIN, ensemble={"samples": 8, "seed": 3}).to_toml("study.toml")
     np.save("p.npy", study().random.strength.sample(study().problem.interface, seed=8)[0])

@@ -422,6 +422,7 @@ class Setup:
     save: Save | None = None
     random: Any = None
     uncertain: Any = None
+    reliability: Any = None
     ensemble: Any = None
     sweep: Any = ()
     title: Any = ""
