@@ -225,6 +225,9 @@ def test_a_damaged_study_is_made_of_the_one_given_and_the_chunks(run, reference,
     assert again(run).identical(reference)
 
 
+EDGE = {"type": "edge", "excess": 2.0, "decay": 0.02}
+
+
 def test_numbers_are_read_without_the_plug_in_that_made_them(
     tmp_path, often, runs, monkeypatch
 ):
@@ -244,7 +247,7 @@ def test_numbers_are_read_without_the_plug_in_that_made_them(
         method={"type": "equilibrium", "events": 2},
         sweep=[
             {"random.strength.marginal.alpha": [1.5, 2.5, 2.0]},
-            {"problem.load.profile": [{"type": "tilted"}, {"type": "edge", "excess": 2.0, "decay": 0.02}]},
+            {"problem.load.profile": [{"type": "tilted"}, EDGE]},
         ],
     )  # fmt: skip
     folder = tmp_path / "run"

@@ -221,7 +221,8 @@ def read_study(folder: Path) -> dict[str, Any]:
     found = read_json(folder / STUDY)
     if "ensemble" not in found:
         raise Damaged(
-            f"{folder / STUDY}: is damaged: it is another file of a run; run the study again to repair it"
+            f"{folder / STUDY}: is damaged: it is another file of a run;"
+            " run the study again to repair it"
         )
     return found
 
