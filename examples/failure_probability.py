@@ -26,4 +26,3 @@ print(design)
 weak = found.failing_profiles
 lowest = float(weak.strength.rolling(x=16).mean().min("x").mean())
 print(f"weakest 1.6 mm of failing interfaces: {lowest / 1e6:.3f} MPa on average")
-st.plot.weak_spots(found)

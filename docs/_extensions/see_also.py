@@ -11,14 +11,13 @@ ROWS = """
     onset monte_carlo equilibrium_path simulate_rupture
     onset plot.onset
     monte_carlo Study plot.monte_carlo plot.quantiles
-    simulate_rupture Save Rupture plot.rupture plot.film statistics.misfit
+    simulate_rupture Save Rupture plot.rupture plot.film
     failure_probability failure_curve design_stress external.limit_state
-    failure_curve plot.failure_curve theory.rice_distribution
-    failure_probability plot.weak_spots
+    failure_curve plot.failure_curve
     fit_field plot.fit
     infer read_peaks design_of_tests plot.posterior external.simulator
-    statistics.density statistics.quantiles statistics.combined_mean
-    theory.nucleation_stress theory.nucleation_statistics theory.rice_distribution
+    statistics.density statistics.quantiles
+    theory.nucleation_stress theory.nucleation_statistics
     theory.griffith_length theory.energy_release_rate
     Study Ensemble open_run monte_carlo
 """

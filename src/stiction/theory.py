@@ -3,12 +3,10 @@
 from stiction.criterion.griffith import energy_release_rate, griffith_length
 from stiction.criterion.local import nucleation_stress
 from stiction.statistics.moments import nucleation_statistics
-from stiction.statistics.rice import rice_distribution
 
 __all__ = [
     "energy_release_rate",
     "griffith_length",
     "nucleation_statistics",
     "nucleation_stress",
-    "rice_distribution",
 ]

@@ -164,24 +164,6 @@ def test_failure_probability_of_a_plane_is_that_of_counting():
     assert low < wanted.stress < high
 
 
-def test_dips_count_the_onsets_of_a_plane_that_are_low():
-    """Euler characteristic against onsets of other samples, where it says it can."""
-    field = field_of(1.0)
-    rice = st.theory.rice_distribution(PLANE, field, profiles=1000, seed=3)
-    onsets = ensemble(PLANE, field, 1500, seed=4).critical_stress.values
-    stresses = rice.stress[rice.trusted][::2]
-    shares = np.array([np.mean(onsets <= stress) for stress in stresses])
-    for stress, share in zip(stresses, shares, strict=True):
-        error = np.sqrt(share / onsets.size + share / rice.profiles)
-        # Planes of equal mean dip more evenly than a Poisson process does: half of P too low.
-        apart = abs(rice.failure_probability(stress) - share)
-        assert apart < 4.0 * error + 0.5 * share**2
-    assert np.sum(shares > 0.03) >= 3
-    field = field_of(3.0, mean_mode=True)
-    together = st.theory.rice_distribution(PLANE, field, profiles=300, seed=3)
-    assert (together.probability[together.trusted] <= 0.1).all()
-
-
 def test_coarse_directions_are_named():
     def onset_on(*nodes):
         local_onset(make_problem(nodes, PLANE.interface.length), np.full(nodes, 1e6))

@@ -17,7 +17,7 @@ from stiction.criterion.local import excess_of
 from stiction.elasticity.exponential_sum import fit_exponentials
 from stiction.equilibrium.solver import OnsetSolver, follow
 from stiction.reliability import subset
-from stiction.statistics import combined_mean, density, quantiles
+from stiction.statistics import density, quantiles
 from stiction.theory import energy_release_rate, griffith_length, nucleation_statistics
 
 LINE = st.Interface(length=0.1, nodes=256)
@@ -126,7 +126,7 @@ test_numbers = refusals({
     "seed: must be greater than or equal to 0, got -1":
         lambda: make_strength().sample(LINE, seed=-1),
     "seed ... whole ... '1'":
-        lambda: st.theory.rice_distribution(PROBLEM, make_strength(), seed="1"),
+        lambda: st.monte_carlo(PROBLEM, make_strength(), method=LOCAL, samples=2, seed="1"),
     "samples: must be greater than or equal to 1, got 0": lambda: monte_carlo(samples=0),
     "title ... valid string": lambda: make_study(title="\udcff"),
     "events": lambda: st.Equilibrium(events=-1),
@@ -237,15 +237,11 @@ test_theory_and_statistics = refusals({
     "load ... must be numbers": lambda: griffith_length(PROBLEM, "1 MPa", 1.0),
     "load.profile ... monte_carlo":
         lambda: nucleation_statistics(loaded(np.linspace(0.9, 1.1, 256)), make_strength()),
-    "profiles":
-        lambda: st.theory.rice_distribution(PROBLEM, make_strength(), profiles=0),
     "probability": lambda: quantiles(TEN, 1.0),
     "finite": lambda: quantiles([1.0, np.nan], 0.5),
     "equal": lambda: density(np.ones(50)),
     "at least 16": lambda: density(TEN),
     "below the lower bound": lambda: density(np.linspace(-1, 1, 50), bounds=(0.0, None)),
-    "inexpensive: each ... [10, 3]": lambda: combined_mean(TEN, TEN[:3]),
-    "at least 3 are needed, got 2": lambda: combined_mean(TEN[:2]),
 })  # fmt: skip
 
 test_what_the_local_criterion_cannot_take = refusals({

@@ -119,7 +119,6 @@ test_impossible_values_and_places_are_refused = refusals({
     ).sample(LINE),
     "the field already has one": lambda: GIVEN.given(KNOWN, noise=1e3),
     "is conditioned on": lambda: st.theory.nucleation_statistics(OWN.problem, GIVEN),
-    "conditioned on measured values": lambda: st.theory.rice_distribution(OWN.problem, GIVEN),
     "strength is conditioned on one specimen": partial(
         st.infer, OWN.problem, GIVEN, [7e5, 7.1e5, 7.3e5], method=OWN.method,
         prior={"marginal.low": (0.5e6, 0.65e6)},

@@ -262,5 +262,3 @@ def test_failing_profiles_are_kept():
         target_cv=0.5, max_evaluations=300,
     )  # fmt: skip
     assert found.failing_profiles.sizes["sample"] >= 2
-    with pytest.raises(st.InputError, match="weak spots are drawn of a line"):
-        st.plot.weak_spots(found, problem=plan.problem)

@@ -84,7 +84,7 @@ def test_monte_carlo_shows_coefficients_where_there_is_a_pressure(swept):
     assert tops[0] == pytest.approx(0.01 * tops[1])  # both in MPa
 
 
-def test_failure_curve_and_weak_spots():
+def test_failure_curve():
     curve = st.failure_curve(PROBLEM, FIELD, method=LOCAL, smallest=1e-2)
     axes = st.plot.failure_curve(curve)
     assert axes.get_yscale() == "log"
@@ -96,9 +96,6 @@ def test_failure_curve_and_weak_spots():
     (above,) = axes.child_axes
     assert above.get_xlabel() == "shear force (kN)"
     assert np.array(above.get_xlim()) / 2.0 == pytest.approx(axes.get_xlim())
-    found = st.failure_probability(PROBLEM, FIELD, stress=0.7e6, method=LOCAL)
-    mean = st.plot.weak_spots(found).lines[-2].get_xydata()
-    assert abs(mean[mean[:, 1].argmin(), 0]) < 0.5  # weakest within the critical patch
 
 
 def test_a_rupture_in_the_units_of_its_size(run, tmp_path):
@@ -151,9 +148,6 @@ def test_what_does_not_fit_is_refused(run, swept):
         "has no slip_patches; it holds": lambda: plot.monte_carlo(one, quantity="slip_patches"),
         "result.isel(": lambda: plot.monte_carlo(swept),
         "one or two parameters, got none": lambda: plot.quantiles(one),
-        "holds no failing profile": lambda: plot.weak_spots(
-            st.failure_probability(PROBLEM, FIELD, stress=0.5e6, method=LOCAL)
-        ),
         "give problem=": lambda: plot.rupture(run.drop_attrs()),
         "has no slip_rate": lambda: plot.rupture(run.drop_vars("slip_rate")),
         ".gif, got 'film.avi'": lambda: plot.film(run, "film.avi"),

@@ -9,7 +9,7 @@ pressure, friction coefficients are drawn too.
 """
 
 from stiction.plot.distributions import monte_carlo, quantiles
-from stiction.plot.failure import failure_curve, weak_spots
+from stiction.plot.failure import failure_curve
 from stiction.plot.fields import field
 from stiction.plot.fits import agreement, fit, posterior
 from stiction.plot.onsets import onset
@@ -32,5 +32,4 @@ __all__ = [
     "quantiles",
     "rupture",
     "specimen",
-    "weak_spots",
 ]

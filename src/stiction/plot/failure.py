@@ -1,4 +1,4 @@
-"""Failure probability: the curve over decades, and the weak spots of failing interfaces."""
+"""Failure probability: the curve over decades."""
 
 from contextlib import suppress
 
@@ -16,15 +16,12 @@ from stiction.plot.axes import (
     problem_of,
     with_unit,
 )
-from stiction.plot.style import ACCENT, BAND, COLUMN, INK, PALE, QUIET
-from stiction.problem import Problem
-from stiction.reliability.answer import Answer, bounded
+from stiction.plot.style import ACCENT, BAND, INK, PALE, QUIET
+from stiction.reliability.answer import bounded
 from stiction.units import unit_for
 
 TINY = 1e-300
 """Probability that stands for none on a logarithmic scale."""
-NEAR = 4.0
-"""Nucleation lengths on either side of a weak spot that are drawn."""
 
 
 @checked
@@ -94,58 +91,4 @@ def failure_curve(
             with suppress(InputError):  # a problem that exists in Python only: stresses alone
                 add_friction_scale(axes, problem_of(curve), "x", factor)
         axes.legend(loc="lower right")
-    return axes
-
-
-@checked
-def weak_spots(
-    found: Answer, *, problem: Problem | None = None, ax: Axes | None = None
-) -> Axes:
-    """Draw failing lines, each shifted so that sliding begins in the middle, and their mean.
-
-    Parameters
-    ----------
-    found : Answer
-        From `failure_probability`.
-    problem : Problem, optional
-        Needed only if the profiles do not hold it; gives the nucleation length.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw on; new ones by default.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        Lengths over h_n.
-
-    Raises
-    ------
-    InputError
-        If no failing profile was kept, the interface is a plane, or there is no single nucleation
-        length.
-    """
-    failing = found.failing_profiles
-    if not failing:
-        raise InputError("found: holds no failing profile")
-    problem = problem_of(failing, problem)
-    problem.refuse_specimen("weak spots", "draw a failing profile with st.plot.onset")
-    interface, length = problem.interface, problem.nucleation_length
-    if interface.is_plane:
-        raise InputError("found: weak spots are drawn of a line; st.plot.field draws a plane")
-    middle, places = interface.size // 2, failing["critical_position"].values
-    shifts = middle - np.round(places / interface.spacing).astype(int)
-    pairs = zip(failing["strength"].values, shifts, strict=True)
-    centred = np.stack([np.roll(row, shift) for row, shift in pairs])
-    s = (np.arange(interface.size) - middle) * interface.spacing / length
-    near = np.abs(s) <= NEAR
-    factor, unit = unit_for("Pa", centred)
-    s, shown = s[near], centred[:, near] * factor
-    with on_axes(ax, COLUMN * 1.2, 2.6) as axes:
-        axes.axvspan(-0.5, 0.5, color=PALE, linewidth=0.0)
-        axes.plot(s, shown.T, color=QUIET, linewidth=0.4, alpha=0.7)
-        axes.plot(s, shown.mean(axis=0), color=INK, label="mean of these")
-        axes.axhline(found.stress * factor, color=ACCENT, linewidth=0.9, label="demand")
-        axes.set_xlabel(r"$(x - x_{\mathrm{cr}})/h_n$")
-        axes.set_ylabel(f"peak strength ({unit})")
-        axes.set_xlim(-NEAR, NEAR)
-        axes.legend(loc="upper right", frameon=True, framealpha=0.9, edgecolor="none")
     return axes

@@ -1,4 +1,4 @@
-"""Statistics of samples: densities, quantiles, combined means, agreement with tests, misfits."""
+"""Statistics of samples: densities, quantiles, agreement with tests."""
 
 from importlib import import_module
 from typing import Any
@@ -7,11 +7,9 @@ _HOMES = {
     "agreement": "stiction.inference.agreement",
     "density": "stiction.statistics.densities",
     "quantiles": "stiction.statistics.estimates",
-    "combined_mean": "stiction.statistics.estimates",
-    "misfit": "stiction.dynamics.misfit",
 }
 
-__all__ = ["agreement", "combined_mean", "density", "misfit", "quantiles"]
+__all__ = ["agreement", "density", "quantiles"]
 
 
 def __getattr__(name: str) -> Any:

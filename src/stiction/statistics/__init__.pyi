@@ -1,7 +1,5 @@
 # What editors see; __init__.py imports each on first use.
 
-from stiction.dynamics.misfit import misfit as misfit
 from stiction.inference.agreement import agreement as agreement
 from stiction.statistics.densities import density as density
-from stiction.statistics.estimates import combined_mean as combined_mean
 from stiction.statistics.estimates import quantiles as quantiles
