@@ -22,7 +22,7 @@ BASIC = ("local", "moments", "exact", "ruptures", "printed", "theory", "represen
 NEEDS = {
     1: (), 2: (), 3: (), 4: (), 5: (), 6: (), 7: (), 8: (), 9: ("trend",), 10: ("convergence",),
     11: ("growth", "mechanism"), 12: ("arrest",), 13: ("driving",),
-    14: ("wide_strength", "random_load", "random_residual", "correlation"),
+    14: ("wide_strength", "random_load", "random_residual"),
     15: ("length", "normal_load", "free_end", "failure"),
     16: ("skewness", "exponent", "uniform_dc"),
 }  # fmt: skip

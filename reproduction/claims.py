@@ -1,10 +1,12 @@
 """A claim is a row: what the paper says, where, what is computed for it, and the rule."""
 
+import dataclasses
 import functools
 import math
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +15,13 @@ import xarray as xr
 
 from reproduction import setting
 from reproduction.numbers_with_errors import Number
-from reproduction.rules import Rule, Verdict
+from reproduction.rules import Rule, Verdict, limits_times, together
 from reproduction.runner import Size
 from reproduction.setting import RATIOS
 
 MINUS = "\N{MINUS SIGN}"
+TEXTS = tomllib.loads(Path(__file__).with_name("statements.toml").read_text("utf-8"))
+"""By name: what the paper says, where, and what stands beside the verdict."""
 
 
 @dataclass(frozen=True)
@@ -81,47 +85,88 @@ class Data:
         return self[name][variable].isel(point=point).values
 
 
-Measured = tuple[Sequence[Series], Sequence[Series]]
+Measured = tuple[Sequence[Series] | Mapping[str, Sequence[Series]], Sequence[Series]]
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A statement of the paper.
+    """A statement of the paper, whose text stands in `statements.toml` under its name.
 
-    `kind` is "finding", or "arithmetic" for printed numbers, identities and what is true by the
-    definitions: those are counted apart.
+    `measure` returns what is judged, by reading of the modulus if it depends on it, and what
+    stands beside it; `note` makes a note of results. `kind` is "finding"; "arithmetic" for
+    printed numbers, identities and what is true by the definitions; "beyond" for a statement
+    outside the range that the paper covers. The last two are counted apart.
     """
 
     name: str
-    says: str
-    where: str
     rule: Rule
     measure: Callable[[Data], Measured]
-    note: str = ""
+    note: Callable[[Data], str] | None = None
     kind: str = "finding"
+
+    @property
+    def says(self) -> str:
+        """What the paper says, in our words."""
+        return TEXTS[self.name]["says"]
+
+    @property
+    def where(self) -> str:
+        """Section, paragraph and sentence."""
+        return TEXTS[self.name]["where"]
 
 
 Check = functools.partial(Claim, kind="arithmetic")
+Beyond = functools.partial(Claim, kind="beyond")
 
 
 @dataclass(frozen=True)
 class Finding:
-    """A claim with its numbers and its verdict."""
+    """A claim with its numbers and its verdict.
+
+    `readings` has the verdict of each reading of the modulus, `otherwise` those that limits half
+    and twice as large would give if they differ.
+    """
 
     claim: Claim
-    judged: Sequence[Series] = field(default_factory=list)
-    beside: Sequence[Series] = field(default_factory=list)
-    verdict: Verdict = Verdict.OPEN
+    judged: Sequence[Series]
+    beside: Sequence[Series]
+    verdict: Verdict
+    readings: Mapping[str, Verdict]
+    otherwise: Mapping[str, Verdict]
+    note: str = ""
+
+
+def verdicts(rule: Rule, cases: Mapping[str, Sequence[Series]]) -> dict[str, Verdict]:
+    """Return the verdict of a rule on each case."""
+    return {
+        key: rule([[number for _, number in series.rows] for series in judged])
+        for key, judged in cases.items()
+    }
 
 
 def judge(claim: Claim, data: Data) -> Finding | None:
     """Compute the numbers of a claim and apply its rule; None if a study is left out."""
     try:
         judged, beside = claim.measure(data)
+        note = claim.note(data) if claim.note else TEXTS[claim.name].get("note", "")
     except LeftOut:
         return None
-    verdict = claim.rule([[number for _, number in series.rows] for series in judged])
-    return Finding(claim, judged, beside, verdict)
+    cases = judged if isinstance(judged, Mapping) else {"": judged}
+    found = verdicts(claim.rule, cases)
+    verdict, otherwise = together(found.values()), {}
+    for factor, text in ((0.5, "half"), (2.0, "twice")):
+        with limits_times(factor):
+            other = together(verdicts(claim.rule, cases).values())
+        if other is not verdict:
+            otherwise[text] = other
+    rows = [
+        dataclasses.replace(series, label=f"({key}) {series.label}" if key else series.label)
+        for key, each in cases.items()
+        for series in each
+    ]
+    return Finding(
+        claim, rows, beside, verdict, found if "" not in found else {}, otherwise, note
+    )
 
 
 def over_ratios(

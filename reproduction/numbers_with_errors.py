@@ -18,6 +18,9 @@ class Number:
     def __mul__(self, factor: float) -> Number:
         return Number(self.value * factor, self.error * abs(factor))
 
+    def __add__(self, other: Number) -> Number:
+        return Number(self.value + other.value, math.hypot(self.error, other.error))
+
     def __sub__(self, other) -> Number:
         other = other if isinstance(other, Number) else Number(float(other))
         return Number(self.value - other.value, math.hypot(self.error, other.error))
@@ -85,12 +88,20 @@ def quantile(values, p: float) -> Number:
     return Number(float(at), float(influence.std()) / math.sqrt(values.size))
 
 
-def lower_spread(values) -> Number:
+def lower_spread(values, upper: float = 0.5) -> Number:
     """Return the median less the lower quartile, the spread that the paper plots."""
     values = np.ravel(values)
-    median, one = _quantile_influence(values, 0.5)
+    high, one = _quantile_influence(values, upper)
     quartile, other = _quantile_influence(values, 0.25)
-    return Number(float(median - quartile), float((one - other).std()) / math.sqrt(values.size))
+    return Number(float(high - quartile), float((one - other).std()) / math.sqrt(values.size))
+
+
+def ratio_of_means(values, others) -> Number:
+    """Return the ratio of the means of paired values."""
+    values, others = np.ravel(values), np.ravel(others)
+    ratio = float(values.mean() / others.mean())
+    error = float((values - ratio * others).std()) / abs(float(others.mean()))
+    return Number(ratio, error / math.sqrt(values.size))
 
 
 def pooled_moments(sums) -> tuple[Number, Number, Number]:

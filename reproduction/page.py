@@ -15,7 +15,7 @@ from markupsafe import Markup, escape
 import stiction as st
 from reproduction import PARAMETERS, setting, texts
 from reproduction.claims import Data, rounded
-from reproduction.modulus import compare
+from reproduction.modulus import EVIDENCE, compare, odds
 from reproduction.rules import Verdict
 
 TEXTS = tomllib.loads(Path(__file__).with_name("page.toml").read_text("utf-8"))
@@ -42,28 +42,40 @@ def physics(text: str) -> Markup:
 def write(path: Path, data: Data, groups, images, runner, warned) -> None:
     """Write the page: groups of findings by title, images by figure number, texts of warnings."""
     found = [finding for rows in groups.values() for finding in rows]
-    arithmetic = Counter(f.verdict.value for f in found if f.claim.kind == "arithmetic")
+    counts = {
+        kind: Counter(f.verdict.value for f in found if f.claim.kind == kind)
+        for kind in ("arithmetic", "beyond")
+    }
     environment = jinja2.Environment(autoescape=True, trim_blocks=True)
     environment.filters |= {"physics": physics, "number": rounded}
     template = environment.from_string(Path(__file__).with_name("page.html").read_text("utf-8"))
     readings = compare(data)
-    exceptions = [f for f in found if f.verdict in (Verdict.FAILS, Verdict.CORRECTED)]
-    exceptions.sort(key=lambda f: f.verdict is not Verdict.FAILS)
-    sections = [("What does not hold, or only with a correction", exceptions, True)]
+    order = [Verdict.FAILS, Verdict.TEXT, Verdict.CORRECTED]
+    exceptions = [f for f in found if f.verdict in order]
+    exceptions.sort(key=lambda f: order.index(f.verdict))
+    title = "What does not hold, only under some readings, or only with a correction"
+    sections = [(title, exceptions, True)]
     sections += [(title, rows, False) for title, rows in groups.items() if rows]
     text = template.render(
         version=st.__version__,
         own=", ".join(f"{name} = {value:g}" for name, value in PARAMETERS.items()),
-        **texts.in_short(data),
-        total=len(found),
+        short=texts.in_short(data, {f.claim.name: f for f in found}),
         verdicts=Verdict,
         findings=[f.verdict for f in found if f.claim.kind == "finding"],
-        arithmetic=", ".join(f"{count} {verdict}" for verdict, count in arithmetic.items()),
+        others={
+            kind: f"{sum(row.values())} ({', '.join(f'{n} {v}' for v, n in row.items())})"
+            for kind, row in counts.items()
+        },
+        resting=sum(bool(f.otherwise) for f in found if f.claim.kind == "finding"),
         texts=TEXTS,
         figures=[_figure(number, image, data) for number, image in images.items()],
         few=texts.few_and_many(data),
         readings=readings,
-        best=max(reading.likelihood for reading in readings) or 1.0,
+        best=max(float(reading.likelihood[0]) for reading in readings) or 1.0,
+        evidence=[(what, where) for what, where, _ in EVIDENCE],
+        odds=odds(data),
+        odds_of_counts=odds(data, slice(3)),
+        odds_otherwise=[odds(data, visible=visible)[0] for visible in (0.5, 2.0)],
         claims=sections,
         setting=setting,
         size=data.size,

@@ -1,6 +1,8 @@
 """Rules that turn numbers with errors into a verdict; three standard errors decide."""
 
-from collections.abc import Callable, Sequence
+import contextlib
+from collections.abc import Callable, Iterable, Sequence
+from contextvars import ContextVar
 from dataclasses import dataclass
 from decimal import Decimal
 from enum import Enum
@@ -16,11 +18,23 @@ class Verdict(Enum):
 
     FAILS = "does not hold"
     CORRECTED = "holds with a correction"
+    TEXT = "undecided from the text"
     OPEN = "undecided"
     HOLDS = "holds"
 
 
 Numbers = Sequence[Number]
+_FACTOR = ContextVar("factor", default=1.0)
+
+
+@contextlib.contextmanager
+def limits_times(factor: float):
+    """Multiply limits that are a choice, to see whether a verdict rests on them."""
+    token = _FACTOR.set(factor)
+    try:
+        yield
+    finally:
+        _FACTOR.reset(token)
 
 
 @dataclass(frozen=True)
@@ -40,17 +54,16 @@ def _range(number: Number) -> tuple[float, float]:
     return number.value - SIGMAS * number.error, number.value + SIGMAS * number.error
 
 
-def within(low: float, high: float, why: str = "", *, partly: bool = False) -> Rule:
-    """Every number lies between two limits; `partly`: a part of them earns a correction."""
+def within(low: float, high: float, why: str = "") -> Rule:
+    """Every number lies between two limits; `why` is the reason of limits that are a choice."""
 
     def judge(series: Sequence[Numbers]) -> Verdict:
+        factor = _FACTOR.get() if why and (low <= 0.0 or high == float("inf")) else 1.0
         ranges = [_range(number) for row in series for number in row]
-        inside = [low <= left and right <= high for left, right in ranges]
-        outside = [left > high or right < low for left, right in ranges]
-        if all(inside):
+        if all(factor * low <= left and right <= factor * high for left, right in ranges):
             return Verdict.HOLDS
-        if any(outside):
-            return Verdict.CORRECTED if partly and any(inside) else Verdict.FAILS
+        if any(left > factor * high or right < factor * low for left, right in ranges):
+            return Verdict.FAILS
         return Verdict.OPEN
 
     text = f"between {low:g} and {high:g}"
@@ -61,14 +74,14 @@ def within(low: float, high: float, why: str = "", *, partly: bool = False) -> R
     return Rule(text + (f" ({why})" if why else ""), judge)
 
 
-def below(limit: float, why: str = "", *, partly: bool = False) -> Rule:
+def below(limit: float, why: str = "") -> Rule:
     """Every number is below a limit."""
-    return within(-float("inf"), limit, why, partly=partly)
+    return within(-float("inf"), limit, why)
 
 
-def above(limit: float, why: str = "", *, partly: bool = False) -> Rule:
+def above(limit: float, why: str = "") -> Rule:
     """Every number is above a limit."""
-    return within(limit, float("inf"), why, partly=partly)
+    return within(limit, float("inf"), why)
 
 
 def printed(digits: str) -> Rule:
@@ -124,7 +137,7 @@ def graded(strict: Rule, weak: Rule) -> Rule:
             return Verdict.CORRECTED if weak(series) is Verdict.HOLDS else Verdict.OPEN
         return verdict
 
-    return Rule(f"{strict.text}; with a correction {weak.text}", judge)
+    return Rule(f"{strict.text}; a correction if only {weak.text}", judge)
 
 
 def main(first: Rule, *others: Rule) -> Rule:
@@ -137,20 +150,19 @@ def main(first: Rule, *others: Rule) -> Rule:
             return Verdict.OPEN if Verdict.FAILS not in rest else Verdict.CORRECTED
         return verdict
 
-    text = "; else with a correction: ".join(rule.text for rule in (first, *others))
-    return Rule(text, judge)
+    rest = " and ".join(rule.text for rule in others)
+    return Rule(f"the first {first.text}; a correction if not the others {rest}", judge)
 
 
 def never(limit: float) -> Rule:
-    """It happens in no sample; with a correction in few."""
+    """It happens in no sample of so many that the share is below a limit."""
 
     def judge(series: Sequence[Numbers]) -> Verdict:
-        if all(number.value == 0.0 for row in series for number in row):
-            return Verdict.HOLDS
-        verdict = below(limit)(series)
-        return Verdict.CORRECTED if verdict is Verdict.HOLDS else verdict
+        verdict = below(limit, "choice")(series)
+        seen = any(number.value > 0.0 for row in series for number in row)
+        return Verdict.CORRECTED if verdict is Verdict.HOLDS and seen else verdict
 
-    return Rule(f"never; with a correction below {limit:g}", judge)
+    return Rule(f"in no sample, of enough to exclude {limit:g}; a correction if in some", judge)
 
 
 def by_chance(level: float = 0.01) -> Rule:
@@ -171,3 +183,24 @@ def corrected(rule: Rule) -> Rule:
         return Verdict.CORRECTED if verdict is Verdict.HOLDS else verdict
 
     return Rule(f"{rule.text} (with the correction beside it)", judge)
+
+
+def together(verdicts: Iterable[Verdict]) -> Verdict:
+    """Return what several readings of a text have in common."""
+    decided = {*verdicts}
+    sure = decided - {Verdict.OPEN}
+    if len(sure) > 1:
+        return Verdict.TEXT
+    return Verdict.OPEN if Verdict.OPEN in decided else sure.pop()
+
+
+def alike(rule: Rule) -> Rule:
+    """One rule for every judged measure of what the text does not define."""
+
+    def judge(series: Sequence[Numbers]) -> Verdict:
+        found = [rule([row]) for row in series]
+        if Verdict.FAILS in found:
+            return together(found)
+        return min(found, key=(Verdict.CORRECTED, Verdict.OPEN, Verdict.HOLDS).index)
+
+    return Rule(f"by each measure: {rule.text}", judge)

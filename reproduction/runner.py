@@ -38,7 +38,7 @@ class Size:
 
 QUICK = Size(samples=500, ruptures=4, readings=200, trend=300, what_if=40, arrests=2, dynamic=0,
              few=6)  # fmt: skip
-USUAL = Size(samples=10_000, ruptures=20, readings=1000, trend=2500, what_if=200, arrests=6,
+USUAL = Size(samples=10_000, ruptures=20, readings=1000, trend=2500, what_if=200, arrests=8,
              dynamic=0, few=24)  # fmt: skip
 FULL = Size(samples=10_000, ruptures=20, readings=2000, trend=10_000, what_if=400, arrests=200,
             dynamic=1000, few=60)  # fmt: skip

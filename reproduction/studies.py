@@ -16,6 +16,8 @@ from reproduction.setting import MEAN, PROBLEM, RATIOS, SIMULATED, STRAIN, H, st
 LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
 RUPTURE = st.Rupture(loading_rate=setting.LOADING_RATE)
 CELLS = 2048
+NORMAL = np.linspace(-2.0, 2.0, 17)
+"""Places in standard deviations at which tau_n is compared with a normal distribution."""
 TREND = (0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 30.0)
 WINDOWS = (2.0, 4.0, 8.0, 16.0)
 LEVELS = (0.88, 0.90, 0.92, 0.94, 0.95, 0.96, 0.97, 0.98, 0.985, 0.99, 0.995, 0.999)
@@ -62,6 +64,9 @@ def moments(run: Runner, samples: int) -> xr.Dataset:
     kernel[: weights.size] = weights
     transform = np.conj(np.fft.rfft(kernel))
     edges = np.linspace(setting.LOW, setting.HIGH, CELLS + 1)
+    spread = {
+        r: setting.DEVIATION * variance_ratio(PROBLEM, strength(r)) ** 0.5 for r in RATIOS
+    }
 
     def batch(ratio, first, count):
         seed = run.seed_of(ratio)
@@ -83,8 +88,11 @@ def moments(run: Runner, samples: int) -> xr.Dataset:
         }
         found = xr.Dataset({name: ("sample", values) for name, values in each.items()})
         counts = np.histogram(tau_n[:, ::16], edges)[0]
+        limits = [MEAN + level * spread[ratio] for level in NORMAL]
         return found.assign(
-            powers=(("sample", "order"), np.array(powers).T), counts=("cell", counts)
+            below=(("sample", "level"), np.array([(tau_n < s).mean(axis=1) for s in limits]).T),
+            powers=(("sample", "order"), np.array(powers).T),
+            counts=("cell", counts),
         )
 
     return run.batches(batch, "correlation_ratio", RATIOS, samples)
@@ -153,6 +161,8 @@ def readings(run: Runner) -> xr.Dataset:
         parts.append(
             xr.Dataset(
                 {
+                    "simulated": stress,
+                    "predicted": predicted["first_instability"],
                     "excess": predicted["first_instability"] / stress - 1.0,
                     "consistent_excess": consistent["first_instability"] / stress - 1.0,
                     "misplaced": (("correlation_ratio", "sample"), gap > 0.5 * length),
@@ -257,6 +267,22 @@ def trend(run: Runner) -> xr.Dataset:
         found = run.study(f"trend-{int(mode)}", study).rename(correlation_length="ratio")
         parts.append(found[["critical_stress"]].assign_coords(ratio=list(TREND)))
     return along("mean_mode", (0, 1), parts)
+
+
+@kept(samples=lambda size: size.trend)
+def vanishing(run: Runner, samples: int) -> xr.Dataset:
+    """Onsets at vanishing correlation length, by the local criterion on a finer grid."""
+    fine = setting.grid(PROBLEM, nodes=4.0)
+
+    def batch(ratio, first, count):
+        field = strength(ratio)
+        tau_p = field.sample(
+            fine.interface, samples=count, seed=run.seed_of(ratio), first=first
+        )
+        least = st.theory.nucleation_stress(fine, tau_p).min(axis=1)
+        return xr.Dataset({"stress": ("sample", least)})
+
+    return run.batches(batch, "ratio", (1 / 64, 1 / 32), samples)
 
 
 @kept(samples=lambda size: size.trend // 2)
@@ -523,7 +549,7 @@ def _held(problem, tau_p, stress: float) -> float:
     return float(longest) * problem.interface.spacing
 
 
-@kept(count=lambda size: min(size.what_if, 400))
+@kept(count=lambda size: min(2 * size.what_if, 400))
 def free_end(run: Runner, count: int) -> xr.Dataset:
     """Onsets with free ends in mode III, where a mirrored field has them exactly.
 
@@ -563,22 +589,26 @@ def failure(run: Runner) -> xr.Dataset:
 
 
 WHAT_IFS = (
-    "wide_strength", "correlation", "random_residual", "random_load", "normal_load", "length",
-    "exponent", "skewness", "uniform_dc",
+    "wide_strength", "random_residual", "random_load", "normal_load", "length", "exponent",
+    "skewness", "uniform_dc",
 )  # fmt: skip
 ARRESTS = {
-    "wide_strength": ((1, 3),),
-    "random_load": ((3, 5),),
+    "wide_strength": ((3,),),
+    "random_load": ((4, 5),),
     "random_residual": ((2,), (0,)),
-    "correlation": ((0, 2, 5), (0,)),
 }
 """What-ifs in which arrest is the question: of each axis, the values that are run with inertia."""
+TIMES = {"random_load": 2}
+"""Samples by equilibrium, in multiples of the usual number: more where shares are small."""
+TIMES_RUPTURES = {"random_residual": 6}
 
 
 def what_if(run: Runner, name: str) -> xr.Dataset:
     """A study file of `what_if/`, its swept points stacked along 'point'."""
     study = st.Study.from_toml(setting.WHAT_IF / f"{name}.toml")
-    most = run.size.trend if study.method == LOCAL else run.size.what_if
+    most = run.size.trend
+    if study.method != LOCAL:
+        most = run.size.what_if * TIMES.get(name, 1)
     ensemble = st.Ensemble(samples=min(most, study.ensemble.samples), seed=run.seed)
     return stacked(run.study(name, dataclasses.replace(study, ensemble=ensemble)))
 
@@ -600,14 +630,15 @@ def what_if_dynamic(run: Runner, name: str) -> xr.Dataset:
         for axis, chosen in zip(plain["sweep"], ARRESTS[name], strict=True)
     ]
     plain["method"] = RUPTURE
-    plain["ensemble"] = {"samples": run.size.arrests, "seed": run.seed}
+    samples = min(run.size.arrests * TIMES_RUPTURES.get(name, 1), 200)
+    plain["ensemble"] = {"samples": samples, "seed": run.seed}
     found = stacked(run.study(f"{name}-inertia", st.Study.from_dict(plain)))
     return found.assign_coords(point=numbers.ravel())
 
 
 STUDIES = (
     local, moments, exact, ruptures, printed, readings, theory, representative, convergence, trend,
-    window, modes, growth, mechanism, arrest, driving, free_end, failure,
+    vanishing, window, modes, growth, mechanism, arrest, driving, free_end, failure,
 )  # fmt: skip
 """In the order in which they are computed."""
 
@@ -620,5 +651,5 @@ def jobs(size: Size):
         text = f"What if: {name.replace('_', ' ')}"
         yield name, text, functools.partial(what_if, name=name)
         if name in ARRESTS:
-            text += f", {size.arrests} ruptures each"
+            text += ", with inertia"
             yield f"{name}-inertia", text, functools.partial(what_if_dynamic, name=name)

@@ -215,13 +215,12 @@ def _shares(axes, d: Data, name: str, title: str) -> None:
 
 def figure_14(d: Data):
     """Draw the share of arrested samples where more is random, with and without inertia."""
-    figure = common.new(8.6)
-    axes = figure.subplots(4, 1, height_ratios=(4, 6, 6, 12), sharex=True)
+    figure = common.new(5.6)
+    axes = figure.subplots(3, 1, height_ratios=(4, 6, 6), sharex=True)
     for panel, (name, title) in zip(axes, (
         ("wide_strength", "range of the strength"),
         ("random_load", "random initial stress"),
         ("random_residual", "random residual strength"),
-        ("correlation", "residual strength correlated with the strength"),
     ), strict=True):  # fmt: skip
         _shares(panel, d, name, title)
     axes[1].legend(loc="upper right")
