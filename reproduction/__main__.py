@@ -20,11 +20,11 @@ from reproduction import PARAMETERS
 BASIC = ("local", "moments", "exact", "ruptures", "printed", "theory", "representative",
          "dynamic")  # fmt: skip
 NEEDS = {
-    1: (), 2: (), 3: (), 4: (), 5: (), 6: (), 7: (), 8: (), 9: ("trend",), 10: ("convergence",),
-    11: ("growth", "mechanism"), 12: ("arrest",), 13: ("driving",),
-    14: ("wide_strength", "random_load", "random_residual"),
+    1: (), 2: (), 3: (), 4: (), 5: (), 6: (), 7: (), 8: (),
+    9: ("trend", "vanishing"), 10: ("convergence",), 11: ("growth", "mechanism"), 12: ("arrest",),
+    13: ("driving",), 14: ("wide_strength", "random_load", "random_residual"),
     15: ("length", "normal_load", "free_end", "failure"),
-    16: ("skewness", "exponent", "uniform_dc"),
+    16: ("skewness", "exponent"),
 }  # fmt: skip
 """Studies of each figure besides the basic ones; the page needs all."""
 

@@ -13,7 +13,6 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from reproduction import setting
 from reproduction.numbers_with_errors import Number
 from reproduction.rules import Rule, Verdict, limits_times, together
 from reproduction.runner import Size
@@ -73,12 +72,6 @@ class Data:
         """Return the first instability by the local criterion over the exact one, less one."""
         name = "first_instability"
         return self.at("local", name, ratio) / self.at("exact", name, ratio) - 1.0
-
-    def misplaced(self, ratio: float) -> np.ndarray:
-        """Return whether the local criterion puts the onset more than h_n/2 from where it is."""
-        one = self.at("local", "critical_position", ratio)
-        other = self.at("exact", "critical_position", ratio)
-        return setting.distance(one, other) > 0.5 * setting.H
 
     def what_if(self, name: str, variable: str, point: int) -> np.ndarray:
         """Return a variable of a what-if at one of its points."""

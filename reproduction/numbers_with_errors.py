@@ -18,9 +18,6 @@ class Number:
     def __mul__(self, factor: float) -> Number:
         return Number(self.value * factor, self.error * abs(factor))
 
-    def __add__(self, other: Number) -> Number:
-        return Number(self.value + other.value, math.hypot(self.error, other.error))
-
     def __sub__(self, other) -> Number:
         other = other if isinstance(other, Number) else Number(float(other))
         return Number(self.value - other.value, math.hypot(self.error, other.error))

@@ -48,6 +48,13 @@ def write(path: Path, data: Data, groups, images, runner, warned) -> None:
     }
     environment = jinja2.Environment(autoescape=True, trim_blocks=True)
     environment.filters |= {"physics": physics, "number": rounded}
+    plain = jinja2.Environment(undefined=jinja2.StrictUndefined)
+    plain.filters["number"] = rounded
+    known = texts.names(data, {f.claim.name: f for f in found})
+
+    def filled(text: str) -> str:
+        return " ".join(plain.from_string(text).render(known).split())
+
     template = environment.from_string(Path(__file__).with_name("page.html").read_text("utf-8"))
     readings = compare(data)
     order = [Verdict.FAILS, Verdict.TEXT, Verdict.CORRECTED]
@@ -59,7 +66,7 @@ def write(path: Path, data: Data, groups, images, runner, warned) -> None:
     text = template.render(
         version=st.__version__,
         own=", ".join(f"{name} = {value:g}" for name, value in PARAMETERS.items()),
-        short=texts.in_short(data, {f.claim.name: f for f in found}),
+        short=[filled(line) for line in TEXTS["short"]],
         verdicts=Verdict,
         findings=[f.verdict for f in found if f.claim.kind == "finding"],
         others={
@@ -68,7 +75,7 @@ def write(path: Path, data: Data, groups, images, runner, warned) -> None:
         },
         resting=sum(bool(f.otherwise) for f in found if f.claim.kind == "finding"),
         texts=TEXTS,
-        figures=[_figure(number, image, data) for number, image in images.items()],
+        figures=[_figure(number, image, filled) for number, image in images.items()],
         few=texts.few_and_many(data),
         readings=readings,
         best=max(float(reading.likelihood[0]) for reading in readings) or 1.0,
@@ -90,11 +97,11 @@ def write(path: Path, data: Data, groups, images, runner, warned) -> None:
     unfinished.replace(path)
 
 
-def _figure(number: int, image: Path, data: Data) -> dict:
+def _figure(number: int, image: Path, filled) -> dict:
     encoded = base64.b64encode(image.read_bytes()).decode()
     about = TEXTS["figure"][str(number)]
     return about | {
         "number": number,
-        "ours": texts.OURS[number](data) if number in texts.OURS else about["ours"],
+        "ours": filled(about["ours"]),
         "image": f"data:image/png;base64,{encoded}",
     }

@@ -332,30 +332,20 @@ def by_reading(function):
     return lambda d: {key: function(functools.partial(at, d, key)) for key in READINGS}
 
 
-def _simulated(label: str, unit: str, function, ratios=SIMULATED) -> Series:
-    return over_ratios(label, unit, function, ratios)
-
-
-def _changes(index: int, label: str):
-    return lambda v: _simulated(label, "%", lambda r: abs(relative_changes(
-        v("predicted", r), v("simulated", r))[index]) * PER_CENT)  # fmt: skip
+def _changes(v, index: int, label: str) -> Series:
+    return over_ratios(label, "%", lambda r: abs(relative_changes(
+        v("predicted", r), v("simulated", r))[index]) * PER_CENT, SIMULATED)  # fmt: skip
 
 
 def _above_simulation(v, ratios=SIMULATED) -> Series:
-    return _simulated(
-        "theory above simulation, mean", "%", lambda r: mean(v("excess", r)) * PER_CENT, ratios
-    )
+    return over_ratios("theory above simulation, mean", "%",
+                       lambda r: mean(v("excess", r)) * PER_CENT, ratios)  # fmt: skip
 
 
 def _explained(d: Data) -> dict:
-    shares = by_reading(
-        lambda v: [
-            one(
-                "share of what the theory lacks at 0.25 that interaction explains",
-                ratio_of_means(v("consistent_excess", 0.25), v("excess", 0.25)),
-            )
-        ]
-    )(d)
+    label = "share of what the theory lacks at 0.25 that interaction explains"
+    shares = by_reading(lambda v: [one(label, ratio_of_means(
+        v("consistent_excess", 0.25), v("excess", 0.25)))])(d)  # fmt: skip
     rest = over_ratios("exact equilibrium against the ruptures, mean", "%", lambda r: abs(
         mean(offsets(d, r, "exact"))) * PER_CENT, SIMULATED)  # fmt: skip
     return {key: [*rows, rest] for key, rows in shares.items()}
@@ -363,16 +353,16 @@ def _explained(d: Data) -> dict:
 
 PREDICTION = [
     Claim("good-prediction", below(1.0, "%: a third of what samples differ by"),
-        lambda d: (by_reading(lambda v: [_simulated("error, root mean square", "%", lambda r:
-                       root_mean_square(v("excess", r)) * PER_CENT)])(d),
+        lambda d: (by_reading(lambda v: [over_ratios("error, root mean square", "%", lambda r:
+                       root_mean_square(v("excess", r)) * PER_CENT, SIMULATED)])(d),
                    [over_ratios("one modulus, against exact equilibrium of all samples", "%",
                        lambda r: root_mean_square(d.excess(r)) * PER_CENT),
                     over_ratios("one modulus, against the ruptures", "%", lambda r:
                        root_mean_square(offsets(d, r, "local")) * PER_CENT, SIMULATED)])),
     Claim("distribution-described", each(below(0.65, f"%: {TWENTY}"), below(16.0, f"%: {TWENTY}")),
         lambda d: (by_reading(lambda v: [
-            _changes(0, "error of the mean")(v),
-            _changes(1, "error of the standard deviation")(v)])(d), [])),
+            _changes(v, 0, "error of the mean"),
+            _changes(v, 1, "error of the standard deviation")])(d), [])),
     Claim("overpredicts",
         each(falling(), above(0.0), below(1.0, "%: a third of what samples differ by")),
         lambda d: (by_reading(lambda v: [_above_simulation(v)] + 2 * [
@@ -396,8 +386,8 @@ PREDICTION = [
             np.concatenate([v("excess", r)[v("misplaced", r)] for r in SIMULATED]) < 0.03))])(d),
             [])),
     Claim("wrong-positions-short", falling(),
-        lambda d: (by_reading(lambda v: [_simulated("share of onsets more than h_n/2 off", "",
-                       lambda r: share(v("misplaced", r)))])(d), [])),
+        lambda d: (by_reading(lambda v: [over_ratios("share of onsets more than h_n/2 off", "",
+                       lambda r: share(v("misplaced", r)), SIMULATED)])(d), [])),
     Check("applied-load", below(0.1, "%"),
         lambda d: ([over_ratios("applied load above the peak of the mean stress", "%", lambda r:
                     mean(d.at("ruptures", "applied_load", r) / d.stress(r, "ruptures") - 1.0)

@@ -8,17 +8,7 @@ import numpy as np
 from reproduction import numbers_with_errors, rules, setting
 from reproduction.claims import Check, Claim, Data, Series, one, over_ratios
 from reproduction.numbers_with_errors import Number, deviation, lower_spread, mean, share
-from reproduction.rules import (
-    above,
-    alike,
-    below,
-    corrected,
-    each,
-    falling,
-    graded,
-    rising,
-    within,
-)
+from reproduction.rules import above, alike, below, each, falling, graded, rising, within
 from reproduction.setting import HIGH, RATIOS, SIMULATED, H, L
 
 KPA, MPA, PER_CENT = 1e-3, 1e-6, 100.0
@@ -176,7 +166,7 @@ ARREST = [
         lambda d: ([_long_arrests(d, "edge"), _long_arrests(d, "gradient")],
                    [_long_arrests(d, "uniform"),
                     one("edge, with inertia, held", share(_edge_lengths(d) < 0.95 * L))])),
-    Claim("griffith-arrest", corrected(within(0.67, 1.5, "to a half")),
+    Claim("griffith-arrest", rules.corrected(within(0.67, 1.5, "to a half")),
         lambda d: ([one("median length over Griffith's, edge load", _griffith(d, "length")),
                     one("with inertia, first event", _griffith(d, "dynamic_length"))], [])),
 ]  # fmt: skip
@@ -270,15 +260,16 @@ SIZE = [
     Claim("longer-interface", falling(),
         lambda d: ([Series("median less lower quartile", "kPa", _lengths(d, lower_spread, KPA))],
                    [Series("mean", "MPa", _lengths(d, mean, MPA))])),
-    Claim("free-end", corrected(below(0.0)),
+    Claim("free-end", rules.corrected(below(0.0)),
         lambda d: ([_free(d, mean)],
                    [over_ratios("share of samples lowered", "", lambda r: share(
                        d["free_end"]["change"].values[RATIOS.index(r)] < -1e-9))])),
-    Claim("finite-size", corrected(rising()),
+    Claim("finite-size", rules.corrected(rising()),
         lambda d: ([Series("change by free ends, mean, xi_0/h_n = 0.25", "%", [
             (label, mean(d["free_end"]["change"].values[i]) * PER_CENT)
             for label, i in (("L/4", 4), ("L/2", 5), ("L", 0))])], [])),
-    Claim("end-range", corrected(each(above(0.0), within(-0.05, 0.05, "no effect beyond h_n"))),
+    Claim("end-range",
+        rules.corrected(each(above(0.0), within(-0.05, 0.05, "no effect beyond h_n"))),
         lambda d: ([one("share of onsets within h_n/2 of an end, less chance",
                         _near_end(d, 0.0, 0.5)),
                     one("from h_n to 2 h_n, less chance", _near_end(d, 1.0, 2.0))], [])),

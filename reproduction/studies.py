@@ -590,7 +590,7 @@ def failure(run: Runner) -> xr.Dataset:
 
 WHAT_IFS = (
     "wide_strength", "random_residual", "random_load", "normal_load", "length", "exponent",
-    "skewness", "uniform_dc",
+    "skewness",
 )  # fmt: skip
 ARRESTS = {
     "wide_strength": ((3,),),

@@ -12,7 +12,7 @@ from reproduction.figures.common import COLOURS, GREY, INK, OVER_MEAN, RED, TAU_
 from reproduction.numbers_with_errors import deviation, lower_spread, mean
 from reproduction.setting import HIGH, MEAN, PROBLEM, RATIOS, SIMULATED, H, L
 from reproduction.statements_onset import trend
-from reproduction.statements_rupture import arrested, shares
+from reproduction.statements_rupture import arrested, shares, with_inertia
 from reproduction.studies import DRIVING, LEVELS, RATES
 
 
@@ -46,6 +46,11 @@ def figure_9(d: Data):
     top, bottom = figure.subplots(2, 1, sharex=True)
     cases = ((0, COLOURS[0], "-", "o", "fixed mean of $z$, as in the paper"),
              (1, COLOURS[2], "--", "^", "random mean of $z$"))  # fmt: skip
+    tiny = d["vanishing"]["stress"]
+    for axes, function, factor in ((top, mean, 1 / MEAN), (bottom, lower_spread, 1e-3)):
+        found = [function(row.values) * factor for row in tiny]
+        common.numbers(axes, tiny.ratio.values, found, color=COLOURS[0], marker="o", mfc="white",
+                       ls="-", label="finer grid, other draws")  # fmt: skip
     for mode, colour, dashes, marker, label in cases:
         for axes, function, factor in ((top, mean, 1 / MEAN), (bottom, lower_spread, 1e-3)):
             rows = trend(d, function, factor, mode)
@@ -56,10 +61,11 @@ def figure_9(d: Data):
                 label="standard deviation, fixed mean")  # fmt: skip
     for axes in (top, bottom):
         axes.axvspan(RATIOS[0], RATIOS[-1], color="#eeeeee", lw=0, zorder=0)
-    top.set(xscale="log", ylabel=rf"mean of $\tau_\mathrm{{cr}}{OVER_MEAN}", ylim=(0.68, 0.92))
+    top.set(xscale="log", ylabel=rf"mean of $\tau_\mathrm{{cr}}{OVER_MEAN}", ylim=(0.68, 0.96))
     top.text(0.71, 0.69, "the paper's range", ha="center", color=GREY)
     bottom.set(yscale="log", xlabel=XI, ylabel="median less lower quartile (kPa)")
-    common.plain_ticks(bottom.xaxis, (0.0625, 0.25, 1, 4, 16))
+    common.plain_ticks(bottom.xaxis, (1 / 64, 1 / 16, 0.25, 1, 4, 16))
+    bottom.set_xticklabels(["1/64", "1/16", "1/4", "1", "4", "16"])
     common.plain_ticks(bottom.yaxis, (10, 20, 50, 100))
     bottom.legend(loc="upper left")
     common.letters((top, bottom))
@@ -151,11 +157,11 @@ def figure_12(d: Data):
     top.set(xlabel=r"length of the rupture over $h_\mathrm{n}$", xlim=(0, 4.5), ylim=(0, 1.6),
             ylabel=r"$G/\Gamma_\mathrm{max}$")  # fmt: skip
     top.legend(loc="lower right", title=XI)
-    studies = [("exact", -0.06, COLOURS[0], "o", "without inertia")]
-    if "dynamic" in d:
-        studies.append(("dynamic", 0.06, RED, "D", "with inertia"))
-    for name, shift, colour, marker, text in studies:
-        found = [arrested(d, ratio, name) * 100 for ratio in RATIOS]
+    for function, shift, colour, marker, text in (
+        (arrested, 0.0, COLOURS[0], "o", "without inertia"),
+        (with_inertia, 0.1, RED, "D", "with inertia (drawn beside)"),
+    ):
+        found = [function(d, ratio) * 100 for ratio in RATIOS]
         style = {"fmt": marker, "color": colour, "ms": 5, "label": text}
         common.numbers(bottom, np.log2(RATIOS) + shift, found, **style)
     common.ratio_axis(bottom)
@@ -181,15 +187,20 @@ def figure_13(d: Data):
     for i, case in enumerate(("edge", "gradient", "uniform")):
         here = study.sel(case=case)
         style = {"color": COLOURS[2 - i], "ms": 4, "ls": "none"}
-        bottom.plot(here["griffith"].values.ravel() / H, here["length"].values.ravel() / H,
-                    marker="osv"[i], label=f"{case}, without inertia", **style)  # fmt: skip
+        length = here["length"].values.ravel() / H
+        griffith = np.minimum(here["griffith"].values.ravel() / H, 45.0)  # infinite if uniform
+        bottom.plot(griffith, length, marker="osv"[i],
+                    label=f"{case}, without inertia ({np.isfinite(length).sum()})",
+                    **style)  # fmt: skip
     edge = study.sel(case="edge")
     bottom.plot(edge["griffith"].values[:, 0] / H, edge["dynamic_length"].values / H, "D",
-                color=RED, mfc="none", ms=5, label="edge, first event, with inertia")  # fmt: skip
-    limit = 24
-    bottom.plot([0, limit], [0, limit], color=GREY, lw=0.8)
-    bottom.set(xlim=(0, limit), ylim=(0, limit), xlabel=r"Griffith's length over $h_\mathrm{n}$",
+                color=RED, mfc="none", ms=5, label="edge, first event, with inertia"
+                f" ({np.isfinite(edge['dynamic_length'].values).sum()})")  # fmt: skip
+    bottom.plot([5, 40], [5, 40], color=GREY, lw=0.8)
+    bottom.set(xscale="log", yscale="log", xlabel=r"Griffith's length over $h_\mathrm{n}$",
                ylabel=r"arrested length over $h_\mathrm{n}$")  # fmt: skip
+    for axis in (bottom.xaxis, bottom.yaxis):
+        common.plain_ticks(axis, (1, 2, 5, 10, 20, 40))
     bottom.legend(loc="upper left")
     common.letters((top, bottom))
     return figure
@@ -263,7 +274,9 @@ def figure_15(d: Data):
     end.legend(loc="lower right", ncols=3)
     study = d["failure"]
     tail.semilogy(study["stress"] * 1e-6, study["probability"], color=COLOURS[0],
-                  label="subset simulation")  # fmt: skip
+                  label="subset simulation, 95 %")  # fmt: skip
+    tail.fill_between(study["stress"] * 1e-6, study["probability_low"], study["probability_high"],
+                      color=COLOURS[1], alpha=0.3, lw=0)  # fmt: skip
     ordered = np.sort(d.stress(RATIOS[1])) * 1e-6
     counted = np.arange(1, ordered.size + 1) / ordered.size
     tail.semilogy(ordered[: ordered.size // 2], counted[: ordered.size // 2], ".", color=RED, ms=2,
@@ -275,9 +288,9 @@ def figure_15(d: Data):
 
 
 def figure_16(d: Data):
-    """Draw what other strengths, spectra and laws do to the onset."""
-    figure = common.new(6.4)
-    skew, spectrum, law = figure.subplots(3, 1)
+    """Draw what other strengths and spectra do to the onset."""
+    figure = common.new(4.6)
+    skew, spectrum = figure.subplots(2, 1)
     x = np.log2(RATIOS)
     for start, colour, marker, text in (
         (0, COLOURS[0], "o", "the paper's strength"),
@@ -300,17 +313,6 @@ def figure_16(d: Data):
                  ylabel=f"mean {TAU_CR} (%)")  # fmt: skip
     common.plain_ticks(spectrum.xaxis, (1.5, 2, 4, 8))
     spectrum.legend(title=XI, loc="upper right")
-    for start, colour, marker, text in (
-        (0, COLOURS[0], "o", "uniform $W$"),
-        (4, COLOURS[2], "^", r"uniform $d_\mathrm{c}$"),
-    ):
-        rows = [
-            mean(d.what_if("uniform_dc", "critical_stress", start + i) / MEAN) for i in range(4)
-        ]
-        common.numbers(law, x, rows, color=colour, marker=marker, label=text)
-    law.set(ylabel=r"$\langle\tau_\mathrm{cr}\rangle/\langle\tau_\mathrm{p}\rangle$")
-    law.legend()
-    for panel in (skew, law):
-        common.ratio_axis(panel)
-    common.letters((skew, spectrum, law))
+    common.ratio_axis(skew)
+    common.letters((skew, spectrum))
     return figure

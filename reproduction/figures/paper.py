@@ -132,6 +132,11 @@ SLOW_TO_FAST = LinearSegmentedColormap.from_list(
 )
 
 
+def _shift(study) -> int:
+    """Return the nodes by which the periodic interface is shifted: its onset is at 0.75 L then."""
+    return round((0.75 - float(study["critical_position"]) / L) * study.sizes["x"])
+
+
 def figure_3(d: Data):
     """Draw one rupture: slip rate in space and time, load, strength."""
     study, solid = d["representative"], PROBLEM.solid
@@ -140,9 +145,7 @@ def figure_3(d: Data):
     time, x = study["time"].values, study["x"].values / L
     mean_stress = study["mean_stress"].values
     onset, end = time[mean_stress.argmax()], time[-1]
-    # The interface is periodic: it is shifted so that the onset lies at x/L = 0.75.
-    centre = 0.75
-    shift = round((centre - float(study["critical_position"]) / L) * x.size)
+    centre, shift = 0.75, _shift(study)
     rate = np.roll(study["slip_rate"].values, shift, axis=1) * setting.G_STAR
     rate = np.maximum(rate / (MEAN * solid.shear_wave_speed), 1e-12)
     zoom = figure.add_subplot(grid[0, :])
@@ -191,10 +194,12 @@ def figure_4(d: Data):
     top, middle, bottom = (figure.add_subplot(grid[i]) for i in range(3))
     study = d["representative"]
     x = study["x"].values / L
-    top.plot(x, study["strength"] / MEAN, "--", color=GREY, lw=0.8, label=r"$\tau_\mathrm{p}$")
-    top.plot(x, study["tau_n"] / MEAN, color=COLOURS[1], label=r"$\tau_\mathrm{n}$")
-    least = int(study["tau_n"].argmin())
-    top.plot(x[least], study["tau_n"].values[least] / MEAN, "o", color=INK, ms=5)
+    tau_p, tau_n = (
+        np.roll(study[name], _shift(study)) / MEAN for name in ("strength", "tau_n")
+    )
+    top.plot(x, tau_p, "--", color=GREY, lw=0.8, label=r"$\tau_\mathrm{p}$")
+    top.plot(x, tau_n, color=COLOURS[1], label=r"$\tau_\mathrm{n}$")
+    top.plot(x[tau_n.argmin()], tau_n.min(), "o", color=INK, ms=5)
     top.set(xlabel="$x/L$", ylabel=rf"stress ${OVER_MEAN}", xlim=(0, 1), ylim=(0.6, 1.75))
     top.legend(loc="upper right", ncols=2)
     common.letter(top, "a", x=-0.1)
@@ -228,17 +233,23 @@ def figure_4(d: Data):
 def figure_5(d: Data):
     """Draw strength, nucleation stress and onset at four correlation lengths."""
     figure = common.new(8.4)
-    grid = figure.add_gridspec(4, 1, height_ratios=(1.1, 1.0, 1.0, 0.7))
-    rows = [grid[i].subgridspec(1, 3, width_ratios=(4, 1, 1.2), wspace=0.04) for i in (0, 1)]
-    upper = [figure.add_subplot(rows[0][i]) for i in range(3)]
+    grid = figure.add_gridspec(4, 1, height_ratios=(1.5, 0.9, 0.9, 0.6))
+    rows = [grid[i].subgridspec(4 - 3 * i, 3, width_ratios=(4, 1, 1.2), wspace=0.04, hspace=0.06)
+            for i in (0, 1)]  # fmt: skip
+    fields = [figure.add_subplot(rows[0][i, 0]) for i in range(4)]
+    upper = [figure.add_subplot(rows[0][:, i]) for i in (1, 2)]
     lower = [figure.add_subplot(rows[1][i]) for i in range(3)]
     x = PROBLEM.interface.x / L
     s = np.linspace(LOW, HIGH, 300)
     law = setting.MARGINAL.distribution.pdf(s) * MEAN
-    upper[1].plot(law, s / MEAN, color=INK)
-    for ratio in RATIOS:
+    upper[0].plot(law, s / MEAN, color=INK)
+    for ratio, strip in zip(RATIOS, fields, strict=True):
         tau_p = setting.strength(ratio).sample(PROBLEM.interface)  # of the same draws for each
-        upper[0].plot(x, tau_p[0] / MEAN, **common.line(ratio), lw=0.9, label=f"{ratio:g}")
+        strip.plot(x, tau_p[0] / MEAN, color=common.line(ratio)["color"], lw=0.9)
+        strip.plot([], [], **common.line(ratio), label=f"{XI} = {ratio:g}")
+        strip.legend(loc="upper right", borderpad=0.1)
+        strip.set(xlim=(0, 1), ylim=(0.62, 2.1), yticks=(0.75, 1.25))
+        strip.tick_params(labelbottom=strip is fields[-1])
         lower[0].plot(
             x,
             st.theory.nucleation_stress(PROBLEM, tau_p)[0] / MEAN,
@@ -248,32 +259,29 @@ def figure_5(d: Data):
         least = st.statistics.density(
             d.at("moments", "weakest_strength", ratio), bounds=(LOW, HIGH)
         )
-        upper[2].plot(least.value / least.value.max(), least.x / MEAN, **common.line(ratio))
+        upper[1].plot(least.value / least.value.max(), least.x / MEAN, **common.line(ratio))
         counts = d.at("moments", "counts", ratio).reshape(-1, 32).sum(axis=1)
         edges = np.linspace(LOW, HIGH, counts.size + 1)
         centre = 0.5 * (edges[1:] + edges[:-1])
         density = counts / counts.sum() / (edges[1] - edges[0]) * MEAN
         lower[1].plot(density, centre / MEAN, **common.line(ratio))
-    for axes, (low, high) in ((upper, (0.62, 1.72)), (lower, (0.62, 1.42))):
-        for one in axes:
-            one.set_ylim(low, high)
-        for one in axes[1:]:  # narrow panels of densities
-            one.set_xticks([])
-            one.tick_params(labelleft=False)
-    upper[0].set(ylabel=rf"$\tau_\mathrm{{p}}{OVER_MEAN}", xlim=(0, 1))
-    upper[0].legend(title=XI, loc="upper center", ncols=4, columnspacing=0.9)
-    upper[0].set_ylim(0.62, 2.1)
-    upper[1].set_ylim(0.62, 2.1)
-    upper[2].set_ylim(LOW / MEAN, 0.74)
-    upper[2].yaxis.tick_right()
-    upper[2].tick_params(labelright=True)
-    upper[2].set_yticks((0.68, 0.70, 0.72))
-    upper[1].set_title(r"$f(\tau_\mathrm{p})$")
-    upper[2].set_title(r"$f(\min\tau_\mathrm{p})$")
+    for one in (*upper, *lower[1:]):  # narrow panels of densities
+        one.set_xticks([])
+        one.tick_params(labelleft=one is upper[0])
+    for one in lower:
+        one.set_ylim(0.62, 1.52)
+    fields[1].set_ylabel(rf"$\tau_\mathrm{{p}}{OVER_MEAN}", y=0.0)
+    upper[0].set_ylim(0.62, 1.72)
+    upper[1].set_ylim(LOW / MEAN, 0.76)
+    upper[1].yaxis.tick_right()
+    upper[1].tick_params(labelright=True)
+    upper[1].set_yticks((0.68, 0.70, 0.72, 0.74))
+    upper[0].set_title(r"$f(\tau_\mathrm{p})$")
+    upper[1].set_title(r"$f(\min\tau_\mathrm{p})$")
     lower[0].set(ylabel=rf"$\tau_\mathrm{{n}}{OVER_MEAN}", xlabel="$x/L$", xlim=(0, 1))
     lower[1].set_title(r"$f(\tau_\mathrm{n})$")
     lower[2].axis("off")
-    common.letter(upper[0], "a", x=-0.12)
+    common.letter(fields[0], "a", x=-0.12)
     common.letter(lower[0], "b", x=-0.12)
     stress, place = figure.add_subplot(grid[2]), figure.add_subplot(grid[3])
     for ratio in RATIOS:

@@ -316,7 +316,7 @@ def test_the_table_of_claims_is_tidy_and_the_main_results_stand(pipeline):
     times = float(re.search(r"is ([\d.e+]+) times as likely", short)[1])
     assert times == pytest.approx(max(two) / max(a, b), rel=0.1)
     for name in (
-        "lower-friction", "neighbours-lower", "vanishing-variability", "nucleation-mean",
+        "lower-friction", "neighbours-lower", "nucleation-mean", "short-stress",
     ):  # fmt: skip
         assert verdicts[name] == HOLDS.value, name
     for name in ("good-prediction", "coincide", "interaction-suffices", "overpredicts"):
