@@ -1,6 +1,7 @@
 """Linear limit states in many dimensions, whose failure probability is known."""
 
 import math
+import re
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -13,8 +14,9 @@ from scipy.stats import t as student
 from setups import beta_strength
 
 import stiction as st
+from stiction.random import equally_likely
 from stiction.random.equally_likely import EquallyLikely
-from stiction.reliability.subset import descend
+from stiction.reliability.subset import Descent, Population, descend
 from stiction.reliability.tail import Tail, agreement, repeat_until_precise
 from stiction.reliability.two_level import _covered, bridge
 from stiction.reliability.uncertainty import generator, log_width
@@ -199,6 +201,23 @@ def test_walkers_of_one_ancestor_are_one_observation():
     assert np.mean(variance * last**2) == pytest.approx(exact, rel=0.1)
 
 
+@pytest.mark.parametrize("count", [4, 7])
+def test_few_unequal_families_have_their_whole_variance(count):
+    """Of a mean weighted by sizes, about the mean itself: each family pulls it to its own."""
+    rng = np.random.default_rng(4)
+    sizes = np.array([19, 7, 5, 2, 1, 1, 1])[:count]
+    families = rng.permutation(np.repeat(np.arange(count), sizes))
+    seen = rng.normal(0.0, 0.1, (4000, count)) + 0.7
+    found = []
+    for own in seen:
+        covered = rng.random((200, families.size)) < own[families]
+        states = np.where(covered, -1.0, 1.0).reshape(-1, 1)
+        found.append(_covered(states, first, 0.0, families, 1000))
+    last, variance = np.array(found).T
+    # Without the pull it is 0.6 of that with seven, and 0.4 with four.
+    assert np.mean(variance * last**2) == pytest.approx(last.var(), rel=0.1)
+
+
 def test_evaluations_are_the_samples_that_were_solved():
     """Of both functions, within the budget."""
     solved = {"exact": 0, "guide": 0}
@@ -295,6 +314,75 @@ def test_unknown_mean_and_variance_give_students_tail():
     assert found.band[1] == pytest.approx(np.quantile(each, 0.95), rel=0.5)
 
 
+@dataclass(frozen=True)
+class UnknownMean:
+    """Strengths of deviation 30 kPa whose mean is 1.1 MPa, known to a deviation of its own."""
+
+    deviation: float
+
+    def interfaces(self, count, seed=0):
+        means = np.random.default_rng([seed, 8]).normal(1.1e6, self.deviation, count)
+        spectrum = beta_strength(9e-3).spectrum
+        return [
+            st.RandomInterface(strength=st.RandomField(norm(m, 30e3), spectrum)) for m in means
+        ]
+
+
+def test_as_many_members_are_drawn_as_the_target_needs(monkeypatch):
+    monkeypatch.setattr(equally_likely, "FIRST", 100)
+    source, options = UnknownMean(24e3), {"method": AtOnePlace(), "seed": 3, "progress": False}
+    scale = math.hypot(24e3, 30e3)
+    stress = 1.1e6 - 2.9 * scale
+    true = norm.cdf(-2.9)
+    found = st.failure_probability(LINE, source, stress, **options, target_cv=0.3)
+    # By 100 members the mean over them alone has an error of about a half.
+    assert found.members.size > 200
+    assert 0.0 < found.members_cv <= 0.6 * 0.3
+    assert found.cv <= 0.3
+    assert found.probability == pytest.approx(true, rel=4.0 * found.cv)
+    design = st.design_stress(LINE, source, probability=true, **options, target_cv=0.5)
+    slope = norm.pdf(2.9) / true / scale
+    assert design.stress == pytest.approx(stress, abs=4.0 * design.cv / slope)
+    # A list is a sample, and the answer says so; what it was drawn from would do.
+    few = source.interfaces(12, seed=1)
+    given = st.failure_probability(LINE, few, stress, **options, target_cv=0.3)
+    exact = norm.cdf(stress, [one.strength.mean for one in few], 30e3)
+    shares = exact / exact.sum()
+    # Failures are of some hundred ancestors.
+    assert given.members_cv == pytest.approx(math.sqrt(np.sum(shares**2) - 1 / 12), rel=0.3)
+    assert given.cv == pytest.approx(given.members_cv, rel=0.2)
+    carriers = 1 + np.searchsorted(np.cumsum(np.sort(shares)[::-1]), 0.9)
+    told = int(re.search(r"(\d+) of its 12", given.warnings[-1]).group(1))
+    assert told == pytest.approx(carriers, abs=1)
+    assert "carry 90% of the mean" in given.warnings[-1]
+    assert "c.o.v. by the list" in str(given)
+    alike = st.failure_probability(LINE, few[:1] * 12, 1.01e6, **options, target_cv=0.3)
+    assert alike.members_cv == 0.0  # one interface, twelve times
+
+
+@pytest.mark.parametrize("spread", [0.0, 1.2])
+def test_the_error_of_a_list_is_not_that_of_its_samples(spread):
+    """Pairs of runs of 40 and 60 families, pooled; of 25 entries two are equal."""
+    rng = np.random.default_rng(2)
+    chances = np.exp(spread * rng.standard_normal(25))
+    chances[7] = chances[24]
+    shares, kinds = chances / chances.sum(), np.append(np.arange(24), 7)
+    found = []
+    for _ in range(200):
+        runs = []
+        for size, copies in ((40, 5), (60, 3)):
+            members = np.repeat(rng.choice(25, size, p=shares), copies)
+            ancestors = np.repeat(np.arange(size), copies)
+            values = np.zeros(members.size)
+            level = Population(math.inf, 0.0, values, ancestors, members, np.zeros((0, 0)))
+            runs.append(Descent(1000, [level], 1.0, 1000, True))
+        found.append(Tail(runs).members_cv(1.0, kinds) ** 2)
+    entries, own = np.bincount(kinds) / 25.0, np.bincount(kinds, shares)
+    expected = (np.sum(own**2) - np.sum(entries**2)) / (1.0 - np.sum(entries**2))
+    # With the samples of each entry as they are it is 0.01 higher; below zero it is cut off.
+    assert np.mean(found) == pytest.approx(expected, abs=4e-3)
+
+
 def test_small_repetitions_over_members_are_unbiased():
     """Five members in an order that is not that of their strength: the weakest carries the tail."""
     shifts = np.array([1.5, -0.4, 0.3, 1.1, 0.0])
@@ -312,7 +400,7 @@ def test_small_repetitions_over_members_are_unbiased():
     # The probability of each member is unbiased as well, those that are seen in few runs too.
     shares = []
     for run in runs:
-        each, members = run.below(-3.3)
+        each, members, _ = run.below(-3.3)
         shares.append(5 * each * np.bincount(members, minlength=5))
     for number in (1, 2, 4):
         assert_mean(np.array(shares)[:, number], true[number], errors=3.5)

@@ -15,6 +15,7 @@ from setups import EXACT, LOCAL, exact_onset, local_onset, make_problem, turns
 
 import stiction as st
 from stiction.random.stresses import share_below_residual
+from stiction.reliability.counting import count_failures
 
 PROBLEM = st.paper.problem(nodes=256)
 FIELD = st.paper.strength(PROBLEM, 0.5)
@@ -132,7 +133,7 @@ def test_budget_too_small_for_any_failure():
     with pytest.warns(st.AccuracyWarning, match="come down to"):
         result = failure(0.6605e6, algorithm="subset", max_evaluations=3000)
     # The same repetition, asked for where it ended: its upper limit, and not its estimate.
-    reached = float(re.search(r"come down to (\S+) Pa", result.warnings[0]).group(1))
+    reached = float(re.search(r"come down to (\S+) Pa", " ".join(result.warnings)).group(1))
     there = failure(reached, algorithm="subset", max_evaluations=3000, target_cv=1.0)
     assert result.interval == (0.0, pytest.approx(there.interval[1], rel=0.03))
     assert there.evaluations == result.evaluations
@@ -156,7 +157,23 @@ def test_a_median_interface_that_fails_at_once():
     # A thousand of a thousand: by Clopper and Pearson at least 0.025^(1/1000), or 1 - 0.0037.
     assert result.interval == (pytest.approx(0.025**0.001, abs=4e-4), 1.0)
     chosen = failure(0.99e6)
-    assert (chosen.algorithm, chosen.probability, chosen.warnings) == ("plain", 1.0, ())
+    assert (chosen.algorithm, chosen.probability) == ("plain", 1.0)
+    assert not any("evaluations" in text for text in chosen.warnings)
+
+
+def test_the_pilot_that_chose_to_count_is_not_counted():
+    """It holds more failures than it should where it leads to counting."""
+    found = failure(0.7e6, target_cv=0.1, seed=4)
+    state = st.external.limit_state(*SYSTEM, LOCAL)
+    options = {"target_cv": 0.1, "least": 1000, "max_evaluations": 10**5}
+    after, before = (count_failures(state, 4, 0.7e6, start=i, **options)[0] for i in (1000, 0))
+    assert found.probability == after.probability != before.probability
+    # What the printed line calls what.
+    low, high = found.interval
+    assert f"P = {found.probability:.3g} (95 %: {low:.3g} to {high:.3g}, c.o.v." in str(found)
+    spread = dataclasses.replace(found, members=np.linspace(0.0, 0.4, 101)[::-1])
+    assert spread.band == pytest.approx((0.02, 0.38))
+    assert "5 % have at most P = 0.02 and 95 % at most 0.38" in str(spread)
 
 
 def test_first_instability_is_never_later_than_letting_go():

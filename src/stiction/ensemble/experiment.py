@@ -55,7 +55,7 @@ class Experiment:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        random = as_random(self.random)
+        random = as_random(self.random, self.seed)
         found: dict[str, None] = {}  # equally likely interfaces have the same mistakes
         for one in random.members:
             try:

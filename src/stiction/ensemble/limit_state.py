@@ -27,9 +27,9 @@ from stiction.random.stresses import support_in_stress
 
 Event = Literal["critical_stress", "first_instability"]
 
-RANKED, LOW = 32, 3.0
-"""Samples of each of equally likely interfaces that put these in order, and the number of standard
-deviations below the mean that does."""
+RANKED, RANKINGS, LOW = 32, 4_000, 3.0
+"""Samples of each of equally likely interfaces that put these in order, at most and of all about,
+and the number of standard deviations below the mean that does."""
 SHORTEST = 2e-3
 """Seconds of work that justify a thread."""
 
@@ -111,6 +111,11 @@ class LimitState:
             found = found * self.experiment.pressure / pressure
         self.meter.advance(draws.shape[0])
         return found
+
+    @property
+    def several(self) -> bool:
+        """Whether there are several equally likely interfaces."""
+        return len(self.experiment.random.members) > 1
 
     @property
     def may_survive(self) -> bool:
@@ -195,9 +200,10 @@ def weakest_first(state: LimitState) -> LimitState:
     first_stage: Any = getattr(experiment.method, "first_stage", None)
     apt = first_stage and not no_single_length(experiment.problem, random)
     by = state.by(METHODS[first_stage]()) if apt else state
-    draws = np.repeat(state.draws(0, 0, RANKED), count, axis=0)
-    draws[:, 0] = np.tile(ndtri((np.arange(count) + 0.5) / count), RANKED)
-    onset = by(draws).reshape(RANKED, count)
+    ranked = int(np.clip(RANKINGS // count, 4, RANKED))
+    draws = np.repeat(state.draws(0, 0, ranked), count, axis=0)
+    draws[:, 0] = np.tile(ndtri((np.arange(count) + 0.5) / count), ranked)
+    onset = by(draws).reshape(ranked, count)
     onset = np.minimum(onset, onset.max(where=np.isfinite(onset), initial=0.0))
     lowest = np.array(state.bounds_of_members())[:, 0]
     weak = np.maximum(onset.mean(axis=0) - LOW * onset.std(axis=0), lowest)

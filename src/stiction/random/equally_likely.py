@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Annotated, Any, TypeAlias
+from functools import cached_property, lru_cache
+from typing import Annotated, Any, NamedTuple, Protocol, Self, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +21,25 @@ WHICH = Stream(2000, BLOCK, np.arange(0), mean_mode=True)
 MODES = 1 << 40
 """More than the number of draws of a stream."""
 
+FIRST, MOST = 1_000, 8_000
+"""Members that are drawn from a source at first, and at most."""
+
+
+@runtime_checkable
+class Source(Protocol):
+    """What draws any number of equally likely interfaces: a fit, a posterior, parameters."""
+
+    def interfaces(self, count: int, seed: int = 0) -> list[RandomInterface]:
+        """Return so many of them."""
+
+
 AnyRandom: TypeAlias = (
     RandomInterface
     | RandomField
+    | Annotated[Source, InstanceOf()]
     | list[Annotated[RandomInterface, InstanceOf()] | Annotated[RandomField, InstanceOf()]]
 )
-"""A random interface, a field that becomes one, or several that are equally likely."""
+"""A random interface, a field that becomes one, or several equally likely ones or their source."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +52,7 @@ class EquallyLikely:
 
     members: tuple[RandomInterface, ...]
     order: tuple[int, ...] = ()  # of the members along the first draw; empty: as they are
+    source: Source | None = None  # that they were drawn from
 
     def __post_init__(self) -> None:
         if not self.members:
@@ -64,6 +78,18 @@ class EquallyLikely:
         """Names of the random properties."""
         return self.members[0].names
 
+    @cached_property
+    def kinds(self) -> NDArray[np.int64]:
+        """A number for each member, the same for those whose fields are equal, (members,)."""
+        known: dict[Any, int] = {}
+        each = [known.setdefault(tuple(o.properties.items()), len(known)) for o in self.members]
+        return np.array(each, np.int64)
+
+    def larger(self, count: int, seed: int) -> Self:
+        """Return as many members from the same source."""
+        assert self.source is not None
+        return type(self)(tuple(self.source.interfaces(count, seed)), source=self.source)
+
     def member(self, draws: Array) -> NDArray[np.int64]:
         """Return the number of the member of each sample."""
         count = len(self.members)
@@ -72,21 +98,22 @@ class EquallyLikely:
 
     def dimension(self, interface: Interface) -> int:
         """Return the number of standard normal draws of a sample."""
-        return 1 + max(int(own.max(initial=0)) for own in _columns(self, interface))
+        return _columns(self, interface).dimension
 
     def draws(self, interface: Interface, samples: int, seed: int, first: int = 0) -> Array:
         """Draw samples `first`, `first` + 1, ..., (samples, dimension)."""
         found = np.full((samples, self.dimension(interface)), np.nan)
         found[:, :1] = WHICH.draw(seed, first, samples)
-        for one, own in zip(self.members, _columns(self, interface), strict=True):
-            if samples and np.isnan(found[0, own]).any():
-                found[:, own] = one.draws(interface, samples, seed, first)
+        columns = _columns(self, interface)
+        for number in columns.covering:
+            own = columns.of[number]
+            found[:, own] = self.members[number].draws(interface, samples, seed, first)
         return found
 
     def from_draws(self, interface: Interface, draws: Array) -> dict[str, Array]:
         """Map draws (samples, dimension) to profiles by name, (samples, *shape) each."""
         found = {name: np.empty((len(draws), *interface.shape)) for name in self.names}
-        selected, columns = self.member(draws), _columns(self, interface)
+        selected, columns = self.member(draws), _columns(self, interface).of
         for number in np.unique(selected).tolist():
             rows = np.flatnonzero(selected == number)
             own = draws[np.ix_(rows, columns[number])]
@@ -95,9 +122,16 @@ class EquallyLikely:
         return found
 
 
+class Columns(NamedTuple):
+    """Columns of each member's draws among those of all, and members that have all of them."""
+
+    of: list[NDArray[np.int64]]
+    dimension: int
+    covering: list[int]
+
+
 @lru_cache(maxsize=16)
-def _columns(random: EquallyLikely, interface: Interface) -> list[NDArray[np.int64]]:
-    """Return the columns of each member's draws among those of all."""
+def _columns(random: EquallyLikely, interface: Interface) -> Columns:
     keys = []
     for one in random.members:
         parts = []
@@ -107,17 +141,25 @@ def _columns(random: EquallyLikely, interface: Interface) -> list[NDArray[np.int
             parts.append(stream.number * MODES + own)
         keys.append(np.concatenate(parts))
     every = np.unique(np.concatenate(keys))
-    return [1 + np.searchsorted(every, own) for own in keys]
+    columns = [1 + np.searchsorted(every, own) for own in keys]
+    drawn, covering = np.zeros(1 + every.size, np.bool_), []
+    for number, own in enumerate(columns):
+        if not drawn[own].all():
+            covering.append(number)
+            drawn[own] = True
+    return Columns(columns, drawn.size, covering)
 
 
 def _named(kinds: Mapping[str, Any]) -> str:
     return " and ".join(f"{name} ({of})" if of else name for name, of in kinds.items())
 
 
-def as_random(given: Any) -> RandomInterface | EquallyLikely:
+def as_random(given: Any, seed: int = 0) -> RandomInterface | EquallyLikely:
     """Return what is random; a list of one is that one, of several one that stands for them."""
     if isinstance(given, EquallyLikely):
         return given
+    if isinstance(given, Source):
+        return EquallyLikely(tuple(given.interfaces(FIRST, seed)), source=given)
     if not isinstance(given, list | tuple):
         return as_random_interface(given)
     found = EquallyLikely(tuple(map(as_random_interface, given)))

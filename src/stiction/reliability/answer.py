@@ -19,6 +19,7 @@ from stiction.ensemble.pilot import exact_counterpart
 from stiction.errors import InputError, collect_warnings, warn_accuracy
 from stiction.model import Real, at_least
 from stiction.progress import Meter
+from stiction.random.equally_likely import MOST as MOST_MEMBERS
 from stiction.reliability.tail import Tail, two_levels_refused
 from stiction.units import in_words
 
@@ -28,10 +29,14 @@ Probability: TypeAlias = Annotated[Real, Field(ge=1e-30, lt=1)]
 Budget: TypeAlias = at_least(100)  # type: ignore[valid-type]  # a call makes it
 
 SECONDS, FEWEST, MOST = 100.0, 1_000, 2_000_000
-"""Computing time, and fewest and most evaluations, that an answer takes by default."""
+"""Computing time of counting by a slow method, and fewest and most evaluations, by default."""
 CHAIN, PATIENCE = 20_000, 900.0
 """Evaluations of subset simulation for about P = 1e-4 with a coefficient of variation of 0.1, and
-seconds on one core beyond which they are begun only if `max_evaluations` allows them."""
+seconds on one core that evaluations take at most if `max_evaluations` does not allow more."""
+LISTED, SAMPLED = 0.6, 0.8
+"""Parts of the target for the error of the list of interfaces and that of sampling, in squares."""
+MORE, CARRIED = 1.2, 0.9
+"""Margin on the number of members wanted; share of the mean whose carriers are counted."""
 CHECKED = (8, 64)
 """Fewest and most samples that are solved exactly to check those of the local criterion."""
 
@@ -49,6 +54,9 @@ class Answer:
     cv : float
         Coefficient of variation of the probability: estimated standard error over the estimate;
         infinite without a failure, zero if exact.
+    members_cv : float
+        Part of `cv` that is due to a list of equally likely interfaces being a sample of those
+        that may be true; the rest, with which it adds in squares, is that of sampling.
     evaluations, first_stage_evaluations : int
         Samples solved by the method, and by its less expensive first stage only.
     lower_bound, stress_above_bound : float
@@ -84,6 +92,7 @@ class Answer:
     probability: float
     interval: tuple[float, float]
     cv: float
+    members_cv: float = 0.0
     evaluations: int
     first_stage_evaluations: int = 0
     lower_bound: float
@@ -100,15 +109,14 @@ class Answer:
 
     @classmethod
     def of(cls, state: LimitState, *, doubts: Sequence[str] = (), **values: Any) -> Self:
-        """Issue the doubts as warnings, and return the answer with them."""
+        """Return the answer from a limit state, and issue the doubts as warnings."""
         for text in doubts:
             warn_accuracy(text)
         bound, pressure = state.bounds[0], state.experiment.pressure
         area = state.experiment.problem.area or math.nan
         return cls(
-            lower_bound=bound, normal_pressure=pressure, area=area, warnings=tuple(doubts),
-            **values,
-        )  # fmt: skip
+            lower_bound=bound, normal_pressure=pressure, area=area, warnings=(), **values
+        )
 
     @property
     def friction_coefficient(self) -> float:
@@ -161,6 +169,7 @@ class Answer:
             low, high = self.band
             result += f"; the mean over {self.members.size} equally likely interfaces, of which"
             result += f" 5 % have at most P = {low:.2g} and 95 % at most {high:.2g}"
+            result += f" (c.o.v. by the list {self.members_cv:.2g})"
         return f"{result}; {self.algorithm}, {self.evaluations} evaluations"
 
 
@@ -206,9 +215,11 @@ def prepare(
     if problems:
         raise InputError(problems)
     check_fields([experiment])
-    if not (algorithm == "plain" or too_slow(experiment, max_evaluations)):
+    slow = too_slow(experiment, max_evaluations)
+    if not (algorithm == "plain" or slow):
         state = weakest_first(state)
-    return state, max_evaluations or int(min(MOST, max(FEWEST, SECONDS / experiment.seconds)))
+    seconds = SECONDS if slow else PATIENCE
+    return state, max_evaluations or int(min(MOST, max(FEWEST, seconds / experiment.seconds)))
 
 
 def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
@@ -228,11 +239,46 @@ def bounded(lowest: float) -> bool:
     return bool(np.isfinite(lowest) and lowest > 0.0)
 
 
+def wanted_members(random: Any, cv: float, target_cv: float) -> int:
+    """Return how many members to draw from a source instead, 0 for no more."""
+    least = cv / (LISTED * target_cv)
+    count = len(random.members)
+    if getattr(random, "source", None) is None or least <= 1.0 or count >= MOST_MEMBERS:
+        return 0
+    return int(min(max(MORE * count * least * least, 2 * count), MOST_MEMBERS))
+
+
+def few_members(
+    random: Any, members: Array, cv: float, members_cv: float, target_cv: float
+) -> list[str]:
+    """Return a warning if the list makes the estimate less precise than `target_cv`."""
+    if not (cv > target_cv and members_cv > LISTED * target_cv):
+        return []
+    shares = np.cumsum(np.sort(np.bincount(random.kinds, members))[::-1])
+    count = 1 + int(np.searchsorted(shares, CARRIED * shares[-1]))
+    advice = (
+        "give what it was drawn from, a fit or a posterior, in its place: more are then drawn"
+    )
+    if random.source is not None:
+        advice = (
+            "no more differ, or no more are drawn: take more repetitions of a fit (bootstrap=)"
+        )
+    return [
+        f"the list of interfaces is a sample, and {count} of its {shares.size} different ones carry"
+        f" {CARRIED:.0%} of the mean: by this alone the coefficient of variation is"
+        f" {members_cv:.2g} (target {target_cv:g}); {advice}; more profiles or tests make them"
+        " more alike"
+    ]
+
+
 def imprecise(cv: float, target_cv: float, evaluations: int) -> list[str]:
     """Return a warning if the estimate is less precise than `target_cv`."""
+    advice = "raise max_evaluations"
+    if math.isfinite(cv):
+        advice += f" to about {MORE * evaluations * (cv / target_cv) ** 2:.1g}"
     text = (
-        f"the coefficient of variation is {cv:.3g}, not {target_cv:g}: {evaluations} evaluations"
-        " do not suffice; raise max_evaluations"
+        f"the coefficient of variation by sampling is {cv:.3g}, not {target_cv:.3g}: {evaluations}"
+        f" evaluations do not suffice; {advice}, or target_cv"
     )
     return [text] if cv > target_cv else []
 

@@ -1,7 +1,8 @@
 """Failure probability, design stress and the curve of both: counting, or the tail of the onset."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -10,13 +11,14 @@ import xarray as xr
 from stiction.arrays import Array
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import Event, LimitState
-from stiction.errors import InputError, warn_accuracy
+from stiction.errors import InputError, merge_warnings, texts_of, warn_accuracy
 from stiction.methods import MethodObject, label
 from stiction.model import Count, Number, Positive, Progress, Real, checked
 from stiction.problem import Problem
 from stiction.progress import Meter
 from stiction.random.equally_likely import AnyRandom
 from stiction.reliability.answer import (
+    SAMPLED,
     Answer,
     Budget,
     Probability,
@@ -24,14 +26,16 @@ from stiction.reliability.answer import (
     band_of,
     distinct,
     exact_doubts,
+    few_members,
     imprecise,
     members_of,
     prepare,
     too_slow,
+    wanted_members,
 )
 from stiction.reliability.counting import count_failures
 from stiction.reliability.tail import Tail, sample_tail
-from stiction.reliability.uncertainty import generator, lognormal_interval
+from stiction.reliability.uncertainty import binomial_interval, generator, lognormal_interval
 from stiction.results import along, study_attributes, to_dataset
 from stiction.units import Doubt, doubt_units, in_words
 from stiction.variables import ONSET_VARIABLES, PROFILES, Variable
@@ -70,6 +74,7 @@ CURVE = {
         ("stress_high", "Pa", "upper end of the interval of the stress"),
         ("band_low", "1", "probability that 5 % of the interfaces do not exceed"),
         ("band_high", "1", "probability that 95 % of the interfaces do not exceed"),
+        ("members_cv", "1", "part of the coefficient of variation by the list of interfaces"),
     )
 }
 CURVE["members"] = Variable("1", "probability of each interface", ("point", "member"))
@@ -98,9 +103,11 @@ def failure_probability(
     ----------
     problem, seed, workers, progress
         As in `monte_carlo`. The total number of samples is an estimate.
-    random : RandomInterface, RandomField or list of them
-        Of a list, each is equally likely: such as ``posterior.interfaces(30)``. The answer is then
-        for the mean over the list, the predictive probability, and has its `band`.
+    random : RandomInterface, RandomField, list of them, FieldFit or Posterior
+        Of a list, each is equally likely. From a fit or a posterior, or any object with a method
+        ``interfaces(count, seed)``, as many are drawn as the target needs, from 1,000 up to 8,000.
+        The answer is then the mean over them, the predictive probability, and has its `band`. The
+        list is a sample of what may be true: the error by that is in the interval.
     stress : float, optional
         Mean shear stress to carry, Pa. Failure is an onset strictly below it.
     method : LocalCriterion, Equilibrium or Rupture
@@ -118,11 +125,11 @@ def failure_probability(
         levels for equilibrium if the local criterion picks the same weakest samples, else subset
         simulation. `reason` in the result gives the cause.
     target_cv : float
-        Coefficient of variation to reach.
+        Coefficient of variation to reach, that by the list of interfaces included.
     max_evaluations : int, optional
-        Largest number of samples to solve: by default 2,000,000 by the local criterion,
-        200,000 by equilibrium, 1,000 by rupture. If they do not suffice, the result holds
-        the estimate so far and a warning.
+        Largest number of samples to solve: by default as many as take a quarter of an hour on
+        one core, at most 2,000,000; 1,000 by rupture. Fewer are solved where the target is
+        reached before; if they do not suffice, there is a warning.
     event : {"critical_stress", "first_instability"}
         Whether the interface as a whole has to slide, or the first patch to become unstable,
         arrested or not. By the local criterion they are the same.
@@ -167,42 +174,48 @@ def failure_probability(
     [name] = asked
     if force is not None:
         stress = problem.stress_of("force", force)
+
+    def solve(experiment: Experiment, meter: Meter) -> Answer:
+        state, budget = prepare(
+            experiment, event, workers, meter, max_evaluations,
+            algorithm=algorithm, per_pressure=stress is None,
+        )  # fmt: skip
+        wanted = (
+            (friction_coefficient or 0.0) * experiment.pressure if stress is None else stress
+        )
+        _check_unit(state, name, given[name] or 0.0, wanted)
+        found = _probability(
+            state, float(wanted), algorithm, target_cv, budget, max_evaluations
+        )
+        return Answer.of(state, stress=float(wanted), quantity=name, **found)
+
     experiment = Experiment(problem, random, method, seed=seed)
-    meter = Meter("failure_probability", show=progress)
-    state, budget = prepare(
-        experiment, event, workers, meter, max_evaluations,
-        algorithm=algorithm, per_pressure=stress is None,
-    )  # fmt: skip
-    if stress is None:
-        stress = float((friction_coefficient or 0.0) * experiment.pressure)
-    likely = state.likely_bounds(NEGLIGIBLE)
-    _check_unit(state, name, given[name] or 0.0, stress)
-    with meter:
-        if not likely[0] < stress < likely[1]:
-            found = _certain(state, stress, likely)
-            return Answer.of(state, stress=stress, quantity=name, **found)
-        reason, pilot, least = "as requested", None, min(PILOT, max(budget // 5, 50))
-        if algorithm == "auto" and (slow := too_slow(experiment, max_evaluations)):
-            algorithm, reason = "plain", slow
-        elif algorithm == "auto":
-            draws = state.draws(seed, 0, least)
-            pilot = draws, state(draws)
-            failures = int(np.sum(pilot[1] < stress))
-            rare = failures < FREQUENT * least
-            algorithm = "auto" if rare else "plain"
-            reason = f"{failures} failure{'s' * (failures != 1)} of {least} plain samples: "
-            reason += "rare" if rare else "frequent enough to count"
-        if algorithm == "plain":
-            begun = 0 if pilot is None else least
-            found = _by_counting(state, stress, target_cv, budget, least, begun)
-            found["reason"] = reason
-        else:
-            tail = sample_tail(
-                state, algorithm=algorithm, target_cv=target_cv, budget=budget,
-                stress=stress, reason=reason, pilot=pilot,
-            )  # fmt: skip
-            found = _by_tail(state, stress, tail, target_cv)
-    return Answer.of(state, stress=stress, quantity=name, **found)
+    return _answered(experiment, target_cv, Meter("failure_probability", show=progress), solve)
+
+
+def _answered(
+    experiment: Experiment,
+    target_cv: float,
+    meter: Meter,
+    solve: Callable[[Experiment, Meter], Answer],
+) -> Answer:
+    """Return an answer from as many members as the target needs, with all that it warned of."""
+    with meter, merge_warnings() as warned:
+        answer = solve(experiment, meter)
+        while count := wanted_members(experiment.random, answer.members_cv, target_cv):
+            known = experiment.random
+            meter.note = f"{count:,} interfaces, c.o.v. by the list {answer.members_cv:.2g}"
+            larger = known.larger(count, experiment.seed)
+            if larger.kinds.max() <= known.kinds.max():  # the source has no others
+                break
+            experiment = replace(experiment, random=larger)
+            warned.clear()
+            answer = solve(experiment, meter)
+        random = experiment.random
+        doubts = few_members(random, answer.members, answer.cv, answer.members_cv, target_cv)
+        for text in doubts:
+            warn_accuracy(text)
+    return replace(answer, warnings=tuple(texts_of(warned)))
 
 
 def _check_unit(state: LimitState, name: str, given: float, stress: float) -> None:
@@ -220,6 +233,37 @@ def _check_unit(state: LimitState, name: str, given: float, stress: float) -> No
         doubt_units([Doubt(text, ratio, (least, 1.0 / DOUBTFUL), possible)])
 
 
+def _probability(
+    state: LimitState, stress: float, algorithm: str, target_cv: float, budget: int,
+    allowed: int | None,
+) -> dict[str, Any]:  # fmt: skip
+    """Return the attributes of an answer by the algorithm, or by the one that is chosen."""
+    likely = state.likely_bounds(NEGLIGIBLE)
+    if not likely[0] < stress < likely[1]:
+        return _certain(state, stress, likely)
+    reason, pilot, least = "as requested", None, min(PILOT, max(budget // 5, 50))
+    if algorithm == "auto" and (slow := too_slow(state.experiment, allowed)):
+        algorithm, reason = "plain", slow
+    elif algorithm == "auto":
+        draws = state.draws(state.experiment.seed, 0, least)
+        pilot = draws, state(draws)
+        failures = int(np.sum(pilot[1] < stress))
+        rare = failures < FREQUENT * least
+        algorithm = "auto" if rare else "plain"
+        reason = f"{failures} failure{'s' * (failures != 1)} of {least} plain samples: "
+        reason += "rare" if rare else "frequent enough to count"
+    target_cv *= SAMPLED if state.several else 1.0
+    if algorithm == "plain":
+        begun = 0 if pilot is None else least
+        found = _by_counting(state, stress, target_cv, budget, least, begun)
+        return found | {"reason": reason}
+    tail = sample_tail(
+        state, algorithm=algorithm, target_cv=target_cv, budget=budget,
+        stress=stress, reason=reason, pilot=pilot,
+    )  # fmt: skip
+    return _by_tail(state, stress, tail, target_cv)
+
+
 def _certain(state: LimitState, stress: float, likely: tuple[float, float]) -> dict[str, Any]:
     """Return the attributes of an answer where no sample is needed."""
     certain = not state.bounds[0] < stress < state.bounds[1]
@@ -234,6 +278,9 @@ def _certain(state: LimitState, stress: float, likely: tuple[float, float]) -> d
     reason += "" if certain else f", but for a probability below {doubt:g}"
     members = len(state.experiment.random.members)
     found = {"probability": chance, "interval": interval, "cv": 0.0, "evaluations": 0}
+    if state.several:  # another list might hold others
+        doubt = max(doubt, binomial_interval(0, members)[1])
+        found["interval"] = (chance - doubt, chance) if chance else (0.0, doubt)
     found["members"] = np.full(members if members > 1 else 0, chance)
     return found | {"algorithm": "exact", "reason": reason}
 
@@ -260,16 +307,20 @@ def _by_counting(
     # The weakest samples: failures and others in their true shares.
     some = failed[:CHECKED]
     near = np.argsort(stresses[: some.max(initial=-1) + 1], kind="stable")[: 2 * some.size]
+    tail = Tail([counted])
+    by_list = _members_cv(state, tail, stress)
+    cv, interval = math.hypot(count.cv, by_list), count.interval()
     doubts = imprecise(count.cv, target_cv, start + stresses.size)
     doubts += exact_doubts(state, (drawn(near), stresses[near]), stress, count.probability)
     return {
         "algorithm": "plain",
         "probability": count.probability,
-        "cv": count.cv,
-        "interval": count.interval(),
+        "cv": cv,
+        "members_cv": by_list,
+        "interval": lognormal_interval(count.probability, cv) if by_list else interval,
         "evaluations": start + stresses.size,
         "survived": counted.survived,
-        "members": members_of(state, Tail([counted]), stress),
+        "members": members_of(state, tail, stress),
         "failing_profiles": _profiles(state, drawn(failed[:SHOWN])),
         "doubts": doubts,
     }
@@ -277,9 +328,11 @@ def _by_counting(
 
 def _by_tail(state: LimitState, stress: float, tail: Tail, target_cv: float) -> dict[str, Any]:
     """Return the attributes of an answer by subset simulation, by one level or two."""
-    probability, cv, last = tail.probability(stress), tail.cv(stress), tail.repetitions[-1]
+    probability, last = tail.probability(stress), tail.repetitions[-1]
+    by_list, sampled = _members_cv(state, tail, stress), tail.cv(stress)
+    cv = math.hypot(sampled, by_list)
     interval = lognormal_interval(probability, cv)
-    doubts = imprecise(cv, target_cv, tail.spent)
+    doubts = imprecise(sampled, target_cv, tail.spent)
     if tail.algorithm == "two_level" and probability == 0.0:
         interval = 0.0, last.rarest
         doubts = [
@@ -303,11 +356,17 @@ def _by_tail(state: LimitState, stress: float, tail: Tail, target_cv: float) -> 
     return tail.attributes | {
         "probability": probability,
         "cv": cv,
+        "members_cv": by_list,
         "interval": interval,
         "members": members_of(state, tail, stress),
         "failing_profiles": _profiles(state, draws[chosen]),
         "doubts": doubts,
     }
+
+
+def _members_cv(state: LimitState, tail: Tail, stress: float) -> float:
+    """Return the coefficient of variation by the list of interfaces, 0 of a single one."""
+    return tail.members_cv(stress, state.experiment.random.kinds) if state.several else 0.0
 
 
 def _profiles(state: LimitState, draws: Array) -> xr.Dataset:
@@ -381,46 +440,63 @@ def design_stress(
     >>> bool(found.stress > found.lower_bound)
     True
     """
+
+    def solve(experiment: Experiment, meter: Meter) -> Answer:
+        state, budget = prepare(experiment, event, workers, meter, max_evaluations)
+        return Answer.of(state, **_quantile(state, probability, target_cv, budget))
+
     experiment = Experiment(problem, random, method, seed=seed)
-    meter = Meter("design_stress", show=progress)
-    state, budget = prepare(experiment, event, workers, meter, max_evaluations)
+    return _answered(experiment, target_cv, Meter("design_stress", show=progress), solve)
+
+
+def _quantile(
+    state: LimitState, probability: float, target_cv: float, budget: int
+) -> dict[str, Any]:
+    """Return the attributes of an answer on the stress of a probability."""
     often, lowest, doubts = probability >= FREQUENT, state.bounds[0], []
-    with meter:
-        tail = sample_tail(
-            state, algorithm="subset" if often else "auto", target_cv=target_cv, budget=budget,
-            probability=probability, reason="frequent" if often else "rare",
-        )  # fmt: skip
-        if tail.complete:
-            stress, least = tail.quantile(probability), math.nextafter(lowest, math.inf)
-            cv, on_it = tail.cv(stress), tail.probability(least)
-            if math.isinf(stress):
-                doubts.append(
-                    f"the event happens in {1.0 - tail.survived:.3g} of all samples, less than"
-                    f" P = {probability:g}: no stress has that probability"
-                )
-            if on_it >= probability:
-                stress, cv = lowest, tail.cv(least)
-                doubts.append(
-                    f"{on_it:.2g} of all samples slide at the bound of {lowest:.7g} Pa,"
-                    " within the accuracy of the method: the stress at P ="
-                    f" {probability:g} is the bound itself"
-                )
-            interval = tail.stress_interval(probability, cv, lowest)
-            doubts += imprecise(cv, target_cv, tail.spent)
-            if tail.algorithm == "subset":
-                doubts += exact_doubts(
-                    state, tail.repetitions[-1].around(stress), stress, probability
-                )
-        else:  # the tail ends at its lowest sample
-            cv, stress = math.inf, tail.extent[0] if math.isfinite(tail.extent[0]) else math.nan
-            interval = (lowest, stress) if stress > lowest else state.bounds
-            doubts.append(tail.short_of(f"P = {probability:g}"))
-    return Answer.of(
-        state, stress=stress, probability=probability, cv=cv, interval=interval,
-        members=members_of(state, tail, stress), of_stress=True, doubts=doubts,
-        quantity="stress" if problem.area is None else "force",
-        **tail.attributes,
+    target_cv *= SAMPLED if state.several else 1.0
+    tail = sample_tail(
+        state, algorithm="subset" if often else "auto", target_cv=target_cv, budget=budget,
+        probability=probability, reason="frequent" if often else "rare",
     )  # fmt: skip
+    by_list = 0.0
+    if tail.complete:
+        stress, least = tail.quantile(probability), math.nextafter(lowest, math.inf)
+        sampled, on_it = tail.cv(stress), tail.probability(least)
+        if math.isinf(stress):
+            doubts.append(
+                f"the event happens in {1.0 - tail.survived:.3g} of all samples, less than"
+                f" P = {probability:g}: no stress has that probability"
+            )
+        if on_it >= probability:
+            stress, sampled = lowest, tail.cv(least)
+            doubts.append(
+                f"{on_it:.2g} of all samples slide at the bound of {lowest:.7g} Pa,"
+                " within the accuracy of the method: the stress at P ="
+                f" {probability:g} is the bound itself"
+            )
+        by_list = _members_cv(state, tail, stress)
+        cv = math.hypot(sampled, by_list)
+        interval = tail.stress_interval(probability, cv, lowest)
+        doubts += imprecise(sampled, target_cv, tail.spent)
+        if tail.algorithm == "subset":
+            near = tail.repetitions[-1].around(stress)
+            doubts += exact_doubts(state, near, stress, probability)
+    else:  # the tail ends at its lowest sample
+        cv, stress = math.inf, tail.extent[0] if math.isfinite(tail.extent[0]) else math.nan
+        interval = (lowest, stress) if stress > lowest else state.bounds
+        doubts.append(tail.short_of(f"P = {probability:g}"))
+    return tail.attributes | {
+        "stress": stress,
+        "probability": probability,
+        "cv": cv,
+        "members_cv": by_list,
+        "interval": interval,
+        "members": members_of(state, tail, stress),
+        "of_stress": True,
+        "quantity": "stress" if state.experiment.problem.area is None else "force",
+        "doubts": doubts,
+    }
 
 
 @checked
@@ -519,19 +595,21 @@ def curve_of(
     rows, members = [], []
     for chance in wanted.tolist():
         stress = tail.quantile(chance)
-        found, cv = tail.probability(stress), tail.cv(stress)
+        found, by_list = tail.probability(stress), _members_cv(state, tail, stress)
+        cv = math.hypot(tail.cv(stress), by_list)
         ends = lognormal_interval(found, cv)
         sides = tail.stress_interval(chance, cv, lowest)
         values = stress, stress - lowest, stress / pressure, stress * area
         members.append(members_of(state, tail, stress))
-        rows.append((*values, found, *ends, cv, *sides, *band_of(members[-1])))
+        rows.append((*values, found, *ends, cv, *sides, *band_of(members[-1]), by_list))
     table: dict[str, Any] = dict(zip(CURVE, np.array(rows).T, strict=False))
     table["members"] = np.array(members)
     survive = np.isinf(table["stress"])  # so many that no stress has this probability
     for values in table.values():
         values[survive] = np.nan
     if not table["members"].size:
-        del table["band_low"], table["band_high"], table["members"]
+        for name in ("band_low", "band_high", "members", "members_cv"):
+            del table[name]
     if not np.isfinite(pressure):
         del table["friction_coefficient"]
     if not np.isfinite(area):

@@ -48,6 +48,14 @@ class Population(NamedTuple):
         return self._replace(draws=np.empty((0, self.draws.shape[1])))
 
 
+class Below(NamedTuple):
+    """Samples below a value: the probability that each stands for, members and ancestors."""
+
+    each: float
+    members: NDArray[np.int64]
+    ancestors: NDArray[np.int64]
+
+
 class Descent(NamedTuple):
     """A finished repetition: populations from all samples down to the rarest.
 
@@ -85,11 +93,12 @@ class Descent(NamedTuple):
         rarest = self._holders(value)[-1]
         return math.exp(rarest.log_probability) * float((rarest.values < value).mean())
 
-    def below(self, value: float) -> tuple[float, NDArray[np.int64]]:
-        """Return the probability that each sample below a value stands for; their members."""
+    def below(self, value: float) -> Below:
+        """Return the samples below a value."""
         rarest = self._holders(value)[-1]
         each = math.exp(rarest.log_probability) / rarest.values.size
-        return each, rarest.members[rarest.values < value]
+        failed = rarest.values < value
+        return Below(each, rarest.members[failed], rarest.ancestors[failed])
 
     def relative_variance(self, value: float) -> float:
         """Return the squared coefficient of variation of `probability(value)`, from ancestry."""

@@ -105,11 +105,36 @@ class Tail(NamedTuple):
         total = sum(one.samples for one in self.repetitions)
         found, single = np.zeros(count), 0.0
         for one in self.repetitions:
-            each, members = one.below(stress)
+            each, members, _ = one.below(stress)
             each *= count * one.samples / total
             found += each * np.bincount(members, minlength=count)
             single += each / len(self.repetitions)
         return np.minimum(np.where(found > 0.0, found, single), 1.0)
+
+    def members_cv(self, stress: float, kinds: Array) -> float:
+        """Return the coefficient of variation by the list of interfaces being a sample.
+
+        With the shares p of the list's entries in the mean it is the square root of sum p^2 less
+        1/M, as of the bootstrap over entries. The sum is the chance that two failures are of one
+        entry. It is that of two samples of different ancestors, which are independent: the few
+        samples of each entry do not make it too large. `kinds` has a number for each member;
+        those with the same are one entry.
+        """
+        entries = np.bincount(kinds)
+        total, pairs, alike = np.zeros(entries.size), 0.0, 0.0
+        for one in self.repetitions:
+            each, members, ancestors = one.below(stress)
+            each, own = each * one.samples, kinds[members]
+            total += each * np.bincount(own, minlength=entries.size)
+            pairs -= each * each * _squares(ancestors)
+            alike -= each * each * _squares(own, ancestors)
+        pairs, alike = pairs + float(total.sum()) ** 2, alike + float(total @ total)
+        if not pairs > 0.0:
+            return 0.0
+        expected = float(np.sum(entries**2)) / kinds.size**2
+        # A spread seen in so many entries is that of one entry less.
+        excess = (alike / pairs - expected) / max(1.0 - expected, 1e-300)
+        return math.sqrt(max(excess, 0.0))
 
     def quantile(self, probability: float) -> float:
         """Return the stress below which the onset lies with this probability.
@@ -139,6 +164,12 @@ class Tail(NamedTuple):
         seen = self.probability(float(np.nextafter(least, math.inf)))
         low = self.quantile(below) if below >= seen else lowest
         return low, self.quantile(min(probability * math.exp(width), 1.0))
+
+
+def _squares(*labels: Array) -> float:
+    """Return the sum of the squared numbers of samples that share their labels."""
+    _, sizes = np.unique(np.stack(labels), axis=1, return_counts=True)
+    return float(np.sum(sizes.astype(np.float64) ** 2))
 
 
 def repeat_until_precise(

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.arrays import Array
-from stiction.reliability.subset import Function, Label, descend, grow
+from stiction.reliability.subset import Below, Function, Label, descend, grow
 from stiction.reliability.uncertainty import ancestral_variance
 
 GUIDING = 5
@@ -71,10 +71,11 @@ class Bridge(NamedTuple):
         share = float(np.mean(self.values < value)) if self.values.size else 0.0
         return math.exp(self.log_probability) * share / self.last
 
-    def below(self, value: float) -> tuple[float, NDArray[np.int64]]:
-        """Return the probability that each sample below a value stands for; their members."""
+    def below(self, value: float) -> Below:
+        """Return the samples below a value."""
         each = math.exp(self.log_probability) / max(self.values.size, 1) / self.last
-        return each, self.members[self.values < value]
+        failed = self.values < value
+        return Below(each, self.members[failed], self.ancestors[failed])
 
     def relative_variance(self, value: float) -> float:
         """Return the squared coefficient of variation of `probability(value)`."""
@@ -95,8 +96,15 @@ def _covered(
     last = max(float(covered.mean()), 1.0 / samples)
     # Walkers of one ancestor are alike: each family is one observation.
     _, group = np.unique(families, return_inverse=True)
-    sums = np.bincount(group, weights=covered.mean(axis=0) - last)
-    return last, float(np.sum(sums * sums)) / (walkers * last) ** 2
+    sums = np.bincount(group, weights=covered.mean(axis=0) - last) / (walkers * last)
+    # A family of share w pulls the mean: its square is (1 - 2 w + sum w^2) of that about the truth.
+    shares = np.bincount(group) / walkers
+    squares = shares * shares
+    kept = float(squares @ (1.0 - 2.0 * shares + squares.sum()))
+    variance = float(sums @ sums * squares.sum())
+    if kept > 1e-12:
+        return last, variance / kept
+    return last, math.inf if last < 1.0 else 0.0  # a single family
 
 
 def bridge(
