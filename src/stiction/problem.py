@@ -35,6 +35,8 @@ from stiction.variables import PROFILES, QUANTITIES
 
 FEWEST_NODES = 4
 """Nodes in a nucleation length."""
+HUGE = 1e8
+"""Strength of a node over the median beyond which others are lost in round-off."""
 LARGEST = 1e100
 """Of a profile, in SI units; sums and products of larger numbers overflow."""
 RIGIDITY = (1e-8, 1.0), (0.0, math.inf)
@@ -671,6 +673,18 @@ class Problem:
                 f"{f', and in {others} more samples' * (others > 0)}; only st.Rupture() accepts"
                 " stress above the strength"
             )
+        if np.max(strength, where=np.isfinite(strength), initial=0.0) > HUGE * strength.min():
+            middle = np.median(strength, axis=along, keepdims=True)
+            huge = np.isfinite(strength) & (strength > HUGE * middle)
+            if huge.any():
+                number, node = np.argwhere(huge.reshape(len(strength), -1))[0].tolist()
+                problems.append(
+                    f"strength: {strength[number].flat[node]:g} Pa at"
+                    f" {self.interface.describe_node(node)} of sample {number} is more than"
+                    f" {HUGE:g} times the median, {middle[number].item():g} Pa, which is lost"
+                    " beside it in round-off; less is as good where nothing breaks, or give"
+                    " np.inf to st.Rupture()"
+                )
         nowhere = ~((strength > residual) & np.isfinite(strength)).any(axis=along)
         if nowhere.any():
             number = int(np.argmax(nowhere))

@@ -4,9 +4,11 @@ import dataclasses
 
 import numpy as np
 import pytest
+import scipy.linalg
 from setups import exact_onset
 
 import stiction as st
+from stiction.elasticity import line
 from stiction.theory import energy_release_rate, griffith_length
 
 PROBLEM = st.paper.problem(nodes=1024)
@@ -88,3 +90,23 @@ def test_arrested_patches_are_as_long_as_griffith_says():
     ratio = found["event_length"].values[there] / griffith
     assert len(ratio) > 12
     assert 0.67 < np.median(ratio) < 1.5
+
+
+@pytest.mark.parametrize(("run", "share"), [(4, 0.04), (48, 0.42), (64, 0.49), (512, 0.90)])
+def test_residual_run_of_a_crack_in_equilibrium_is_shorter_than_griffiths_length(run, share):
+    """On a uniform interface, W = G*/60 per node; so runs as long as that cannot stop."""
+    column, rate = line.stiffness_column(8192, 8192.0, 1.0), 1.0 / 60.0
+    for ends in range(1, 100):
+        size = run + 2 * ends
+        weakens = np.ones(size)
+        weakens[ends : ends + run] = 0.0
+        matrix = scipy.linalg.toeplitz(column[:size]) - rate * np.diag(weakens)
+        slope, start = np.linalg.solve(matrix, np.stack([np.ones(size), -weakens], 1)).T
+        edge = [0.5 * (one[ends] + one[ends - 1]) for one in (slope, start)]
+        drop = (1.0 / rate - edge[1]) / edge[0]  # the run ends where slip is the critical one
+        slip = drop * slope + start
+        if slip.min() >= 0.0 and drop - column[size:0:-1] @ slip <= 1.0:  # the next node holds
+            break
+    length = line.griffith_length(drop, 0.5 / rate, 1.0)
+    assert run / length == pytest.approx(share, abs=0.02)
+    assert run < length

@@ -50,7 +50,12 @@ def test_a_restart_is_the_same_run_to_the_bit(whole, steps, tmp_path):
     read = open_rupture(tmp_path / "run")
     for name in ("slip", "slip_rate", "shear_stress"):
         assert np.array_equal(read[name].values[-1], whole[name].values[-1])
-    for name in ("critical_stress", "critical_position", "rupture_speed", "arrival_time"):
+    for name in (
+        "critical_stress",
+        "critical_position",
+        "median_rupture_speed",
+        "arrival_time",
+    ):
         assert np.array_equal(rest[name].values, whole[name].values, equal_nan=True)
 
 

@@ -170,6 +170,14 @@ test_objects_in_the_place_of_others = refusals({
     "where: must be a Problem or an Interface, got 3": lambda: st.plot.field(3, ONE),
     "profile ... must be a DataArray over x ... (64, 64)":
         lambda: make_strength().given(np.ones((64, 64)), noise=1e4),
+    "profile ... must be a DataArray over x ... (3, 256)":
+        lambda: make_strength().given(np.stack([ONE, ONE, ONE]), noise=1e4),
+    "profile ... values finite, or NaN where not measured": lambda: make_strength().given(
+        xr.DataArray([1e6, np.inf], {"x": [0.01, 0.02]}, "x"), noise=1e4
+    ),
+    "profile ... places must be known": lambda: make_strength().given(
+        xr.DataArray([1e6, 1.1e6], {"x": [0.01, np.nan]}, "x"), noise=1e4
+    ),
     "sweep: slip cannot be kept ... an interface that is swept": lambda: make_study(
         method=st.Equilibrium(slip=True), sweep=[{"problem.interface.nodes": [128, 256]}]
     ),
@@ -285,6 +293,8 @@ test_profiles_and_loads = refusals({
         ),
     "initial_stress ... at 1 of 256 nodes of sample 1, ... and in 1 more samples":
         lambda: onset(np.stack([3.0 * ONE, ONE, ONE]), initial_stress=2e6 * (np.arange(256) == 7)),
+    "strength: 1e+90 Pa at x = 0.0117188 m of sample 1 ... 1e+08 times the median, 1e+06 Pa":
+        lambda: onset(np.stack([ONE, np.where(np.arange(256) == 30, 1e90, ONE)])),
     "another friction.weakening_rate, load.initial_stress;": lambda: onset(OTHER.sample(ONE)),
     "another load_profile": lambda: onset(
         PROBLEM.sample(ONE)._replace(problem=None, load_profile=np.linspace(0.9, 1.1, 256))

@@ -126,6 +126,15 @@ test_impossible_values_and_places_are_refused = refusals({
 })  # fmt: skip
 
 
+def test_what_was_measured_is_copied():
+    scan = KNOWN.copy(deep=True)
+    given = FIELD.given(scan, noise=20e3)
+    before = hash(given)
+    scan.values[:] = 0.9e6
+    assert hash(given) == before
+    np.testing.assert_array_equal(given.conditions.values, KNOWN.values)
+
+
 def test_unlikely_values_are_warned_of():
     rough = KNOWN.copy(data=KNOWN.values[np.random.default_rng(0).permutation(KNOWN.size)])
     with pytest.warns(st.AccuracyWarning, match="unlikely for this field"):

@@ -213,7 +213,8 @@ class Rupture:
         checks.warn_of_slip(run, state)
         found = summary(run, state)
         if self.stop == "onset":
-            found |= {name: np.full(np.shape(found[name]), np.nan) for name in _LATER}
+            later = [name for name in _LATER if name in found]
+            found |= {name: np.full(np.shape(found[name]), np.nan) for name in later}
         return found
 
     def _follow(self, run: Run, state: State) -> None:

@@ -40,10 +40,14 @@ def per_area(interface: Interface, variable: Variable) -> Variable:
 
 
 def scalars(interface: Interface) -> dict[str, Variable]:
-    """Return the additional variables of a run; on a plane, speeds along x and y."""
+    """Return the additional variables of a run; on a plane, the median speeds along x and y.
+
+    The largest one is left out there: where a front arrives at an angle, it is above any of waves.
+    """
     found = {name: per_area(interface, variable) for name, variable in _SCALARS.items()}
-    for name in ("rupture_speed", "median_rupture_speed"):
-        found[name] = position(interface, found[name])
+    if interface.is_plane:
+        del found["rupture_speed"]
+    found["median_rupture_speed"] = position(interface, found["median_rupture_speed"])
     return found
 
 
@@ -130,14 +134,15 @@ def summary(run: Run, state: State) -> dict[str, Any]:
         "radiated_energy": spent["radiated_energy"],
         "fracture_energy": spent["fracture_energy"],
         "arrested_events": int(now["arrested"]),
-        "rupture_speed": _axis_speeds(run, state, 2.0, np.max),
         "median_rupture_speed": _axis_speeds(run, state, 0.5, np.median),
         "start_load": float(now["start_load"]),
         "start_error": float(now["start_error"]),
         "implicit_steps": int(now["implicit_steps"]),
         "explicit_steps": int(now["explicit_steps"]),
     }
-    for name in ("critical_position", "rupture_speed", "median_rupture_speed"):
+    if not interface.is_plane:
+        found["rupture_speed"] = _axis_speeds(run, state, 2.0, np.max)
+    for name in {"critical_position", "rupture_speed", "median_rupture_speed"} & found.keys():
         # A number on a line; one along x and one along y on a plane.
         along = np.where(np.isnan(onset), np.nan, found[name])
         found[name] = along if interface.is_plane else along[0]

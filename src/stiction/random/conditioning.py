@@ -52,9 +52,13 @@ FLAT, SHARP = 1e-4, 1e-4  # least precision of a measured z; its error that need
 TINY, LOWEST = 1e-12, -1e9  # least variance, and least logarithm of a likelihood
 
 
+class Kept(np.ndarray):
+    """Places and values that were read before, unlike an array that a user gives."""
+
+
 def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
     """Places (rows x, and y on a plane) and values (last row) of a measurement."""
-    if isinstance(value, np.ndarray) and value.ndim == 2 and len(value) in (2, 3):  # as kept
+    if isinstance(value, Kept):
         return value
     context = info.context or {}
     if "read" in context and not hasattr(value, "dims"):
@@ -74,11 +78,13 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
         places = np.meshgrid(*(_in_si(value[name]) for name in names), indexing="ij")
         rows = [*places, _in_si(value.transpose(*names))]
     points = np.array([np.ravel(row) for row in rows], dtype=np.float64)
-    points = points[:, np.isfinite(points).all(axis=0)]
+    if np.isinf(points).any() or np.isnan(points[:-1]).any():
+        raise ValueError("places must be known, and values finite, or NaN where not measured")
+    points = points[:, ~np.isnan(points[-1])]
     if points.shape[1] == 0:
         raise ValueError("must hold at least one value")
     points.flags.writeable = False
-    return points
+    return points.view(Kept)
 
 
 def _in_si(array: Any) -> Array:
@@ -113,12 +119,12 @@ class Conditions:
     @property
     def places(self) -> Array:
         """Where values were measured, m: (dimensions, points)."""
-        return self.profile[:-1]
+        return np.asarray(self.profile[:-1])
 
     @property
     def values(self) -> Array:
         """The measured values, (points,)."""
-        return self.profile[-1]
+        return np.asarray(self.profile[-1])
 
     def check(self, marginal: Any, interface: Interface, factor: Any = None) -> None:
         """Raise an `InputError` if places or values are impossible for a field."""
