@@ -227,6 +227,31 @@ def test_uncertain_parameters_in_every_command(runs, tmp_path, monkeypatch, line
     runs(line)
 
 
+def test_in_memory_it_is_the_same_curve_with_the_same_doubts(tmp_path):
+    """A tenth of the strength does not weaken, and the field has no mean mode."""
+    plain = small_study(64, correlation_length=9e-3)
+    plain["problem"]["friction"]["residual_strength"] = 0.76e6
+    one = st.Study.from_dict(plain)
+    (point,) = one.experiments
+    told = []
+    for ask in (
+        lambda: st.failure_curve(
+            point.problem, point.random, method=point.method, seed=point.seed,
+            smallest=SMALLEST, target_cv=0.13,
+        ),
+        lambda: computed(tmp_path / "run", told[0][0].repetitions, one),
+    ):  # fmt: skip
+        with warnings.catch_warnings(record=True, action="always") as caught:
+            told.append((ask(), {str(w.message) for w in caught}))
+    (memory, first), (stored, second) = told
+    assert first == second
+    for words in ("of its marginal", "mean mode"):
+        assert sum(words in text for text in first) == 1
+    assert memory.evaluations == stored.evaluations
+    assert memory.repetitions > 1
+    xr.testing.assert_equal(memory, stored)
+
+
 def test_commands_print_export_and_report_its_numbers(runs, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     study().to_toml("study.toml")

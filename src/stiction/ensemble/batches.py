@@ -28,7 +28,8 @@ from stiction.errors import (
 )
 from stiction.random.synthesis import BLOCK, block_of
 
-POINT, NUMBER = "_point", "_sample"
+POINT: str = "_point"
+NUMBER: str = "_sample"
 """Names of the columns that hold the numbers of the point and of the sample."""
 SECONDS = 0.5
 """Duration of a piece of work."""

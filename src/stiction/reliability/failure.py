@@ -34,7 +34,8 @@ from stiction.reliability.answer import (
     wanted_members,
 )
 from stiction.reliability.counting import count_failures
-from stiction.reliability.tail import Tail, sample_tail
+from stiction.reliability.repetitions import SAMPLES, repetition
+from stiction.reliability.tail import Tail, repeat_until_precise, sample_tail
 from stiction.reliability.uncertainty import binomial_interval, generator, lognormal_interval
 from stiction.results import along, study_attributes, to_dataset
 from stiction.units import Doubt, doubt_units, in_words
@@ -44,6 +45,8 @@ PILOT = 1_000
 """Number of plain samples by which the algorithm is chosen."""
 FREQUENT = 0.01
 """Probability above which plain sampling needs no more evaluations than subset simulation."""
+CURVE_CV = 0.3
+"""Coefficient of variation at the end of a curve by default."""
 COMMONEST, PER_DECADE = 0.5, 3
 """Probability at which a curve begins, and its points for each decade."""
 NEGLIGIBLE = 1e-15
@@ -506,7 +509,7 @@ def failure_curve(
     *,
     method: MethodObject,
     smallest: Probability = 1e-9,
-    target_cv: TargetCv = 0.3,
+    target_cv: TargetCv = CURVE_CV,
     seed: Number = 0,
     max_evaluations: Budget | None = None,
     event: Event = "critical_stress",
@@ -521,6 +524,8 @@ def failure_curve(
         Smallest probability of the curve.
     target_cv : float
         Coefficient of variation to reach at the smallest probability; it is lower elsewhere.
+        Repetitions are added until it is reached: the same, of the same numbers, as those of
+        `Study.failure_curve`.
     problem, seed, workers, progress
         As in `monte_carlo`.
     random, method, max_evaluations, event
@@ -557,25 +562,41 @@ def failure_curve(
     True
     """
     experiment = Experiment(problem, random, method, seed=seed)
-    meter = Meter("failure_curve", show=progress)
-    state, budget = prepare(experiment, event, workers, meter, max_evaluations)
-    with meter:
-        tail = sample_tail(
-            state, algorithm="subset", target_cv=target_cv, budget=budget, probability=smallest
-        )
-        if tail.complete:
-            stress = tail.quantile(smallest)
-            doubts = exact_doubts(state, tail.repetitions[-1].around(stress), stress, smallest)
-        else:
-            doubts = [f"{tail.short_of(f'P = {smallest:g}')}; the curve ends there"]
+    with Meter("failure_curve", show=progress) as meter, merge_warnings():
+        state, budget = prepare(experiment, event, workers, meter, max_evaluations)
+        # Fewer than usual where the budget would not even hold four levels.
+        size = min(SAMPLES, max(budget // 4, 20))
+        target = target_cv * (SAMPLED if state.several else 1.0)
+        found = repeat_until_precise(
+            lambda samples, number, left: repetition(state, number, smallest, samples, left),
+            lambda done: Tail(done).cv(Tail(done).quantile(smallest)),
+            target_cv=target, first=size, largest=size, max_evaluations=budget, meter=meter,
+        )  # fmt: skip
+        tail = Tail(found, spent=sum(one.evaluations for one in found))
+        for text in curve_doubts(state, tail, smallest, target_cv):
+            warn_accuracy(text)
+        if not tail.complete:
             smallest = tail.probability(tail.reached)
-    for text in doubts:
-        warn_accuracy(text)
     attributes = study_attributes(problem=problem, random=experiment.given, method=method) | {
         "seed": seed,
         "evaluations": tail.spent,
+        "repetitions": len(tail.repetitions),
     }
     return curve_of(tail, state, chances(smallest), attributes)
+
+
+def curve_doubts(
+    state: LimitState, tail: Tail, smallest: float, target_cv: float = CURVE_CV
+) -> list[str]:
+    """Return the reasons not to trust the end of a curve."""
+    if not tail.complete:
+        return [f"{tail.short_of(f'P = {smallest:g}')}; the curve ends there"]
+    stress = tail.quantile(smallest)
+    by_list = _members_cv(state, tail, stress)
+    cv, members = math.hypot(tail.cv(stress), by_list), members_of(state, tail, stress)
+    doubts = few_members(state.experiment.random, members, cv, by_list, target_cv)
+    near = tail.repetitions[-1].around(stress)
+    return doubts + exact_doubts(state, near, stress, smallest)
 
 
 def chances(smallest: float) -> Array:

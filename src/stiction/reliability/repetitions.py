@@ -1,5 +1,6 @@
 """Repetitions of subset simulation by number: each depends on (seed, number) only, as a table."""
 
+import math
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from stiction.ensemble.batches import NUMBER, POINT, Table, versions
 from stiction.ensemble.limit_state import LimitState
+from stiction.errors import collect_warnings, merged
 from stiction.reliability.subset import Descent, Population, descend
 from stiction.reliability.tail import DEEPER
 from stiction.reliability.uncertainty import generator
@@ -38,13 +40,20 @@ ROW = np.dtype(
 """A sample of a level, with what its level and its repetition share."""
 
 
-def repetition(state: LimitState, number: int, smallest: float) -> Descent:
+def repetition(
+    state: LimitState,
+    number: int,
+    smallest: float,
+    samples: int = SAMPLES,
+    max_evaluations: float = math.inf,
+) -> Descent:
     """Return a repetition that goes down to a probability."""
     return descend(
         state,
         state.dimension,
         rng=generator(state.experiment.seed, STREAM, number),
-        samples=SAMPLES,
+        samples=samples,
+        max_evaluations=max_evaluations,
         probability=DEEPER * smallest,
         floor=state.bounds[0],
         label=state.member,
@@ -54,7 +63,8 @@ def repetition(state: LimitState, number: int, smallest: float) -> Descent:
 def table_of(state: LimitState, point: int, number: int, smallest: float) -> Table:
     """Return a repetition as a table of a store."""
     begin = time.perf_counter()
-    found = repetition(state, number, smallest)
+    with collect_warnings() as warned:
+        found = repetition(state, number, smallest)
     rows = np.empty(sum(one.values.size for one in found.populations), ROW)
     rows[POINT], rows[NUMBER] = point, number
     for name in OF_ALL:
@@ -67,7 +77,8 @@ def table_of(state: LimitState, point: int, number: int, smallest: float) -> Tab
         for name in OF_LEVEL:
             own[name] = getattr(one, name)
         first += one.values.size
-    return Table(rows, (), time.perf_counter() - begin, versions())
+    seconds = time.perf_counter() - begin
+    return Table(rows, (), seconds, versions(), tuple(merged(warned)))
 
 
 def repetitions_in(rows: NDArray[Any]) -> Iterator[tuple[int, int, Descent]]:

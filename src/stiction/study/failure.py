@@ -14,12 +14,12 @@ import xarray as xr
 
 from stiction.ensemble.batches import Table, usable_cores
 from stiction.ensemble.limit_state import LimitState, weakest_first
+from stiction.ensemble.monte_carlo import check_fields
 from stiction.ensemble.pilot import exact_counterpart
 from stiction.ensemble.store import Store
-from stiction.errors import InputError, warn_accuracy
+from stiction.errors import InputError, Warned, merge_warnings, texts_of, warn_accuracy
 from stiction.progress import Meter, Show
-from stiction.reliability.answer import exact_doubts
-from stiction.reliability.failure import chances, curve_of
+from stiction.reliability.failure import chances, curve_doubts, curve_of
 from stiction.reliability.repetitions import repetition, repetitions_in, table_of
 from stiction.reliability.subset import Descent
 from stiction.reliability.tail import Tail
@@ -135,22 +135,29 @@ def compute(
     if part is not None:
         wanted &= samples_of_part(part, *wanted.shape)
     jobs = [(point, number) for number, point in np.argwhere(wanted.T).tolist()]
-    if jobs:
-        states = list(map(weakest_first, states))
     smallest, cores = settings["smallest"], workers or usable_cores()
     meter = Meter("failure curve", len(jobs), progress, unit="repetitions")
     with ExitStack() as stack:
         stack.callback(store.save)  # also on Ctrl-C
         stack.enter_context(meter)
+        warned = stack.enter_context(merge_warnings())
+        if jobs:
+            check_fields(study.experiments)
+            states = list(map(weakest_first, states))
         for table in _tables(states, smallest, jobs, cores, executor):
+            warned += map(Warned.unnumbered, table.warned)
             store.add(table)
             rows.add(table)
             meter.advance(1)
-    if store.pilot is None and (part is None or part[0] == 1):
-        doubts = dict.fromkeys(text for state in states for text in _doubts(state, smallest))
-        for text in doubts:
-            warn_accuracy(text)
-        store.note_pilot({"doubts": list(doubts)})
+        if store.pilot is None and (part is None or part[0] == 1):
+            before = len(warned)
+            for point, state in enumerate(states):
+                tail = rows.tail(point)
+                if exact_counterpart(state.experiment):  # stored repetitions have no draws
+                    tail = Tail([repetition(state, 0, smallest)])
+                for text in curve_doubts(state, tail, smallest) if tail else ():
+                    warn_accuracy(text)
+            store.note_pilot({"doubts": texts_of(warned[before:])})
     return StoredCurves(store, study, settings).labelled(rows)
 
 
@@ -174,12 +181,3 @@ def _tables(
     finally:
         for future in running:
             future.cancel()
-
-
-def _doubts(state: LimitState, smallest: float) -> list[str]:
-    """Compare the local criterion with equilibrium on samples at the end of the curve."""
-    if exact_counterpart(state.experiment) is None:
-        return []
-    tail = Tail([repetition(state, 0, smallest)])
-    stress = tail.quantile(smallest)
-    return exact_doubts(state, tail.repetitions[0].around(stress), stress, smallest)
