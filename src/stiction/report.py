@@ -22,6 +22,7 @@ from stiction.errors import InputError
 from stiction.files import write_whole
 from stiction.plot.axes import scaled, shown_quantity, with_unit
 from stiction.plot.style import PAGE, panel, paper_style
+from stiction.reliability.answer import bounded
 from stiction.statistics.estimates import mean, quantiles, standard_deviation
 from stiction.study.failure import StoredCurves
 from stiction.study.run import StoredRun
@@ -133,9 +134,11 @@ def add_curves(page: Page, run: StoredCurves) -> None:
             continue
         if point.number < MOST_FIGURES:
             figure = Figure(figsize=(0.75 * PAGE, 3.2))
-            plot.failure_curve(curve, ax=figure.subplots())
+            area = run.study.experiments[point.number].problem.area
+            plot.failure_curve(curve, area=area, ax=figure.subplots())
             page.figure(figure, f"Probability of an onset below a stress{where}.")
-        own = [one for one in curve.data_vars.values() if one.dims == ("point",)]
+        same = "stress_above_bound" if not bounded(curve.attrs["lower_bound"]) else ""
+        own = [v for name, v in curve.items() if v.dims == ("point",) and name != same]
         factors, _, labels = zip(*map(scaled, own), strict=True)
         rows = np.transpose(own) * factors
         mean = ""
@@ -220,6 +223,8 @@ def add_tables(page: Page, result: xr.Dataset, dims: list[str], keys: list[str])
     labels = [[each[i] for each in places] for i in range(min(flat.sizes["point"], MOST_ROWS))]
     quantities = [f"{what} \N{PLUS-MINUS SIGN} standard error" for what in SPREAD]
     quantities += [f"{100 * level:g} % quantile" for level in LEVELS]
+    if flat["first_instability"].equals(flat["critical_stress"]):  # of the local criterion
+        flat = flat.drop_vars("first_instability")
     for name in QUANTITIES:
         if name in flat:
             factor, unit, _ = scaled(flat[name])
@@ -250,5 +255,7 @@ def _estimates(found: Any) -> list[Any]:
 
 def rounded(value: float, error: float) -> str:
     """Return a number to the second digit of its error."""
-    digits = 1 - math.floor(math.log10(error)) if 0.0 < error < math.inf else 4
+    if not 0.0 < error < math.inf:  # too few samples beyond the quantile
+        return shown(float(value))
+    digits = 1 - math.floor(math.log10(error))
     return f"{value:.{max(digits, 0)}f}".replace("-", "\N{MINUS SIGN}")

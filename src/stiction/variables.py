@@ -54,7 +54,7 @@ DIRECTION = "direction"
 
 ONSET_VARIABLES: dict[str, Variable] = {
     "critical_load": Variable("Pa", "load factor at which the interface slides as a whole"),
-    "critical_stress": Variable("Pa", "mean interface stress at the critical load"),
+    "critical_stress": Variable("Pa", "largest mean interface stress on the way to sliding"),
     "first_instability": Variable(
         "Pa", "mean interface stress when the first patch is unstable"
     ),

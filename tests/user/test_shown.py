@@ -254,12 +254,12 @@ def test_columns_of_a_table_are_the_variables_in_their_units(kind, folder, tmp_p
     expected = {}
     for name in ("sample", *result.data_vars, *(AXES if kind == "sweep" else ())):
         variable = result[name]
-        parts = {name: variable} if not {"x", "y"} & {*variable.dims} else {}
-        if "direction" in variable.dims:
+        parts = {name: variable} if not {"x", "y", "event"} & {*variable.dims} else {}
+        if parts and "direction" in variable.dims:
             parts = {f"{name}_{c}": variable.sel(direction=c) for c in ("x", "y")}
         expected |= {f"{one} ({part.units})": part for one, part in parts.items()}
-    assert {*table.columns} - {"event (1)"} == {*expected}
-    whole = result["event_load" if kind == "sweep" else "critical_load"]
+    assert {*table.columns} == {*expected}
+    whole = result["critical_load"]
     for column, variable in expected.items():
         rows = variable.broadcast_like(whole).transpose(*whole.dims).values.ravel()
         found = table[column] == "True" if rows.dtype == bool else table[column].astype(float)
@@ -268,6 +268,32 @@ def test_columns_of_a_table_are_the_variables_in_their_units(kind, folder, tmp_p
         xr.testing.assert_identical(read.load(), result)
         for name, variable in result.variables.items():
             assert "units" in variable.attrs or variable.dtype.kind in "Ub", name
+
+
+def test_a_report_of_failures_has_forces_and_no_number_twice(tmp_path, runs, monkeypatch):
+    """Of a strength without a bound, on an interface of known width."""
+    plain = small_study(64, correlation_length=9e-3)
+    plain["problem"]["interface"]["width"] = 0.013
+    plain["random"]["strength"]["marginal"] = {"type": "lognormal", "mean": 1e6, "cv": 0.2}
+    st.Study.from_dict(plain).failure_curve(out=tmp_path / "run", repetitions=1, smallest=0.1)
+    run, page = st.open_run(tmp_path / "run"), Shown("")
+    report.add_curves(page, run)
+    (figure, _), table = page.parts
+    top = figure.axes[0].child_axes[0]
+    assert top.get_xlabel() == "shear force (N)"
+    figure.savefig(tmp_path / "drawn.png")  # which sets the limits of the second axis
+    shown = np.divide(top.get_xlim(), figure.axes[0].get_xlim())
+    np.testing.assert_allclose(shown, 1e6 * 0.1 * 0.013, rtol=1e-9)
+    assert "stress above bound (MPa)" not in table["columns"]
+    columns = np.transpose([row[:4] for row in table["rows"]]).tolist()
+    assert len({tuple(column) for column in columns}) == 4
+    st.Study.from_dict(plain).run(out=tmp_path / "samples")
+    runs(f"report {tmp_path / 'samples'}")
+    found = tables((tmp_path / "samples" / "report.html").read_text("utf-8"))
+    assert [*found] == [  # the first instability is the onset itself
+        "Largest mean interface stress on the way to sliding",
+        "Largest shear force on the way to sliding",
+    ]
 
 
 def test_a_disk_without_room_for_a_result_is_left_as_it_was(tmp_path, monkeypatch):
