@@ -22,7 +22,7 @@ import stiction as st
 KM = 1e3
 SOLID = st.Solid(shear_modulus=2670.0 * 3464.0**2, poisson_ratio=0.25, density=2670.0)
 STRENGTH, RESIDUAL, CRITICAL_SLIP = 81.24e6, 63.0e6, 0.40
-NORMAL = -120.0  # MPa; compression is negative
+NORMAL = -120.0e6  # compression is negative
 AROUND, INSIDE = 70.0e6, 81.6e6
 FAULT, SQUARE = (30 * KM, 15 * KM), 3 * KM
 PERIOD = (60 * KM, 42 * KM)  # images of the fault are 27 km away: 4.5 s for the fastest waves
@@ -30,18 +30,7 @@ BROKEN = (
     1e-3  # share of the strength lost, by 0.4 mm of slip: soon after a point begins to slip
 )
 STATIONS = {"along the slip": (7.5, 0.0), "across it": (0.0, 6.0), "oblique": (7.5, 4.5)}  # km
-RECORDED = {"slip": 1.0, "slip_rate": 1.0, "shear_stress": 1e6}  # m, m/s and MPa in SI units
-COLUMNS = """
-Column #1 = time (s)
-Column #2 = horizontal slip (m)
-Column #3 = horizontal slip rate (m/s)
-Column #4 = horizontal shear stress (MPa)
-Column #5 = vertical slip (m)
-Column #6 = vertical slip rate (m/s)
-Column #7 = vertical shear stress (MPa)
-Column #8 = normal stress (MPa), compression negative
-"""
-NAMES = "t h-slip h-slip-rate h-shear-stress v-slip v-slip-rate v-shear-stress n-stress"
+RECORDED = ["slip", "slip_rate", "shear_stress"]
 
 
 class Found(NamedTuple):
@@ -77,9 +66,7 @@ def simulate(spacing: float, end_time: float = 9.0) -> Found:
         load=none, implicit=False, stop="time", end_time=end_time, arrival=BROKEN
     )
     stations = {name: middle + KM * np.array(at) for name, at in STATIONS.items()}
-    save = st.Save(
-        list(RECORDED), every=1000, stations=stations
-    )  # of the frames the first is used
+    save = st.Save(RECORDED, every=1000, stations=stations)  # of the frames the first is used
     run = st.simulate_rupture(problem, tau_p, method=method, save=save)
     x, y = (run[dim].values - length / 2 for dim, length in zip("xy", PERIOD, strict=True))
     return Found(x, y, run.arrival_time.values, run)
@@ -115,37 +102,8 @@ def draw(found: Found, title: str) -> Figure:
     return figure
 
 
-def write_station(found: Found, name: str, spacing: float, out: Path) -> Path:
-    """Write the record of a station as SCEC collects them: header, line of names, from t = 0 on.
-
-    Slip is along x, the horizontal direction; it has no vertical component here.
-    """
-    (a, b), record = STATIONS[name], found.run.sel(station=name)
-    place = {dim: float(record[f"station_{dim}"]) for dim in "xy"}
-    start = found.run.isel(time=0).sel(place, method="nearest")
-    time = np.append(start.time, record.step_time)
-    shown = [np.append(start[k], record[f"station_{k}"]) / unit for k, unit in RECORDED.items()]
-    about = f"""problem=TPV3
-code=stiction
-code_version={st.__version__}
-element_size={spacing:g} m
-time_step={time[1]:.6e} s
-num_time_steps={time.size}
-location=on fault, {a:g} km along strike, {b:g} km down-dip"""
-    still = np.zeros_like(time)
-    path = out / f"{spacing:g}m_faultst{10 * a:03.0f}dp{10 * b:03.0f}.txt"
-    np.savetxt(
-        path,
-        np.column_stack([time, *shown, still, still, still, still + NORMAL]),
-        fmt="%21.13e" + 7 * " %15.7e",
-        header="\n".join(f"# {line}" for line in (about + COLUMNS).splitlines()) + f"\n{NAMES}",
-        comments="",
-    )
-    return path
-
-
 def report(spacing: float, out: Path) -> None:
-    """One run: figure, a file for each station as the community exchanges them, a few lines."""
+    """One run: figure, files as the community exchanges them, a few lines."""
     found = simulate(spacing)
     along, across = at_axes(found, [3 * KM, 6 * KM, 7.5 * KM, 9 * KM, 12 * KM])
     print(f"{spacing:g} m: rupture time (s) at 3, 6, 7.5 km")
@@ -155,7 +113,8 @@ def report(spacing: float, out: Path) -> None:
         record = found.run.sel(station=name)
         top, slip = float(record.station_slip_rate.max()), float(record.station_slip[-1])
         print(f"  {name}: peak slip rate {top:.2f} m/s, slip at the end {slip:.2f} m")
-        write_station(found, name, spacing, out)
+    files = out / f"{spacing:g}m"  # as the community exchanges them
+    st.external.write_scec(found.run, files, origin=np.array(PERIOD) / 2, normal_stress=NORMAL)
     figure = draw(found, f"rupture time, nodes {spacing:g} m apart")
     figure.savefig(out / f"community_benchmark_{spacing:g}m.png", dpi=150)
 

@@ -1,6 +1,7 @@
 """Stations: what fields show at their nodes, after every step, and nothing else changes."""
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from refusals import refusals
@@ -43,6 +44,26 @@ test_what_no_station_is = refusals({
     "stations ... must be ... got 3": lambda: st.Save(stations={3: 0.01}),
     "stations: must be a valid dictionary": lambda: st.Save(stations=[0.01]),
 })  # fmt: skip
+
+
+def test_files_of_a_line_read_back(tmp_path):
+    run = simulate(LINE, stations={"a": 0.0131}, fields=["slip", "slip_rate", "shear_stress"])
+    path, contours = st.external.write_scec(run, tmp_path, origin=0.004, normal_stress=-7e6)
+    rows, table = (pd.read_csv(one, comment="#", sep=r"\s+") for one in (path, contours))
+    assert path.name == "faultst000dp000.txt"
+    assert rows.columns[1:4].tolist() == ["h-slip", "h-slip-rate", "h-shear-stress"]
+    assert rows["n-stress"].to_numpy() == pytest.approx(-7.0)
+    own = run.sel(station="a")
+    np.testing.assert_allclose(rows["h-slip"][1:], own.station_slip, rtol=1e-6)
+    np.testing.assert_allclose(
+        rows["h-shear-stress"][1:] * 1e6, own.station_shear_stress, rtol=1e-6
+    )
+    np.testing.assert_allclose(table["j"], run.x - 0.004, atol=1e-9)
+    np.testing.assert_allclose(table["t"], run.arrival_time.fillna(1e9), rtol=1e-6)
+    with pytest.raises(st.InputError, match="lacks station_slip; give simulate_rupture"):
+        st.external.write_scec(
+            run.drop_vars("station_slip"), tmp_path, origin=0, normal_stress=0
+        )
 
 
 def test_an_end_of_the_interface_is_its_first_node():

@@ -212,11 +212,16 @@ def test_community_fault(tmp_path):
         assert np.nanmax(np.abs(other - arrival)) < 1e-6
     outside = (np.abs(found.x) > 15.1e3)[:, None] | (np.abs(found.y) > 7.6e3)[None, :]
     assert np.all(np.isnan(arrival[outside]))
-    path = FAULT.write_station(found, "oblique", 200.0, tmp_path)
-    assert path.name == "200m_faultst075dp045.txt"
+    middle = np.array(FAULT.PERIOD) / 2
+    *paths, contours = st.external.write_scec(
+        found.run, tmp_path / "scec", origin=middle, normal_stress=-120e6
+    )
+    names = [path.name for path in paths]
+    assert names == ["faultst076dp000.txt", "faultst000dp060.txt", "faultst076dp046.txt"]
+    path = paths[-1]
     lines = path.read_text().splitlines()
     first = next(i for i, line in enumerate(lines) if not line.startswith("# "))
-    assert "# location=on fault, 7.5 km along strike, 4.5 km down-dip" in lines[:first]
+    assert "# location=7600 m along strike, 4600 m down-dip" in lines[:first]
     assert lines[first].split()[::7] == ["t", "n-stress"]
     rows, own = np.loadtxt(lines[first + 1 :]), found.run.sel(station="oblique")
     assert rows[0] == pytest.approx([0, 0, 0, 70.0, 0, 0, 0, -120.0])
@@ -224,6 +229,11 @@ def test_community_fault(tmp_path):
     stresses = own.station_slip_rate, own.station_shear_stress / 1e6
     assert rows[1:, 2:4] == pytest.approx(np.stack(stresses, axis=1))
     assert f"# num_time_steps={len(rows)}" in lines
+    table = np.loadtxt(contours.read_text().split("j k t")[1].splitlines()[1:])
+    here = table[(table[:, 0] == 3000.0) & (table[:, 1] == -1400.0), 2]
+    i, j = np.argmin(abs(found.x - 3000.0)), np.argmin(abs(found.y + 1400.0))
+    assert here == pytest.approx(arrival[i, j])
+    assert np.count_nonzero(table[:, 2] == 1e9) == np.isnan(arrival).sum()
     record = found.run.sel(station="along the slip")
     slipped = record.station_slip.values > FAULT.CRITICAL_SLIP
     # Nodes are 200 m apart, and the nearest to 7.5 km is 100 m further out or in.
