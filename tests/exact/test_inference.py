@@ -10,7 +10,13 @@ from setups import EXACT, LOCAL, turns
 import stiction as st
 from stiction.inference.density import log_likelihoods, tabulate
 from stiction.inference.grid import grid_of
-from stiction.inference.likelihood import experiments_at, make_likelihood, moved, simulate
+from stiction.inference.likelihood import (
+    experiments_at,
+    make_likelihood,
+    moved,
+    simulate,
+    worth_of,
+)
 from stiction.inference.prior import make_prior
 from stiction.inference.scaling import find_scaling
 from stiction.progress import SILENT
@@ -225,6 +231,9 @@ def test_specimens_of_two_lengths_have_samples_of_their_own():
     assert one.onsets.mean() == pytest.approx(other.onsets.mean(), rel=0.01)
 
 
+ONE = np.zeros((1, 1), dtype=np.int64), np.ones((1, 1))
+
+
 @pytest.mark.parametrize("alike", [0.9, 0.99])
 def test_onsets_moved_to_another_method_are_worth_what_they_say(alike):
     """The scatter of their mean over many campaigns, in a unit of their own."""
@@ -233,12 +242,11 @@ def test_onsets_moved_to_another_method_are_worth_what_they_say(alike):
         local = rng.standard_normal((1, 1000))
         rest = rng.standard_normal((1, 100))
         exact = alike * local[:, :100] + np.sqrt(1.0 - alike**2) * rest
-        found, worth = moved(0.7e6 + 2e4 * exact, 0.9e6 + 3e4 * local)
-        means.append(found.mean())
+        few, many = 0.7e6 + 2e4 * exact, 0.9e6 + 3e4 * local
+        means.append(moved(many, few, many[:, :100], *ONE).mean())
     assert np.mean(means) == pytest.approx(0.7e6, abs=4.0 * np.std(means) / 20)
     # 400 campaigns know a variance to 7 %; that of quantiles is 2/(1 + alike) of that of a mean.
-    assert worth == pytest.approx((2e4 / np.std(means)) ** 2, rel=0.3)
-    assert moved(exact, rng.standard_normal((1, 1000)))[1] == 100
+    assert worth_of(alike, 1000, 100) == pytest.approx((2e4 / np.std(means)) ** 2, rel=0.3)
 
 
 def test_grid_against_a_sum_by_hand():

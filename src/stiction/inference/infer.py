@@ -111,6 +111,8 @@ def infer(
     AccuracyWarning
         If the posterior piles up at an end of the prior, the method is not accurate there, or
         few samples are simulated for the number of peaks.
+    UserWarning
+        Beforehand, if the simulation will take more than a minute: how long, and what takes less.
 
     Notes
     -----

@@ -2,7 +2,8 @@
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Self
 
@@ -14,17 +15,19 @@ from stiction.criterion.local import LocalCriterion
 from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import LimitState, no_single_length
-from stiction.errors import InputError
+from stiction.errors import InputError, warn_user
 from stiction.inference.density import ERRORS, Densities, log_likelihoods, tabulate
 from stiction.inference.prior import Prior
 from stiction.inference.scaling import Scaling, find_scaling
-from stiction.progress import SILENT, Meter
+from stiction.progress import SILENT, Meter, duration
 from stiction.random.dotted_keys import full_key
 from stiction.random.synthesis import BLOCK
 from stiction.units import is_in
 
 NODES = {0: 1, 1: 25, 2: 11, 3: 7, 4: 5}
-"""Nodes along each simulated parameter, by the number of these parameters."""
+COARSE = {0: 1, 1: 5, 2: 4, 3: 3, 4: 2}
+"""Nodes along each simulated parameter, by the number of these parameters; and along each where the
+local criterion is simulated at those, and another method only at these."""
 LOG = 3.0
 """Ratio of the ends of a prior from which a parameter is interpolated in its logarithm."""
 SAMPLES = {"local_criterion": 2000, "equilibrium": 500}
@@ -33,6 +36,9 @@ ALIKE = 0.8
 """Correlation of the onsets by two methods above which one helps the other."""
 SPECIMEN = 2**20
 """Samples of a specimen of another length begin at multiples of this."""
+LONG = 60.0
+"""Seconds from which on it is said beforehand how long the simulation takes."""
+TIMED = 8
 BEYOND = 2.0
 """Spreads beyond the extremes of these at which a peak is out of reach."""
 
@@ -45,20 +51,22 @@ class Axis(NamedTuple):
     scale: Callable[[Array], Array]  # on which the parameter is interpolated
 
 
-def make_axes(prior: Prior, scaling: Scaling, box: Array) -> tuple[Axis, ...]:
+def make_axes(
+    prior: Prior, scaling: Scaling, box: Array, along: Mapping[int, int] = NODES
+) -> tuple[Axis, ...]:
     """Place the nodes of the parameters that need simulation in a box of the prior."""
     simulated = [i for i in range(prior.dimension) if i not in scaling.keys]
-    if len(simulated) not in NODES:
+    if len(simulated) not in along:
         names = ", ".join(prior.names[i] for i in simulated)
         raise InputError(
             f"prior: {len(simulated)} parameters would have to be simulated on a grid,"
-            f" {names}; at most {max(NODES)} are possible: fix the best-known ones"
+            f" {names}; at most {max(along)} are possible: fix the best-known ones"
         )
     axes = []
     for i, (first, last) in enumerate(prior.theta(box).T):
         log = last >= LOG * first > 0.0
         space: Any = np.geomspace if log else np.linspace
-        nodes = space(first, last, NODES[len(simulated)])
+        nodes = space(first, last, along[len(simulated)])
         axes.append(Axis(i, nodes, np.log if log else np.positive))
     return tuple(axes[i] for i in simulated)
 
@@ -316,8 +324,14 @@ def make_likelihood(
     axes = make_axes(prior, scaling, box)
     thetas = nodes_of(axes, scaling.reference)
     count = samples or SAMPLES.get(method.type, FEW)
-    meter.stage("simulated onsets", len(thetas) * len(lengths) * count)
-    guided = method.type != "local_criterion" and not no_single_length(*prior.at(prior.middle))
+    local = method.type == "local_criterion"
+    guided = not local and not no_single_length(*prior.at(prior.middle))
+    few = make_axes(prior, scaling, box, COARSE) if guided else axes
+    coarse, weights = nodes_of(few, scaling.reference), corners(few, thetas)
+    total = len(coarse) * len(lengths) * count
+    if not local:
+        _warn_if_long(experiments_at(prior, coarse[:1], method)[0], total, workers)
+    meter.stage("simulated onsets", total)
     worth, densities = float(count), []
     for number, length in enumerate(lengths):
         experiments = experiments_at(prior, thetas, method, length)
@@ -325,11 +339,23 @@ def make_likelihood(
             end.random.warn_if_inaccurate(end.problem.interface)
         options: Any = {"first": number * SPECIMEN, "seed": seed, "variable": variable}
         options["workers"] = workers
-        found = simulate(experiments, samples=count, meter=meter, **options)
+        own = experiments_at(prior, coarse, method, length)
+        found = simulate(own, samples=count, meter=meter, **options)
         if guided:
-            others = [own.by(LocalCriterion()) for own in experiments]
-            local = simulate(others, samples=max(count, SAMPLES["local_criterion"]), **options)
-            found, worth = moved(found, local)
+            known = simulate(
+                [one.by(LocalCriterion()) for one in own], samples=count, **options
+            )
+            options["samples"] = max(count, SAMPLES["local_criterion"])
+            many = simulate([one.by(LocalCriterion()) for one in experiments], **options)
+            alike = np.mean(
+                [np.corrcoef(*pair)[0, 1] for pair in zip(found, known, strict=True)]
+            )
+            if alike > ALIKE:
+                found = moved(many, found, known, *weights)
+                worth = worth_of(float(alike), many.shape[1], count)
+            else:
+                _warn_if_long(experiments[0], len(thetas) * count, workers)
+                found = simulate(experiments, **options | {"samples": count})
         bounds = [bounds_of(own, variable)[0] for own in experiments]
         densities.append(tabulate(found, np.array(bounds)))
     none = Area(1.0, np.zeros(prior.dimension))
@@ -337,21 +363,46 @@ def make_likelihood(
     return Likelihood(prior, method, scaling, axes, error, densities, areas, worth, box)
 
 
-def moved(few: Array, many: Array) -> tuple[Array, float]:
-    """Move many onsets by the local criterion, (points, many), to those of a few by the method.
+def moved(
+    many: Array, few: Array, known: Array, index: NDArray[np.int64], weight: Array
+) -> Array:
+    """Move many onsets by the local criterion, (points, many), to those by another method.
 
-    The same samples by both methods differ little, and so do their quantiles: the difference of
-    the quantiles of the few is added to the many. The few are returned if the methods differ much.
-    The number is that of independent samples by the method that would serve as well.
+    At coarse nodes a `few` onsets by it and those of the same samples by the local criterion are
+    `known`, (nodes, few). Their quantiles differ little. This difference, both as shares of the
+    spread, is interpolated between the nodes around each point, `index`, by their `weight`.
     """
-    known = many[:, : few.shape[1]]
-    alike = np.mean([np.corrcoef(*pair)[0, 1] for pair in zip(few, known, strict=True)])
-    if not alike > ALIKE:
-        return few, few.shape[1]
+    mean, spread = known.mean(axis=1, keepdims=True), known.std(axis=1, keepdims=True)
+    own = (np.sort(known) - mean) / spread
+    away = (np.sort(few) - np.sort(known)) / spread
     result = np.empty_like(many)
-    for row, exact, local, own in zip(result, np.sort(few), many, np.sort(known), strict=True):
-        row[:] = local + np.interp(local, own, exact - own)
-    return result, float(1.0 / (alike**2 / many.shape[1] + (1.0 - alike**2) / few.shape[1]))
+    for row, values, nodes, share in zip(result, many, index, weight, strict=True):
+        same = values[: few.shape[1]]
+        z = (values - same.mean()) / same.std()
+        shift = share @ np.stack([np.interp(z, own[node], away[node]) for node in nodes])
+        row[:] = values + same.std() * shift
+    return result
+
+
+def worth_of(alike: float, many: int, few: int) -> float:
+    """Return how many independent samples serve as well as onsets that were moved."""
+    return 1.0 / (alike**2 / many + (1.0 - alike**2) / few)
+
+
+def _warn_if_long(experiment: Experiment, samples: int, workers: int | None) -> None:
+    """Warn of a simulation that takes long, by the time of a few samples."""
+    experiment.results(0, 1)  # compiles and prepares
+    begun = time.perf_counter()
+    experiment.results(0, TIMED)
+    each = (time.perf_counter() - begun) / TIMED
+    seconds = samples * each / (workers or usable_cores())
+    if seconds > LONG:
+        warn_user(
+            f"the likelihood takes about {duration(seconds)}: {samples:,} onsets by"
+            f" {experiment.method.label} of {duration(each)} each; fewer samples, nodes or unknown"
+            " parameters take less, and LocalCriterion() takes seconds where it holds",
+            UserWarning,
+        )
 
 
 def bounds_of(
