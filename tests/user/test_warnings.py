@@ -5,8 +5,11 @@ from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 import pytest
+import tomli_w
+from small_study import small_study
 
 import stiction as st
+from stiction import cli
 from stiction.errors import collect_warnings, merge_warnings, warn_of_samples, warn_user
 
 STIFF = float("inf")
@@ -87,3 +90,74 @@ def test_samples_are_counted_over_those_without_the_doubt_too():
     assert merging(*some) == ["off by 0.25 in 3 of 9 samples (1, 3, 5)"]
     assert merging(some[1]) == []
     assert merging(some[2]) == ["off by 0.05 in 1 of 2 samples (5)"]
+
+
+def changed(**values):
+    """The small study with other values, by dotted key."""
+    plain = small_study(64, correlation_length=9e-3, ensemble={"samples": 6, "seed": 3})
+    for key, value in values.items():
+        table = plain
+        *steps, last = key.split("__")
+        for step in steps:
+            table = table.setdefault(step, {})
+        table[last] = value
+    return plain
+
+
+DOUBTED = {
+    "below the residual": changed(problem__friction__residual_strength=0.8e6),
+    "uniform": changed(random__strength__spectrum__correlation_length=0.3),
+    "other units": changed(
+        random__strength__marginal__low=0.66e3, random__strength__marginal__high=1.66e3
+    ),
+    "refused": changed(random__strength__of="friction_coefficient"),
+}
+
+
+@pytest.mark.parametrize("curve", [False, True])
+@pytest.mark.parametrize("doubt", DOUBTED)
+def test_the_same_doubts_in_python_in_a_study_and_in_a_command(
+    doubt, curve, tmp_path, monkeypatch, runs
+):
+    """Each way of the same computation warns of the same, and refuses the same."""
+    monkeypatch.chdir(tmp_path)
+    plain = DOUBTED[doubt]
+    (tmp_path / "study.toml").write_text(tomli_w.dumps(plain))
+
+    def by_function():
+        given = {"method": st.LocalCriterion()}
+        given["problem"] = st.Problem(**plain["problem"])
+        given["random"] = st.RandomInterface(**plain["random"])
+        if curve:
+            return st.failure_curve(**given, smallest=0.1, seed=3, progress=False)
+        return st.monte_carlo(**given, samples=6, seed=3, progress=False)
+
+    def by_study():
+        study = st.Study.from_toml("study.toml")
+        if curve:
+            return study.failure_curve(out="A", smallest=0.1, repetitions=1, progress=False)
+        return study.run(progress=False)
+
+    line = (
+        "reliability study.toml --smallest 0.1 --repetitions 1" if curve else "run study.toml"
+    )
+    found = []
+    for way in (by_function, by_study):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                way()
+            except st.InputError as error:
+                found.append({*error.problems})
+            else:
+                found.append({str(one.message) for one in caught})
+    refused = doubt in ("uniform", "refused")
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        said = runs(f"{line} --out B", code=2 * refused).splitlines()
+    start = "error: " if refused else "warning: "
+    printed = {text.removeprefix(start) for text in said if text.startswith(start)}
+    command = cli.reliability if curve else cli.run
+    assert found[0] == found[1]
+    assert {cli.in_options(text, command) for text in found[0]} == printed
+    assert found[0]
