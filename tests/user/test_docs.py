@@ -106,6 +106,26 @@ def test_python_of_the_page_on_reliability():
     assert low < scope["decision"].probability < high
 
 
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+def test_the_road_from_files_to_a_force(monkeypatch, tmp_path):
+    """Every block of the page on decisions, with fewer repetitions and interfaces."""
+    monkeypatch.chdir(tmp_path)
+    less = {
+        "between=True": "between=True, bootstrap=20",
+        r"interfaces\(60\)": "interfaces(6)",
+        "samples=400": "samples=40",
+        "probability=1e-3, method": "probability=0.03, method",
+        "nodes=256": "nodes=128",
+    }
+    scope = run_blocks("docs/decisions.md", {}, **less)
+    assert scope["fit"].parameters["marginal.mean"] == pytest.approx(0.2, rel=0.1)
+    assert 30e3 < scope["design"].force < 50e3
+    assert scope["demand"].force == pytest.approx(40e3)
+    assert 0.0 < scope["demand"].probability < 0.3
+    assert str(scope["design"]).startswith("force ")
+
+
 WITH_EXAMPLES = [
     ".".join(path.relative_to(ROOT / "src").with_suffix("").parts)
     for path in sorted((ROOT / "src").rglob("*.py"))

@@ -1,9 +1,12 @@
 """The public plots: what they draw, on whose axes, in which units, and what they refuse."""
 
+import dataclasses
+
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+import xarray as xr
 from PIL import Image
 from refusals import refuses
 from setups import EXACT, LOCAL, exact_onset, local_onset, make_problem
@@ -84,6 +87,44 @@ def test_monte_carlo_shows_coefficients_where_there_is_a_pressure(swept):
     assert tops[0] == pytest.approx(0.01 * tops[1])  # both in MPa
 
 
+def test_coefficients_and_forces_have_their_own_axes():
+    """A measured profile, the field that it conditions, its onset, and the force of many."""
+    mu = st.read_profile(
+        xr.DataArray(ONE / PRESSURE, {"x": PROBLEM.interface.x}, "x", name="mu"),
+        quantity="friction_coefficient",
+    )
+    field = st.RandomField(
+        st.Lognormal(mean=0.2, cv=0.2), FIELD.spectrum, of="friction_coefficient"
+    ).given(mu[40:60], noise=5e-3)
+    for profile in (mu, field):
+        axes = st.plot.field(PROBLEM, profile)
+        assert axes.get_ylabel() == "friction coefficient"
+        assert not axes.child_axes
+        assert np.median(axes.lines[0].get_ydata()) == pytest.approx(0.18, rel=0.15)
+    assert (
+        st.plot.field(PROBLEM, ONE / PRESSURE, quantity="friction_coefficient").get_ylim()[1]
+        < 1
+    )
+    refuses("unit 1", lambda: FIELD.given(mu, noise=5e-3))
+    refuses(
+        "unit Pa",
+        lambda: field.__class__(
+            field.marginal, field.spectrum, of="friction_coefficient"
+        ).given((mu * PRESSURE).assign_attrs(units="Pa"), noise=5e-3),
+    )
+    drawn, same = (
+        st.plot.onset(local_onset(PROBLEM, one), one, problem=PROBLEM) for one in (mu, ONE)
+    )
+    for line, other in zip(drawn.lines, same.lines, strict=True):
+        np.testing.assert_allclose(line.get_xydata(), other.get_xydata(), rtol=1e-12)
+    wide = dataclasses.replace(PROBLEM, interface=st.Interface(0.1, 256, width=0.3))
+    many = st.monte_carlo(wide, FIELD, method=LOCAL, samples=30, seed=0)
+    assert st.plot.monte_carlo(many).get_xlabel() == "critical force (kN)"
+    large = make_problem((64, 32), (0.02, 0.01), load=wide.load)
+    onsets = st.monte_carlo(large, FIELD, method=LOCAL, samples=30, seed=0)
+    assert st.plot.monte_carlo(onsets).get_xlabel() == "static friction coefficient"
+
+
 def test_failure_curve():
     curve = st.failure_curve(PROBLEM, FIELD, method=LOCAL, smallest=1e-2)
     axes = st.plot.failure_curve(curve)
@@ -96,6 +137,13 @@ def test_failure_curve():
     (above,) = axes.child_axes
     assert above.get_xlabel() == "shear force (kN)"
     assert np.array(above.get_xlim()) / 2.0 == pytest.approx(axes.get_xlim())
+    known = curve.assign(force=curve.stress * 2e-3)  # as of a problem with an area
+    drawn = st.plot.failure_curve(known, force=1.4e3)
+    assert drawn.get_legend_handles_labels()[1][-1].startswith("demand: 1.4 kN, P = 0.1")
+    assert drawn.child_axes[0].get_xlabel() == "shear force (kN)"
+    assert drawn.lines[-1].get_xdata()[0] == pytest.approx(0.7)
+    refuses("area=...", lambda: st.plot.failure_curve(curve, force=1.4e3))
+    refuses("force or stress", lambda: st.plot.failure_curve(known, force=1.4e3, stress=7e5))
 
 
 def test_a_rupture_in_the_units_of_its_size(run, tmp_path):

@@ -18,7 +18,7 @@ from stiction.plot.axes import (
 )
 from stiction.plot.style import ACCENT, BAND, INK, PALE, QUIET
 from stiction.reliability.answer import bounded
-from stiction.units import unit_for
+from stiction.units import in_words, unit_for
 
 TINY = 1e-300
 """Probability that stands for none on a logarithmic scale."""
@@ -29,6 +29,7 @@ def failure_curve(
     curve: xr.Dataset,
     *,
     stress: Real | None = None,
+    force: Positive | None = None,
     area: Positive | None = None,
     ax: Axes | None = None,
 ) -> Axes:
@@ -40,28 +41,38 @@ def failure_curve(
         From `stiction.failure_curve`.
     stress : float, optional
         Demand, Pa: the mean shear stress to carry. It is marked, with its probability.
+    force : float, optional
+        Instead of `stress`: demand, N.
     area : float, optional
-        Nominal area of contact, m², for a scale of shear forces at the top.
+        Nominal area of contact, m², if the problem has none: for a scale of forces at the top.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on; new ones by default.
 
     Returns
     -------
     matplotlib.axes.Axes
-        Without an area, friction coefficients are at the top if there is a normal pressure. A
-        dotted line marks the lower bound of the strength. Of a list of equally likely interfaces
-        the line is their mean, and a wider band holds 90 % of them.
+        Where the area is not known, friction coefficients are at the top if there is a normal
+        pressure. A dotted line marks the lower bound of the strength. Of a list of equally likely
+        interfaces the line is their mean, and a wider band holds 90 % of them.
 
     Raises
     ------
     InputError
-        If the dataset is not a failure curve.
+        If the dataset is not a failure curve, or the area of a force is not known.
     """
     need(curve, "stress", "probability", "probability_low", "probability_high")
     curve = curve.isel(point=np.isfinite(curve["stress"].values))
     bound, chance = float(curve.attrs["lower_bound"]), curve["probability"].values
     factor, unit = unit_for("Pa", curve["stress"].values)
     x = curve["stress"].values * factor
+    if area is None and "force" in curve:
+        area = float(curve["force"][0] / curve["stress"][0])
+    if force is not None:
+        if area is None or stress is not None:
+            raise InputError("force: give force or stress, and with a force area=... (m2)")
+        stress, shown = force / area, in_words("N", force)
+    elif stress is not None:
+        shown = f"{stress * factor:.4g} {unit}"
     with on_axes(ax) as axes:
         if bounded(bound):
             axes.axvline(bound * factor, color=QUIET, linewidth=0.7, linestyle=":")
@@ -75,7 +86,7 @@ def failure_curve(
         axes.fill_between(x, low, high, color=PALE, linewidth=0.0)
         axes.plot(x, chance, "o-", color=INK, markersize=2.5, linewidth=0.9, label=text)
         if stress is not None:
-            text = f"demand: {stress * factor:.4g} {unit}"
+            text = f"demand: {shown}"
             if x[-1] <= stress * factor <= x[0]:
                 there = np.interp(stress * factor, x[::-1], np.log(chance[::-1]))
                 text += f", P = {np.exp(there):.2g}"
@@ -85,8 +96,8 @@ def failure_curve(
         axes.set_xlabel(f"stress $s$ ({unit})")
         axes.set_ylabel(r"$P(\tau_{\mathrm{cr}} < s)$")
         if area is not None:
-            force, name = unit_for("N", x / factor * area)
-            add_scale(axes, "x", area * force / factor, with_unit("shear force", name))
+            scale, name = unit_for("N", x / factor * area)
+            add_scale(axes, "x", area * scale / factor, with_unit("shear force", name))
         else:
             with suppress(InputError):  # a problem that exists in Python only: stresses alone
                 add_friction_scale(axes, problem_of(curve), "x", factor)
