@@ -90,7 +90,7 @@ class Rupture:
         When to end (see Notes), unless nothing slips and the load has stopped rising:
         "sliding": every node that can break is at its residual strength. "onset": the first
         instability has begun. "rest": the interface is at rest after an instability, or
-        slides. "time": at `end_time`.
+        slides. "time": at `end_time`; an interface that slides takes explicit steps until then.
     implicit : bool
         False takes explicit steps only (slow loading then costs a million steps).
     max_steps : int
