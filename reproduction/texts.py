@@ -11,8 +11,7 @@ from reproduction.setting import RATIOS, SIMULATED
 from reproduction.statements_onset import dynamic_mean, least, offsets, rate_offsets, trend
 from reproduction.statements_rupture import arrested, shares, with_inertia
 
-ABOVE = 1e-9
-"""Relative: what is nearer than the tolerance of the solver is equal."""
+ABOVE = 1e-9  # relative; what is nearer than the tolerance of the solver is equal
 PER_CENT = 100.0
 
 
@@ -44,7 +43,8 @@ def names(d: Data, found: dict) -> dict:
         "least": least(wide),
         "last": wide[-1],
         "odds": odds(d),
-        "depends": sum(each.verdict is Verdict.TEXT for each in found.values()),
+        "otherwise": [odds(d, visible=seen)[0] for seen in (0.5, 2.0)],
+        "depends": sum(len({*each.readings.values()}) > 1 for each in found.values()),
         "still": over(lambda r: arrested(d, r) * PER_CENT),
         "moving": over(lambda r: with_inertia(d, r) * PER_CENT),
         "share_moving": moving,

@@ -308,7 +308,8 @@ def test_the_table_of_claims_is_tidy_and_the_main_results_stand(pipeline):
     lines = re.findall(r"<li>(.*?)</li>", short[: short.index('id="departures"')])
     assert len(lines) == 8
     assert all(
-        re.search(r"± \d|\(\S+ to \S+\)|[\d,]+ of [\d,]+ samples", line) for line in lines
+        re.search(r"± \d|\(\S+ to \S+ by sampling|[\d,]+ of [\d,]+ samples", line)
+        for line in lines
     )
     # Two moduli are compared with either reading of one.
     row = re.search(r"product, over the largest.*?</tr>", short)[0]
