@@ -216,6 +216,14 @@ def test_forces_are_of_the_area_at_each_point_of_the_prior(key):
         assert other.p_values == own.p_values
 
 
+@pytest.mark.filterwarnings("default::UserWarning")
+def test_how_long_it_takes_is_said_before_it_does(monkeypatch):
+    monkeypatch.setattr("stiction.inference.likelihood.LONG", 1e-9)
+    words = "takes about .* 500 onsets by equilibrium of .* each; fewer samples"
+    with pytest.warns(UserWarning, match=words):  # at 5 points, and not at all 25
+        infer(method=st.Equilibrium(), samples=100)
+
+
 def test_a_posterior_between_the_points_of_a_grid_counts_in_a_design_of_tests():
     """A prior so wide that one posterior of ten lies below the first point of any fixed grid."""
     field = dataclasses.replace(STRENGTH, marginal=scipy.stats.weibull_min(4.0, 1e6, 1e5))
