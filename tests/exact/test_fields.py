@@ -331,3 +331,14 @@ def test_correlation_of_a_custom_spectrum_with_a_step():
     lag = np.array([0.0, 1e-3, 1e-2, 10.0])
     found = spectrum.correlation(lag)
     np.testing.assert_allclose(found, np.sinc(3000.0 / np.pi * lag), atol=1e-10)
+
+
+def test_a_coarse_grid_is_told_how_many_nodes_suffice():
+    """Below one per cent there is nothing to say; above, as many nodes as said are enough."""
+    field = field_of(scipy.stats.lognorm(0.2, scale=1e6), 4e-3, mean_mode=True)
+    rough = st.RandomField(field.marginal, st.ExponentialSpectrum(2e-3), mean_mode=True)
+    with pytest.warns(st.AccuracyWarning, match=r"interface.nodes >= 508 it is less than 1 %"):
+        rough.sample(COARSE)
+    shares = [rough.modes(st.Interface(0.1, nodes)).unresolved for nodes in (508, 506)]
+    assert shares[0] <= 0.01 < shares[1]
+    rough.sample(st.Interface(0.1, 508))

@@ -76,6 +76,15 @@ def test_a_wider_marginal_keeps_its_mean_and_what_is_fixed(given):
         assert getattr(wider, name) == value
 
 
+def test_strengths_have_no_negative_bound():
+    """Some fits to eighty values of a Weibull field put the bound of 'beta' far below zero."""
+    rng, family = np.random.default_rng(1), family_of("beta")
+    for _ in range(20):
+        values = st.Weibull(mean=1e6, cv=0.3).distribution.rvs(80, random_state=rng)
+        found = family.fit(values)
+        assert 0.0 <= family.widened(found, 1.3).low <= found.low
+
+
 @pytest.mark.parametrize("noise", [0.0, 8e4])
 def test_the_likelihood_is_that_of_values(noise):
     """The density of the sum with the noise by quadrature, whatever the bins."""

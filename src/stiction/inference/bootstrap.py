@@ -388,7 +388,8 @@ def limits_of(found: Estimate, values: Array, noise: float) -> dict[str, tuple[f
     quiet = found.setting.marginal.quiet(values, noise)
     bottom, top = (float(end) for end in found.marginal.distribution.support())
     least, most = max(float(quiet.min()), bottom), min(float(quiet.max()), top)
-    below, above = (-math.inf, least), (most, math.inf)
+    below = 0.0 if values.min() > 0.0 and least > 0.0 else -math.inf, least
+    above = most, math.inf
     limits = {
         "spectrum.exponent": RANGES["exponent"],
         "anisotropy": RANGES["anisotropy"],

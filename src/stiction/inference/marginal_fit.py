@@ -172,6 +172,8 @@ class Family:
             return with_parameters(marginal, moved | {"scale": factor * free["scale"]})
         if not isinstance(marginal, Beta):
             return replace(marginal, cv=factor * marginal.cv)
+        if "low" in moved and marginal.low >= 0.0:
+            moved["low"] = max(moved["low"], 0.0)
         wider = replace(marginal, **moved)
         u = (mean - wider.low) / (wider.high - wider.low)
         deviation = factor * float(marginal.distribution.std()) / (wider.high - wider.low)
@@ -289,6 +291,8 @@ def _beta(family: Family, values: Array, quiet: Array, noise: float, start: Any)
         first.append(max(side * (getattr(start, name) - mean) / unit, 1e-3))
         least = 0.5 if noise else room[name] / unit * (1.0 + 1e-9)
         most = (room[name] + WIDEST * float(np.ptp(values))) / unit
+        if name == "low" and values.min() > 0.0:  # of positive values it is not negative
+            most = max(min(most, mean / unit * (1.0 - 1e-12)), least)
         limits.append((math.log(least), math.log(most)))
     return Search(np.log(first), limits, parameters)
 

@@ -47,7 +47,7 @@ BETWEEN = 1000  # number of the stream of draws of the first property's factor
 DEFINITE = 1e-12  # round-off of eigenvalues of a correlation matrix
 # Limits of warnings: shares of the variance that the grid or the mean mode would hold, and the
 # error of a correlation.
-LOST, WITHOUT_MEAN, UNCERTAIN = 1e-4, 0.075, 0.01
+LOST, WITHOUT_MEAN, UNCERTAIN = 0.01, 0.075, 0.01
 
 
 @model
@@ -191,11 +191,12 @@ class RandomField:
         lost = modes.unresolved
         if lost > LOST:
             nodes = " x ".join(map(str, interface.shape))
-            enough = " x ".join(map(str, 2 * np.abs(modes.numbers).max(axis=1)))
+            enough = " x ".join(map(str, modes.nodes_for(LOST)))
             warn_accuracy(
                 f"the grid of {nodes} nodes is coarser than the spectrum: values at the nodes"
                 f" are exact, but {100.0 * lost:.2g} % of the variance lies at wavelengths that the"
-                f" grid does not resolve (interface.nodes >= {enough} resolves all)"
+                f" grid does not resolve; with interface.nodes >= {enough} it is less than"
+                f" {100.0 * LOST:g} %, or end the spectrum there with power_kept={1.0 - lost:.3g}"
             )
         if self.mean_mode:
             return
