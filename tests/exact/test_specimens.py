@@ -12,6 +12,7 @@ from brute_force import BruteForce, energy
 from matplotlib.patches import Rectangle
 from refusals import refusals
 from specimens import crooked, rough
+from stopping_slip import StoppingBruteForce
 
 import stiction as st
 from stiction.elasticity.places import places_of
@@ -99,15 +100,75 @@ def test_a_stiffness_in_another_unit_draws_a_warning():
         crooked(drive=st.Platen(stiffness=20.0))
 
 
-def test_slip_that_goes_back_is_reported():
-    """Two pushers behind a rigid machine: slip at one end unloads the other."""
+LAWS = {
+    "linear": {"nodes": 64, "residual": 0.2e6, "rate": 0.12e12},
+    "out of plane": {"nodes": 64, "residual": 0.2e6, "rate": 0.12e12, "mode": "III"},
+    "two pieces": {
+        "nodes": 48,
+        "friction": st.PiecewiseWeakening(
+            slip=(0.3, 1.0), strength=(0.5, 0.0), weakening_rate=0.13e12, residual_strength=0.15e6
+        ),
+    },
+    "two pieces, steeper": {
+        "nodes": 48,
+        "friction": st.PiecewiseWeakening(
+            slip=(0.4, 1.0), strength=(0.75, 0.0), weakening_rate=0.06e12, residual_ratio=0.2
+        ),
+    },
+}  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+@pytest.mark.parametrize("name", LAWS)
+def test_nodes_stop_rest_and_slip_again(name):
+    """Two pushers behind a rigid machine: every state is an equilibrium, as by brute force.
+
+    Nodes stop between events, within one, and where another passes a corner.
+    """
     drive = st.Pusher(height=0.004, width=0.003, side="both", stiffness=INF)
-    problem = crooked(drive=drive, height=0.009)
+    given = dict(LAWS[name])
+    law = given.pop("friction", None)
+    problem = crooked(drive=drive, height=0.009, **given)
+    if law is not None:
+        problem = dataclasses.replace(problem, friction=law)
     strength = rough(problem, 3)
-    with pytest.warns(st.AccuracyWarning, match="slip goes back by up to .* 1 of 1 samples"):
-        st.onset(problem, strength, method=st.Equilibrium())
-    with pytest.warns(st.AccuracyWarning, match="slip goes back"):
-        st.equilibrium_path(problem, strength, [1e5])
+    brute = StoppingBruteForce(problem, strength).run()
+    assert min(brute.stops, brute.stops_in_jumps) > 0
+    assert brute.stops_at_corners > 0 or name != "two pieces, steeper"
+    found = st.onset(problem, strength, method=st.Equilibrium(events=60)).isel(sample=0)
+    assert float(found.critical_load) == pytest.approx(brute.load, rel=1e-9)
+    assert float(found.critical_stress) == pytest.approx(brute.peak, rel=1e-9)
+    assert float(found.first_instability) == pytest.approx(brute.first, rel=1e-9)
+    np.testing.assert_allclose(drops(found), brute.drops, rtol=1e-5, atol=1e-4)
+
+    end = brute.load * (1.0 - 1e-9), brute.load * (1.0 + 1e-9)
+    loads = np.unique([*(load for load in brute.kinks if load < end[0]), *end])
+    path = st.equilibrium_path(problem, strength, loads)
+    np.testing.assert_array_equal(path.sliding, loads > brute.load)
+    path = path.isel(load=~path.sliding.values)
+    slip, rows = path.slip.values, problem.sample(strength)
+    assert np.diff(slip, axis=0).min() > -1e-9 * slip.max()
+    blocks, initial = problem.blocks, rows.initial_stress[0]
+    stress = path["load"].values[:, None] * blocks.shear + initial - slip @ blocks.stiffness
+    np.testing.assert_allclose(path.stress, stress, atol=1e-9 * strength.mean())
+    np.testing.assert_allclose(
+        path.mean_stress, path["load"] + initial.mean() - blocks.mean_relief(slip), rtol=1e-9
+    )
+    residual = rows.residual_strength[0]
+    present = residual + (strength[0] - residual) * np.interp(
+        slip / brute.critical, brute.u, brute.f
+    )
+    over = (stress - present) / strength.mean()
+    assert over.max() < 1e-9
+    slips = np.diff(slip, axis=0) > 1e-9 * slip.max()
+    quiet = np.diff(path.arrested_events.values) == 0
+    assert np.abs(over[1:][slips & quiet[:, None]]).max() < 1e-9
+    rests = (slip > 0.0) & (over < -1e-6)
+    assert rests.any()
+    assert (rests[:-1] & slips).any() or name == "two pieces"  # slips again
+    balance = energy(problem, strength, brute.kinks)
+    assert balance.jumps.sum() > 0
+    assert np.abs(balance.lost[~balance.jumps]).sum() < 1e-9 * balance.work.sum()
 
 
 def test_windows_bound_the_onset_and_become_it():

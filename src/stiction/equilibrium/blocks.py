@@ -27,8 +27,6 @@ from stiction.problem import Problem
 RUNG = 1.5
 """Ratio of successive weakening rates whose windows are tried where the rate varies."""
 MOST_RUNGS = 12
-AT_REST = 1e-6
-"""Share of the strength by which the stress at a node that slips may be off."""
 
 
 class BlockProgram(LineProgram):
@@ -43,6 +41,7 @@ class BlockProgram(LineProgram):
     def _make_stiffness(self, problem: Problem) -> None:
         self.blocks = problem.blocks
         self.machine = self.blocks.relief > 0.0
+        self.stops = self.blocks.positive > 0.0
         self.stiffness = make_block_stiffness(self.blocks.stiffness, self.blocks.relief)
         self.own = np.diag(self.blocks.stiffness).copy()
         if self.blocks.positive:
@@ -64,15 +63,12 @@ class BlockProgram(LineProgram):
     def of_stress(self, sample: Sample, state: State, y: Array) -> Array:
         """Return the derivative of the mean stress at an instability from y, that of its drive.
 
-        Until the instability (K - W) d = D q - s on the nodes that slip; NaN if one is at rest.
+        Until the instability (K - W) d = D q - s on the nodes that slip, none of which rests.
         """
         if not self.machine:
             return y
-        _, strength, rate = present_pieces(sample, state.slip)
+        rate = present_pieces(sample, state.slip).rate
         slips, q = state.slip > 0.0, sample.profile
-        missing = state.load * q - state.stiff - strength + rate * state.slip
-        if slips.any() and np.abs(missing[slips]).max() > AT_REST * np.abs(strength).max():
-            return np.full(y.size, np.nan)
         moved = np.zeros(y.size)  # d' of a rise of the drive
         block = self.blocks.stiffness[np.ix_(slips, slips)] - np.diag(rate[slips])
         moved[slips] = np.linalg.solve(block, q[slips])

@@ -177,7 +177,8 @@ class Workspace(NamedTuple):
     `members[:size]` are the slipping nodes in the order of the rows of `factor`, `inside` marks
     them, `diagonal` is that of A; `forward` holds the forward substitutions of the load profile
     and of the strength. `order` is a list of nodes to append. Rows of the factor up to `held` are
-    valid for these members and `entries`, their diagonal entries of A.
+    valid for these members and `entries`, their diagonal entries of A. The last of the `vectors` is
+    the stress that nodes take off the interface which slipped and rest.
     """
 
     stiffness: Any
@@ -204,7 +205,7 @@ def make_workspace(stiffness: Any, n: int) -> Workspace:
         np.empty(n, dtype=np.bool_),
         np.empty(n),
         np.empty((2, n + 4)),
-        np.empty((4, n + 4)),
+        np.zeros((5, n + 4)),
         np.empty((2, n // 2)),
         np.zeros(1, dtype=np.int64),
         np.empty(n + 4),
@@ -261,6 +262,35 @@ def append(workspace: Workspace, size: int, count: int) -> int:
 
 
 @jit
+def remove(workspace: Workspace, size: int, position: int) -> int:
+    """Take one member out of the factor; returns the number of those that stay.
+
+    The rows below it move up, and plane rotations spread its column over the others.
+    """
+    factor, members, turns = workspace.factor, workspace.members, workspace.vectors
+    for r in range(position + 1, size):
+        start = row_start(r)
+        row = factor[start : start + r + 1]
+        start = row_start(r - 1)
+        above = factor[start : start + r]
+        extra = row[position]
+        for k in range(position):
+            above[k] = row[k]
+        for k in range(position, r - 1):
+            own = row[k + 1]
+            above[k] = turns[0, k] * own + turns[1, k] * extra
+            extra = turns[0, k] * extra - turns[1, k] * own
+        pivot = math.sqrt(row[r] * row[r] + extra * extra)
+        turns[0, r - 1] = row[r] / pivot
+        turns[1, r - 1] = extra / pivot
+        above[r - 1] = pivot
+        members[r - 1] = members[r]
+        workspace.entries[r - 1] = workspace.entries[r]
+    workspace.held[0] = size - 1
+    return size - 1
+
+
+@jit
 def factor_inside(workspace: Workspace) -> int:
     """Factor A on the nodes that are `inside`; returns what `append` returns.
 
@@ -309,6 +339,19 @@ def substitute_members(
 def multiply_members(workspace: Workspace, size: int, values: Array, result: Array) -> None:
     """Multiply K by a field given on the members; the result is at all nodes."""
     apply(workspace.stiffness, workspace.members, size, values, workspace.halves, result)
+
+
+@jit_inside
+def take_off_resting(workspace: Workspace, slip: Array) -> None:
+    """Multiply K by the slip of the nodes that rest, into the last of the vectors."""
+    values, count = workspace.vectors[0], ZERO
+    for i in range(slip.shape[0]):
+        if slip[i] > 0.0 and not workspace.inside[i]:
+            workspace.order[count] = i
+            values[count] = slip[i]
+            count += 1
+    resting = workspace.vectors[4]
+    apply(workspace.stiffness, workspace.order, count, values, workspace.halves, resting)
 
 
 @jit_inside

@@ -64,6 +64,8 @@ class LineProgram(Program):
 
     widest_gap = 1e-9
     """Certificate gap, as a share of the load, above which there is a warning."""
+    stops = False
+    """Whether slip may unload a node that slips, so that it stops."""
     stiffness: Any
     own: Any
 
@@ -185,16 +187,16 @@ class LineProgram(Program):
             stuck = state is not None
         state = state or self.at_rest(sample)
         slip, stiff, direction = state.slip.copy(), state.stiff.copy(), state.direction.copy()
-        load, peak, back, status = advance(
-            sample, state.load, target, slip, stiff, direction, self._workspace
+        load, peak, stopped, status = advance(
+            sample, state.load, target, slip, stiff, direction, self._workspace, self.stops
         )
         found = State(
             load, slip, stiff, direction,
             unstable=status == UNSTABLE, known=status in (UNSTABLE, REACHED), stuck=stuck,
-            peak=peak, back=back,
+            peak=peak, stopped=stopped or state.stopped,
         )  # fmt: skip
-        # No multiplier bounds the load from above where a law steepens.
-        found.certified = found.unstable and not self.pieces.steepens
+        # No multiplier bounds the load from above where a law steepens, or a node stopped.
+        found.certified = found.unstable and not (self.pieces.steepens or found.stopped)
         if found.certified:
             _, strength, rate = present_pieces(sample, slip)
             present = sample._replace(excess=strength, rate=rate)
@@ -222,13 +224,17 @@ class LineProgram(Program):
         outcome, griffith = self._runs_away(sample, found, slip)
         if outcome == Outcome.UNDECIDED:
             stiff = stiff.copy()
-            outcome = jump(sample, found.load, slip, stiff, griffith, *self._workspaces)
+            outcome = jump(
+                sample, found.load, slip, stiff, griffith, *self._workspaces, self.stops
+            )
         if outcome == Outcome.ARRESTED:
             before, after = (present_pieces(sample, each).piece for each in (found.slip, slip))
             if not np.any(after > before):
                 # Round-off: only nodes that pass a corner can stop an instability.
                 outcome = Outcome.UNDECIDED
-        state = State(found.load, slip, stiff, direction, stuck=found.stuck)
+        state = State(
+            found.load, slip, stiff, direction, stuck=found.stuck, stopped=found.stopped
+        )
         return Jump(outcome == Outcome.ARRESTED, outcome != Outcome.UNDECIDED, state)
 
     def _runs_away(self, sample: Sample, found: State, slip: Array) -> tuple[int, float]:

@@ -62,8 +62,8 @@ class Equilibrium:
     ----------
     sensitivity : bool
         Also return d first_instability / d tau_p at every node, at fixed weakening rates. NaN
-        where a law steepens and a node passes a corner before the first instability, where a node
-        slipped and is at rest again, or where the turning point of a plane is not found.
+        where a law steepens and a node passes a corner before the first instability, where a
+        node of a specimen stops before it, or where the turning point of a plane is not found.
     slip : bool
         Also return the slip at the first instability.
     events : int
@@ -82,7 +82,8 @@ class Equilibrium:
     before the interface slid), and `sliding_position` (m), which differs from
     `critical_position` only after an arrested event. Arrest is decided by equilibrium:
     inertia may carry a rupture through. Where a law steepens and a corner is passed before
-    the first instability, there is no bound from above, and `certificate_gap` is nan.
+    the first instability, or on a specimen a node stops before it, there is no bound from
+    above, and `certificate_gap` is nan.
 
     On planes positions have two components, along 'direction'; instead of a length there
     are `critical_patch_extent` (m, along 'direction') and `critical_patch_area` (m²), and

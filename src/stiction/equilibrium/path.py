@@ -12,7 +12,6 @@ from stiction.equilibrium.solver import (
     event_variables,
     follow,
     make_program,
-    warn_if_back,
 )
 from stiction.errors import InputError, warn_accuracy
 from stiction.model import Numbers, check, check_memory
@@ -113,7 +112,6 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
     program = make_program(problem, GAP)
     sample = program.sample_of(rows, 0)
     whole = follow(program, sample)
-    warn_if_back(np.array([whole.back]))
     passed, end, known = whole.events, whole.last.load, whole.known
     slip, stress = np.full((2, given.size, interface.size), np.nan)
     travel = np.full(given.size, np.nan)

@@ -149,8 +149,9 @@ class State:
     `certified` is true if that is proved, `unstable` if the path is unstable there, `known` if it
     could be followed so far, `stuck` if the programme failed to find the next instability before.
     `peak` is the largest mean stress on the way there, over the mean of the load profile: the load
-    itself (None), unless a machine drives; `back` is how far slip went back on the way, m. `ahead`
-    is what is known beyond: on lines K times the direction, on planes the turn of the path.
+    itself (None), unless a machine drives; `stopped` says whether a node that slipped stopped on
+    the way. `ahead` is what is known beyond: on lines K times the direction, on planes the turn of
+    the path.
     """
 
     load: float
@@ -164,7 +165,7 @@ class State:
     stuck: bool = False
     ahead: Any = None
     peak: float | None = None
-    back: float = 0.0
+    stopped: bool = False
 
 
 class Program:

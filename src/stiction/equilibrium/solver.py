@@ -48,8 +48,6 @@ OF_SPECIMENS = {
     "event_travel_step": Variable("m", "travel of the drives in the event", ("event",)),
     "event_start": Variable("m", "left end of the patch that slipped", ("event",)),
 }
-BACK = 1e-6
-"""Share of the largest slip by which slip may go back without a warning."""
 EVENT_CORE = 1e-3
 """Share of the largest added slip above which a node belongs to the patch of an event."""
 
@@ -121,8 +119,7 @@ class Path:
 
     `first` is the first instability, `last` the last equilibrium, `known` is false where a jump
     or a path did not come to its end: `last` is then a lower bound. `peak` is the largest mean
-    stress on the way, over the mean of the load profile; `back` is how far slip went back, as a
-    share of the largest.
+    stress on the way, over the mean of the load profile.
     """
 
     first: State
@@ -130,7 +127,6 @@ class Path:
     peak: float
     events: list[Event] = field(default_factory=list)
     known: bool = True
-    back: float = 0.0
 
 
 def follow(program: AnyProgram, sample: Sample) -> Path:
@@ -142,7 +138,7 @@ def follow(program: AnyProgram, sample: Sample) -> Path:
     found = program.next(sample)
     first: State | None = None
     events: list[Event] = []
-    known, peak, back = found.known, peak_of(found), found.back
+    known, peak = found.known, peak_of(found)
     while found.unstable:
         jump = program.jump(sample, found)
         if jump.counts:
@@ -152,9 +148,8 @@ def follow(program: AnyProgram, sample: Sample) -> Path:
                 break
             events.append(Event(found, jump.state))
         found = program.next(sample, jump.state)
-        known, peak, back = found.known, max(peak, peak_of(found)), max(back, found.back)
-    back /= max(float(found.slip.max()), 1e-300)
-    return Path(first or found, found, peak, events, known, back)
+        known, peak = found.known, max(peak, peak_of(found))
+    return Path(first or found, found, peak, events, known)
 
 
 def peak_of(state: State) -> float:
@@ -181,7 +176,7 @@ class OnsetSolver:
     def __call__(self, rows: Samples) -> dict[str, NDArray[Any]]:
         """Return the onset of each sample; see `Equilibrium`."""
         self.problem.warn_if_coarse(rows, FINE, ROUGHLY[len(self.problem.interface.shape)])
-        samples, table, known, back = sample_of(rows, self.program.pieces), [], [], []
+        samples, table, known = sample_of(rows, self.program.pieces), [], []
         for row in range(rows.samples):
             sample = row_of(samples, row)
             try:
@@ -192,12 +187,11 @@ class OnsetSolver:
                 )
                 raise
             known.append(path.known)
-            back.append(path.back)
             table.append(self._values(rows, row, sample, path))
         values = {name: np.array([each[name] for each in table]) for name in table[0]}
         at_first, proved = values["first_instability"], values.pop("certified")
         self._warn(values["certificate_gap"], at_first, ~proved, ~np.array(known))
-        warn_if_back(np.array(back))
+        _warn_if_stopped(values.pop("stopped") & np.isfinite(at_first))
         values["critical_stress"] = rows.mean_stress(values["critical_stress"])
         values["first_instability"] = rows.mean_stress(at_first)
         values["certificate_gap"] *= rows.load_profile.mean()
@@ -231,6 +225,7 @@ class OnsetSolver:
             "arrested_events": len(path.events),
             "residual_reached": not straight and bool(residual_nodes(sample, last.slip).any()),
             "certified": first.certified,
+            "stopped": first.stopped,
         }
         if interface.is_plane:
             values["critical_patch_extent"] = patch.extents
@@ -298,10 +293,10 @@ class OnsetSolver:
 def _sensitivity(program: AnyProgram, sample: Sample, state: State) -> Array:
     """Derivative of the stress of an instability by the peak strengths, from its multiplier.
 
-    NaN where a node passed a corner beyond which it weakens more steeply, or slips no more.
+    NaN where a node passed a corner beyond which it weakens more steeply, or stopped.
     """
     pieces, y = sample.pieces, multiplier_of(sample, state)
-    if pieces.steepens and not state.certified:
+    if state.stopped or (pieces.steepens and not state.certified):
         return np.full(y.size, np.nan)
     y = program.of_stress(sample, state, y)
     # A piece starts from share tau_p + (1 - share) tau_r; the share of the last piece is 0.
@@ -309,15 +304,12 @@ def _sensitivity(program: AnyProgram, sample: Sample, state: State) -> Array:
     return y * np.where(sample.critical > 0.0, pieces.starts[piece], 1.0)
 
 
-def warn_if_back(back: Array) -> None:
-    """Warn where slip goes back, by a share of the largest in each sample."""
+def _warn_if_stopped(stopped: NDArray[np.bool_]) -> None:
+    """Warn where a first instability has no bounds, as a node stopped before."""
     warn_of_samples(
-        "slip goes back by up to {worst:.1g} of the largest in {samples}: behind so stiff a machine"
-        " slip at one place unloads another, where it should stop, which is not modelled; their"
-        " loads and events are approximate (docs/specimens.md); under dead load this does not"
-        " happen",
-        back > BACK,
-        back,
+        "a node that slipped stops before the first instability in {samples}: its equilibria are no"
+        " longer the least ones, so that nothing bounds it from above, and certificate_gap is NaN",
+        stopped,
     )
 
 
@@ -325,7 +317,7 @@ def _warn_if_lost(sensitivity: Array, unstable: NDArray[np.bool_]) -> None:
     """Warn where a first instability has no derivative."""
     warn_of_samples(
         "the first instability has no known derivative in {samples}, so sensitivity is NaN: nodes"
-        " pass a corner from which their law falls more steeply, a node that slipped is at rest, or"
-        " the turning point was not resolved",
+        " stop, or pass a corner from which their law falls more steeply, or the turning point was"
+        " not resolved",
         unstable & np.isnan(sensitivity).reshape(len(sensitivity), -1).any(axis=1),
     )

@@ -5,6 +5,14 @@ at zero slip of the piece on which a node is, less the initial stress, and W the
 An event is a node at rest that reaches its strength (a new row of the factor), a slipping node
 that reaches the next corner (a diagonal entry that rises as the strength falls less steeply), or a
 node whose slipping, or weakening more steeply, makes A singular: there the path ends.
+
+Slip never goes back. Where K has positive entries off its diagonal, slip may unload other nodes: at
+the nodes at their strength the rates v of slip solve v >= 0, A v - p >= 0, <v, A v - p> = 0, the
+conditions of a minimum of <v, A v>/2 - <p, v> over v >= 0. After an event the rates move from those
+before towards the minimum on the face of the slipping nodes; the first node whose rate reaches zero
+leaves it: it stops, and rests at the strength of the slip that it has reached. A node that comes to
+its strength, again or in no time, is an event as above. Each such move lowers the function, so that
+they end, at a minimum or in a direction y >= 0, <y, A y> <= 0 that nothing bounds: the instability.
 """
 
 from typing import Any
@@ -22,11 +30,14 @@ from stiction.equilibrium.cholesky import (
     factor_inside,
     multiply_members,
     raise_diagonal,
+    remove,
     singular_direction,
     solve_forward,
     substitute_members,
+    take_off_resting,
 )
-from stiction.equilibrium.sample import Sample, piece_at, start_of
+from stiction.equilibrium.linear_program import stress_tolerance
+from stiction.equilibrium.sample import Sample, piece_at, start_of, strength_at
 from stiction.jit import ZERO, jit_allocating, jit_inside
 
 REACHED = 0
@@ -37,23 +48,135 @@ ONE: Any = np.int64(1)
 """An index that is no literal, as `ZERO`."""
 REFRESH = 16
 """Events after which slip is solved for anew, so that round-off does not accumulate."""
+AT_STRENGTH = 1e3
+"""Overstresses by round-off below its strength within which a node counts as at it."""
+STARTS = 16
+"""Times that a node may start again, on average."""
+REVERSED = 1e-10
+"""Share of the largest rate by which a rate below zero is round-off."""
 
 
 @jit_inside
 def _begin(
-    sample: Sample, slip: Array, piece: NDArray[np.int64], strength: Array, workspace: Workspace
-) -> int:
-    """Strength and diagonal of A for the present pieces; returns how many nodes slip."""
+    sample: Sample,
+    load: float,
+    slip: Array,
+    stiff: Array,
+    piece: NDArray[np.int64],
+    strength: Array,
+    workspace: Workspace,
+    stops: bool,
+) -> tuple[int, bool]:
+    """Strength and diagonal of A for the present pieces.
+
+    Returns how many nodes slip, and whether others rest that slipped before.
+    """
     count = ZERO
+    rests = False
+    near = AT_STRENGTH * stress_tolerance(sample, load)
     for i in range(slip.shape[0]):
-        workspace.inside[i] = slip[i] > 0.0
+        slips = slip[i] > 0.0
         piece[i] = piece_at(sample.pieces, sample.critical[i], slip[i])
         strength[i] = start_of(sample, i, piece[i])
         own = entry(workspace.stiffness, i, i)
         workspace.diagonal[i] = own - sample.pieces.slopes[piece[i]] * sample.rate[i]
-        if workspace.inside[i]:
+        if stops and slips:
+            margin = strength_at(sample, slip, i) - load * sample.profile[i] + stiff[i]
+            slips = margin <= near
+            rests = rests or not slips
+        workspace.inside[i] = slips
+        if slips:
             count += 1
-    return count
+    return count, rests
+
+
+@jit_inside
+def _first_to_stop(
+    workspace: Workspace, size: int, values: Array, speed: Array, endless: bool
+) -> int:
+    """Member whose rate is the first to reach zero as rates go towards `values`; -1 for none.
+
+    The rates (n,) move as far as that. If the move is `endless`, rates go along `values` instead.
+    """
+    members = workspace.members
+    largest = 0.0
+    for t in range(size):
+        largest = max(largest, abs(values[t]))
+    first = -1
+    share = np.inf
+    for t in range(size):
+        if values[t] < -REVERSED * largest:
+            now = speed[members[t]]
+            reach = now / ((0.0 if endless else now) - values[t])
+            if reach < share or (reach == share and values[t] < values[first]):
+                first = t
+                share = reach
+    if first >= 0:
+        for t in range(size):
+            i = members[t]
+            change = values[t] - (0.0 if endless else speed[i])
+            speed[i] = max(speed[i] + share * change, 0.0)
+    return first
+
+
+@jit_inside
+def _fails(workspace: Workspace, size: int, speed: Array, direction: Array, stops: bool) -> int:
+    """Write the direction after a pivot failed; the member whose rate bounds it, -1 for none.
+
+    Rates then move along it until that of the member is zero.
+    """
+    singular_direction(workspace, size, direction)
+    if not stops:
+        return -1
+    solution = workspace.vectors[1]
+    solution[size] = 1.0
+    return _first_to_stop(workspace, size + 1, solution, speed, True)
+
+
+@jit_inside
+def _stop(workspace: Workspace, size: int, member: int, slip: Array, speed: Array) -> int:
+    """Let a member rest; returns how many slip on."""
+    node = workspace.members[member]
+    workspace.inside[node] = False
+    speed[node] = 0.0
+    size = remove(workspace, size, member)
+    take_off_resting(workspace, slip)
+    return size
+
+
+@jit_inside
+def _keep_members(workspace: Workspace, size: int, slip: Array, speed: Array) -> None:
+    """Let all others rest; those at their strength slip on in the next events."""
+    for i in range(slip.shape[0]):
+        workspace.inside[i] = False
+    for t in range(size):
+        workspace.inside[workspace.members[t]] = True
+    for i in range(slip.shape[0]):
+        if not workspace.inside[i]:
+            speed[i] = 0.0
+    take_off_resting(workspace, slip)
+
+
+@jit_inside
+def _substitute(
+    sample: Sample, strength: Array, workspace: Workspace, first: int, size: int
+) -> None:
+    """Extend both forward substitutions by the members first..size-1."""
+    right, resting = workspace.vectors[0], workspace.vectors[4]
+    for t in range(first, size):
+        i = workspace.members[t]
+        right[i] = strength[i] + resting[i]
+    substitute_members(workspace, first, size, sample.profile, workspace.forward[0])
+    substitute_members(workspace, first, size, right, workspace.forward[1])
+
+
+@jit_inside
+def all_slip(workspace: Workspace, slip: Array) -> bool:
+    """Whether every node slips or has slipped."""
+    count = ZERO
+    for i in range(slip.shape[0]):
+        count += workspace.inside[i] or slip[i] > 0.0
+    return bool(count == slip.shape[0])
 
 
 @jit_inside
@@ -76,7 +199,8 @@ def _next_event(
     ends = -1
     for i in range(slip.shape[0]):
         if not workspace.inside[i]:
-            margin = max(sample.excess[i] - load * sample.profile[i] + stiff[i], 0.0)
+            present = strength_at(sample, slip, i) if slip[i] > 0.0 else sample.excess[i]
+            margin = max(present - load * sample.profile[i] + stiff[i], 0.0)
             closing = sample.profile[i] - stiff_rate[i]
             if closing > 0.0 and margin < step * closing:
                 step = margin / closing
@@ -118,12 +242,13 @@ def advance(
     stiff: Array,
     direction: Array,
     workspace: Workspace,
-) -> tuple[float, float, float, int]:
+    stops: bool,
+) -> tuple[float, float, bool, int]:
     """Follow the stable path from a load towards another one; slip d and K d go with it.
 
-    It ends where all nodes slip, too. Returned are the load at the end, the largest mean stress on
-    the way (over the mean of the load profile; the load, unless a machine drives), how far a node
-    slipped back (m; it would have stopped, which is not modelled) and the status. The status is
+    It ends where all nodes have slipped, too. `stops` says whether a node may stop. Returned are
+    the load at the end, the largest mean stress on the way (over the mean of the load profile; the
+    load, unless a machine drives), whether a node stopped or rests after slip, and the status:
     REACHED; UNSTABLE, in the direction z >= 0, A z <= 0, that is then written; or CROWDED: more
     members than the workspace holds.
     """
@@ -133,42 +258,55 @@ def advance(
         workspace.vectors[2],
         workspace.vectors[3],
     )
+    resting = workspace.vectors[4]
     pieces = sample.pieces
     piece = np.zeros(n, np.int64)
     strength = np.empty(n)
+    speed = np.zeros(n)
     members, order = workspace.members, workspace.order
-    count = _begin(sample, slip, piece, strength, workspace)
+    count, stopped = _begin(sample, load, slip, stiff, piece, strength, workspace, stops)
     peak = load - mean_relief(workspace.stiffness, sample.profile, slip)
-    back = 0.0
     if count > MOST_MEMBERS:
-        return load, load, 0.0, CROWDED
+        return load, load, stopped, CROWDED
     size = factor_inside(workspace)
     if size < count:
         # Stability was lost exactly as the residual strength was reached.
-        singular_direction(workspace, size, direction)
-        return load, peak, back, UNSTABLE
-    substitute_members(workspace, ZERO, size, sample.profile, workspace.forward[0])
-    substitute_members(workspace, ZERO, size, strength, workspace.forward[1])
-    # A node begins to slip, and passes each corner, once.
-    for event in range((1 + pieces.ends.shape[0]) * n + 1):
+        if _fails(workspace, size, speed, direction, stops) < 0:
+            return load, peak, stopped, UNSTABLE
+        _keep_members(workspace, size, slip, speed)
+    for i in range(n):
+        resting[i] = 0.0
+    if stopped or size < count:
+        take_off_resting(workspace, slip)
+    _substitute(sample, strength, workspace, ZERO, size)
+    # Unless it stops, a node begins to slip, and passes each corner, once.
+    for event in range((1 + STARTS * stops + pieces.ends.shape[0]) * n + 1):
+        while True:
+            for t in range(size):
+                rate[t] = workspace.forward[0, t]
+            back_substitute(workspace.factor, size, rate)
+            first = _first_to_stop(workspace, size, rate, speed, False) if stops else -1
+            if first < 0:
+                break
+            stopped = True
+            size = _stop(workspace, size, first, slip, speed)
+            _substitute(sample, strength, workspace, ZERO, size)
         for t in range(size):
-            rate[t] = workspace.forward[0, t]
-        back_substitute(workspace.factor, size, rate)
+            speed[members[t]] = max(rate[t], 0.0)
         multiply_members(workspace, size, rate, stiff_rate)
         if event % REFRESH == 0:
             solve_forward(workspace, size, load, solution)
             multiply_members(workspace, size, solution, stiff)
             for t in range(size):
-                before = slip[members[t]]
                 slip[members[t]] = max(solution[t], 0.0)
-                back = max(back, before - slip[members[t]])
+            for i in range(n):
+                stiff[i] += resting[i]
         step, starts, ends = _next_event(
             sample, load, target, slip, stiff, piece, workspace, size
         )
         load = target if starts < 0 and ends < 0 else load + step
         for t in range(size):
             slip[members[t]] += step * rate[t]
-            back = max(back, -step * rate[t])
         for i in range(n):
             stiff[i] += step * stiff_rate[i]
         peak = max(peak, load - mean_relief(workspace.stiffness, sample.profile, slip))
@@ -181,24 +319,34 @@ def advance(
             strength[i] = start_of(sample, i, piece[i])
             after = pieces.slopes[piece[i]] * sample.rate[i]
             now = _change_slope(workspace, size, ends, before, after)
-            if now < size:
-                singular_direction(workspace, now, direction)
-                return load, peak, back, UNSTABLE
             changed = ends
+            if now < size:
+                if _fails(workspace, now, speed, direction, stops) < 0:
+                    return load, peak, stopped, UNSTABLE
+                size = now
+                _keep_members(workspace, size, slip, speed)
+                changed = ZERO
         elif starts >= 0:
             if size == MOST_MEMBERS:
-                return load, peak, back, CROWDED
-            order[0] = starts
-            now = append(workspace, size, ONE)
-            if now == size:
-                singular_direction(workspace, size, direction)
-                return load, peak, back, UNSTABLE
+                return load, peak, stopped, CROWDED
+            while True:
+                order[0] = starts
+                if append(workspace, size, ONE) > size:
+                    break
+                first = _fails(workspace, size, speed, direction, stops)
+                if first < 0:
+                    return load, peak, stopped, UNSTABLE
+                stopped = True
+                size = _stop(workspace, size, first, slip, speed)
+                changed = ZERO
             workspace.inside[starts] = True
-            size = now
-            if size == n:
-                return load, peak, back, REACHED
+            size += 1
+            if slip[starts] > 0.0:  # it had stopped
+                take_off_resting(workspace, slip)
+                changed = ZERO
+            if all_slip(workspace, slip):
+                return load, peak, stopped, REACHED
         else:
-            return load, peak, back, REACHED
-        substitute_members(workspace, changed, size, sample.profile, workspace.forward[0])
-        substitute_members(workspace, changed, size, strength, workspace.forward[1])
-    return load, peak, back, CROWDED
+            return load, peak, stopped, REACHED
+        _substitute(sample, strength, workspace, changed, size)
+    return load, peak, stopped, CROWDED
