@@ -381,7 +381,7 @@ test_refused = refusals(
         "rupture ... half-spaces": lambda: solved(
             lambda p, s: st.onset(p, s, method=st.Rupture(loading_rate=1e9))
         ),
-        "another problem ... problem.sample": lambda: solved(
+        "with another specimen.height ... problem.sample": lambda: solved(
             lambda p, s: p.sample(of(specimen=st.Blocks(height=0.02)).sample(s))
         ),
         "nucleation_stress": lambda: solved(st.theory.nucleation_stress),
