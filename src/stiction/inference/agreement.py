@@ -230,7 +230,8 @@ def _with_posterior(
         map(np.array_equal, measured.values, fitted.values)
     )
     # Parameters from a wider posterior stand, by weights, for the posterior of every campaign.
-    wide = grid_of(lambda u: 0.5 * likelihood(u), likelihood.box)
+    cells = likelihood.prior.cells
+    wide = grid_of(lambda u: 0.5 * likelihood(u), likelihood.box, cells=cells)
     if wide is None:  # narrower than its cells: the posterior stands for itself
         u, power = posterior.u[:POINTS], 1.0
     else:

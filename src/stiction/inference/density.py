@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp, ndtr, ndtri
+from scipy.special import ndtr, ndtri
 
 from stiction.arrays import Array
 from stiction.jit import jit
@@ -89,7 +89,9 @@ def tabulate(onsets: Array, bound: Array) -> Densities:
     for row, own in zip(found.table, found.standardised(), strict=True):
         centres, share = grouped(np.sort(own))
         away = (z[:, None] - math.sqrt(1.0 - width**2) * centres) / width
-        row[:] = logsumexp(-0.5 * away**2, axis=1, b=share)
+        powers = -0.5 * away**2
+        top = powers.max(axis=1)
+        row[:] = top + np.log(np.exp(powers - top[:, None]) @ share)
         row -= math.log(width * math.sqrt(2.0 * math.pi))
     return found
 

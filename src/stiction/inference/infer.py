@@ -11,6 +11,7 @@ from stiction.ensemble.limit_state import no_single_length
 from stiction.ensemble.pilot import compare, doubt
 from stiction.errors import InputError, warn_accuracy
 from stiction.inference.grid import grid_of
+from stiction.inference.joined import join
 from stiction.inference.likelihood import (
     Likelihood,
     bounds_of,
@@ -20,17 +21,16 @@ from stiction.inference.likelihood import (
     variable_of,
 )
 from stiction.inference.peaks import Peaks, factor_of, make_peaks
-from stiction.inference.posterior import Posterior
+from stiction.inference.posterior import DRAWS, Posterior
 from stiction.inference.prior import Prior, make_prior
 from stiction.load import NotNegative
 from stiction.methods import MethodObject
 from stiction.model import Count, Progress, at_least, checked
 from stiction.problem import Problem
 from stiction.progress import Meter
-from stiction.random.fields import RandomField, RandomInterface
+from stiction.random.equally_likely import AnyRandom
 from stiction.random.stresses import mean_in_stress
 
-DRAWS = 4000
 TOLERABLE = 0.25
 """Monte Carlo error over the posterior's standard deviation above which it is reported."""
 NEVER = 1e-9
@@ -46,10 +46,10 @@ EDGE, PILED = 0.02, 4.0
 @checked
 def infer(
     problem: Problem,
-    random: RandomInterface | RandomField,
+    random: AnyRandom,
     peaks: Any,
     *,
-    prior: Any,
+    prior: Any = None,
     method: MethodObject,
     load_cell_error: NotNegative = 0.0,
     unit: str = "Pa",
@@ -64,13 +64,15 @@ def infer(
     ----------
     problem : Problem
         One specimen.
-    random : RandomInterface or RandomField
-        The random properties with known parameters; `prior` replaces their values.
+    random : RandomInterface, RandomField, a fit, or a list of interfaces
+        The random properties with known parameters; `prior` replaces their values. Without a
+        `prior`: what is known already, equally likely interfaces, such as a `FieldFit`, a
+        `Posterior`, anything with such `interfaces`, or a list. The peaks weigh them.
     peaks : array, mapping of arrays, or Peaks
         Mean shear stress, or force, at which each specimen slid, in `unit`; for specimens of
         several lengths a mapping of each length (m) to its peaks, ``{0.1: [...], 0.2: [...]}``,
         with the node spacing of the problem. Or the result of `read_peaks`.
-    prior : mapping
+    prior : mapping, optional
         Parameters and the prior of each: a frozen continuous `scipy.stats` distribution, a
         range ``(low, high)``, or ``{"low": ..., "high": ..., "spacing": "log"}``. Priors
         are independent. Keys are those of a sweep: for the strength,
@@ -88,7 +90,7 @@ def infer(
         ``Load(normal_pressure=...)``.
     samples : int, optional
         Simulated specimens at each point: by default 2000 by the local criterion, 500 by
-        equilibrium.
+        equilibrium, and 500 for each of a list.
     seed : int
         Not negative. The same samples are used at every point, so that the likelihood is smooth.
     workers, progress
@@ -104,13 +106,15 @@ def infer(
     ------
     InputError
         If any argument is invalid, or no parameters in the prior can produce the peaks; the
-        message then names the bound that must move.
+        message then names the bound that must move. If a list and the peaks contradict each
+        other: none of 999 simulated campaigns is as far off (`stiction.statistics.agreement`).
 
     Warns
     -----
     AccuracyWarning
         If the posterior piles up at an end of the prior, the method is not accurate there, or
-        few samples are simulated for the number of peaks.
+        few samples are simulated for the number of peaks. If a list and the peaks hardly agree,
+        or few of its interfaces keep weight.
     UserWarning
         Beforehand, if the simulation will take more than a minute: how long, and what takes less.
 
@@ -122,6 +126,10 @@ def infer(
     simulated on a grid with the same draws everywhere, and interpolated. The posterior is summed
     on a grid, for up to about four parameters; for more, give `log_likelihood` and
     `prior_transform` of the result to emcee or dynesty.
+
+    Of a fit 300 interfaces are drawn, and up to 3000 where the peaks leave few of them weight. The
+    parameters of the posterior are then what they differ in: mean, standard deviation and
+    correlation length of each property, and the scatter between specimens.
 
     Examples
     --------
@@ -136,16 +144,33 @@ def infer(
     >>> low, high = posterior.interval("marginal.low")
     >>> 0.5e6 < low < high < 0.75e6
     True
+
+    Profiles and peaks of one kind of surface, joined:
+
+    >>> records = strength.sample(problem.interface, samples=3, seed=2)
+    >>> fit = st.fit_field(records, problem.interface, marginal="beta", noise=0.0, bootstrap=20)
+    >>> both = st.infer(
+    ...     problem, fit, peaks, unit="MPa", method=st.LocalCriterion(), samples=100
+    ... )
+    >>> low, high = both.interval("strength.mean", confidence=0.99)
+    >>> 0.9e6 < low < high < 1.1e6
+    True
     """
     measured = make_peaks(peaks, unit)
-    parameters = make_prior(problem, random, prior)
-    variable = variable_of(parameters, measured.unit)
     error = load_cell_error * (1.0 if isinstance(peaks, Peaks) else factor_of(unit))
     if error > np.concatenate(measured.values).max():
         raise InputError(
             f"load_cell_error: {load_cell_error:g} {unit} is more than the largest peak; it is a"
             " standard deviation in the unit of the peaks"
         )
+    if prior is None:
+        with Meter("infer", show=progress) as meter:
+            return join(
+                problem, random, measured, method=method, error=error, samples=samples,
+                seed=seed, workers=workers, meter=meter,
+            )  # fmt: skip
+    parameters = make_prior(problem, random, prior)
+    variable = variable_of(parameters, measured.unit)
     (own,) = experiments_at(parameters, parameters.middle, method)
     own.problem.warn_of_units(mean_in_stress(own.problem, own.random, "strength"))
     _check_reach(parameters, method, measured, error)

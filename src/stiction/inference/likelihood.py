@@ -55,6 +55,10 @@ def make_axes(
     prior: Prior, scaling: Scaling, box: Array, along: Mapping[int, int] = NODES
 ) -> tuple[Axis, ...]:
     """Place the nodes of the parameters that need simulation in a box of the prior."""
+    if prior.cells is not None:  # numbers 0, 1, ...; few at equal steps
+        last = int(prior.ends[1, 0])
+        few = last + 1 if along is NODES else min(last + 1, along[1])
+        return (Axis(0, np.linspace(0, last, few).round(), np.positive),)
     simulated = [i for i in range(prior.dimension) if i not in scaling.keys]
     if len(simulated) not in along:
         names = ", ".join(prior.names[i] for i in simulated)
@@ -345,7 +349,8 @@ def make_likelihood(
             known = simulate(
                 [one.by(LocalCriterion()) for one in own], samples=count, **options
             )
-            options["samples"] = max(count, SAMPLES["local_criterion"])
+            most = SAMPLES["local_criterion"] if prior.cells is None else 0
+            options["samples"] = max(count, most)
             many = simulate([one.by(LocalCriterion()) for one in experiments], **options)
             alike = np.mean(
                 [np.corrcoef(*pair)[0, 1] for pair in zip(found, known, strict=True)]

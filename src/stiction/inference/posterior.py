@@ -18,8 +18,10 @@ from stiction.random.dotted_keys import full_key
 from stiction.random.fields import RandomInterface
 from stiction.random.spectra import Share
 
-CHAINS = 4
-"""Number of chains into which independent draws are cut for ArviZ."""
+DRAWS, CHAINS = 4000, 4
+"""Number of draws, and of chains into which these independent ones are cut for ArviZ."""
+MEMBER = "member"
+"""Key of the number of an interface in a list, which says nothing by its size."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -218,8 +220,10 @@ class Posterior:
     def __str__(self) -> str:
         width = max(map(len, self.names))
         lines = [f"{self.peaks}; onset by {self.method}"]
-        prior = self.prior.theta(np.repeat([[0.05], [0.95]], len(self.names), axis=1)).T
+        prior = np.stack([self.prior.quantile(share) for share in (0.05, 0.95)], axis=1)
         for name, before in zip(self.names, prior, strict=True):
+            if name == MEMBER:
+                continue
             low, high = self.interval(name)
             lines.append(
                 f"  {name:{width}s}  mean {self.mean(name):.4g}, 90 % {low:.4g} to {high:.4g} (of"

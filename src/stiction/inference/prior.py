@@ -14,7 +14,7 @@ from stiction.errors import InputError, prefixed
 from stiction.model import describe
 from stiction.problem import Problem
 from stiction.random.dotted_keys import distributions_of, full_key, with_values
-from stiction.random.fields import RandomInterface, as_random_interface
+from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 
 TAIL = 1e-4
 """Probability that is cut from either end of a prior whose density is zero there."""
@@ -57,6 +57,15 @@ class Prior:
     def ends(self) -> Array:
         """Least and greatest values, (2, parameters)."""
         return self.theta(self.whole)
+
+    @property
+    def cells(self) -> int | None:
+        """Number of equally likely values of a single parameter; None if it is continuous."""
+        return None
+
+    def quantile(self, share: float) -> Array:
+        """Return a quantile of each parameter, (parameters,)."""
+        return self.theta(np.full((1, self.dimension), share))[0]
 
     def theta(self, u: Array) -> Array:
         """Return the parameters at `u`, by the inverse distribution functions."""
@@ -118,6 +127,11 @@ def make_prior(problem: Problem, random: Any, given: Any) -> Prior:
         )
     with prefixed("prior"):
         found = distributions_of(given)
+    if not isinstance(random, RandomField | RandomInterface):
+        raise InputError(
+            "prior: is of one random field or interface; leave it out where a fit or a list of"
+            " interfaces holds what is known already"
+        )
     random = as_random_interface(random)
     for name, field in random.properties.items():
         if field.conditions is not None:

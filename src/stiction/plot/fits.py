@@ -13,7 +13,7 @@ from scipy import fft
 from stiction.inference.agreement import Agreement
 from stiction.inference.bootstrap import bands
 from stiction.inference.fit import FieldFit
-from stiction.inference.posterior import Posterior
+from stiction.inference.posterior import MEMBER, Posterior
 from stiction.inference.whittle import Observed, observe
 from stiction.plot.axes import on_axes, with_unit
 from stiction.plot.style import (
@@ -179,11 +179,12 @@ def posterior(found: Posterior) -> Figure:
         On the diagonal, each parameter before (grey) and after the tests, with the
         information gained (nats); pairs below; on the right the measured and predicted peaks.
     """
-    names, count = found.names, len(found.names)
+    names = [name for name in found.names if name != MEMBER]
+    count = len(names)
     size = max(2.0 * count, 4.0)
-    drawn = found.prior.theta(np.random.default_rng(0).random((20_000, count)))
+    drawn = found.prior.theta(np.random.default_rng(0).random((20_000, len(found.names))))
     before, after, labels = [], [], []
-    for values, name in zip(drawn.T, names, strict=True):
+    for values, name in zip(drawn.T[-count:], names, strict=True):
         factor, unit = _unit_of(name, values)
         before.append(values * factor)
         after.append(found.draws[name].ravel() * factor)

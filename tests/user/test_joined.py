@@ -1,0 +1,184 @@
+"""Equally likely interfaces, such as those of a fit, weighed by the peaks of tests."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import scipy.stats
+import xarray as xr
+from refusals import refuses
+
+import stiction as st
+from stiction.inference import joined as joining
+
+pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+
+PROBLEM = st.Problem(
+    st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
+    st.Interface(0.05, 64, width=0.013),
+    st.LinearWeakening(weakening_rate=0.25e12),
+)
+RNG = np.random.default_rng(8)
+MEANS, SCATTER = RNG.normal(1.03e6, 4e4, 20), RNG.uniform(0.03, 0.09, 20)
+PEAKS = 1.05e6 * np.exp(0.05 * RNG.standard_normal(9))
+LOCAL = {"method": st.LocalCriterion(), "progress": False}
+
+
+def even(mean, cv):
+    """Strength that hardly varies within a specimen: the onset is that of the factor."""
+    marginal = st.Lognormal(mean=mean, cv=1e-4)
+    field = st.RandomField(marginal, st.PowerLawSpectrum(4e-3))
+    return st.RandomInterface(
+        strength=field, between={"strength": st.Lognormal(mean=1.0, cv=cv)}
+    )
+
+
+LIST = [even(*pair) for pair in zip(MEANS, SCATTER, strict=True)]
+
+
+def chances(peaks, error):
+    """Return the closed logarithm of the likelihood for each interface of the list."""
+    z = np.linspace(-7.0, 7.0, 1401)
+    found = []
+    for mean, cv in zip(MEANS, SCATTER, strict=True):
+        sigma = np.sqrt(np.log1p(cv**2))
+        if error:
+            onset = mean * np.exp(sigma * z - 0.5 * sigma**2)
+            density = scipy.stats.norm(onset, error).pdf(peaks[:, None])
+            found.append(np.log(np.trapezoid(density * scipy.stats.norm.pdf(z), z)).sum())
+        else:
+            law = scipy.stats.lognorm(sigma, scale=mean * np.exp(-0.5 * sigma**2))
+            found.append(law.logpdf(peaks).sum())
+    return np.array(found)
+
+
+@pytest.mark.parametrize(("lengths", "error"), [((0.05,), 0.0), ((0.05, 0.075), 3e4)])
+def test_weights_are_those_of_closed_likelihoods(lengths, error):
+    """Within three errors of 1000 samples; in newtons they are the same as in pascals."""
+    groups = dict(zip(lengths, np.split(PEAKS, [4] if len(lengths) > 1 else []), strict=True))
+    options = LOCAL | {"samples": 1000}
+    found = st.infer(PROBLEM, LIST, groups, load_cell_error=error, **options)
+    exact = chances(PEAKS, error)
+    own = found.likelihood(found.prior.u(np.arange(20.0)[:, None]))
+    near = exact > exact.max() - 4.0
+    assert near.sum() > 4
+    assert np.abs(own - exact)[near].max() < 0.7
+    weight = np.exp(exact - exact.max())
+    shift = found.log_evidence - (exact.max() + np.log(weight.mean()))
+    weight /= weight.sum()
+    names = "strength.mean", "between.strength"
+    for name, values in zip(names, (MEANS, SCATTER), strict=True):
+        mean = weight @ values
+        spread = np.sqrt(weight @ (values - mean) ** 2)
+        assert abs(found.mean(name) - mean) < 0.3 * spread
+        assert found.draws[name].std() == pytest.approx(spread, rel=0.15)
+        assert found.mean(name) == pytest.approx(found.draws[name].mean())
+    assert abs(shift) < 0.3
+    assert found.information["member"] == pytest.approx(
+        np.log(20.0) + weight @ np.log(weight), abs=0.15
+    )
+    assert 0.0 < found.information["strength.mean"] < found.information["member"] + 1e-9
+    if len(lengths) > 1:
+        forces = {one: 1e-3 * own * one * 0.013 for one, own in groups.items()}
+        refuses(
+            "load_cell_error: 30000 kN is more",
+            lambda: st.infer(PROBLEM, LIST, forces, unit="kN", load_cell_error=3e4, **options),
+        )
+        exact_forces = st.infer(PROBLEM, LIST, forces, unit="kN", **options)
+        again = st.infer(PROBLEM, LIST, groups, **options)
+        np.testing.assert_array_equal(exact_forces.u, again.u)
+
+
+@pytest.fixture(scope="module")
+def joined():
+    """Posterior of a list in which one member stands three times."""
+    return st.infer(PROBLEM, [LIST[2], *LIST, LIST[2]], PEAKS, samples=400, **LOCAL)
+
+
+def test_what_comes_out_is_a_posterior(joined):
+    draws = joined.draws["strength.mean"]
+    own = joined.likelihood(joined.prior.u(np.arange(20.0)[:, None]))
+    order = list(dict.fromkeys([LIST[2], *LIST]))
+    wanted = np.exp(own - own.max()) * np.where(np.arange(20) == 0, 3.0, 1.0)
+    for one, share in zip(order, wanted / wanted.sum(), strict=True):
+        error = 5.0 * np.sqrt(share * (1.0 - share) / draws.size) + 1e-3
+        assert abs(np.mean(np.isclose(draws, one.strength.mean)) - share) < error
+    chosen = joined.interfaces(600, seed=1)
+    assert np.mean([one.strength.mean for one in chosen]) == pytest.approx(
+        draws.mean(), abs=0.3 * draws.std()
+    )
+    assert "interfaces, weighed by the peaks, are worth" in str(joined)
+    assert "member" not in str(joined)
+    assert st.statistics.agreement(joined).p_values["cramer_von_mises"] > 0.05
+    assert len(st.plot.posterior(joined).subfigs[0].axes) == 9
+    theta = np.stack([own[:3] for own in joined.draws.values()], axis=1)
+    assert joined.log_likelihood(theta) == pytest.approx(joined.likelihood(joined.u[:3]))
+    assert joined.at(0)[1] in LIST
+    pytest.importorskip("arviz")
+    assert joined.to_arviz().posterior["strength.mean"].shape == (4, 1000)
+
+
+def test_equal_interfaces_keep_equal_weights():
+    """Which differ in what the peaks do not see, the length of a variation of 1e-4."""
+    field = LIST[0].strength
+    fields = [dataclasses.replace(field, spectrum=st.PowerLawSpectrum(x)) for x in (3e-3, 5e-3)]
+    alike = [dataclasses.replace(LIST[0], strength=one) for one in fields]
+    found = st.infer(PROBLEM, alike, PEAKS, samples=1000, **LOCAL)
+    assert np.mean(found.draws["member"]) == pytest.approx(0.5, abs=0.05)
+    assert found.information["strength.efolding_length"] < 0.01
+
+
+def test_peaks_that_contradict_the_list():
+    refuses(
+        "contradict the interfaces ... p = 0.001",
+        lambda: st.infer(PROBLEM, LIST, 1.3 * PEAKS, samples=200, **LOCAL),
+    )
+    with pytest.warns(st.AccuracyWarning, match="the peaks contradict .* p = 0.0"):
+        found = st.infer(PROBLEM, LIST, 1.12 * PEAKS, samples=200, **LOCAL)
+    assert any("contradict" in note for note in found.notes)
+    refuses(
+        "about 1.05 Pa, predictions",
+        lambda: st.infer(PROBLEM, LIST, 1e-6 * PEAKS, samples=200, **LOCAL),
+    )
+
+
+class Source:
+    """Draws interfaces like those of the list, and counts them."""
+
+    def interfaces(self, count, seed=0):
+        self.count = count
+        rng = np.random.default_rng(seed)
+        return [even(mean, 0.02) for mean in rng.normal(1.03e6, 6e4, count)]
+
+
+def test_more_are_drawn_from_a_source_where_few_keep_weight(monkeypatch):
+    monkeypatch.setattr(joining, "FIRST", 20)
+    monkeypatch.setattr(joining, "MOST", 70)
+    source = Source()
+    with pytest.warns(st.AccuracyWarning, match="weight of only .* give more `bootstrap`"):
+        found = st.infer(PROBLEM, source, 1.04 * PEAKS, samples=100, **LOCAL)
+    assert source.count == 70
+    assert found.prior.cells == source.count
+
+
+def test_what_cannot_be_weighed():
+    field = LIST[0].strength
+    values = field.sample(PROBLEM.interface, samples=1, seed=1)[0]
+    profile = xr.DataArray(values, {"x": PROBLEM.interface.x}, "x")
+    known = [field.given(profile[::9], noise=1e4 * k) for k in (1.0, 2.0)]
+    for given, prior, text in [
+        (field, None, "prior: is left out, so `random` must hold several interfaces"),
+        (LIST[:1] * 2, None, "prior: is left out, so `random` must hold several interfaces"),
+        (LIST, {"marginal.mean": (1e6, 2e6)}, "prior: is of one random field or interface"),
+        (known, None, "random: strength is conditioned on one specimen, but the peaks are"),
+    ]:
+        refuses(text, lambda g=given, p=prior: st.infer(PROBLEM, g, PEAKS, prior=p, **LOCAL))
+    records = field.sample(PROBLEM.interface, samples=3, seed=2)
+    pressures = st.fit_field(
+        records, PROBLEM.interface, quantity="normal_pressure", marginal="lognormal",
+        spectrum="exponential", noise=0.0, bootstrap=20, progress=False,
+    )  # fmt: skip
+    refuses(
+        "interfaces: need a strength, and the fit is of normal_pressure",
+        lambda: st.infer(PROBLEM, pressures, PEAKS, **LOCAL),
+    )
