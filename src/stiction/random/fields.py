@@ -527,7 +527,7 @@ class RandomInterface:
             known.warn()
 
 
-@lru_cache(maxsize=2048)
+@lru_cache(maxsize=8192)
 def layout(random: RandomInterface, interface: Interface) -> list[Stream]:
     """Draws of each property, and of each factor between specimens."""
     fields = list(random.properties.values())

@@ -17,6 +17,7 @@ from pydantic import Field, model_validator
 from scipy.optimize import brentq, root
 from scipy.special import gammaln
 
+from stiction.arrays import Array
 from stiction.errors import InputError, UnitWarning, unknown_name, warn_user
 from stiction.kinds import Kinds, OneOf, from_table, register
 from stiction.model import Positive, Real, check, model
@@ -135,6 +136,12 @@ class Lognormal(_ByMoments):
 
     def _shape(self, ratio: float) -> tuple[float, float]:
         return math.sqrt(math.log1p(ratio**2)), math.sqrt(1.0 + ratio**2)
+
+    def of_normal(self, z: Array) -> Array:
+        """Return the values whose quantiles are those of standard normal numbers."""
+        above = self.mean - self.low
+        shape, mean_over_scale = self._shape(self.cv * self.mean / above)
+        return self.low + above / mean_over_scale * np.exp(shape * z)
 
 
 @register
