@@ -351,14 +351,17 @@ def test_coarse_grid_warns_from_a_ten_thousandth_of_the_variance(lost, warns, re
 
 
 def test_fields_and_grids_that_are_doubted(recwarn):
-    words = r"52 % of the variance .*interface.nodes >= 624"
+    words = r"52 % of the variance .*interface.nodes >= 330"
     with pytest.warns(st.AccuracyWarning, match=words):
         make_strength(8e-4).sample(st.Interface(length=0.1, nodes=64))
+    with pytest.warns(st.AccuracyWarning, match="but 1 % of the variance"):
+        make_strength(8e-4).sample(st.Interface(length=0.1, nodes=328))
     with pytest.warns(st.AccuracyWarning, match=r"spans 4.4 nodes"):
         onset(np.full(128, 1e6), problem=make_problem(128))
     with pytest.warns(st.AccuracyWarning, match="no mean mode"):
         make_strength(0.05).sample(LINE)
     recwarn.clear()
+    make_strength(8e-4).sample(st.Interface(length=0.1, nodes=330))
     make_strength(0.05, mean_mode=True).sample(LINE)
     assert not recwarn.list
 
