@@ -16,7 +16,7 @@ STIFF = float("inf")
 
 
 def joint(samples, **options):
-    """Samples of a lap joint behind a stiff machine, in which slip goes back in many."""
+    """Samples of a lap joint behind a stiff machine, in many of which a node that slipped stops."""
     solid = st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress")
     drive = st.Pusher(height=0.01, width=0.004, side="both", stiffness=STIFF)
     problem = st.Problem(
@@ -30,7 +30,7 @@ def joint(samples, **options):
     given = {"method": st.Equilibrium(), "samples": samples, "progress": False} | options
     with pytest.warns(st.AccuracyWarning) as caught:
         st.monte_carlo(problem, strength, **given)
-    return [str(one.message) for one in caught if "goes back" in str(one.message)]
+    return [str(one.message) for one in caught if "stops before" in str(one.message)]
 
 
 def test_one_warning_for_all_batches_threads_and_processes(monkeypatch):
