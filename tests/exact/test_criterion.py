@@ -147,7 +147,9 @@ def test_wave_speeds_of_both_plane_states(plane, nu):
 def test_load_that_varies_along_the_interface(nodes):
     """Strength and load are single cosines, so both averages are known in closed form."""
     x, k = 0.1 * np.arange(nodes) / nodes, 2.0 * np.pi / 0.1
-    load = st.Load(profile=1.0 + 0.6 * np.cos(2.0 * k * (x - 0.013)), normal_pressure=4e6 * (x + 1.0))
+    load = st.Load(
+        profile=1.0 + 0.6 * np.cos(2.0 * k * (x - 0.013)), normal_pressure=4e6 * (x + 1.0)
+    )
     problem = make_problem(nodes, load=load)
     tau_p = 1e6 - 2e5 * np.cos(3.0 * k * (x - 0.031))
     one, two = multiplier_of(problem)[[3, 2]]
