@@ -355,7 +355,11 @@ def test_as_many_members_are_drawn_as_the_target_needs(monkeypatch):
     told = int(re.search(r"(\d+) of its 12", given.warnings[-1]).group(1))
     assert told == pytest.approx(carriers, abs=1)
     assert "carry 90% of the mean" in given.warnings[-1]
-    assert "c.o.v. by the list" in str(given)
+    sampled = math.sqrt(given.cv**2 - given.members_cv**2)
+    assert f"by the list {given.members_cv:.2g}, by sampling {sampled:.2g})" in str(given)
+    assert found.band[0] > 2.0 * true  # what one sample stands for: no band of the members
+    assert "of which 5 %" in str(given)
+    assert "of which" not in str(found)
     alike = st.failure_probability(LINE, few[:1] * 12, 1.01e6, **options, target_cv=0.3)
     assert alike.members_cv == 0.0  # one interface, twelve times
 

@@ -134,7 +134,8 @@ class Answer:
 
         5 % of them have at most the one, 95 % at most the other. More tests make it narrower. It
         is too wide by the sampling error of each interface, up to a factor of two or three of alike
-        ones: a smaller `target_cv` lowers that. The sampling error of the mean is `interval`.
+        ones: a smaller `target_cv` lowers that. Of thousands few have a sample so low, and the band
+        is what one would stand for: take a list of tens. The error of the mean is `interval`.
         """
         return band_of(self.members)
 
@@ -166,10 +167,13 @@ class Answer:
         if self.survived:
             result += f"; {self.survived:.3g} of plain samples survive any stress"
         if self.members.size:
-            low, high = self.band
-            result += f"; the mean over {self.members.size} equally likely interfaces, of which"
-            result += f" 5 % have at most P = {low:.2g} and 95 % at most {high:.2g}"
-            result += f" (c.o.v. by the list {self.members_cv:.2g})"
+            result += f"; the mean over {self.members.size} equally likely interfaces"
+            if self.members.mean() < 2.0 * self.probability:  # else few had a sample so low
+                low, high = self.band
+                result += f", of which 5 % have at most P = {low:.2g}"
+                result += f" and 95 % at most {high:.2g}"
+            sampled = math.sqrt(max(self.cv**2 - self.members_cv**2, 0.0))
+            result += f" (c.o.v. by the list {self.members_cv:.2g}, by sampling {sampled:.2g})"
         return f"{result}; {self.algorithm}, {self.evaluations} evaluations"
 
 
