@@ -1,0 +1,274 @@
+"""Everything that a public call gives, as numbers and texts, beside what was recorded of it.
+
+A call is a function without arguments. Its result is taken apart: datasets, arrays, answers, tables
+and figures, down to each number, label and warning. Records (`records/*.json`) have one line for
+each output. `pytest -n 0 tests/records --record` writes them anew and prints what changed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import re
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+CLOSE = 1e-6
+"""Relative distance of numbers that count as the same: other processors round otherwise."""
+FLOOR = 1e-9
+"""The same as a share of the largest of an output, for those that are nearly zero."""
+WHOLE = 16
+"""Most numbers of an output that are recorded one by one; of more their sums with two weights."""
+FEW = 5
+"""Most members of a list that are taken apart; of all, the number is recorded."""
+ROUND_OFF = ("certificate_gap",)
+"""Outputs that are nothing but round-off where all is well: recorded as whether they are small."""
+NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:,\d{3})*(?:\.\d+)?(?:e[-+]?\d+)?", re.ASCII)
+VERSIONS = re.compile(r"version|created|platform")
+
+
+class Call(NamedTuple):
+    """A public call, by what its recorded values were verified, and how close they must be."""
+
+    make: Callable[[], Any]
+    verified: str
+    close: float
+
+
+class Calls(dict[str, Call]):
+    """The calls of a file, by name."""
+
+    def __call__(self, verified: str, close: float = CLOSE) -> Callable[[Any], Any]:
+        """Add a call; `verified` names the oracle, closed form or reading behind its values."""
+
+        def add(make: Callable[[], Any]) -> Callable[[], Any]:
+            self[make.__name__] = Call(make, verified, close)
+            return make
+
+        return add
+
+
+def outputs_of(call: Call) -> dict[str, Any]:
+    """All outputs of a call by their path, warnings included."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        result = call.make()
+        found = dict(taken_apart(result))
+    ours = {f"{one.category.__name__}: {one.message}" for one in caught if _ours(one.category)}
+    for number, text in enumerate(sorted(ours)):
+        found[f"warning {number}"] = text
+    return found
+
+
+def _ours(category: type) -> bool:
+    return category.__module__.startswith("stiction")
+
+
+def taken_apart(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Paths, and the text or the numbers there."""
+    if isinstance(value, xr.Dataset | xr.DataArray):
+        yield from _labelled(value, path)
+    elif isinstance(value, pd.DataFrame):
+        for name in value.columns:
+            yield from taken_apart(value[name].tolist(), f"{path}[{name}]")
+    elif isinstance(value, Figure | Axes):
+        for number, axes in enumerate(value.axes if isinstance(value, Figure) else [value]):
+            yield from _axes(axes, f"{path}axes {number}")
+    elif isinstance(value, Mapping):
+        for key, each in value.items():
+            yield from taken_apart(each, f"{path}.{key}" if path else str(key))
+    elif hasattr(value, "__pydantic_fields__"):
+        yield path, repr(value)
+    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
+        names = [
+            field.name
+            for field in dataclasses.fields(value)
+            if field.repr and not field.name.startswith("_")
+        ]
+        names += [name for name in dir(type(value)) if _is_property(type(value), name)]
+        yield from taken_apart({name: getattr(value, name) for name in names}, path)
+        yield f"{path}.str", str(value)
+    elif isinstance(value, str | Path) or value is None:
+        yield path, str(value)
+    elif isinstance(value, list | tuple) and not _numeric(value):
+        yield f"{path}.len", [len(value)]
+        for number, each in enumerate(value[:FEW]):
+            yield from taken_apart(each, f"{path}[{number}]")
+    elif _numeric(value):
+        yield path, numbers(value, path)
+    else:
+        yield path, repr(value)
+
+
+def _is_property(kind: type, name: str) -> bool:
+    return not name.startswith("_") and isinstance(getattr(kind, name), property)
+
+
+def _numeric(value: Any) -> bool:
+    try:
+        return np.asarray(value).dtype.kind in "bifuc"
+    except (TypeError, ValueError):
+        return False
+
+
+def numbers(value: Any, path: str) -> Any:
+    """The numbers of an output: all of them, or of many their shape and four sums."""
+    array = np.asarray(value, dtype=float)
+    if path.endswith(ROUND_OFF):
+        array = np.where(np.isnan(array), np.nan, array > 1.0)
+    if array.size <= WHOLE:
+        return [_short(one) for one in array.reshape(-1)]
+    flat = np.nan_to_num(array.reshape(-1), posinf=0.0, neginf=0.0)
+    place = np.arange(flat.size)
+    weighted = [np.mean(flat * np.cos(rate * place + 1.0)) for rate in (1.234, 0.057)]
+    least_and_most = [np.nanmin(array), np.nanmax(array)] if np.isfinite(flat).any() else []
+    lost = int(np.isnan(array).sum())
+    digest = [_short(float(one)) for one in (*least_and_most, flat.mean(), *weighted)]
+    return {"shape": list(array.shape), "nan": lost, "digest": digest}
+
+
+def _short(number: Any) -> float:
+    return float(f"{float(number):.10g}")
+
+
+def _labelled(value: Any, path: str) -> Iterator[tuple[str, Any]]:
+    for name, text in value.attrs.items():
+        if not VERSIONS.search(str(name)) and name != "study":
+            yield f"{path}@{name}", text if isinstance(text, str) else str(text)
+    arrays = value.variables if isinstance(value, xr.Dataset) else {"": value.variable}
+    for name, array in arrays.items():
+        whole = f"{path}.{name}" if path and name else f"{path}{name}"
+        about = f"{array.attrs.get('long_name')}, {array.attrs.get('units')}, {array.dims}"
+        yield f"{whole}@", about
+        yield from taken_apart(
+            array.values.tolist() if array.dtype.kind in "OU" else array.values, whole
+        )
+
+
+def _axes(axes: Axes, path: str) -> Iterator[tuple[str, Any]]:
+    """What is written and drawn on axes."""
+    legend = axes.get_legend()
+    texts = [axes.get_title(), axes.get_xlabel(), axes.get_ylabel()]
+    texts += [axes.get_xscale(), axes.get_yscale()]
+    texts += [text.get_text() for text in legend.get_texts()] if legend else []
+    texts += [text.get_text() for text in axes.texts]
+    yield path, " | ".join(texts)
+    for number, line in enumerate(axes.lines):
+        x, y = (np.asarray(one, dtype=float) for one in line.get_data())
+        yield (
+            f"{path} line {number}",
+            numbers(np.column_stack([x, y]) if x.shape == y.shape else y, ""),
+        )
+    for number, drawn in enumerate(axes.collections):
+        points = np.ma.filled(np.ma.asarray(drawn.get_offsets(), dtype=float), np.nan)
+        shape = [p.vertices for p in drawn.get_paths()[:3]]
+        yield f"{path} points {number}", numbers(points, "")
+        if shape:
+            yield f"{path} outline {number}", numbers(np.concatenate(shape), "")
+        if drawn.get_array() is not None:
+            yield (
+                f"{path} colours {number}",
+                numbers(np.ma.filled(drawn.get_array(), np.nan), ""),
+            )
+    for number, image in enumerate(axes.images):
+        yield f"{path} image {number}", numbers(np.ma.filled(image.get_array(), np.nan), "")
+    boxes = [patch.get_path().vertices @ np.eye(2) for patch in axes.patches]
+    if boxes:
+        yield f"{path} patches", numbers(np.concatenate(boxes), "")
+
+
+def differences(
+    found: Mapping[str, Any], recorded: Mapping[str, Any], close: float
+) -> list[str]:
+    """What differs between the outputs of a call and those recorded, a line each."""
+    lines = [f"{path}: is new: {found[path]}" for path in found.keys() - recorded.keys()]
+    lines += [f"{path}: is gone: {recorded[path]}" for path in recorded.keys() - found.keys()]
+    for path in found.keys() & recorded.keys():
+        if not _same(found[path], recorded[path], close):
+            lines.append(f"{path}: {found[path]} for {recorded[path]}")
+    return sorted(lines)
+
+
+def _same(one: Any, other: Any, close: float) -> bool:
+    if isinstance(one, dict) and isinstance(other, dict):
+        alike = one["shape"] == other["shape"] and one["nan"] == other["nan"]
+        return alike and _near(one["digest"], other["digest"], close)
+    if isinstance(one, str) and isinstance(other, str):
+        return _same_text(one, other, close)
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other) and _near(one, other, close)
+    return type(one) is type(other) and one == other
+
+
+def _near(one: list[float], other: list[float], close: float) -> bool:
+    size = max((abs(x) for x in other if math.isfinite(x)), default=0.0)
+    return all(
+        x == y or (x != x and y != y) or abs(x - y) <= close * abs(y) + FLOOR * size
+        for x, y in zip(one, other, strict=True)
+    )
+
+
+def _same_text(one: str, other: str, close: float) -> bool:
+    """Whether two texts say the same, but for the last digit of a number."""
+    if NUMBER.sub("#", one) != NUMBER.sub("#", other):
+        return False
+    return all(
+        abs(_value(x) - _value(y)) <= 1.01 * _last_digit(y) + close * abs(_value(y))
+        if not (x.isdecimal() and y.isdecimal())
+        else x == y
+        for x, y in zip(NUMBER.findall(one), NUMBER.findall(other), strict=True)
+    )
+
+
+def _value(text: str) -> float:
+    return float(text.replace(",", ""))
+
+
+def _last_digit(text: str) -> float:
+    digits, _, power = text.partition("e")
+    return 10.0 ** (int(power or 0) - len(digits.partition(".")[2]))
+
+
+def read(path: Path) -> dict[str, dict[str, Any]]:
+    """Recorded outputs of the calls of a file."""
+    return json.loads(path.read_text()) if path.exists() else {}
+
+
+def write(path: Path, records: Mapping[str, Mapping[str, Any]]) -> None:
+    """Write records, an output a line."""
+    blocks = []
+    for name in sorted(records):
+        lines = [
+            f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in records[name].items()
+        ]
+        blocks.append(f"{json.dumps(name)}: {{\n" + ",\n".join(lines) + "\n}")
+    path.write_text("{\n" + ",\n".join(blocks) + "\n}\n")
+
+
+def compared(calls: Calls, file: str) -> Callable[..., None]:
+    """A test of each call of a file beside its records; with ``--record`` these are written."""
+
+    @pytest.mark.parametrize("name", calls)
+    def test(name: str, request: pytest.FixtureRequest) -> None:
+        path = Path(file).with_name(Path(file).stem.removeprefix("test_") + ".json")
+        found = outputs_of(calls[name])
+        recorded = read(path)
+        changed = differences(found, recorded.get(name, {}), calls[name].close)
+        if request.config.getoption("--record") and changed:
+            print(f"\n{name}", *changed, sep="\n  ")
+            here = {key: one for key, one in recorded.items() if key in calls}
+            write(path, here | {name: found})
+        else:
+            assert not changed, "\n".join([f"{name} ({calls[name].verified})", *changed])
+
+    return test

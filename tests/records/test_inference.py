@@ -1,0 +1,168 @@
+"""Recorded outputs: fits to profiles, parameters from peaks, agreement, designs of tests."""
+
+import dataclasses
+
+import numpy as np
+import xarray as xr
+from recording import Calls, compared
+from setups import LOCAL, make_problem
+from specimens import crooked
+
+import stiction as st
+
+calls = Calls()
+RECOVERED = "recovery and coverage of known truths, validation/fit_coverage.py, inference.py"
+FIELD = st.RandomField(
+    st.Weibull(mean=1.1e6, cv=0.21, low=4e5), st.PowerLawSpectrum(1.9e-3, exponent=1.7)
+)
+
+
+def record(nodes, length, seed, trend=0.0, noise=1.5e4):
+    rng = np.random.default_rng([seed, 1])
+    values = FIELD.sample(st.Interface(length, nodes), samples=2, seed=seed)[1]
+    x = np.arange(nodes) * length / nodes
+    values = values + trend * (x / length - 0.5) + noise * rng.standard_normal(nodes)
+    return xr.DataArray(values, {"x": x}, ("x",), attrs={"units": "Pa"})
+
+
+RECORDS = [record(180, 0.036, 1, 9e4), record(130, 0.026, 2, -7e4)]
+PEAKS = np.array([7.31e5, 7.55e5, 7.02e5, 7.74e5, 7.18e5, 7.43e5])
+PROBLEM = make_problem(96, 0.031, weakening_rate=0.42e12, load=st.Load(normal_pressure=2.3e6))
+BOUNDED = st.RandomField(
+    st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
+    st.PowerLawSpectrum(2.3e-3, truncation=2.5),
+)
+
+
+@calls(RECOVERED, close=2e-2)
+def a_fit_to_records_of_unlike_length():
+    found = st.fit_field(
+        RECORDS,
+        marginal=["weibull", "gamma"],
+        detrend=1,
+        noise=True,
+        bootstrap=20,
+        seed=4,
+        progress=False,
+    )
+    one, other = found.interfaces(2, seed=3)
+    grid = st.Interface(0.03, 80)
+    return {
+        "fit": found,
+        "one": one.profiles(grid, samples=2, seed=1),
+        "other": repr(other.strength),
+    }
+
+
+@calls(RECOVERED, close=2e-2)
+def a_fit_with_scatter_between_specimens():
+    factors = (0.83, 1.06, 1.19, 0.95, 1.27)
+    records = [record(120, 0.024, 20 + i) * factor for i, factor in enumerate(factors)]
+    for each in records:
+        each.attrs["units"] = "Pa"
+    found = st.fit_field(
+        records, marginal="lognormal", between=True, bootstrap=20, seed=5, progress=False
+    )
+    return {"fit": found, "drawn": [repr(one) for one in found.interfaces(2, seed=7)]}
+
+
+def inferred(**more):
+    prior = {"correlation_length": (1e-3, 6e-3), "marginal.low": (5.6e5, 7.2e5)}
+    options = {"prior": prior, "method": LOCAL, "samples": 300, "seed": 3, "progress": False}
+    return st.infer(PROBLEM, BOUNDED, PEAKS, **options | more)
+
+
+@calls(RECOVERED, close=1e-5)
+def two_parameters_from_six_peaks():
+    found = inferred(load_cell_error=6e3)
+    members = [repr(one.strength) for one in found.interfaces(2, seed=4)]
+    tree = found.to_arviz()
+    return {
+        "str": str(found),
+        "mean": [found.mean(name) for name in found.names],
+        "interval": [found.interval(name, 0.8) for name in found.names],
+        "information": found.information,
+        "draws": found.draws,
+        "members": members,
+        "notes": found.notes if hasattr(found, "notes") else "",
+        "at": repr(found.at(7)[1]),
+        "prior": found.prior_transform(np.array([0.21, 0.77])),
+        "likelihood": found.log_likelihood(np.array([[2.1e-3, 6.3e5], [3.4e-3, 6.6e5]])),
+        "groups": sorted(
+            str(group) for group in (tree.groups() if callable(tree.groups) else tree.groups)
+        ),
+    }
+
+
+@calls(RECOVERED, close=1e-5)
+def parameters_from_peaks_in_newtons_and_two_lengths():
+    problem = dataclasses.replace(PROBLEM, interface=st.Interface(0.031, 96, width=0.011))
+    forces = {0.031: PEAKS[:4] * 0.031 * 0.011, 0.062: PEAKS[2:] * 0.98 * 0.062 * 0.011}
+    return str(
+        st.infer(
+            problem,
+            BOUNDED,
+            forces,
+            unit="N",
+            prior={"marginal.high": (1.2e6, 2.2e6)},
+            method=LOCAL,
+            samples=300,
+            progress=False,
+        )
+    )
+
+
+@calls("p-values uniform over campaigns, validation/inference.py", close=1e-5)
+def agreement_with_a_prediction_and_a_posterior():
+    predicted = st.monte_carlo(
+        PROBLEM, BOUNDED, method=LOCAL, samples=300, seed=6, pilot=False, progress=False
+    )
+    return {
+        "prediction": st.statistics.agreement(
+            predicted, PEAKS[1:] * 1e-3, unit="kPa", load_cell_error=4.0, seed=2, replicates=299
+        ),
+        "posterior": st.statistics.agreement(inferred(), seed=3, replicates=199),
+    }
+
+
+@calls("nested Monte Carlo of another seed, tests/exact/test_inference.py", close=1e-5)
+def what_tests_would_tell():
+    return st.design_of_tests(
+        PROBLEM,
+        BOUNDED,
+        prior={"marginal.low": (5e5, 8e5), "correlation_length": (1e-3, 5e-3)},
+        designs={
+            "few": 4,
+            "two lengths": {0.031: 3, 0.062: 2},
+            "known": {"tests": 6, "known": ["correlation_length"]},
+        },
+        method=LOCAL,
+        load_cell_error=5e3,
+        repetitions=10,
+        samples=200,
+        seed=2,
+        progress=False,
+    )
+
+
+@calls(RECOVERED, close=1e-5)
+def a_specimen_in_newtons():
+    problem = crooked(nodes=72, drive=st.Pusher(height=0.012, width=0.006))
+    field = dataclasses.replace(BOUNDED, spectrum=st.PowerLawSpectrum(4e-3))
+    peaks = np.array([452.0, 471.0, 463.0, 440.0])
+    return str(
+        st.infer(
+            problem,
+            field,
+            peaks,
+            unit="N",
+            prior={"marginal.high": (1.2e6, 2.4e6)},
+            method=LOCAL,
+            samples=200,
+            load_cell_error=4.0,
+            progress=False,
+        )
+    )
+
+
+test_outputs_are_as_recorded = compared(calls, __file__)

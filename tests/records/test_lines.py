@@ -1,0 +1,196 @@
+"""Recorded outputs: onsets, paths and theory on lines where nothing is symmetric."""
+
+import dataclasses
+
+import numpy as np
+from crooked import LINE, LINE_STRENGTH, uneven
+from recording import Calls, compared
+from setups import EXACT, LOCAL, make_problem
+
+import stiction as st
+
+calls = Calls()
+INTERFACE = LINE.interface
+TWO = np.stack(
+    [LINE_STRENGTH, 1.04 * np.roll(LINE_STRENGTH, 31) - 2e4 * uneven(INTERFACE, seed=8)]
+)
+ROUGH = 1.15e6 + 5.2e5 * uneven(INTERFACE, seed=21)
+"""A strength of a range so wide that instabilities are arrested."""
+ORACLE = "linear programme and sums over patches, tests/oracle/test_crooked.py"
+EVENTS = "stepping event by event, tests/oracle/test_equilibrium.py"
+READ = "formula read beside the code"
+
+
+def barred(interface, low=4.2e5):
+    """A weak place within barriers."""
+    x = interface.x / interface.length
+    wall = (np.abs(x - 0.31) < 0.14) & (np.abs(x - 0.31) > 0.09)
+    dip = 1.2e6 + 9e4 * uneven(interface, seed=9) - low * np.exp(-(((x - 0.77) / 0.09) ** 2))
+    weak = 6e5 + 8e4 * uneven(interface, seed=6)
+    return np.where(wall, 3.3e6, np.where(np.abs(x - 0.31) <= 0.09, weak, dip))
+
+
+def of_width(problem, width=0.0123):
+    wide = dataclasses.replace(problem.interface, width=width)
+    return dataclasses.replace(problem, interface=wide)
+
+
+def law(kind, **more):
+    about = {
+        "residual_strength": 1.7e5 + 4e4 * uneven(INTERFACE, seed=4),
+        "weakening_rate": 2.3e11,
+    }
+    about |= more
+    return dataclasses.replace(LINE, friction=kind(**about))
+
+
+@calls(ORACLE)
+def local_criterion_of_two_strengths():
+    return st.onset(LINE, TWO, method=LOCAL, progress=False)
+
+
+@calls("closed form of the mean stress; " + ORACLE)
+def local_criterion_with_forces_in_mode_three():
+    problem = dataclasses.replace(of_width(LINE), mode="III")
+    return st.onset(problem, TWO, method=LOCAL, progress=False)
+
+
+@calls(ORACLE + "; sensitivity by difference quotients, tests/exact/test_equilibrium.py")
+def exact_onsets_with_slip_sensitivity_and_forces():
+    method = st.Equilibrium(slip=True, sensitivity=True)
+    return st.onset(of_width(LINE), TWO, method=method, progress=False)
+
+
+@calls(EVENTS)
+def arrested_events_of_two_strengths():
+    both = np.stack([barred(INTERFACE), np.roll(barred(INTERFACE, 3.1e5), 17)])
+    return st.onset(LINE, both, method=st.Equilibrium(events=3), progress=False)
+
+
+@calls(EVENTS)
+def a_law_of_two_pieces_with_critical_slip_along_x():
+    slip = 2.6e-6 + 7e-7 * uneven(INTERFACE, seed=12)
+    problem = law(
+        st.PiecewiseWeakening,
+        weakening_rate=None,
+        critical_slip=slip,
+        slip=(0.4, 1.0),
+        strength=(0.35, 0.0),
+    )
+    return st.onset(problem, TWO, method=st.Equilibrium(events=2, slip=True), progress=False)
+
+
+@calls(EVENTS)
+def a_law_that_rests_and_steepens():
+    problem = law(
+        st.PiecewiseWeakening, slip=(0.2, 0.5, 0.8, 1.0), strength=(0.7, 0.69, 0.15, 0.0)
+    )
+    return st.onset(problem, TWO, method=st.Equilibrium(sensitivity=True), progress=False)
+
+
+@calls("the same by the whole law in many pieces, tests/oracle/test_friction_laws.py")
+def an_exponential_law_in_pieces():
+    exponential = law(st.ExponentialWeakening).friction
+    problem = dataclasses.replace(LINE, friction=st.PiecewiseWeakening.from_law(exponential, 5))
+    return st.onset(problem, TWO[0], method=EXACT, progress=False)
+
+
+@calls(EVENTS)
+def several_profiles_by_name():
+    profiles = {
+        "strength": TWO,
+        "residual_strength": 2.1e5 + 5e4 * uneven(INTERFACE, seed=13),
+        "initial_stress": -3e4 + 6e4 * uneven(INTERFACE, seed=14),
+        "weakening_rate": 2.6e11 + 4e10 * uneven(INTERFACE, seed=15),
+        "normal_pressure": np.stack(
+            [2.7e6 + 8e5 * uneven(INTERFACE, seed=s) for s in (16, 17)]
+        ),
+    }
+    return st.onset(LINE, profiles, method=EXACT, progress=False)
+
+
+@calls(EVENTS)
+def fracture_energy_along_x_and_residual_ratio():
+    energy = 1.1 + 0.2 * uneven(INTERFACE, seed=18)
+    friction = st.LinearWeakening(fracture_energy=energy, residual_ratio=0.23)
+    problem = dataclasses.replace(LINE, friction=friction)
+    return st.onset(problem, {"strength": TWO}, method=EXACT, progress=False)
+
+
+@calls("states checked as equilibria, tests/exact/test_equilibrium.py")
+def a_path_through_an_arrested_event():
+    loads = [1.1e5, 2.9e5, 3.6e5, 4.1e5, 4.6e5, 5.6e5, 9e5]
+    return st.equilibrium_path(of_width(LINE), barred(INTERFACE), loads)
+
+
+@calls("weighted mean over each patch; " + ORACLE)
+def nucleation_stress():
+    return {
+        "two": st.theory.nucleation_stress(LINE, TWO),
+        "one": st.theory.nucleation_stress(LINE, {"strength": TWO[1]}),
+    }
+
+
+@calls("textbook weights of cracks, tests/oracle/test_crooked.py")
+def energy_release_rate_and_griffith_length():
+    lengths = [0.0013, 0.0071, 0.019, 0.031]
+    return {
+        "rate": st.theory.energy_release_rate(LINE, 4.1e5, lengths, centre=0.0362),
+        "start": st.theory.griffith_length(LINE, 1.7e5, 8e-3, centre=0.031),
+        "arrest": st.theory.griffith_length(
+            LINE, [1.5e5, 2.2e5], 8e-3, centre=0.033, arrest=True
+        ),
+    }
+
+
+@calls("quadrature of the exact correlation, tests/exact/test_statistics_moments.py")
+def nucleation_statistics():
+    field = st.RandomField(
+        st.Weibull(mean=1.05e6, cv=0.17, low=4e5),
+        st.ExponentialSpectrum(2.3e-3, power_kept=0.97),
+    )
+    return st.theory.nucleation_statistics(
+        make_problem(160, 0.043, weakening_rate=3.1e11), field
+    )
+
+
+@calls(READ + ": excess * exp(-distance/decay), 1 + amplitude cos")
+def loads_with_an_edge_and_a_gradient():
+    found = {}
+    for name, shape in {
+        "edge": st.EdgeLoad(excess=1.7, decay=0.0031, edge=0.23),
+        "gradient": st.GradientLoad(amplitude=0.41, centre=0.37),
+    }.items():
+        load = dataclasses.replace(LINE.load, profile=shape)
+        problem = dataclasses.replace(LINE, load=load)
+        found[name] = st.onset(problem, TWO, method=EXACT, progress=False)
+    return found
+
+
+@calls(READ + ": pi/4 a_k and Bessel sums; h_n = 2 lambda_0 G*/W")
+def moduli_and_lengths_of_solids():
+    found = {}
+    for plane, nu, mode in (
+        ("strain", 0.17, "II"),
+        ("stress", 0.41, "II"),
+        ("stress", 0.29, "III"),
+    ):
+        solid = st.Solid(youngs_modulus=3.1e9, poisson_ratio=nu, density=1190.0, plane=plane)
+        problem = make_problem(64, 0.05, solid=solid, mode=mode, weakening_rate=2.1e11)
+        names = (
+            "shear_modulus",
+            "shear_wave_speed",
+            "dilatational_wave_speed",
+            "rayleigh_wave_speed",
+        )
+        found[plane, mode] = {
+            name: getattr(solid, name) for name in names if hasattr(solid, name)
+        }
+        found[plane, mode] |= {
+            "modulus": problem.effective_modulus,
+            "length": problem.nucleation_length,
+        }
+    return found
+
+
+test_outputs_are_as_recorded = compared(calls, __file__)

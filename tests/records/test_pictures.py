@@ -1,0 +1,136 @@
+"""Recorded outputs: every line, point, label and legend of the figures."""
+
+import dataclasses
+import tempfile
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from crooked import LINE, LINE_STRENGTH, PLANE, PLANE_STRENGTH, uneven
+from PIL import Image
+from recording import Calls, compared
+from setups import EXACT, LOCAL
+from small_study import lengths, small_study
+from specimens import crooked, rough
+
+import stiction as st
+
+calls = Calls()
+DRAWN = "numbers of the results beside those drawn, tests/user/test_plot.py; looked at"
+TWO = np.stack(
+    [LINE_STRENGTH, 1.04 * np.roll(LINE_STRENGTH, 31) - 2e4 * uneven(LINE.interface, seed=8)]
+)
+FIELD = st.RandomField(
+    st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
+    st.PowerLawSpectrum(2.3e-3, truncation=2.5),
+)
+JOINT = crooked(nodes=64, drive=st.Pusher(height=0.008, width=0.004))
+
+
+def plain(problem):
+    """The problem without profiles of its own."""
+    friction = st.LinearWeakening(weakening_rate=0.28e12, residual_strength=1.9e5)
+    return dataclasses.replace(problem, friction=friction, load=st.Load(normal_pressure=2.9e6))
+
+
+@calls(DRAWN)
+def onsets_on_a_line_and_a_plane():
+    both = [st.onset(LINE, TWO, method=method, progress=False) for method in (LOCAL, EXACT)]
+    plane = st.onset(PLANE, PLANE_STRENGTH, method=LOCAL, progress=False)
+    return {
+        "line": st.plot.onset(both, TWO, problem=LINE, sample=1),
+        "plane": st.plot.onset(plane, PLANE_STRENGTH, problem=PLANE),
+        "field": st.plot.field(LINE, TWO[1]),
+        "field of a plane": st.plot.field(PLANE.interface, PLANE_STRENGTH),
+    }
+
+
+@calls(DRAWN)
+def densities_and_quantiles():
+    sweep = [
+        *lengths(1.7e-3, 2.9e-3, 4.1e-3),
+        {"problem.friction.residual_strength": [4e4, 1.5e5]},
+    ]
+    study = small_study(
+        nodes=96, length=0.047, weakening_rate=0.31e12, ensemble={"samples": 40}, sweep=sweep
+    )
+    swept = st.Study.from_dict(study).run(progress=False)
+    one = st.monte_carlo(
+        plain(LINE), FIELD, method=LOCAL, samples=60, seed=2, pilot=False, progress=False
+    )
+    return {
+        "one": st.plot.monte_carlo(one),
+        "several": st.plot.monte_carlo(
+            {"a": one, "b": one.isel(sample=slice(7, None))}, quantity="critical_position"
+        ),
+        "swept": st.plot.monte_carlo(swept.isel(residual_strength=1)),
+        "quantiles": st.plot.quantiles(
+            swept.isel(residual_strength=0), along="correlation_length"
+        ),
+    }
+
+
+@calls(DRAWN)
+def specimens_and_their_events():
+    strength = rough(JOINT, 6)[0]
+    found = st.onset(JOINT, strength, method=st.Equilibrium(events=5), progress=False)
+    path = st.equilibrium_path(JOINT, strength, np.linspace(2e5, 1.5e6, 9))
+    return {
+        "specimen": st.plot.specimen(JOINT, strength, found),
+        "precursors": st.plot.precursors(path, problem=JOINT),
+        "force": st.plot.force_travel(path),
+    }
+
+
+@calls(DRAWN, close=1e-4)
+def failure_curves():
+    problem = plain(LINE)
+    problem = dataclasses.replace(
+        problem, interface=dataclasses.replace(problem.interface, width=0.012)
+    )
+    curve = st.failure_curve(
+        problem, FIELD, method=LOCAL, smallest=1e-2, target_cv=0.4, seed=3, progress=False
+    )
+    return {
+        "curve": st.plot.failure_curve(curve),
+        "asked": st.plot.failure_curve(curve, stress=7.4e5),
+    }
+
+
+@calls(DRAWN, close=1e-4)
+def posteriors_and_agreement():
+    problem = plain(LINE)
+    peaks = np.array([7.1e5, 7.4e5, 6.9e5, 7.7e5, 7.3e5])
+    prior = {
+        "correlation_length": {"low": 8e-4, "high": 6e-3, "spacing": "log"},
+        "marginal.low": (5.2e5, 7.2e5),
+    }
+    found = st.infer(
+        problem, FIELD, peaks, prior=prior, method=LOCAL, samples=200, progress=False
+    )
+    agreed = st.statistics.agreement(found, replicates=199)
+    return {"posterior": st.plot.posterior(found), "agreement": st.plot.agreement(agreed)}
+
+
+@calls(DRAWN, close=1e-3)
+def a_fit_of_two_records():
+    grid = st.Interface(0.03, 140)
+    rows = FIELD.sample(grid, samples=2, seed=9)
+    found = st.fit_field(rows, grid, marginal="beta", bootstrap=20, seed=1, progress=False)
+    return st.plot.fit(found)
+
+
+@calls(DRAWN, close=1e-4)
+def a_rupture_and_its_film():
+    save = st.Save(["slip", "slip_rate", "shear_stress"], every=30)
+    method = st.Rupture(loading_rate=9e8, kernel_tolerance=1e-5)
+    run = st.simulate_rupture(LINE, TWO[0], method=method, save=save, progress=False)
+    with tempfile.TemporaryDirectory() as folder:
+        path = st.plot.film(run, Path(folder) / "film.gif", frames=4, progress=False)
+        with Image.open(path) as film:
+            film_is = [film.n_frames, *film.size, film.info["duration"]]
+    return {"rupture": st.plot.rupture(run, problem=LINE), "film": film_is}
+
+
+test_outputs_are_as_recorded = compared(calls, __file__)
+plt.rcParams["figure.max_open_warning"] = 0

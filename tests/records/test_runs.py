@@ -1,0 +1,192 @@
+"""Recorded outputs: studies, runs, exports, pages and what commands print."""
+
+import contextlib
+import io
+import re
+import sys
+import tempfile
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from recording import Calls, compared
+from small_study import lengths, small_study
+
+import stiction as st
+from stiction import cli
+
+calls = Calls()
+SAME = "the same numbers by st.monte_carlo, tests/user/test_study.py"
+SWEPT = small_study(
+    nodes=96,
+    length=0.047,
+    weakening_rate=0.31e12,
+    ensemble={"samples": 20, "seed": 11},
+    sweep=[
+        *lengths(2.2e-3, 5.1e-3),
+        {
+            "problem.friction.residual_strength": [5e4, 1.6e5, 2.3e5],
+            "problem.solid.poisson_ratio": [0.2, 0.3, 0.4],
+        },
+    ],
+    title="two axes",
+)
+SPECIMEN = small_study(
+    nodes=64,
+    length=0.083,
+    weakening_rate=0.19e12,
+    correlation_length=6e-3,
+    method={"type": "equilibrium", "events": 1},
+    ensemble={"samples": 6, "seed": 2},
+)
+SPECIMEN["problem"] |= {
+    "specimen": {
+        "height": 0.031,
+        "thickness": 0.0071,
+        "drive": {"type": "pusher", "height": 0.012, "width": 0.006},
+    },
+    "load": {"normal_pressure": 2.1e6},
+}
+SPECIMEN["problem"]["friction"]["residual_strength"] = 3.1e5
+PLAIN = re.compile(
+    r"<script.*?</script>|<style.*?</style>|<[^>]+>|data:image/[^\"')]*", re.DOTALL
+)
+CHANGES = re.compile(
+    r"\d+(\.\d+)? (us|ms|s|min|h)\b|(numpy|stiction|Python) [\d.]+\S*|\S*/tmp\S*"
+    r"|about [\d.e-]+ MB"
+)
+
+
+PROGRESS = re.compile(r"^(drawing the figures|onset by \w+|rupture|timing|writing)\b.*:")
+
+
+@contextlib.contextmanager
+def inside(study):
+    """A folder with a study file, in which commands run."""
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        st.Study.from_dict(study).to_toml(Path("study.toml"))
+        yield Path(folder)
+
+
+def command(line):
+    """Exit code, output and errors of a command line."""
+    out, err, code, before = io.StringIO(), io.StringIO(), 0, sys.argv
+    sys.argv = ["stiction", *line.split()]
+    with (
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+        warnings.catch_warnings(),
+    ):
+        try:
+            cli.main()
+        except SystemExit as ended:
+            code = ended.code or 0
+    sys.argv = before
+    return {"code": code, "out": quiet(out.getvalue()), "err": quiet(err.getvalue())}
+
+
+def quiet(text):
+    """A text without times, versions and folders."""
+    return "\n".join(
+        " ".join(CHANGES.sub("...", line).split())
+        for line in text.splitlines()
+        if line.strip() and not PROGRESS.search(line)
+    )
+
+
+@calls(SAME)
+def a_sweep_of_two_axes():
+    return st.Study.from_dict(SWEPT).run(progress=False)
+
+
+@calls(SAME)
+def commands_of_a_sweep():
+    found = {}
+    with inside(SWEPT) as folder:
+        for line in (
+            "run study.toml --out run --workers 1",
+            "status run --parts 3",
+            "export run all.csv",
+            "export run all.nc",
+            "report run",
+        ):
+            found[line] = command(line)
+        found["table"] = pd.read_csv(folder / "all.csv")
+        found["page"] = quiet(PLAIN.sub(" ", (folder / "run/report.html").read_text()))
+    return found
+
+
+@calls("events by st.onset of the same samples")
+def commands_of_a_specimen():
+    found = {}
+    with inside(SPECIMEN) as folder:
+        for line in (
+            "run study.toml --out run --workers 1",
+            "export run all.csv",
+            "report run",
+        ):
+            found[line] = command(line)
+        found["table"] = pd.read_csv(folder / "all.csv")
+        found["page"] = quiet(PLAIN.sub(" ", (folder / "run/report.html").read_text()))
+    return found
+
+
+@calls("st.onset and st.simulate_rupture of the same profile", close=1e-5)
+def onset_and_rupture_of_a_profile():
+    study = small_study(
+        nodes=96,
+        length=0.047,
+        weakening_rate=0.31e12,
+        method={"type": "rupture", "loading_rate": 6e8},
+    )
+    x = np.arange(96) * 0.047 / 96
+    strength = 0.95 + 0.2 * np.sin(400.0 * x) + 0.1 * np.cos(933.0 * x)
+    found = {}
+    with inside(study):
+        table = np.column_stack([1e3 * x, strength])
+        np.savetxt(
+            "scan.csv", table, delimiter=";", header="x (mm);strength (MPa)", comments=""
+        )
+        for line in (
+            "onset study.toml --strength scan.csv",
+            "rupture study.toml --strength scan.csv --out found",
+            "onset study.toml --strength scan.csv --method equilibrium --unit GPa",
+        ):
+            found[line] = command(line)
+    return found
+
+
+@calls("st.failure_curve and counting, tests/user/test_failure_run.py", close=1e-4)
+def reliability_of_uncertain_interfaces():
+    study = small_study(nodes=96, length=0.047, weakening_rate=0.31e12)
+    study["uncertain"] = {"count": 3, "strength.marginal.low": [6.1e5, 7.0e5]}
+    found = {}
+    with inside(study) as folder:
+        for line in (
+            "reliability study.toml --out run --smallest 1e-2 --repetitions 2 --workers 1",
+            "status run",
+            "export run all.csv",
+            "report run",
+        ):
+            found[line] = command(line)
+        found["table"] = pd.read_csv(folder / "all.csv")
+        found["page"] = quiet(PLAIN.sub(" ", (folder / "run/report.html").read_text()))
+    return found
+
+
+@calls("read beside the study")
+def what_a_study_would_do():
+    with inside(SWEPT):
+        check = command("check study.toml")
+        Path("study.toml").write_text(
+            Path("study.toml").read_text().replace("poisson_ratio", "poison_ratio")
+        )
+        return {
+            "check": check,
+            "wrong": command("check study.toml"),
+            "schema": command("schema"),
+        }
+
+
+test_outputs_are_as_recorded = compared(calls, __file__)

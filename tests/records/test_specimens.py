@@ -1,0 +1,115 @@
+"""Recorded outputs: finite blocks, each drive, machine, mode and pressing."""
+
+import dataclasses
+
+import numpy as np
+from recording import Calls, compared
+from setups import LOCAL
+from specimens import crooked, rough
+
+import stiction as st
+
+calls = Calls()
+ELEMENTS = "stiffness by finite elements, tests/oracle/test_block_response.py; "
+STEPS = ELEMENTS + "stepping without going back, validation/specimens.py"
+EVENTS = st.Equilibrium(events=4, slip=True, sensitivity=True)
+
+
+def solved(problem, seed=5, method=EVENTS, samples=2):
+    return st.onset(problem, rough(problem, seed, samples), method=method, progress=False)
+
+
+@calls(STEPS)
+def platen_under_dead_load():
+    return solved(crooked(nodes=72))
+
+
+@calls(STEPS)
+def platen_behind_a_machine_in_mode_three():
+    drive = st.Platen(stiffness=4.1e7)
+    return solved(crooked(nodes=72, mode="III", drive=drive, height=0.019), seed=7)
+
+
+@calls(STEPS)
+def pusher_on_the_left_behind_a_machine():
+    drive = st.Pusher(height=0.006, width=0.0035, stiffness=8.3e7)
+    return solved(crooked(nodes=72, drive=drive), seed=8)
+
+
+@calls(STEPS)
+def pusher_on_the_right_in_plane_strain():
+    drive = st.Pusher(height=0.013, width=0.007, side="right")
+    return solved(crooked(nodes=72, drive=drive, plane="strain", nu=0.41, height=0.045), seed=9)
+
+
+@calls(STEPS)
+def pushers_on_both_sides_of_a_stiff_machine():
+    drive = st.Pusher(height=0.004, width=0.002, side="both", stiffness=9e8)
+    return solved(crooked(nodes=72, drive=drive, height=0.021, residual=0.31e6), seed=11)
+
+
+@calls(STEPS)
+def glued_pressing_of_friction_coefficients():
+    problem = crooked(nodes=72, height=0.024)
+    blocks = dataclasses.replace(problem.specimen, pressing="glued")
+    problem = dataclasses.replace(
+        problem,
+        specimen=blocks,
+        friction=st.LinearWeakening(weakening_rate=0.21e12, residual_ratio=0.37),
+    )
+    field = st.RandomField(
+        st.Lognormal(mean=0.43, cv=0.19),
+        st.ExponentialSpectrum(6e-3, power_kept=0.95),
+        of="friction_coefficient",
+    )
+    return st.monte_carlo(
+        problem, field, method=st.Equilibrium(events=2), samples=3, seed=2, progress=False
+    )
+
+
+@calls(STEPS)
+def a_law_of_two_pieces():
+    friction = st.PiecewiseWeakening(
+        weakening_rate=0.26e12, residual_strength=0.45e6, slip=(0.3, 1.0), strength=(0.55, 0.0)
+    )
+    problem = dataclasses.replace(crooked(nodes=72), friction=friction)
+    return solved(problem, seed=13)
+
+
+@calls("states checked as equilibria, tests/exact/test_specimens.py")
+def a_path_with_travel_and_force():
+    drive = st.Pusher(height=0.007, width=0.004, stiffness=6e7)
+    problem = crooked(nodes=72, drive=drive)
+    loads = np.linspace(3e5, 1.6e6, 7)
+    return st.equilibrium_path(problem, rough(problem, 6)[0], loads)
+
+
+@calls("least place of the block's own windows, tests/exact/test_specimens.py")
+def local_criterion_under_a_pusher_and_a_platen():
+    drive = st.Pusher(height=0.012, width=0.006)
+    return {
+        "pusher": solved(crooked(nodes=88, drive=drive), 14, LOCAL, 3),
+        "platen": solved(crooked(nodes=88, mode="III", height=0.05), 15, LOCAL, 3),
+    }
+
+
+@calls("response of refined elements, tests/oracle/test_block_response.py", close=1e-5)
+def stiffness_and_response_of_blocks():
+    drive = st.Pusher(height=0.009, width=0.005, side="both", stiffness=2.2e8)
+    found = {}
+    for name, problem in {
+        "pushers": crooked(nodes=60, drive=drive, nu=0.21),
+        "platen": crooked(nodes=60, plane="strain", nu=0.45, height=0.07),
+        "three": crooked(nodes=60, mode="III", drive=st.Platen(stiffness=3e7)),
+    }.items():
+        blocks = problem.blocks
+        found[name] = {
+            "stiffness": blocks.stiffness,
+            "shear": blocks.shear,
+            "relief": blocks.relief,
+            "travel": blocks.travel(1.3e4, np.linspace(0.0, 2e-6, 60)),
+        }
+    return found
+
+
+test_outputs_are_as_recorded = compared(calls, __file__)
