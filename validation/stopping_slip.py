@@ -13,6 +13,8 @@ import stiction as st
 
 AT = 1e-9
 """Share of the mean strength within which a node is at its strength, and of a corner at it."""
+PIVOTS, EVENTS = 100, 200
+"""Most pivots of a minimum and most events of a path, for each node: round-off may repeat them."""
 ELASTIC = 20
 """Elastic steps of a jump after which one with the present weakening is taken."""
 
@@ -88,7 +90,7 @@ class StoppingBruteForce:
         if z.any() and np.linalg.eigvalsh(a[np.ix_(z > 0.0, z > 0.0)])[0] <= 0.0:
             z[:] = 0.0
         free, joins = z > 0.0, -1
-        while True:
+        for _ in range(PIVOTS * z.size):
             slope, d = a @ z - drive, np.zeros(z.size)
             if joins < 0 and np.abs(slope[free]).max(initial=0.0) <= least:
                 joins = int(np.where(at & ~free, slope, np.inf).argmin())
@@ -113,6 +115,7 @@ class StoppingBruteForce:
                 free[out], z[out] = False, 0.0
             elif joins >= 0:
                 free[joins], joins = True, -1
+        raise AssertionError(f"no minimum after {PIVOTS} pivots a node")
 
     def move(self, z: np.ndarray, longest: float) -> float:
         """Slip along z, at most so many times, as far as the first corner; return how far."""
@@ -170,7 +173,9 @@ class StoppingBruteForce:
     def run(self) -> "StoppingBruteForce":
         """Follow the path until the whole interface slides."""
         piece = self.piece
-        while not self.slides:
+        for _ in range(EVENTS * piece.size):
+            if self.slides:
+                return self
             rate, stable = self.complementary(self.q, self.rate)
             if stable:
                 stop = int(((rate == 0.0) & (self.rate > 0.0)).sum())
@@ -184,4 +189,4 @@ class StoppingBruteForce:
             else:
                 self.rate = np.zeros(rate.size)
                 self.jump(rate)
-        return self
+        raise AssertionError(f"no sliding after {EVENTS} events a node")
