@@ -185,7 +185,6 @@ def what_a_study_would_do():
         return {
             "check": check,
             "wrong": command("check study.toml"),
-            "schema": command("schema"),
         }
 
 
