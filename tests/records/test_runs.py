@@ -95,6 +95,15 @@ def quiet(text):
     )
 
 
+def of_commands(study, *lines):
+    """What commands print in a folder with a study, and the table and page that they leave."""
+    with inside(study) as folder:
+        found = {line: command(line) for line in lines}
+        found["table"] = pd.read_csv(folder / "all.csv")
+        found["page"] = quiet(PLAIN.sub(" ", (folder / "run/report.html").read_text()))
+    return found
+
+
 @calls(SAME)
 def a_sweep_of_two_axes():
     return st.Study.from_dict(SWEPT).run(progress=False)
@@ -102,34 +111,24 @@ def a_sweep_of_two_axes():
 
 @calls(SAME)
 def commands_of_a_sweep():
-    found = {}
-    with inside(SWEPT) as folder:
-        for line in (
-            "run study.toml --out run --workers 1",
-            "status run --parts 3",
-            "export run all.csv",
-            "export run all.nc",
-            "report run",
-        ):
-            found[line] = command(line)
-        found["table"] = pd.read_csv(folder / "all.csv")
-        found["page"] = quiet(PLAIN.sub(" ", (folder / "run/report.html").read_text()))
-    return found
+    return of_commands(
+        SWEPT,
+        "run study.toml --out run --workers 1",
+        "status run --parts 3",
+        "export run all.csv",
+        "export run all.nc",
+        "report run",
+    )
 
 
 @calls("events by st.onset of the same samples")
 def commands_of_a_specimen():
-    found = {}
-    with inside(SPECIMEN) as folder:
-        for line in (
-            "run study.toml --out run --workers 1",
-            "export run all.csv",
-            "report run",
-        ):
-            found[line] = command(line)
-        found["table"] = pd.read_csv(folder / "all.csv")
-        found["page"] = quiet(PLAIN.sub(" ", (folder / "run/report.html").read_text()))
-    return found
+    return of_commands(
+        SPECIMEN,
+        "run study.toml --out run --workers 1",
+        "export run all.csv",
+        "report run",
+    )
 
 
 @calls("st.onset and st.simulate_rupture of the same profile", close=1e-5)
@@ -161,18 +160,13 @@ def onset_and_rupture_of_a_profile():
 def reliability_of_uncertain_interfaces():
     study = small_study(nodes=96, length=0.047, weakening_rate=0.31e12)
     study["uncertain"] = {"count": 3, "strength.marginal.low": [6.1e5, 7.0e5]}
-    found = {}
-    with inside(study) as folder:
-        for line in (
-            "reliability study.toml --out run --smallest 1e-2 --repetitions 2 --workers 1",
-            "status run",
-            "export run all.csv",
-            "report run",
-        ):
-            found[line] = command(line)
-        found["table"] = pd.read_csv(folder / "all.csv")
-        found["page"] = quiet(PLAIN.sub(" ", (folder / "run/report.html").read_text()))
-    return found
+    return of_commands(
+        study,
+        "reliability study.toml --out run --smallest 1e-2 --repetitions 2 --workers 1",
+        "status run",
+        "export run all.csv",
+        "report run",
+    )
 
 
 @calls("read beside the study")
