@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from PIL import Image
 
-from stiction.equilibrium.patches import critical_patch
+from stiction.methods.equilibrium.patches import critical_patch
 from stiction.plot.style import ACCENT, INK, PAGE, QUIET, color, panel, paper_style, series
 
 LEAST = 1e-3

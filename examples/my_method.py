@@ -1,6 +1,6 @@
 """I have a criterion of my own: how does it fare against the exact onset?
 
-A method is a frozen dataclass with the seven members of `stiction.methods.Method`. This one says
+A method is a frozen dataclass with the seven members of `stiction.extensions.Method`. This one says
 that the interface slides when the mean strength over a window of given length is reached somewhere.
 """
 
@@ -10,7 +10,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 import stiction as st
-from stiction.results import onset_variables
+from stiction.extensions import onset_variables
 
 
 @dataclass(frozen=True)

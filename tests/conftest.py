@@ -11,6 +11,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from stiction.cli import commands
+
 ROOT = Path(__file__).parents[1]
 
 
@@ -105,7 +107,6 @@ def make_strength(problem):
 @pytest.fixture
 def command(monkeypatch, capfd):
     """Run a command line in this process: exit code, output, errors."""
-    from stiction import cli
 
     # pytest turns warnings into errors; on the command line they are lines of text.
     monkeypatch.setattr("warnings.showwarning", None, raising=False)
@@ -114,7 +115,7 @@ def command(monkeypatch, capfd):
         monkeypatch.setattr(sys, "argv", ["stiction", *map(str, arguments)])
         code = 0
         try:
-            cli.main()
+            commands.main()
         except SystemExit as ended:
             code = ended.code or 0
         said = capfd.readouterr()

@@ -16,8 +16,8 @@ from scipy.optimize import brentq
 from scipy.special import logsumexp
 
 import stiction as st
-from stiction.arrays import Array
-from stiction.criterion.windows import windows_of
+from stiction.base.arrays import Array
+from stiction.methods.criterion.windows import windows_of
 from stiction.random.fields import RandomField
 from stiction.random.mapping import from_normal
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction.equilibrium.sample import LINEAR, make_sample
-from stiction.equilibrium.transforms import AT_CORNER, Plane
+from stiction.methods.equilibrium.sample import LINEAR, make_sample
+from stiction.methods.equilibrium.transforms.plane import AT_CORNER, Plane
 
 
 class Lattice(Plane):

@@ -9,9 +9,9 @@ import numpy as np
 from setups import QUARTER, SOLID, make_problem, turns
 
 import stiction as st
-from stiction.dynamics.method import make_run
-from stiction.dynamics.simulate import simulate_rupture
-from stiction.dynamics.summary import energy_balance
+from stiction.methods.dynamics.method import make_run
+from stiction.methods.dynamics.simulate import simulate_rupture
+from stiction.methods.dynamics.summary import energy_balance
 
 STRESS = dataclasses.replace(SOLID, plane="stress")
 

@@ -18,11 +18,11 @@ import numpy as np
 import scipy.stats
 
 import stiction as st
+from stiction.base.progress import SILENT
 from stiction.inference.grid import grid_of
 from stiction.inference.likelihood import experiments_at, make_likelihood, simulate
 from stiction.inference.peaks import make_peaks
 from stiction.inference.prior import make_prior
-from stiction.progress import SILENT
 
 DRAWS, BINS, TESTS = 99, 10, 25
 POINTS = 30**3

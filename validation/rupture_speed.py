@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import stiction as st
-from stiction.dynamics.summary import rupture_speed
+from stiction.methods.dynamics.summary import rupture_speed
 from stiction.plot.style import COLUMN, paper_style, series
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0, plane="strain")

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 import stiction as st
-from stiction.dynamics.method import make_run
+from stiction.methods.dynamics.method import make_run
 from stiction.plot.style import PAGE, panel, paper_style, series
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")

@@ -51,7 +51,8 @@ REST = "bad_input specimens crooked criterion study dynamics_input own_method"
 
 def tests_near(target: str) -> list[str]:
     """The test files for a folder or file of the package, quick ones first."""
-    names = NEAREST.get(Path(target).parts[0].removesuffix(".py"), REST).split()
+    parts = Path(target).with_suffix("").parts
+    names = next((NEAREST[part] for part in reversed(parts) if part in NEAREST), REST).split()
     found = [path for name in names for path in sorted(ROOT.glob(f"tests/*/test_{name}.py"))]
     return list(dict.fromkeys(str(path.relative_to(ROOT)) for path in found))
 

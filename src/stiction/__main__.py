@@ -1,5 +1,5 @@
 """``python -m stiction``."""
 
-from stiction.cli import main
+from stiction.cli.commands import main
 
 main()

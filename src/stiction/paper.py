@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Literal
 
 import stiction as st
-from stiction.model import Positive, checked
+from stiction.base.model import Positive, checked
 
 
 def problem(nodes: int = 1024, plane: Literal["stress", "strain"] = "stress") -> st.Problem:

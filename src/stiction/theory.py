@@ -1,7 +1,7 @@
 """Theory of the local criterion and of cracks: results that need no ensemble."""
 
-from stiction.criterion.griffith import energy_release_rate, griffith_length
-from stiction.criterion.local import nucleation_stress
+from stiction.methods.criterion.griffith import energy_release_rate, griffith_length
+from stiction.methods.criterion.local import nucleation_stress
 from stiction.statistics.moments import nucleation_statistics
 
 __all__ = [

@@ -7,8 +7,8 @@ from oracles import angle_rule
 from planes import WAVENUMBERS
 from setups import LENGTH, RATE, exact_onset, make_problem, turns
 
-from stiction.criterion import eigenfunction
-from stiction.equilibrium.transforms import plane_onset
+from stiction.methods.criterion import eigenfunction
+from stiction.methods.equilibrium.transforms.plane import plane_onset
 
 pytestmark = pytest.mark.slow
 DEPTH = 0.4e6

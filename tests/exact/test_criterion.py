@@ -6,7 +6,7 @@ from scipy.special import jv
 from setups import QUARTER, ROUND_OFF, SOLID, local_onset, make_problem, turns
 
 import stiction as st
-from stiction.criterion.eigenfunction import (
+from stiction.methods.criterion.eigenfunction import (
     around,
     eigenvalue_and_vector,
     grid_weights,
@@ -14,8 +14,8 @@ from stiction.criterion.eigenfunction import (
     odd_bessel,
     weight,
 )
-from stiction.criterion.windows import windows_of
-from stiction.friction.parameters import SMALLEST_EIGENVALUE
+from stiction.methods.criterion.windows import windows_of
+from stiction.problem.friction.parameters import SMALLEST_EIGENVALUE
 
 
 def first_onset(problem, tau_p):

@@ -8,7 +8,7 @@ from setups import beta_strength, exact_onset, make_problem, turns
 
 import stiction as st
 from stiction.elasticity.line import apply_stiffness, make_stiffness, stiffness_column
-from stiction.equilibrium.cholesky import (
+from stiction.methods.equilibrium.dense.cholesky import (
     append,
     back_substitute,
     factor_inside,
@@ -17,12 +17,12 @@ from stiction.equilibrium.cholesky import (
     row_start,
     substitute,
 )
-from stiction.equilibrium.dense import LineProgram
-from stiction.equilibrium.linear_program import certificate
-from stiction.equilibrium.patches import count_patches, main_patch
-from stiction.equilibrium.runaway import Runs, block_factor, unstoppable_length
-from stiction.equilibrium.sample import LINEAR, make_sample, pieces_of
-from stiction.equilibrium.windows import smallest_window, window_mode
+from stiction.methods.equilibrium.dense.line import LineProgram
+from stiction.methods.equilibrium.dense.linear_program import certificate
+from stiction.methods.equilibrium.dense.runaway import Runs, block_factor, unstoppable_length
+from stiction.methods.equilibrium.dense.windows import smallest_window, window_mode
+from stiction.methods.equilibrium.patches import count_patches, main_patch
+from stiction.methods.equilibrium.sample import LINEAR, make_sample, pieces_of
 
 COLUMN = stiffness_column(256, 0.1, 1e9)
 

@@ -8,7 +8,7 @@ from checks import assert_close
 from scipy.integrate import quad
 
 import stiction as st
-from stiction.friction.kernels import line_at, strength_at, strengths
+from stiction.problem.friction.kernels import line_at, strength_at, strengths
 
 DROP, RESIDUAL, RATE = 1.1e6, 0.3e6, 0.4e12
 TWO_PIECES = {"slip": [0.2, 1.0], "strength": [0.4, 0.0]}

@@ -8,6 +8,7 @@ import scipy.stats
 from setups import EXACT, LOCAL, turns
 
 import stiction as st
+from stiction.base.progress import SILENT
 from stiction.inference.density import log_likelihoods, tabulate
 from stiction.inference.grid import grid_of
 from stiction.inference.likelihood import (
@@ -19,7 +20,6 @@ from stiction.inference.likelihood import (
 )
 from stiction.inference.prior import make_prior
 from stiction.inference.scaling import find_scaling
-from stiction.progress import SILENT
 
 pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 

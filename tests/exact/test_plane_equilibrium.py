@@ -6,11 +6,11 @@ from planes import Lattice
 from setups import RATE, exact_onset, make_problem, repeated, turns
 
 import stiction as st
-from stiction.criterion.windows import ellipse_window
 from stiction.elasticity.operator import make_operator, product
-from stiction.equilibrium.growing_patch import window_around
-from stiction.equilibrium.patches import labelled_patches, patch_of
-from stiction.equilibrium.transforms import Plane, doubled, halved, plane_onset
+from stiction.methods.criterion.windows import ellipse_window
+from stiction.methods.equilibrium.patches import labelled_patches, patch_of
+from stiction.methods.equilibrium.transforms.growing_patch import window_around
+from stiction.methods.equilibrium.transforms.plane import Plane, doubled, halved, plane_onset
 
 NODES, LENGTH = 128, 0.04
 UNEVEN = {

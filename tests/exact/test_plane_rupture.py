@@ -11,10 +11,10 @@ from ruptures import stepped, with_step
 from setups import QUARTER, RATE, make_problem
 
 import stiction as st
-from stiction.dynamics.medium import amplification
-from stiction.dynamics.simulate import simulate_rupture
 from stiction.elasticity.exponential_sum import ExponentialSum
 from stiction.elasticity.memory_kernels import memory_kernel, static_stiffness
+from stiction.methods.dynamics.medium import amplification
+from stiction.methods.dynamics.simulate import simulate_rupture
 
 # Strips are narrow, and solids soft, where only waves count.
 pytestmark = pytest.mark.filterwarnings("ignore::stiction.UnitWarning")

@@ -11,7 +11,7 @@ from scipy.stats import binom, nbinom
 from setups import EXACT, LOCAL, ensemble, local_onset, turns
 
 import stiction as st
-from stiction.progress import SILENT
+from stiction.base.progress import SILENT
 from stiction.reliability.counting import Count, count_failures
 from stiction.reliability.failure import curve_of
 from stiction.reliability.subset import Descent, Population

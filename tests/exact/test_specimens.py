@@ -16,7 +16,7 @@ from stopping_slip import StoppingBruteForce
 
 import stiction as st
 from stiction.elasticity.places import places_of
-from stiction.equilibrium.blocks import BlockProgram
+from stiction.methods.equilibrium.dense.blocks import BlockProgram
 from stiction.random.stresses import mean_in_stress, support_in_stress
 
 INF = float("inf")

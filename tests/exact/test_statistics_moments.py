@@ -8,7 +8,7 @@ from oracles import angle_rule
 from setups import make_problem
 
 import stiction as st
-from stiction.criterion import eigenfunction
+from stiction.methods.criterion import eigenfunction
 from stiction.random.mapping import correlation_of_mapped, hermite_coefficients
 from stiction.statistics.moments import nucleation_statistics, strength_spectrum
 

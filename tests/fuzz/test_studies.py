@@ -20,7 +20,7 @@ import tomli_w
 from small_study import lengths, small_study
 
 import stiction as st
-from stiction.cli import description
+from stiction.cli.commands import description
 from stiction.study.study import Study
 
 PLAIN = small_study(

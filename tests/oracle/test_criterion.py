@@ -12,7 +12,7 @@ from setups import ROUND_OFF, ensemble, exact_onset, local_onset, make_problem
 from specimens import crooked, rough
 
 import stiction as st
-from stiction.criterion import eigenfunction
+from stiction.methods.criterion import eigenfunction
 
 
 # With the error of the weights on the grid, a tenth of the strength's own variation at most.

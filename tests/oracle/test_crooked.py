@@ -20,8 +20,8 @@ from oracles import angle_rule, dense, largest_load, symbol_of
 from setups import exact_onset, local_onset
 
 import stiction as st
-from stiction.criterion.eigenfunction import weight
-from stiction.criterion.windows import STRETCHES
+from stiction.methods.criterion.eigenfunction import weight
+from stiction.methods.criterion.windows import STRETCHES
 from stiction.theory import energy_release_rate, griffith_length
 
 BOTH = pytest.mark.parametrize(

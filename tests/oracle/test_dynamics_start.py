@@ -7,8 +7,8 @@ from ruptures import CROOKED, CROOKED_STRENGTH, radiated_energy, run_of
 from setups import make_problem, turns
 
 import stiction as st
-from stiction.dynamics import slow_start as module
-from stiction.dynamics.slow_start import slow_start, static_program
+from stiction.methods.dynamics import slow_start as module
+from stiction.methods.dynamics.slow_start import slow_start, static_program
 
 RATES = (2e5, 2e7, 2e8)
 RATIOS = (0.25, 0.5, 1.0, 2.0)

@@ -8,10 +8,10 @@ from oracles import by_relaxation, largest_load, symbol_of
 from setups import RATE, exact_onset, make_problem, turns
 
 import stiction as st
-import stiction.equilibrium.dense
-from stiction.equilibrium.dense import LineProgram
-from stiction.equilibrium.solver import follow
-from stiction.equilibrium.transforms import Plane, plane_onset
+import stiction.methods.equilibrium.dense.line
+from stiction.methods.equilibrium.dense.line import LineProgram
+from stiction.methods.equilibrium.solver import follow
+from stiction.methods.equilibrium.transforms.plane import Plane, plane_onset
 
 
 def relaxed(problem, strength, load, rate=RATE):
@@ -85,7 +85,7 @@ def test_transforms_agree_with_the_dense_factor(make_strength, monkeypatch, roug
     rows = problem.sample(make_strength(0.25).sample(problem.interface, samples=4, seed=12))
     samples = [program.sample_of(rows, row) for row in range(4)]
     dense = [program.solve(sample) for sample in samples]
-    monkeypatch.setattr(stiction.equilibrium.dense, "MANY_NODES", 10)
+    monkeypatch.setattr(stiction.methods.equilibrium.dense.line, "MANY_NODES", 10)
     for sample, exact in zip(samples, dense, strict=True):
         found = program.solve(sample)
         assert found.load == pytest.approx(exact.load, rel=1e-9)

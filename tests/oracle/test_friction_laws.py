@@ -8,7 +8,7 @@ from oracles import by_relaxation, symbol_of
 from setups import beta_strength, exact_onset, make_problem
 
 import stiction as st
-from stiction.friction.kernels import strengths
+from stiction.problem.friction.kernels import strengths
 
 RATE = {"weakening_rate": 0.5e12, "residual_strength": 0.2e6}
 SLIP = {"critical_slip": 8e-6, "residual_strength": 0.2e6}

@@ -20,11 +20,14 @@ from setups import (
 import stiction as st
 from stiction.elasticity.linear import SOLVED, lowest_eigenvector, no_spring, solve_inside
 from stiction.elasticity.operator import make_operator
-from stiction.equilibrium.bracket import make_bracket
-from stiction.equilibrium.relaxation import least_equilibrium, stable_equilibrium
-from stiction.equilibrium.sample import Outcome, present_pieces
-from stiction.equilibrium.solver import follow
-from stiction.equilibrium.transforms import Plane, PlaneProgram, plane_onset
+from stiction.methods.equilibrium.sample import Outcome, present_pieces
+from stiction.methods.equilibrium.solver import follow
+from stiction.methods.equilibrium.transforms.bracket import make_bracket
+from stiction.methods.equilibrium.transforms.plane import Plane, PlaneProgram, plane_onset
+from stiction.methods.equilibrium.transforms.relaxation import (
+    least_equilibrium,
+    stable_equilibrium,
+)
 
 pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")  # 24 nodes are few
 

@@ -5,8 +5,8 @@ import pytest
 from setups import QUARTER, make_problem
 
 import stiction as st
-from stiction.dynamics.simulate import simulate_rupture
-from stiction.dynamics.summary import rupture_speed
+from stiction.methods.dynamics.simulate import simulate_rupture
+from stiction.methods.dynamics.summary import rupture_speed
 
 RATE, STRENGTH = 1e12, 1e6
 

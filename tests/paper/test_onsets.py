@@ -8,9 +8,9 @@ from importance import by_importance, longer
 from setups import LENGTH, LOCAL, RATE, beta_strength, exact_onset, local_onset, make_problem
 
 import stiction as st
-from stiction.criterion.average import least_average
-from stiction.criterion.windows import ellipse_window
-from stiction.equilibrium.transforms import Plane, plane_onset
+from stiction.methods.criterion.average import least_average
+from stiction.methods.criterion.windows import ellipse_window
+from stiction.methods.equilibrium.transforms.plane import Plane, plane_onset
 
 
 @pytest.mark.parametrize(

@@ -21,8 +21,8 @@ from setups import (
 )
 
 import stiction as st
-from stiction.criterion.average import averages
-from stiction.criterion.windows import windows_of
+from stiction.methods.criterion.average import averages
+from stiction.methods.criterion.windows import windows_of
 
 PROBLEM = make_problem(128)
 PLANE = make_problem((48, 48), (5.0 * LENGTH, 4.0 * LENGTH))

@@ -10,8 +10,8 @@ from setups import make_problem
 
 import stiction as st
 from stiction import Rupture, simulate_rupture
-from stiction.dynamics.save import read_checkpoint, write_checkpoint
-from stiction.dynamics.state import Reason
+from stiction.methods.dynamics.save import read_checkpoint, write_checkpoint
+from stiction.methods.dynamics.state import Reason
 
 NODES = 128
 PROBLEM = make_problem(NODES, 0.05, solid=st.paper.problem().solid)

@@ -6,7 +6,7 @@ from hypothesis import strategies as hs
 from setups import exact_onset, make_problem, turns
 
 import stiction as st
-from stiction.equilibrium.dense import LineProgram
+from stiction.methods.equilibrium.dense.line import LineProgram
 
 NODES = 96
 ANGLE = turns(NODES)

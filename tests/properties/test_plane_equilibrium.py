@@ -6,13 +6,13 @@ from planes import WAVENUMBERS, Lattice, plane_sample
 from setups import LENGTH, RATE, exact_onset, make_problem, smooth_noise
 
 import stiction as st
-from stiction.criterion.average import _between_nodes, least_average
-from stiction.criterion.windows import ellipse_window
 from stiction.elasticity.operator import make_operator
-from stiction.equilibrium import growing_patch, relaxation, transforms
-from stiction.equilibrium.relaxation import least_equilibrium
-from stiction.equilibrium.sample import Outcome
-from stiction.equilibrium.transforms import Plane, plane_onset
+from stiction.methods.criterion.average import _between_nodes, least_average
+from stiction.methods.criterion.windows import ellipse_window
+from stiction.methods.equilibrium import growing_patch, relaxation, transforms
+from stiction.methods.equilibrium.sample import Outcome
+from stiction.methods.equilibrium.transforms.plane import Plane, plane_onset
+from stiction.methods.equilibrium.transforms.relaxation import least_equilibrium
 
 NODES, SHAPE = (48, 40), (40, 32)
 LENGTHS = (6.0 * LENGTH, 4.0 * LENGTH)

@@ -6,8 +6,8 @@ from checks import assert_second_order
 from ruptures import BREAKING_PLANE, BREAKING_STRENGTH, dip, radiated_energy, stepped
 
 import stiction as st
-from stiction.dynamics.save import open_rupture
-from stiction.dynamics.simulate import simulate_rupture
+from stiction.methods.dynamics.save import open_rupture
+from stiction.methods.dynamics.simulate import simulate_rupture
 
 pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 

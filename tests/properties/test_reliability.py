@@ -12,9 +12,9 @@ from hypothesis import strategies as of
 from setups import EXACT, LOCAL, SOLID, ensemble, local_onset
 
 import stiction as st
+from stiction.base.errors import collect_warnings
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import LimitState
-from stiction.errors import collect_warnings
 from stiction.reliability.subset import descend
 from stiction.reliability.uncertainty import generator
 

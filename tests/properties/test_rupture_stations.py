@@ -9,7 +9,7 @@ from ruptures import BREAKING_PLANE, dip
 from setups import QUARTER, make_problem
 
 import stiction as st
-from stiction.dynamics.save import open_rupture
+from stiction.methods.dynamics.save import open_rupture
 
 pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 

@@ -14,7 +14,7 @@ from recording import Calls, compared
 from small_study import lengths, small_study
 
 import stiction as st
-from stiction import cli
+from stiction.cli import commands
 
 calls = Calls()
 SAME = "the same numbers by st.monte_carlo, tests/user/test_study.py"
@@ -79,7 +79,7 @@ def command(line):
         warnings.catch_warnings(),
     ):
         try:
-            cli.main()
+            commands.main()
         except SystemExit as ended:
             code = ended.code or 0
     sys.argv = before

@@ -11,9 +11,9 @@ from checks import python
 from refusals import refuses
 
 import stiction as st
-from stiction.kinds import register
-from stiction.load import LoadShape
-from stiction.model import model
+from stiction.base.kinds import register
+from stiction.base.model import model
+from stiction.problem.load import LoadShape
 
 MIXED = {
     "average.py", "diagnostics.py", "explicit.py", "implicit.py", "loading.py",
@@ -55,12 +55,12 @@ def test_an_edited_message_compiles_no_kernel_anew():
     }
     for path, text in texts.items():
         if path.name in MIXED or not re.search(
-            r"^from stiction\.(jit|lanes) import", text, flags=re.MULTILINE
+            r"^from stiction\.base.(jit|lanes) import", text, flags=re.MULTILINE
         ):
             continue
         for module in re.findall(r"^from (stiction[\w.]*) import", text, flags=re.MULTILINE):
             imported = texts.get(names.get(module), "")
-            assert module == "stiction.jit" or "InputError" not in imported, (path, module)
+            assert module == "stiction.base.jit" or "InputError" not in imported, (path, module)
 
 
 def worked_examples(language: str) -> list[str]:

@@ -13,9 +13,9 @@ from refusals import refusals, refuses
 from setups import LENGTH, LOCAL, RATE, SOLID, beta_strength, local_onset, make_problem
 
 import stiction as st
-from stiction.criterion.local import excess_of
 from stiction.elasticity.exponential_sum import fit_exponentials
-from stiction.equilibrium.solver import OnsetSolver, follow
+from stiction.methods.criterion.local import excess_of
+from stiction.methods.equilibrium.solver import OnsetSolver, follow
 from stiction.reliability import subset
 from stiction.statistics import density, quantiles
 from stiction.theory import energy_release_rate, griffith_length, nucleation_statistics
@@ -397,7 +397,7 @@ def test_nothing_is_said_where_nothing_is_in_doubt():
 
 
 def test_a_path_whose_end_is_not_known_is_said(monkeypatch):
-    ends = "stiction.equilibrium.path.follow"
+    ends = "stiction.methods.equilibrium.path.follow"
     monkeypatch.setattr(ends, lambda *given: dataclasses.replace(follow(*given), known=False))
     path([1e5])
     with pytest.warns(st.AccuracyWarning, match="no equilibrium was found beyond 900000 Pa"):

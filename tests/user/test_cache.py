@@ -9,10 +9,10 @@ import numba
 import pytest
 from checks import python
 
-from stiction.jit import decorators, folder, internals
+from stiction.base.jit import decorators, folder, internals
 
 SOURCES = Path(__file__).parents[2] / "src"
-WITHOUT = 'import sys\nsys.modules["stiction.jit.internals"] = None\n'
+WITHOUT = 'import sys\nsys.modules["stiction.base.jit.internals"] = None\n'
 """As if the file with numba's private parts had been deleted."""
 
 
@@ -33,19 +33,27 @@ def test_an_edited_kernel_is_another_folder_for_those_who_call_it(tmp_path, monk
     """numba looks at the kernel's own file only; the kernels here call those of other files."""
     copy = tmp_path / "stiction"
     shutil.copytree(SOURCES / "stiction", copy)
-    monkeypatch.setattr(folder, "__file__", str(copy / "jit" / "folder.py"))
+    monkeypatch.setattr(folder, "__file__", str(copy / "base" / "jit" / "folder.py"))
     monkeypatch.setattr(folder, "KEPT", "")
     sources = folder._kernel_sources.__wrapped__
     monkeypatch.setattr(folder, "_kernel_sources", sources)
     find = folder.kernel_folder.__wrapped__
     monkeypatch.setenv("STICTION_CACHE_DIR", str(tmp_path / "cache"))
     folders = []
-    for edited in (None, "errors.py", "dynamics/explicit.py", "friction/__init__.py"):
+    for edited in (
+        None,
+        "base/errors.py",
+        "methods/dynamics/explicit.py",
+        "problem/friction/__init__.py",
+    ):
         if edited:
             with (copy / edited).open("a") as file:
                 file.write("\n# edited\n")
         folders.append(
-            [find(f"stiction.{m}", "own") for m in ("dynamics.explicit", "random.synthesis")]
+            [
+                find(f"stiction.{m}", "own")
+                for m in ("methods.dynamics.explicit", "random.synthesis")
+            ]
         )
     before, message, own, law = folders
     assert before[0].parent == tmp_path / "cache" / "compiled"
@@ -56,14 +64,14 @@ def test_an_edited_kernel_is_another_folder_for_those_who_call_it(tmp_path, monk
 
 
 def test_kernels_need_no_folder(run):
-    code = "from stiction.jit import jit\n\n@jit\ndef twice(x):\n    return 2 * x\n\n"
+    code = "from stiction.base.jit import jit\n\n@jit\ndef twice(x):\n    return 2 * x\n\n"
     assert run(code + "print(twice(4))", Path(os.devnull) / "cache") == ["8"]
 
 
 LAWS = """
 from typing import NamedTuple
 import numpy as np, stiction as st
-from stiction.friction import kernels
+from stiction.problem.friction import kernels
 
 class OwnParameters(NamedTuple):
     scale: float
@@ -96,7 +104,7 @@ from numba.core import event
 before = numba.config.CACHE_DIR
 import stiction as st
 from stiction.elasticity.linear import inner
-from stiction.friction import kernels
+from stiction.problem.friction import kernels
 
 x = np.random.default_rng(7).lognormal(sigma=2.0, size=203)
 law = st.PiecewiseWeakening(slip=[0.3, 1.0], strength=[0.4, 0.0], weakening_rate=1.3).parameters
@@ -125,7 +133,7 @@ def test_plain_numba_gives_the_same_bits_and_user_code_is_left_alone(tmp_path):
 
 def imported():
     """Import the file with numba's private parts again, as a module of its own."""
-    exec(Path(internals.__file__).read_text(), {"__name__": "stiction.jit.internals"})
+    exec(Path(internals.__file__).read_text(), {"__name__": "stiction.base.jit.internals"})
 
 
 @pytest.mark.parametrize("owner", internals.PARTS)

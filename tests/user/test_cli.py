@@ -18,11 +18,11 @@ from refusals import refuses
 from small_study import lengths, small_study
 
 import stiction as st
-from stiction import files
-from stiction.cli import app, in_options, onset
+from stiction.base import files
+from stiction.base.files import private_folder
+from stiction.cli.commands import app, in_options, onset
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.store import Store
-from stiction.files import private_folder
 from stiction.study.study import study_schema
 
 STUDY = small_study(

@@ -13,12 +13,12 @@ from setups import make_problem
 
 import stiction as st
 from stiction import Rupture
-from stiction.dynamics import save as save_module
-from stiction.dynamics.save import open_rupture
-from stiction.dynamics.summary import rupture_speed
+from stiction.base.errors import StoreError
+from stiction.base.files import read_arrays
 from stiction.elasticity.exponential_sum import kernel_sum
-from stiction.errors import StoreError
-from stiction.files import read_arrays
+from stiction.methods.dynamics import save as save_module
+from stiction.methods.dynamics.save import open_rupture
+from stiction.methods.dynamics.summary import rupture_speed
 
 METHOD = Rupture(loading_rate=1e8)
 PROBLEM, PROFILE = wavy_line()
@@ -100,7 +100,7 @@ def test_a_barrier_that_slips_where_the_grid_does_not_resolve_it_is_said():
 
 
 def test_a_run_that_blows_up_stops_and_says_where(monkeypatch):
-    monkeypatch.setattr("stiction.dynamics.medium.largest_step", lambda *_: 0.02)
+    monkeypatch.setattr("stiction.methods.dynamics.medium.largest_step", lambda *_: 0.02)
     method = Rupture(loading_rate=1e8, implicit=False, stop="time", end_time=10.0)
     with pytest.warns(
         st.AccuracyWarning, match=r"non-finite at t = .* s, x = .* m \(node \d+\)"
@@ -157,7 +157,7 @@ def test_a_run_cut_short_goes_on_to_the_same_numbers(tmp_path, monkeypatch, ever
 def test_a_run_killed_after_its_last_frame_takes_no_further_step(tmp_path, monkeypatch):
     save, whole = st.Save(to=tmp_path / "run"), simulate(st.Save(to=tmp_path / "whole"))
     with monkeypatch.context() as patch:
-        patch.setattr("stiction.dynamics.save.Recorder.finish", lambda *_: 1 / 0)
+        patch.setattr("stiction.methods.dynamics.save.Recorder.finish", lambda *_: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             simulate(save)
     assert simulate(save).identical(whole)

@@ -229,7 +229,7 @@ def test_doubtful_records_are_warned_of(words):
 
 
 @pytest.mark.parametrize("records", [2, 3])
-@pytest.mark.filterwarnings("error::stiction.errors.UnitWarning")
+@pytest.mark.filterwarnings("error::stiction.base.errors.UnitWarning")
 def test_two_specimens_leave_a_wide_but_finite_scatter(records):
     rows = [
         labelled(VALUES[i * 100 : i * 100 + 100] * f, PIECE.x[:100])

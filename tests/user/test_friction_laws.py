@@ -10,8 +10,8 @@ from refusals import refusals, refuses
 from setups import LENGTH, beta_strength, make_problem
 
 import stiction as st
-from stiction.friction import FrictionLaw
-from stiction.model import model
+from stiction.base.model import model
+from stiction.problem.friction import FrictionLaw
 
 LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
 EXPONENTIAL = st.ExponentialWeakening(weakening_rate=0.5e12)

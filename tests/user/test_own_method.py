@@ -5,8 +5,8 @@ import pytest
 from refusals import refuses
 
 import stiction as st
-from stiction.results import onset_variables
-from stiction.variables import Variable
+from stiction.base.variables import Variable
+from stiction.problem.results import onset_variables
 
 
 class Broken:

@@ -8,7 +8,7 @@ from setups import make_problem
 from small_study import small_study
 
 import stiction as st
-from stiction.profiles.reading import at_nodes
+from stiction.problem.profiles.reading import at_nodes
 
 PLANE = st.Interface(length=(0.02, 0.01), nodes=(32, 16))
 VALUES = 1e6 + 1e5 * np.sin(2.0 * np.pi * PLANE.x / 0.02)[:, None] * np.ones(16)

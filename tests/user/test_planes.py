@@ -14,9 +14,9 @@ from setups import RATE, make_problem, smooth_noise
 from small_study import lengths, small_study
 
 import stiction as st
-from stiction.equilibrium import solver, transforms
-from stiction.equilibrium.relaxation import Relaxed
-from stiction.equilibrium.sample import Jump, Outcome
+from stiction.methods.equilibrium import solver, transforms
+from stiction.methods.equilibrium.sample import Jump, Outcome
+from stiction.methods.equilibrium.transforms.relaxation import Relaxed
 
 
 def smooth(shape, seed=0):

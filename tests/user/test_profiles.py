@@ -15,7 +15,7 @@ from setups import make_problem
 from small_study import small_study
 
 import stiction as st
-from stiction.units import parse
+from stiction.base.units import parse
 
 NODES = 128
 LINE = st.Interface(length=0.1, nodes=NODES)

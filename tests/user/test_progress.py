@@ -10,8 +10,8 @@ import pytest
 from checks import python
 
 import stiction as st
-from stiction import progress
-from stiction.progress import Meter
+from stiction.base import progress
+from stiction.base.progress import Meter
 
 
 @pytest.fixture
@@ -88,7 +88,7 @@ def test_one_of_nested_meters_is_shown(hasty, capsys):
         work(Meter("inner", 100), 0.4)
     assert "inner: " in capsys.readouterr().err
     assert threading.active_count() == before
-    code = "from stiction.progress import Meter; Meter('left open').__enter__()"
+    code = "from stiction.base.progress import Meter; Meter('left open').__enter__()"
     python("-c", code)
 
 

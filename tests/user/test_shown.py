@@ -15,10 +15,10 @@ from setups import LOCAL, local_onset
 from small_study import small_study
 
 import stiction as st
-from stiction import cli, report
+from stiction.base.errors import StoreError
+from stiction.cli import commands, report
 from stiction.ensemble import batches
 from stiction.ensemble.experiment import Experiment
-from stiction.errors import StoreError
 from stiction.study import export
 
 SCALES = {"": 1.0, "mm": 1e3, "kPa": 1e-3, "MPa": 1e-6}
@@ -210,7 +210,7 @@ Cost = namedtuple("Cost", "seconds failures")
 
 def test_the_description_of_a_study_and_its_time(monkeypatch):
     study = swept()
-    lines = cli.description(study)
+    lines = commands.description(study)
     h_n = study.experiments[0].problem.nucleation_length
     assert lines["nucleation length"] == f"{h_n:.5g} m"
     assert lines["nodes in h_n"] == f"{h_n / (0.037 / 96):.5g}"
@@ -230,7 +230,7 @@ def test_the_description_of_a_study_and_its_time(monkeypatch):
 
     monkeypatch.setattr(batches, "solve_span", solved)
     monkeypatch.setattr(batches, "usable_cores", lambda: 4)
-    cost, _, _ = cli._cost(study)
+    cost, _, _ = commands._cost(study)
     words = "about 5 min on one core, 75 s on the 4 here (1 s to 4 s a sample"
     assert cost["time"].startswith(words)
     size = sum(point.sample_bytes for point in study.experiments) * 30

@@ -22,15 +22,15 @@ from setups import beta_strength, make_problem
 from small_study import lengths, small_study
 
 import stiction as st
-from stiction import files, kinds
+from stiction.base import files, kinds
+from stiction.base.errors import StoreError, WorkerError
+from stiction.base.kinds import register
+from stiction.base.model import model
+from stiction.cli.report import write_report
 from stiction.ensemble import batches, pilot, store
 from stiction.ensemble.dataset import Gathered
 from stiction.ensemble.experiment import Experiment
-from stiction.errors import StoreError, WorkerError
-from stiction.kinds import register
-from stiction.load import LoadShape
-from stiction.model import model
-from stiction.report import write_report
+from stiction.problem.load import LoadShape
 from stiction.study.run import samples_of_part
 
 STUDY = small_study(

@@ -9,8 +9,8 @@ import tomli_w
 from small_study import small_study
 
 import stiction as st
-from stiction import cli
-from stiction.errors import collect_warnings, merge_warnings, warn_of_samples, warn_user
+from stiction.base.errors import collect_warnings, merge_warnings, warn_of_samples, warn_user
+from stiction.cli import commands
 
 STIFF = float("inf")
 
@@ -157,7 +157,7 @@ def test_the_same_doubts_in_python_in_a_study_and_in_a_command(
         said = runs(f"{line} --out B", code=2 * refused).splitlines()
     start = "error: " if refused else "warning: "
     printed = {text.removeprefix(start) for text in said if text.startswith(start)}
-    command = cli.reliability if curve else cli.run
+    command = commands.reliability if curve else commands.run
     assert found[0] == found[1]
-    assert {cli.in_options(text, command) for text in found[0]} == printed
+    assert {commands.in_options(text, command) for text in found[0]} == printed
     assert found[0]

@@ -21,7 +21,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 from scipy.fft import idct
 
-from stiction.arrays import Array, one_blas_thread
+from stiction.base.arrays import Array, one_blas_thread
 from stiction.elasticity.free_end import (
     image_slip,
     lattice_symbol,

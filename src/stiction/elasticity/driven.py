@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from stiction.arrays import Array
+from stiction.base.arrays import Array
 from stiction.elasticity.blocks import Pushes, block_response, glued_pressure
 
 POSITIVE = 1e-12

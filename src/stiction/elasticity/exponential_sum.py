@@ -17,10 +17,10 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.arrays import one_blas_thread
+from stiction.base.arrays import one_blas_thread
+from stiction.base.errors import InputError, StoreError
+from stiction.base.files import UNREADABLE, cache_folder, read_arrays, write_arrays
 from stiction.elasticity.memory_kernels import arc_quadrature, exponential_sum
-from stiction.errors import InputError, StoreError
-from stiction.files import UNREADABLE, cache_folder, read_arrays, write_arrays
 
 Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]

@@ -7,7 +7,7 @@ reflection on the free surface (Muskhelishvili 1953, chapter 18).
 
 import numpy as np
 
-from stiction.arrays import Array
+from stiction.base.arrays import Array
 from stiction.elasticity.rectangle import Goursat
 
 CORRECTION = 1.0 / 12.0

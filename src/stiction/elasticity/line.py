@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stiction.arrays import Array
-from stiction.jit import ZERO, jit
-from stiction.lanes import multiply_add
+from stiction.base.arrays import Array
+from stiction.base.jit import ZERO, jit
+from stiction.base.lanes import multiply_add
 
 
 def stiffness_column(nodes: int, length: float, modulus: float) -> Array:

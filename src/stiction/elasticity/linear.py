@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.arrays import Array
+from stiction.base.arrays import Array
+from stiction.base.jit import jit, jit_allocating
+from stiction.base.lanes import LANES, add, load, multiply_add, total, zeros
 from stiction.elasticity.operator import Operator, filtered, product
-from stiction.jit import jit, jit_allocating
-from stiction.lanes import LANES, add, load, multiply_add, total, zeros
 
 SOLVED = 0
 NEGATIVE = 1

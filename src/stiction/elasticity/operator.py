@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from rocket_fft import c2c, c2r, r2c
 
-from stiction.arrays import Array
-from stiction.jit import jit, jit_inside
+from stiction.base.arrays import Array
+from stiction.base.jit import jit, jit_inside
 
 
 def stiffness_symbol(

@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 import scipy.linalg
 
-from stiction.arrays import Array
+from stiction.base.arrays import Array
 from stiction.elasticity.driven import Driven
 from stiction.elasticity.weakest import Places
 

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stiction.arrays import Array
+from stiction.base.arrays import Array
 
 DEGREE = 24
 """Degree of the polynomials for a block, with its mirror image, as long as high."""

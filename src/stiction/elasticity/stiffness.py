@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba.extending import overload
 
-from stiction.arrays import Array
+from stiction.base.arrays import Array
+from stiction.base.jit import ZERO, jit
 from stiction.elasticity.line import Stiffness, add_four, apply_stiffness
-from stiction.jit import ZERO, jit
 
 
 class BlockStiffness(NamedTuple):

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.arrays import Array
+from stiction.base.arrays import Array
+from stiction.base.jit import jit
 from stiction.elasticity.linear import dot
-from stiction.jit import jit
 
 
 class Places(NamedTuple):

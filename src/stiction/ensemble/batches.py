@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction import __version__
-from stiction.arrays import one_blas_thread
-from stiction.ensemble.experiment import Experiment
-from stiction.errors import (
+from stiction.base.arrays import one_blas_thread
+from stiction.base.errors import (
     InputError,
     Warned,
     WorkerError,
@@ -26,6 +25,7 @@ from stiction.errors import (
     merge_warnings,
     merged,
 )
+from stiction.ensemble.experiment import Experiment
 from stiction.random.synthesis import BLOCK, block_of
 
 POINT: str = "_point"

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction.base.model import check_memory
+from stiction.base.variables import SAMPLE, Variable
 from stiction.ensemble.batches import NUMBER, POINT, Failure, Table
 from stiction.ensemble.experiment import Ensemble, Experiment
-from stiction.model import check_memory
-from stiction.results import as_text, to_dataset
-from stiction.variables import SAMPLE, Variable
+from stiction.problem.results import as_text, to_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

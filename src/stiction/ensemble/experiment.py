@@ -13,10 +13,11 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from stiction.arrays import Array
-from stiction.errors import InputError, UnitWarning, unknown_name, warn_user
-from stiction.friction import SCALES
-from stiction.methods import (
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, UnitWarning, unknown_name, warn_user
+from stiction.base.model import Count, Names, Number, model
+from stiction.base.variables import PROFILES, Variable
+from stiction.methods.protocol import (
     Solver,
     Values,
     batch_size,
@@ -24,8 +25,9 @@ from stiction.methods import (
     seconds_per_sample,
     variables_of,
 )
-from stiction.model import Count, Names, Number, model
-from stiction.problem import Problem, refusals
+from stiction.problem.friction import SCALES
+from stiction.problem.problem import Problem, refusals
+from stiction.problem.results import along
 from stiction.random.equally_likely import as_random
 from stiction.random.stresses import (
     check_pressure,
@@ -33,8 +35,6 @@ from stiction.random.stresses import (
     mean_in_stress,
     profiles_in_stress,
 )
-from stiction.results import along
-from stiction.variables import PROFILES, Variable
 
 MOST_NUMBERS = 1 << 20
 """Nodes, and draws, of all samples of planes that are solved at once: 8 MiB for each profile."""

@@ -9,18 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from stiction.arrays import Array
-from stiction.criterion.windows import windows_of
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError
+from stiction.base.model import Count, Numbers, check, checked, describe
+from stiction.base.progress import SILENT, Meter
 from stiction.elasticity.places import places_of
 from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.monte_carlo import check_fields
-from stiction.errors import InputError
-from stiction.friction import SCALES
-from stiction.methods import METHODS, MethodObject
-from stiction.model import Count, Numbers, check, checked, describe
-from stiction.problem import Problem
-from stiction.progress import SILENT, Meter
+from stiction.methods.criterion.windows import windows_of
+from stiction.methods.protocol import METHODS, MethodObject
+from stiction.problem.friction import SCALES
+from stiction.problem.problem import Problem
 from stiction.random.equally_likely import AnyRandom
 from stiction.random.fields import RandomInterface
 from stiction.random.stresses import support_in_stress

@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
+from stiction.base.errors import InputError, RunError, Warned, merge_warnings, warn_accuracy
+from stiction.base.model import Count, Flag, Names, Number, Progress, checked
+from stiction.base.progress import Meter, Show
 from stiction.ensemble.batches import missing_spans, solve_spans, usable_cores
 from stiction.ensemble.dataset import Gathered, GridAxes, distinct, labels_of
 from stiction.ensemble.experiment import Ensemble, Experiment
 from stiction.ensemble.pilot import compare, doubt
 from stiction.ensemble.store import Store
-from stiction.errors import InputError, RunError, Warned, merge_warnings, warn_accuracy
-from stiction.methods import MethodObject
-from stiction.model import Count, Flag, Names, Number, Progress, checked
-from stiction.problem import Problem
-from stiction.progress import Meter, Show
+from stiction.methods.protocol import MethodObject
+from stiction.problem.problem import Problem
+from stiction.problem.results import study_attributes
 from stiction.random.equally_likely import AnyRandom
-from stiction.results import study_attributes
 
 if TYPE_CHECKING:
     import xarray as xr

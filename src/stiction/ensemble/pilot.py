@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from stiction.arrays import Array
-from stiction.criterion.local import LocalCriterion
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, collect_warnings
+from stiction.base.progress import Meter
 from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.experiment import Experiment
-from stiction.equilibrium.method import Equilibrium
-from stiction.errors import InputError, collect_warnings
-from stiction.progress import Meter
+from stiction.methods.criterion.local import LocalCriterion
+from stiction.methods.equilibrium.method import Equilibrium
 
 ON_A_LINE, ON_A_PLANE = 32, 8
 """Numbers of first samples of a pilot, and of the weakest ones."""

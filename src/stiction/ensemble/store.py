@@ -21,11 +21,11 @@ from typing import Any
 
 import numpy as np
 
+from stiction.base.errors import InputError, StoreError, warn_user
+from stiction.base.files import PART, cannot, write_whole
+from stiction.base.model import describe
 from stiction.ensemble.batches import Failure, Table, versions
 from stiction.ensemble.pilot import LOOKED_AT
-from stiction.errors import InputError, StoreError, warn_user
-from stiction.files import PART, cannot, write_whole
-from stiction.model import describe
 
 FORMAT = 5
 STUDY, PILOT, LABELS, CHUNKS = "study.json", "pilot.json", "labels.json", "chunks"

@@ -13,14 +13,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from stiction.arrays import Array
-from stiction.errors import InputError, warn_accuracy
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, warn_accuracy
+from stiction.base.model import Number, at_least, brief, checked
 from stiction.inference.grid import grid_of
 from stiction.inference.likelihood import area_of, variable_of
 from stiction.inference.peaks import Peaks, factor_of, make_peaks
 from stiction.inference.posterior import Posterior
-from stiction.load import NotNegative
-from stiction.model import Number, at_least, brief, checked
+from stiction.problem.load import NotNegative
 
 POINTS, VALUES = 1000, 400
 """Parameters that stand for a posterior, and values at which the density of a peak is kept."""

@@ -8,8 +8,8 @@ from scipy.optimize import brentq
 from scipy.stats import chi2
 from scipy.stats import t as student
 
-from stiction.arrays import Array
-from stiction.errors import InputError
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError
 
 MOST_SCATTER = math.log(2.0)
 """Largest variance between specimens of the logarithm that is searched: a factor of cv 1."""

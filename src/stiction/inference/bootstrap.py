@@ -9,9 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stiction.arrays import Array
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError
+from stiction.base.progress import Meter, Show
 from stiction.ensemble.batches import in_threads, usable_cores
-from stiction.errors import InputError
 from stiction.inference.between import as_of_one, levels_of, scatter_between
 from stiction.inference.marginal_fit import Family, distance, with_parameters
 from stiction.inference.whittle import (
@@ -25,7 +26,6 @@ from stiction.inference.whittle import (
     origin,
 )
 from stiction.inference.window import RecordWindow
-from stiction.progress import Meter, Show
 from stiction.random.fields import RandomField
 from stiction.random.mapping import from_normal
 

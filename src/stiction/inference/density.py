@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
-from stiction.arrays import Array
-from stiction.jit import jit
+from stiction.base.arrays import Array
+from stiction.base.jit import jit
 
 GROUPS = 256
 """Largest number of groups of neighbouring sorted samples, whose means stand for the sample."""

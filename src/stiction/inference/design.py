@@ -7,20 +7,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stiction.arrays import Array
-from stiction.errors import InputError, unknown_name
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, unknown_name
+from stiction.base.model import Count, Names, Progress, at_least, check, checked, is_whole
+from stiction.base.progress import Meter
+from stiction.base.variables import Variable
 from stiction.inference.grid import grid_of
 from stiction.inference.likelihood import Likelihood, make_likelihood, variable_of
 from stiction.inference.peaks import factor_of
 from stiction.inference.prior import make_prior
-from stiction.load import NotNegative
-from stiction.methods import MethodObject
-from stiction.model import Count, Names, Progress, at_least, check, checked, is_whole
-from stiction.problem import Problem
-from stiction.progress import Meter
+from stiction.methods.protocol import MethodObject
+from stiction.problem.load import NotNegative
+from stiction.problem.problem import Problem
+from stiction.problem.results import to_dataset
 from stiction.random.fields import RandomField, RandomInterface
-from stiction.results import to_dataset
-from stiction.variables import Variable
 
 POINTS = 8_000
 """Number of points of the grid of each posterior."""

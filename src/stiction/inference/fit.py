@@ -10,8 +10,10 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 from scipy.stats import t as student
 
-from stiction.arrays import Array
-from stiction.errors import InputError, unknown_name, warn_accuracy
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, unknown_name, warn_accuracy
+from stiction.base.model import Count, Flag, Number, Positive, Progress, at_least, checked
+from stiction.base.variables import QUANTITIES
 from stiction.inference.between import likely_between, scatter_between
 from stiction.inference.bootstrap import (
     FEWEST,
@@ -27,13 +29,11 @@ from stiction.inference.marginal_fit import Family, family_of, mean_log_likeliho
 from stiction.inference.records import Record, records_of
 from stiction.inference.whittle import SpectrumFamily, spectrum_of
 from stiction.inference.window import RecordWindow
-from stiction.interface import Interface
-from stiction.load import NotNegative
-from stiction.model import Count, Flag, Number, Positive, Progress, at_least, checked
+from stiction.problem.interface import Interface
+from stiction.problem.load import NotNegative
 from stiction.random.fields import RandomField, RandomInterface
 from stiction.random.marginals import Lognormal
 from stiction.random.spectra import Share
-from stiction.variables import QUANTITIES
 
 MARGINALS = ("lognormal", "weibull", "gamma", "beta")
 ENOUGH_LENGTHS = 10.0

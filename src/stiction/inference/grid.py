@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import entropy
 
-from stiction.arrays import Array
+from stiction.base.arrays import Array
 
 POINTS = 100_000
 """Approximate number of points of a grid."""

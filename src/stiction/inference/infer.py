@@ -5,11 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from stiction.arrays import Array
-from stiction.criterion.local import LocalCriterion
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, warn_accuracy
+from stiction.base.model import Count, Progress, at_least, checked
+from stiction.base.progress import Meter
 from stiction.ensemble.limit_state import no_single_length
 from stiction.ensemble.pilot import compare, doubt
-from stiction.errors import InputError, warn_accuracy
 from stiction.inference.grid import grid_of
 from stiction.inference.joined import join
 from stiction.inference.likelihood import (
@@ -23,11 +24,10 @@ from stiction.inference.likelihood import (
 from stiction.inference.peaks import Peaks, factor_of, make_peaks
 from stiction.inference.posterior import DRAWS, Posterior
 from stiction.inference.prior import Prior, make_prior
-from stiction.load import NotNegative
-from stiction.methods import MethodObject
-from stiction.model import Count, Progress, at_least, checked
-from stiction.problem import Problem
-from stiction.progress import Meter
+from stiction.methods.criterion.local import LocalCriterion
+from stiction.methods.protocol import MethodObject
+from stiction.problem.load import NotNegative
+from stiction.problem.problem import Problem
 from stiction.random.equally_likely import AnyRandom
 from stiction.random.stresses import mean_in_stress
 

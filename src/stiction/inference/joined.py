@@ -12,16 +12,16 @@ from typing import Any
 import numpy as np
 from scipy.stats import entropy
 
-from stiction.arrays import Array
-from stiction.errors import InputError, prefixed, warn_accuracy
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, prefixed, warn_accuracy
+from stiction.base.progress import Meter
 from stiction.inference.agreement import agreement
 from stiction.inference.grid import PosteriorGrid, grid_of
 from stiction.inference.likelihood import Likelihood, make_likelihood, variable_of
 from stiction.inference.peaks import Peaks
 from stiction.inference.posterior import DRAWS, MEMBER, Posterior
 from stiction.inference.prior import Prior
-from stiction.problem import Problem
-from stiction.progress import Meter
+from stiction.problem.problem import Problem
 from stiction.random.equally_likely import EquallyLikely, Source, as_random
 from stiction.random.fields import RandomInterface
 

@@ -10,19 +10,19 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.arrays import Array
-from stiction.criterion.local import LocalCriterion
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, warn_user
+from stiction.base.progress import SILENT, Meter, duration
+from stiction.base.units import is_in
 from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import LimitState, no_single_length
-from stiction.errors import InputError, warn_user
 from stiction.inference.density import ERRORS, Densities, log_likelihoods, tabulate
 from stiction.inference.prior import Prior
 from stiction.inference.scaling import Scaling, find_scaling
-from stiction.progress import SILENT, Meter, duration
+from stiction.methods.criterion.local import LocalCriterion
 from stiction.random.dotted_keys import full_key
 from stiction.random.synthesis import BLOCK
-from stiction.units import is_in
 
 NODES = {0: 1, 1: 25, 2: 11, 3: 7, 4: 5}
 COARSE = {0: 1, 1: 5, 2: 4, 3: 3, 4: 2}

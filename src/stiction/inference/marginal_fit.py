@@ -16,10 +16,10 @@ import numpy as np
 import scipy.stats
 from scipy.special import betainc, betaln, gammainc, ndtr
 
-from stiction.arrays import Array
-from stiction.errors import InputError, unknown_name
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, unknown_name
+from stiction.base.model import describe, is_finite
 from stiction.inference.scoring import climb
-from stiction.model import describe, is_finite
 from stiction.random.marginals import MARGINALS, Beta, ScipyMarginal, marginal_of
 
 BINS = 160

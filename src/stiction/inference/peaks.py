@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stiction.arrays import Array
-from stiction.errors import InputError, prefixed
-from stiction.model import FilePath, Numbers, check, describe, is_finite
-from stiction.profiles.tables import read_table
-from stiction.units import factor_to, is_in
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, prefixed
+from stiction.base.model import FilePath, Numbers, check, describe, is_finite
+from stiction.base.units import factor_to, is_in
+from stiction.problem.profiles.tables import read_table
 
 FEWEST = 3
 """Fewest peaks in all: of two numbers, one may be a mistake."""

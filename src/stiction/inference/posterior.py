@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from stiction.arrays import Array
-from stiction.errors import InputError
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError
+from stiction.base.model import Count, Number, Numbers, check, checked
 from stiction.inference.likelihood import Likelihood
 from stiction.inference.peaks import Peaks
 from stiction.inference.prior import Prior
-from stiction.model import Count, Number, Numbers, check, checked
-from stiction.problem import Problem
+from stiction.problem.problem import Problem
 from stiction.random.dotted_keys import full_key
 from stiction.random.fields import RandomInterface
 from stiction.random.spectra import Share

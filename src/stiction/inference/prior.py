@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from stiction.arrays import Array
-from stiction.errors import InputError, prefixed
-from stiction.model import describe
-from stiction.problem import Problem
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, prefixed
+from stiction.base.model import describe
+from stiction.problem.problem import Problem
 from stiction.random.dotted_keys import distributions_of, full_key, with_values
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 

@@ -4,12 +4,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stiction.arrays import Array
-from stiction.errors import InputError, prefixed, warn_accuracy
-from stiction.interface import Interface
-from stiction.model import real_array
-from stiction.profiles.placing import points_of
-from stiction.profiles.reading import is_labelled, labelled, simplified
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, prefixed, warn_accuracy
+from stiction.base.model import real_array
+from stiction.problem.interface import Interface
+from stiction.problem.profiles.placing import points_of
+from stiction.problem.profiles.reading import is_labelled, labelled, simplified
 
 FEWEST = 64
 """Fewest measured points from which a spectrum can be estimated."""

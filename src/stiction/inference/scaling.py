@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stiction.arrays import Array
+from stiction.base.arrays import Array
 from stiction.inference.prior import Prior
 from stiction.random.dotted_keys import full_key
 from stiction.random.marginals import affine_parameters

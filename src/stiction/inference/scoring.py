@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from stiction.arrays import Array
+from stiction.base.arrays import Array
 
 STEPS = 40
 HIGHEST = 1e8

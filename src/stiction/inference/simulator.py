@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from stiction.arrays import Array
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError
+from stiction.base.model import Names, Numbers, at_least, check, checked, describe
 from stiction.ensemble.experiment import Experiment
-from stiction.errors import InputError
 from stiction.inference.likelihood import simulate
 from stiction.inference.prior import with_parameters
-from stiction.load import NotNegative
-from stiction.methods import MethodObject
-from stiction.model import Names, Numbers, at_least, check, checked, describe
-from stiction.problem import Problem
+from stiction.methods.protocol import MethodObject
+from stiction.problem.load import NotNegative
+from stiction.problem.problem import Problem
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 
 

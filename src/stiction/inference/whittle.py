@@ -24,11 +24,11 @@ from numpy.polynomial.hermite_e import hermevander
 from scipy.ndimage import uniform_filter
 from scipy.special import factorial
 
-from stiction.arrays import Array
+from stiction.base.arrays import Array
+from stiction.base.kinds import from_table
 from stiction.inference.marginal_fit import table_of
 from stiction.inference.scoring import climb
 from stiction.inference.window import RecordWindow
-from stiction.kinds import from_table
 from stiction.random.mapping import quantile_of_normal
 from stiction.random.spectra import SPECTRA
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy import fft
 from scipy.signal.windows import tukey
 
-from stiction.arrays import Array
+from stiction.base.arrays import Array
 
 TAPERED = 0.5
 """Share of a record over which the cosine taper rises and falls."""

@@ -10,12 +10,12 @@ import pydantic
 import xarray as xr
 from matplotlib.axes import Axes
 
-from stiction.errors import InputError
-from stiction.model import check
+from stiction.base.errors import InputError
+from stiction.base.model import check
+from stiction.base.units import unit_for
+from stiction.base.variables import DIRECTION, FRICTION_COEFFICIENT
 from stiction.plot.style import COLUMN, paper_style
-from stiction.problem import Problem
-from stiction.units import unit_for
-from stiction.variables import DIRECTION, FRICTION_COEFFICIENT
+from stiction.problem.problem import Problem
 
 
 def with_unit(name: str, unit: str) -> str:

@@ -7,12 +7,12 @@ import xarray as xr
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from stiction.errors import InputError
+from stiction.base.errors import InputError
+from stiction.base.variables import DIRECTION
 from stiction.plot.axes import named, need, on_axes, scaled, shown_quantity
 from stiction.plot.style import color, series
 from stiction.statistics.densities import density
 from stiction.statistics.estimates import quantiles as estimate_quantiles
-from stiction.variables import DIRECTION
 
 CURVES = 6
 FEWEST = 20

@@ -6,8 +6,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from stiction.errors import InputError
-from stiction.model import Positive, Real, checked
+from stiction.base.errors import InputError
+from stiction.base.model import Positive, Real, checked
+from stiction.base.units import in_words, unit_for
 from stiction.plot.axes import (
     add_friction_scale,
     add_scale,
@@ -18,7 +19,6 @@ from stiction.plot.axes import (
 )
 from stiction.plot.style import ACCENT, BAND, INK, PALE, QUIET
 from stiction.reliability.answer import bounded
-from stiction.units import in_words, unit_for
 
 TINY = 1e-300
 """Probability that stands for none on a logarithmic scale."""

@@ -6,16 +6,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from stiction.errors import InputError
-from stiction.interface import Interface
-from stiction.model import check
+from stiction.base.errors import InputError
+from stiction.base.model import check
+from stiction.base.units import unit_for
+from stiction.base.variables import PROFILES, QUANTITIES
 from stiction.plot.axes import add_friction_scale, on_axes, with_unit
 from stiction.plot.style import INK, PAGE, color, series
-from stiction.problem import Problem
-from stiction.profiles.reading import is_coefficient
+from stiction.problem.interface import Interface
+from stiction.problem.problem import Problem
+from stiction.problem.profiles.reading import is_coefficient
 from stiction.random.fields import RandomField
-from stiction.units import unit_for
-from stiction.variables import PROFILES, QUANTITIES
 
 MOST_LINES = 6
 

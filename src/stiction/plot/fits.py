@@ -10,6 +10,8 @@ from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 from numpy.typing import NDArray
 from scipy import fft
 
+from stiction.base.units import unit_for
+from stiction.base.variables import QUANTITIES
 from stiction.inference.agreement import Agreement
 from stiction.inference.bootstrap import bands
 from stiction.inference.fit import FieldFit
@@ -26,8 +28,6 @@ from stiction.plot.style import (
     panel,
     paper_style,
 )
-from stiction.units import unit_for
-from stiction.variables import QUANTITIES
 
 Array = NDArray[np.float64]
 

@@ -11,10 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
-from stiction.criterion.local import nucleation_stress
-from stiction.equilibrium.patches import critical_patch
-from stiction.errors import InputError
-from stiction.interface import Interface
+from stiction.base.errors import InputError
+from stiction.base.units import unit_for
+from stiction.methods.criterion.local import nucleation_stress
+from stiction.methods.equilibrium.patches import critical_patch
 from stiction.plot.axes import (
     add_friction_scale,
     named,
@@ -25,10 +25,10 @@ from stiction.plot.axes import (
 )
 from stiction.plot.fields import draw_map, draw_outline, map_height, name_line, rows_of
 from stiction.plot.style import ACCENT, PAGE, PALE, QUIET, color, series
-from stiction.problem import Problem
-from stiction.profiles.placing import IN_GAP, MEASURED
-from stiction.profiles.reading import is_coefficient
-from stiction.units import unit_for
+from stiction.problem.interface import Interface
+from stiction.problem.problem import Problem
+from stiction.problem.profiles.placing import IN_GAP, MEASURED
+from stiction.problem.profiles.reading import is_coefficient
 
 Array = NDArray[np.float64]
 

@@ -13,14 +13,14 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from stiction.errors import InputError
-from stiction.model import FilePath, at_least, check
+from stiction.base.errors import InputError
+from stiction.base.model import FilePath, at_least, check
+from stiction.base.progress import Meter, Show
+from stiction.base.units import unit_for
 from stiction.plot.axes import need, on_axes, problem_of, with_unit
 from stiction.plot.fields import draw_map, map_height, name_line
 from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, paper_style
-from stiction.problem import Problem
-from stiction.progress import Meter, Show
-from stiction.units import unit_for
+from stiction.problem.problem import Problem
 
 Array = NDArray[np.float64]
 Moving = list[tuple[Any, str, Any]]

@@ -9,13 +9,13 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from stiction.model import check
+from stiction.base.model import check
+from stiction.base.units import unit_for
 from stiction.plot.axes import need, on_axes, problem_of, with_unit
 from stiction.plot.fields import rows_of
 from stiction.plot.style import ACCENT, COLUMN, PALE, QUIET, paper_style, series
-from stiction.problem import Problem
-from stiction.specimen import Pusher
-from stiction.units import unit_for
+from stiction.problem.problem import Problem
+from stiction.problem.specimen import Pusher
 
 Array = NDArray[np.float64]
 

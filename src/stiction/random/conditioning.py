@@ -27,15 +27,15 @@ from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 from scipy.linalg import eigh, svd
 from scipy.special import ndtri
 
-from stiction.arrays import Array
-from stiction.errors import InputError, warn_accuracy
-from stiction.interface import Interface
-from stiction.model import PROFILE_SCHEMA, Numbers, Positive, check, model
-from stiction.profiles.placing import MEASURED
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, warn_accuracy
+from stiction.base.model import PROFILE_SCHEMA, Numbers, Positive, check, model
+from stiction.base.units import parse
+from stiction.problem.interface import Interface
+from stiction.problem.profiles.placing import MEASURED
 from stiction.random.mapping import from_normal, quantile_of_normal
 from stiction.random.synthesis import condition
 from stiction.random.transport import Ratio, make_transport, transport
-from stiction.units import parse
 
 DOUBTFUL = 5.0  # standard deviations of chi-square beyond which values do not suit a field
 UNCERTAIN = 0.1  # of a standard deviation of z, by which a posterior may be off

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import scipy.stats
 
-from stiction.errors import InputError, prefixed, unknown_name
-from stiction.model import describe, is_finite, keys_of
+from stiction.base.errors import InputError, prefixed, unknown_name
+from stiction.base.model import describe, is_finite, keys_of
+from stiction.base.variables import PROFILES
 from stiction.random.marginals import Marginal, ScipyMarginal, marginal_of
-from stiction.variables import PROFILES
 
 OF_INTERFACE = (*PROFILES, "correlation", "between")
 OF_FIELD = ("marginal", "spectrum", "anisotropy", "given")

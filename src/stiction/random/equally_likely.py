@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from pydantic import InstanceOf
 from scipy.special import ndtr
 
-from stiction.arrays import Array
-from stiction.errors import InputError
-from stiction.interface import Interface
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError
+from stiction.problem.interface import Interface
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface, layout
 from stiction.random.synthesis import BLOCK, Stream
 

@@ -15,11 +15,9 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 from scipy.optimize import brentq
 from scipy.special import ndtri
 
-from stiction.arrays import Array
-from stiction.errors import InputError, prefixed, unknown_name, warn_accuracy
-from stiction.friction import SCALES
-from stiction.interface import Interface
-from stiction.model import (
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, prefixed, unknown_name, warn_accuracy
+from stiction.base.model import (
     Count,
     Flag,
     Number,
@@ -31,6 +29,10 @@ from stiction.model import (
     describe,
     model,
 )
+from stiction.base.units import is_in
+from stiction.base.variables import PROFILES
+from stiction.problem.friction import SCALES
+from stiction.problem.interface import Interface
 from stiction.random.conditioning import Conditioning, Conditions, Measured
 from stiction.random.dotted_keys import distributions_of, full_key, with_values
 from stiction.random.mapping import correlation_of_mapped, from_normal, hermite_coefficients
@@ -38,8 +40,6 @@ from stiction.random.marginals import AnyMarginal
 from stiction.random.modes import Modes, make_modes
 from stiction.random.spectra import Share, Spectrum, lag_of_correlation
 from stiction.random.synthesis import BLOCK, Stream, block_of
-from stiction.units import is_in
-from stiction.variables import PROFILES
 
 NAMES = tuple(PROFILES)
 COEFFICIENTS = ("strength", "residual_strength", "initial_stress")  # or stresses
@@ -388,7 +388,7 @@ class RandomInterface:
 
     @cached_property
     def properties(self) -> dict[str, RandomField]:
-        """The random properties by name, in the order of `stiction.variables.PROFILES`."""
+        """The random properties by name, in the order of `stiction.base.variables.PROFILES`."""
         return {name: getattr(self, name) for name in NAMES if getattr(self, name) is not None}
 
     @property

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtr
 
-from stiction.arrays import Array
-from stiction.errors import InputError
-from stiction.jit import jit
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError
+from stiction.base.jit import jit
 
 REACH, MOSTLY = 8.0, 4.0
 """Reach of a whole table, and of the part that most samples need."""

@@ -17,10 +17,10 @@ from pydantic import Field, model_validator
 from scipy.optimize import brentq, root
 from scipy.special import gammaln
 
-from stiction.arrays import Array
-from stiction.errors import InputError, UnitWarning, unknown_name, warn_user
-from stiction.kinds import Kinds, OneOf, from_table, register
-from stiction.model import Positive, Real, check, model
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, UnitWarning, unknown_name, warn_user
+from stiction.base.kinds import Kinds, OneOf, from_table, register
+from stiction.base.model import Positive, Real, check, model
 
 Bound: TypeAlias = Annotated[Real, Field(gt=-1e18, lt=1e18)]
 

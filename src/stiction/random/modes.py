@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.arrays import Array
-from stiction.errors import InputError
-from stiction.interface import Interface
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError
+from stiction.problem.interface import Interface
 from stiction.random.synthesis import synthesise
 
 MOST_MODES = 1 << 22

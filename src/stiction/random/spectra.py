@@ -22,10 +22,10 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import betainc, betaincinv, gammainc, gammainccinv, gammaln, kve
 
-from stiction.arrays import Array
-from stiction.errors import InputError
-from stiction.kinds import Kinds, OneOf, from_table, register
-from stiction.model import Positive, Real, describe, model
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError
+from stiction.base.kinds import Kinds, OneOf, from_table, register
+from stiction.base.model import Positive, Real, describe, model
 
 Share: TypeAlias = Annotated[Real, Field(gt=0, lt=1)]
 Span: TypeAlias = Annotated[Positive, Field(gt=1e-15, lt=1e15)]

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from stiction.arrays import Array
-from stiction.errors import InputError, warn_accuracy
-from stiction.problem import Problem
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, warn_accuracy
+from stiction.problem.problem import Problem
 from stiction.random.fields import RandomInterface
 
 # Shares of the strength at or below the residual strength that give a warning, or an error.

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.arrays import Array
-from stiction.jit import jit_allocating
+from stiction.base.arrays import Array
+from stiction.base.jit import jit_allocating
 
 BLOCK = 256
 

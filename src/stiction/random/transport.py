@@ -21,8 +21,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.arrays import Array
-from stiction.jit import jit_allocating
+from stiction.base.arrays import Array
+from stiction.base.jit import jit_allocating
 
 MOST, LISTED = 16, 12  # directions, and places whose dependence on the earlier ones counts
 WORTH = 0.1  # difference of the logarithm of a density that is worth a direction

@@ -10,18 +10,18 @@ import xarray as xr
 from numpy.typing import NDArray
 from pydantic import Field
 
-from stiction.arrays import Array
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, collect_warnings, warn_accuracy
+from stiction.base.model import Real, at_least
+from stiction.base.progress import Meter
+from stiction.base.units import in_words
 from stiction.ensemble.batches import usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import Event, LimitState, weakest_first
 from stiction.ensemble.monte_carlo import check_fields
 from stiction.ensemble.pilot import exact_counterpart
-from stiction.errors import InputError, collect_warnings, warn_accuracy
-from stiction.model import Real, at_least
-from stiction.progress import Meter
 from stiction.random.equally_likely import MOST as MOST_MEMBERS
 from stiction.reliability.tail import Tail, two_levels_refused
-from stiction.units import in_words
 
 TargetCv: TypeAlias = Annotated[Real, Field(ge=1e-6, le=1)]
 """A smaller coefficient of variation would take more than 1e12 failures; a larger is no answer."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.arrays import Array
+from stiction.base.arrays import Array
 from stiction.ensemble.limit_state import LimitState
 from stiction.reliability.subset import Descent, Population
 from stiction.reliability.uncertainty import binomial_interval

@@ -8,14 +8,17 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 
-from stiction.arrays import Array
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, merge_warnings, texts_of, warn_accuracy
+from stiction.base.model import Count, Number, Positive, Progress, Real, checked
+from stiction.base.progress import Meter
+from stiction.base.units import Doubt, doubt_units, in_words
+from stiction.base.variables import ONSET_VARIABLES, PROFILES, Variable
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import Event, LimitState
-from stiction.errors import InputError, merge_warnings, texts_of, warn_accuracy
-from stiction.methods import MethodObject, label
-from stiction.model import Count, Number, Positive, Progress, Real, checked
-from stiction.problem import Problem
-from stiction.progress import Meter
+from stiction.methods.protocol import MethodObject, label
+from stiction.problem.problem import Problem
+from stiction.problem.results import along, study_attributes, to_dataset
 from stiction.random.equally_likely import AnyRandom
 from stiction.reliability.answer import (
     SAMPLED,
@@ -37,9 +40,6 @@ from stiction.reliability.counting import count_failures
 from stiction.reliability.repetitions import SAMPLES, repetition
 from stiction.reliability.tail import Tail, repeat_until_precise, sample_tail
 from stiction.reliability.uncertainty import binomial_interval, generator, lognormal_interval
-from stiction.results import along, study_attributes, to_dataset
-from stiction.units import Doubt, doubt_units, in_words
-from stiction.variables import ONSET_VARIABLES, PROFILES, Variable
 
 PILOT = 1_000
 """Number of plain samples by which the algorithm is chosen."""

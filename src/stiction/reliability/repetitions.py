@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction.base.errors import collect_warnings, merged
 from stiction.ensemble.batches import NUMBER, POINT, Table, versions
 from stiction.ensemble.limit_state import LimitState
-from stiction.errors import collect_warnings, merged
 from stiction.reliability.subset import Descent, Population, descend
 from stiction.reliability.tail import DEEPER
 from stiction.reliability.uncertainty import generator

@@ -12,8 +12,8 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.arrays import Array
-from stiction.model import check_memory
+from stiction.base.arrays import Array
+from stiction.base.model import check_memory
 from stiction.reliability.uncertainty import ancestral_variance
 
 Function = Callable[[Array], Array]

@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stiction.arrays import Array
+from stiction.base.arrays import Array
+from stiction.base.progress import SILENT, Meter
 from stiction.ensemble.limit_state import LimitState, no_single_length
-from stiction.methods import METHODS
-from stiction.progress import SILENT, Meter
+from stiction.methods.protocol import METHODS
 from stiction.reliability.subset import descend
 from stiction.reliability.two_level import bridge
 from stiction.reliability.uncertainty import generator, log_width

@@ -16,7 +16,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.arrays import Array
+from stiction.base.arrays import Array
 from stiction.reliability.subset import Below, Function, Label, descend, grow
 from stiction.reliability.uncertainty import ancestral_variance
 

@@ -9,9 +9,9 @@ import numpy as np
 import scipy.fft
 from scipy.optimize import brentq
 
-from stiction.arrays import Array
-from stiction.errors import InputError
-from stiction.model import Real, brief, checked
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError
+from stiction.base.model import Real, brief, checked
 from stiction.statistics.estimates import as_sample
 
 CELLS = 4096

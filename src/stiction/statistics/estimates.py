@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import scipy.stats
 
-from stiction.arrays import Array
-from stiction.errors import InputError
-from stiction.model import Numbers, brief, check, checked
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError
+from stiction.base.model import Numbers, brief, check, checked
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stiction.arrays import Array
-from stiction.criterion.local import check_law
-from stiction.criterion.windows import windows_of
-from stiction.errors import InputError
-from stiction.model import checked
-from stiction.problem import Problem
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError
+from stiction.base.model import checked
+from stiction.methods.criterion.local import check_law
+from stiction.methods.criterion.windows import windows_of
+from stiction.problem.problem import Problem
 from stiction.random.fields import RandomField
 
 

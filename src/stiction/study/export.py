@@ -9,9 +9,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from stiction.errors import InputError, warn_accuracy
-from stiction.files import cannot, write_whole
-from stiction.variables import DIRECTION
+from stiction.base.errors import InputError, warn_accuracy
+from stiction.base.files import cannot, write_whole
+from stiction.base.variables import DIRECTION
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,20 +12,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from stiction.base.errors import InputError, Warned, merge_warnings, texts_of, warn_accuracy
+from stiction.base.progress import Meter, Show
+from stiction.base.variables import Variable
 from stiction.ensemble.batches import Table, usable_cores
 from stiction.ensemble.limit_state import LimitState, weakest_first
 from stiction.ensemble.monte_carlo import check_fields
 from stiction.ensemble.pilot import exact_counterpart
 from stiction.ensemble.store import Store
-from stiction.errors import InputError, Warned, merge_warnings, texts_of, warn_accuracy
-from stiction.progress import Meter, Show
+from stiction.problem.results import to_dataset
 from stiction.reliability.failure import chances, curve_doubts, curve_of
 from stiction.reliability.repetitions import repetition, repetitions_in, table_of
 from stiction.reliability.subset import Descent
 from stiction.reliability.tail import Tail
-from stiction.results import to_dataset
 from stiction.study.run import StoredRun, samples_of_part
-from stiction.variables import Variable
 
 CURVES = "failure_curve"
 """Key of the settings of a run of failure curves: its smallest probability and its event."""

@@ -6,9 +6,9 @@ from typing import Any
 
 from pydantic import model_validator
 
+from stiction.base.errors import InputError
+from stiction.base.model import Positive, Real, model
 from stiction.ensemble.experiment import Experiment
-from stiction.errors import InputError
-from stiction.model import Positive, Real, model
 from stiction.reliability.answer import Answer, Probability, TargetCv
 from stiction.reliability.failure import design_stress, failure_probability
 

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
+from stiction.base.errors import RunError
+from stiction.base.model import FilePath, brief, check
 from stiction.ensemble.batches import Failure
 from stiction.ensemble.dataset import Gathered, with_labels
 from stiction.ensemble.experiment import Ensemble
 from stiction.ensemble.store import Store
-from stiction.errors import RunError
-from stiction.model import FilePath, brief, check
 from stiction.random.synthesis import BLOCK
 from stiction.study.export import export
 

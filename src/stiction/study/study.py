@@ -15,16 +15,9 @@ import pydantic
 import tomli_w
 from pydantic import BeforeValidator, Discriminator, Tag, model_validator
 
-from stiction.dynamics.save import Save
-from stiction.ensemble.dataset import GridAxes, variables_in
-from stiction.ensemble.experiment import Ensemble, Experiment
-from stiction.ensemble.limit_state import Event
-from stiction.ensemble.monte_carlo import gather
-from stiction.ensemble.store import Damaged, Store, read_study
-from stiction.errors import InputError, StoreError
-from stiction.kinds import OneOf
-from stiction.methods import METHODS, as_method
-from stiction.model import (
+from stiction.base.errors import InputError, StoreError
+from stiction.base.kinds import OneOf
+from stiction.base.model import (
     Count,
     FilePath,
     Flag,
@@ -36,8 +29,15 @@ from stiction.model import (
     model,
     to_plain,
 )
-from stiction.problem import Problem
-from stiction.profiles.reading import profile_in_file
+from stiction.ensemble.dataset import GridAxes, variables_in
+from stiction.ensemble.experiment import Ensemble, Experiment
+from stiction.ensemble.limit_state import Event
+from stiction.ensemble.monte_carlo import gather
+from stiction.ensemble.store import Damaged, Store, read_study
+from stiction.methods.dynamics.save import Save
+from stiction.methods.protocol import METHODS, as_method
+from stiction.problem.problem import Problem
+from stiction.problem.profiles.reading import profile_in_file
 from stiction.random.dotted_keys import with_values
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 from stiction.reliability.answer import Probability

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
 
+from stiction.base.errors import InputError, prefixed, unknown_name
+from stiction.base.model import Count, Real, at_least, check, describe, model, to_plain
+from stiction.base.variables import PROFILES, Variable
 from stiction.ensemble.dataset import Coordinates, GridAxes
-from stiction.errors import InputError, prefixed, unknown_name
-from stiction.model import Count, Real, at_least, check, describe, model, to_plain
 from stiction.random.dotted_keys import distributions_of, full_key
 from stiction.random.marginals import Marginal, marginal_of
-from stiction.variables import PROFILES, Variable
 
 INTERFACES = 30
 """Number of equally likely interfaces of a study with uncertain parameters."""

@@ -1,0 +1,155 @@
+"""numba's private parts: kernels compiled in half the time, and kept by the text of their files.
+
+This file may be deleted. Without it, or where it cannot be imported, as with a numba newer than the
+newest that was tried, `decorators.py` compiles the kernels with plain `numba.njit`, to the same
+bits.
+"""
+
+from __future__ import annotations
+
+import gc
+import hashlib
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numba
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+from numba.core.compiler import Compiler, CompileResult, Flags
+
+from stiction.base.jit.folder import kernel_folder
+
+NEWEST = (0, 68)
+"""The newest numba with which the tests ran."""
+PARTS: dict[type, str] = {
+    Compiler: "compile_extra define_pipelines",
+    CompileResult: "_find_referenced_environments",
+    Flags: "values",
+    FunctionCache: "load_overload save_overload",
+    JITCPUCodegen: "set_env",
+    JITCodeLibrary: "_optimize_final_module _finalize_final_module _finalize_dynamic_globals"
+    " enable_object_caching serialize_using_bitcode serialize_using_object_code",
+}
+"""What is used of numba's classes; without it `decorators.py` makes do with plain numba."""
+if numba.version_info.short > NEWEST:
+    raise ImportError(f"numba {numba.__version__} was not tried")
+for owner, names in PARTS.items():
+    if missing := [name for name in names.split() if not hasattr(owner, name)]:
+        raise ImportError(f"numba's {owner.__name__} lacks {', '.join(missing)}")
+
+
+class _Locator(_CacheLocator):
+    """The folder of a function's compiled forms.
+
+    What tells it from others is the text of its file, not where the file lies or when it was
+    written: another environment with the same package compiles nothing again.
+    """
+
+    def __init__(self, function: Any, file: str) -> None:
+        self._path = kernel_folder(function.__module__, "own") / function.__module__
+        self._stamp = hashlib.sha256(Path(file).read_bytes()).hexdigest()
+        self._line = function.__code__.co_firstlineno
+
+    @classmethod
+    def from_function(cls, function: Any, file: str) -> _Locator | None:
+        try:
+            found = cls(function, file)
+            found.ensure_cache_path()
+        except (OSError, TypeError):  # a folder that is read-only; a function of no module
+            return None
+        return found
+
+    def get_cache_path(self) -> str:
+        return str(self._path)
+
+    def get_source_stamp(self) -> str:
+        return self._stamp
+
+    def get_disambiguator(self) -> str:
+        return str(self._line)
+
+
+class _Format(CompileResultCacheImpl):
+    _locator_classes: ClassVar = [_Locator]
+
+
+class Cache(FunctionCache):
+    """Compiled forms of a function on disk, with what drafts leave to those that call them."""
+
+    _impl_class = _Format
+
+    def save_overload(self, signature: Any, data: Any) -> None:
+        for env in data._find_referenced_environments():  # its own, and those of drafts
+            data.library.codegen.set_env(env.env_name, env)
+        super().save_overload(signature, data)
+
+
+class _Flags(Flags):
+    """Options of a compilation, compared by those that were set: numba compares all of them."""
+
+    def values(self) -> dict[str, Any]:
+        given: dict[str, Any] = self._values
+        return given
+
+
+class _Draft(JITCodeLibrary):
+    """Code that becomes machine code only as a part of the kernels that call it."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    @property
+    def codegen(self) -> Any:
+        """This draft, in place of the machine code in which numba looks for its environment."""
+        return self
+
+    def set_env(self, name: str, env: Any) -> None:
+        """Leave the environment to the kernels that call this code."""
+
+    def get_pointer_to_function(self, name: str) -> int:
+        return 0
+
+    def serialize_using_object_code(self) -> Any:
+        return self.serialize_using_bitcode()
+
+
+class _Compiler(Compiler):
+    """numba's compiler with these options."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.state.flags = _Flags(self.state.flags)
+
+    def compile_extra(self, function: Any) -> Any:
+        """Compile without garbage collection, which takes 7 % of the time."""
+        collects = gc.isenabled()
+        gc.disable()
+        try:
+            return super().compile_extra(function)
+        finally:
+            if collects:  # compilations are nested
+                gc.enable()
+
+
+class _InsideCompiler(_Compiler):
+    """A compiler of drafts."""
+
+    def define_pipelines(self) -> Any:
+        state = self.state
+        state.library = _Draft(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return super().define_pipelines()
+
+
+OPTIONS: dict[str, Any] = {"_nrt": False, "no_cfunc_wrapper": True, "pipeline_class": _Compiler}
+ALLOCATING: dict[str, Any] = OPTIONS | {"_nrt": True}
+"""For kernels that make arrays: others count no references, and so compile faster."""
+INSIDE: dict[str, Any] = OPTIONS | {
+    "no_cpython_wrapper": True,
+    "pipeline_class": _InsideCompiler,
+}
+"""For what only other kernels call, in half the time."""

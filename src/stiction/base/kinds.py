@@ -1,0 +1,171 @@
+"""Kinds of methods, laws, loads, marginals and spectra, distinguished by `type` in a study file."""
+
+import dataclasses
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property, lru_cache
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, TypeVar
+
+import pydantic
+from pydantic_core import CoreSchema, core_schema
+
+from stiction.base.errors import InputError, unknown, warn_user
+from stiction.base.model import Mistakes, keys_of, mistakes, to_plain
+
+T = TypeVar("T", bound=type)
+_registered: dict[str, dict[str, Any]] = {}
+
+
+def register(kind: T) -> T:
+    """Class decorator: let study files name a class by its `type`.
+
+    The class is a method, or derives from `FrictionLaw`, `LoadShape`, `Marginal` or
+    `SpectralDensity`; its `type` is a field such as ``type: Literal["band"] = "band"``. Files that
+    name it can be read once its module is imported. An entry point of the same name, in the group
+    ``stiction.methods``, ``.laws``, ``.loads``, ``.marginals`` or ``.spectra``, does without.
+    """
+    name = getattr(getattr(kind, "__dataclass_fields__", {}).get("type"), "default", None)
+    if not isinstance(name, str):
+        raise InputError(f'{kind}: needs a field such as type: Literal["mine"] = "mine"')
+    if missing := getattr(kind, "__abstractmethods__", ()):
+        raise InputError(f"{kind.__name__}: lacks {', '.join(sorted(missing))}")
+    known = _registered.setdefault(getattr(kind, "family", "methods"), {})
+    other = known.setdefault(name, kind)
+    if (other.__module__, other.__qualname__) != (kind.__module__, kind.__qualname__):
+        raise InputError(f"{kind.__name__}: the type {name!r} is that of {other}; rename it")
+    known[name] = kind
+    return kind
+
+
+class Kinds(Mapping[str, Any]):
+    """The classes of a family by their `type`: our own, those registered, those of entry points.
+
+    `own` are places ("module:name") of classes that are imported when they are named, as those of
+    entry points are.
+    """
+
+    def __init__(self, family: str, own: Mapping[str, str] | None = None) -> None:
+        self._group, self._own = f"stiction.{family}", own or {}
+        self._registered = _registered.setdefault(family, {})
+
+    @cached_property
+    def _offered(self) -> dict[str, list[EntryPoint]]:
+        found: dict[str, list[EntryPoint]] = {}
+        for point in entry_points(group=self._group):
+            found.setdefault(point.name, []).append(point)
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(dict.fromkeys((*self._own, *self._registered, *self._offered)))
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def __getitem__(self, name: str) -> Any:
+        if name in self._own:
+            module, attribute = self._own[name].split(":")
+            return getattr(import_module(f"stiction.{module}"), attribute)
+        if name not in self._registered:
+            self._load(name, self._offered[name])
+        return self._registered[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._own or name in self._registered or name in self._offered
+
+    def _load(self, name: str, points: Sequence[EntryPoint]) -> None:
+        try:
+            if len(points) > 1:
+                raise ImportError("two packages offer it; uninstall one of them")
+            kind = register(points[0].load())
+            if self._registered.get(name) is not kind:
+                raise ImportError(f"{kind} is no such class of this type")
+        except Exception as error:  # of any kind: the code is another's
+            packages = ", ".join(str(point.dist and point.dist.name) for point in points)
+            text = f"{type(error).__name__}: {' '.join(str(error).split())}"
+            raise InputError(
+                f"{name!r} of the package {packages} (entry point of {self._group}) cannot be"
+                f" used: {text}"
+            ) from None
+
+    def usable(self) -> dict[str, Any]:
+        """Return all classes by their `type`; warn of those that cannot be imported."""
+        found = {}
+        for name in self:
+            try:
+                found[name] = self[name]
+            except InputError as error:
+                warn_user(f"left out: {error}", UserWarning)
+        return found
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class OneOf:
+    """Annotation of a field that holds an object of one of several classes.
+
+    `kinds` are the classes by `type`, `default` is the type of a table that names none. `convert`
+    maps what was given to such an object, or returns NotImplemented to leave it: a table to its
+    class, anything else to the annotated type; `also` are JSON schemas of what else the field may
+    hold.
+    """
+
+    kinds: Kinds
+    convert: Callable[[Any], Any]
+    also: Sequence[Mapping[str, Any]] = ()
+    default: str | None = None
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
+        def read(value: Any, inner: Any, info: Any) -> Any:
+            found = self.convert(value)
+            if found is not NotImplemented:
+                return found
+            if not isinstance(value, Mapping) or (self.also and "type" not in value):
+                return inner(value)
+            table = {"type": self.default, **value} if self.default else value
+            return self.convert(from_table(self.kinds, table, info.context))
+
+        own = handler(source)
+        plain = core_schema.wrap_serializer_function_ser_schema(self._written, schema=own)
+        return core_schema.with_info_wrap_validator_function(read, own, serialization=plain)
+
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: Any) -> dict[str, Any]:
+        found = []
+        for name, kind in self.kinds.usable().items():
+            one = pydantic.TypeAdapter(kind).json_schema()
+            found.append(one)
+            if name != self.default:
+                one["required"] = [*one.get("required", ()), "type"]
+        return {"anyOf": [*found, *self.also]}
+
+    def _written(self, value: Any, handler: Any) -> Any:
+        if hasattr(value, "plain"):
+            return value.plain()
+        if not dataclasses.is_dataclass(value):
+            return handler(value)
+        plain = to_plain(value)
+        if self.kinds.get(plain.get("type")) is not type(value):
+            raise ValueError(
+                f"{type(value).__name__} is a class of your own that study files cannot name;"
+                " decorate it with stiction.extensions.register"
+            )
+        return plain
+
+
+def from_table(kinds: Kinds, given: Mapping[str, Any], context: Any = None) -> Any:
+    """Make an object of the class that `type` names in a table, or raise an `InputError`."""
+    rest = dict(given)
+    name = rest.pop("type", None)
+    if name is None:
+        raise Mistakes([("type", f"missing (valid: {', '.join(kinds)})")])
+    if not isinstance(name, str) or name not in kinds:
+        raise Mistakes([("type", unknown(str(name), kinds))])
+    kind = kinds[name]
+    try:
+        return _adapter(kind).validate_python(rest, context=context)
+    except pydantic.ValidationError as error:
+        raise Mistakes(mistakes(error, list(keys_of(kind)), False)) from None
+
+
+@lru_cache(maxsize=64)
+def _adapter(kind: Any) -> pydantic.TypeAdapter[Any]:
+    return pydantic.TypeAdapter(kind)

@@ -1,0 +1,478 @@
+"""Frozen, validated parameter objects, and public functions that check their arguments.
+
+One definition serves Python, TOML and JSON. All mistakes come at once, as one `InputError`.
+"""
+
+import dataclasses
+import functools
+import inspect
+import math
+import numbers
+import operator
+import os
+import types
+import typing
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar, dataclass_transform
+
+import numpy as np
+import pydantic
+import pydantic_core
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    InstanceOf,
+    PlainSerializer,
+    WithJsonSchema,
+)
+from pydantic.dataclasses import dataclass as pydantic_dataclass
+
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, unknown
+from stiction.base.progress import Show
+
+T = TypeVar("T")
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+# -- kinds of values -----------------------------------------------------------------------------
+
+
+def as_number(value: Any) -> float:
+    """A number of any library, but no text and no truth value, which pydantic would convert."""
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    if not isinstance(value, numbers.Real) or isinstance(value, bool):
+        raise ValueError("must be a number")
+    try:
+        return float(value)
+    except OverflowError:
+        raise ValueError("must be finite") from None
+
+
+def as_count(value: Any) -> int:
+    """A whole number of any library; 1e4 counts as one."""
+    if isinstance(value, numbers.Integral) and not isinstance(value, bool):
+        return int(value)
+    if isinstance(value, bool | np.ndarray) or not is_finite(value) or value % 1:
+        raise ValueError("must be a whole number")
+    return int(value)
+
+
+def is_whole(value: Any, least: int) -> bool:
+    """Whether a value is a whole number (1e4 too), and not less than `least`."""
+    try:
+        return as_count(value) >= least
+    except ValueError:
+        return False
+
+
+def is_finite(value: Any) -> bool:
+    """Whether a value is a finite number, and neither text nor a truth value."""
+    try:
+        return math.isfinite(as_number(value))
+    except ValueError:
+        return False
+
+
+def real_array(value: Any) -> Array:
+    """Return `value` as a float64 array, or raise a TypeError that names what it is instead."""
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        raise TypeError("got a masked array")
+    try:
+        given = np.asarray(value)
+    except ValueError:
+        raise TypeError("got rows of unequal length") from None
+    if given.dtype.kind not in "fiu":
+        kind = type(value).__name__ if given.ndim == 0 else f"elements of type {given.dtype}"
+        raise TypeError(f"got {kind}")
+    return np.ascontiguousarray(given, dtype=np.float64).reshape(given.shape)
+
+
+def as_numbers(value: Any) -> Array:
+    """Return `value` as a float64 array, or raise an `InputError`."""
+    try:
+        return real_array(value)
+    except (TypeError, OverflowError) as error:
+        raise InputError(f"must be numbers; {error}") from None
+
+
+def is_unplaced(value: Any) -> bool:
+    """Whether a profile has coordinates or units of its own, which its problem resolves."""
+    own = ("dims", "to_xarray", "magnitude", "to_value")
+    return any(hasattr(value, name) for name in own)
+
+
+def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
+    """A number, a read-only float64 array of shape (*shape), or what a problem will place.
+
+    In a study file also what its reader takes: a path, or a table {file, ...} with options.
+    """
+    read = (info.context or {}).get("read")
+    if isinstance(value, str | Path | dict) and read is not None:
+        value = read(value, str(info.field_name))
+    if isinstance(value, str | Path | dict):
+        raise ValueError(
+            "files, and tables with the key 'file', belong in a study file; in Python give a"
+            " number, an array or st.read_profile(path)"
+        )
+    if is_unplaced(value):
+        return value
+    if isinstance(value, numbers.Real) or is_finite(value):
+        if not is_finite(as_number(value)):
+            raise ValueError("must be finite")
+        return as_number(value)
+    try:
+        array = np.array(real_array(value))
+    except TypeError as error:
+        raise ValueError(f"must be a number or an array of numbers, {error}") from None
+    if array.ndim not in (1, 2) or array.size == 0:
+        raise ValueError(f"must have shape (nodes,) or (nx, ny), got shape {array.shape}")
+    if not np.all(np.isfinite(array)):
+        raise ValueError(f"must be finite; entry {int(np.argmin(np.isfinite(array)))} is not")
+    array.flags.writeable = False
+    return array
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def _flag(value: Any, words: str = "True or False") -> bool:
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError(f"must be {words}")
+    return bool(value)
+
+
+def _show(value: Any) -> Any:
+    if callable(value) and not isinstance(value, type):
+        return value
+    return _flag(value, "True, False or a function of (done, total)")
+
+
+def _names(value: Any) -> tuple[str, ...]:
+    names = tuple(value) if isinstance(value, list | tuple | set | frozenset) else (value,)
+    if not all(isinstance(name, str) for name in names):
+        raise ValueError("must be a name or a list of names")
+    return names
+
+
+def _path(value: Any) -> Path:
+    text = os.fspath(value) if isinstance(value, str | os.PathLike) else ""
+    valid = isinstance(text, str) and text == text.encode(errors="ignore").decode()
+    if (
+        not valid
+        or not text
+        or "\0" in text
+        or max(map(len, Path(text).parts), default=0) > 255
+    ):
+        raise ValueError("must be a path in UTF-8, each name at most 255 letters")
+    return Path(text)
+
+
+@functools.cache
+def at_least(least: int) -> Any:
+    """Return the annotation of a whole number not below `least`; 1e4 counts as one."""
+    return Annotated[int, Field(ge=least), BeforeValidator(as_count)]
+
+
+Count: TypeAlias = at_least(1)  # type: ignore[valid-type]  # a call makes it
+Number: TypeAlias = at_least(0)  # type: ignore[valid-type]
+Real: TypeAlias = Annotated[float, BeforeValidator(as_number), Field(allow_inf_nan=False)]
+Positive: TypeAlias = Annotated[Real, Field(gt=0)]
+Numbers: TypeAlias = Annotated[Any, BeforeValidator(as_numbers)]
+"""Real numbers of any shape, as a float64 array."""
+PROFILE_SCHEMA = [
+    {"type": "number"},
+    {"type": "array", "items": {"type": "number"}},
+    {"type": "string", "description": "path to a .npy, text or NetCDF file"},
+    {"type": "object", "description": "file, and options of read_profile: unit, x_unit, ..."},
+]
+Profile: TypeAlias = Annotated[
+    Any,
+    BeforeValidator(_profile),
+    PlainSerializer(_plain),
+    WithJsonSchema({"anyOf": PROFILE_SCHEMA}),
+]
+OptionalProfile: Any = Profile | None
+"""A number, or a read-only array of shape (nodes,); or None for 'not given'."""
+Flag: TypeAlias = Annotated[bool, BeforeValidator(_flag)]
+Progress: TypeAlias = Annotated[Show, BeforeValidator(_show)]
+"""True, False, or a function of (done, total)."""
+Text: TypeAlias = Annotated[str, Field(strict=True, min_length=0)]
+"""Text in valid UTF-8; pydantic looks at it only if its length is limited."""
+Names: TypeAlias = Annotated[tuple[str, ...], BeforeValidator(_names)]
+"""One name or several, as a tuple."""
+FilePath: TypeAlias = Annotated[Path, BeforeValidator(_path)]
+Mode: TypeAlias = Literal["II", "III"]
+
+
+# -- mistakes ------------------------------------------------------------------------------------
+
+
+class Mistakes(InputError):
+    """Mistakes inside a model, as pairs of a path and a text."""
+
+    def __init__(self, found: list[tuple[str, str]]) -> None:
+        super().__init__(_joined(path, text, by=": ") for path, text in found)
+        self.found = found
+
+
+def describe(value: Any) -> str:
+    """Return a short form of what was given, for messages."""
+    if isinstance(value, np.ndarray):
+        return f"an array of shape {value.shape}"
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def keys_of(cls: Any) -> dict[str, str]:
+    """Return the keys of a model in a study file, and the field that each stands for."""
+    known = getattr(cls, "__pydantic_fields__", {})
+    names = [field.name for field in dataclasses.fields(cls) if field.init]
+    return {(name in known and known[name].alias) or name: name for name in names}
+
+
+def mistakes(
+    error: pydantic.ValidationError, valid: Sequence[str], call: bool
+) -> list[tuple[str, str]]:
+    """Return the mistakes that pydantic found in one model or call, each with its path.
+
+    `valid` are the names of its keys or arguments. What lies inside another model was explained
+    there. Pydantic adds the members of a union to the path of a `call`; they are left out.
+    """
+    found: dict[tuple[str, str, str], list[str]] = {}  # a union has an item for each member
+    for item in error.errors():
+        kind, given = item["type"], f", got {describe(item.get('input'))}"
+        context, steps = item.get("ctx") or {}, list(item["loc"])
+        wrong = context.get("error")
+        if steps and isinstance(steps[0], int) and steps[0] < len(valid):
+            steps[0] = valid[steps[0]]
+        if call or isinstance(wrong, Mistakes):
+            named = steps[: bool(valid)]
+            steps = named + [step for step in steps[len(named) :] if isinstance(step, int)]
+        path = ".".join(map(str, steps))
+        if isinstance(wrong, InputError):
+            pairs = [("", text) for text in wrong.problems]
+            for inner, text in wrong.found if isinstance(wrong, Mistakes) else pairs:
+                found[_joined(path, inner), text, ""] = [""]
+            continue
+        text, member = str(wrong), ""
+        if kind == "unexpected_positional_argument":
+            return [("", f"give the arguments by name (valid: {', '.join(valid)})")]
+        if kind.startswith("missing"):
+            text, given = "missing", ""
+        elif kind in ("unexpected_keyword_argument", "extra_forbidden"):
+            path, text, given = "", unknown(path, valid), ""
+        elif wrong is None:
+            name = str(context.get("class_name") or context.get("class") or "")
+            text, member = "must be ", item["msg"].removeprefix("Input should be ")
+            member = f"{'an' if name[0] in 'AEIO' else 'a'} {name}" if name else member
+        found.setdefault((path, text, given), []).append(member)
+    return [
+        (path, text + " or ".join(dict.fromkeys(members)) + given)
+        for (path, text, given), members in found.items()
+    ]
+
+
+def _joined(*steps: str, by: str = ".") -> str:
+    return by.join(filter(None, steps))
+
+
+def explain(error: pydantic.ValidationError, root: str = "") -> list[str]:
+    """List the mistakes that pydantic found, one text each, with its path below `root`."""
+    found = mistakes(error, (), True)
+    return [_joined(_joined(root, path), text, by=": ") for path, text in found]
+
+
+# -- objects and functions -----------------------------------------------------------------------
+
+
+def _explained(cls: Any, given: Any, handler: Callable[[Any], Any]) -> Any:
+    """Validate a model, whose mistakes it explains itself: it has the names of its keys."""
+    try:
+        return handler(given)
+    except pydantic.ValidationError as error:
+        raise Mistakes(mistakes(error, list(keys_of(cls)), False)) from None
+
+
+@typing.overload
+def model(cls: type[T]) -> type[T]: ...
+@typing.overload
+def model(*, kw_only: bool = ...) -> Callable[[type[T]], type[T]]: ...
+@dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field, Field))
+def model(cls: Any = None, *, kw_only: bool = False) -> Any:
+    """Class decorator: a frozen pydantic dataclass whose mistakes come as `InputError`.
+
+    Objects compare by value (arrays too) and hash by value. Consistency checks go into a method
+    decorated with ``pydantic.model_validator(mode="after")`` that raises `InputError`.
+    """
+    if cls is None:
+        return functools.partial(model, kw_only=kw_only)
+    explained: Any = classmethod(_explained)
+    # A name of its own, so that it lies outside the validators of a base class.
+    setattr(cls, f"_explained_{cls.__name__}", pydantic.model_validator(mode="wrap")(explained))
+    config = ConfigDict(extra="forbid", arbitrary_types_allowed=True, validate_by_name=True)
+    decorate = pydantic_dataclass(
+        frozen=True, eq=False, repr=False, kw_only=kw_only, config=config
+    )
+    wrapped: Any = decorate(cls)
+    validated_init = wrapped.__init__
+
+    @functools.wraps(validated_init)
+    def init(self: Any, *args: Any, **kwargs: Any) -> None:
+        try:
+            validated_init(self, *args, **kwargs)
+        except pydantic.ValidationError as error:
+            raise InputError(explain(error, cls.__name__)) from None
+
+    # Validation inside another model must keep calling pydantic's own path, not this wrapper.
+    init.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # pydantic's own marker
+    wrapped.__init__, wrapped.__repr__ = init, brief
+    wrapped.__eq__, wrapped.__hash__ = _equal, _hash
+    return wrapped
+
+
+def _comparable(value: Any) -> Any:
+    """Return what stands for a value where objects are compared and hashed."""
+    if value is None or isinstance(value, str | float):
+        return value  # most are, and hashes stand in many calls
+    if isinstance(value, np.ndarray):
+        return value.shape, (value + 0.0).tobytes()  # zeros of both signs are equal
+    if hasattr(value, "identical"):  # labelled arrays
+        return str(value.to_dict())
+    if isinstance(value, dict):
+        return tuple((key, _comparable(value[key])) for key in sorted(value))
+    return tuple(map(_comparable, value)) if isinstance(value, list | tuple) else value
+
+
+def _fields(self: Any) -> tuple[Any, ...]:
+    return tuple(_comparable(getattr(self, one.name)) for one in dataclasses.fields(self))
+
+
+def _equal(self: Any, other: Any) -> bool:
+    return _fields(self) == _fields(other) if type(self) is type(other) else NotImplemented
+
+
+def _hash(self: Any) -> int:
+    return hash(_fields(self))
+
+
+def differing(one: Any, other: Any, name: str = "") -> list[str]:
+    """Return the names of what differs between two objects, such as 'interface.length'."""
+    if _comparable(one) == _comparable(other):
+        return []
+    if not (dataclasses.is_dataclass(one) and type(one) is type(other)):
+        return [name]
+    values, others = vars(one), vars(other)
+    each = (differing(values[key], others[key], _joined(name, key)) for key in values)
+    return [found for names in each for found in names]
+
+
+def brief(self: Any) -> str:
+    """Use as `__repr__` of a dataclass: its fields that are not at their default, shortened."""
+    parts = []
+    for field in dataclasses.fields(self):
+        value = getattr(self, field.name)
+        default = type(value) is type(field.default) and value == field.default
+        if field.repr and not default:
+            parts.append(f"{field.name}={_shown(value)}")
+    return f"{type(self).__name__}({', '.join(parts)})"
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        shape = " x ".join(str(size) for size in value.shape)
+        if value.dtype.kind not in "fiu" or value.size == 0:
+            return f"<{shape} array>"
+        return f"<{shape} array, {np.nanmin(value):.6g} to {np.nanmax(value):.6g}>"
+    if isinstance(value, list | tuple) and len(value) > 6:
+        return f"<{len(value)} values>"
+    return repr(float(value) if isinstance(value, np.floating) else value)
+
+
+def to_plain(value: Any) -> Any:
+    """Return the object as plain dicts, lists and numbers: what TOML and JSON hold.
+
+    It is an `InputError` if something in it exists in Python only, such as a function.
+    """
+    try:
+        return pydantic.TypeAdapter(type(value)).dump_python(
+            value, mode="json", exclude_none=True, by_alias=True
+        )
+    except pydantic_core.PydanticSerializationError as error:
+        words = "cannot be written down: "  # the innermost reason, without names of exceptions
+        reason = str(error).rsplit(words, 1)[-1].rsplit("Error: ", 1)[-1]
+        raise InputError(f"{type(value).__name__}: {words}{reason}") from None
+    except pydantic.errors.PydanticSchemaGenerationError:
+        raise InputError(f"{type(value).__name__}: exists in Python only") from None
+
+
+def checked(function: Function) -> Function:
+    """Decorator of a public function: check its arguments by their annotations.
+
+    A class in an annotation takes its own instances only, not the tables of a study file. All that
+    is wrong comes as one `InputError`.
+    """
+    written = function.__annotations__
+    function.__annotations__ = {name: one for name, one in written.items() if name != "return"}
+    hints = typing.get_type_hints(function, include_extras=True)
+    function.__annotations__ = {name: _instances(hint) for name, hint in hints.items()}
+    validated = pydantic.validate_call(config=ConfigDict(arbitrary_types_allowed=True))(
+        function
+    )
+    function.__annotations__ = written
+    names = list(inspect.signature(function).parameters)
+
+    @functools.wraps(function)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        try:
+            return validated(*args, **kwargs)
+        except pydantic.ValidationError as error:
+            found = mistakes(error, names, True)
+            raise InputError(
+                f"{path or function.__name__}: {text}" for path, text in found
+            ) from None
+
+    return typing.cast(Function, call)
+
+
+def _instances(hint: Any) -> Any:
+    """Return the annotation, with model classes that take instances only."""
+    if isinstance(hint, types.UnionType) or typing.get_origin(hint) is typing.Union:
+        return functools.reduce(operator.or_, map(_instances, typing.get_args(hint)))
+    own = dataclasses.is_dataclass(hint)
+    return Annotated[hint, InstanceOf()] if own else hint  # type: ignore[type-arg]
+
+
+def check(name: str, value: Any, annotation: Any) -> Any:
+    """Return a value as an annotation has it, or raise an `InputError` that begins with `name`.
+
+    For what `checked` does not see, such as entries of a mapping or options of a command.
+    """
+    try:
+        return _adapter(annotation).validate_python(value)
+    except pydantic.ValidationError as error:
+        raise InputError(explain(error, name)) from None
+
+
+@functools.lru_cache(maxsize=64)
+def _adapter(annotation: Any) -> pydantic.TypeAdapter[Any]:
+    if isinstance(annotation, type):  # no table of a study file
+        return pydantic.TypeAdapter(Annotated[annotation, InstanceOf()])
+    return pydantic.TypeAdapter(_instances(annotation))
+
+
+def check_memory(name: str, needed: float, advice: str = "take fewer") -> None:
+    """Raise an `InputError` if arrays need more memory (bytes) than this machine has."""
+    try:
+        there = float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):  # unknown on this system
+        return
+    if needed > there:
+        raise InputError(
+            f"{name}: this takes {needed / 2**30:,.1f} GiB of memory, more than the"
+            f" {there / 2**30:,.1f} GiB of this machine; {advice}"
+        )

@@ -1,0 +1,145 @@
+"""Units that measured data state, and their factors to SI: nothing is converted by guessing."""
+
+import re
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stiction.base.errors import InputError, UnitWarning, warn_user
+
+
+class Unit(NamedTuple):
+    """A unit: its factor to SI, and its powers of kilogram, metre and second."""
+
+    factor: float
+    powers: tuple[int, ...]
+
+
+_LENGTH, _STRESS = (0, 1, 0), (1, -1, -2)
+_BASE = {
+    "m meter metre meters metres": Unit(1.0, _LENGTH),
+    "s second seconds": Unit(1.0, (0, 0, 1)),
+    "N newton newtons": Unit(1.0, (1, 1, -2)),
+    "J joule joules": Unit(1.0, (1, 2, -2)),
+    "Pa pascal pascals": Unit(1.0, _STRESS),
+    "bar": Unit(1e5, _STRESS),
+    "g": Unit(1e-3, (1, 0, 0)),
+}
+_PREFIXES = {  # those of symbols, and of words
+    ("", ""): 1.0, ("T", "tera"): 1e12, ("G", "giga"): 1e9, ("M", "mega"): 1e6,
+    ("k", "kilo"): 1e3, ("c", "centi"): 1e-2, ("m", "milli"): 1e-3, ("u", "micro"): 1e-6,
+    ("\N{MICRO SIGN}", "micro"): 1e-6, ("\N{GREEK SMALL LETTER MU}", "micro"): 1e-6,
+    ("n", "nano"): 1e-9,
+}  # fmt: skip
+_OTHERS = {
+    "1 - dimensionless": Unit(1.0, (0, 0, 0)),
+    "%": Unit(0.01, (0, 0, 0)),
+    "in inch": Unit(0.0254, _LENGTH),
+    "micron microns": Unit(1e-6, _LENGTH),
+    "psi": Unit(6894.757293168, _STRESS),
+    "ksi": Unit(6894757.293168, _STRESS),
+}
+_UNITS = {name: unit for names, unit in _OTHERS.items() for name in names.split()}
+for (_short, _long), _scale in _PREFIXES.items():
+    for _names, _unit in _BASE.items():
+        _symbol, *_words = _names.split()
+        for _name in (_short + _symbol, *(_long + word for word in _words)):
+            _UNITS[_name] = Unit(_scale * _unit.factor, _unit.powers)
+_COMMON = "m, cm, mm, um, nm, km, in, Pa, kPa, MPa, GPa, bar, psi, ksi, N, kN, s, ms"
+_MULTIPLES: dict[str, tuple[float, dict[str, float]]] = {
+    "m": (1.0, {"km": 1e-3, "m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}),
+    "s": (1.0, {"s": 1.0, "ms": 1e3, "µs": 1e6, "ns": 1e9}),
+    "Pa": (0.1, {"MPa": 1e-6, "kPa": 1e-3, "Pa": 1.0}),
+    "N": (1.0, {"MN": 1e-6, "kN": 1e-3, "N": 1.0}),
+}
+"""Largest value on a scale from which on a unit is used, in that unit; units and their factors."""
+_SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴", "-01234")
+_POWER = re.compile(r"([^\W\d_]+|%|1(?!\d))(?:\^?([+-]?\d))?$")
+
+
+def parse(text: str) -> Unit | None:
+    """Return the unit that `text` names (``MPa``, ``N/mm^2``, ``Pa m-1``), None if it is unknown.
+
+    Powers of known units are separated by blanks or dots. After each slash, one is divided by.
+    """
+    text = text.strip()
+    whole = _UNITS.get(text) or _UNITS.get(text.lower() if len(text) > 4 else text)
+    if whole is not None:
+        return whole
+    plain = re.sub("[⁻⁰¹²³⁴]+", lambda m: "^" + m.group().translate(_SUPERSCRIPTS), text)
+    plain = re.sub(r"\*(?!\*)|[·⋅]", " ", plain.replace("**", "^"))
+    factor = 1.0
+    powers: tuple[int, ...] = (0, 0, 0)
+    for place, part in enumerate(plain.split("/")):
+        for number, word in enumerate(part.split() or ("",)):
+            match = _POWER.match(word)
+            unit = _UNITS.get(match[1]) if match else None
+            if match is None or unit is None:
+                return None
+            power = int(match[2] or 1) * (-1 if place and number == 0 else 1)
+            factor *= unit.factor**power
+            powers = tuple(a + power * b for a, b in zip(powers, unit.powers, strict=True))
+    return Unit(factor, powers)
+
+
+def is_in(text: str | None, si: str) -> bool:
+    """Return whether a text names a unit of the same dimension as an SI unit."""
+    given, wanted = parse(text or ""), parse(si)
+    return given is not None and wanted is not None and given.powers == wanted.powers
+
+
+def factor_to(si: str, text: str) -> float:
+    """Return what a value in the unit `text` is multiplied by to be in the SI unit `si`."""
+    wanted, given = parse(si), parse(text)
+    assert wanted is not None
+    if given is None:
+        near = [name for name in _COMMON.split(", ") if name.lower() == text.strip().lower()]
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise InputError(
+            f"unknown unit {text!r}{hint} (known: {_COMMON}, products and quotients such as MPa/mm)"
+        )
+    if given.powers != wanted.powers:
+        raise InputError(f"is in {text}, which cannot be converted to {si}")
+    return given.factor / wanted.factor
+
+
+def unit_for(units: str, values: Any) -> tuple[float, str]:
+    """Return the factor and name of the unit that suits the size of SI values."""
+    if units not in _MULTIPLES:
+        return 1.0, "" if units == "1" else units
+    array = np.asarray(values, dtype=np.float64)
+    largest = float(np.max(np.abs(array[np.isfinite(array)]), initial=0.0))
+    least, multiples = _MULTIPLES[units]
+    suited = [unit for unit, f in multiples.items() if largest * f >= least * (1.0 - 1e-9)]
+    unit = suited[0] if suited else list(multiples)[-1 if largest else 0]
+    return multiples[unit], unit
+
+
+def in_words(units: str, value: float, digits: int = 3) -> str:
+    """Return an SI value in the unit that suits its size, such as '40 kN'."""
+    value = float(f"{value:.{digits}g}")  # 999.6 N are 1 kN
+    factor, unit = unit_for(units, value)
+    return f"{value * factor:.{digits}g} {unit}".rstrip()
+
+
+class Doubt(NamedTuple):
+    """A ratio of two values that shows whether both are in the units assumed."""
+
+    text: str
+    ratio: float
+    usual: tuple[float, float]
+    possible: tuple[float, float]
+
+
+def doubt_units(doubts: Iterable[Doubt]) -> bool:
+    """Warn of the first ratio that is not usual, and return whether there is one.
+
+    If one is not possible, all that are not usual are an `InputError`.
+    """
+    unusual = [one for one in doubts if not one.usual[0] <= one.ratio <= one.usual[1]]
+    if any(not one.possible[0] <= one.ratio <= one.possible[1] for one in unusual):
+        raise InputError(one.text for one in unusual)
+    if unusual:
+        warn_user(unusual[0].text, UnitWarning)
+    return bool(unusual)

@@ -1,0 +1,1 @@
+"""The command line: parse, call, print; and a result as a page."""

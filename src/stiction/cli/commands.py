@@ -1,0 +1,685 @@
+"""The command line: parse, call, print. Numerics are imported inside commands: help is quick."""
+
+import functools
+import inspect
+import json
+import logging
+import os
+import re
+import signal
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+from typer import Argument, Option
+from typer.models import OptionInfo
+
+from stiction import __version__
+from stiction.base.errors import InputError, RunError, collect_warnings, unknown_name
+from stiction.base.progress import Meter, duration, interrupted
+
+SHOWN = 12
+"""Points, failures or damaged chunks that are listed."""
+LEVELS = (0.05, 0.5, 0.95)
+PROBED = 5
+"""Points of a sweep at which samples are timed."""
+BUDGET = 2.0
+"""Seconds that the timing may take, apart from preparation and compilation."""
+RUPTURE = (
+    "critical_stress", "stress_drop", "onset_time", "critical_position", "median_rupture_speed"
+)  # fmt: skip
+"""What is printed of a rupture."""
+
+StudyFile = Annotated[Path, Argument(metavar="STUDY.toml", help="See `stiction schema`.")]
+RunPath = Annotated[Path, Argument(metavar="RUN", help="Folder of a run.")]
+Workers = Annotated[int | None, Option(help="Threads; all cores by default.", min=1)]
+Scheduler = Annotated[
+    str | None,
+    Option(metavar="ADDRESS", help="Address of a Dask scheduler, such as tcp://host:8786."),
+]
+Part = Annotated[
+    str | None, Option(metavar="K/N", help="Compute the K-th of N parts, into one folder RUN.")
+]
+LOADING_RATE = 2e7
+"""Pa/s, of a rupture if the method of the study is another one."""
+
+
+# -- what commands share -------------------------------------------------------------------------
+
+
+def echo(text: Any = "", *, err: bool = False) -> None:
+    """Print what may come from a file, with escapes for all that could steer the terminal."""
+    safe = "".join(
+        char if char.isprintable() or char in "\n\t" else repr(char)[1:-1] for char in str(text)
+    )
+    typer.echo(safe, err=err)
+
+
+def in_options(text: str, command: Callable[..., Any]) -> str:
+    """Return a message in the words of a command: ``--gaps fill`` for ``gaps="fill"``."""
+    methods = r"(?:\bmethod=)?st\.(LocalCriterion|Equilibrium|Rupture)\([^)]*\)"
+    text = re.sub(methods, _method, text)
+    for name, parameter in inspect.signature(command, eval_str=True).parameters.items():
+        extras = getattr(parameter.annotation, "__metadata__", ())
+        if any(isinstance(extra, OptionInfo) for extra in extras):
+            option, argument = f"--{name.replace('_', '-')}", rf"(?<![\w.-]){name}"
+            text = re.sub(rf"{argument}=(True\b|\.\.\.)", option, text)
+            value = r"[\"']?([^\s\"',;)]*)[\"']?(?: to st\.\w+(?: or st\.\w+)*)?"
+            text = re.sub(rf"{argument}={value}", rf"{option} \1", text)
+            text = re.sub(rf"^{name}(?=:| must)", option, text)
+    return text
+
+
+def _method(match: re.Match[str]) -> str:
+    return f"the method {re.sub('(?<!^)(?=[A-Z])', '_', match[1]).lower()}"
+
+
+def _show_some(texts: Sequence[Any], prefix: str, *, err: bool = False) -> None:
+    for text in texts[:SHOWN]:
+        echo(f"{prefix}{text}", err=err)
+    if len(texts) > SHOWN:
+        echo(f"{prefix}and {len(texts) - SHOWN} more", err=err)
+
+
+def _save_figure(axes: Any, path: Path) -> None:
+    from stiction.base.files import write_whole
+
+    for suffix in ("png", "pdf"):
+        save = functools.partial(axes.figure.savefig, format=suffix, dpi=220)
+        write_whole(path.with_suffix(f".{suffix}"), save)
+
+
+# -- studies and runs ----------------------------------------------------------------------------
+
+
+def _interrupt(*_: object) -> None:
+    interrupted.set()
+    raise KeyboardInterrupt
+
+
+@contextmanager
+def _resumable(out: Path) -> Iterator[None]:
+    """Let an interruption end a run as Ctrl-C does: what is done is stored."""
+    signal.signal(signal.SIGTERM, _interrupt)  # of a batch system
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else it is ignored
+        signal.signal(signal.SIGINT, _interrupt)
+    try:
+        yield
+        if interrupted.is_set():
+            raise KeyboardInterrupt
+    except KeyboardInterrupt:
+        echo(f"interrupted: what is done is in {out}; rerun the command to resume", err=True)
+        raise typer.Exit(130) from None
+    finally:
+        interrupted.clear()
+
+
+@contextmanager
+def _executor(scheduler: str | None) -> Iterator[Any]:
+    """The executor of a Dask scheduler; None without one."""
+    if scheduler is None:
+        yield None
+        return
+    try:
+        from distributed import Client
+
+        client = Client(scheduler)
+    except (ImportError, OSError, ValueError, TypeError) as error:
+        raise InputError(f"--scheduler: {scheduler} cannot be reached: {error}") from None
+    with client:
+        yield client.get_executor(pure=False)
+
+
+def run(
+    study: StudyFile,
+    out: Annotated[Path, Option(metavar="RUN", help="Folder in which samples are stored.")],
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    part: Part = None,
+    pilot: Annotated[bool, Option(help="Compare some samples with the exact onset.")] = True,
+) -> None:
+    """Run the study in a file, or the missing part of it.
+
+    Rerunning the command resumes an interrupted run, computes failed samples again, and new ones
+    if `samples` was raised. The results do not depend on workers, machines or interruptions.
+
+    Exit code 0: complete; 1: samples failed or the run could not continue; 2: errors in the study
+    or the command; 130: interrupted.
+    """
+    import pandas as pd
+
+    from stiction.study.study import Study, open_run
+
+    loaded = Study.from_toml(study)
+    with _resumable(out), _executor(scheduler) as executor:
+        result = loaded.run(out=out, workers=workers, executor=executor, part=part, pilot=pilot)
+    dims = list(loaded.axes)
+    for name in ("critical_stress", "friction_coefficient", "critical_force"):
+        if name in result:
+            scale, unit = {"Pa": (1e-6, ", MPa"), "N": (1.0, ", N")}.get(
+                result[name].attrs["units"], (1.0, "")
+            )
+            values = (result[name] * scale).transpose(*dims, "sample")
+            labels: Any = [name]
+            if dims:
+                labels = values.isel(sample=0, drop=True).to_series().index
+                labels = labels.set_names(
+                    [f"{dim} ({result[dim].attrs['units']})" for dim in dims]
+                )
+            rows = pd.DataFrame(values.values.reshape(len(labels), -1), index=labels)
+            table = rows.T.describe(percentiles=LEVELS).T
+            for level in LEVELS:  # as the report estimates them
+                table[f"{level:.0%}"] = [_quantile(row, level) for row in rows.to_numpy()]
+            echo(f"{name}{unit}\n{table.to_string(max_rows=48)}")
+    state = open_run(out).status()
+    echo(f"part {part}: " * bool(part) + f"{state.done} of {state.samples} samples in {out}")
+    if state.failures:
+        echo(f"{len(state.failures)} samples failed; the same command retries:", err=True)
+        _show_some(state.failures, "  ", err=True)
+        raise typer.Exit(1)
+
+
+def _quantile(row: Any, level: float) -> float:
+    from stiction.statistics.estimates import quantiles
+
+    known = row[row == row]
+    return float(quantiles(known, level).value[0]) if known.size else float("nan")
+
+
+def status(
+    run: RunPath,
+    parts: Annotated[
+        int | None, Option(metavar="N", help="Name those of N parts that are missing.", min=1)
+    ] = None,
+) -> None:
+    """Show the completed, failed and damaged parts of a run.
+
+    Exit code 0: complete; 1: samples are missing, failed or damaged, or the run cannot be read.
+    """
+    from stiction.study.study import open_run
+
+    stored = open_run(run)
+    state, points = stored.status(), stored.points
+    each = state.samples // len(points)
+    echo(f"{run}: {' '.join(stored.title.split())}".removesuffix(": "))
+    share = 100.0 * state.done / state.samples
+    echo(f"  {stored.counted:11s} {state.done} of {state.samples} ({share:.1f} %)")
+    echo(f"  chunks      {state.chunks}")
+    echo(f"  computed    {duration(state.seconds)} of one core")
+    counts = zip(points, state.done_by_point, strict=True)
+    behind = [f"{one}: {done} of {each}" for one, done in counts if done < each]
+    _show_some(behind if len(points) > 1 else [], "  ")
+    if parts is not None:
+        missing = stored.missing_parts(parts)
+        names = ", ".join(f"{k}/{parts}" for k in missing)
+        echo(f"  missing     {f'parts {names}' if names else f'none of {parts} parts'}")
+    _show_some(state.damaged, "  damaged     ")
+    if state.damaged:
+        echo("  run the study again to repair this")
+    else:
+        echo("  verified    all stored chunks match their checksums")
+    if state.failures:
+        echo(f"  failed      {len(state.failures)}; `stiction run` computes them again:")
+        _show_some(state.failures, "    ")
+    if state.damaged or not state.complete:
+        raise typer.Exit(1)
+
+
+def export(
+    run: RunPath,
+    out: Annotated[Path, Argument(metavar="RESULT", help=".nc (NetCDF) or .csv.")],
+    partial: Annotated[
+        bool, Option("--partial", help="Write what is there of a run that is not complete.")
+    ] = False,
+) -> None:
+    """Write a run as one file over the sweep and the samples.
+
+    A table (.csv) has one row for each sample and columns named `name (unit)`; it leaves out
+    profiles along the interface and events. Exit code 1: samples are missing, and nothing is
+    written; with --partial they are NaN.
+    """
+    from stiction.study.study import open_run
+
+    stored = open_run(run)
+    stored.export(out, partial=partial)
+    state = stored.status()
+    rest = "" if state.complete else "; the others are missing"
+    echo(f"{state.done} of {state.samples} {stored.counted} written to {out}{rest}")
+
+
+def report(
+    run: RunPath,
+    out: Annotated[Path | None, Option(help="HTML file; RUN/report.html by default.")] = None,
+) -> None:
+    """Write one self-contained HTML page: figures, tables, failures, the study and versions."""
+    from stiction.cli.report import write_report
+    from stiction.study.study import open_run
+
+    path = out or run / "report.html"
+    with Meter("writing the report"):
+        write_report(open_run(run), path)
+    echo(f"report: {path}")
+
+
+# -- what a study would do -----------------------------------------------------------------------
+
+
+def check(study: StudyFile) -> None:
+    """Validate a study file and estimate its time and size, or list all errors.
+
+    A few samples are solved to estimate the time. Exit code 1: all of them failed.
+    """
+    from stiction.study.study import Study
+
+    loaded = Study.from_toml(study)
+    echo(f"{study}: valid" + (f", {loaded.title!r}" if loaded.title else ""))
+    with Meter("timing a few samples"):
+        cost, tried, failures = _cost(loaded)
+    for name, text in (description(loaded) | cost).items():
+        echo(f"  {name:20s} {text}")
+    if failures:
+        echo(
+            f"{len(failures)} of {tried} probed samples failed, such as {failures[0]}", err=True
+        )
+    if len(failures) == tried:
+        raise typer.Exit(1)
+
+
+def description(study: Any) -> dict[str, str]:
+    """Return a description of a study, in a few lines with titles."""
+    import pandas as pd
+
+    from stiction.ensemble.dataset import distinct
+
+    points, ensemble = study.experiments, study.ensemble
+    samples = f"{ensemble.samples} (seed {ensemble.seed})"
+    if study.sweep:
+        samples += f" at each of {len(points)} points: {len(points) * ensemble.samples} in all"
+    some = distinct(points, "problem", "random", "method")
+    methods = ", ".join(dict.fromkeys(point.method.label for point in some))
+    lines = {"method": methods, "samples": samples}
+    if study.uncertain:
+        keys = ", ".join(key for key in study.uncertain if key != "count")
+        lines["uncertain"] = f"{keys}: {study.uncertain['count']} equally likely interfaces"
+    for number, (dim, coordinates) in enumerate(study.axes.items(), start=1):
+        keys = " with ".join(variable.long_name for _, variable in coordinates.values())
+        values, variable = coordinates[dim]
+        unit = f" {variable.units}".removesuffix(" 1")
+        text = f"{keys}: {len(values)} values, {values[0]} to {values[-1]}{unit}"
+        lines[f"axis {number}"] = text
+    numbers = pd.DataFrame(
+        [_numbers(one.problem, member) for one in some for member in one.random.members]
+    )
+    for (title, unit), each in numbers.items():
+        ends = dict.fromkeys(f"{value:.5g}" for value in (each.min(), each.max()))
+        lines[title] = f"{' to '.join(ends)} {unit}".rstrip()
+    return lines
+
+
+def _numbers(problem: Any, random: Any) -> dict[tuple[str, str], float]:
+    """Return key numbers of a point and what is random there, by title and unit."""
+    field = random.strength
+    unit = "Pa" if field.of is None else "(friction coefficient)"
+    found = {
+        ("mean strength", unit): field.mean,
+        ("standard deviation", unit): field.standard_deviation,
+        ("correlation length", "m (to 1/e)"): field.efolding_length(),
+    }
+    if problem.uniform_rate is None:  # the nucleation length varies along the interface
+        return found
+    length = found["nucleation length", "m"] = problem.nucleation_length
+    found["nodes in h_n", ""] = min(problem.nodes_in_nucleation_length(problem.uniform_rate))
+    for dim, whole in zip(problem.interface.dims, problem.interface.lengths, strict=True):
+        found[f"L / h_n along {dim}", ""] = whole / length
+    if hasattr(field.spectrum, "correlation_length"):
+        found["xi_0 / h_n", ""] = field.spectrum.correlation_length / length
+    return found
+
+
+def _cost(study: Any) -> tuple[dict[str, str], int, list[str]]:
+    """Estimate the time of a study from a few timed samples, and the size of its result.
+
+    Return also how many samples were solved or failed, and the failures.
+    """
+    import numpy as np
+
+    from stiction.ensemble.batches import Span, solve_span, usable_cores
+
+    ensemble, points = study.ensemble, study.experiments
+    chosen = np.unique(np.linspace(0, len(points) - 1, PROBED).round().astype(int))
+    rates: list[float] = []
+    failures: dict[str, None] = {}
+    tried = 0
+    with collect_warnings():  # the run itself warns
+        for number in chosen.tolist():
+            point, best = points[number], np.inf
+            solve_span(point, Span(number, ensemble.first, 1))  # compiles and prepares
+            for most in (1, 8, point.batch):  # few samples at once cost more each
+                count = max(1, int(min(most, ensemble.samples, BUDGET / chosen.size / best)))
+                table = solve_span(point, Span(number, ensemble.first, count))
+                best = min(best, table.seconds / count)
+                failures |= dict.fromkeys(map(str, table.failures))
+            rates.append(best)
+            tried += count
+    seconds = float(np.interp(np.arange(len(points)), chosen, rates).sum()) * ensemble.samples
+    each = " to ".join(dict.fromkeys((duration(min(rates)), duration(max(rates)))))
+    cores, size = usable_cores(), sum(point.sample_bytes for point in points) * ensemble.samples
+    lines = {
+        "time": f"about {duration(seconds)} on one core, {duration(seconds / cores)} on the {cores}"
+        f" here ({each} a sample, probed at {len(chosen)} of {len(points)} points)",
+        "size": f"about {size / 1e6:.3g} MB",
+    }
+    return lines, tried, list(failures)
+
+
+def schema() -> None:
+    """Print the JSON schema of a study file, for editors that complete and check TOML."""
+    from stiction.study.study import study_schema
+
+    echo(json.dumps(study_schema(), indent=2))
+
+
+# -- one interface -------------------------------------------------------------------------------
+
+
+def onset(
+    study: StudyFile,
+    strength: Annotated[Path, Option(metavar="PROFILE", help="File of the peak strength.")],
+    method: Annotated[list[str] | None, Option(help="Use only this one (repeatable).")] = None,
+    unit: Annotated[
+        str | None, Option(help="Unit of the values in PROFILE, such as MPa.")
+    ] = None,
+    x_unit: Annotated[str | None, Option(help="Unit of x in PROFILE, such as mm.")] = None,
+    value: Annotated[str | None, Option(help="Column of the values: name or number.")] = None,
+    x: Annotated[str | None, Option(help="Column of x: name, or number from 0.")] = None,
+    quantity: Annotated[
+        Literal["strength", "friction_coefficient"],
+        Option(help="What PROFILE holds; coefficients need a normal pressure."),
+    ] = "strength",
+    interpolate: Annotated[bool, Option("--interpolate", help="Interpolate to nodes.")] = False,
+    gaps: Annotated[Literal["refuse", "fill"], Option(help="Missing values.")] = "refuse",
+) -> None:
+    """Compute the load and position at which one interface of given strength begins to slide.
+
+    The study file needs the problem only. PROFILE is .npy, text (.csv, .txt, ...) or NetCDF, with
+    or without x; on a plane it is .npy of shape (nx, ny). Values are in Pa and m unless the file
+    states units, as in 'x (mm); strength (MPa)'. Every applicable method is used: that of the
+    study with its options, the others with their defaults, and `rupture` at 2e7 Pa/s.
+    """
+    import pandas as pd
+
+    from stiction.base.variables import ONSET_VARIABLES
+    from stiction.methods.protocol import METHODS
+    from stiction.methods.protocol import onset as find
+    from stiction.problem.profiles.reading import read_profile
+    from stiction.study.export import table_of
+    from stiction.study.study import read_setup
+
+    setup = read_setup(study)
+    problem, own = setup.problem, setup.method
+    if unknown := [name for name in method or () if name not in METHODS]:
+        raise InputError([unknown_name("--method", name, METHODS) for name in unknown])
+    profile = read_profile(
+        strength, interface=problem.interface, unit=unit, x_unit=x_unit, interpolate=interpolate,
+        gaps=gaps, value=_column(value), x=_column(x), quantity=quantity,
+    )  # fmt: skip
+    # Each method refuses, and warns, for itself.
+    problem.sample(profile, accept=("barriers", "overstress", "constant"))
+    printed = (
+        *ONSET_VARIABLES, "friction_coefficient", "critical_force", "first_instability_force"
+    )  # fmt: skip
+    rows: dict[str, dict[str, float]] = {}
+    refused: list[str] = []
+    for name in method or METHODS.usable():
+        options = {"loading_rate": LOADING_RATE} if name == "rupture" else {}
+        try:
+            one = own if own is not None and own.type == name else METHODS[name](**options)
+            with Meter(f"onset by {name}"):
+                result = find(problem, profile, method=one)
+            found = table_of(result[[key for key in printed if key in result]])
+            rows[name] = {key: v[0] for key, v in found.items() if key.startswith(printed)}
+        except (InputError, TypeError) as error:  # TypeError: it has options without defaults
+            refused.append(f"{name} does not apply: {error}")
+    if rows:
+        echo(pd.DataFrame(rows).T.to_string(na_rep="", float_format="{:.8g}".format))
+    for text in refused:
+        echo(text)
+    if not rows:
+        raise typer.Exit(1)
+
+
+def _column(text: str | None) -> int | str | None:
+    return int(text) if text is not None and text.isdecimal() else text
+
+
+def rupture(
+    study: StudyFile,
+    out: Annotated[Path, Option(help="Folder of result and figures.")] = Path(
+        "stiction-rupture"
+    ),
+    sample: Annotated[int, Option(min=0, help="Sample of the study's strength.")] = 0,
+    strength: Annotated[
+        Path | None,
+        Option(metavar="PROFILE", help="Peak strength, instead of a sample."),
+    ] = None,
+    film: Annotated[bool, Option("--film", help="Also write rupture.gif.")] = False,
+) -> None:
+    """Simulate one interface from its first slip to global sliding, or as its study stops it.
+
+    The strength is a sample of the study (of a sweep, at its first point) or a profile of your
+    own, with or without x. The command writes `rupture.nc` (slip, slip rate and stress over time
+    and x) and a figure of the slip rate in space and time (PNG and PDF). The loading rate is that
+    of the study's method `rupture`, else 2e7 Pa/s.
+    """
+    from stiction import plot
+    from stiction.methods.dynamics.method import Rupture
+    from stiction.methods.dynamics.simulate import simulate_rupture
+    from stiction.problem.profiles.reading import read_profile
+    from stiction.study.export import write_result
+    from stiction.study.study import Study, read_setup
+
+    out.mkdir(parents=True, exist_ok=True)
+    profiles: Any
+    if strength is None:
+        loaded = Study.from_toml(study)
+        point, save = loaded.experiments[0], loaded.save
+        problem, method = point.problem, point.method
+        profiles = point.profiles(point.draws(sample, 1))
+    else:
+        setup = read_setup(study)
+        problem, method, save = setup.problem, setup.method, setup.save
+        profiles = read_profile(strength, interface=problem.interface)
+    if not isinstance(method, Rupture):
+        method = Rupture(loading_rate=LOADING_RATE)
+    result = simulate_rupture(problem, profiles, method=method, save=save)
+    write_result(result, out / "rupture.nc")
+    echo(_summary(result))
+    with Meter("drawing the figures"):
+        _save_figure(plot.rupture(result, problem=problem), out / "rupture")
+    if film:
+        echo(f"film: {plot.film(result, out / 'rupture.gif')}")
+    echo(f"written to {out}")
+
+
+def _summary(result: Any) -> str:
+    """Return the numbers of a rupture, one a line, without those that are NaN."""
+    lines = []
+    for name in RUPTURE:
+        numbers = [f"{number:.5g}" for number in result[name].values.reshape(-1)]
+        if numbers != ["nan"]:
+            about = result[name].attrs
+            lines.append(f"{about['long_name']}: {' and '.join(numbers)} {about['units']}")
+    return "\n".join([*lines, f"ended by: {result.attrs['stopped']}"])
+
+
+def reliability(
+    study: StudyFile,
+    force: Annotated[float | None, Option(help="Shear force to carry, N.")] = None,
+    stress: Annotated[float | None, Option(help="Mean shear stress to carry, Pa.")] = None,
+    friction_coefficient: Annotated[
+        float | None, Option(help="Shear stress over normal pressure to carry.")
+    ] = None,
+    probability: Annotated[float | None, Option(help="Probability of a design.")] = None,
+    out: Annotated[
+        Path | None,
+        Option(metavar="RUN", help="Compute the curve; repetitions are stored in this folder."),
+    ] = None,
+    smallest: Annotated[float, Option(help="Smallest probability of the curve.")] = 1e-9,
+    repetitions: Annotated[int, Option(help="Independent repetitions.", min=1)] = 8,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    part: Part = None,
+) -> None:
+    """Compute how likely a study's interface is to slide below a demand, or its design.
+
+    One line answers at each point of the sweep: to `--force`, `--stress` or
+    `--friction-coefficient` with a probability, to `--probability` with the design; without an
+    option, to the table [reliability] of the study. With `--out` it is the whole curve, decade by
+    decade.
+
+    Problem, strength, method, seed and sweep come from the study file; its number of samples is
+    not used. The stress is the mean shear stress on the interface; failure means that the
+    interface as a whole slides below it. With a table [uncertain] the probability is the mean over
+    equally likely interfaces, and the band that holds 90 % of them is beside it. Rerunning the
+    command resumes an interrupted run, and computes more if there are to be more repetitions.
+    `stiction export` writes the curve as a table, `stiction report` a page with its figure.
+    """
+    from stiction.study.export import table_of
+    from stiction.study.study import Study, open_run
+
+    loaded = Study.from_toml(study)
+    options = {
+        "force": force, "stress": stress, "friction_coefficient": friction_coefficient,
+        "probability": probability,
+    }  # fmt: skip
+    asked = {name: one for name, one in options.items() if one is not None}
+    if out is None:
+        needs = [name for name, one in (("part", part), ("scheduler", scheduler)) if one]
+        if needs:
+            raise InputError(
+                [f"--{name}: shares the work of a curve; give --out" for name in needs]
+            )
+        _answer(loaded, asked, workers)
+        return
+    if asked:
+        raise InputError(
+            f"--out: is for the whole curve; leave out {' and '.join(asked)}, or --out"
+        )
+    with _resumable(out), _executor(scheduler) as executor:
+        curve = loaded.failure_curve(
+            out=out, repetitions=repetitions, smallest=smallest, workers=workers,
+            executor=executor, part=part,
+        )  # fmt: skip
+    echo(table_of(curve).to_string(index=False, float_format="{:.7g}".format, max_rows=200))
+    if "members" in curve:
+        echo(
+            f"probability: the mean over {curve.sizes['member']} equally likely interfaces, to"
+            " decide with; probability_low, _high: its sampling error, 95 %; band_low, _high: 90 %"
+            " of the interfaces"
+        )
+    state = open_run(out).status()
+    echo(
+        f"part {part}: " * bool(part) + f"{state.done} of {state.samples} repetitions in {out}"
+    )
+
+
+def _answer(study: Any, asked: dict[str, float], workers: int | None) -> None:
+    """Print the answer to what was asked, or else to the question of the study, at each point."""
+    from stiction.study.question import Question
+
+    question = study.reliability
+    if asked:
+        given = {} if question is None else {"target_cv": question.target_cv}
+        try:
+            question = Question(**given, **asked)
+        except InputError as error:
+            texts = (text.partition("Question")[2].lstrip(".: ") for text in error.problems)
+            raise InputError(texts) from None
+    if question is None:
+        raise InputError(
+            "--out: give the folder of a curve, or ask for one answer with --force, --stress,"
+            " --friction-coefficient or --probability, or in the table [reliability] of the study"
+        )
+    for point, experiment in zip(study.points, study.experiments, strict=True):
+        where = f"{point}: " if point.values else ""
+        echo(f"{where}{question.answer(experiment, workers)}")
+
+
+# -- the program ---------------------------------------------------------------------------------
+
+app = typer.Typer(
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="The statistics of static friction: at which load, and where, does an interface let go?",
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        echo(f"stiction {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, Option("--version", callback=_print_version, is_eager=True)
+    ] = False,
+) -> None:
+    pass
+
+
+def _command(function: Callable[..., None]) -> Callable[..., None]:
+    """Messages in the words of the command; Ctrl-C ends with exit code 130, as shells expect."""
+
+    def show(message: Warning | str, *args: Any, **kwargs: Any) -> None:
+        echo(f"warning: {in_options(str(message), function)}", err=True)
+
+    @functools.wraps(function)
+    def wrapped(*args: Any, **kwargs: Any) -> None:
+        warnings.showwarning = show
+        try:
+            function(*args, **kwargs)
+        except InputError as error:
+            raise InputError([in_options(text, function) for text in error.problems]) from None
+        except RunError as error:
+            raise type(error)(in_options(str(error), function)) from None
+        except KeyboardInterrupt:
+            echo("interrupted", err=True)
+            raise typer.Exit(130) from None
+
+    return wrapped
+
+
+for _function in (run, check, status, export, report, schema, onset, rupture, reliability):
+    app.command()(_command(_function))
+
+
+def main() -> None:
+    """Run the command line: invalid input and a full disk give a message, not a traceback.
+
+    The exit code is 2 for invalid input and 1 for failures of the run.
+    """
+    logging.basicConfig(format="%(message)s", level=logging.WARNING, stream=sys.stderr)
+    try:
+        try:
+            app(standalone_mode=True)
+        finally:
+            sys.stdout.flush()
+    except InputError as error:
+        for text in error.problems:
+            echo(f"error: {text}", err=True)
+        sys.exit(2)
+    except (RunError, TimeoutError, MemoryError, OSError) as error:
+        echo(f"error: {str(error) or 'not enough memory'}", err=True)
+        try:
+            sys.stdout.flush()
+        except OSError:  # to a full disk: the interpreter would try again at its end
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)

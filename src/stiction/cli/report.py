@@ -1,0 +1,261 @@
+"""A result as one self-contained HTML page: text, figures and tables."""
+
+import base64
+import io
+import itertools
+import math
+import platform
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+import tomli_w
+import xarray as xr
+from matplotlib.figure import Figure
+
+from stiction import __version__, plot
+from stiction.base.errors import InputError
+from stiction.base.files import write_whole
+from stiction.base.variables import DIRECTION
+from stiction.plot.axes import scaled, shown_quantity, with_unit
+from stiction.plot.style import PAGE, panel, paper_style
+from stiction.reliability.answer import bounded
+from stiction.statistics.estimates import mean, quantiles, standard_deviation
+from stiction.study.failure import StoredCurves
+from stiction.study.run import StoredRun
+
+MOST_ROWS = 200
+MOST_FIGURES = 12
+LEVELS = (0.05, 0.5, 0.95)
+QUANTITIES = ("critical_stress", "first_instability", "friction_coefficient", "critical_force")
+SPREAD = ("mean", "standard deviation")
+
+
+@dataclass
+class Page:
+    """Text, figures, tables and listings in the order in which they are added."""
+
+    title: str
+    parts: list[dict[str, Any]] = field(default_factory=list)
+
+    def text(self, text: str, *, warning: bool = False) -> None:
+        """Add a paragraph."""
+        self.parts.append({"kind": "text", "text": text, "warning": warning})
+
+    def figure(self, figure: Figure, caption: str) -> None:
+        """Add a figure as a picture."""
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format="png", dpi=150)
+        data = base64.b64encode(buffer.getvalue()).decode("ascii")
+        self.parts.append({"kind": "figure", "caption": caption, "data": data})
+
+    def table(self, title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+        """Add a table; numbers are shown to five digits."""
+        cells = [[shown(entry) for entry in row] for row in rows]
+        self.parts.append({"kind": "table", "title": title, "columns": columns, "rows": cells})
+
+    def listing(self, title: str, text: str) -> None:
+        """Add the text of a file."""
+        self.parts.append({"kind": "listing", "title": title, "text": text})
+
+    def html(self) -> str:
+        """Return the page."""
+        environment = jinja2.Environment(
+            loader=jinja2.PackageLoader("stiction.cli"),
+            autoescape=True,
+            trim_blocks=True,
+            lstrip_blocks=True,
+            undefined=jinja2.StrictUndefined,
+        )
+        return environment.get_template("report.html.j2").render(page=self)
+
+
+def shown(entry: Any) -> str:
+    """Return a table entry as text: numbers to five digits, a dash for what is missing."""
+    if entry is None or (isinstance(entry, float | np.floating) and np.isnan(entry)):
+        return "\N{EN DASH}"
+    if isinstance(entry, int | np.integer):
+        return f"{entry:,}"
+    if isinstance(entry, float | np.floating):
+        return f"{entry:.5g}".replace("-", "\N{MINUS SIGN}")
+    return str(entry)
+
+
+def write_report(run: StoredRun, path: Path) -> None:
+    """Write a page about a run: figures, tables, failed samples, the study and versions."""
+    if run.study is None:
+        raise InputError(f"{run.path}: a report needs the study, which cannot be read")
+    state = run.status()
+    if not state.done:
+        raise InputError(f"{run.path}: no sample is stored yet")
+    add: Any
+    what, add = "Onset of sliding: a Monte Carlo study", add_samples
+    if isinstance(run, StoredCurves):
+        what, add = "Failure probability", add_curves
+    page = Page(run.study.title or what)
+    methods = " and ".join(dict.fromkeys(plan.method.label for plan in run.study.experiments))
+    page.text(f"{state.done:,} of {state.samples:,} {run.counted} by {methods}.")
+    if not state.complete:
+        page.text("The run is not complete.", warning=True)
+    with paper_style():
+        add(page, run)
+    if state.failures:
+        rows = [[str(failure)] for failure in state.failures[:MOST_ROWS]]
+        page.table(f"Samples that failed ({len(state.failures):,})", ["sample"], rows)
+    page.listing(
+        "The study, to run again to the same numbers", tomli_w.dumps(run.study.to_dict())
+    )
+    packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "numba"))
+    page.text(
+        f"Computed with {'; '.join(state.versions)}; page written with stiction"
+        f" {__version__}, Python {platform.python_version()}, {packages}."
+    )
+    write_whole(path, page.html().encode())
+
+
+def add_samples(page: Page, run: StoredRun) -> None:
+    """Add the figures and the tables of samples."""
+    names = [*QUANTITIES, "critical_position", "arrested_events"]
+    result, axes = run.dataset(only=names), run.study.axes
+    add_figures(page, result, list(axes))
+    add_tables(page, result, list(axes), [name for own in axes.values() for name in own])
+
+
+def add_curves(page: Page, run: StoredCurves) -> None:
+    """Add a figure and a table of the failure curve at each point of a sweep."""
+    for point, curve in zip(run.study.points, run.curves(), strict=True):
+        where = f" at {point}" if point.values else ""
+        if np.isnan(curve["stress"]).all():
+            page.text(f"No repetition is stored{where}.", warning=True)
+            continue
+        if point.number < MOST_FIGURES:
+            figure = Figure(figsize=(0.75 * PAGE, 3.2))
+            area = run.study.experiments[point.number].problem.area
+            plot.failure_curve(curve, area=area, ax=figure.subplots())
+            page.figure(figure, f"Probability of an onset below a stress{where}.")
+        same = "stress_above_bound" if not bounded(curve.attrs["lower_bound"]) else ""
+        own = [v for name, v in curve.items() if v.dims == ("point",) and name != same]
+        factors, _, labels = zip(*map(scaled, own), strict=True)
+        rows = np.transpose(own) * factors
+        mean = ""
+        if "members" in curve:
+            count = curve.sizes["member"]
+            mean = f", mean over {count} equally likely interfaces; the band holds 90 % of them"
+        page.table(f"Failure probability{where}{mean}", labels, rows)
+
+
+def add_figures(page: Page, result: xr.Dataset, dims: list[str]) -> None:
+    """Add densities of the onset and its quantiles along the longest axis of a sweep."""
+    what = scaled(result[shown_quantity(result)])[2].partition(" (")[0]
+    if not dims:
+        figure = densities(result, None)
+        page.figure(figure, f"{what.capitalize()} and critical position.")
+        return
+    along, *others = sorted(dims, key=lambda dim: -result.sizes[dim])
+    within, over = others[:1], others[1:]
+    steps = itertools.product(*(range(result.sizes[dim]) for dim in over))
+    for chosen in itertools.islice(steps, MOST_FIGURES):
+        part = result.isel(dict(zip(over, chosen, strict=True)))
+        fixed = _where(part, over)
+        first = part if not within else part.isel({within[0]: 0})
+        page.figure(
+            densities(first, along),
+            f"Densities of the {what} and of the critical position{_where(first, others)}.",
+        )
+        figure = Figure(figsize=(0.75 * PAGE, 3.2))
+        plot.quantiles(part, along=along, ax=figure.subplots())
+        page.figure(
+            figure,
+            f"Median of the {what} with its 95 % confidence interval{fixed}; band: between"
+            " quartiles"
+            + ("." if within else ", pale band: between the 5 % and 95 % quantiles."),
+        )
+
+
+def _where(part: xr.Dataset, dims: list[str]) -> str:
+    """Return ' at NAME = VALUE' of what is held fixed."""
+    values = []
+    for dim in dims:
+        factor, unit, _ = scaled(part[dim])
+        value = part[dim].item()
+        number = f"{value * factor:.4g} {unit}".strip() if isinstance(value, float) else value
+        values.append(f"{dim.replace('_', ' ')} = {number}")
+    return f" at {', '.join(values)}" if values else ""
+
+
+def densities(result: xr.Dataset, along: str | None) -> Figure:
+    """Return a figure of the densities of the onset and of its position, along a sweep."""
+    parts = [result[[shown_quantity(result)]]]
+    if DIRECTION in result["critical_position"].dims:
+        place = result[["critical_position"]]
+        parts += [place.sel({DIRECTION: direction}) for direction in result[DIRECTION].values]
+    else:
+        parts.append(result[["critical_position"]])
+    figure = Figure(figsize=(PAGE, 2.6 if along is None else 3.0))
+    panels = figure.subplots(1, len(parts))
+    for letter, axes, part in zip("abc", panels, parts, strict=False):
+        (name,) = part.data_vars
+        plot.monte_carlo(part, quantity=str(name), ax=axes)
+        if DIRECTION in part.coords:
+            axes.set_xlabel(f"{axes.get_xlabel()}, {part[DIRECTION].item()}")
+        if legend := axes.get_legend():
+            legend.remove()
+        panel(axes, letter)
+    if along is not None:
+        handles, labels = panels[0].get_legend_handles_labels()
+        title = scaled(result[along])[2]
+        figure.legend(handles, labels, loc="outside lower center", ncols=3, title=title)
+    return figure
+
+
+def add_tables(page: Page, result: xr.Dataset, dims: list[str], keys: list[str]) -> None:
+    """Add mean, spread and quantiles of the onset at every point, with errors."""
+    flat = result.stack(point=dims) if dims else result.expand_dims("point")
+    scales = [scaled(result[key]) for key in keys]
+    swept = [*(label for _, _, label in scales), "samples"]
+    values = [flat[key].values for key in keys]
+    pairs = zip(values, scales, strict=True)
+    places = [each * scale[0] if each.dtype.kind == "f" else each for each, scale in pairs]
+    labels = [[each[i] for each in places] for i in range(min(flat.sizes["point"], MOST_ROWS))]
+    quantities = [f"{what} \N{PLUS-MINUS SIGN} standard error" for what in SPREAD]
+    quantities += [f"{100 * level:g} % quantile" for level in LEVELS]
+    if flat["first_instability"].equals(flat["critical_stress"]):  # of the local criterion
+        flat = flat.drop_vars("first_instability")
+    for name in QUANTITIES:
+        if name in flat:
+            factor, unit, _ = scaled(flat[name])
+            columns = [*swept, *(with_unit(quantity, unit) for quantity in quantities)]
+            found = flat[name].transpose("point", ...).values * factor
+            rows = [[*at, *_estimates(row)] for at, row in zip(labels, found, strict=False)]
+            page.table(flat[name].attrs["long_name"].capitalize(), columns, rows)
+    if "arrested_events" in flat:
+        found = flat["arrested_events"].transpose("point", ...).values
+        counts = [[int(np.isfinite(row).sum()), int(np.sum(row > 0))] for row in found]
+        rows = [[*at, *count] for at, count in zip(labels, counts, strict=False)]
+        page.table("Arrested events", [*swept, "of these with an arrested event"], rows)
+
+
+def _estimates(found: Any) -> list[Any]:
+    """Return number, mean, standard deviation and quantiles of samples as texts."""
+    values = found[np.isfinite(found)]
+    if values.size < 4:
+        return [values.size, *[None] * (2 + len(LEVELS))]
+    levels = quantiles(values, LEVELS)
+    errors = 0.25 * (levels.upper - levels.lower)  # 95 % lie within two
+    estimates = [
+        f"{rounded(one.value, one.error)} \N{PLUS-MINUS SIGN} {rounded(one.error, one.error)}"
+        for one in (mean(values), standard_deviation(values))
+    ]
+    return [values.size, *estimates, *map(rounded, levels.value, errors)]
+
+
+def rounded(value: float, error: float) -> str:
+    """Return a number to the second digit of its error."""
+    if not 0.0 < error < math.inf:  # too few samples beyond the quantile
+        return shown(float(value))
+    digits = 1 - math.floor(math.log10(error))
+    return f"{value:.{max(digits, 0)}f}".replace("-", "\N{MINUS SIGN}")

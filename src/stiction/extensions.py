@@ -1,0 +1,31 @@
+"""What a package of your own needs to add a method, law, load, marginal or spectrum.
+
+`docs/architecture.md` has an example of each. These names stay where they are; the modules that
+they come from may move.
+"""
+
+from stiction.base.kinds import register
+from stiction.base.model import Positive, Real, model
+from stiction.base.variables import Variable
+from stiction.methods.protocol import Method
+from stiction.problem.friction import FrictionLaw
+from stiction.problem.load import LoadShape, distance
+from stiction.problem.results import onset_variables
+from stiction.random.marginals import Marginal
+from stiction.random.spectra import ScaledSpectrum, SpectralDensity
+
+__all__ = [
+    "FrictionLaw",
+    "LoadShape",
+    "Marginal",
+    "Method",
+    "Positive",
+    "Real",
+    "ScaledSpectrum",
+    "SpectralDensity",
+    "Variable",
+    "distance",
+    "model",
+    "onset_variables",
+    "register",
+]

@@ -1,0 +1,207 @@
+"""The average of strength over load with the weights of critical patches, and where it is least."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from rocket_fft import c2r, r2c
+
+from stiction.base.arrays import Array
+from stiction.base.jit import ZERO, jit, jit_allocating
+from stiction.methods.criterion.windows import Window
+from stiction.problem.interface import Interface
+
+STENCIL = 10
+# Coefficients of the polynomial through ten nodes, in powers of the distance from their middle.
+_FIT = np.linalg.inv(np.vander(np.arange(STENCIL) - 0.5 * (STENCIL - 1), increasing=True))
+
+
+def averages(
+    interface: Interface, windows: Sequence[Window], excess: Array, profile: Array
+) -> Iterator[Iterator[Array]]:
+    """Yield for each sample <s, y>/<p, y> over each window y, centred at every node, (*shape).
+
+    Strength less initial stress s (Pa) is of shape (samples, *shape), the load profile p (*shape).
+    """
+    load = interface.transform(profile)
+    scales = [interface.inverse_transform(load * (one.spectrum / one.total)) for one in windows]
+    for strength in excess:
+        waves = interface.transform(strength)
+        each = zip(windows, scales, strict=True)
+        yield (interface.inverse_transform(waves * y.spectrum) / scale for y, scale in each)
+
+
+def least_average(
+    interface: Interface, windows: Sequence[Window], excess: Array, profile: Array
+) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Find the least average of each sample over places and windows, see `averages`.
+
+    Returned are the averages (Pa), their places in nodes, and the numbers of their windows. On a
+    line the minimum is taken between the nodes. On a plane the load is that of a node, which is
+    exact for the discrete problem, and only the place lies between the nodes.
+    """
+    count = len(excess)
+    load, place, chosen = np.full(count, np.inf), np.zeros(count), np.zeros(count, np.int64)
+    if not interface.is_plane:
+        multiplier, axis = np.array(windows[0].spectrum), np.arange(1)
+        scale, spectrum = np.empty(excess.shape[1]), np.empty(multiplier.size, dtype=complex)
+        _filter(profile, multiplier / multiplier[0], axis, spectrum, scale)
+        reach = int(np.ceil(0.5 * windows[0].extents[0] / interface.spacing)) + 2
+        _minimum_of_rows(excess, profile, scale, multiplier, reach, axis, spectrum, load, place)
+        return load, place, chosen
+    place = np.zeros((count, 2))
+    for i, each in enumerate(averages(interface, windows, excess, profile)):
+        bound = np.min(excess[i] / profile)  # the rounding of the transforms may not keep to it
+        for window, average in enumerate(each):
+            least = max(average.min(), bound)
+            if least < load[i]:
+                load[i], place[i], chosen[i] = least, _between_nodes(average), window
+    return load, place, chosen
+
+
+def _between_nodes(average: Array) -> Array:
+    """Return where a parabola through the nodes around the lowest has its minimum, in nodes.
+
+    Places at nodes would show as stripes in a histogram.
+    """
+    node = np.unravel_index(int(average.argmin()), average.shape)
+    place = np.array(node, dtype=np.float64)
+    for axis in (0, 1):
+        line = np.take(average, node[1 - axis], axis=1 - axis)
+        before, here, after = (line[(node[axis] + s) % line.size] for s in (-1, 0, 1))
+        bend = before - 2.0 * here + after
+        if bend > 0.0:
+            place[axis] += 0.5 * (before - after) / bend
+    return np.mod(place, average.shape)
+
+
+@jit
+def _filter(field: Array, multiplier: Array, axis: Array, spectrum: Array, out: Array) -> None:
+    """Write a line with its Fourier modes multiplied to `out`."""
+    r2c(field, spectrum, axis, True, 1.0, 1)
+    for i in range(spectrum.size):
+        spectrum[i] *= multiplier[i]
+    c2r(spectrum, out, axis, False, 1.0 / out.size, 1)
+
+
+@jit
+def _estimates(values: Array, i: int) -> tuple[float, float]:
+    """Minimum near a node by a parabola, and how much lower it may be; infinite without one.
+
+    A cubic through four nodes differs from the parabola by at most 0.065 third differences.
+    """
+    n = values.size
+    left, middle, right = values[i - 1], values[i], values[i + 1 - n]
+    if not (middle <= left and middle < right):
+        return np.inf, 0.0
+    shift = 0.5 * (left - right) / (left - 2.0 * middle + right)
+    before = abs(right - 3.0 * middle + 3.0 * left - values[i - 2])
+    after = abs(values[i + 2 - n] - 3.0 * right + 3.0 * middle - left)
+    return middle - 0.25 * (left - right) * shift, 0.065 * max(before, after)
+
+
+@jit
+def _slope(power: Array, u: float) -> tuple[float, float]:
+    """First and second derivative of a polynomial."""
+    slope, curvature = 0.0, 0.0
+    for p in range(STENCIL - 1, 0, -1):
+        curvature = curvature * u + slope
+        slope = slope * u + p * power[p]
+    return slope, curvature
+
+
+@jit
+def _minimum_near(
+    values: Array, strength: Array, profile: Array, reach: int, node: int, power: Array
+) -> tuple[float, float]:
+    """Minimum between a node and the next on either side, and its place, by local polynomials.
+
+    By Newton's method on the slope, kept between the points where the slope is known to change
+    sign; it bisects where the function is not convex. The polynomial rings where the strength
+    jumps: the minimum is not below the least ratio of strength to load under the patch, nor, where
+    the values are convex, below the lines through two values on either side, extended until they
+    meet.
+    """
+    n = values.size
+    least = np.inf
+    for j in range(node - reach, node + reach + 1):
+        least = min(least, strength[j % n] / profile[j % n])
+    lowest, place = values[node], float(node)
+    for side in (-1, 1):
+        cell = node if side > 0 else (node - 1) % n
+        for p in range(STENCIL):
+            power[p] = 0.0
+        for j in range(STENCIL):
+            value = values[(cell - STENCIL // 2 + 1 + j) % n] - values[cell]
+            for p in range(STENCIL):
+                power[p] += _FIT[p, j] * value
+        u = -0.5 * side
+        if side * _slope(power, u)[0] >= 0.0:  # it rises from the node
+            continue
+        low, high = -0.5, 0.5
+        for _ in range(50):
+            slope, curvature = _slope(power, u)
+            if slope > 0.0:
+                high = u
+            else:
+                low = u
+            move = -slope / curvature if curvature > 0.0 else np.inf
+            if abs(move) < 1e-11:
+                break
+            u = u + move if low < u + move < high else 0.5 * (low + high)
+        value = 0.0
+        for p in range(STENCIL - 1, -1, -1):
+            value = value * u + power[p]
+        value = max(values[cell] + value, least)
+        here, beside = values[node], values[(node + side) % n]
+        before, rise = here - values[(node - side) % n], beside - here
+        after = values[(node + 2 * side) % n] - beside
+        if before <= rise <= after:
+            bound = here
+            if before < after:
+                bound = here + before * (after - rise) / (after - before)
+            value = max(value, bound)
+        if value < lowest:
+            lowest, place = value, node + 0.5 * side + u
+    return lowest, place
+
+
+@jit_allocating
+def _minimum_of_rows(
+    excess: Array, profile: Array, scale: Array, multiplier: Array, reach: int,
+    axis: Array, spectrum: Array, minimum: Array, place: Array,
+) -> None:  # fmt: skip
+    """Minimum over a line of <s, y>/<p, y> for every row, and its place in units of nodes.
+
+    `scale` is <p, y>. A parabola through each local minimum of the nodes estimates how low the
+    function falls there; polynomials through ten nodes take the lowest, and any other that might be
+    lower.
+    """
+    nodes = profile.size
+    values, power = np.empty(nodes), np.empty(STENCIL)
+    for row in range(excess.shape[0]):
+        strength = excess[row]
+        _filter(strength, multiplier, axis, spectrum, values)
+        # The weights keep to the least ratio; only the rounding of the transforms may not.
+        least = np.inf
+        for i in range(nodes):
+            least = min(least, multiplier[0] * strength[i] / profile[i])
+        for i in range(nodes):
+            values[i] = max(values[i] / scale[i], least)
+        best, lowest = ZERO - 1, np.inf
+        for i in range(nodes):
+            low = _estimates(values, i)[0]
+            if low < lowest:
+                best, lowest = i, low
+        value, where = values[0], 0.0
+        if best >= 0:  # not constant
+            value, where = _minimum_near(values, strength, profile, reach, best, power)
+        for i in range(nodes):
+            low, error = _estimates(values, i)
+            if i != best and low - error < value:
+                other, elsewhere = _minimum_near(values, strength, profile, reach, i, power)
+                if other < value:
+                    value, where = other, elsewhere
+        where %= nodes
+        minimum[row] = value
+        place[row] = where if where < nodes else 0.0  # a tiny negative place rounds to `nodes`

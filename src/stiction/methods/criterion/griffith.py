@@ -1,0 +1,172 @@
+"""Griffith's criterion under any load: energy release rate and critical crack length."""
+
+from typing import Any
+
+import numpy as np
+
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError
+from stiction.base.model import Flag, Numbers, Positive, Real, checked, describe
+from stiction.problem.problem import Problem
+
+POINTS = 512  # fewest Gauss-Chebyshev points along a crack; smooth drops are exact to round-off
+SHORT = np.geomspace(1e-6, 1.0, 40, endpoint=False)  # lengths below one node spacing
+BATCH = 1 << 20  # points evaluated at once
+HALVINGS = 30
+
+
+@checked
+def energy_release_rate(
+    problem: Problem, load: Real, lengths: Numbers, *, centre: Real = 0.0
+) -> Array:
+    """Return the static energy release rate at both tips of a crack, by Bueckner's weights.
+
+    Parameters
+    ----------
+    problem : Problem
+        A line; its load profile, initial stress and residual strength make the stress drop
+        tau_i + tau_0 p - tau_r.
+    load : float
+        tau_0, Pa.
+    lengths : (m,) array or float
+        Lengths of the crack, m, between 0 and that of the interface.
+    centre : float
+        Centre of the crack, m.
+
+    Returns
+    -------
+    (m, 2) array, J/m²
+        At the left and the right tip; negative where the faces would close there.
+
+    Raises
+    ------
+    InputError
+        On a plane, with `residual_ratio`, or if a length is out of range.
+
+    Notes
+    -----
+    G = K|K|/(2 G*) between identical half-spaces, K the integral of the drop times the weight of
+    Bueckner (1970). The interface is periodic: u = tan(pi x/L) maps the row of collinear cracks to
+    one crack, so that a uniform drop gives K = drop (L tan(pi a/L))^(1/2), a the half-length
+    (Koiter, 1959). Kammer et al. (2015) and Ke et al. (2018) predict the length of confined
+    ruptures so. Between the nodes the drop is linear.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> rate = st.theory.energy_release_rate(problem, 1e6, [0.01, 0.02])
+    >>> bool(rate[1, 0] > rate[0, 0] > 0.0)  # J/m²
+    True
+    """
+    resting, profile = _stress_drops(problem)
+    whole, period = np.atleast_1d(lengths), problem.interface.extent
+    if whole.ndim != 1 or not np.all((whole > 0.0) & (whole < period)):
+        raise InputError(
+            f"lengths: must be between 0 and {period:g} m, got {describe(lengths)}"
+        )
+    drops = (resting + load * profile)[None]
+    return _release_rate(problem, _intensity_factors(problem, drops, whole, centre)[0])
+
+
+@checked
+def griffith_length(
+    problem: Problem,
+    load: Numbers,
+    fracture_energy: Positive,
+    *,
+    centre: Real = 0.0,
+    arrest: Flag = False,
+) -> Any:
+    """Return the length at which a crack begins to run, or is arrested, by Griffith's criterion.
+
+    Parameters
+    ----------
+    problem : Problem
+        A line, see `energy_release_rate`.
+    load : float or (k,) array
+        tau_0, Pa; many at once cost little more than one.
+    fracture_energy : float
+        Gamma, J/m², positive; for random strength its mean.
+    centre : float
+        Centre of the crack, m, at equal distances from both tips.
+    arrest : bool
+        False: the shortest length above which the smaller of the two release rates exceeds
+        Gamma. True: the next length at which it falls below Gamma again.
+
+    Returns
+    -------
+    float or (k,) array
+        Length, m; infinite where there is none.
+
+    """
+    if load.ndim > 1 or not np.all(np.isfinite(load)):
+        raise InputError(
+            f"load: must be a finite number or a list of them, got {describe(load)}"
+        )
+    tau, drops = load.reshape(-1, 1, 1), _stress_drops(problem)
+
+    def runs(lengths: Array, tau: Array) -> Any:
+        resting, unit = _intensity_factors(problem, drops, lengths, centre)
+        rate = _release_rate(problem, resting + tau * unit)
+        return rate.min(axis=-1) > fracture_energy
+
+    # Crossings are bracketed at lengths one node apart, and at ever shorter ones, then bisected.
+    whole = problem.interface.spacing * np.append(SHORT, np.arange(1, problem.interface.size))
+    above = runs(whole, tau)
+    if arrest:
+        above = ~above & np.maximum.accumulate(above, axis=1)
+    crosses, first = above.any(axis=1), above.argmax(axis=1)
+    low, high = np.append(0.0, whole)[first[crosses]], whole[first[crosses]]
+    for _ in range(HALVINGS if crosses.any() else 0):
+        middle = 0.5 * (low + high)
+        beyond = runs(middle, tau[crosses, 0]) != arrest
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+    found = np.full(tau.size, np.inf)
+    found[crosses] = high
+    return found if load.ndim else float(found[0])
+
+
+def _stress_drops(problem: Problem) -> Array:
+    """Return the stress drop (Pa) without a load, and by a unit load, at the nodes: (2, nodes)."""
+    if problem.interface.is_plane:
+        raise InputError("problem: must have a line interface")
+    problem.refuse_specimen("the theory of cracks between half-spaces", "use st.Equilibrium()")
+    if problem.friction.residual_ratio is not None:
+        raise InputError(
+            "problem.friction.residual_ratio: the stress drop needs the residual strength in Pa;"
+            " give friction.residual_strength, for random strength the ratio times its mean"
+        )
+    resting = problem.load.initial_stress - problem.friction.residual_strength
+    drops = np.empty((2, problem.interface.size))
+    drops[0], drops[1] = resting, problem.load_profile
+    return drops
+
+
+def _intensity_factors(problem: Problem, drops: Array, whole: Array, centre: float) -> Array:
+    """Return K at both tips of cracks of these lengths, Pa m^(1/2), (drops, m, 2)."""
+    interface, period = problem.interface, problem.interface.extent
+    points = max(POINTS, interface.size)
+    cosine = np.cos((np.arange(points) + 0.5) * np.pi / points)
+    found = []
+    for some in np.array_split(whole, 1 + whole.size * points // BATCH):
+        reach = np.tan(0.5 * np.pi * some / period)  # U
+        u = reach[:, None] * cosine
+        place = (centre + np.arctan(u) * period / np.pi) / interface.spacing
+        left = np.floor(place)
+        share, left = place - left, left.astype(np.int64) % interface.size
+        after = (left + 1) % interface.size
+        # K = (L (1 + U^2) U)^(1/2)/pi times the integral of drop (1 +- cos t)/(1 + u^2) over t.
+        scale = np.sqrt(period * (1.0 + reach**2) * reach)
+        weighted = [(d[left] * (1.0 - share) + d[after] * share) / (1.0 + u * u) for d in drops]
+        tips = [[scale * (w * (1.0 + side * cosine)).mean(axis=1) for side in (-1.0, 1.0)]
+                for w in weighted]  # fmt: skip
+        found.append(np.moveaxis(np.array(tips), 1, 2))
+    return np.concatenate(found, axis=1)
+
+
+def _release_rate(problem: Problem, factor: Array) -> Array:
+    """Return G = K|K|/(2 G*), J/m²."""
+    rate: Array = factor * np.abs(factor) / (2.0 * problem.effective_modulus)
+    return rate

@@ -1,0 +1,101 @@
+"""Refusals and warnings of a run: coarse grids, rates of loading, loads that reverse."""
+
+from typing import Any
+
+import numpy as np
+
+from stiction.base.errors import InputError, warn_accuracy
+from stiction.methods.dynamics.integrator import Run
+from stiction.methods.dynamics.loading import value_at
+from stiction.methods.dynamics.state import Reason, State
+from stiction.problem.problem import FEWEST_NODES, Problem, Sample
+
+# In units of the stress scale: load in one explicit step, and stress below minus the strength.
+_COARSE, _COARSEST, _REVERSED = 5e-3, 0.2, 1e-3
+
+
+def warn_if_coarse(problem: Problem, rows: Sample) -> None:
+    """Warn where the nucleation length is not resolved, with the error to expect."""
+    # Largest of rough fields against 126 nodes, see docs/validation.md: 16 %, 3 % and 0.6 %
+    # at 8, 16 and 32 nodes.
+    percent = 3.0 * (16.0 / min(problem.nodes_in_nucleation_length(rows.steepest_rate))) ** 2.4
+    expected = f"up to {percent:.0f} %" if percent < 15.0 else "more than 15 %"
+    problem.warn_if_coarse(
+        rows,
+        15.0,
+        f"expect {expected} error in slip just after onset (3 % at 16 nodes, 0.6 % at 32; the"
+        " critical load is far less sensitive)",
+    )
+
+
+def warn_of_slip(run: Run, state: State) -> None:
+    """Warn of nodes that weaken too steeply for the grid, such as barriers, and of reversal."""
+    rates, interface, now = run.setting.nodes.weakening, run.medium.interface, state.now
+    shortest = FEWEST_NODES * interface.spacing
+    steepest = run.medium.problem.nucleation_lengths(1.0)[-1] / shortest
+    steep = np.flatnonzero((state.slip > 0.0) & (rates > steepest))
+    if steep.size:
+        warn_accuracy(
+            f"{steep.size} nodes slipped, the first at {interface.describe_node(steep[0])}, "
+            f"where the strength falls by up to {rates[steep].max():.3g} Pa/m, too steeply for this"
+            " grid; take more nodes, or infinite strength for barriers that never break"
+        )
+    if now["least"] < -_REVERSED * now["scale"]:
+        warn_accuracy(
+            f"the stress fell below minus the strength, by {-now['least']:.3g} Pa at "
+            f"{interface.describe_node(int(now['least_node']))}: what would slip in reverse there, "
+            "which is not modelled, was kept at rest; change the sign of the load, or unload less"
+        )
+
+
+def at_first_slip(run: Run) -> State | None:
+    """Return the state of rest at first slip, None if none comes; refuse or warn of loads."""
+    time, step = run.first_slip(), run.medium.step
+    if not time < run.setting.thresholds.end_time:
+        return None
+    if np.spacing(time) > 0.01 * step:
+        raise InputError(
+            f"loading_rate: the first slip would come after {time:.3g} s, too late to resolve "
+            f"steps of {step:.2g} s; load faster (the onset no longer depends on the rate)"
+        )
+    scale = run.scale_at(float(value_at(run.setting.load, time)))
+    if not scale > 0.0:
+        raise InputError(
+            "initial_stress: too far from the strength for any scale of stress between them; "
+            "check the units of both"
+        )
+    rise = run.slope(time) * step / scale
+    if rise > _COARSE:
+        courant = step / run.medium.largest_step * _COARSE / rise
+        text = (
+            f"loading_rate: in one explicit step of {step:.3g} s the load rises by {rise:.2g} of "
+            f"the stress scale, {scale:.3g} Pa; use courant={courant:.2g} or less, or load more"
+            " slowly"
+        )
+        if rise > _COARSEST:
+            raise InputError(text)
+        warn_accuracy(f"{text} (the onset is sampled coarsely)")
+    return run.start(time)
+
+
+def warn_of_survival(stop: str, results: list[Any]) -> None:
+    """Warn of interfaces that did not slide, or become unstable, before their run ended."""
+    name = "kinetic_stress" if stop == "sliding" else "first_instability"
+    if any(np.isnan(one[name]) for one in results):
+        what = "slide" if stop == "sliding" else "become unstable"
+        warn_accuracy(
+            f"load: an interface did not {what} before its run ended: what did not happen is NaN,"
+            " and failure_probability counts it as survived"
+        )
+
+
+def check_finite(run: Run, state: State, reason: int) -> None:
+    """Raise a `FloatingPointError` with the time and place at which a run became non-finite."""
+    if reason == Reason.NOT_FINITE:
+        now = state.now
+        node = int(now["bad_node"])
+        raise FloatingPointError(
+            f"the slip rate became non-finite at t = {now['time']:.9g} s, "
+            f"{run.medium.interface.describe_node(node)} (node {node}), tau_0 = "
+            f"{now['load']:.6g} Pa, after {state.steps} steps; the last finite state is kept"
+        )

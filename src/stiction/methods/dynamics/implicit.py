@@ -1,0 +1,279 @@
+"""Implicit steps of adaptive size while the interface creeps, in one compiled loop."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stiction.base.arrays import Array
+from stiction.base.jit import ZERO, jit, jit_inside
+from stiction.elasticity.operator import backward, forward
+from stiction.methods.dynamics.complementarity import solve_increment
+from stiction.methods.dynamics.diagnostics import EVENT_DROP, STEADY_STRESS, Step, finish_step
+from stiction.methods.dynamics.loading import value_at
+from stiction.methods.dynamics.memory import advance_with_ramp, fading_memory, tabulate
+from stiction.methods.dynamics.state import (
+    Grid,
+    ImplicitTables,
+    Reason,
+    Record,
+    Setting,
+    State,
+    Thresholds,
+)
+from stiction.problem.friction.kernels import strength_at
+
+LARGEST_STEP = 1e20  # s
+_ROUND_OFF = 1e-14  # share of the largest stress: ten times the error of a few transforms
+# In units of the stress scale:
+_SOLVED = 1e-9  # stress at which a step counts as solved
+_SMALL_DROP = 0.1  # weakening below that is not resolved
+_NOTICED = 1e-7  # Z <V> from which its growth in a step is limited, and by which factor
+_GROWTH = 1.3
+_NEGLIGIBLE = 5e-7  # rise of the load in a step for which growth does not matter
+
+
+class _Attempt(NamedTuple):
+    """One step that is tried.
+
+    V at its end is mean + ratio (mean - past mean); in it, V rises at (mean - past mean) rise, a
+    second difference of slip.
+    """
+
+    size: float
+    time: float
+    load: float
+    ratio: float
+    rise: float
+
+
+@jit_inside
+def _choose_size(now: Any, setting: Setting, step: float) -> Any:
+    """Return (size to try, size to go on with, whether cut short, whether the last one)."""
+    thresholds, time, clipped, size = setting.thresholds, now.time, False, step
+    smallest = thresholds.smallest_step
+    small = thresholds.load_step * now.scale
+    while True:
+        rise = value_at(setting.load, time + size) - now.load
+        if size <= smallest or abs(rise) <= small:
+            break
+        size /= np.sqrt(2.0)
+        step = size
+    for turning_time in setting.turning_times:  # land on each peak of the load
+        ahead = turning_time - time
+        if 1e-6 * smallest < ahead < size:
+            size = ahead
+            clipped = True
+            break
+    last = time + size > thresholds.end_time
+    if last:
+        size = thresholds.end_time - time
+        clipped = True
+    return size, step, clipped, last
+
+
+@jit_inside
+def _assemble(
+    state: State, grid: Grid, setting: Setting, tables: ImplicitTables, attempt: _Attempt
+) -> Any:
+    """Matrix, stress if nothing slipped, and first guess; return the accuracy to ask for, Pa."""
+    stiffness, entry, symbol = grid.stiffness, grid.entry, tables.symbol
+    response, ramp, past_hat = tables.response, tables.ramp_response, tables.past_hat
+    size, ratio, rise = attempt.size, attempt.ratio, attempt.rise
+    impedance = grid.impedance
+    if size != tables.valid_for[0]:
+        tabulate(grid, size, tables)
+    if size != tables.valid_for[0] or ratio != tables.valid_for[1]:
+        symbol[0] = impedance * (1.0 + ratio) / size
+        for q in range(1, symbol.size):
+            fading = stiffness[1, q] * (response[entry[q]] + rise * ramp[entry[q]]) / size
+            symbol[q] = symbol[0] + stiffness[0, q] - fading
+        for q in range(symbol.size):
+            tables.inverse[q] = 1.0 / symbol[q]
+        tables.valid_for[0], tables.valid_for[1] = size, ratio
+    fading_memory(grid, state.memory, tables)
+    forward(grid.transform, state.past, past_hat)
+    trial_hat, trial = tables.work, tables.trial_stress
+    trial_hat[0] = impedance * ratio * past_hat[0]
+    for q in range(1, trial_hat.size):
+        g, c, risen = stiffness[0, q], stiffness[1, q], rise * ramp[entry[q]]
+        past, memory, slip = past_hat[q], tables.memory_sum[q], state.slip_hat[q]
+        real = c * (memory.real - risen * past.real) - g * slip.real
+        imaginary = c * (memory.imag - risen * past.imag) - g * slip.imag
+        trial_hat[q] = complex(
+            real + impedance * ratio * past.real, imaginary + impedance * ratio * past.imag
+        )
+    backward(grid.transform, trial_hat, trial)
+    profile, initial = setting.nodes.profile, setting.nodes.initial
+    level = 0.0
+    for i in range(trial.size):
+        trial[i] += attempt.load * profile[i] + initial[i]
+        level = max(level, abs(trial[i]))
+        tables.increment[i] = state.past[i] * size
+        tables.slipping[i] = 1 if state.rate[i] > 0.0 else 0
+    # Round-off of the transforms limits the accuracy.
+    return max(_SOLVED * state.diagnostics[0].scale, _ROUND_OFF * level)
+
+
+@jit_inside
+def _effect(
+    state: State, setting: Setting, u: Array, impedance: float, attempt: _Attempt
+) -> Any:
+    """Return (largest loss of strength of a node, total slip, Z <V>) of slip increments u."""
+    nodes, law, slip, past = setting.nodes, setting.law, state.slip, state.past
+    peak, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
+    critical, size, ratio = nodes.critical, attempt.size, attempt.ratio
+    scale = state.diagnostics[0].scale
+    largest, total, radiated = 0.0, 0.0, 0.0
+    least, creep = _SMALL_DROP * scale, STEADY_STRESS * scale * size / impedance
+    for i in range(u.size):
+        if slip[i] < critical[i] and u[i] > 0.0:
+            lost = strength_at(law, peak[i], residual[i], weakening[i], slip[i])
+            lost -= strength_at(law, peak[i], residual[i], weakening[i], slip[i] + u[i])
+            largest = max(largest, lost / max(peak[i] - residual[i], least))
+        elif u[i] > creep and critical[i] > 0.0:
+            largest = max(largest, u[i] / critical[i])
+        total += u[i]
+        radiated += max(u[i] / size * (1.0 + ratio) - ratio * past[i], 0.0)
+    return largest, total, radiated * (impedance / u.size)
+
+
+@jit_inside
+def _accelerates(
+    now: Any, thresholds: Thresholds, attempt: _Attempt, largest: float, radiated: float
+) -> Any:
+    """Return whether the interface accelerates too much for an accurate load at onset."""
+    # A step that hardly raises the load cannot put the onset wrong.
+    matters = abs(attempt.load - now.load) > _NEGLIGIBLE * now.scale
+    noticed = _NOTICED * now.scale
+    growing = radiated > noticed and radiated > _GROWTH * max(now.radiated, noticed)
+    # At the smallest size, waves of an arrested event alone do not call for explicit steps.
+    halved = 0.5 * attempt.size >= thresholds.smallest_step
+    shorter = halved or largest > 0.1 * thresholds.slip_step
+    return growing and matters and shorter and attempt.ratio > 0.0
+
+
+@jit_inside
+def _accept(
+    state: State,
+    grid: Grid,
+    setting: Setting,
+    tables: ImplicitTables,
+    attempt: _Attempt,
+    radiated: float,
+) -> Any:
+    """Take the step in place and return it; `tables.driving` then holds the strength."""
+    size, ratio, rise, load = attempt.size, attempt.ratio, attempt.rise, attempt.load
+    law, nodes, u, transfer = setting.law, setting.nodes, tables.increment, tables.trial_stress
+    rate_hat, past_hat, transfer_hat = tables.rate_hat, tables.past_hat, tables.work
+    stiffness, entry, slip_hat = grid.stiffness, grid.entry, state.slip_hat
+    forward(grid.transform, u, rate_hat)
+    for q in range(rate_hat.size):
+        slip_hat[q] += rate_hat[q]
+        mean, past = complex(rate_hat[q].real / size, rate_hat[q].imag / size), past_hat[q]
+        rate_hat[q] = mean
+        past_hat[q] = complex(rise * (mean.real - past.real), rise * (mean.imag - past.imag))
+    advance_with_ramp(grid, state.memory, tables)
+    transfer_hat[0] = 0.0
+    for q in range(1, transfer_hat.size):
+        response, ramp = tables.response[entry[q]], tables.ramp_response[entry[q]]
+        memory, v, a, slip = tables.memory_sum[q], rate_hat[q], past_hat[q], slip_hat[q]
+        g, c = stiffness[0, q], stiffness[1, q]
+        real = c * (memory.real + response * v.real + ramp * a.real) - g * slip.real
+        imaginary = c * (memory.imag + response * v.imag + ramp * a.imag) - g * slip.imag
+        transfer_hat[q] = complex(real, imaginary)
+    backward(grid.transform, transfer_hat, transfer)
+    slip, rate, past, stress = state.slip, state.rate, state.past, state.stress
+    strength, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
+    profile, initial, limit = nodes.profile, nodes.initial, tables.driving
+    mean_load = 0.5 * (load + state.diagnostics[0].load)
+    work = 0.0
+    for i in range(u.size):
+        work += u[i] * (mean_load * profile[i] + initial[i])
+        slip[i] += u[i]
+        rate[i] = max(u[i] / size * (1.0 + ratio) - ratio * past[i], 0.0)
+        past[i] = u[i] / size
+        stress[i] = transfer[i] + load * profile[i] + initial[i] - grid.impedance * rate[i]
+        limit[i] = strength_at(law, strength[i], residual[i], weakening[i], slip[i])
+    return Step(attempt.time, size, load, work * grid.cell, radiated)
+
+
+@jit_inside
+def _next_size(asked: float, size: float, largest: float, growing: bool) -> Any:
+    """Return the next size: it changes by powers of sqrt 2, so that tables are reused."""
+    root = np.sqrt(2.0)
+    if largest > asked:
+        return size / root
+    if largest < 0.25 * asked and not growing:
+        return min(2.0 * size, LARGEST_STEP)
+    if largest < 0.7 * asked and not growing:
+        return min(root * size, LARGEST_STEP)
+    return size
+
+
+@jit
+def implicit_steps(
+    count: int,
+    step: float,
+    state: State,
+    grid: Grid,
+    setting: Setting,
+    tables: ImplicitTables,
+    record: Record,
+) -> Any:
+    """Take up to `count` accepted implicit steps in place; return (steps, next size, reason).
+
+    Parameters as in `explicit_steps`; `state.memory` holds psi itself, `step` is the first size to
+    try. Second order, as in the two-step backward differences: the slip rate at the end of a step
+    follows from the mean rates of this step and the one before (`past`), and changes linearly
+    in the memory. A step is repeated at half size if no slip increments are found (negative
+    rise: the patches are unstable at this size), a node weakens too much, or the interface
+    accelerates too much. Creep at the residual strength does not count.
+    """
+    now, thresholds, u = state.diagnostics[0], setting.thresholds, tables.increment
+    smallest = thresholds.smallest_step
+    taken, reason = ZERO, Reason.DONE  # one way out: each costs as much to compile as the rest
+    while taken < count:
+        size, step, clipped, last = _choose_size(now, setting, step)
+        if size < smallest and not clipped:
+            reason = Reason.TO_EXPLICIT
+            break
+        past_step = now.past_step
+        ratio = size / (size + past_step) if past_step > 0.0 else 0.0
+        time = now.time + size
+        load = value_at(setting.load, time)
+        attempt = _Attempt(size, time, load, ratio, 2.0 * ratio / size)
+        accuracy = _assemble(state, grid, setting, tables, attempt)
+        near = accuracy if thresholds.curved else 0.0
+        found = solve_increment(grid.transform, setting, state.slip, tables, accuracy, near)
+        failed = not found
+        largest, total, radiated = 0.0, 0.0, 0.0
+        if not failed:
+            largest, total, radiated = _effect(state, setting, u, grid.impedance, attempt)
+        if not np.isfinite(total):
+            now.bad_node = 0
+            reason = Reason.NOT_FINITE
+            break
+        too_much = largest > 2.0 * thresholds.slip_step
+        if failed or too_much or _accelerates(now, thresholds, attempt, largest, radiated):
+            step = size / 2.0
+            if step < smallest:
+                reason = Reason.TO_EXPLICIT
+                break
+            continue
+        growing = radiated > _NOTICED * now.scale and radiated > np.sqrt(_GROWTH) * now.radiated
+        done = _accept(state, grid, setting, tables, attempt, radiated)
+        now.implicit_steps += 1
+        now.past_step, now.radiated = size, radiated
+        fall = finish_step(state, grid, setting, done, u, tables.driving, record, taken)
+        taken += 1
+        if not clipped:
+            step = _next_size(thresholds.slip_step, size, largest, growing)
+        if now.slid >= thresholds.slid_stop:
+            reason = Reason.ALL_SLID
+        elif thresholds.event_stop and fall > EVENT_DROP * now.scale:
+            reason = Reason.DROPPED
+        elif step < smallest and not (clipped or last or now.time >= thresholds.end_time):
+            reason = Reason.TO_EXPLICIT
+        if reason != Reason.DONE or last or now.time >= thresholds.end_time:
+            break
+    return taken, step, reason

@@ -1,0 +1,237 @@
+"""One run: explicit steps and implicit steps, the switch between them, and when it ends."""
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction.methods.dynamics.explicit import explicit_steps
+from stiction.methods.dynamics.implicit import LARGEST_STEP, implicit_steps
+from stiction.methods.dynamics.loading import first_reach, value_at
+from stiction.methods.dynamics.medium import Medium
+from stiction.methods.dynamics.memory import (
+    empty_memory,
+    explicit_tables,
+    implicit_tables,
+    scale_memory,
+    step_table,
+    sum_memory,
+)
+from stiction.methods.dynamics.state import (
+    DIAGNOSTICS,
+    STATION,
+    ExplicitTables,
+    Floats,
+    ImplicitTables,
+    Reason,
+    Record,
+    Setting,
+    State,
+)
+from stiction.problem.friction.kernels import strengths
+
+_OVERSTRESSED = 1e-6  # stress scales above the strength beyond which slip begins with waves
+_NO_SLIP = 1e-9  # Z V below which nothing slips, in units of the stress scale
+_STEPS = 1000  # between two looks at whether a run has ended
+
+_ENDINGS: dict[int, str] = {
+    Reason.ALL_SLID: "sliding",
+    Reason.DROPPED: "onset",
+    Reason.AT_REST: "rest",
+}
+NOTHING = Record(np.empty(0, DIAGNOSTICS), np.empty((0, 0), STATION))
+
+
+@dataclasses.dataclass(eq=False)
+class Run:
+    """One interface under one load history: what does not change in a run, and tables of steps."""
+
+    medium: Medium
+    setting: Setting
+    stop: str  # as `Rupture.stop`
+    steepest_rate: float  # largest, Pa/m, at which a node that may break weakens at any slip
+    # Load below which nothing runs away: the mean strength of the weakest nodes that make up half a
+    # nucleation length, Pa; a few nodes of next to no strength do not make it low.
+    least_load: float
+    # Tables of the last kind of step only: they are large, and one kind at a time is enough.
+    tables: ExplicitTables | ImplicitTables | None = None
+
+    def elastic_stress(self, slip_hat: NDArray[np.complex128], load: float) -> Floats:
+        """Return the static stress of a slip at a load, Pa: what an interface at rest carries."""
+        grid, nodes = self.medium.grid, self.setting.nodes
+        interface = self.medium.interface
+        stress_hat = (-grid.stiffness[0] * slip_hat).reshape(interface.wavenumbers.shape)
+        shared: Floats = interface.inverse_transform(stress_hat).ravel()
+        return shared + load * nodes.profile + nodes.initial
+
+    def strength_after(self, slip: Floats) -> Floats:
+        """Return the strength after a slip (m), Pa."""
+        nodes, law = self.setting.nodes, self.setting.law
+        found: Floats = strengths(law, nodes.strength, nodes.residual, nodes.weakening, slip)
+        return found
+
+    def scale_at(self, load: float) -> float:
+        """Stress scale of a load, Pa, at least that of the least that can run away."""
+        return float(value_at(self.setting.scale, max(load, self.least_load)))
+
+    @property
+    def first_load(self) -> float:
+        """Load at which the first node reaches its strength, if nothing has slipped, Pa."""
+        nodes = self.setting.nodes
+        return float(np.min((nodes.strength - nodes.initial) / nodes.profile))
+
+    def first_slip(self) -> float:
+        """Return when the first node reaches its strength, s."""
+        return first_reach(self.setting.load, self.first_load)
+
+    def slope(self, time: float) -> float:
+        """Return the size of the loading rate just after a time, Pa/s."""
+        times, values = self.setting.load
+        i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, times.size - 2))
+        return float(abs(values[i + 1] - values[i]) / (times[i + 1] - times[i]))
+
+    def start(self, time: float, slip: Floats | None = None) -> State:
+        """Return the state of rest, or of an equilibrium with a slip, with an empty memory.
+
+        Where the stress is above the strength by more than round-off, explicit steps come first.
+        """
+        interface, impedance = self.medium.interface, self.medium.impedance
+        setting, nodes, thresholds = self.setting, self.setting.nodes, self.setting.thresholds
+        given = np.zeros(interface.size) if slip is None else slip
+        delta = np.array(given, dtype=np.float64).ravel()
+        memory, memory_sum = empty_memory(self.medium.grid)
+        load = float(value_at(self.setting.load, time))
+        slip_hat = interface.transform(delta.reshape(interface.shape)).ravel()
+        stress = self.elastic_stress(slip_hat, load)
+        limit = self.strength_after(delta)
+        excess = stress - limit
+        rate = np.maximum(excess, 0.0) / impedance
+        # A node that has just reached its strength has not begun to slip: drop round-off.
+        rate[rate * impedance < 1e-12 * nodes.strength] = 0.0
+        stress = stress - impedance * rate
+        diagnostics = np.zeros(1, DIAGNOSTICS)
+        now = diagnostics[0]
+        now["time"] = now["local_time"] = time
+        now["load"] = now["local_load"] = now["start_load"] = load
+        # Before anything slips: nothing is radiated.
+        now["local_stress"] = setting.mean_initial + load * setting.mean_profile
+        now["mean_stress"] = stress.mean()
+        now["local_node"] = now["top_node"] = int(np.argmax(excess))
+        now["first_stress"] = now["onset_stress"] = now["kinetic_stress"] = -np.inf  # not yet
+        now["onset_time"] = now["onset_load"] = np.nan
+        now["bad_node"] = -1
+        times, values = setting.load
+        lowest = min(load, values[times <= time].min()) if slip is None else load
+        left = stress + limit - (load - lowest) * nodes.profile  # at rest, at the lowest load
+        now["least"], now["least_node"] = left.min(), int(np.argmin(left))
+        now["top_slip_rate"], now["mean_slip"] = rate.max(), delta.mean()
+        now["slid"] = np.count_nonzero(delta >= nodes.critical)
+        scale = max(0.0, self.scale_at(load))
+        now["scale"] = scale
+        front = thresholds.arrival * nodes.critical
+        arrival = np.where((delta > 0.0) & (delta >= front), time, np.nan)
+        size, slope = thresholds.smallest_step, self.slope(time)
+        first = 0.1 * thresholds.load_step * scale / slope if slope > 0.0 else size
+        explicit = thresholds.explicit_only or impedance * rate.max() > _OVERSTRESSED * scale
+        phase = np.array([float(explicit), min(max(size, first), LARGEST_STEP)])
+        return State(
+            slip=delta,
+            rate=rate,
+            stress=stress,
+            slip_hat=slip_hat,
+            past=rate.copy(),
+            memory=memory,
+            memory_sum=memory_sum,
+            arrival=arrival,
+            diagnostics=diagnostics,
+            phase=phase,
+        )
+
+    def ended(self, state: State) -> bool:
+        """Return whether the end time is reached, up to the rounding of a sum of many steps."""
+        left = self.setting.thresholds.end_time - state.now["time"]
+        return bool(left <= 1e-6 * self.medium.step)
+
+    def ending(self, state: State, reason: int) -> str | None:
+        """Return the reason why a run ends here, in a word; None if it goes on."""
+        if reason in _ENDINGS:
+            return _ENDINGS[reason]
+        if self.ended(state):
+            return "time"
+        times, values = self.setting.load
+        resting = (  # the load, beyond its last piece, never rises again, and nothing slips
+            not state.explicit
+            and state.now["time"] >= times[-1]
+            and values[-1] <= values[-2]
+            and self.medium.impedance * state.rate.max() <= _NO_SLIP * state.now["scale"]
+        )
+        return "rest" if self.stop != "time" and resting else None
+
+    def follow(self, state: State, most: int) -> tuple[str | None, int]:
+        """Go on to the end of the run, or to `most` steps in all; return why it ended and the code.
+
+        The reason is None if it has not ended; the code is then NOT_FINITE or DONE (all steps).
+        """
+        word, reason = None, int(Reason.DONE)
+        while word is None and reason != Reason.NOT_FINITE and state.steps < most:
+            _, reason = self.advance(state, min(_STEPS, most - state.steps))
+            word = self.ending(state, reason)
+        return word, reason
+
+    def advance(self, state: State, count: int, record: Record = NOTHING) -> tuple[int, int]:
+        """Take up to `count` steps in place; return (steps taken, why it returned).
+
+        The reason is DONE after `count` steps or at the end time, else ALL_SLID, DROPPED, AT_REST
+        or NOT_FINITE. Rows of `record` are filled, one a step.
+        """
+        taken = 0
+        while taken < count:
+            part = Record(*(rows[taken:] for rows in record))
+            steps = self._explicit if state.explicit else self._implicit
+            more, reason = steps(state, count - taken, part)
+            taken += more
+            if reason == Reason.TO_EXPLICIT:
+                self._to_explicit(state)
+            elif reason == Reason.TO_IMPLICIT:
+                self._to_implicit(state)
+            elif reason != Reason.DONE or self.ended(state):
+                return taken, reason
+        return taken, Reason.DONE
+
+    def _explicit(self, state: State, count: int, record: Record) -> tuple[int, int]:
+        medium, tables = self.medium, self._explicit_tables()
+        left = self.setting.thresholds.end_time - state.now["time"]
+        if left < count * medium.step:
+            count = min(count, max(1, int(np.ceil(left / medium.step - 1e-6))))
+        return explicit_steps(count, state, medium.grid, self.setting, tables, record)
+
+    def _implicit(self, state: State, count: int, record: Record) -> tuple[int, int]:
+        size, grid = float(state.phase[1]), self.medium.grid
+        if not isinstance(self.tables, ImplicitTables):
+            self.tables = None  # release the others before these are made
+            self.tables = implicit_tables(grid)
+        taken, state.phase[1], reason = implicit_steps(
+            count, size, state, grid, self.setting, self.tables, record
+        )
+        return taken, reason
+
+    def _explicit_tables(self) -> ExplicitTables:
+        if not isinstance(self.tables, ExplicitTables):
+            self.tables, medium = None, self.medium
+            table = medium.step_table or step_table(medium.grid, medium.step)
+            self.tables = explicit_tables(medium.grid, medium.step, *table)
+        return self.tables
+
+    def _to_explicit(self, state: State) -> None:
+        grid, tables = self.medium.grid, self._explicit_tables()
+        scale_memory(grid, state.memory, tables.step, divide=True)
+        sum_memory(grid, state.memory, tables.table, state.memory_sum)
+        state.phase[0] = 1.0
+        state.now["calm_steps"], state.now["calm_rate"] = 0, state.rate.max()
+
+    def _to_implicit(self, state: State) -> None:
+        scale_memory(self.medium.grid, state.memory, self.medium.step, divide=False)
+        state.past[:] = state.rate
+        state.phase[:] = 0.0, 2.0 * self.setting.thresholds.smallest_step
+        state.now["past_step"] = 0.0  # the first implicit step is one of first order
+        state.now["radiated"] = self.medium.impedance * state.rate.mean()

@@ -1,0 +1,179 @@
+"""Data shared by all runs of one problem: stiffness, memory kernel, explicit time step."""
+
+import dataclasses
+import functools
+
+import numpy as np
+
+from stiction.base.errors import InputError
+from stiction.base.model import check_memory
+from stiction.elasticity.exponential_sum import ExponentialSum, kernel_sum
+from stiction.elasticity.memory_kernels import static_stiffness
+from stiction.elasticity.operator import make_transform
+from stiction.methods.dynamics.memory import offsets, phi, step_table
+from stiction.methods.dynamics.state import Floats, Grid
+from stiction.problem.interface import Interface
+from stiction.problem.problem import Problem
+
+LARGEST_RATIO = 7.15  # c_d over c_s: nu = 0.49 in plane strain
+SMALLEST_RATIO = 1.002  # nu = -0.99 in plane stress
+STEADY_TOLERANCE = 1e-4  # sums this good were stable for every Poisson's ratio
+_GROWTH = 1e-5  # growth of a wave in a step; a rupture takes thousands
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Medium:
+    """Elastic half-spaces on a grid, with a fixed explicit step. Read-only, shared by threads."""
+
+    problem: Problem
+    grid: Grid
+    step: float  # explicit time step, s
+    largest_step: float  # limit of stability of the explicit step, s
+    # Kept for a line; on a plane it would leave no room for tables of implicit steps.
+    step_table: tuple[Floats, Floats] | None
+
+    @property
+    def interface(self) -> Interface:
+        """The interface of the problem."""
+        return self.problem.interface
+
+    @property
+    def impedance(self) -> float:
+        """Z = G/(2 c_s), Pa s/m."""
+        return self.grid.impedance
+
+
+def prepare_medium(problem: Problem, tolerance: float, courant: float) -> Medium:
+    """Return tables for a problem; refuse a solid or a tolerance that no step is stable for."""
+    solid, interface, mode = problem.solid, problem.interface, problem.mode
+    if mode == "II" and not SMALLEST_RATIO <= solid.wave_speed_ratio <= LARGEST_RATIO:
+        valid = "nu <= 0.49" if solid.plane == "strain" else "nu >= -0.99"
+        raise InputError(
+            f"solid.poisson_ratio: elastodynamics in mode II needs {valid} in plane {solid.plane}, "
+            f"got {solid.poisson_ratio}"
+        )
+    eta, speed = solid.wave_speed_ratio, solid.shear_wave_speed
+    names = ("II", "III") if interface.is_plane else (mode,)
+    kernels = [kernel_sum(name, eta, tolerance) for name in names]
+    # At its largest a run takes implicit steps: memory variables and tables, on a line those of
+    # explicit steps too, and forty arrays of nodes.
+    modes, pairs = interface.wavenumbers.size, sum(kernel.poles.size for kernel in kernels)
+    tables = 6 * modes / 2 if interface.is_plane else 10 * modes
+    size = 8.0 * (pairs * (4 * modes + tables) + 40 * interface.size)
+    check_memory("interface.nodes", size, "take fewer nodes, or a larger kernel_tolerance")
+    limit = largest_step(names, eta, tolerance, interface.spacings) / speed
+    if limit == 0.0:
+        error = max(kernel.error for kernel in kernels)
+        raise InputError(
+            f"kernel_tolerance: with an error of {error:.2g} in the memory kernel waves grow"
+            f" at any time step; got {tolerance:g}, use {STEADY_TOLERANCE:g} or less"
+        )
+    grid, step = _grid(problem, kernels), courant * limit
+    table = None if interface.is_plane else step_table(grid, step)
+    return Medium(problem, grid, step, limit, table)
+
+
+def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:
+    """Stiffness and memory on the modes of the interface.
+
+    On a plane a wave vector has a = (kx/k)² of mode II and b = 1 - a of mode III (Geubelle and Rice
+    1995): K = (k/2)(G* a + G b), and the memory is (G k/2)[a C_II + b C_III] * V.
+    """
+    solid, interface = problem.solid, problem.interface
+    k, share = interface.wavenumbers, interface.in_plane_share
+    entry, offset, multiplicity = offsets(k.shape)
+    modulus = (problem.effective_modulus * share + solid.shear_modulus * (1.0 - share)) * k
+    # Modes with entries in the tables: on a plane kx >= 0, on a line k > 0.
+    own = slice(0, interface.shape[0] // 2 + 1) if interface.is_plane else slice(1, None)
+    return Grid(
+        transform=make_transform(interface.shape),
+        impedance=solid.shear_modulus / (2.0 * solid.shear_wave_speed),
+        cell=interface.cell,
+        stiffness=0.5 * np.stack([modulus.ravel(), solid.shear_modulus * k.ravel()]),
+        entry=entry,
+        offset=offset,
+        multiplicity=multiplicity,
+        frequency=k[own].ravel() * solid.shear_wave_speed,
+        mode_two=share[own].ravel(),
+        poles=np.concatenate([kernel.poles for kernel in kernels]),
+        weights=np.concatenate([kernel.weights for kernel in kernels]),
+        split=kernels[0].poles.size,
+    )
+
+
+@functools.lru_cache(maxsize=64)
+def largest_step(
+    modes: tuple[str, ...], eta: float, tolerance: float, spacings: tuple[float, ...]
+) -> float:
+    """Return the largest stable c_s dt, m, of the explicit predictor-corrector.
+
+    The criterion is the shortest waves of the grid on an interface that slides freely, which
+    carries undamped Rayleigh waves: no eigenvalue of a step may grow. On a plane they lie on the
+    rim of the rectangle |kx| <= pi/dx, |ky| <= pi/dy, and differ in length and in their share of
+    mode II: the limit is that of the two axes and of the corner, shortened until waves in between
+    do not grow either. It is 0 where the error of the kernel makes waves grow whatever the step.
+    """
+    kernels = [kernel_sum(mode, eta, tolerance) for mode in modes]
+    static = static_stiffness(modes[0], eta)
+    if len(modes) == 1:
+        return _largest(kernels[0], static) / np.pi * spacings[0]
+
+    def wave(a: float, b: float) -> tuple[float, ExponentialSum, float]:
+        kx, ky = a * np.pi / spacings[0], b * np.pi / spacings[1]
+        share = float(kx**2 / (kx**2 + ky**2))
+        kernel = _mixed(kernels, share)
+        return float(np.hypot(kx, ky)), kernel, share * static + 1.0 - share
+
+    corners = [wave(1.0, 0.0), wave(1.0, 1.0), wave(0.0, 1.0)]
+    limit = min(_largest(kernel, stiffness) / k for k, kernel, stiffness in corners)
+    sides = ((1.0, 0.25), (1.0, 0.5), (1.0, 0.75), (0.75, 1.0), (0.5, 1.0), (0.25, 1.0))
+    between = [wave(a, b) for a, b in sides]
+    while limit > 0.0 and not all(
+        _stable(k * limit, kernel, stiffness) for k, kernel, stiffness in between
+    ):
+        limit *= 0.99
+    return limit
+
+
+def amplification(kappa: float, kernel: ExponentialSum, stiffness: float) -> Floats:
+    """Return the matrix of an explicit step of a frictionless mode, kappa = |k| c_s dt."""
+    pairs = kernel.poles.size
+    z = kernel.poles * kappa
+    decay, gain = np.exp(z), kappa * phi(z)
+    response = float(np.sum(kernel.weights * gain).real)
+    state = np.eye(2 + 2 * pairs)
+    rate, slip = state[0], state[1]
+    memory = state[2 : 2 + pairs] + 1j * state[2 + pairs :]
+    memory_sum = ((kernel.weights * decay) @ memory).real
+    predicted = -stiffness * (slip + kappa * rate) + memory_sum + response * rate
+    mean = 0.5 * (rate + predicted)
+    slip = slip + kappa * mean
+    memory = decay[:, None] * memory + gain[:, None] * mean
+    rate = -stiffness * slip + memory_sum + response * mean
+    return np.vstack([rate, slip, memory.real, memory.imag])
+
+
+def _stable(kappa: float, kernel: ExponentialSum, stiffness: float) -> bool:
+    matrix = amplification(kappa, kernel, stiffness)
+    growth = np.abs(np.linalg.eigvals(matrix)).max() - 1.0
+    return bool(growth < _GROWTH)
+
+
+def _largest(kernel: ExponentialSum, stiffness: float) -> float:
+    """Largest |k| c_s dt up to which no wave grows."""
+    low, high = 0.0, 0.1
+    while high < 6.0 and _stable(high, kernel, stiffness):
+        low, high = high, high + 0.1
+    if low == 0.0:  # long waves grow: that is the kernel, which no smaller step mends
+        return 0.0
+    for _ in range(12):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _stable(middle, kernel, stiffness) else (low, middle)
+    return low
+
+
+def _mixed(kernels: list[ExponentialSum], share: float) -> ExponentialSum:
+    """The kernel of a wave vector on a plane, whose share of mode II is (kx/k)²."""
+    weights = share * kernels[0].weights, (1.0 - share) * kernels[1].weights
+    poles = np.concatenate([kernel.poles for kernel in kernels])
+    return ExponentialSum(poles, np.concatenate(weights), max(one.error for one in kernels))

@@ -1,0 +1,310 @@
+"""Elastodynamic rupture as a method: from the first slip to global sliding, sample by sample."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+import pydantic
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
+
+from stiction.base.errors import InputError
+from stiction.base.model import Count, Flag, Positive, Real, model
+from stiction.base.variables import Variable
+from stiction.methods.dynamics import checks
+from stiction.methods.dynamics.diagnostics import stress_scale
+from stiction.methods.dynamics.integrator import Run
+from stiction.methods.dynamics.loading import load_history, turning_times
+from stiction.methods.dynamics.medium import Medium, prepare_medium
+from stiction.methods.dynamics.slow_start import slow_start, static_program
+from stiction.methods.dynamics.state import History, Nodes, Setting, State, Thresholds
+from stiction.methods.dynamics.summary import scalars, summary
+from stiction.problem.friction.parameters import SMALLEST_EIGENVALUE
+from stiction.problem.problem import Problem, Sample, steepest_rate
+from stiction.problem.results import onset_variables
+
+Fraction = Annotated[Real, Field(gt=0, le=1)]
+
+_SWITCH = 6.0  # explicit steps in the smallest implicit step
+_CALM_STEPS = 300
+# Z V that only an instability reaches, in units of the median of tau_p - tau_r: at least 0.106 in
+# those that were arrested, at most 0.054 in the waves after them (4 problems, 5e6 and 5e7 Pa/s).
+_UNSTABLE_STRESS = 0.075
+
+Start = Literal["equilibrium", "rest"]
+Stop = Literal["sliding", "onset", "rest", "time"]
+# Not known yet when a run stops at its onset.
+_LATER = (
+    "kinetic_stress", "stress_drop", "seismic_moment", "radiated_energy", "fracture_energy",
+    "arrested_events", "rupture_speed", "median_rupture_speed",
+)  # fmt: skip
+
+
+LoadHistory = Annotated[
+    Any,
+    BeforeValidator(lambda value: None if value is None else load_history(value)),
+    PlainSerializer(lambda value: None if value is None else [one.tolist() for one in value]),
+    WithJsonSchema({"type": "array", "items": {"type": "array", "items": {"type": "number"}}}),
+]
+
+
+@model(kw_only=True)
+class Rupture:
+    """Onset from an elastodynamic simulation under a slowly rising load.
+
+    Adaptive implicit steps follow the creeping interface, explicit steps its rupture. Strength
+    may be infinite where nothing ever breaks, and the initial stress may be above the
+    strength: such a patch breaks at once, at zero load.
+
+    Parameters
+    ----------
+    loading_rate : float, optional
+        d tau_0/dt, Pa/s, positive. Either this or `load` must be given.
+    kernel_tolerance : float
+        Allowed error (1) of the memory kernel, a sum of exponentials. The sum is fitted once
+        for each solid and stored on disk, in 1 s at 1e-6 (22 pairs) or half a minute at 1e-8
+        (35). From about 1e-3 on, waves may grow at any time step, which raises an error.
+    courant : float
+        Explicit time step in units of the stability limit, in (0, 1].
+    slip_step : float
+        Slip of any weakening node in one implicit step, in units of its d_c.
+    load_step : float
+        Rise of the load in one implicit step, in units of the stress scale (see Notes).
+    start : {"equilibrium", "rest"}
+        "rest": at the first slip. "equilibrium": on the quasi-static path, as close below
+        the first instability as the estimated error allows; `start_load` is the load there,
+        and `start_error` (Pa) the estimate. The run still begins at the first slip if the
+        loading rate is too high, if a node loses half of its strength before, on planes, with
+        laws that are not piecewise linear, and with barriers or stress above the strength.
+    end_time : float, optional
+        Time at which a run ends at the latest, s, but for a part of the last explicit step.
+    load : (times, values), optional
+        Samples of tau_0(t), Pa, from t = 0 s, instead of a constant rate, with linear
+        interpolation; the last slope continues.
+    arrival : float
+        Share of tau_p - tau_r that a node has lost when the front arrives there, in (0, 1]:
+        0.5 is the middle of the cohesive zone, 1e-3 its tip.
+    stop : {"sliding", "onset", "rest", "time"}
+        When to end (see Notes), unless nothing slips and the load has stopped rising:
+        "sliding": every node that can break is at its residual strength. "onset": the first
+        instability has begun. "rest": the interface is at rest after an instability, or
+        slides. "time": at `end_time`; an interface that slides takes explicit steps until then.
+    implicit : bool
+        False takes explicit steps only (slow loading then costs a million steps).
+    max_steps : int
+        Number of steps after which a run is abandoned.
+
+    Raises
+    ------
+    InputError
+        If an option is out of range.
+
+    Notes
+    -----
+    An instability is slip that the load does not drive. It begins at a maximum of the mean
+    shear stress after which waves lower it by 1e-4 of the stress scale, not counting any fall
+    of the load itself; at the start where the stress is above the strength.
+    `first_instability` is the mean stress at which the first one begins. The highest one has
+    `onset_time`, `critical_position`, `applied_load` (the load factor then) and, if the
+    interface slides, `critical_stress` and `critical_load`, the load factor that carries that
+    stress statically; what waves radiate is the difference. NaN is what did not happen, with a
+    warning, and an overstressed start has no `critical_load`.
+
+    `arrested_events` counts instabilities in which a node slips so fast that Z V exceeds 7.5 %
+    of the median of tau_p - tau_r before the mean stress is as high again or all is calm.
+    `Equilibrium` also counts jumps too small for that. The stress scale is the mean over nodes
+    of tau_p - tau_r, or of three times the drop tau_0 p + tau_i - tau_r at the largest load so
+    far where that is less, so that unbroken barriers do not count. `kinetic_stress` and the
+    energies are those of the first step after which every node that can break is at its
+    residual strength; radiated energy and moment grow by about 2 % in that step.
+
+    With "onset" and "rest", critical values are those of the highest instability, which need
+    not end in sliding, and with "onset" what is not final is NaN: kinetic stress, stress drop,
+    moment, energies, rupture speeds and arrested events.
+
+    Slip never reverses: a node whose slip rate would become negative sticks, keeps its
+    weakened strength, and slips again only when the stress reaches it; a warning gives the
+    place if the stress fell below minus the strength. Boundary integral in Fourier space:
+    Breitenfeld and Geubelle (1998).
+    """
+
+    loading_rate: Positive | None = None
+    end_time: Positive | None = None
+    load: LoadHistory = None
+    kernel_tolerance: Positive = 1e-6
+    courant: Fraction = 0.9
+    slip_step: Fraction = 0.02
+    load_step: Fraction = 1e-3
+    implicit: Flag = True
+    arrival: Fraction = 0.5
+    start: Start = "equilibrium"
+    stop: Stop = "sliding"
+    max_steps: Count = 5_000_000
+    type: Literal["rupture"] = "rupture"
+    # Combinations that `Problem.sample` may let through.
+    accepts: ClassVar[tuple[str, ...]] = ("barriers", "overstress")
+    label: ClassVar[str] = "rupture"
+
+    @pydantic.model_validator(mode="after")
+    def _consistent(self) -> Rupture:
+        problems = []
+        if (self.loading_rate is None) == (self.load is None):
+            problems.append("loading_rate: give either loading_rate or load")
+        if self.stop == "time" and self.end_time is None:
+            problems.append("end_time: needed with stop='time', got None")
+        if problems:
+            raise InputError(problems)
+        return self
+
+    def seconds_per_sample(self, problem: Problem) -> float:
+        """Return the approximate time of a sample on one core, s."""
+        shape = problem.interface.shape
+        if len(shape) == 1:
+            usual = 0.1 if self.start == "rest" else 0.05
+            return usual * (shape[0] / 1024) ** 2
+        # As many steps as the longer side has nodes, each in proportion to all nodes.
+        return 1.5 * (max(shape) / 128) * (problem.interface.size / 128**2)
+
+    def supports(self, problem: Problem) -> list[str]:
+        """Return the reasons why the method cannot solve a problem; none if it can."""
+        if problem.specimen is None:
+            return []
+        return [
+            "problem.specimen: ruptures run between half-spaces, and waves that return from the"
+            " faces of blocks are not modelled; use st.Equilibrium(), which arrests without inertia"
+        ]
+
+    def variables(self, problem: Problem) -> dict[str, Variable]:
+        """Return the variables that the solver computes for each sample."""
+        return onset_variables(problem.interface) | scalars(problem.interface)
+
+    def medium(self, problem: Problem) -> Medium:
+        """Return kernel and tables for a problem."""
+        return prepare_medium(problem, self.kernel_tolerance, self.courant)
+
+    def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, NDArray[Any]]]:
+        """Return a solver for samples of this problem, with its kernel fitted once."""
+        medium, rate = self.medium(problem), self.loading_rate
+        from_equilibrium = self.start == "equilibrium" and self.implicit and rate is not None
+        static = static_program(problem) if from_equilibrium else None
+
+        def solve(rows: Sample) -> dict[str, NDArray[Any]]:
+            checks.warn_if_coarse(problem, rows)
+            found = []
+            for i in range(rows.samples):
+                run = make_run(self, medium, rows, i)
+                start = slow_start(static, run, rows, i, rate) if static and rate else None
+                found.append(self._one(run, start))
+            checks.warn_of_survival(self.stop, found)
+            names = self.variables(problem)
+            return {name: np.array([one[name] for one in found]) for name in names}
+
+        return solve
+
+    def _one(self, run: Run, state: State | None) -> dict[str, Any]:
+        rest = checks.at_first_slip(run)
+        if rest is None:  # nothing slips: what it came to is at the end of the load
+            state = run.start(min(run.setting.load.at[-1], run.setting.thresholds.end_time))
+        else:
+            state = rest if state is None else state
+            self._follow(run, state)
+        checks.warn_of_slip(run, state)
+        found = summary(run, state)
+        if self.stop == "onset":
+            later = [name for name in _LATER if name in found]
+            found |= {name: np.full(np.shape(found[name]), np.nan) for name in later}
+        return found
+
+    def _follow(self, run: Run, state: State) -> None:
+        ended, reason = run.follow(state, self.max_steps)
+        checks.check_finite(run, state, reason)
+        if ended is None:
+            raise InputError(
+                f"max_steps: {self.max_steps} steps led to tau_0 = {state.now['load']:.6g} Pa, and "
+                f"{state.now['slid']} nodes to their residual strength, but not to stop="
+                f"{self.stop!r}; raise max_steps or the loading rate, or stop at 'onset' or 'rest'"
+            )
+
+
+def make_run(
+    method: Rupture,
+    medium: Medium,
+    rows: Sample,
+    sample: int,
+    stations: NDArray[np.int64] | None = None,
+) -> Run:
+    """Return the run of one sample, which records what happens at some nodes."""
+    strength, residual = rows.strength[sample], rows.residual_strength[sample]
+    weakening, initial = rows.weakening_rate[sample], rows.initial_stress[sample]
+    friction, finite = medium.problem.friction, np.isfinite(strength)
+    with np.errstate(over="ignore"):
+        critical = friction.reach * friction.critical_slip_of(strength - residual, weakening)
+    if not np.all(np.isfinite(critical[finite])):
+        raise InputError(
+            f"friction: a weakening rate of {weakening.min():.3g} Pa/m takes infinitely much slip;"
+            " check its unit"
+        )
+    every = (strength, residual, weakening, critical, rows.load_profile, initial)
+    nodes = Nodes(*(np.array(values, dtype=np.float64).ravel() for values in every))
+    steepest = steepest_rate(strength[None], residual[None], weakening[None])
+    steepest *= friction.steepest_slope / friction.initial_slope
+    history = method.load
+    if history is None:
+        history = History(np.array([0.0, 1.0]), np.array([0.0, method.loading_rate]))
+    setting = Setting(
+        law=friction.parameters,
+        nodes=nodes,
+        mean_profile=float(nodes.profile.mean()),
+        mean_initial=float(nodes.initial.mean()),
+        load=history,
+        turning_times=turning_times(history),
+        scale=stress_scale(nodes),
+        thresholds=_thresholds(method, medium, nodes),
+        stations=np.empty(0, dtype=np.int64) if stations is None else stations,
+    )
+    least = _least_load(medium, nodes, steepest)
+    return Run(medium, setting, method.stop, steepest, least)
+
+
+def _least_load(medium: Medium, nodes: Nodes, steepest: float) -> float:
+    """Return the mean load, Pa, at which the weakest nodes of half a nucleation length slip."""
+    interface, solid = medium.interface, medium.problem.solid
+    moduli = (medium.problem.effective_modulus, solid.shear_modulus)[: len(interface.shape)]
+    # Of a line, or on a plane along x times along y.
+    half = float(np.prod([SMALLEST_EIGENVALUE * modulus / steepest for modulus in moduli]))
+    weakens = np.isfinite(nodes.strength) & (nodes.critical > 0.0)
+    loads = ((nodes.strength - nodes.initial) / nodes.profile)[weakens]
+    weakest = round(min(max(half / interface.cell, 1.0), loads.size))
+    return float(np.partition(loads, weakest - 1)[:weakest].mean())
+
+
+def _thresholds(method: Rupture, medium: Medium, nodes: Nodes) -> Thresholds:
+    """When steps change or end.
+
+    Calm: for as long as shear waves need to cross the interface, nothing slips faster than a crack
+    of half its length does when the load alone drives it, or nothing faster than before.
+    """
+    friction, finite = medium.problem.friction, np.isfinite(nodes.strength)
+    frequency = medium.grid.frequency
+    crossing = 2.0 * np.pi / frequency[frequency > 0.0].min() / medium.step
+    typical = float(np.median((nodes.strength - nodes.residual)[finite]))
+    arrival = min(friction.slip_at(1.0 - method.arrival), friction.reach) / friction.reach
+    breakable = int(np.count_nonzero(finite))
+    return Thresholds(
+        slid_stop=np.inf if method.stop == "time" else float(breakable),
+        event_stop=method.stop == "onset",
+        rest_stop=method.stop == "rest",
+        end_time=np.inf if method.end_time is None else method.end_time,
+        breakable=breakable,
+        calm_slip=max(medium.interface.lengths) / medium.problem.effective_modulus,
+        calm_count=max(_CALM_STEPS, int(np.ceil(crossing))),
+        slip_step=method.slip_step,
+        load_step=method.load_step,
+        smallest_step=_SWITCH * medium.step,
+        unstable_rate=_UNSTABLE_STRESS * typical / medium.impedance,
+        arrival=float(arrival),
+        curved=not friction.linear,
+        explicit_only=not method.implicit,
+    )

@@ -1,0 +1,337 @@
+"""Stored results of a rupture: frames, the record of every step, and a folder on disk."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import pydantic
+from numpy.typing import NDArray
+from pydantic import BeforeValidator
+
+from stiction.base.errors import InputError, unknown_name
+from stiction.base.files import UNREADABLE, read_arrays, write_arrays, write_whole
+from stiction.base.model import Count, FilePath, Names, Real, Text, checked, model
+from stiction.base.variables import Variable
+from stiction.methods.dynamics.integrator import Run
+from stiction.methods.dynamics.state import DIAGNOSTICS, STATION, Floats, Record, State
+from stiction.methods.dynamics.summary import energy_balance, per_area, seismic_moment
+from stiction.problem.interface import Interface
+from stiction.problem.results import along, coordinate, to_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FRAMES = 64
+"""Number of frames in a file of a folder."""
+_MOST_STEPS = 50_000  # recorded between frames that lie far apart, before they are written
+_CHECKPOINT, _SUMMARY, _CHUNKS = "checkpoint.npz", "summary.nc", "frames-*.nc"
+
+
+def _over(*dims: str, **about: tuple[str, str]) -> dict[str, Variable]:
+    """Return variables with these dimensions, by name, from their units and meaning."""
+    return {name: Variable(*one, dims) for name, one in about.items()}
+
+
+FIELDS = _over(
+    "time",
+    slip=("m", "slip"),
+    slip_rate=("m/s", "slip rate"),
+    shear_stress=("Pa", "shear stress on the interface"),
+    strength=("Pa", "current strength"),
+)
+SCALARS = _over(
+    "time",
+    load=("Pa", "load factor tau_0"),
+    mean_stress=("Pa", "mean shear stress on the interface"),
+    mean_slip=("m", "mean slip"),
+    top_slip_rate=("m/s", "largest slip rate"),
+    weakened_fraction=("1", "share of nodes at the residual strength"),
+    seismic_moment=("N", "seismic moment per length"),
+    work=("J/m", "work of the load on the slip"),
+    strain_energy=("J/m", "static strain energy of the slip"),
+    fracture_energy=("J/m", "energy dissipated above the residual"),
+    radiated_energy=("J/m", "work minus dissipated and strain energy"),
+)
+STEPS = _over(  # DIAGNOSTICS of these names
+    "step",
+    step_time=("s", "time after each step"),
+    step_load=("Pa", "load factor tau_0 after each step"),
+    step_mean_stress=("Pa", "mean shear stress after each step"),
+    step_mean_slip=("m", "mean slip after each step"),
+    step_top_slip_rate=("m/s", "largest slip rate after each step"),
+    step_size=("s", "size of each step"),
+    step_work=("J/m", "work of the load up to each step"),
+)
+STATIONS = _over(  # as in STATION
+    "step",
+    "station",
+    station_slip=("m", "slip at a station after each step"),
+    station_slip_rate=("m/s", "slip rate at a station after each step"),
+    station_shear_stress=("Pa", "shear stress (traction) at a station after each step"),
+)
+TIME = Variable("s", "time from zero load", ("time",))
+_WATCHED = ("time", "load", "mean_stress", "work")
+
+
+Place = Annotated[
+    tuple[Real, ...], BeforeValidator(lambda place: np.atleast_1d(place).tolist())
+]
+
+
+@model
+class Save:
+    """Results that `simulate_rupture` keeps, and where it stores them.
+
+    Parameters
+    ----------
+    fields : sequence of {"slip", "slip_rate", "shear_stress", "strength"}
+        Fields to keep in frames.
+    every : int
+        Explicit steps between frames; while the interface creeps, a tenth as many implicit steps
+        (at least one). Steps shorten as it accelerates, so that frames are dense in time around
+        the onset.
+    stations : mapping of str to float or (float, float)
+        Names and places x, on a plane (x, y), in m, where slip, slip rate and shear stress
+        (traction) are recorded after every step. The node nearest to a place is taken.
+    to : path, optional
+        Folder to write to during the run. Memory then stays bounded and the result holds no
+        fields; `stiction.methods.dynamics.save.open_rupture` reads them. If the folder holds the
+        same run, interrupted, it resumes from the last state written, and every number is
+        the same, to the bit, as without the interruption. A finished run is read.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> st.Save(["slip"], every=50, stations={"centre": 0.05}).stations
+    {'centre': (0.05,)}
+    """
+
+    fields: Names = ("slip", "slip_rate", "shear_stress")
+    every: Annotated[Count, pydantic.Field(le=10**6)] = 10
+    stations: dict[Text, Place] = pydantic.Field(default_factory=dict)
+    to: FilePath | None = None
+
+    @pydantic.model_validator(mode="after")
+    def _known(self) -> Save:
+        if unknown := [name for name in self.fields if name not in FIELDS]:
+            raise InputError([unknown_name("fields", name, FIELDS) for name in unknown])
+        return self
+
+    def nodes(self, interface: Interface) -> NDArray[np.int64]:
+        """Return the numbers of the stations' nodes, flat; refuse those not on the interface."""
+        lengths, numbers = interface.lengths, []
+        for name, place in self.stations.items():
+            at = np.array(place)
+            if at.size != len(lengths) or not np.all((at >= 0.0) & (at <= lengths)):
+                reach = " x ".join(f"{length:g}" for length in lengths)
+                raise InputError(
+                    f"stations[{name!r}]: {place} is not on the interface of {reach} m; give"
+                    f" {' and '.join(interface.dims)} in m, from the first node"
+                )
+            index = tuple(np.round(at / interface.spacings).astype(int) % interface.shape)
+            numbers.append(np.ravel_multi_index(index, interface.shape))
+        return np.array(numbers, dtype=np.int64)
+
+
+class Recorder:
+    """Frames and step records gathered so far, and their folder if there is one."""
+
+    def __init__(self, run: Run, save: Save, attributes: dict[str, Any]) -> None:
+        self.run, self.save, self.attributes = run, save, attributes
+        interface = run.medium.interface
+        self._others = repr([save.fields, save.stations])  # on which a folder depends, too
+        rows, stations = save.every, len(save.stations)
+        self._record = Record(np.empty(rows, DIAGNOSTICS), np.empty((rows, stations), STATION))
+        self._columns = {name: self._record.steps[name.removeprefix("step_")] for name in STEPS}
+        for name in STATIONS if stations else ():
+            self._columns[name] = self._record.stations[name.removeprefix("station_")]
+        self._frames: list[dict[str, Any]] = []
+        self._steps: list[dict[str, Floats]] = []
+        over = {name: along(interface, what) for name, what in FIELDS.items()}
+        over |= SCALARS | STEPS | STATIONS
+        self.variables = {name: per_area(interface, what) for name, what in over.items()}
+
+    def advance(self, state: State, count: int) -> tuple[int, int]:
+        """Take up to `count` steps and record them; return (steps taken, why it returned)."""
+        rows = Record(*(part[:count] for part in self._record))
+        taken, reason = self.run.advance(state, count, rows)
+        self._steps.append({name: one[:taken].copy() for name, one in self._columns.items()})
+        return taken, reason
+
+    def add(self, state: State) -> None:
+        """Keep a frame of the state as it is now."""
+        run, now, medium = self.run, state.now, self.run.medium
+        frame: dict[str, Any] = {name: float(now[name]) for name in _WATCHED}
+        frame |= {
+            "mean_slip": float(state.slip.mean()),
+            "top_slip_rate": float(state.rate.max()),
+            "weakened_fraction": float(now["slid"]) / state.slip.size,
+            "seismic_moment": seismic_moment(run, state),
+        }
+        with np.errstate(over="ignore"):  # just before a run becomes non-finite
+            frame |= energy_balance(run, state)
+        fields = {
+            "slip": state.slip,
+            "slip_rate": state.rate,
+            "shear_stress": state.stress,
+            "strength": run.strength_after(state.slip),
+        }
+        shape = medium.interface.shape
+        frame |= {name: fields[name].reshape(shape).copy() for name in self.save.fields}
+        self._frames.append(frame)
+
+    def take(self) -> xr.Dataset:
+        """Return the data gathered since the last call as a dataset."""
+        interface, save = self.run.medium.interface, self.save
+        names = ("time", *SCALARS, *save.fields)
+        data = {name: np.array([frame[name] for frame in self._frames]) for name in names}
+        shape = len(self._frames), *interface.shape  # also if there are none
+        data |= {name: data[name].reshape(shape) for name in save.fields}
+        for name, column in self._columns.items():
+            data[name] = np.concatenate([column[:0], *(one[name] for one in self._steps)])
+        self._frames, self._steps = [], []
+        coordinates = {"time": (data.pop("time"), TIME)}
+        coordinates |= {dim: coordinate(interface, dim) for dim in interface.dims}
+        if save.stations:
+            label = Variable("", "name of a station", ("station",))
+            coordinates["station"] = (np.array(list(save.stations), dtype=str), label)
+            index = np.unravel_index(self.run.setting.stations, interface.shape)
+            for dim, i, spacing in zip(interface.dims, index, interface.spacings, strict=True):
+                place = Variable("m", f"{dim} of a station's node", ("station",))
+                coordinates[f"station_{dim}"] = (i * spacing, place)
+        return to_dataset(data, self.variables, coordinates, self.attributes)
+
+    def begin(self, state: State) -> bool:
+        """Open the folder; return whether it holds this very run up to its end.
+
+        If it holds a part of the run, the state becomes that which was written last.
+        """
+        folder = self.save.to
+        if folder is None:
+            return False
+        checkpoint = folder / _CHECKPOINT
+        if not checkpoint.exists():
+            if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+                raise InputError(
+                    f"to: {str(folder)!r} is not empty and holds no rupture; give a new folder"
+                )
+            write_checkpoint(checkpoint, self.run, state, self._others)
+            return False
+        read_checkpoint(checkpoint, self.run, state, self._others)
+        if (folder / _SUMMARY).exists():
+            return True
+        for path in folder.glob(_CHUNKS):
+            if int(path.stem.removeprefix("frames-")) > state.steps:
+                path.unlink()
+        return False
+
+    def flush(self, state: State, *, at_once: bool = False, last: bool = False) -> None:
+        """Write what was gathered, if there is enough or at once, and the state to resume from.
+
+        That is not the last one: a run that goes on may have no frame where `max_steps` ended it.
+        """
+        folder, steps = self.save.to, sum(one["step_time"].size for one in self._steps)
+        full = len(self._frames) >= FRAMES or steps >= _MOST_STEPS
+        if folder is None or not (full or ((at_once or last) and self._frames)):
+            return
+        _write(folder / f"frames-{state.steps:012d}.nc", self.take())
+        if not last:
+            write_checkpoint(folder / _CHECKPOINT, self.run, state, self._others)
+
+    def finish(self, dataset: xr.Dataset, stopped: str) -> None:
+        """Write the variables of the whole run beside its frames, unless it can go on."""
+        if self.save.to is not None and stopped != "max_steps":
+            whole = dataset.drop_dims(["time", "step"], errors="ignore")
+            _write(self.save.to / _SUMMARY, whole)
+
+
+def _write(path: Path, dataset: xr.Dataset) -> None:
+    write_whole(path, lambda aside: dataset.to_netcdf(aside, engine="netcdf4"))
+
+
+def _digest(run: Run, others: str) -> str:
+    """SHA-256 of all that a run depends on besides its state."""
+    medium, setting = run.medium, run.setting
+    grid = medium.grid
+    slips = np.linspace(0.0, 5.0, 101)  # where laws are compared, in units of d_c
+    law = np.concatenate([medium.problem.friction.fraction(slips), *map(np.ravel, setting.law)])
+    about = [medium.interface, float(medium.step), others, DIAGNOSTICS]
+    digest = hashlib.sha256(repr(about).encode())
+    for values in (
+        *setting.nodes, law, *setting.load, np.array(setting.thresholds, float),
+        grid.impedance, grid.stiffness, grid.poles, grid.weights,
+    ):  # fmt: skip
+        digest.update(np.ascontiguousarray(values).tobytes())
+    return digest.hexdigest()
+
+
+def write_checkpoint(path: Path, run: Run, state: State, others: str = "") -> None:
+    """Save the state of a run and a digest of all that it depends on, whole or not at all."""
+    digest = np.frombuffer(_digest(run, others).encode(), np.uint8)
+    write_arrays(path, {"digest": digest} | state._asdict())
+
+
+def read_checkpoint(path: Path, run: Run, state: State, others: str = "") -> State:
+    """Fill a state of this very run with the content of a checkpoint, and return it."""
+    try:
+        arrays = read_arrays(path)
+        digest = arrays["digest"].tobytes().decode()
+        saved = [arrays[name] for name in state._fields]
+    except UNREADABLE as error:
+        raise InputError(f"to: {str(path)!r} is not a readable checkpoint: {error}") from None
+    if digest != _digest(run, others):
+        raise InputError(
+            f"to: {str(path.parent)!r} holds another run: the problem, the profiles, the load, "
+            "the method, or what is kept differs; give a new folder"
+        )
+    for own, values in zip(state, saved, strict=True):
+        own[...] = values  # in place: the arrays lie where steps want them
+    return state
+
+
+@checked
+def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset:
+    """Read a run that `Save.to` names, also one that is still going on or was cut short.
+
+    Parameters
+    ----------
+    folder : path
+    fields : sequence of str, optional
+        Fields over ('time', 'x'), or ('time', 'x', 'y'), to load; all that were kept if left out.
+
+    Returns
+    -------
+    xarray.Dataset
+        As from `simulate_rupture`; what belongs to the run as a whole once it has ended.
+
+    Raises
+    ------
+    InputError
+        If the folder holds no rupture.
+    """
+    import xarray as xr
+
+    parts = []
+    for path in sorted(folder.glob(_CHUNKS)):
+        with xr.open_dataset(path, engine="netcdf4") as data:
+            unwanted = [] if fields is None else FIELDS.keys() - set(fields)
+            parts.append(data.drop_vars(unwanted, errors="ignore").load())
+    if not parts:
+        raise InputError(f"folder: {str(folder)!r} holds no frames of a rupture")
+
+    def joined(dim: str, other: str) -> xr.Dataset:
+        return xr.concat(
+            [part.drop_dims(other) for part in parts], dim=dim,
+            data_vars="minimal", coords="minimal", compat="override", join="override",
+        )  # fmt: skip
+
+    framed = joined("time", "step").merge(joined("step", "time"))
+    framed.attrs = parts[-1].attrs
+    if (folder / _SUMMARY).exists():
+        with xr.open_dataset(folder / _SUMMARY, engine="netcdf4") as whole:
+            framed = framed.merge(whole.load(), compat="override")
+            framed.attrs = dict(whole.attrs)
+    return framed

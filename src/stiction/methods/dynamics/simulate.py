@@ -1,0 +1,164 @@
+"""simulate_rupture: one rupture in space and time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from stiction.base.errors import InputError, warn_accuracy
+from stiction.base.model import Progress, checked
+from stiction.base.progress import Meter
+from stiction.base.variables import Variable
+from stiction.methods.dynamics import checks
+from stiction.methods.dynamics.integrator import Run
+from stiction.methods.dynamics.method import Rupture, make_run
+from stiction.methods.dynamics.save import SCALARS, Recorder, Save, open_rupture
+from stiction.methods.dynamics.state import State
+from stiction.methods.dynamics.summary import summary
+from stiction.problem.problem import Problem, refusals
+from stiction.problem.profiles.placing import with_gaps
+from stiction.problem.results import along, study_attributes, to_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_ALONG: dict[str, Variable] = {
+    "peak_strength": Variable("Pa", "peak strength tau_p", ()),
+    "arrival_time": Variable("s", "arrival time of the front, see `Rupture.arrival`", ()),
+}
+
+
+@checked
+def simulate_rupture(
+    problem: Problem,
+    profiles: Any,
+    *,
+    method: Rupture,
+    save: Save | None = None,
+    progress: Progress = True,
+) -> xr.Dataset:
+    """Simulate one interface from its first slip to global sliding, in space and time.
+
+    Parameters
+    ----------
+    problem : Problem
+    profiles : array, mapping of arrays, xarray.Dataset or Sample
+        Peak strength (Pa) of one sample, infinite where nothing ever breaks, or several profiles
+        by name, as in `onset`. Where the initial stress is above the strength, slip begins at
+        once.
+    method : Rupture
+        Load, numerical options and end of the run. The run begins at the first slip,
+        regardless of `start`, and keeps its results if `max_steps` ends it.
+    save : Save, optional
+        Results to keep and where to store them: by default slip, slip rate and shear stress
+        every ten explicit steps, in memory.
+    progress : bool or callable
+        True shows progress on standard error after two seconds; a callable gets the steps taken
+        and 0.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ('time', 'x') the fields; over 'time' `load`, `mean_stress`, `mean_slip`,
+        `top_slip_rate`, `weakened_fraction`, `seismic_moment`, `work` and energies; over 'step'
+        some of these at every step, with `step_time`; over ('step', 'station') `station_slip`,
+        `station_slip_rate` and `station_shear_stress`, and `station_x` (and `station_y`), where
+        their nodes are; over 'x' `peak_strength` and `arrival_time`; and the scalars of
+        `Rupture` for the run so far. The attribute `stopped` is the reason why it ended.
+
+    Raises
+    ------
+    InputError
+        If any argument is invalid; the message lists every problem.
+    StoreError
+        If `save.to` cannot be written; what was written stays readable.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=256)
+    >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(problem.interface, seed=1)
+    >>> method = st.Rupture(loading_rate=1e8, stop="onset")
+    >>> run = st.simulate_rupture(problem, tau_p[0], method=method, save=st.Save(["slip"]))
+    >>> run.attrs["stopped"]
+    'onset'
+    """
+    save = Save() if save is None else save
+    if refused := refusals(problem, method):
+        raise InputError(refused)
+    rows, measured = problem.placed_sample(profiles, method.accepts)
+    if rows.samples != 1:
+        raise InputError(f"profiles: one sample at a time, got {rows.samples}")
+    stations = save.nodes(problem.interface)
+    problem.warn_of_units(rows.mean_strength, float(rows.residual_strength.mean()))
+    checks.warn_if_coarse(problem, rows)
+    run = make_run(method, method.medium(problem), rows, 0, stations)
+    state = checks.at_first_slip(run)
+    if state is None:
+        raise InputError(
+            f"load: does not reach the first slip, tau_0 = {run.first_load:.6g} Pa, before the run"
+            " ends; raise the load, Load.initial_stress where slip should begin, or end_time"
+        )
+    attributes = study_attributes(problem=problem, method=method)
+    recorder = Recorder(run, save, attributes | {"stopped": "running"})
+    if recorder.begin(state) and save.to is not None:
+        return with_gaps(problem, open_rupture(save.to, fields=()), measured)
+    if state.steps == 0:
+        recorder.add(state)
+    with Meter("rupture", show=progress, unit="steps") as meter:
+        stopped = _follow(run, state, recorder, method.max_steps, meter)
+    recorder.attributes["stopped"] = stopped
+    checks.warn_of_slip(run, state)
+    recorder.flush(state, last=True)
+    dataset = recorder.take() if save.to is None else open_rupture(save.to, fields=())
+    dataset.attrs["stopped"] = stopped
+    result = _complete(dataset, method, run, state)
+    if stopped in ("rest", "time"):
+        checks.warn_of_survival(method.stop, [result])
+    recorder.finish(result, stopped)
+    return with_gaps(problem, result, measured)
+
+
+def _follow(run: Run, state: State, recorder: Recorder, most: int, meter: Meter) -> str:
+    """Take steps and keep frames until the run ends; return the reason."""
+    every = recorder.save.every
+    while state.steps < most:
+        count = every if state.explicit else max(1, every // 10)
+        if state.steps + count >= most:
+            recorder.flush(state, at_once=True)
+        taken, reason = recorder.advance(state, min(count, most - state.steps))
+        try:
+            checks.check_finite(run, state, reason)
+        except FloatingPointError as error:
+            warn_accuracy(str(error))
+            return f"not finite: {error}"
+        recorder.add(state)
+        now = state.now
+        meter.note = (
+            f"t = {now['time']:.6g} s, mean stress {now['mean_stress'] * 1e-6:.4f} MPa, "
+            f"{now['slid'] / state.slip.size:.0%} weakened"
+        )
+        meter.advance(taken)
+        if stopped := run.ending(state, reason):
+            return stopped
+        recorder.flush(state)
+    return "max_steps"
+
+
+def _complete(dataset: xr.Dataset, method: Rupture, run: Run, state: State) -> xr.Dataset:
+    """Add the variables of the whole run."""
+    problem, interface = run.medium.problem, run.medium.interface
+    variables = {name: along(interface, variable) for name, variable in _ALONG.items()}
+    for name, variable in method.variables(problem).items():
+        variables[name] = replace(variable, dims=variable.dims[1:])  # without 'sample'
+    found: dict[str, Any] = {
+        "peak_strength": run.setting.nodes.strength.reshape(interface.shape),
+        "arrival_time": state.arrival.reshape(interface.shape),
+    }
+    with np.errstate(over="ignore", invalid="ignore"):  # after a run that became non-finite
+        found |= summary(run, state)
+    # Energies and moment are already there over 'time'; their last value is the total.
+    new = {name: value for name, value in found.items() if name not in SCALARS}
+    return dataset.merge(to_dataset(new, variables, {}, {}, interface))

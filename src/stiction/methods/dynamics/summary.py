@@ -1,0 +1,167 @@
+"""The scalars of a run: loads, moment, energies, rupture speeds."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from stiction.base.variables import Variable
+from stiction.methods.dynamics.integrator import Run
+from stiction.methods.dynamics.state import Floats, State
+from stiction.problem.interface import Interface
+from stiction.problem.results import position
+
+_SCALARS: dict[str, Variable] = {
+    "applied_load": Variable("Pa", "load factor applied at the onset"),
+    "onset_time": Variable("s", "time from zero load to the onset"),
+    "kinetic_stress": Variable("Pa", "mean stress when every node that can break has broken"),
+    "stress_drop": Variable("Pa", "critical stress minus kinetic stress"),
+    "seismic_moment": Variable("N", "seismic moment per length, G times the integral of slip"),
+    "radiated_energy": Variable("J/m", "energy radiated up to the end of the run"),
+    "fracture_energy": Variable("J/m", "energy dissipated above the residual strength"),
+    "arrested_events": Variable("1", "instabilities that stopped before global sliding"),
+    "rupture_speed": Variable("m/s", "largest apparent speed of the front over 2 h_n"),
+    "median_rupture_speed": Variable("m/s", "median apparent speed of the front over h_n/2"),
+    "start_load": Variable("Pa", "load factor at which the simulation began"),
+    "start_error": Variable("Pa", "estimated error of the onset due to the start; 0 from rest"),
+    "implicit_steps": Variable("1", "implicit steps taken"),
+    "explicit_steps": Variable("1", "explicit steps taken"),
+}
+
+
+def per_area(interface: Interface, variable: Variable) -> Variable:
+    """Return a variable for a plane, where a quantity per length of a line is a total."""
+    if not interface.is_plane:
+        return variable
+    units = {"N": "N m", "J/m": "J"}.get(variable.units, variable.units)
+    name = variable.long_name.replace(" per length", "")
+    return replace(variable, units=units, long_name=name)
+
+
+def scalars(interface: Interface) -> dict[str, Variable]:
+    """Return the additional variables of a run; on a plane, the median speeds along x and y.
+
+    The largest one is left out there: where a front arrives at an angle, it is above any of waves.
+    """
+    found = {name: per_area(interface, variable) for name, variable in _SCALARS.items()}
+    if interface.is_plane:
+        del found["rupture_speed"]
+    found["median_rupture_speed"] = position(interface, found["median_rupture_speed"])
+    return found
+
+
+def seismic_moment(run: Run, state: State) -> float:
+    """Return the moment of the slip, N; on a plane N m."""
+    medium = run.medium
+    return medium.problem.solid.shear_modulus * float(state.slip.sum()) * medium.grid.cell
+
+
+def energy_balance(run: Run, state: State) -> dict[str, float]:
+    """Return strain, fracture and radiated energy, J/m; on a plane J.
+
+    The static strain energy is the sum over modes of K(k)|delta_k|²/2. Waves carry away the work
+    less friction less strain energy. The stress equals the strength wherever there is slip rate, so
+    that the work of friction follows from the slip alone.
+    """
+    nodes, grid, friction = run.setting.nodes, run.medium.grid, run.medium.problem.friction
+    drop = np.where(np.isfinite(nodes.strength), nodes.strength - nodes.residual, 0.0)
+    fracture = friction.dissipated(state.slip, drop, nodes.weakening)
+    share = np.full(grid.transform.half, 2.0)  # a mode and its conjugate, which is left out
+    share[..., 0] = share[..., -1] = 1.0  # modes without a conjugate
+    power = share.ravel()[1:] * grid.stiffness[0, 1:] * np.abs(state.slip_hat[1:]) ** 2
+    strain = float(0.5 * np.sum(power) * grid.cell / np.prod(grid.transform.shape))
+    spent = float((fracture + nodes.residual * state.slip).sum()) * grid.cell
+    return {
+        "strain_energy": strain,
+        "fracture_energy": float(fracture.sum()) * grid.cell,
+        "radiated_energy": float(state.now["work"]) - spent - strain,
+    }
+
+
+def _axis_speeds(
+    run: Run, state: State, lengths: float, statistic: Callable[[Floats], Any]
+) -> list[float]:
+    """A statistic of the front's speed along each axis, on the lines through its origin.
+
+    Speeds are means over `lengths` times the shortest h_n along the axis.
+    """
+    interface = run.medium.interface
+    nucleation = run.medium.problem.nucleation_lengths(run.steepest_rate)
+    arrival = state.arrival.reshape(interface.shape)
+    began = np.unravel_index(int(state.now["onset_node"]), interface.shape)
+    found = []
+    for axis, spacing in enumerate(interface.spacings):
+        window = max(lengths * nucleation[axis], 8.0 * spacing)
+        window = min(window, 0.25 * interface.lengths[axis])
+        through = tuple(slice(None) if i == axis else node for i, node in enumerate(began))
+        speeds = rupture_speed(arrival[through], spacing, window)
+        speeds = speeds[np.isfinite(speeds)]
+        found.append(float(statistic(speeds)) if speeds.size else np.nan)
+    return found
+
+
+def _critical_load(run: Run, now: Any, stress: float) -> float:
+    """Return the load that carries the critical stress, Pa; nan if an overstressed start has it."""
+    nodes, margin = run.setting.nodes, 1e-6 * now["scale"]
+    load = (stress - run.setting.mean_initial) / run.setting.mean_profile
+    began = now["start_load"] * nodes.profile + nodes.initial
+    overstressed = bool(np.any(began - nodes.strength > margin))
+    return load if not overstressed or load > now["start_load"] + margin else np.nan
+
+
+def summary(run: Run, state: State) -> dict[str, Any]:
+    """Return the scalars of a finished run; NaN is what did not happen."""
+    interface, now = run.medium.interface, state.now
+    onset, first, kinetic = (
+        float(now[name]) if np.isfinite(now[name]) else np.nan
+        for name in ("onset_stress", "first_stress", "kinetic_stress")
+    )
+    # A run that goes on until the interface slides, or to its end time, may see it survive.
+    critical = np.nan if np.isnan(kinetic) and run.stop in ("sliding", "time") else onset
+    node = np.unravel_index(int(now["onset_node"]), interface.shape)
+    spent = energy_balance(run, state)
+    found: dict[str, Any] = {
+        "critical_load": _critical_load(run, now, critical),
+        "critical_stress": critical,
+        "first_instability": first,
+        "critical_position": [i * h for i, h in zip(node, interface.spacings, strict=True)],
+        "applied_load": float(now["onset_load"]),
+        "onset_time": float(now["onset_time"]),
+        "kinetic_stress": kinetic,
+        "stress_drop": critical - kinetic,
+        "seismic_moment": seismic_moment(run, state),
+        "radiated_energy": spent["radiated_energy"],
+        "fracture_energy": spent["fracture_energy"],
+        "arrested_events": int(now["arrested"]),
+        "median_rupture_speed": _axis_speeds(run, state, 0.5, np.median),
+        "start_load": float(now["start_load"]),
+        "start_error": float(now["start_error"]),
+        "implicit_steps": int(now["implicit_steps"]),
+        "explicit_steps": int(now["explicit_steps"]),
+    }
+    if not interface.is_plane:
+        found["rupture_speed"] = _axis_speeds(run, state, 2.0, np.max)
+    for name in {"critical_position", "rupture_speed", "median_rupture_speed"} & found.keys():
+        # A number on a line; one along x and one along y on a plane.
+        along = np.where(np.isnan(onset), np.nan, found[name])
+        found[name] = along if interface.is_plane else along[0]
+    return found
+
+
+def rupture_speed(arrival: Floats, spacing: float, window: float) -> Floats:
+    """Return the apparent speed of the front at each node of a line, m/s; nan where none passed.
+
+    `arrival` (s) is periodic and nan where the front never came. The speed is a mean over `window`
+    (m), where the arrival is strictly monotone over the window: the birth of patches and the
+    meeting of fronts do not count.
+    """
+    half = max(1, round(0.5 * window / spacing))
+    if 2 * half >= arrival.size:
+        return np.full(arrival.shape, np.nan)
+    wrapped = np.concatenate([arrival[-half:], arrival, arrival[:half]])
+    steps = np.lib.stride_tricks.sliding_window_view(np.diff(wrapped), 2 * half)
+    monotone = np.all(steps > 0.0, axis=1) | np.all(steps < 0.0, axis=1)
+    slowness = np.abs(wrapped[2 * half :] - wrapped[: -2 * half]) / (2 * half * spacing)
+    with np.errstate(divide="ignore"):
+        return np.where(monotone, 1.0 / slowness, np.nan)

@@ -1,0 +1,171 @@
+"""A quick test for an unstable patch that runs along the interface, all others held fixed.
+
+A lower bound of what happens: if the patch alone, growing as one run of nodes, reaches a length at
+which no fracture energy can stop it, the whole interface slides. Each step solves the elastic
+problem of the run with frozen strengths; the blocks of K being Toeplitz, one Cholesky factor serves
+the runs of every sample.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from stiction.base.arrays import Array
+from stiction.base.jit import ZERO, jit
+from stiction.base.lanes import multiply_add
+from stiction.elasticity.line import griffith_length
+from stiction.methods.equilibrium.dense.cholesky import back_substitute, row_start, substitute
+from stiction.methods.equilibrium.sample import (
+    Outcome,
+    Sample,
+    step_to_corner,
+    strength_at,
+    unsupported,
+)
+
+STEPS = 30
+"""Elastic steps; most samples need five to eight."""
+SHARE = 1e-3
+"""Growth in a step, as a share of the largest slip, below which the test gives up."""
+
+
+def block_factor(column: Array, width: int) -> Array:
+    """Cholesky factor of the leading block of K, for runs of up to `width` nodes.
+
+    The block is a Toeplitz matrix: its factor follows column by column from two vectors, in
+    `width`^2 operations (the algorithm of Schur; Kailath and Sayed, 1999).
+    """
+    factor = np.empty(row_start(width + 4))
+    starts = np.array([row_start(r) for r in range(width)])
+    upper = column[:width] / np.sqrt(column[0])
+    lower = upper.copy()
+    for k in range(width):
+        if k > 0:
+            # One step down, and the hyperbolic rotation that clears entry k of the second vector.
+            shifted, rest = upper[k - 1 : -1], lower[k:]
+            turn = lower[k] / upper[k - 1]
+            length = np.sqrt((1.0 - turn) * (1.0 + turn))
+            upper[k:] = (shifted - turn * rest) / length
+            lower[k:] = length * rest - turn * upper[k:]
+        factor[starts[k:] + k] = upper[k:]
+    return factor
+
+
+class Runs(NamedTuple):
+    """Properties of a line that the test needs.
+
+    The first column of K three times over (Pa/m), the factor for runs of up to `longest` nodes,
+    the distance of the nodes (m), and G* (Pa).
+    """
+
+    wide_column: Array
+    factor: Array
+    longest: int
+    spacing: float
+    modulus: float
+
+
+@jit
+def unstoppable_length(sample: Sample, load: float, runs: Runs) -> float:
+    """Nodes in a row at their residual strength that nothing on the interface stops.
+
+    Griffith's length with the least stress drop and the largest fracture energy, which is
+    (tau_p - tau_r) d_c times the area under the law.
+    """
+    drop = np.inf
+    energy = 0.0
+    for i in range(sample.excess.shape[0]):
+        drop = min(drop, load * sample.profile[i] - sample.residual[i])
+        fall = sample.excess[i] - sample.residual[i]
+        energy = max(energy, sample.pieces.area * fall * sample.critical[i])
+    return griffith_length(drop, energy, runs.modulus) / runs.spacing
+
+
+@jit
+def runs_away(
+    sample: Sample,
+    runs: Runs,
+    load: float,
+    slip: Array,
+    stiff: Array,
+    direction: Array,
+    stiff_direction: Array,
+    first: int,
+    length: int,
+    work: Array,
+) -> Outcome:
+    """Whether the patch of an instability certainly becomes global sliding: SLIDING or UNDECIDED.
+
+    Slip d and K d are those of the state that became unstable; afterwards slip is a lower bound of
+    the next equilibrium. K times the unstable direction is given beside it, and the first node and
+    the length of its patch; `work` (4, n) is work space.
+    """
+    n = slip.shape[0]
+    griffith = unstoppable_length(sample, load, runs)
+    step = step_to_corner(sample, slip, direction, np.inf)
+    if step == np.inf:
+        return Outcome.SLIDING
+    if (griffith > runs.longest and griffith < np.inf) or length > runs.longest:
+        return Outcome.UNDECIDED
+    # Everything below is numbered from `origin`, so that the patch lies in the middle.
+    begin = (n - length) // 2
+    end = begin + length
+    low = begin
+    high = end
+    origin = first - begin
+    if origin < 0:
+        origin += n
+    grown, extra, push, solution = work[0], work[1], work[2], work[3]
+    for q in range(n):
+        i = (origin + q) % n
+        push[q] = load * sample.profile[i] - stiff[i] - step * stiff_direction[i]
+        grown[q] = 0.0
+        extra[q] = 0.0
+    for _ in range(STEPS):
+        # Neighbours that are driven forward join, as far as the stress was computed.
+        while begin > low:
+            i = (origin + begin - 1) % n
+            if push[begin - 1] - extra[begin - 1] < strength_at(sample, slip, i):
+                break
+            begin -= 1
+        while end < high:
+            i = (origin + end) % n
+            if push[end] - extra[end] < strength_at(sample, slip, i):
+                break
+            end += 1
+        length = end - begin
+        if length > runs.longest:
+            return Outcome.UNDECIDED
+        for t in range(length):
+            q = begin + t
+            i = (origin + q) % n
+            solution[t] = max(push[q] - extra[q] - strength_at(sample, slip, i), 0.0)
+        substitute(runs.factor, ZERO, length, solution)
+        back_substitute(runs.factor, length, solution)
+        run = 0
+        longest = 0
+        largest = 0.0
+        fastest = 0.0
+        for t in range(length):
+            i = (origin + begin + t) % n
+            slip[i] += solution[t]
+            grown[begin + t] += solution[t]
+            largest = max(largest, slip[i])
+            fastest = max(fastest, solution[t])
+            run = run + 1 if slip[i] >= sample.pieces.at_corner * sample.critical[i] else 0
+            longest = max(longest, run)
+        if longest >= griffith or unsupported(sample, load, slip):
+            return Outcome.SLIDING
+        if fastest < SHARE * largest:
+            return Outcome.UNDECIDED
+        low = max(begin - length // 2, 0)
+        high = min(end + length // 2, n)
+        near = extra[low:high]
+        for t in range(near.shape[0]):
+            near[t] = 0.0
+        for q in range(begin, end):
+            source = runs.wide_column[n + low - q : n + high - q]
+            factor = grown[q]
+            for t in range(near.shape[0]):
+                near[t] = multiply_add(factor, source[t], near[t])
+    return Outcome.UNDECIDED

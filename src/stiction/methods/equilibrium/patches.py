@@ -1,0 +1,163 @@
+"""Patches on a line or plane: their number, and the position and width of one of them.
+
+Nodes of a plane are connected where their cells share an edge (four neighbours), also across the
+borders. The `interface` of these functions is an `Interface`; kernels do not depend on its file.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import label
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from stiction.base.arrays import Array
+from stiction.base.jit import jit
+
+Mask = NDArray[np.bool_]
+
+CORE = 0.1
+"""Share of the largest weight above which a node of a plane belongs to the critical patch."""
+
+
+class Patch(NamedTuple):
+    """Centre (m, from 0 to the period) and extents (m) along each direction, area (m²; m)."""
+
+    centre: tuple[float, ...]
+    extents: tuple[float, ...]
+    area: float
+
+
+def count_patches(slip: Array) -> int:
+    """Return the number of runs of slipping nodes on the circle."""
+    above = slip > 0.0
+    starts = int(np.count_nonzero(above[1:] > above[:-1])) + int(above[0] > above[-1])
+    return max(starts, int(above[0]))
+
+
+@jit
+def main_patch(field: Array) -> tuple[int, int, float]:
+    """First node, length and centroid (in nodes, from 0 to n) of the run with the largest entry.
+
+    Runs are where the field, which is not negative, is positive.
+    """
+    n = field.shape[0]
+    peak = 0
+    for i in range(n):
+        if field[i] > field[peak]:
+            peak = i
+    start = peak
+    length = 1
+    while length < n and field[start - 1 if start else n - 1] > 0.0:
+        start = start - 1 if start else n - 1
+        length += 1
+    end = peak
+    while length < n:
+        end = end + 1 if end < n - 1 else 0
+        if not field[end] > 0.0:
+            break
+        length += 1
+    if length == n:
+        # Everything slips: a centre exists only with respect to the largest entry.
+        start = (peak + n // 2 + 1) % n
+    weight = 0.0
+    moment = 0.0
+    for q in range(length):
+        value = field[(start + q) % n]
+        weight += value
+        moment += value * q
+    centre = start + moment / weight
+    return start, length, centre - n if centre >= n else centre
+
+
+def with_ends(field: Array, interface: Any) -> Array:
+    """Return a field with a node at rest between its ends, where these do not meet."""
+    return np.append(field, 0.0) if interface.is_free else field
+
+
+def line_patch(field: Array, interface: Any) -> Patch:
+    """Return the measures of the run of `main_patch`."""
+    spacing = interface.spacing
+    _, length, centre = main_patch(with_ends(field, interface))
+    centre += interface.first
+    return Patch((centre * spacing,), (length * spacing,), length * spacing)
+
+
+def labelled_patches(mask: Mask) -> tuple[NDArray[np.int64], int]:
+    """Return the label of each node's patch, from 1 (0: none), and the number of patches."""
+    pieces, count = label(mask)
+    if count == 0:
+        return pieces.astype(np.int64), 0
+    first = np.concatenate((pieces[0, :], pieces[:, 0]))
+    last = np.concatenate((pieces[-1, :], pieces[:, -1]))
+    meet = (first > 0) & (last > 0)
+    graph = coo_array((np.ones(meet.sum()), (first[meet], last[meet])), (count + 1, count + 1))
+    patches, numbers = connected_components(graph, directed=False)
+    # Node 0 of the graph, the background, is a component of its own.
+    order = np.zeros(patches, dtype=np.int64)
+    order[np.delete(np.arange(patches), numbers[0])] = np.arange(1, patches)
+    return order[numbers][pieces], patches - 1
+
+
+def span(occupied: Mask, peak: int) -> tuple[int, int]:
+    """Return the first place and the length of the shortest arc that holds all places.
+
+    If none is empty it is the whole circle from the far side of the peak.
+    """
+    n = occupied.size
+    places = np.flatnonzero(occupied)
+    if places.size == n:
+        return peak - n // 2, n
+    gaps = np.diff(np.append(places, places[0] + n))
+    widest = int(np.argmax(gaps))
+    return int(places[(widest + 1) % places.size]), n - int(gaps[widest]) + 1
+
+
+def patch_of(mask: Mask, weight: Array, spacings: tuple[float, ...]) -> Patch:
+    """Return the centre (centroid of the weight), extents and area of a patch of a plane."""
+    peak = np.unravel_index(int(np.argmax(np.where(mask, weight, -np.inf))), mask.shape)
+    centre, extents = [], []
+    for axis in (0, 1):
+        start, length = span(np.any(mask, axis=1 - axis), int(peak[axis]))
+        profile = np.where(mask, weight, 0.0).sum(axis=1 - axis)
+        n = mask.shape[axis]
+        along = profile[(start + np.arange(length)) % n]
+        place = (start + (along * np.arange(length)).sum() / along.sum()) % n
+        centre.append(float(place * spacings[axis]))
+        extents.append(length * spacings[axis])
+    area = float(mask.sum()) * spacings[0] * spacings[1]
+    return Patch((centre[0], centre[1]), (extents[0], extents[1]), area)
+
+
+def largest_patch(weight: Array, interface: Any, share: float) -> tuple[Mask, Patch]:
+    """Return the patch around the largest weight: which nodes belong to it, and its measures.
+
+    The weight is not negative and not all zero; nodes belong to a patch where it is above a share
+    of its largest value.
+    """
+    above = weight > share * weight.max()
+    if weight.ndim == 1:
+        above = np.where(above, weight, 0.0)
+        start, length, _ = main_patch(with_ends(above, interface))
+        inside = np.zeros(weight.size, dtype=np.bool_)
+        inside[(start + np.arange(length)) % weight.size] = True
+        return inside, line_patch(above, interface)
+    numbers, _ = labelled_patches(above)
+    inside = numbers == numbers.flat[int(np.argmax(weight))]
+    return inside, patch_of(inside, weight, interface.spacings)
+
+
+def critical_patch(multiplier: Array, interface: Any) -> tuple[Mask, Patch]:
+    """Return the patch that becomes unstable, from its multiplier y >= 0, not all zero.
+
+    On a line it is the run with the largest y. On a plane it is where y is above a tenth of its
+    largest value, around that value. It is not all slipping nodes connected with it: on rough
+    strengths these reach across the plane, with a y close to zero.
+    """
+    return largest_patch(multiplier, interface, 0.0 if multiplier.ndim == 1 else CORE)
+
+
+def patches_of(slip: Array) -> int:
+    """Return the number of slipping patches on a line (n,) or a plane (nx, ny)."""
+    return count_patches(slip) if slip.ndim == 1 else labelled_patches(slip > 0.0)[1]

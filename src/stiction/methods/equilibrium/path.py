@@ -1,0 +1,161 @@
+"""The path of one sample: slip and stress at given loads, and arrested events on the way."""
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, warn_accuracy
+from stiction.base.model import Numbers, check, check_memory
+from stiction.base.variables import Variable, force_variables, forces
+from stiction.methods.equilibrium.dense.blocks import BlockProgram
+from stiction.methods.equilibrium.solver import (
+    event_table,
+    event_variables,
+    follow,
+    make_program,
+)
+from stiction.problem.problem import Problem
+from stiction.problem.results import along, study_attributes, to_dataset
+
+LOAD = Variable("Pa", "load factor tau_0", ("load",))
+VARIABLES = {
+    "slip": Variable("m", "slip", ("load",)),
+    "stress": Variable("Pa", "shear stress on the interface", ("load",)),
+    "mean_stress": Variable("Pa", "mean shear stress on the interface", ("load",)),
+    "arrested_events": Variable("1", "instabilities that came to rest so far", ("load",)),
+    "sliding": Variable("1", "whether the interface as a whole slides", ("load",)),
+}
+TRAVEL = Variable("m", "travel of both drives together", ("load",))
+EVENT = Variable("1", "event number", ("event",))
+CLOSE = 1e-9
+"""Relative distance of loads that count as the same."""
+GAP = 1e-6
+"""Relative distance of the bounds of instabilities on planes."""
+
+
+def _check_loads(loads: Any) -> Array:
+    given = np.atleast_1d(check("loads", loads, Numbers))
+    if given.ndim != 1 or given.size == 0 or not np.all(np.isfinite(given)):
+        raise InputError(
+            f"loads: must be a one-dimensional array of finite numbers, got shape {given.shape}"
+        )
+    if np.any(np.diff(given, prepend=-1e-300) <= 0.0):
+        worst = int(np.argmin(np.diff(given, prepend=0.0)))
+        raise InputError(
+            f"loads: must rise, none negative; entry {worst} is {given[worst]:g} Pa"
+        )
+    return given
+
+
+def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
+    """Return slip and stress of one interface at rising loads, and its arrested events.
+
+    Patches grow, merge and become unstable; an instability that comes to rest is an event.
+
+    Parameters
+    ----------
+    problem : Problem
+    profiles : array, mapping of arrays, xarray.Dataset or Sample
+        Peak strength (Pa) of one sample, or several profiles by name, as in `onset`.
+    loads : (loads,) array
+        Load factors tau_0, rising, Pa.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over 'load' and the nodes: `slip` (m) and `stress` (Pa); over 'load': `mean_stress` (Pa),
+        `arrested_events` so far, and `sliding`. From the onset of global sliding on slip and
+        stress are NaN and `sliding` is true.
+
+        Over 'event', all arrested events up to global sliding, whatever the loads: `event_load`
+        (Pa, tau_0), `event_stress` (Pa, the mean on the interface), `event_position` (m),
+        `event_length` (m) of the patch that slipped, `event_mean_slip` (m, over that length) and
+        `event_moment` (N per unit depth: G times the slip added, integrated over the interface).
+        On specimens the load is the drive, the mean stress that it would cause if nothing slipped;
+        `travel` (m) is that of both drives together, on top of which a machine gives by its force
+        over its stiffness; and events have `event_stress_drop` (Pa), `event_travel` (m, before it),
+        `event_travel_step` (m) and `event_start` (m), the left end of the patch. With a thickness,
+        width or area each mean stress is given as a force, too: `force`, `event_force` and
+        `event_force_drop` (N).
+
+        On planes positions have two components, along 'direction', `event_extent` (m) and
+        `event_area` (m²) take the place of the length, and the moment is in N m.
+
+    Raises
+    ------
+    InputError
+        If there is more than one profile or the loads do not rise, and as `onset` does.
+
+    Notes
+    -----
+    A patch jumps to the least equilibrium at the same load: an overdamped interface would stop
+    there. Inertia may carry a rupture through; only `Rupture` decides that.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(problem.interface, seed=1)
+    >>> path = st.equilibrium_path(problem, tau_p[0], [0.5e6, 2e6])
+    >>> path.sliding.values
+    array([False,  True])
+    """
+    given = _check_loads(loads)
+    check("problem", problem, Problem)
+    rows = problem.sample(profiles)
+    if rows.samples != 1:
+        raise InputError(f"profiles: must be one sample, got {rows.samples}")
+    interface = problem.interface
+    check_memory("loads", 16.0 * given.size * interface.size)
+    program = make_program(problem, GAP)
+    sample = program.sample_of(rows, 0)
+    whole = follow(program, sample)
+    passed, end, known = whole.events, whole.last.load, whole.known
+    slip, stress = np.full((2, given.size, interface.size), np.nan)
+    travel = np.full(given.size, np.nan)
+    at = np.array([event.before.load for event in passed])
+    events = (at[None, :] < given[:, None]).sum(axis=1)
+    sliding = given > end
+    state = program.at_rest(sample)
+    for i, load in enumerate(map(float, given[~sliding])):
+        if events[i]:
+            after = passed[events[i] - 1].after
+            state = max(after, state, key=lambda one: one.load)
+        there = program.at(sample, state, load, fresh=not events[i])
+        ahead = passed[events[i]].before if events[i] < len(passed) else None
+        if there is None and ahead is not None and load > (1.0 - CLOSE) * ahead.load:
+            there = ahead  # the state about to jump
+        if there is None:  # within the accuracy of the load of sliding
+            sliding[i:] = True
+            break
+        state = there
+        slip[i] = state.slip
+        if isinstance(program, BlockProgram):
+            travel[i] = program.travel(load, state.slip)
+        released = program.stress_released(state)
+        stress[i] = rows.initial_stress[0].reshape(-1) + load * sample.profile - released
+    if not known and sliding.any():
+        warn_accuracy(
+            f"no equilibrium was found beyond {end:g} Pa, and none was ruled out; the"
+            " path ends there"
+        )
+    wide = (given.size, *interface.shape)
+    values = {
+        "slip": slip.reshape(wide),
+        "stress": stress.reshape(wide),
+        "mean_stress": stress.mean(axis=1),
+        "arrested_events": events,
+        "sliding": sliding,
+    } | event_table(problem, program, rows, 0, passed)
+    variables = VARIABLES | event_variables(interface)
+    variables |= {name: along(interface, VARIABLES[name]) for name in ("slip", "stress")}
+    if interface.is_free:
+        values["travel"], variables["travel"] = travel, TRAVEL
+    if problem.area is not None:
+        values |= forces(values, problem.area)
+        variables |= force_variables(variables)
+    coordinates = {"load": (given, LOAD), "event": (np.arange(len(passed)), EVENT)}
+    attributes = study_attributes(problem=problem)
+    return to_dataset(values, variables, coordinates, attributes, interface)

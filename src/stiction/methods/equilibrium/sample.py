@@ -1,0 +1,297 @@
+"""One sample as the solvers take it: strength excess, residual, and the pieces of its law.
+
+Strength falls with slip along straight pieces. A law of M pieces has M corners; piece M is the
+residual strength. Between corners everything is linear, and a corner is an event. The linear law
+has one piece: its start is tau_p, to the bit.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction.base.arrays import Array
+from stiction.base.jit import jit, jit_inside
+from stiction.elasticity.linear import inner
+from stiction.problem.friction import FrictionLaw
+from stiction.problem.friction.parameters import Linear, Polygon
+from stiction.problem.problem import Sample as Samples
+
+FLAT = 1e-11
+"""Share of the mean strength by which a node must weaken to count as weakening. A smaller fall
+is within the round-off of K d; an instability of such nodes adds no slip and never ends."""
+
+
+class Pieces(NamedTuple):
+    """A falling piecewise linear function f of u = slip/d_c, the same at every node.
+
+    `ends` are the u at the end of each piece, the last 1. For each piece and the residual
+    strength, `starts` are f continued back to zero slip (1, ..., 0) and `slopes` are -f' over
+    the first (1, ..., 0); `first` is -f' on the first piece, `area` the integral of f. From
+    the share `at_corner` of the slip at a corner on a node counts as beyond it.
+    """
+
+    ends: Array
+    starts: Array
+    slopes: Array
+    first: float = 1.0
+    area: float = 0.5
+    at_corner: float = 1.0 - 1e-12
+
+    @property
+    def steepens(self) -> bool:
+        """Whether a piece falls more steeply than the one before it."""
+        return bool(np.any(np.diff(self.slopes) > 0.0))
+
+
+LINEAR = Pieces(np.array([1.0]), np.array([1.0, 0.0]), np.array([1.0, 0.0]))
+
+
+def refused(law: FrictionLaw) -> list[str]:
+    """Return the reasons why a law cannot be followed piece by piece; none if it can."""
+    name, kind = type(law).__name__, type(law.parameters)
+    if kind in (Linear, Polygon):
+        return []
+    return [
+        f"friction: equilibria are followed along straight pieces, and {name} has none;"
+        " use st.PiecewiseWeakening.from_law(friction, pieces=32), or st.Rupture(...)"
+    ]
+
+
+def pieces_of(law: FrictionLaw) -> Pieces:
+    """Return the pieces of a law for which `refused` returns no reason."""
+    parameters = law.parameters
+    if not isinstance(parameters, Polygon):
+        return LINEAR
+    u, f = parameters.slip, parameters.fraction
+    steep = np.append(-np.diff(f) / np.diff(u), 0.0)
+    starts = f + steep * u
+    return Pieces(u[1:].copy(), starts, steep / steep[0], float(steep[0]), law.integral)
+
+
+class Outcome(IntEnum):
+    """What becomes of an interface that moves at a fixed load."""
+
+    SLIDING = 0
+    ARRESTED = 1
+    UNDECIDED = 2
+
+
+class Sample(NamedTuple):
+    """One strength profile; all arrays of shape (nodes,).
+
+    Stress is counted from the initial one: `excess` is the strength excess tau_p - tau_i and
+    `residual` is tau_r - tau_i (Pa). `profile` is the load profile, `rate` the weakening rate W at
+    zero slip (Pa/m), and `critical` the slip d_c (m) at which the strength is residual. Nodes of
+    constant strength have both 0. `pieces` are those of the friction law.
+    """
+
+    excess: Array
+    residual: Array
+    profile: Array
+    rate: Array
+    critical: Array
+    pieces: Pieces
+
+
+def make_sample(
+    excess: Array, residual: Array, profile: Array, rate: Array, pieces: Pieces
+) -> Sample:
+    """Return one sample, or many over the first axis.
+
+    Nodes whose strength is residual, but for round-off, do not weaken.
+    """
+    fall = excess - residual
+    largest = max(excess.max(), residual.max(), -excess.min(), -residual.min())
+    if not fall.min() > FLAT * largest:
+        scale = np.maximum(np.abs(excess), np.abs(residual)).mean(axis=-1, keepdims=True)
+        constant = ~(fall > FLAT * scale)
+        residual = np.where(constant, excess, residual)
+        fall, rate = np.where(constant, 0.0, (fall, rate))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        critical = np.where(rate > 0.0, pieces.first * fall / rate, 0.0)
+    # A copy: of a read-only array, as of a law, each kernel would be compiled a second time.
+    return Sample(excess, residual, profile, rate.copy(), critical, pieces)
+
+
+def sample_of(rows: Samples, pieces: Pieces, row: int | slice = slice(None)) -> Sample:
+    """Return one sample of a batch, or all of them, as the kernels take them."""
+    initial = rows.initial_stress[row]
+    shape = (*initial.shape[: initial.ndim - rows.load_profile.ndim], -1)
+    excess = (rows.strength[row] - initial).reshape(shape)
+    residual = (rows.residual_strength[row] - initial).reshape(shape)
+    rate = rows.weakening_rate[row].reshape(shape)
+    return make_sample(excess, residual, rows.load_profile.flatten(), rate, pieces)
+
+
+def row_of(samples: Sample, row: int) -> Sample:
+    """Return one sample of a batch."""
+    excess, residual, profile, rate, critical, pieces = samples
+    return Sample(excess[row], residual[row], profile, rate[row], critical[row], pieces)
+
+
+class Present(NamedTuple):
+    """The piece on which each node is, its value at zero slip (Pa), and its slope (Pa/m)."""
+
+    piece: NDArray[np.int64]
+    strength: Array
+    rate: Array
+
+
+@dataclass
+class State:
+    """An equilibrium on the path of one sample, by default one at which it is unstable.
+
+    Load tau_0 (Pa), slip d (m), K d (Pa; of lines only), the direction in which it is unstable,
+    and the distance to a load without equilibrium (Pa), NaN where none is known.
+    `certified` is true if that is proved, `unstable` if the path is unstable there, `known` if it
+    could be followed so far, `stuck` if the programme failed to find the next instability before.
+    `peak` is the largest mean stress on the way there, over the mean of the load profile: the load
+    itself (None), unless a machine drives; `stopped` says whether a node that slipped stopped on
+    the way. `ahead` is what is known beyond: on lines K times the direction, on planes the turn of
+    the path.
+    """
+
+    load: float
+    slip: Array
+    stiff: Array
+    direction: Array
+    gap: float = np.nan
+    certified: bool = True
+    unstable: bool = True
+    known: bool = True
+    stuck: bool = False
+    ahead: Any = None
+    peak: float | None = None
+    stopped: bool = False
+
+
+class Program:
+    """Base of the programmes of lines and planes, which find equilibria; thread-safe."""
+
+    pieces: Pieces
+
+    def sample_of(self, rows: Samples, row: int) -> Sample:
+        """Return one sample of a batch."""
+        return sample_of(rows, self.pieces, row)
+
+    def at_rest(self, sample: Sample) -> State:
+        """Return the state in which the first node is about to slip."""
+        load = float((sample.excess / sample.profile).min())
+        return State(load, *np.zeros((3, sample.excess.size)))
+
+    def at_turn(self, sample: Sample, state: State) -> State:
+        """Return an instability with its exact direction, as it is on lines."""
+        return state
+
+    def of_stress(self, sample: Sample, state: State, y: Array) -> Array:
+        """Return the derivative of the mean stress at an instability from y, that of its load."""
+        return y
+
+    def relief(self, slip: Array) -> float:
+        """Return by how much slip lowers the load that the interface carries, Pa."""
+        return 0.0
+
+
+def multiplier_of(sample: Sample, state: State) -> Array:
+    """Return the multiplier y of an instability, <p, y> = 1: the direction, normalised.
+
+    Where `ahead` is known it is normalised already.
+    """
+    y = state.direction
+    return y if state.ahead is not None else y / max(inner(y, sample.profile), 1e-300)
+
+
+class Jump(NamedTuple):
+    """End of an instability: whether it is arrested and counts, the state, if that is known.
+
+    `counts` is false for a jump so small that it is a long step of the stable path.
+    """
+
+    arrested: bool
+    known: bool
+    state: State
+    counts: bool = True
+
+
+def residual_nodes(sample: Sample, slip: Array) -> NDArray[np.bool_]:
+    """Return which weakening nodes have reached their residual strength."""
+    reached: NDArray[np.bool_] = slip >= sample.pieces.at_corner * sample.critical
+    return reached & (sample.critical > 0.0)
+
+
+def exceeds(sample: Sample, slip: Array, piece: NDArray[np.int64] | None = None) -> bool:
+    """Whether a slip goes beyond the piece of each node that it rests on, by default the first."""
+    pieces = sample.pieces
+    end = pieces.ends[0] if piece is None else np.append(pieces.ends, 1e300)[piece]
+    beyond: NDArray[np.bool_] = slip > (2.0 - pieces.at_corner) * (end * sample.critical)
+    return bool(beyond.any()) and bool((beyond & (sample.critical > 0.0)).any())
+
+
+@jit_inside
+def piece_at(pieces: Pieces, critical: float, slip: float) -> int:
+    """The piece on which a node of this d_c is after a slip."""
+    piece = 0
+    while piece < pieces.ends.shape[0] and slip >= pieces.at_corner * (
+        pieces.ends[piece] * critical
+    ):
+        piece += 1
+    return piece
+
+
+@jit_inside
+def start_of(sample: Sample, i: int, piece: int) -> float:
+    """Value of a piece of node i at zero slip, Pa: tau_p on the first, tau_r on the last."""
+    share = sample.pieces.starts[piece]
+    return share * sample.excess[i] + (1.0 - share) * sample.residual[i]
+
+
+@jit_inside
+def strength_at(sample: Sample, slip: Array, i: int) -> float:
+    """Strength less initial stress of node i after some slip, Pa."""
+    piece = piece_at(sample.pieces, sample.critical[i], slip[i])
+    return start_of(sample, i, piece) - sample.pieces.slopes[piece] * sample.rate[i] * slip[i]
+
+
+@jit
+def _find_pieces(sample: Sample, slip: Array, present: Present) -> None:
+    for i in range(slip.size):
+        piece = piece_at(sample.pieces, sample.critical[i], slip[i])
+        present.piece[i] = piece
+        present.strength[i] = start_of(sample, i, piece)
+        present.rate[i] = sample.pieces.slopes[piece] * sample.rate[i]
+
+
+def present_pieces(sample: Sample, slip: Array) -> Present:
+    """Return the pieces on which the nodes are after a slip."""
+    present = Present(np.empty(slip.size, dtype=np.int64), *np.empty((2, slip.size)))
+    _find_pieces(sample, slip, present)
+    return present
+
+
+@jit
+def step_to_corner(sample: Sample, slip: Array, direction: Array, longest: float) -> float:
+    """Move along a direction until the first node reaches a corner, at most `longest` of it."""
+    step = longest
+    ends = sample.pieces.ends
+    for i in range(slip.shape[0]):
+        if direction[i] > 0.0:
+            piece = piece_at(sample.pieces, sample.critical[i], slip[i])
+            if piece < ends.shape[0]:
+                step = min(step, (ends[piece] * sample.critical[i] - slip[i]) / direction[i])
+    if step == np.inf:
+        return step
+    for i in range(slip.shape[0]):
+        slip[i] += step * direction[i]
+    return step
+
+
+@jit_inside
+def unsupported(sample: Sample, load: float, slip: Array) -> bool:
+    """Whether the whole interface, at its present strengths, cannot carry the load."""
+    balance = 0.0
+    for i in range(slip.shape[0]):
+        balance += load * sample.profile[i] - strength_at(sample, slip, i)
+    return balance > 0.0

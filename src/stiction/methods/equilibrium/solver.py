@@ -1,0 +1,323 @@
+"""The solver of the equilibrium method: samples in, onsets out, on lines and planes."""
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, warn_of_samples
+from stiction.base.variables import Variable
+from stiction.methods.equilibrium.dense.blocks import BlockProgram
+from stiction.methods.equilibrium.dense.line import LineProgram
+from stiction.methods.equilibrium.patches import (
+    Patch,
+    critical_patch,
+    largest_patch,
+    line_patch,
+    patches_of,
+    with_ends,
+)
+from stiction.methods.equilibrium.sample import (
+    Sample,
+    State,
+    multiplier_of,
+    present_pieces,
+    refused,
+    residual_nodes,
+    row_of,
+    sample_of,
+)
+from stiction.methods.equilibrium.transforms.plane import PlaneProgram
+from stiction.problem.interface import Interface
+from stiction.problem.problem import Problem
+from stiction.problem.problem import Sample as Samples
+from stiction.problem.results import position
+
+FINE = 8.0
+"""Nodes in the nucleation length below which there is a warning."""
+ROUGHLY = {
+    1: "single onsets are off by 0.4 % at 9 nodes and 3 % at 4 if the correlation length is a"
+    " quarter of it, by 3 and 9 % if it is a tenth",
+    2: "single onsets are off by 0.15 % at 9 nodes along x and 6 along y, by 0.5 % at 6 and 4",
+}
+OF_SPECIMENS = {
+    "event_stress_drop": Variable("Pa", "fall of the mean interface stress", ("event",)),
+    "event_travel": Variable("m", "travel of the drives before the event", ("event",)),
+    "event_travel_step": Variable("m", "travel of the drives in the event", ("event",)),
+    "event_start": Variable("m", "left end of the patch that slipped", ("event",)),
+}
+EVENT_CORE = 1e-3
+"""Share of the largest added slip above which a node belongs to the patch of an event."""
+
+AnyProgram: TypeAlias = LineProgram | PlaneProgram
+
+
+def event_variables(interface: Interface) -> dict[str, Variable]:
+    """Return the variables of each arrested event on a line or a plane."""
+
+    def variable(units: str, text: str) -> Variable:
+        return Variable(units, text, ("event",))
+
+    plane = interface.is_plane
+    centre = variable("m", "centre of the slip added by the event")
+    extent = variable("m", f"{'extent' if plane else 'length'} of the patch that slipped")
+    moment = "shear modulus times slip added" + ("" if plane else ", per unit depth")
+    return {
+        "event_load": variable("Pa", "load factor of the event"),
+        "event_stress": variable("Pa", "mean interface stress at the event"),
+        "event_position": position(interface, centre),
+        "event_extent" if plane else "event_length": position(interface, extent),
+        **({"event_area": variable("m2", "area of the patch that slipped")} if plane else {}),
+        "event_mean_slip": variable("m", "mean slip added to that patch"),
+        "event_moment": variable("N m" if plane else "N", moment),
+        **(OF_SPECIMENS if interface.is_free else {}),
+    }
+
+
+class Event(NamedTuple):
+    """An instability that came to rest: the states before and after it."""
+
+    before: State
+    after: State
+
+
+def event_table(
+    problem: Problem, program: AnyProgram, rows: Samples, row: int, events: list[Event]
+) -> dict[str, Array]:
+    """Return the variables of the arrested events of one sample, (events, ...) arrays."""
+    interface, plane = problem.interface, problem.interface.is_plane
+    initial, profile = rows.initial_stress[row].mean(), rows.load_profile.mean()
+    table = []
+    for before, after in events:
+        added = (after.slip - before.slip).reshape(interface.shape)
+        inside, patch = largest_patch(np.maximum(added, 0.0), interface, EVENT_CORE)
+        held = before.load - program.relief(before.slip)
+        stress = initial + held * profile
+        moment = problem.solid.shear_modulus * float(added.sum()) * interface.cell
+        measures = (
+            (patch.centre, patch.extents, patch.area) if plane else (*patch.centre, patch.area)
+        )
+        values: tuple[Any, ...] = (*measures, added[inside].mean(), moment)
+        if isinstance(program, BlockProgram):
+            left = after.load - program.relief(after.slip)
+            moved, on = (program.travel(one.load, one.slip) for one in (before, after))
+            start = float(np.argmax(inside)) * interface.spacing
+            values += ((held - left) * profile, moved, on - moved, start)
+        table.append((before.load, stress, *values))
+    names = event_variables(interface)
+    if not table:
+        return {name: np.empty((0, 2)[: len(names[name].dims)]) for name in names}
+    columns = zip(*table, strict=True)
+    return {name: np.array(column) for name, column in zip(names, columns, strict=True)}
+
+
+@dataclass
+class Path:
+    """Course of one sample until it slides.
+
+    `first` is the first instability, `last` the last equilibrium, `known` is false where a jump
+    or a path did not come to its end: `last` is then a lower bound. `peak` is the largest mean
+    stress on the way, over the mean of the load profile.
+    """
+
+    first: State
+    last: State
+    peak: float
+    events: list[Event] = field(default_factory=list)
+    known: bool = True
+
+
+def follow(program: AnyProgram, sample: Sample) -> Path:
+    """Follow a sample from rest to global sliding.
+
+    Arrest is overdamped: the patch stops at the least equilibrium of the same load. Inertia may
+    carry it through.
+    """
+    found = program.next(sample)
+    first: State | None = None
+    events: list[Event] = []
+    known, peak = found.known, peak_of(found)
+    while found.unstable:
+        jump = program.jump(sample, found)
+        if jump.counts:
+            first = first or found
+            if not jump.arrested:
+                known = jump.known
+                break
+            events.append(Event(found, jump.state))
+        found = program.next(sample, jump.state)
+        known, peak = found.known, max(peak, peak_of(found))
+    return Path(first or found, found, peak, events, known)
+
+
+def peak_of(state: State) -> float:
+    """Return the largest load that the interface carried on the way to a state."""
+    return state.load if state.peak is None else state.peak
+
+
+def make_program(problem: Problem, gap: float = 1e-6) -> AnyProgram:
+    """Return the programme that finds equilibria of a problem, or raise an `InputError`."""
+    if reasons := refused(problem.friction):
+        raise InputError(reasons)
+    if problem.specimen is not None:
+        return BlockProgram(problem)
+    return PlaneProgram(problem, gap) if problem.interface.is_plane else LineProgram(problem)
+
+
+class OnsetSolver:
+    """Solves samples of a problem with options of `Equilibrium`; safe in several threads."""
+
+    def __init__(self, problem: Problem, options: Any) -> None:
+        self.problem, self.options = problem, options
+        self.program = make_program(problem, options.gap)
+
+    def __call__(self, rows: Samples) -> dict[str, NDArray[Any]]:
+        """Return the onset of each sample; see `Equilibrium`."""
+        self.problem.warn_if_coarse(rows, FINE, ROUGHLY[len(self.problem.interface.shape)])
+        samples, table, known = sample_of(rows, self.program.pieces), [], []
+        for row in range(rows.samples):
+            sample = row_of(samples, row)
+            try:
+                path = follow(self.program, sample)
+            except Exception as error:
+                error.add_note(
+                    f"in sample {row} of the {rows.samples} that were solved together"
+                )
+                raise
+            known.append(path.known)
+            table.append(self._values(rows, row, sample, path))
+        values = {name: np.array([each[name] for each in table]) for name in table[0]}
+        at_first, proved = values["first_instability"], values.pop("certified")
+        self._warn(values["certificate_gap"], at_first, ~proved, ~np.array(known))
+        _warn_if_stopped(values.pop("stopped") & np.isfinite(at_first))
+        values["critical_stress"] = rows.mean_stress(values["critical_stress"])
+        values["first_instability"] = rows.mean_stress(at_first)
+        values["certificate_gap"] *= rows.load_profile.mean()
+        if self.problem.interface.is_plane:
+            values["certified"] = proved
+        if self.options.sensitivity:
+            _warn_if_lost(values["sensitivity"], np.isfinite(at_first))
+        return values
+
+    def _values(self, rows: Samples, row: int, sample: Sample, path: Path) -> dict[str, Any]:
+        """Return the variables of one sample, the first instability as a load."""
+        interface, shape = self.problem.interface, rows.strength[row].shape
+        first, last = path.first, path.last
+        y = multiplier_of(sample, first)
+        patch = self._patch(y)
+        # On lines a programme knows what is ahead, and passes no corner.
+        straight = last is first and first.ahead is not None and not interface.is_plane
+        slides = patch
+        if last is not first and last.direction.any():
+            slides = self._patch(last.direction)
+        values: dict[str, Any] = {
+            "critical_load": last.load,
+            "critical_stress": path.peak,
+            "first_instability": first.load - self.program.relief(first.slip),
+            "certificate_gap": first.gap,
+            "critical_position": patch.centre,
+            "sliding_position": slides.centre,
+            "slip_patches": patches_of(
+                with_ends(first.slip.reshape(interface.shape), interface)
+            ),
+            "arrested_events": len(path.events),
+            "residual_reached": not straight and bool(residual_nodes(sample, last.slip).any()),
+            "certified": first.certified,
+            "stopped": first.stopped,
+        }
+        if interface.is_plane:
+            values["critical_patch_extent"] = patch.extents
+            values["critical_patch_area"] = patch.area
+        else:
+            values["critical_patch_length"] = patch.area
+            values["critical_position"], values["sliding_position"] = (
+                *patch.centre, *slides.centre,
+            )  # fmt: skip
+        if path.known and not first.unstable:  # behind a stiff machine
+            of_patch = ("first_instability", "critical_position", "critical_patch_length")
+            values |= dict.fromkeys(of_patch, np.nan)
+        if self.options.slip:
+            values["slip"] = first.slip.reshape(shape)
+        if self.options.sensitivity:
+            turn = self.program.at_turn(sample, first)
+            derivative = _sensitivity(self.program, sample, turn) * rows.load_profile.mean()
+            if path.known and not first.unstable:
+                derivative[:] = np.nan
+            values["sensitivity"] = derivative.reshape(shape)
+        if most := self.options.events:
+            events = event_table(self.problem, self.program, rows, row, path.events[:most])
+            for name, column in events.items():
+                values[name] = np.full((most, *column.shape[1:]), np.nan)
+                values[name][: len(column)] = column
+        return values
+
+    def _patch(self, direction: Array) -> Patch:
+        interface = self.problem.interface
+        if not interface.is_plane:
+            return line_patch(direction, interface)
+        return critical_patch(direction.reshape(interface.shape), interface)[1]
+
+    def _warn(
+        self, gap: Array, load: Array, unproved: NDArray[np.bool_], lost: NDArray[np.bool_]
+    ) -> None:
+        """Warn where bounds are wide or absent, or where a path was not followed to its end."""
+        share = gap / np.maximum(np.abs(load), 1e-300)
+        warn_of_samples(
+            f"the bounds of the first instability did not close to {self.program.widest_gap:g} of"
+            " it in {samples}: they hold, and are up to {worst:.2g} of it apart; take more nodes",
+            ~unproved & ~(share <= self.program.widest_gap),
+            share,
+        )
+        if self.problem.interface.is_plane:
+            warn_of_samples(
+                "nodes reach a corner of the law or their residual strength before the first"
+                " instability in {samples}: it was found by following equilibria, to {worst:.2g}"
+                " of it, and has no certificate",
+                unproved,
+                share,
+            )
+        warn_of_samples(
+            "no patch becomes unstable in {samples}: behind so stiff a machine their interface"
+            " slides stably, and first_instability is NaN",
+            np.isnan(load),
+        )
+        warn_of_samples(
+            "a jump was not followed to its end in {samples}: their critical load is the last with"
+            " a known equilibrium, a lower bound",
+            lost,
+        )
+
+
+def _sensitivity(program: AnyProgram, sample: Sample, state: State) -> Array:
+    """Derivative of the stress of an instability by the peak strengths, from its multiplier.
+
+    NaN where a node passed a corner beyond which it weakens more steeply, or stopped.
+    """
+    pieces, y = sample.pieces, multiplier_of(sample, state)
+    if state.stopped or (pieces.steepens and not state.certified):
+        return np.full(y.size, np.nan)
+    y = program.of_stress(sample, state, y)
+    # A piece starts from share tau_p + (1 - share) tau_r; the share of the last piece is 0.
+    piece = present_pieces(sample, state.slip).piece
+    return y * np.where(sample.critical > 0.0, pieces.starts[piece], 1.0)
+
+
+def _warn_if_stopped(stopped: NDArray[np.bool_]) -> None:
+    """Warn where a first instability has no bounds, as a node stopped before."""
+    warn_of_samples(
+        "a node that slipped stops before the first instability in {samples}: its equilibria are no"
+        " longer the least ones, so that nothing bounds it from above, and certificate_gap is NaN",
+        stopped,
+    )
+
+
+def _warn_if_lost(sensitivity: Array, unstable: NDArray[np.bool_]) -> None:
+    """Warn where a first instability has no derivative."""
+    warn_of_samples(
+        "the first instability has no known derivative in {samples}, so sensitivity is NaN: nodes"
+        " stop, or pass a corner from which their law falls more steeply, or the turning point was"
+        " not resolved",
+        unstable & np.isnan(sensitivity).reshape(len(sensitivity), -1).any(axis=1),
+    )

@@ -1,0 +1,266 @@
+"""Equilibria at a fixed load, by transforms: each node stuck or on a piece of its friction law.
+
+From an equilibrium at a lower load either the path to this load is certainly stable
+(`stable_equilibrium`), or an overdamped interface moves to the least equilibrium that is not below
+it, or slides (`least_equilibrium`, as `jump` with dense factors).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from stiction.base.arrays import Array
+from stiction.elasticity.linear import (
+    EXHAUSTED,
+    NEGATIVE,
+    SOLVED,
+    inner,
+    lowest_eigenvector,
+    no_spring,
+    residual_of,
+    solve_inside,
+)
+from stiction.elasticity.operator import Operator, product
+from stiction.methods.equilibrium.sample import (
+    Outcome,
+    Present,
+    Sample,
+    present_pieces,
+    residual_nodes,
+    step_to_corner,
+)
+from stiction.methods.equilibrium.transforms.growing_patch import ENDS, FIRST, grown
+from stiction.methods.equilibrium.transforms.held_equilibrium import ITERATIONS, equilibrate
+
+NEWTON = 100
+LOOSE = 0.03
+"""Factor by which a residual is reduced before the pieces of the law are revised."""
+CHECKED = 0.1
+"""Factor by which it is reduced where a matrix is looked through for negative curvature."""
+STEPS = 2000
+RELEVANT = 1e-5
+"""Share of the largest value below which a node is not part of an unstable direction."""
+SETTLED = 0.02
+"""Growth of slip in one step, as a share of d_c, below which the whole weakening is tried."""
+LEAST_LEFT = 0.02
+"""Least share of the weakening that a step leaves out, if it leaves out any."""
+DRAG = 1e-3
+"""Stiffness added to steps that leave out all weakening, as a share of the largest W."""
+ROUGH = 0.05
+"""Largest residual stress of a step, as a share of the weakening left out in the step before."""
+
+
+def residual_tolerance(sample: Sample, load: float, accuracy: float) -> float:
+    """Residual stress that is allowed, Pa, from its share of the mean strength or load.
+
+    Strength beyond the load, such as that of barriers, does not count.
+    """
+    applied = abs(load) * sample.profile
+    mean = np.minimum(np.abs(sample.excess), applied).mean() + applied.mean()
+    return accuracy * float(mean)
+
+
+def slip_under(
+    operator: Operator, drive: Array, rate: Array, slip: Array, tolerance: float
+) -> tuple[int, Array]:
+    """Equilibrium for given strengths at zero slip and rates; status and slip."""
+    new = slip.copy()
+    inside = (slip > 0.0) | (drive > 0.0)
+    status, _ = equilibrate(
+        operator._replace(rate=rate), no_spring(slip.size), drive, inside, new,
+        np.empty_like(slip), np.empty((3, slip.size)), tolerance,
+    )  # fmt: skip
+    return status, new
+
+
+def _definite(operator: Operator, rate: Array, growth: Array, slip: Array) -> bool:
+    """Whether K - `rate` on the nodes that slip shows no negative curvature.
+
+    It is looked for in the growth, which is close to the direction of a loss of stability,
+    and as the matrix is solved with.
+    """
+    x, image = np.zeros_like(slip), np.empty_like(slip)
+    operator, inside = operator._replace(rate=rate), slip > 0.0
+    product(operator, growth, image)
+    curvature = inner(growth, image)
+    if not curvature > 0.0:
+        return False
+    status, _ = solve_inside(
+        operator._replace(slow=growth / np.sqrt(curvature)), no_spring(slip.size), inside,
+        x, np.where(inside, 1.0, 0.0), np.empty((3, slip.size)), CHECKED, ITERATIONS,
+    )  # fmt: skip
+    return status == SOLVED
+
+
+def stable_equilibrium(
+    operator: Operator, sample: Sample, load: float, slip: Array, accuracy: float, guess: Array
+) -> Array | None:
+    """Return the equilibrium at a load to which a stable path leads from one at a lower load.
+
+    The guess is a slip there. None if that is not certain. It is if A is positive definite, on the
+    nodes that slip at the end, with the steepest weakening that each passes on the way: then it is
+    at each state on the way, and there is no other equilibrium. Newton's method finds the pieces at
+    the end; until it knows them its solutions are rough.
+    """
+    tolerance = residual_tolerance(sample, load, accuracy)
+    pieces, first = sample.pieces, present_pieces(sample, slip)
+    before, residual = first.piece, np.empty_like(slip)
+    new, rough = np.maximum(guess, slip), np.inf
+    for _ in range(NEWTON):
+        now = present_pieces(sample, new)
+        if rough <= tolerance and np.array_equal(before, now.piece):
+            break
+        drive, before = load * sample.profile - now.strength, now.piece
+        if rough > tolerance:
+            present = operator._replace(rate=now.rate)
+            residual_of(present, no_spring(slip.size), drive, new, residual)
+            largest = np.where(new > 0.0, np.abs(residual), residual).max()
+            rough = max(tolerance, LOOSE * float(largest))
+        status, found = slip_under(operator, drive, now.rate, new, rough)
+        if status != SOLVED:
+            return None
+        new = np.maximum(found, slip)
+    else:
+        return None
+    steepest = first.rate
+    if pieces.steepens:
+        piece = np.arange(pieces.slopes.size)[:, None]
+        passed = (first.piece <= piece) & (piece <= now.piece)
+        steepest = np.where(passed, pieces.slopes[:, None], 0.0).max(axis=0) * sample.rate
+    return new if _definite(operator, steepest, new - slip, new) else None
+
+
+def _bound(
+    operator: Operator,
+    sample: Sample,
+    load: float,
+    slip: Array,
+    now: Present,
+    share: float,
+    tolerance: float,
+) -> tuple[int, Array, bool]:
+    """Equilibrium if nodes weaken by a share of what they do, and no further than to their corner.
+
+    Their strength is nowhere below the true one, so that the slip is a lower bound of the least
+    equilibrium: as the drive is lowered by the residual allowed, a rough one too. Newton's method;
+    the strength is the larger of two lines. Returns the status, the slip, and whether the
+    strengths are the true ones.
+    """
+    rate = share * now.rate - (1.0 - share) * DRAG * float(sample.rate.max())
+    start = now.strength - (now.rate - rate) * slip
+    corner = np.append(sample.pieces.ends, 1e300)[now.piece] * sample.critical
+    level = np.where(now.rate > 0.0, now.strength - now.rate * corner, -np.inf)
+    flat = np.zeros(slip.size, dtype=np.bool_)
+    new, spared = slip, tolerance if share < 1.0 else 0.0
+    for _ in range(NEWTON):
+        strength, slope = np.where(flat, level, start), np.where(flat, 0.0, rate)
+        drive = load * sample.profile - strength - spared
+        status, new = slip_under(operator, drive, slope, new, tolerance)
+        if status != SOLVED:
+            return status, slip, False
+        beyond = start - rate * new < level
+        if np.array_equal(beyond, flat):
+            passed = present_pieces(sample, new).piece > now.piece
+            onto_other = passed & (now.piece < sample.pieces.ends.size - 1)
+            return SOLVED, np.maximum(new, slip), share == 1.0 and not onto_other.any()
+        flat = beyond
+    return EXHAUSTED, slip, False
+
+
+def _weakening_step(
+    operator: Operator, sample: Sample, load: float, slip: Array, tolerance: float
+) -> Array:
+    """Slip moved with the true states until the first node reaches a corner.
+
+    Only the nodes that slip or are overloaded move: towards their equilibrium or, if they
+    have none, along y >= 0 with A y = lambda y, lambda < 0. Both keep every node that moves driven
+    forward or balanced, so the next equilibrium is not passed.
+    """
+    now = present_pieces(sample, slip)
+    operator = operator._replace(rate=now.rate)
+    drive = load * sample.profile - now.strength
+    rest, new = np.empty_like(slip), slip.copy()
+    workspace = np.empty((3, slip.size))
+    free = no_spring(slip.size)
+    residual_of(operator, free, drive, slip, rest)
+    inside = (slip > 0.0) | (rest > 0.0)
+    status, _ = solve_inside(
+        operator, free, inside, new, rest, workspace, tolerance, ITERATIONS
+    )
+    direction = np.where(inside, np.maximum(new - slip, 0.0), 0.0)
+    longest = 1.0
+    if status == NEGATIVE:
+        direction = np.abs(workspace[1])
+        largest = float(sample.rate.max())
+        lowest_eigenvector(operator, inside, direction, 1e-6 * largest, ITERATIONS)
+        direction = np.where(direction > RELEVANT * direction.max(), direction, 0.0)
+        longest = np.inf
+    moved = slip.copy()
+    step_to_corner(sample, moved, direction, longest)
+    return moved
+
+
+class Relaxed(NamedTuple):
+    """What becomes of the interface at the load, and its slip."""
+
+    status: Outcome
+    slip: Array
+
+
+def least_equilibrium(
+    operator: Operator,
+    sample: Sample,
+    load: float,
+    slip: Array,
+    accuracy: float = 1e-7,
+    unstable: bool = False,
+) -> Relaxed:
+    """Return the least equilibrium at a load that is not below a given slip.
+
+    The slip is zero, or an equilibrium at a lower load, or beyond it along an unstable direction;
+    the accuracy is the largest residual stress as a share of the mean strength or load. Steps with
+    a share of the weakening do not pass it, and are the longer the larger the share; with the whole
+    of it they end there, or A is not positive definite, and slip moves in the unstable direction:
+    at once if the slip is `unstable`, that of an instability.
+
+    The interface slides once the load exceeds the average strength that is left: stiffness adds
+    nothing to the mean. If K has no positive entry off its diagonal, the result is exact up to
+    `accuracy`. On planes K has small positive entries there.
+    """
+    tolerance = residual_tolerance(sample, load, accuracy)
+    slip = np.maximum(slip, 0.0)
+    weakens = sample.critical > 0.0
+    left = kept = dropped = 0.0
+    for _ in range(STEPS):
+        now = present_pieces(sample, slip)
+        drive = load * sample.profile - now.strength
+        if float((drive + now.rate * slip).sum()) > tolerance * slip.size:
+            return Relaxed(Outcome.SLIDING, slip)
+        allowed = max(tolerance, ROUGH * left * dropped)
+        status, new, true = NEGATIVE, slip, False
+        if not unstable:
+            status, new, true = _bound(operator, sample, load, slip, now, 1.0 - left, allowed)
+        unstable = False
+        if status == NEGATIVE and left < 1.0:
+            if left == 0.0:
+                before = slip
+                slip = _weakening_step(operator, sample, load, slip, tolerance)
+                growth = slip - before
+                largest = float((growth[weakens] / sample.critical[weakens]).max(initial=0.0))
+                if largest > ENDS and not sample.pieces.steepens:
+                    growth *= min(1.0, FIRST / largest)
+                    slip = grown(operator, sample, load, slip, growth, tolerance)
+                    continue
+            left, kept = min(max(2.0 * left, kept, LEAST_LEFT), 1.0), 0.0
+            continue
+        if status != SOLVED:
+            break
+        if true:
+            return Relaxed(Outcome.ARRESTED, new)
+        weakening = ~residual_nodes(sample, new) & weakens
+        growth = np.where(weakening, new - slip, 0.0)
+        dropped = float((now.rate * growth).max())
+        slip = new
+        if not (growth > SETTLED * sample.critical).any():
+            left, kept = 0.0, left
+    return Relaxed(Outcome.UNDECIDED, slip)

@@ -1,0 +1,94 @@
+"""Strength of any friction law at a slip, inside compiled kernels.
+
+A law hands kernels its numbers as a NamedTuple of its own type. The line that its strength follows
+is resolved by that type when a kernel is compiled, so a law costs nothing that it does not use, and
+another law changes no kernel.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numba.extending import overload
+
+from stiction.base.arrays import Array
+from stiction.base.jit import jit, jit_allocating
+from stiction.problem.friction.parameters import Linear
+
+# numba compares the names of arguments with their annotations, so functions by type have none.
+# mypy: disable-error-code="no-untyped-def"
+
+
+def _line(law: Any, *numbers: float) -> tuple[float, float]:
+    """Stand for `line_at` of a law; the function is chosen by the type of its parameters."""
+    raise NotImplementedError
+
+
+@overload(_line)
+def _line_of(law, peak, residual, rate, slip, ahead):
+    return _by_type(law.instance_class)
+
+
+@cache
+def compiled(parameters: Any) -> Any:
+    """Return f and -f' of laws with parameters of a type, compiled."""
+    return jit(parameters.f)
+
+
+@cache
+def _by_type(parameters: type) -> Callable[..., tuple[float, float]]:
+    """Return `line_at` for laws with parameters of a type."""
+
+    def linear(law, peak, residual, rate, slip, ahead):
+        if peak - rate * (slip + ahead) > residual:
+            return peak - rate * slip, rate
+        return residual, 0.0
+
+    if parameters is Linear:
+        return linear
+    shape = compiled(parameters)
+
+    def line(law, peak, residual, rate, slip, ahead):
+        drop, first = peak - residual, law.initial_slope
+        if drop <= 0.0:
+            return residual, 0.0
+        f, steep = shape(law, rate * (slip + ahead) / (drop * first))
+        falling = rate * steep / first
+        return residual + drop * f + falling * ahead, falling
+
+    return line
+
+
+@jit
+def line_at(
+    law: Any, peak: float, residual: float, rate: float, slip: float, ahead: float
+) -> tuple[float, float]:
+    """Return the straight line that the strength follows at ``slip + ahead``.
+
+    What the line has at `slip` (Pa), and how fast it falls (Pa/m). Of a piecewise linear law it is
+    the piece itself.
+
+    Parameters
+    ----------
+    law : NamedTuple
+        ``friction.parameters`` of the problem.
+    peak, residual, rate, slip, ahead : float
+        tau_p and tau_r (Pa), the weakening rate W at zero slip (Pa/m), slips (m).
+    """
+    return _line(law, peak, residual, rate, slip, ahead)
+
+
+@jit
+def strength_at(law: Any, peak: float, residual: float, rate: float, slip: float) -> float:
+    """Return the strength tau_f, Pa, at a slip; for the parameters see `line_at`."""
+    return _line(law, peak, residual, rate, slip, 0.0)[0]
+
+
+@jit_allocating
+def strengths(law: Any, peak: Array, residual: Array, rate: Array, slip: Array) -> Array:
+    """Return the strength tau_f at every node, Pa; all arrays (nodes,), see `line_at`."""
+    result = np.empty(slip.size)
+    for i in range(slip.size):
+        result[i] = strength_at(law, peak[i], residual[i], rate[i], slip[i])
+    return result

@@ -1,0 +1,447 @@
+"""Friction laws: strength that falls with slip from tau_p to tau_r.
+
+To add one, derive from `FrictionLaw`; `register` makes it known to study files.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from functools import lru_cache
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
+
+import numpy as np
+from pydantic import BeforeValidator, model_validator
+
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError
+from stiction.base.kinds import Kinds, OneOf, register
+from stiction.base.model import (
+    OptionalProfile,
+    Profile,
+    Real,
+    at_least,
+    checked,
+    is_unplaced,
+    model,
+)
+from stiction.problem.friction.parameters import Exponential, Linear, Parameters, Polygon
+
+SCALES = ("weakening_rate", "critical_slip", "fracture_energy")
+"""Any one of them sets how fast a law weakens."""
+NEARLY_RESIDUAL = 0.01
+"""Share of tau_p - tau_r that is left where a law that never ends counts as residual."""
+SLIPS = 4097
+"""Number of slips up to `FrictionLaw.reach` at which a law of one's own is examined."""
+LAWS = Kinds("laws")
+"""The laws of study files by their `type`."""
+_VALID = {
+    **dict.fromkeys(SCALES, (lambda value: value > 0.0, "be positive everywhere")),
+    "residual_strength": (lambda value: value >= 0.0, "not be negative"),
+    "residual_ratio": (lambda value: (value >= 0.0) & (value < 1.0), "lie in [0, 1)"),
+}
+
+
+@model
+class FrictionLaw(ABC):
+    """Strength tau_f(d) = tau_r + (tau_p - tau_r) f(d/d_c), f falling from 1 to 0.
+
+    A law is the function f, with which its `parameters` come, its integral and its inverse. The
+    arguments are those of `LinearWeakening`, with W = -f'(0) (tau_p - tau_r)/d_c and
+    Gamma = (tau_p - tau_r) d_c times the integral of f.
+    """
+
+    family: ClassVar[str] = "laws"
+    weakening_rate: OptionalProfile = None
+    critical_slip: OptionalProfile = None
+    residual_strength: Profile = 0.0
+    fracture_energy: OptionalProfile = None
+    residual_ratio: OptionalProfile = None
+
+    @model_validator(mode="after")
+    def _one_scale(self) -> Any:
+        problems = []
+        values = {name: getattr(self, name) for name in _VALID}
+        given = {name: value for name, value in values.items() if value is not None}
+        for name, value in given.items():
+            valid, words = _VALID[name]
+            # A profile is checked once it is placed.
+            if not is_unplaced(value) and not valid(np.ravel(value)).all():
+                worst = np.ravel(value)[~valid(np.ravel(value))].min()
+                problems.append(f"{name} must {words}, got {worst:g}")
+        scales = [name for name in SCALES if name in given]
+        if len(scales) != 1:
+            found = " and ".join(scales) or "none"
+            problems.append(f"give one of {', '.join(SCALES)}, got {found}")
+        residual = self.residual_strength
+        if "residual_ratio" in given and (is_unplaced(residual) or np.any(residual)):
+            problems.append("give either residual_strength or residual_ratio, got both")
+        if problems:
+            raise InputError(problems)
+        return self
+
+    @property
+    @abstractmethod
+    def parameters(self) -> Parameters:
+        """What kernels take of the law: a NamedTuple of a type of its own, with f."""
+
+    @abstractmethod
+    def area(self, u: Any) -> Array:
+        """Return the integral of f from 0 to slips u in units of d_c, any shape."""
+
+    @abstractmethod
+    def slip_at(self, fraction: float) -> float:
+        """Return a u at which f has fallen to a fraction in [0, 1]; infinite if it never does."""
+
+    def fraction(self, u: Any) -> Array:
+        """Return f(u) at slips u in units of d_c, any shape."""
+        f = self.parameters.f
+        return np.vectorize(lambda one: f(one)[0], otypes=[float])(u)
+
+    @property
+    def initial_slope(self) -> float:
+        """-f'(0)."""
+        return float(self.parameters.initial_slope)
+
+    @property
+    def steepest_slope(self) -> float:
+        """The largest -f'(u); that at zero slip unless another is larger by 0.1 %."""
+        first = self.initial_slope
+        if isinstance(self.parameters, Linear | Exponential):
+            return first
+        later = float(_examined(self)[2].max())
+        return later if later > 1.001 * first else first
+
+    @property
+    def steepening(self) -> float:
+        """The steepest slope over the first, at least 1: it decides what is unstable."""
+        return self.steepest_slope / self.initial_slope
+
+    @property
+    def integral(self) -> float:
+        """Integral of f(u) over all u >= 0."""
+        return float(self.area(np.inf))
+
+    @property
+    def linear(self) -> bool:
+        """Whether strength falls along one straight line, to the residual strength."""
+        return isinstance(self.parameters, Linear)
+
+    @property
+    def reach(self) -> float:
+        """u from which strength counts as residual: 1 % is left of a law that never ends."""
+        end = self.slip_at(0.0)
+        return end if np.isfinite(end) else self.slip_at(NEARLY_RESIDUAL)
+
+    @property
+    def scale(self) -> tuple[str, Any]:
+        """Which of W, d_c and Gamma was given, and its value."""
+        return next((s, getattr(self, s)) for s in SCALES if getattr(self, s) is not None)
+
+    def residual(self, strength: Array) -> Array:
+        """Return tau_r, Pa, of a peak strength (Pa, any shape)."""
+        if self.residual_ratio is None:
+            return np.asarray(self.residual_strength, dtype=np.float64)
+        return np.asarray(self.residual_ratio) * strength
+
+    def rate(self, drop: Array, scale: str, value: Any) -> Array:
+        """Return the weakening rate W at zero slip, Pa/m.
+
+        `drop` is tau_p - tau_r, Pa; `value` that of one of `SCALES`, in Pa/m, m or J/m².
+        """
+        value = np.asarray(value, dtype=np.float64)
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            if scale == "critical_slip":
+                return self.initial_slope * drop / value
+            if scale == "fracture_energy":
+                return self.initial_slope * self.integral * drop**2 / value
+        return np.broadcast_to(value, np.broadcast_shapes(value.shape, drop.shape))
+
+    def critical_slip_of(self, drop: Array, rate: Array) -> Array:
+        """Return d_c, m, from tau_p - tau_r (Pa) and the weakening rate W (Pa/m)."""
+        return self.initial_slope * drop / rate
+
+    def dissipated(self, slip: Array, drop: Array, rate: Array) -> Array:
+        """Return the energy dissipated above the residual strength up to a slip, J/m².
+
+        `slip` (m) is of shape (..., nodes), `drop` = tau_p - tau_r (Pa) and `rate` = W (Pa/m) of
+        shape (nodes,).
+        """
+        if self.linear:
+            weakened = np.minimum(slip, drop / rate)
+            return weakened * (drop - 0.5 * rate * weakened)
+        critical = self.critical_slip_of(drop, rate)
+        u = np.divide(slip, critical, out=np.zeros(np.shape(slip)), where=critical > 0.0)
+        return drop * critical * self.area(u)
+
+
+@register
+@model
+class LinearWeakening(FrictionLaw):
+    """Strength that falls linearly with slip: max(tau_p - W d, tau_r).
+
+    Parameters
+    ----------
+    weakening_rate, critical_slip, fracture_energy : float or (nodes,) array, optional
+        Exactly one of W (Pa/m), d_c (m) and Gamma (J/m²), positive. With d_c,
+        W = (tau_p - tau_r)/d_c varies with the strength; with Gamma,
+        W = (tau_p - tau_r)²/(2 Gamma) does.
+    residual_strength, residual_ratio : float or (nodes,) array, optional
+        tau_r (Pa) or tau_r/tau_p in [0, 1).
+
+    Notes
+    -----
+    Linear slip weakening after Ida (1972) and Palmer and Rice (1973).
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> st.LinearWeakening(critical_slip=2e-6, residual_strength=0.4e6).scale
+    ('critical_slip', 2e-06)
+    """
+
+    type: Literal["linear"] = "linear"
+    parameters: ClassVar[Linear] = Linear()
+
+    def area(self, u: Any) -> Array:
+        """Return w - w²/2 with w = min(u, 1)."""
+        w = np.minimum(np.asarray(u, dtype=np.float64), 1.0)
+        return w - 0.5 * w * w
+
+    def slip_at(self, fraction: float) -> float:
+        """Return u = 1 - f."""
+        return 1.0 - fraction
+
+
+@register
+@model
+class ExponentialWeakening(FrictionLaw):
+    """Strength that decays with slip: tau_r + (tau_p - tau_r) exp(-d/d_c).
+
+    The parameters are those of `LinearWeakening`; W is the rate at zero slip, d_c the slip at which
+    1/e of tau_p - tau_r is left, and Gamma = (tau_p - tau_r) d_c.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> law = st.ExponentialWeakening(critical_slip=1e-6)
+    >>> float(law.fraction(1.0).round(4))
+    0.3679
+    """
+
+    type: Literal["exponential"] = "exponential"
+    parameters: ClassVar[Exponential] = Exponential()
+
+    def area(self, u: Any) -> Array:
+        """Return 1 - exp(-u)."""
+        return -np.expm1(-np.asarray(u, dtype=np.float64))
+
+    def slip_at(self, fraction: float) -> float:
+        """Return u = -ln f."""
+        return -math.log(fraction) if fraction > 0.0 else math.inf
+
+
+def _listed(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray) and value.ndim else value
+
+
+Corners: TypeAlias = Annotated[tuple[Real, ...], BeforeValidator(_listed)]
+Pieces: TypeAlias = at_least(2)  # type: ignore[valid-type]  # a call makes it
+
+
+@register
+@model(kw_only=True)
+class PiecewiseWeakening(FrictionLaw):
+    """Strength that falls piecewise linearly with slip, such as dual-scale weakening.
+
+    Parameters
+    ----------
+    slip : sequence of float
+        Corners u = d/d_c, rising from above 0 to 1; the corner at zero slip is implied.
+    strength : sequence of float
+        (tau_f - tau_r)/(tau_p - tau_r) at these corners, falling from below 1 to 0.
+    weakening_rate, critical_slip, fracture_energy, residual_strength, residual_ratio : optional
+        As for `LinearWeakening`; W is that of the first piece, and the residual strength is
+        reached at d_c.
+
+    Examples
+    --------
+    Strength that loses 70 % within a tenth of the critical slip and the rest slowly:
+
+    >>> import stiction as st
+    >>> law = st.PiecewiseWeakening(slip=[0.1, 1.0], strength=[0.3, 0.0], critical_slip=1e-5)
+    >>> round(law.initial_slope, 9), round(law.integral, 9)
+    (7.0, 0.2)
+    """
+
+    slip: Corners
+    strength: Corners
+    type: Literal["piecewise"] = "piecewise"
+
+    @model_validator(mode="after")
+    def _falling(self) -> PiecewiseWeakening:
+        slip, strength = self.corners
+        if slip.size != strength.size or slip.size < 2:
+            given = f"{slip.size - 1} and {strength.size - 1}"
+            raise InputError(f"slip and strength: give one number for each corner, got {given}")
+        if np.any(np.diff(slip) <= 0.0) or slip[-1] != 1.0:
+            raise InputError(f"slip: must rise from above 0 to exactly 1, got {self.slip}")
+        if np.any(np.diff(strength) >= 0.0) or strength[-1] != 0.0:
+            raise InputError(
+                "strength: must fall at every corner, from below 1 to exactly 0, got"
+                f" {self.strength}; give a plateau a small fall, such as 0.5, 0.4999"
+            )
+        return self
+
+    @property
+    def corners(self) -> tuple[Array, Array]:
+        """u and f at all corners, including the one at zero slip."""
+        return np.array((0.0, *self.slip)), np.array((1.0, *self.strength))
+
+    @property
+    def _pieces(self) -> tuple[Array, Array]:
+        u, f = self.corners
+        return -np.diff(f) / np.diff(u), 0.5 * (f[1:] + f[:-1]) * np.diff(u)
+
+    @property
+    def steepest_slope(self) -> float:
+        """-f' of the steepest piece."""
+        return float(self._pieces[0].max())
+
+    @property
+    def integral(self) -> float:
+        """Area under f."""
+        return float(np.sum(self._pieces[1]))
+
+    def area(self, u: Any) -> Array:
+        """Return the area under f up to u."""
+        (corners, f), (slopes, areas) = self.corners, self._pieces
+        at_corners = np.append(0.0, np.cumsum(areas))
+        u = np.minimum(np.asarray(u, dtype=np.float64), 1.0)
+        piece = np.clip(np.searchsorted(corners, u, side="right") - 1, 0, len(self.slip) - 1)
+        into = u - corners[piece]
+        return at_corners[piece] + into * (f[piece] - 0.5 * slopes[piece] * into)
+
+    def slip_at(self, fraction: float) -> float:
+        """Return u at f."""
+        u, f = self.corners
+        return float(np.interp(fraction, f[::-1], u[::-1]))
+
+    @property
+    def parameters(self) -> Polygon | Linear:
+        """Parameters for the kernels; a single piece gives the linear law, to the bit."""
+        if len(self.slip) == 1:
+            return Linear()
+        return Polygon(*self.corners, float(self._pieces[0][0]))
+
+    @classmethod
+    @checked
+    def from_law(cls, law: FrictionLaw, pieces: Pieces) -> PiecewiseWeakening:
+        """Approximate another law by a number of linear `pieces`, at least 2.
+
+        Corners lie on the law at equal steps of strength. If the law never reaches its residual
+        strength, the last piece dissipates as much as the rest of the law.
+
+        Examples
+        --------
+        >>> import stiction as st
+        >>> law = st.ExponentialWeakening(weakening_rate=0.5e12)
+        >>> pieces = st.PiecewiseWeakening.from_law(law, 32)
+        >>> round(float(pieces.weakening_rate) / 0.5e12, 3)
+        0.984
+        """
+        if problems := contradictions(law):
+            raise InputError([f"law: {text}" for text in problems])
+        fraction = 1.0 - np.arange(1, pieces + 1) / pieces
+        fraction[-1] = 0.0
+        u = np.array([law.slip_at(float(f)) for f in fraction])
+        if not np.isfinite(u[-1]):
+            u[-1] = u[-2] + 2.0 * pieces * (law.integral - float(law.area(u[-2])))
+        chord = (1.0 - float(fraction[0])) / float(u[0])
+        area = float(np.trapezoid(np.append(1.0, fraction), np.append(0.0, u)))
+        factors = {
+            "weakening_rate": chord / law.initial_slope,
+            "critical_slip": float(u[-1]),
+            "fracture_energy": area / law.integral,
+        }
+        scale, value = law.scale
+        return cls(
+            slip=tuple((u / u[-1]).tolist()),
+            strength=tuple(fraction.tolist()),
+            residual_strength=law.residual_strength,
+            residual_ratio=law.residual_ratio,
+            **{scale: factors[scale] * value},
+        )
+
+
+@lru_cache(maxsize=64)
+def _examined(law: FrictionLaw) -> tuple[Array, Array, Array]:
+    """Slips u up to the reach of a law, and f and -f' there, compiled."""
+    from stiction.problem.friction.kernels import (
+        compiled,  # numba is imported where it is needed
+    )
+
+    parameters = law.parameters
+    f, u = compiled(type(parameters)), np.linspace(0.0, law.reach, SLIPS)
+    values, slopes = np.array([f(parameters, one) for one in u]).T
+    return u, values, slopes
+
+
+def contradictions(law: FrictionLaw) -> list[str]:
+    """Return what is wrong with a law of one's own: it rises, say, or contradicts its f."""
+    if type(law).__module__.startswith("stiction."):
+        return []
+    name, parameters, end = type(law).__name__, law.parameters, law.slip_at(0.0)
+    if not (hasattr(parameters, "_fields") and hasattr(parameters, "f")):
+        return [f"{name}: its parameters must be a NamedTuple with a method f(self, u)"]
+    if not hasattr(parameters, "initial_slope"):
+        return [f"{name}: its parameters need a field initial_slope, -f'(0)"]
+    if not 0.0 < law.reach < np.inf:
+        return [
+            f"{name}: slip_at(0), or slip_at({NEARLY_RESIDUAL}) if that is infinite, must be"
+            f" positive and finite, got {law.reach:g}"
+        ]
+    try:
+        u, f, slope = _examined(law)
+    except Exception as error:  # of any kind: the code is another's
+        lines = [line for line in str(error).splitlines() if line.strip()]
+        reason = next((line for line in lines if "pipeline" not in line), type(error).__name__)
+        return [f"{name}: numba cannot compile its f, which must return f and -f': {reason}"]
+    rising = u[:-1][np.diff(f) > 1e-9]
+    wrong = {
+        f"f and -f' must be finite up to u = {u[-1]:.4g}": not np.isfinite([f, slope]).all(),
+        f"f(0) must be 1, got {f[0]:g}": not abs(f[0] - 1.0) <= 1e-9,
+        f"f must fall from zero slip on, got -f'(0) = {slope[0]:g}; it sets the weakening rate":
+            not min(slope[0], law.initial_slope) > 0.0,
+        f"strength must not rise with slip, as beyond u = {rising.min(initial=u[-1]):.4g}; no"
+        " method follows a hump (begin at its top, with tau_p there)": rising.size,
+        f"the integral of f, area(inf), must be finite, got {law.integral:g}; let f end at 0":
+            not 0.0 < law.integral < np.inf,
+    }  # fmt: skip
+    if found := [text for text, is_so in wrong.items() if is_so]:
+        return [f"{name}: {found[0]}"]
+    pairs: dict[str, tuple[Any, Any]] = {
+        "initial_slope": (law.initial_slope, slope[0]),
+        "the integral of -f'": (np.trapezoid(slope, u), 1.0 - f[-1]),
+        f"area({u[-1]:.3g})": (law.area(u[-1]), np.trapezoid(f, u)),
+    }
+    for share in (0.5, 0.0 if np.isfinite(end) else NEARLY_RESIDUAL):
+        pairs[f"f(slip_at({share:g}))"] = (share, law.fraction(law.slip_at(share)))
+    return [
+        f"{name}: {what} is {float(found):.3g}, but {float(own):.3g} by its f"
+        for what, (found, own) in pairs.items()
+        if not abs(found - own) <= 1e-3 * max(1.0, slope.max())
+    ]
+
+
+def _law(value: Any) -> Any:
+    if not isinstance(value, FrictionLaw | dict):
+        raise ValueError("must be a friction law such as st.LinearWeakening(critical_slip=...)")
+    return NotImplemented if isinstance(value, dict) else value
+
+
+if TYPE_CHECKING:
+    Friction: TypeAlias = FrictionLaw
+else:
+    Friction = Annotated[Any, OneOf(LAWS, _law, default="linear")]
+"""Any friction law; in a study file ``type`` selects it (default: linear)."""

@@ -1,0 +1,57 @@
+"""Parameters of friction laws for kernels: NamedTuples with the function f of their law."""
+
+import math
+from typing import NamedTuple, Protocol
+
+from stiction.base.arrays import Array
+
+SMALLEST_EIGENVALUE = 0.5788869418506
+"""lambda_0 in the nucleation length h_n = 2 lambda_0 G*/W (Uenishi and Rice, 2003)."""
+
+
+class Parameters(Protocol):
+    """What kernels take of a law: a NamedTuple with these members, of a type of its own."""
+
+    @property
+    def initial_slope(self) -> float:
+        """-f'(0), positive; a field."""
+
+    def f(self, u: float) -> tuple[float, float]:
+        """Return f(u) and -f'(u) at a slip u >= 0 in units of d_c; numba compiles it."""
+
+
+class Linear(NamedTuple):
+    """The linear law needs no numbers but those of the sample."""
+
+    initial_slope: float = 1.0
+
+    def f(self, u: float) -> tuple[float, float]:
+        return (1.0 - u, 1.0) if u < 1.0 else (0.0, 0.0)
+
+
+class Exponential(NamedTuple):
+    """The exponential law needs no numbers but those of the sample."""
+
+    initial_slope: float = 1.0
+
+    def f(self, u: float) -> tuple[float, float]:
+        left = math.exp(-u)
+        return left, left
+
+
+class Polygon(NamedTuple):
+    """Corners of f: slip u in units of d_c, from 0 to 1, and f there, from 1 to 0."""
+
+    slip: Array
+    fraction: Array
+    initial_slope: float
+
+    def f(self, u: float) -> tuple[float, float]:
+        piece, last = 0, self.slip.shape[0] - 1
+        while piece < last and u >= self.slip[piece + 1]:
+            piece += 1
+        if piece == last:
+            return 0.0, 0.0
+        fall = self.fraction[piece] - self.fraction[piece + 1]
+        slope = fall / (self.slip[piece + 1] - self.slip[piece])
+        return self.fraction[piece] - slope * (u - self.slip[piece]), slope

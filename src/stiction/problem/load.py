@@ -1,0 +1,165 @@
+"""The load: a profile that grows, on top of an initial stress."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError
+from stiction.base.kinds import Kinds, OneOf, register
+from stiction.base.model import (
+    PROFILE_SCHEMA,
+    OptionalProfile,
+    Positive,
+    Profile,
+    Real,
+    model,
+)
+from stiction.problem.interface import Interface
+
+Fraction = Annotated[Real, Field(ge=0.0, lt=1.0)]
+NotNegative = Annotated[Real, Field(ge=0.0)]
+
+
+class LoadShape(ABC):
+    """A load profile given by a formula, scaled to a mean of one: tau_0 is then the mean stress.
+
+    To add one, decorate a class that derives from it with `stiction.extensions.model`, so that its
+    parameters are checked, and with `stiction.extensions.register`, so that study files accept
+    its `type`.
+    """
+
+    family: ClassVar[str] = "loads"
+    type: str
+
+    @abstractmethod
+    def values(self, interface: Interface) -> Array:
+        """Return the profile at the nodes, of any mean, broadcasting to ``interface.shape``."""
+
+    def on(self, interface: Interface) -> Array:
+        """Return the profile p at the nodes, (*shape), with a mean of one."""
+        values = np.asarray(self.values(interface), dtype=np.float64)
+        values = values / values.mean()
+        if not np.all(values > 0.0):
+            raise InputError(
+                f"load.profile: {type(self).__name__} must be positive everywhere, smallest over"
+                f" its mean is {values.min():g}"
+            )
+        return np.ascontiguousarray(np.broadcast_to(values, interface.shape))
+
+
+LOADS = Kinds("loads")
+"""Load shapes of study files by their `type`."""
+
+
+def distance(interface: Interface, centre: float) -> Array:
+    """Return the distance (m) along x from a share of the length, (nx,); (nx, 1) on a plane."""
+    length = interface.lengths[0]
+    x = np.arange(interface.shape[0]) * length / interface.shape[0]
+    away = np.mod(x - centre * length + 0.5 * length, length) - 0.5 * length
+    return np.abs(away).reshape(-1, *(1 for _ in interface.shape[1:]))
+
+
+@register
+@model(kw_only=True)
+class GradientLoad(LoadShape):
+    """Load that falls linearly from a ridge to half a period away.
+
+    Parameters
+    ----------
+    amplitude : float
+        The profile runs from 1 + amplitude down to 1 - amplitude (1), in [0, 1).
+    centre : float
+        Position of the maximum as a share of the length, in [0, 1).
+    """
+
+    amplitude: Fraction
+    centre: Fraction = 0.0
+    type: Literal["gradient"] = "gradient"
+
+    def values(self, interface: Interface) -> Array:
+        """Return 1 + amplitude (1 - 4 |x - centre|/L)."""
+        away = distance(interface, self.centre)
+        return 1.0 + self.amplitude * (1.0 - 4.0 * away / interface.lengths[0])
+
+
+@register
+@model(kw_only=True)
+class EdgeLoad(LoadShape):
+    """Load that is higher near an edge, where a pusher or the corner of a block acts.
+
+    The profile is proportional to 1 + excess exp(-distance/decay). Both sides of the edge
+    are loaded, like a specimen and its mirror image.
+
+    Parameters
+    ----------
+    excess : float
+        Excess load at the edge over the load far away (1), not negative.
+    decay : float
+        Decay length, m, positive.
+    edge : float
+        Position of the edge as a share of the length, in [0, 1).
+    """
+
+    excess: NotNegative
+    decay: Positive
+    edge: Fraction = 0.0
+    type: Literal["edge"] = "edge"
+
+    def values(self, interface: Interface) -> Array:
+        """Return 1 + excess exp(-distance/decay)."""
+        return 1.0 + self.excess * np.exp(-distance(interface, self.edge) / self.decay)
+
+
+def _shape(value: Any) -> Any:
+    return value if isinstance(value, LoadShape) else NotImplemented
+
+
+@model
+class Load:
+    """Shear stress on an interface without slip: tau_i(x) + tau_0 p(x), with rising tau_0.
+
+    Parameters
+    ----------
+    profile : float, (nodes,) array, GradientLoad, EdgeLoad or another LoadShape
+        p, dimensionless, positive.
+    initial_stress : float or (nodes,) array
+        tau_i, Pa, below the peak strength everywhere.
+    normal_pressure : float or (nodes,) array, optional
+        Pa, positive on average. Every onset then has a `friction_coefficient`.
+    pressing_force : float, optional
+        Instead of `normal_pressure`: N, positive. Over the area of the interface, which must be
+        known, it is the pressure, uniform or the mean between glued plates.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> load = st.Load(profile=st.EdgeLoad(excess=2.0, decay=0.01), normal_pressure=5e6)
+    """
+
+    profile: Annotated[Profile, OneOf(LOADS, _shape, PROFILE_SCHEMA)] = 1.0
+    initial_stress: Profile = 0.0
+    normal_pressure: OptionalProfile = None
+    pressing_force: Positive | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Load:
+        profile, pressure, problems = self.profile, self.normal_pressure, []
+        if isinstance(profile, float | np.ndarray) and np.min(profile) <= 0.0:
+            problems.append(f"profile must be positive everywhere, got {np.min(profile):g}")
+        if isinstance(pressure, float | np.ndarray) and np.mean(pressure) <= 0.0:
+            mean = np.mean(pressure)
+            problems.append(
+                f"normal_pressure must be positive on average, its mean is {mean:g}"
+            )
+        if pressure is not None and self.pressing_force is not None:
+            problems.append(
+                "pressing_force: give either normal_pressure (Pa) or pressing_force (N), not both"
+            )
+        if problems:
+            raise InputError(problems)
+        return self

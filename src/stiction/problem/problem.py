@@ -1,0 +1,784 @@
+"""The physical problem: two solids, an interface, a friction law and a load; and its samples."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Collection, Mapping
+from functools import reduce
+from typing import Any, NamedTuple
+
+import numpy as np
+from pydantic import model_validator
+
+from stiction.base.arrays import Array
+from stiction.base.errors import (
+    InputError,
+    UnitWarning,
+    prefixed,
+    unknown_name,
+    warn_accuracy,
+    warn_user,
+)
+from stiction.base.model import Mode, as_numbers, describe, differing, is_unplaced, model
+from stiction.base.units import Doubt, doubt_units, in_words
+from stiction.base.variables import PROFILES, QUANTITIES
+from stiction.elasticity.driven import Driven
+from stiction.problem.friction import SCALES, Friction, contradictions
+from stiction.problem.friction.parameters import SMALLEST_EIGENVALUE
+from stiction.problem.interface import Interface
+from stiction.problem.load import Load, LoadShape
+from stiction.problem.profiles.placing import Gaps, turned
+from stiction.problem.profiles.reading import at_nodes, is_coefficient
+from stiction.problem.solid import Solid
+from stiction.problem.specimen import Blocks
+
+FEWEST_NODES = 4
+"""Nodes in a nucleation length."""
+HUGE = 1e8
+"""Strength of a node over the median beyond which others are lost in round-off."""
+LARGEST = 1e100
+"""Of a profile, in SI units; sums and products of larger numbers overflow."""
+RIGIDITY = (1e-8, 1.0), (0.0, math.inf)
+"""Strength over shear modulus that is usual, and what is possible; steel (8e10 Pa) under 10 kPa at
+a coefficient of 0.1 has 1e-8."""
+FRICTION = (1e-3, 10.0), (1e-4, 100.0)
+"""Mean strength over normal pressure, from superlubricity to adhesive gels."""
+SLIP = (1e-8, math.inf), (1e-10, math.inf)
+"""Slip over which strength falls, m; an atom measures 1e-10 m."""
+SHORT = 4.0
+"""Nucleation lengths: on shorter lines free ends change the mean onset by more than about 1 %."""
+SOFTEST = 1e-4
+"""Stiffness of a machine over that of its blocks below which it is probably in another unit."""
+FLATTEST, HIGHEST = 0.025, 10.0
+"""Height of blocks over their length between which their response takes seconds and below 1 GB."""
+AT_END = {"II": 0.445 / 1.158, "III": 0.5}
+"""Nucleation length at a free end as a share of that in the middle."""
+NO_AREA = (
+    "a force needs the area of the interface: give the thickness of the specimen, or"
+    " interface.width of a line (m)"
+)
+"""What to do with a force where the area is unknown."""
+BARRIER = 10.0
+"""A node is a barrier where tau_p - tau_r is above so many times its lower quartile, of nodes that
+weaken."""
+
+
+def steepest_rate(strength: Array, residual: Array, rate: Array) -> float:
+    """Return the largest weakening rate of nodes that may break, Pa/m; arrays (samples, *shape).
+
+    Barriers are left out: with a uniform critical slip they weaken steeply, but never slip.
+    """
+    drop = strength - residual
+    if drop.max() <= BARRIER * drop.min():
+        return float(rate.max())
+    drop = drop.reshape(drop.shape[0], -1)
+    weakens = np.isfinite(drop) & (drop > 0.0)
+    typical = np.nanquantile(np.where(weakens, drop, np.nan), 0.25, axis=1)
+    return float(rate.reshape(drop.shape)[drop <= BARRIER * typical[:, None]].max())
+
+
+class Sample(NamedTuple):
+    """One interface or many: the profiles that every method starts from.
+
+    Attributes
+    ----------
+    strength, residual_strength, weakening_rate, initial_stress : (samples, *shape) arrays
+        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa); not to be written to. Strength
+        may be infinite for methods that accept barriers. Where it is at or below the residual
+        strength, both are equal and W has no effect.
+    load_profile : (*shape) array
+        p, dimensionless, positive.
+    normal_pressure : (samples, *shape) array
+        Pa; NaN where the problem has none.
+    problem : Problem, optional
+        That made it, and the only one that takes it; None if it was put together by hand.
+    """
+
+    strength: Array
+    residual_strength: Array
+    weakening_rate: Array
+    initial_stress: Array
+    load_profile: Array
+    normal_pressure: Array
+    problem: Problem | None = None
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return int(self.strength.shape[0])
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of nodes in each direction."""
+        return self.load_profile.shape
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """Axes of the nodes, counted from the last."""
+        return tuple(range(-self.load_profile.ndim, 0))
+
+    def part(self, some: slice) -> Sample:
+        """Return some samples of the batch."""
+        own = {name: rows[some] for name, rows in self._asdict().items() if name in PROFILES}
+        return self._replace(**own)
+
+    @property
+    def uniform_weakening(self) -> bool:
+        """Whether W is the same at all nodes of each sample."""
+        flat = self.weakening_rate.reshape(self.samples, -1)
+        return bool(np.all(flat == flat[:, :1]))
+
+    @property
+    def mean_strength(self) -> float:
+        """Mean strength where it is finite, Pa."""
+        return float(self.strength.mean(where=np.isfinite(self.strength)))
+
+    @property
+    def steepest_rate(self) -> float:
+        """Largest weakening rate of nodes that may break, Pa/m."""
+        return steepest_rate(self.strength, self.residual_strength, self.weakening_rate)
+
+    def mean_stress(self, load: Array) -> Array:
+        """Return <tau_i> + tau_0 <p>, Pa, at the loads tau_0 of shape (samples,)."""
+        return self.initial_stress.mean(axis=self.axes) + load * self.load_profile.mean()
+
+
+@model
+class Problem:
+    """The deterministic part of a model: solid, interface, friction law and load.
+
+    Parameters
+    ----------
+    solid : Solid
+    interface : Interface
+    friction : LinearWeakening, ExponentialWeakening or PiecewiseWeakening
+    load : Load, optional
+        By default uniform and without initial stress.
+    mode : {"II", "III"}
+        In-plane or anti-plane shear; a plane is in-plane along x and anti-plane along y.
+    specimen : Blocks, optional
+        Finite blocks instead of half-spaces. Their drive makes the load profile, the interface ends
+        with them (`interface.ends` is "free"), and tau_0 is the drive: the mean stress that it
+        would cause if nothing slipped.
+
+    Raises
+    ------
+    InputError
+        If an array has another shape than the interface, fewer than four nodes span the
+        nucleation length, or another argument is invalid; the message lists every problem.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.Problem(
+    ...     solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
+    ...     interface=st.Interface(length=0.1, nodes=1024),
+    ...     friction=st.LinearWeakening(weakening_rate=0.5e12),
+    ... )
+    >>> round(problem.nucleation_length * 1e3, 3)  # mm
+    3.456
+    """
+
+    solid: Solid
+    interface: Interface
+    friction: Friction
+    load: Load = Load()
+    mode: Mode = "II"
+    specimen: Blocks | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Problem:
+        problems = self._of_specimen()
+        problems += self._place_profiles()
+        if isinstance(self.load.profile, LoadShape):
+            self.load.profile.on(self.interface)  # refuses one that is not positive
+        if self.interface.is_plane and self.solid.plane != "strain":
+            problems.append(
+                "solid.plane: the solids beside a plane interface are three-dimensional,"
+                f" not in plane {self.solid.plane}; leave plane = 'strain'"
+            )
+        if self.interface.is_plane and self.mode != "II":
+            problems.append(
+                "mode: on a plane, slip along x is mode II along x and mode III along y;"
+                f" leave mode = 'II', got {self.mode!r}"
+            )
+        if self.load.pressing_force is not None and self.area is None:
+            problems.append(f"load.pressing_force: {NO_AREA}, or load.normal_pressure in Pa")
+        problems += [f"friction: {text}" for text in contradictions(self.friction)]
+        if problems:
+            raise InputError(problems)
+        if self.specimen is not None:
+            self._check_drive()
+        rate = self.friction.weakening_rate
+        if rate is not None:
+            self._check_resolution(float(np.max(rate)))
+            self._warn_if_short(float(np.median(rate)))
+        return self
+
+    def _of_specimen(self) -> list[str]:
+        """Let the interface end with the specimen; return what does not go with one."""
+        interface, specimen = self.interface, self.specimen
+        if specimen is None:
+            return [
+                "interface.ends: free ends are those of a specimen: give"
+                " specimen=st.Blocks(...), or leave ends = 'periodic'"
+            ] * interface.is_free
+        if interface.is_plane:
+            return ["specimen: blocks meet on a line; give length and nodes one number each"]
+        object.__setattr__(self, "interface", dataclasses.replace(interface, ends="free"))
+        problems = []
+        if interface.width is not None:
+            problems.append("interface.width: give the thickness of a specimen instead")
+        if not (isinstance(self.load.profile, float) and self.load.profile == 1.0):
+            problems.append(
+                "load.profile: the drive of a specimen makes its load profile; leave one of load"
+                " and specimen out"
+            )
+        if specimen.pressing == "glued" and np.ndim(self.load.normal_pressure or 0.0):
+            problems.append(
+                "load.normal_pressure: with pressing = 'glued' the blocks make the profile: give"
+                " the mean; or use pressing = 'frictionless' with the array"
+            )
+        if specimen.height < 2.0 * interface.spacing:
+            problems.append(
+                f"specimen.height: {specimen.height:g} m is less than two spacings of the nodes,"
+                f" {interface.spacing:.3g} m; take more nodes"
+            )
+        high = specimen.height / interface.extent
+        if self.mode == "II" and not FLATTEST <= high <= HIGHEST:
+            problems.append(
+                f"specimen.height: is {high:.3g} times the length, which must be {FLATTEST:g} to"
+                f" {HIGHEST:g} in mode II; check the units. Blocks that are higher than long act as"
+                " if they had no top; of flat ones, take a shorter piece"
+            )
+        return problems
+
+    def _check_drive(self) -> None:
+        """Refuse a drive that pulls somewhere in reverse, and blocks that open."""
+        for what, profile, advice in (
+            (
+                "drive",
+                self.blocks.shear,
+                "lower the pusher, push from both sides, or use st.Platen()",
+            ),
+            ("pressing", self.blocks.pressure, "use pressing = 'frictionless'"),
+        ):
+            if not profile.min() > 0.0:
+                at = self.interface.describe_node(int(np.argmin(profile)))
+                effect = "shears in reverse" if what == "drive" else "opens the interface"
+                raise InputError(
+                    f"specimen.{what}: {effect} at {at} ({profile.min():.3g} of the mean), which"
+                    f" is not modelled; {advice}"
+                )
+        assert self.specimen is not None  # else there is no drive
+        machine, depth = self.specimen.drive.stiffness, self.specimen.thickness or 1.0
+        own = 0.5 * depth * self.blocks.drive_stiffness  # of both blocks, in series
+        if 0.0 < machine < SOFTEST * own:
+            warn_user(
+                f"specimen.drive.stiffness: {machine:.3g} N/m is {machine / own:.1g} of that of the"
+                f" blocks, {own:.3g} N/m: as good as dead load, 0; check its unit (N/m) if this is"
+                " not intended",
+                UnitWarning,
+            )
+
+    def _place_profiles(self) -> list[str]:
+        """Put profiles with coordinates of their own on the nodes; return what does not fit."""
+        problems: list[str] = []
+        shape = self.interface.shape
+        for part in ("friction", "load"):
+            owner, placed = getattr(self, part), {}
+            for name, value in vars(owner).items():
+                if is_unplaced(value):
+                    try:
+                        at, _ = at_nodes(f"{part}.{name}", value, self.interface)
+                        value = np.asarray(at)  # of a pandas object too
+                    except InputError as error:
+                        problems += error.problems
+                    placed[name] = value
+                if isinstance(value, np.ndarray) and value.shape not in ((), shape):
+                    problems.append(
+                        f"{part}.{name}: must have one entry for each of the"
+                        f" {' x '.join(map(str, shape))} nodes, got"
+                        f" {describe(value)}{turned(value.shape, shape)}"
+                    )
+            if placed and not problems:  # frozen for others; validation is not over yet
+                object.__setattr__(self, part, dataclasses.replace(owner, **placed))
+        return problems
+
+    def _warn_if_short(self, rate: float) -> None:
+        patch = self.nucleation_lengths(rate * self.friction.steepening)[0]
+        length = min(self.interface.lengths)
+        if patch >= length:
+            warn_user(
+                f"the critical patch (nucleation length {patch:.3g} m) fills the interface"
+                f" ({length:.3g} m), which slides as a whole; if this is not intended, check"
+                " the units of the length, the shear modulus and the weakening rate",
+                UnitWarning,
+            )
+        elif length < SHORT * patch and not self.interface.is_plane and self.specimen is None:
+            warn_accuracy(
+                f"the interface is {length / patch:.2g} nucleation lengths long and continues"
+                " periodically: under a uniform antiplane load, free ends would lower its onset by"
+                f" about {min(3.0, 5.0 * patch / length):.1g} % on average and by up to 17 % in"
+                " single cases"
+            )
+        if self.specimen is not None and self.specimen.height < 0.5 * patch:
+            warn_user(
+                f"specimen.height: {self.specimen.height:.3g} m is below half the nucleation"
+                f" length of half-spaces, {patch:.3g} m: the blocks act as strips, and no length of"
+                " half-spaces applies; check the units if this is not intended",
+                UnitWarning,
+            )
+
+    def warn_of_units(
+        self, strength: float, residual: float = 0.0, scales: Mapping[str, Any] | None = None
+    ) -> None:
+        """Doubt mean peak and residual strengths (Pa) that do not fit the rest of the problem.
+
+        It is an `InputError` if they cannot, if a normal pressure is rather a force, or if scales
+        of slip by name are not resolved at these strengths.
+        """
+        modulus, pressure = self.solid.shear_modulus, self.given_pressure
+        compared = [("strength", strength, "shear modulus", modulus, RIGIDITY)]
+        rate, slip = self.friction.weakening_rate, math.inf
+        if rate is not None and (drop := self._mean_drop(strength)) > 0.0:
+            slip = drop / float(np.median(rate))
+        if pressure is not None:
+            mean = float(np.mean(pressure))
+            self._refuse_force(mean, strength / mean, slip)
+            compared.append(("strength", strength, "normal pressure", mean, FRICTION))
+        if residual:
+            compared.append(("residual_strength", residual, "shear modulus", modulus, RIGIDITY))
+        doubts = [
+            Doubt(
+                f"{name}: its mean, {mean:.4g} Pa, is {mean / of:.2g} of the {what}; check the"
+                " units of both (all in Pa; coefficients are fractions, not percentages, and"
+                " need of='friction_coefficient')",
+                mean / of,
+                *limits,
+            )
+            for name, mean, what, of, limits in compared
+        ]
+        text = (
+            f"strength: its mean, {strength:.4g} Pa, falls within a slip of {slip:.2g} m, that of a"
+            " few atoms; check the units of strength or normal pressure (Pa) and weakening_rate"
+            " (Pa/m)"
+        )
+        if doubt_units([*doubts, Doubt(text, slip, *SLIP)]):
+            return
+        own = dict([self.friction.scale]) if self.friction.weakening_rate is None else {}
+        for scale, value in (own if scales is None else scales).items():
+            fall = np.array(strength - residual)
+            steep = max(float(self.friction.rate(fall, scale, np.median(value))), 1e-300)
+            self._warn_if_short(steep)
+            if scales is not None:
+                self._check_resolution(steep)
+
+    def _mean_drop(self, strength: float) -> float:
+        """Return how far a strength falls, Pa."""
+        return strength - float(np.mean(self.friction.residual(np.array(strength))))
+
+    def _refuse_force(self, pressure: float, coefficient: float, slip: float) -> None:
+        """Refuse a normal pressure that makes sense only if it is a force, N, on a known area."""
+        if self.area is None or self.load.normal_pressure is None:
+            return
+        meant, (least, most) = pressure / self.area, FRICTION[0]
+        if coefficient > most:  # of a strength in Pa
+            fits = least <= coefficient * self.area <= most
+        else:  # of coefficients, with which the slip grows
+            fits = slip < SLIP[0][0] <= slip / self.area
+        if fits:
+            raise InputError(
+                f"load.normal_pressure: {pressure:.4g} Pa is too low for this strength; if it is a"
+                f" force, {pressure:.4g} N over {self.area:.3g} m2 are {in_words('Pa', meant)}:"
+                f" give load.pressing_force = {pressure:g}"
+            )
+
+    @property
+    def blocks(self) -> Driven:
+        """Stiffness and profiles of the specimen, which must not be None."""
+        if self.specimen is None:
+            raise InputError("problem.specimen: is not given; the solids are half-spaces")
+        interface = self.interface
+        return self.specimen.driven(interface.extent, interface.size, self.solid, self.mode)
+
+    @property
+    def area(self) -> float | None:
+        """Area of the interface, m², if its width, or the specimen's thickness, is known."""
+        interface, specimen = self.interface, self.specimen
+        depth = interface.width if specimen is None else specimen.thickness
+        if interface.is_plane:
+            return interface.extent
+        return None if depth is None else interface.extent * depth
+
+    def stress_of(self, name: str, force: float) -> float:
+        """Return a force, N, over the area of the interface, Pa; `name` begins its refusal."""
+        if self.area is None:
+            raise InputError(f"{name}: {NO_AREA}")
+        return force / self.area
+
+    @property
+    def given_pressure(self) -> Any:
+        """Normal pressure as given, Pa, a force over the area: a number, an array or None."""
+        force = self.load.pressing_force
+        if force is None:
+            return self.load.normal_pressure
+        return self.stress_of("load.pressing_force", force)
+
+    def refuse_specimen(self, what: str, instead: str) -> None:
+        """Raise an `InputError` if the problem has a specimen, with what to do instead."""
+        if self.specimen is not None:
+            raise InputError(
+                f"problem.specimen: {what} holds for half-spaces, not for finite blocks; {instead}"
+            )
+
+    @property
+    def normal_pressure(self) -> Any:
+        """Normal pressure, Pa: a number, an array at the nodes, or None."""
+        pressure = self.given_pressure
+        return pressure if pressure is None else pressure * self.pressing
+
+    @property
+    def pressing(self) -> Any:
+        """Normal pressure at the nodes over the given one: 1, but of glued blocks (nodes,)."""
+        glued = self.specimen is not None and self.specimen.pressing == "glued"
+        return self.blocks.pressure if glued else 1.0
+
+    @property
+    def load_profile(self) -> Any:
+        """Load profile p: a number, or an array at the nodes, (*shape)."""
+        if self.specimen is not None:
+            return self.blocks.shear
+        profile = self.load.profile
+        return profile.on(self.interface) if isinstance(profile, LoadShape) else profile
+
+    @property
+    def effective_modulus(self) -> float:
+        """Static modulus G* of the plane state and mode, Pa; on a plane that along x."""
+        return self.solid.effective_modulus(self.mode)
+
+    @property
+    def uniform_rate(self) -> float | None:
+        """The problem's weakening rate, Pa/m, if it is the same at all nodes, else None."""
+        rate = self.friction.weakening_rate
+        return None if rate is None or np.ptp(rate) > 0.0 else float(np.max(rate))
+
+    @property
+    def nucleation_length(self) -> float:
+        """h_n = 2 lambda_0 G*/W, m (Uenishi and Rice, 2003), of a uniform weakening rate.
+
+        If the law steepens, W is the steepest rate.
+        It raises an `InputError` if the rate varies along the interface or follows from
+        other parameters.
+        """
+        if self.uniform_rate is None:
+            raise InputError(
+                "friction.weakening_rate: a nucleation length needs a uniform one; give"
+                " weakening_rate, about (strength - residual_strength)/critical_slip, or use"
+                " st.Equilibrium() or st.Rupture(), which need none"
+            )
+        return self.nucleation_lengths(self.uniform_rate * self.friction.steepening)[0]
+
+    def nucleation_lengths(self, rate: float) -> tuple[float, ...]:
+        """Return h_n of a uniform weakening rate (Pa/m) in each direction, m.
+
+        On a plane, the length along x is that of mode II, along y that of mode III.
+        """
+        if not rate > 0.0:
+            raise InputError(f"rate: must be a positive number, got {describe(rate)}")
+        moduli = (self.effective_modulus, self.solid.shear_modulus)[: len(self.interface.shape)]
+        return tuple(2.0 * SMALLEST_EIGENVALUE * modulus / rate for modulus in moduli)
+
+    def nodes_in_nucleation_length(self, rate: float) -> tuple[float, ...]:
+        """Return how many nodes the nucleation length of a weakening rate (Pa/m) spans.
+
+        It returns one number per direction. If the law steepens, the steepest rate counts.
+        """
+        lengths = self.nucleation_lengths(rate * self.friction.steepening)
+        return tuple(np.divide(lengths, self.interface.spacings).tolist())
+
+    def _check_resolution(self, highest_rate: float) -> None:
+        resolution = self.nodes_in_nucleation_length(highest_rate)
+        if min(resolution) < FEWEST_NODES:
+            steepest = highest_rate * self.friction.steepening
+            length = self.nucleation_lengths(steepest)[int(np.argmin(resolution))]
+            raise InputError(
+                f"interface.nodes: the nucleation length {length:.3g} m spans"
+                f" {min(*resolution, FEWEST_NODES - 0.01):.3g} nodes; at least"
+                f" {FEWEST_NODES} are needed, that is"
+                f" interface.nodes >= {self._finer(resolution, FEWEST_NODES)}, got"
+                f" {' x '.join(map(str, self.interface.shape))}; if that is far off, check the"
+                " units of all lengths, moduli and strengths"
+            )
+
+    def _finer(self, resolution: tuple[float, ...], wanted: int) -> str:
+        """Return the nodes with which the nucleation length would span `wanted` of them."""
+        growth = wanted / np.maximum(resolution, 1e-300)
+        halves = np.ceil(0.5 * np.array(self.interface.shape) * growth)
+        return " x ".join(f"{2 * n:.10g}" for n in halves)
+
+    def warn_if_coarse(self, sample: Sample, enough: float, cost: str) -> None:
+        """Warn with the error `cost` if h_n spans fewer than `enough` nodes."""
+        resolution = self.nodes_in_nucleation_length(sample.steepest_rate)
+        if min(resolution) < enough:
+            spanned = f"{resolution[0]:.1f} nodes"
+            if self.interface.is_plane:
+                spanned += f" along x and, in mode III, {resolution[1]:.1f} along y"
+            if self.specimen is not None:
+                spanned += f", {AT_END[self.mode] * resolution[0]:.1f} at a free end"
+            wanted = 16 if enough <= 12.0 else 32
+            warn_accuracy(
+                f"the nucleation length spans {spanned}; {wanted} are recommended"
+                f" (interface.nodes = {self._finer(resolution, wanted)}): {cost}"
+            )
+
+    def sample(self, profiles: Any, *, accept: Collection[str] = ()) -> Sample:
+        """Return the validated profiles of samples, with the problem's own values for all others.
+
+        Parameters
+        ----------
+        profiles : array, mapping of arrays, xarray.Dataset or Sample
+            Peak strength tau_p (Pa), of shape (samples, *shape) or (*shape); or profiles by
+            name: 'strength' and any others of `PROFILES`, but only one of 'weakening_rate',
+            'critical_slip' and 'fracture_energy'. They replace the problem's own; all but the
+            strength may also be (samples, 1) or a number: of 'normal_pressure' the mean, which
+            glued blocks distribute. A 'friction_coefficient' in the place of the strength, or a
+            DataArray that states the unit 1, is multiplied by the pressure.
+        accept : collection of {"barriers", "overstress", "constant"}
+            What the method accepts: infinite strength where nothing breaks; initial stress
+            above the strength; nodes that do not weaken, of which the caller has warned; fewer
+            than four nodes in the nucleation length of the steepest ones.
+
+        Raises
+        ------
+        InputError
+            If a name, shape or value is invalid, a strength is not above the initial stress, no
+            strength is above the residual strength, or a `Sample` was made by another problem;
+            the message lists every problem.
+
+        Notes
+        -----
+        A node whose strength is not above its residual strength does not weaken: its strength is
+        constant. An `AccuracyWarning` gives the share of such nodes, and that of nodes where the
+        initial stress is below minus the strength.
+        """
+        return self.placed_sample(profiles, accept)[0]
+
+    def placed_sample(
+        self, profiles: Any, accept: Collection[str] = (), gaps: Gaps = "refuse"
+    ) -> tuple[Sample, Any]:
+        """Return a sample, and a mask of where all of its profiles were measured, or True."""
+        friction, interface = self.friction, self.interface
+        if isinstance(profiles, Sample):
+            profiles, accept = self._given_sample(profiles), {*accept, "constant"}
+        given = named_profiles(profiles)
+        of = "strength" if "strength" in given else "friction_coefficient"
+        if of not in given:
+            raise InputError("strength: missing among the profiles")
+        problems: list[str] = []
+        measured = [np.ones((1, *interface.shape), dtype=bool)]
+        scales = [name for name in SCALES if name in given]
+        if len(scales) > 1:
+            problems.append(f"give one of {', '.join(SCALES)}, got {' and '.join(scales)}")
+
+        def read(name: str, own: Any, samples: int | None) -> Any:
+            try:
+                value, known = at_nodes(name, given.get(name, own), interface, gaps)
+                if not np.all(known):
+                    measured.append(known.reshape(-1, *interface.shape))
+                with prefixed(name):
+                    return _rows(name, value, interface, samples, "barriers" in accept)
+            except InputError as error:
+                problems.extend(error.problems)
+                return np.ones((samples or 1, *interface.shape))
+
+        strength = read(of, None, None)
+        samples = len(strength)
+        pressure = np.broadcast_to(np.nan, (samples, *interface.shape))
+        if self.given_pressure is not None or "normal_pressure" in given:
+            pressure = read("normal_pressure", self.normal_pressure, samples)
+            own = np.shape(given.get("normal_pressure", pressure))
+            if own in ((), (samples, 1)):  # that of each sample, which its blocks distribute
+                pressure = pressure * self.pressing
+        if of != "strength":
+            problems += _no_coefficients(strength, pressure)
+            strength = strength * pressure
+        residual = friction.residual(np.where(np.isinf(strength), 0.0, strength))
+        residual = read("residual_strength", residual, samples)
+        initial = read("initial_stress", self.load.initial_stress, samples)
+        scale, value = friction.scale
+        scale = scales[0] if scales else scale
+        value = read(scale, value, samples)
+        problems = problems or self._impossible(strength, residual, initial, accept)
+        if problems:
+            raise InputError(problems)
+        rates = self._rates(strength, residual, scale, value)
+        constant = strength <= residual
+        if constant.any():
+            # Residual from the start, tau_r = tau_p: then d_c = 0, and W is of no consequence.
+            residual = np.minimum(residual, strength)
+            along = interface.axes
+            slowest = np.min(rates, axis=along, where=~constant, initial=np.inf, keepdims=True)
+            rates = np.where(constant, slowest, rates)
+            if "constant" not in accept:
+                warn_accuracy(
+                    f"strength is not above residual_strength at {100.0 * constant.mean():.2g}"
+                    " % of the nodes; these do not weaken: their strength is constant"
+                )
+        if initial.min() < 0.0 and (reversed_at := initial < -strength).any():
+            warn_accuracy(
+                f"initial_stress is below minus the strength at {100.0 * reversed_at.mean():.2g} %"
+                " of the nodes; they would slip in reverse, which is not modelled, and are held"
+            )
+        load_shape = np.array(np.broadcast_to(self.load_profile, interface.shape), dtype=float)
+        sample = Sample(strength, residual, rates, initial, load_shape, pressure, self)
+        if "steep" not in accept:
+            self._check_resolution(sample.steepest_rate)
+        return sample, reduce(np.logical_and, measured)
+
+    def _given_sample(self, sample: Sample) -> dict[str, Array]:
+        """Return the profiles of a ready-made sample by name; refuse one of another problem."""
+        if sample.shape != self.interface.shape:
+            shapes = f"shape {sample.shape}, the interface {self.interface.shape}"
+            raise InputError(f"profiles: the sample has {shapes}")
+        others = [] if sample.problem is None else differing(self, sample.problem)
+        if not (others or np.allclose(sample.load_profile, self.load_profile, rtol=1e-6)):
+            others = ["load_profile"]
+        if others:
+            raise InputError(
+                f"profiles: the sample was made by a problem with another {', '.join(others)};"
+                " make it with problem.sample(strength)"
+            )
+        given = {name: rows for name, rows in sample._asdict().items() if name in PROFILES}
+        if np.isnan(sample.normal_pressure).all():
+            del given["normal_pressure"]
+        return given
+
+    def _impossible(
+        self, strength: Array, residual: Array, initial: Array, accept: Collection[str]
+    ) -> list[str]:
+        """Return what is wrong with profiles that are in order one by one."""
+        along, problems = self.interface.axes, []
+        over = (strength <= initial).reshape(len(strength), -1)
+        if "overstress" not in accept and over.any():
+            number = int(over.any(axis=1).argmax())
+            node = int(over[number].argmax())
+            most, least = initial[number].flat[node], strength[number].flat[node]
+            others = int(over.any(axis=1).sum()) - 1
+            problems.append(
+                f"strength: must be above initial_stress everywhere; it is not at"
+                f" {over[number].sum()} of {over.shape[1]} nodes of sample {number}, the first at"
+                f" {self.interface.describe_node(node)}: {least:g} against {most:g} Pa"
+                f"{f', and in {others} more samples' * (others > 0)}; only st.Rupture() accepts"
+                " stress above the strength"
+            )
+        if np.max(strength, where=np.isfinite(strength), initial=0.0) > HUGE * strength.min():
+            middle = np.median(strength, axis=along, keepdims=True)
+            huge = np.isfinite(strength) & (strength > HUGE * middle)
+            if huge.any():
+                number, node = np.argwhere(huge.reshape(len(strength), -1))[0].tolist()
+                problems.append(
+                    f"strength: {strength[number].flat[node]:g} Pa at"
+                    f" {self.interface.describe_node(node)} of sample {number} is more than"
+                    f" {HUGE:g} times the median, {middle[number].item():g} Pa, which is lost"
+                    " beside it in round-off; less is as good where nothing breaks, or give"
+                    " np.inf to st.Rupture()"
+                )
+        nowhere = ~((strength > residual) & np.isfinite(strength)).any(axis=along)
+        if nowhere.any():
+            number = int(np.argmax(nowhere))
+            least, most = strength[number].min(), strength[number].max()
+            problems.append(
+                "strength: must be finite and above residual_strength at one node or more; in"
+                f" sample {number} strength is {least:g} to {most:g} Pa and residual_strength"
+                f" {residual[number].min():g} to {residual[number].max():g} Pa: check the units of"
+                " both"
+            )
+        return problems
+
+    def _rates(self, strength: Array, residual: Array, scale: str, value: Array) -> Array:
+        """Return weakening rates, Pa/m, from whichever scale of slip is given."""
+        rates = self.friction.rate(strength - residual, scale, value)
+        barriers = np.isinf(strength)
+        if barriers.any() and scale != "weakening_rate":  # any rate will do: nothing weakens
+            along = self.interface.axes
+            own = np.where(barriers, 0.0, rates).max(axis=along, keepdims=True)
+            rates = np.where(barriers, own, rates)
+        return rates
+
+
+def _rows(
+    name: str, value: Any, interface: Interface, samples: int | None, barriers: bool
+) -> Array:
+    """Return `value` as a (samples, *shape) float64 array, or raise an `InputError`.
+
+    A single profile (*shape) is one sample. Where `samples` is given, a number, a profile
+    or one number a sample, of shape (samples, 1), is broadcast to all.
+    """
+    shape, array = interface.shape, as_numbers(value)
+    valid = f"{shape} or ({samples or 'samples'}, {', '.join(map(str, shape))})"
+    if samples is None:
+        fits = array.size > 0 and shape in (array.shape, array.shape[1:])
+    else:
+        valid += f", ({samples}, 1) or a number"
+        column = (samples, *(1 for _ in shape))
+        array = array.reshape(column) if array.shape == (samples, 1) else array
+        fits = array.shape in ((), shape, column, (samples, *shape))
+    if not fits:
+        hint = turned(array.shape[-2:], shape)
+        raise InputError(f"must have shape {valid}, got shape {array.shape}{hint}")
+    infinite = barriers and name == "strength"
+    bad = ~(np.abs(array) <= LARGEST) & ~(infinite & (array == np.inf))
+    if bad.any():
+        entry = tuple(np.argwhere(bad)[0].tolist())
+        given = f"{array[entry]:g} (at most {LARGEST:g})"
+        raise InputError(f"must be finite; entry {entry} is {given}")
+    least = f"{array.min():g} {QUANTITIES[name].units}"
+    if name in SCALES and array.min() <= 0.0:
+        raise InputError(f"must be positive, got {least}")
+    if name == "residual_strength" and array.min() < 0.0:
+        raise InputError(f"must not be negative, got {least}")
+    if samples is None:
+        return array.reshape(-1, *shape)
+    return np.broadcast_to(array, (samples, *shape))
+
+
+def _no_coefficients(values: Array, pressure: Array) -> list[str]:
+    """Return why values are no friction coefficients, or what they lack."""
+    if np.isnan(pressure).all():
+        return [
+            "friction_coefficient: needs a normal pressure (load.normal_pressure, Pa, or"
+            " load.pressing_force, N)"
+        ]
+    mean = float(np.mean(values))
+    large = (
+        f"friction_coefficient: its mean is {mean:.3g}; if that is a strength, state its unit,"
+    )
+    return [f"{large} as .assign_attrs(units='Pa') does"] * (mean >= FRICTION[1][1])
+
+
+def named_profiles(given: Any) -> dict[str, Any]:
+    """Return profiles by name: of a mapping or dataset, or of the strength alone.
+
+    The strength may be given as friction coefficients: by this name, or by the unit that it states.
+    """
+    if not isinstance(given, Mapping):  # a Dataset is one too
+        return {"friction_coefficient" if is_coefficient(given) else "strength": given}
+    known = (*PROFILES, "friction_coefficient")
+    unknown = [
+        unknown_name("profiles", str(name), known) for name in given if name not in known
+    ]
+    if "strength" in given and "friction_coefficient" in given:
+        unknown.append("profiles: give either strength (Pa) or friction_coefficient (1)")
+    if unknown and not hasattr(given, "data_vars"):
+        raise InputError(unknown)
+    return {name: given[name] for name in given if name in known}
+
+
+def refusals(problem: Problem, method: Any) -> list[str]:
+    """Return why a method does not take a problem; no texts if it does."""
+    return [
+        f"method: the {method.label} cannot take this: {reason}"
+        for reason in method.supports(problem)
+    ]

@@ -1,0 +1,306 @@
+"""Values put on the nodes of a line or a plane, and their gaps.
+
+The nodes are x_i = i L/n in each direction, periodically: points may come in any order and begin
+anywhere. Those of a specimen are x_i = (i + 1/2) L/n, and nothing continues beyond its ends. What
+is missing stays NaN unless it is filled on request.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, warn_accuracy
+from stiction.problem.interface import Interface
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Gaps = Literal["refuse", "fill", "skip"]
+Mask = NDArray[np.bool_]
+
+TOLERANCE = 0.02
+"""Of the spacing of nodes: what rounding in a file may move a point."""
+WIDE = 4.0
+"""Times the median distance of points: what is wider is no interval but a gap."""
+IN_GAP, MEASURED = "in_gap", "measured"
+"""Variable of a result; coordinate of results and profiles with gaps, False where none was."""
+OF_A_PLANE = (
+    "; a map has columns or coordinates x and y, or is a matrix of shape (nx, ny), and needs an"
+    " interface of two lengths and two numbers of nodes"
+)
+"""What to do with two dimensions where a line was expected."""
+
+
+def points_of(array: Any) -> tuple[Array, dict[str, Array], Any]:
+    """Return values (..., points), their places (m) by direction, and where they were measured.
+
+    The mask is True if nothing was filled in. Values without coordinates keep their shape, and the
+    dictionary is empty.
+    """
+    dims = [dim for dim in ("x", "y") if dim in array.coords]
+    if len(dims) == 2 and "row" not in array.dims:
+        array = array.stack(row=dims, create_index=False)
+    measured: Any = True
+    if MEASURED in array.coords:
+        mask = array[MEASURED].broadcast_like(array).transpose(*array.dims)
+        measured = mask.values.astype(bool)
+    return array.values, {dim: array[dim].values for dim in dims}, measured
+
+
+def place(
+    array: Any, interface: Interface, interpolate: bool = False, gaps: Gaps = "refuse"
+) -> tuple[Array, Any]:
+    """Put values on the nodes of an interface, (..., *shape), with a mask of what was measured.
+
+    The mask is False where there was no value, be it filled in or left out; it is True if nothing
+    is missing.
+    """
+    values, places, measured = points_of(array)
+    if not places:
+        shape = values.shape[-len(interface.shape) :]
+        if shape != interface.shape:
+            hint = turned(shape, interface.shape)
+            if not interface.is_plane:
+                hint = (
+                    "; give one value per node, or name the column of x (x=...), with"
+                    " interpolate=True if points do not lie on the nodes"
+                )
+            raise InputError(f"must have shape {interface.shape}, got shape {shape}{hint}")
+        return close_gaps(values, measured, interface, gaps)
+    if values.size == 0:
+        raise InputError("has no values")
+    offsets = [_offset(dim, places[dim], interface, interpolate) for dim in interface.dims]
+    # Between the nodes, places differ if they are a millionth of the spacing apart.
+    finer = 10**6 if None in offsets else 1
+    shape = tuple(finer * n for n in interface.shape)
+    steps = [
+        np.round(finer * (places[dim] / h - interface.first - (offset or 0.0))).astype(np.int64)
+        for dim, h, offset in zip(interface.dims, interface.spacings, offsets, strict=True)
+    ]
+    if interface.is_free:
+        flat, at = steps[0], places["x"]
+        if finer == 1 and not 0 <= flat.min() <= flat.max() < interface.size:
+            raise InputError(
+                f"x reaches from {at.min():g} to {at.max():g} m, beyond the nodes of a specimen of"
+                f" {interface.extent:g} m; crop the record, or pass interpolate=True"
+            )
+    else:
+        flat = np.ravel_multi_index(steps, shape, mode="wrap")
+    node, first, twins = np.unique(flat, return_index=True, return_inverse=True)
+    _check_repeats(values, places, first[twins], interface)
+
+    def put(rows: Array) -> Array:
+        if finer > 1:
+            return _interpolated(places["x"][first], rows[..., first], interface)
+        full = np.full((*rows.shape[:-1], interface.size), np.nan)
+        full[..., node] = rows[..., first]
+        return full.reshape(*rows.shape[:-1], *interface.shape)
+
+    if finer > 1:
+        warn_accuracy(
+            f"{node.size} points are interpolated linearly to {interface.size} nodes, which are"
+            f" {interface.spacing:.3g} m apart"
+        )
+    whole = np.all(measured) or put(measured * 1.0) > 0.999
+    return close_gaps(put(values), whole, interface, gaps)
+
+
+def turned(given: tuple[int, ...], shape: tuple[int, ...]) -> str:
+    """Return the hint for a message on the shape of a plane if its axes are swapped."""
+    if len(shape) == 2 and given == shape[::-1]:
+        return "; x and y are swapped: the first axis of a profile is x"
+    return ""
+
+
+def _offset(dim: str, x: Array, interface: Interface, interpolate: bool) -> float | None:
+    """Return by how many spacings, in (-0.5, 0.5], all points lie beside nodes.
+
+    It is None if points are to be interpolated, as those of a line that is coarser than the nodes.
+    """
+    axis = interface.dims.index(dim)
+    spacing, length = interface.spacings[axis], interface.lengths[axis]
+    formula, cells = f"{dim}_i = i L/n", ", as at the centres of cells"
+    if interface.is_free:
+        formula, cells = f"{dim}_i = (i + 1/2) L/n", ""
+    at = np.unique(x) / spacing - interface.first
+    if at[-1] - at[0] > interface.shape[axis] + TOLERANCE:
+        period = np.ptp(x) + spacing * np.median(np.diff(at))  # both ends are not one place
+        raise InputError(
+            f"{dim} reaches from {x.min():g} to {x.max():g} m, the interface is {length:g} m long:"
+            f" check the unit of {dim}, crop the record, or make interface.length {period:.6g}"
+        )
+    first = at[0] - np.ceil(at[0] - 0.5 - TOLERANCE)
+    if interface.is_free and first > 0.5 - 2.0 * TOLERANCE:
+        first -= 1.0  # the node before would lie outside
+    deviation = at - first - np.round(at - first)
+    coarse = not interface.is_plane and (at.size < 2 or np.median(np.diff(at)) > 1.5)
+    if coarse or np.abs(deviation).max() > TOLERANCE:
+        if interpolate:
+            return None
+        advice = "" if interface.is_plane else ", or interpolate linearly with interpolate=True"
+        raise InputError(
+            f"{dim} does not coincide with the {interface.shape[axis]} nodes {formula}, which"
+            f" are {spacing:.6g} m apart: {at.size} points from {x.min():.6g} to {x.max():.6g} m;"
+            f" check the unit of {dim}, give values at the nodes, interface.{dim}{advice}"
+        )
+    offset = float(first + deviation.mean())
+    if abs(offset) > TOLERANCE:
+        warn_accuracy(
+            f"{dim} is offset by {offset:.2g} of a spacing from the nodes {formula}{cells}: node i"
+            f" stands for {dim}_i {offset * spacing:+.4g} m, to be added to positions in the result"
+        )
+    return offset
+
+
+def _check_repeats(
+    values: Array, places: dict[str, Array], twins: NDArray[np.int64], interface: Interface
+) -> None:
+    """Refuse two points at one place, unless they have the same value a period apart."""
+    rows = values.reshape(-1, twins.size)
+    for i in np.flatnonzero(twins != np.arange(twins.size)):
+        pair = [twins[i], i]
+        sides = zip(places.values(), interface.lengths, strict=True)
+        apart = max(np.ptp(x[pair]) / length for x, length in sides)
+        one, other = rows.T[pair]
+        if apart < 0.5 or not np.array_equal(one, other, equal_nan=True):
+            where = ", ".join(
+                f"{dim} = {x[twins[i]]:.9g} and {x[i]:.9g} m" for dim, x in places.items()
+            )
+            raise InputError(
+                f"{where} are the same position on an interface of period {interface.length}"
+                f" m; keep one of the two values{'' if interface.is_plane else OF_A_PLANE}"
+            )
+
+
+def _interpolated(x: Array, values: Array, interface: Interface) -> Array:
+    """Linear between points, and NaN in intervals that are gaps."""
+    length, nodes = interface.extent, interface.x
+    margin = TOLERANCE * interface.spacing
+    if not interface.is_free:
+        x = np.mod(x, length)
+    order = np.argsort(x)
+    x = x[order]
+    typical = float(np.median(np.diff(x))) if x.size > 1 else length
+    widest = WIDE * max(typical, interface.spacing)
+
+    def at_nodes(row: Array) -> Array:
+        known = np.flatnonzero(~np.isnan(row))
+        if known.size == 0:
+            raise InputError("has no value at all")
+        begin = x[known]
+        if interface.is_free:  # constant beyond the outermost points, or a gap
+            inner = np.searchsorted(begin, nodes).clip(1, max(known.size - 1, 1))
+            apart = np.diff(begin, append=begin[-1])[inner - 1]
+            cut = (apart > widest) | (np.diff(known, append=known[-1] + 1)[inner - 1] > 1)
+            near = np.abs(nodes[:, None] - begin).min(axis=1)
+            outside = (nodes < begin[0]) | (nodes > begin[-1])
+            found = np.interp(nodes, begin, row[known])
+            hole = np.where(outside, near > 0.5 * widest, cut & (near > margin))
+            return np.where(hole, np.nan, found)
+        width = np.diff(begin, append=begin[0] + length)
+        is_gap = (width > widest) | (np.diff(known, append=known[0] + x.size) > 1)
+        interval = np.searchsorted(begin, nodes, side="right") - 1
+        into = np.mod(nodes - begin[interval], length)
+        inside = (into > margin) & (into < width[interval] - margin)
+        found = np.interp(nodes, begin, row[known], period=length)
+        return np.where(inside & is_gap[interval], np.nan, found)
+
+    return np.apply_along_axis(at_nodes, -1, values[..., order])
+
+
+def close_gaps(
+    values: Array, measured: Any, interface: Interface, gaps: Gaps
+) -> tuple[Array, Any]:
+    """Return values (..., *shape) with NaN refused, left or filled, and what was measured."""
+    missing = np.isnan(values)
+    if not missing.any():
+        return values, measured
+    rows, holes = values.reshape(-1, *interface.shape), missing.reshape(-1, *interface.shape)
+    row = int(np.argmax(holes.any(axis=interface.axes)))
+    text = (
+        f"values are missing (NaN) at {holes[row].sum()} of {interface.size} nodes"
+        f"{f' of sample {row}' * (len(rows) > 1)}, the first at"
+        f" {interface.describe_node(int(np.argmax(holes[row])))}"
+    )
+    how = "smoothly from their rim" if interface.is_plane else "with straight lines"
+    if gaps == "refuse":
+        raise InputError(
+            f"{text}; give them, make interface.length that of the record, or pass gaps='fill'"
+            f" to st.onset or st.read_profile, which fills them {how}"
+        )
+    if gaps == "fill":
+        rows = rows.copy()
+        for one, hole in zip(rows, holes, strict=True):
+            if hole.any():
+                _fill(one, hole, interface)
+        values = rows.reshape(values.shape)
+        doubt = "; check interface.length and the unit of x" if missing.mean() > 0.5 else ""
+        warn_accuracy(f"{text}; filled {how}{doubt}")
+    return values, ~missing & measured
+
+
+def _fill(values: Array, hole: Mask, interface: Interface) -> None:
+    """Solve Laplace's equation of the nodes in the hole, periodically or up to free ends.
+
+    On a line that is the straight line between its ends; nothing is higher or lower than its rim.
+    """
+    from scipy.sparse import csr_array
+    from scipy.sparse.linalg import spsolve
+
+    if hole.all():
+        raise InputError("has no value at all")
+    known, own = np.where(hole, 0.0, values), np.flatnonzero(hole)
+    nodes = np.arange(hole.size).reshape(hole.shape)
+    right, columns = np.zeros(own.size), [own]
+    entries: list[Array] = [np.zeros(own.size)]
+    for axis, spacing in enumerate(interface.spacings):
+        for step in (1, -1):
+            weight: Array = np.full(hole.shape, (min(interface.spacings) / spacing) ** 2)
+            if interface.is_free:
+                weight[0 if step == 1 else -1] = 0.0
+            weight = weight[hole]
+            right += weight * np.roll(known, step, axis)[hole]
+            columns.append(np.roll(nodes, step, axis)[hole])
+            entries.append(-weight)
+            entries[0] += weight
+    rows = np.tile(np.arange(own.size), len(columns))
+    index = (rows, np.concatenate(columns))
+    matrix = csr_array((np.concatenate(entries), index), shape=(own.size, hole.size))
+    values[hole] = spsolve(matrix.tocsc()[:, own], right)
+
+
+def with_gaps(problem: Any, result: xr.Dataset, measured: Any) -> xr.Dataset:
+    """Return a result with the gaps of its profiles, and a mark of patches that reach into one."""
+    if np.all(measured):
+        return result
+    interface, position = problem.interface, result["critical_position"]
+    places = position.values.reshape(-1, len(interface.shape))
+    rate, spacings, missing = problem.uniform_rate, interface.spacings, ~measured
+    patch = spacings if rate is None else problem.nucleation_lengths(rate)
+    for axis, nodes in enumerate(interface.coordinates.values()):
+        half, reach = 0.5 * interface.lengths[axis], max(0.5 * patch[axis], spacings[axis])
+        apart = np.abs(nodes - places[:, axis, None])
+        if not interface.is_free:
+            apart = np.abs(np.mod(nodes - places[:, axis, None] + half, 2.0 * half) - half)
+        others = [other + 1 for other in range(len(spacings)) if other != axis]
+        missing = missing & np.expand_dims(apart < (1.0 - 1e-9) * reach, others)
+    found = missing.any(axis=interface.axes)
+    if found.any():
+        first = zip(interface.dims, places[int(np.argmax(found))], strict=True)
+        warn_accuracy(
+            f"the critical patch at {', '.join(f'{dim} = {at:.6g} m' for dim, at in first)} reaches"
+            f" into a gap of the profile ({found.sum()} of {found.size} samples): the strength"
+            " there was filled in, not measured"
+        )
+    dims = tuple(dim for dim in position.dims if dim != "direction")
+    about = {"units": "1", "long_name": "whether the critical patch reaches into a gap"}
+    result[IN_GAP] = (dims, found.reshape([position.sizes[dim] for dim in dims]), about)
+    nodes = {dim: (dim, at, {"units": "m"}) for dim, at in interface.coordinates.items()}
+    along = (("sample", *interface.dims), measured)
+    return result.assign_coords(
+        nodes | {MEASURED: along if len(measured) > 1 else (interface.dims, measured[0])}
+    )

@@ -1,0 +1,449 @@
+"""Measured profiles: read from files and labelled arrays, and put on the nodes of an interface.
+
+Whatever the source, its values become a DataArray in SI: along 'x', on a plane along 'x' and 'y'
+or, as a list of points, along 'row', with places (m) as coordinates 'x' and 'y' if there are any.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, UnitWarning, prefixed, unknown_name, warn_user
+from stiction.base.model import FilePath, Flag, as_numbers, check, checked, describe, real_array
+from stiction.base.units import factor_to, is_in, parse
+from stiction.base.variables import QUANTITIES
+from stiction.problem.interface import Interface
+from stiction.problem.profiles.placing import MEASURED, OF_A_PLANE, Gaps, close_gaps, place
+from stiction.problem.profiles.tables import load
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+NAMES = {
+    "strength": ("tau_p", "taup", "tau", "peak_strength", "shear_strength"),
+    "residual_strength": ("tau_r", "taur"),
+    "initial_stress": ("tau_i", "taui"),
+    "normal_pressure": ("pressure", "normal_stress", "sigma_n", "sigma"),
+    "critical_slip": ("d_c", "dc"),
+    "load_profile": ("profile", "load"),
+    "friction_coefficient": ("mu", "coefficient"),
+    "height": ("heights", "topography", "z"),
+}
+"""What else a quantity may be called."""
+PLACES = ("x", "position", "pos", "distance", "coordinate")
+SAMPLES = ("sample", "samples")
+_UNNAMED = re.compile(r"\d+$|values?$")
+"""Columns that say nothing of what they hold; without a heading they are called by numbers."""
+
+NARROWEST = 8
+"""Rows, and columns without headings, that are a matrix, its rows along x."""
+TALL = 1e-3
+"""Range of heights, m, from which on a unit must be stated: numbers in um or nm have more."""
+
+Column = str | int | None
+
+
+@checked
+def read_profile(
+    source: Any,
+    *,
+    x: Column = None,
+    value: Column = None,
+    unit: str | None = None,
+    x_unit: str | None = None,
+    quantity: str = "strength",
+    interface: Interface | None = None,
+    interpolate: Flag = False,
+    gaps: Gaps = "refuse",
+) -> xr.DataArray:
+    """Read a profile along the interface from a file or a labelled array, in SI units.
+
+    Parameters
+    ----------
+    source : path, xarray.DataArray or xarray.Dataset
+        ``.npy``: shape (nodes,) or (nx, ny). ``.csv``, ``.txt``, ``.dat``, ``.tsv``, ``.xlsx``:
+        columns, with or without a line of names such as ``x (mm); strength (MPa)``. ``.nc``:
+        variables with `units`, and x as a coordinate. A map is over 'x' and 'y'; a table has both
+        as columns, or is a matrix of eight columns or more without names, its rows along x.
+    x, value : str or int, optional
+        Name, heading or number (from 0) of the column, coordinate or variable. By default the one
+        with such a name (``x``, ``position``; ``strength``, ``tau_p``), the only one in a unit of
+        length or of `quantity`, or, without headings, the first and second of two columns.
+    unit, x_unit : str, optional
+        Units of the values and of positions if the source states none; SI by default.
+    quantity : str
+        'strength', 'residual_strength', 'initial_stress', 'normal_pressure' (Pa), 'critical_slip',
+        'height' (m), 'weakening_rate' (Pa/m), 'load_profile' or 'friction_coefficient' (1).
+    interface : Interface, optional
+        Map the profile to the nodes x_i = i L/n, modulo L, from points in any order.
+    interpolate : bool
+        Interpolate linearly if the points of a line do not coincide with the nodes.
+    gaps : {"refuse", "fill", "skip"}
+        Refuse missing values (NaN, empty cells, missing points), fill them with straight
+        lines (on a plane smoothly from their rim), or leave NaN, for `stiction.fit_field`.
+        Without an interface, they always stay.
+
+    Returns
+    -------
+    xarray.DataArray
+        Over 'x' (m), on a plane over 'x' and 'y', with `units`. With gaps it has the coordinate
+        'measured', False in a gap, which results take over.
+
+    Raises
+    ------
+    InputError
+        If the source cannot be read, a unit is unknown or unsuitable, columns are ambiguous,
+        or the profile does not fit the interface.
+
+    Warns
+    -----
+    AccuracyWarning
+        If something is interpolated or filled in, or x lies between the nodes.
+    UnitWarning
+        If heights without a unit range over more than 1 mm.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> import stiction as st
+    >>> interface = st.Interface(length=0.1, nodes=8)
+    >>> path = Path(tempfile.mkdtemp()) / "profile.csv"
+    >>> table = np.column_stack([interface.x * 1e3, np.linspace(0.8, 1.2, 8)])
+    >>> np.savetxt(path, table, delimiter=",", header="x (mm),strength (MPa)", comments="")
+    >>> profile = st.read_profile(path, interface=interface)
+    >>> round(float(profile.values.max()), 6)  # in Pa, as all of the package
+    1200000.0
+    """
+    import xarray as xr
+
+    if quantity not in QUANTITIES:
+        raise InputError(unknown_name("quantity", quantity, QUANTITIES))
+    if interface is None and (interpolate or gaps == "fill"):
+        raise InputError("interface: needed to interpolate, or to fill gaps")
+    if interpolate and interface is not None and interface.is_plane:
+        raise InputError("interpolate: is an option of profiles of a line")
+    dims = None if interface is None else interface.dims
+    with prefixed(str(source) if isinstance(source, str | Path) else "source"):
+        array = labelled(source, quantity, dims, x=x, value=value, unit=unit, x_unit=x_unit)
+        if not {*array.dims} <= {"x", "y", "row"}:
+            raise InputError(f"must hold one profile, got shape {array.shape}")
+        if interface is not None:
+            values, measured = place(array, interface, interpolate, gaps)
+            array = xr.DataArray(values, interface.coordinates, interface.dims)
+            if not np.all(measured):
+                array[MEASURED] = (interface.dims, measured)
+        else:
+            array = _in_order(array)
+    for dim in {"x", "y"} & {*array.coords}:
+        array[dim].attrs.update(units="m", long_name=f"position along {dim}")
+    if MEASURED in array.coords:
+        array[MEASURED].attrs["long_name"] = "measured, not filled in"
+    array.attrs = {"units": QUANTITIES[quantity].units, "long_name": quantity.replace("_", " ")}
+    return array.rename(quantity)
+
+
+def _in_order(array: Any) -> Any:
+    """Return a profile with rising coordinates, and points on a plane as a map."""
+    if "row" in array.dims:
+        array = array.set_index(row=["x", "y"])
+    for index in array.indexes.values():
+        if index.has_duplicates:
+            twin = index[index.duplicated()]
+            raise InputError(
+                f"x repeats: there are two values at {twin[0]} m ({twin.size} such places); keep"
+                f" one of the two, or their mean{OF_A_PLANE}"
+            )
+    array = array.unstack()
+    return array.sortby([dim for dim in array.dims if dim in array.coords])
+
+
+# -- values in SI --------------------------------------------------------------------------------
+
+
+def is_labelled(value: Any) -> bool:
+    """Whether it is an xarray object, tested without importing xarray."""
+    return hasattr(value, "dims") and hasattr(value, "coords")
+
+
+def is_coefficient(value: Any) -> bool:
+    """Whether a labelled array states that it holds pure numbers: friction coefficients."""
+    return is_labelled(value) and is_in(_unit_of(value), "1")
+
+
+def simplified(value: Any, quantity: str) -> Any:
+    """Return `value` as labelled, a pandas Series over positions too, or as numbers in SI."""
+    si = QUANTITIES[quantity].units
+    if is_labelled(value):
+        plain = not value.dims and not hasattr(value, "data_vars")
+        return _in_si(value, quantity, si) if plain else value
+    kind = getattr(getattr(getattr(value, "index", None), "dtype", None), "kind", "")
+    if kind == "f" and hasattr(value, "to_xarray"):
+        return value.to_xarray()
+    return _magnitude(value, si)
+
+
+def _magnitude(value: Any, si: str) -> Any:
+    """Return the number of a pint or astropy quantity in an SI unit; anything else as it is."""
+    si = re.sub(r"(-\d)", r"**\1", si).replace(" ", "*")  # Pa m-1: Pa*m**-1
+    try:
+        if hasattr(value, "magnitude") and hasattr(value, "to"):
+            return value.to(si).magnitude
+        if hasattr(value, "to_value") and hasattr(value, "unit"):
+            return value.to_value(si)
+    except Exception as error:  # each library has its own for 'no such unit'
+        raise InputError(f"cannot be converted to {si}: {error}") from None
+    return value
+
+
+def _in_si(array: Any, what: str, si: str, given: str | None = None) -> Any:
+    """Return the values of a DataArray in SI, by its unit or the one that the caller gives."""
+    stated = _unit_of(array)
+    with prefixed(what, " "):
+        values = as_numbers(_magnitude(array.data, si))
+        factor = factor_to(si, given or stated or si)
+        known = given and parse(stated)
+        if known and not np.isclose(factor_to(si, stated), factor, rtol=1e-12):
+            raise InputError(f"is given in {given}, but the source states {stated}")
+    return values * factor
+
+
+def _unit_of(array: Any) -> str:
+    return str(array.attrs.get("units") or array.attrs.get("unit") or "").strip()
+
+
+# -- which variable, and which coordinates -------------------------------------------------------
+
+
+def labelled(
+    source: Any,
+    quantity: str,
+    dims: tuple[str, ...] | None = None,
+    *,
+    x: Column = None,
+    value: Column = None,
+    unit: str | None = None,
+    x_unit: str | None = None,
+) -> Any:
+    """Return a quantity of `source` in SI along the directions `dims`, or those that it has.
+
+    A dimension of another name comes first. It is the only one if there is one value a sample.
+    """
+    data: Any = load(Path(source)) if isinstance(source, str | Path) else source
+    if not is_labelled(data):
+        raise InputError(f"must be a path, a DataArray or a Dataset, got {describe(source)}")
+    numbered = "row" in data.dims and all(str(name).isdecimal() for name in data.variables)
+    wide = numbered and min(len(data.variables), data.sizes["row"]) >= NARROWEST
+    if wide and x is value is None and dims != ("x",):
+        data = data.to_array("y").transpose("row", "y").drop_vars("y").rename(row="x")
+        if all(map(_equidistant, (data.values[0, 1:], data.values[1:, 0]))):
+            raise InputError(
+                "the first row and the first column of the matrix are places, not values; leave"
+                " them out, and give the interface"
+            )
+    if not hasattr(data, "data_vars"):
+        if value not in (None, data.name):
+            only = f"the name of the only variable, {data.name!r}"
+            raise InputError(f"value: {value!r} is not {only}")
+        data, value = data.to_dataset(name=quantity), quantity
+    dims = dims or (("x", "y") if _is_map(data) else ("x",))
+    names, table, si = list(data.data_vars), "row" in data.dims, QUANTITIES[quantity].units
+    words = (quantity, *NAMES.get(quantity, ()))
+    chosen = None if value is None else _column(data, names, "value", value)
+    along = [name for name in data.variables if data[name].ndim == 1 and name != chosen]
+    if len(dims) == 2:
+        places = {_plain(name): name for name in along if _plain(name) in dims}
+    else:
+        name = _choose(data, [name for name in along if name in data.dims], PLACES)
+        name = name or _choose(data, along, PLACES, "m" if table and si != "m" else "")
+        if name is None and table and len(names) == 2 and _plain(names[0]) not in words:
+            name = names[0] if names[0] != chosen else None
+        places = {} if name is None else {"x": name}
+    if x is not None:
+        places["x"] = _column(data, along, "x", x)
+    left = [name for name in names if name not in places.values()]
+    left = [name for name in left if table or data[name].ndim >= len(dims)]
+    if chosen is None:
+        chosen = _choose(data, left, words, si)
+    if chosen is None and len(left) == 1 and _UNNAMED.match(_plain(left[0])):
+        chosen = left[0]
+    rivals = [name for name in left if name != chosen and _plain(name) in PLACES]
+    many = value is None and len(names) > 2
+    unplaced = len(places) < len(dims) and (len(dims) == 2 or many)
+    if chosen is None or (table and (unplaced or (rivals and x is None and len(dims) == 1))):
+        raise InputError(_unclear(data, names, quantity, dims))
+    array = data[chosen]
+    texts = [data[name].attrs.get("text") for name in (chosen, *places.values()) if table]
+    if any(texts):
+        raise InputError(filter(None, texts))
+    at = {dim: data[name].variable for dim, name in places.items()}
+    at = {dim: one for dim, one in at.items() if {*one.dims} <= {*array.dims}}
+    own = [name for name in array.coords if name not in (MEASURED, *array.dims)]
+    array = _directed(array.drop_vars(own).assign_coords(at), dims)
+    if len({*dims} & {*array.coords}) == 1 < len(dims):
+        raise InputError("has the coordinate x or y only; a map has both, or none")
+    values = _in_si(array, quantity, si, unit)
+    stated = unit or _unit_of(array) or hasattr(array.data, "units")
+    finite = values[np.isfinite(values)]
+    if quantity == "height" and not stated and finite.size and np.ptp(finite) > TALL:
+        warn_user(
+            f"height: has no unit, is taken in m, and ranges over {np.ptp(finite):.3g} m; give"
+            " unit='um' or another, or unit='m' if that is right",
+            UnitWarning,
+        )
+    for dim in {*dims} & {*array.coords}:
+        place = _in_si(array[dim], dim, "m", x_unit)
+        if not np.all(np.isfinite(place)):
+            entry = int(np.argmin(np.isfinite(place)))
+            line = f" (line {data.attrs['lines'][entry]})" if "lines" in data.attrs else ""
+            raise InputError(f"{dim} must be finite; entry {entry}{line} is not")
+        array = array.assign_coords({dim: (array[dim].dims, place)})
+    return array.copy(data=values)
+
+
+def _equidistant(values: Array) -> bool:
+    steps = np.diff(values)
+    return bool(np.ptp(steps) < 1e-3 * np.abs(steps.mean()))
+
+
+def _is_map(data: Any) -> bool:
+    """Whether values lie on a plane: over x and y, or in a table of both where x repeats."""
+    if "row" not in data.dims:
+        return {"x", "y"} <= {*data.dims}
+    columns = {_plain(name): data[name].values for name in data.data_vars}
+    both = len(columns) > 2 and {"x", "y"} <= {*columns}
+    return both and np.unique(columns["x"]).size < columns["x"].size
+
+
+def _choose(data: Any, names: list[Any], called: tuple[str, ...], si: str = "") -> Any:
+    """Return the variable with one of several names, or else the only one that states a unit."""
+    for word in called:
+        if found := [name for name in names if _plain(name) == word]:
+            return found[0]
+    fitting = [name for name in names if is_in(_unit_of(data[name]), si)]
+    return fitting[0] if len(fitting) == 1 else None
+
+
+def _column(data: Any, names: list[Any], what: str, wanted: Column) -> Any:
+    """Return the variable of this name, heading or number."""
+    columns = list(data.data_vars)
+    if isinstance(wanted, int) and "row" in data.dims and 0 <= wanted < len(columns):
+        return columns[wanted]
+    for name in names:
+        if wanted in (name, data[name].attrs.get("heading")):
+            return name
+    raise InputError(unknown_name(what, str(wanted), map(str, names)))
+
+
+def _unclear(data: Any, names: list[Any], quantity: str, dims: tuple[str, ...]) -> str:
+    units = {name: _unit_of(data[name]) for name in names if not str(name).isdecimal()}
+    shown = [f"{name!r} in {unit}" if unit else repr(name) for name, unit in units.items()]
+    listed = ", ".join(shown) or f"{len(names)} columns without names, as of a matrix"
+    if len(dims) == 2 and not {*dims} <= {_plain(name) for name in data.variables}:
+        return f"has no columns x and y: got {listed}{OF_A_PLANE}"
+    return (
+        f"holds no variable that is clearly the {quantity} ({QUANTITIES[quantity].units}): got"
+        f" {listed}. Call it {quantity!r}, state its unit, or give x=..., value=... and unit=..."
+        + (
+            "; heights are read with quantity='height', friction coefficients with"
+            " quantity='friction_coefficient'"
+        )
+        * (quantity == "strength")
+        + OF_A_PLANE * (len(data.data_vars) != 2)
+    )
+
+
+def _plain(name: Any) -> str:
+    return str(name).casefold().replace(" ", "_")
+
+
+def _directed(array: Any, dims: tuple[str, ...]) -> Any:
+    """Return an array over 'x' ('x' and 'y', or 'row'), after the sample if there are several."""
+    if len(dims) == 1 and "x" in array.coords:
+        array = array.swap_dims({array["x"].dims[0]: "x"})
+    names = [str(dim) for dim in array.dims]
+    if len(dims) == 1 and "x" not in names:
+        called = [name for name in names if _plain(name) in PLACES]
+        called = called or [name for name in names if _plain(name) not in SAMPLES]
+        if len(called) == 1 or (names and all(name.startswith("dim_") for name in names)):
+            array = array.rename({called[-1]: "x"})  # without names the order counts
+    along = [dim for dim in (*dims, "row") if dim in array.dims]
+    samples = [dim for dim in array.dims if dim not in along]
+    one_each = not along and len(samples) == 1
+    one_each = one_each and (len(dims) == 1 or _plain(samples[0]) in SAMPLES)
+    clear = one_each or along in ([*dims], ["row"])
+    if not clear or len(samples) > 1 or "y" in samples or len({*array.dims}) < array.ndim:
+        raise InputError(
+            f"which dimensions run along the interface is not clear from ({', '.join(names)}); call"
+            " it 'x', on a plane 'x' (the direction of load and slip) and 'y', and another one"
+            f" 'sample'{OF_A_PLANE * (len(dims) == 1)}"
+        )
+    array = array.drop_vars([name for name in array.coords if name not in (MEASURED, *dims)])
+    return array.transpose(*samples, *along)
+
+
+# -- what takes profiles -------------------------------------------------------------------------
+
+
+def at_nodes(
+    name: str, value: Any, interface: Interface, gaps: Gaps = "refuse"
+) -> tuple[Any, Any]:
+    """Return what a caller gave for a quantity, with one value a node, and where it was measured.
+
+    `name` may be a dotted key. Numbers, and arrays of another shape, pass as they are, for whoever
+    checks that. The mask is True if nothing is missing.
+    """
+    quantity = quantity_of(name)
+    with prefixed(name):
+        if isinstance(value, ProfileFile):
+            value = value.to_xarray(interface)
+        value = simplified(value, quantity)
+        if is_labelled(value):
+            array = labelled(value, quantity, interface.dims)
+            if array.ndim == 1 and not {*array.dims} <= {"x", "row"}:  # one value a sample
+                if quantity == "strength":
+                    raise InputError("has no dimension along the interface; call it 'x'")
+                return array.values[:, np.newaxis], True
+            return place(array, interface, gaps=gaps)
+        with suppress(TypeError):  # no numbers: refused with everything else that is wrong
+            array = real_array(value)
+            if array.shape[-len(interface.shape) :] == interface.shape:
+                return close_gaps(array, True, interface, gaps)
+    return value, True
+
+
+class ProfileFile(NamedTuple):
+    """A profile that a study file names: it is read once its interface is known."""
+
+    path: Path
+    options: dict[str, Any]
+
+    def to_xarray(self, interface: Interface | None = None) -> xr.DataArray:
+        """Read the file, and place its values on an interface."""
+        return read_profile(self.path, interface=interface, **self.options)
+
+
+def profile_in_file(given: Any, field: str, folder: Path) -> Any:
+    """Return the profile that a study file names: its path, or `file` and options of the reader."""
+    table = dict(given) if isinstance(given, Mapping) else {"file": given}
+    if "file" not in table:
+        return given
+    path = folder / check("file", table.pop("file"), FilePath)
+    own = sorted(table.keys() & {"source", "quantity", "interface"})
+    if own:
+        raise InputError(f"{own[0]}: is not an option in a study file")
+    return ProfileFile(path, table | {"quantity": quantity_of(field)})
+
+
+def quantity_of(key: str) -> str:
+    """Return what the parameter of this name, or of this dotted key, holds."""
+    field = key.rsplit(".", 1)[-1]
+    return "load_profile" if field == "profile" else field

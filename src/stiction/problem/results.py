@@ -1,0 +1,94 @@
+"""Results: labelled datasets with units and all it takes to run them again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction import __version__
+from stiction.base.errors import InputError
+from stiction.base.model import to_plain
+from stiction.base.variables import DIRECTION, ONSET_VARIABLES, Variable
+from stiction.problem.interface import Interface
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def study_attributes(**parts: Any) -> dict[str, Any]:
+    """Return the problem, the method, ... by name in plain form, or why they have none."""
+    try:
+        return {"study": {name: to_plain(part) for name, part in parts.items()}}
+    except InputError as error:
+        return {"study_incomplete": str(error)}
+
+
+def along(interface: Interface, variable: Variable) -> Variable:
+    """Return the same variable with one value a node."""
+    return replace(variable, dims=(*variable.dims, *interface.dims))
+
+
+def position(interface: Interface, variable: Variable) -> Variable:
+    """Return the same variable as a place, which has two components on a plane."""
+    dims = (*variable.dims, DIRECTION) if interface.is_plane else variable.dims
+    return replace(variable, dims=dims)
+
+
+def onset_variables(interface: Interface) -> dict[str, Variable]:
+    """Return the variables that every method computes for each sample."""
+    place = position(interface, ONSET_VARIABLES["critical_position"])
+    return ONSET_VARIABLES | {"critical_position": place}
+
+
+def coordinate(interface: Interface, dim: str) -> tuple[NDArray[Any], Variable]:
+    """Return the values and the meaning of a dimension of the interface."""
+    if dim == DIRECTION:
+        return np.array(interface.dims), Variable("", "direction of a component", (DIRECTION,))
+    what = f"position along {dim}" if interface.is_plane else "position along the interface"
+    return interface.coordinates[dim], Variable("m", what, (dim,))
+
+
+def as_text(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return attributes other than strings and numbers as JSON."""
+    return {
+        name: value if isinstance(value, str | int | float) else json.dumps(value)
+        for name, value in attributes.items()
+    }
+
+
+def to_dataset(
+    values: Mapping[str, NDArray[Any]],
+    variables: Mapping[str, Variable],
+    coordinates: Mapping[str, tuple[NDArray[Any], Variable]],
+    attributes: Mapping[str, Any],
+    interface: Interface | None = None,
+) -> xr.Dataset:
+    """Label arrays with dimensions, coordinates (those of an `interface` too), units and names.
+
+    Attributes other than strings and numbers are written as JSON.
+    """
+    import xarray as xr
+
+    def labelled(array: NDArray[Any], variable: Variable) -> Any:
+        about = {"units": variable.units, "long_name": variable.long_name}
+        return variable.dims, np.asarray(array), about
+
+    attrs: dict[str, Any] = {"stiction_version": __version__}
+    attrs |= {f"{library}_version": version(library) for library in ("numpy", "numba")}
+    attrs |= as_text(attributes)
+    coordinates = dict(coordinates)
+    if interface is not None:
+        used = {dim for name in values for dim in variables[name].dims}
+        for dim in sorted(used & {*interface.dims, DIRECTION}):
+            coordinates[dim] = coordinate(interface, dim)
+    return xr.Dataset(
+        {name: labelled(array, variables[name]) for name, array in values.items()},
+        coords={name: labelled(*given) for name, given in coordinates.items()},
+        attrs=attrs,
+    )

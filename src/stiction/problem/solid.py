@@ -1,0 +1,136 @@
+"""The elastic half-spaces."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+from pydantic_core import ArgsKwargs
+
+from stiction.base.errors import InputError, UnitWarning, warn_user
+from stiction.base.model import Mode, Positive, Real, check, is_finite, model
+
+SLOWEST, FASTEST = 0.3, 2e4
+"""m/s; shear waves run at 1 m/s in the softest gels and at 12 km/s in diamond."""
+
+
+@model
+class Solid:
+    """One of two identical linear-elastic half-spaces.
+
+    Parameters
+    ----------
+    shear_modulus : float
+        G, Pa. Alternatively, pass `youngs_modulus`, E in Pa; then G = E/(2 (1 + nu)) is stored.
+    poisson_ratio : float
+        nu, in (-1, 0.5).
+    density : float
+        rho, kg/m3.
+    plane : {"strain", "stress"}
+        Plane state of the in-plane problem (mode II); mode III does not depend on it.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0).shear_wave_speed
+    1000.0
+    """
+
+    shear_modulus: Positive
+    poisson_ratio: Annotated[Real, Field(gt=-1, lt=0.5)]
+    density: Positive
+    plane: Literal["strain", "stress"] = "strain"
+
+    if TYPE_CHECKING:  # with what the validator below takes besides
+
+        def __init__(
+            self, shear_modulus: float = ..., poisson_ratio: float = ..., density: float = ...,
+            plane: Literal["strain", "stress"] = ..., *, youngs_modulus: float = ...,
+        ) -> None: ...  # fmt: skip
+
+    @model_validator(mode="before")
+    @classmethod
+    def _shear_modulus(cls, given: Any) -> Any:
+        """Replace `youngs_modulus` by G = E/(2 (1 + nu))."""
+        named = dict(given.kwargs or {}) if isinstance(given, ArgsKwargs) else given
+        if not isinstance(named, dict) or "youngs_modulus" not in named:
+            return given
+        if "shear_modulus" in named or (isinstance(given, ArgsKwargs) and given.args):
+            raise InputError("give either shear_modulus or youngs_modulus, by name")
+        ratio: Any = named.get("poisson_ratio")
+        named = dict(named)
+        modulus = check("youngs_modulus", named.pop("youngs_modulus"), Positive)
+        # Without a usable ratio any modulus will do: the ratio is what is complained of.
+        usable = is_finite(ratio) and ratio > -1.0
+        named["shear_modulus"] = modulus / (2.0 * (1.0 + (ratio if usable else 0.0)))
+        return ArgsKwargs((), named) if isinstance(given, ArgsKwargs) else named
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: Any, handler: Any) -> Any:
+        schema = handler.resolve_ref_schema(handler(core))
+        schema["properties"]["youngs_modulus"] = {
+            "type": "number", "exclusiveMinimum": 0, "title": "Youngs Modulus",
+        }  # fmt: skip
+        return schema
+
+    @model_validator(mode="after")
+    def _plausible(self) -> Solid:
+        speed = self.shear_wave_speed
+        if not SLOWEST <= speed <= FASTEST:
+            warn_user(
+                f"solid: the shear wave speed is {speed:.4g} m/s, which no solid has;"
+                f" check the units of shear_modulus = {self.shear_modulus:g} Pa and"
+                f" density = {self.density:g} kg/m3",
+                UnitWarning,
+            )
+        return self
+
+    @property
+    def shear_wave_speed(self) -> float:
+        """c_s = sqrt(G/rho), m/s."""
+        return math.sqrt(self.shear_modulus / self.density)
+
+    @property
+    def wave_speed_ratio(self) -> float:
+        """c_d/c_s: sqrt(2 (1-nu)/(1-2 nu)) in plane strain, sqrt(2/(1-nu)) in plane stress."""
+        nu = self.poisson_ratio
+        if self.plane == "strain":
+            return math.sqrt(2.0 * (1.0 - nu) / (1.0 - 2.0 * nu))
+        return math.sqrt(2.0 / (1.0 - nu))
+
+    @property
+    def dilatational_wave_speed(self) -> float:
+        """c_d of the plane state, m/s."""
+        return self.wave_speed_ratio * self.shear_wave_speed
+
+    @property
+    def rayleigh_wave_speed(self) -> float:
+        """c_R, m/s, from Rayleigh's cubic in q = (c_R/c_s)^2.
+
+        q^3 - 8 q^2 + (24 - 16/eta^2) q - 16 (1 - 1/eta^2) = 0 with eta = c_d/c_s: the equation
+        (2-q)^2 = 4 sqrt(1-q) sqrt(1-q/eta^2), squared and divided by q (Rayleigh, 1885).
+        """
+        slowness = self.wave_speed_ratio**-2
+        roots = np.roots([1.0, -8.0, 24.0 - 16.0 * slowness, -16.0 * (1.0 - slowness)])
+        real = roots.real[np.abs(roots.imag) < 1e-9]
+        return math.sqrt(float(real.min())) * self.shear_wave_speed
+
+    @property
+    def kolosov(self) -> float:
+        """Kolosov's constant: 3 - 4 nu in plane strain, (3 - nu)/(1 + nu) in plane stress."""
+        nu = self.poisson_ratio
+        return 3.0 - 4.0 * nu if self.plane == "strain" else (3.0 - nu) / (1.0 + nu)
+
+    def effective_modulus(self, mode: Mode = "II") -> float:
+        """Static modulus G*, Pa, in tau(k) = tau_0 - (G*/2) |k| delta(k).
+
+        Mode II: G/(1-nu) in plane strain, G (1+nu) in plane stress, that is 2 G (1 - c_s^2/c_d^2)
+        (Geubelle and Rice, 1995, static limit). Mode III: G.
+        """
+        if mode not in ("II", "III"):
+            raise InputError(f"mode: must be 'II' or 'III', got {mode!r}")
+        if mode == "III":
+            return self.shear_modulus
+        return 2.0 * self.shear_modulus * (1.0 - self.wave_speed_ratio**-2)

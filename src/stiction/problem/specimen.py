@@ -1,0 +1,161 @@
+"""Specimens: two equal blocks with free ends, how they are driven and how they are pressed."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
+
+from stiction.base.errors import InputError
+from stiction.base.kinds import Kinds, OneOf
+from stiction.base.model import Mode, Positive, as_number, model
+from stiction.elasticity.blocks import Pushes
+from stiction.elasticity.driven import Driven, driven
+from stiction.problem.solid import Solid
+
+
+def _stiffness(value: Any) -> float:
+    return math.inf if value == "inf" else as_number(value)
+
+
+def _written(value: float) -> Any:
+    """Return a number, or 'inf', which JSON has no number for."""
+    return "inf" if value == math.inf else value
+
+
+Stiffness = Annotated[
+    float, BeforeValidator(_stiffness), PlainSerializer(_written), Field(ge=0.0)
+]
+
+
+def _height(value: Any) -> float:
+    if isinstance(value, list | tuple) or value == math.inf:
+        raise ValueError(
+            "two unlike blocks, or a block on a rigid base, are not modelled: slip would change"
+            " the pressure; give the one height of two equal blocks"
+        )
+    return as_number(value)
+
+
+def _pressing(value: Any) -> Any:
+    if value == "free":
+        raise ValueError(
+            "a free top would let the block tilt and lift off; use 'frictionless' (rollers) or"
+            " 'glued'"
+        )
+    return value
+
+
+@model(kw_only=True)
+class Platen:
+    """The top face is glued to a rigid platen that moves along the interface only.
+
+    Parameters
+    ----------
+    stiffness : float
+        Of the machine, N/m between the grips of the two blocks: 0 is dead load (the force is
+        controlled), ``float("inf")`` a rigid machine (the travel is controlled).
+    """
+
+    stiffness: Stiffness = 0.0
+    type: Literal["platen"] = "platen"
+
+
+@model(kw_only=True)
+class Pusher:
+    """A uniform traction on a side of each block; the top face lies on rollers.
+
+    Parameters
+    ----------
+    height : float
+        Of the middle of the pusher above the interface, m.
+    width : float
+        Over which it pushes, m.
+    side : {"left", "right", "both"}
+        The trailing side, from which slip is driven. On both sides, each takes half: the shear of a
+        lap joint, whose bending and change of pressure are not modelled.
+    stiffness : float
+        Of the machine, N/m between the grips of the two blocks; see `Platen`.
+    """
+
+    height: Positive
+    width: Positive
+    side: Literal["left", "right", "both"] = "left"
+    stiffness: Stiffness = 0.0
+    type: Literal["pusher"] = "pusher"
+
+
+DRIVES = Kinds("drives", {"platen": "problem.specimen:Platen", "pusher": "problem.specimen:Pusher"})
+
+
+def _drive(value: Any) -> Any:
+    return value if isinstance(value, Platen | Pusher) else NotImplemented
+
+
+@model(kw_only=True)
+class Blocks:
+    """Two equal blocks on top of each other, with free ends, driven in opposite directions.
+
+    Parameters
+    ----------
+    height : float
+        Of each block, m; its length is that of the interface.
+    thickness : float, optional
+        Depth, m: turns stresses into forces, N. A machine of finite stiffness needs it.
+    drive : Platen or Pusher
+    pressing : {"frictionless", "glued"}
+        How the blocks are pressed: by a uniform pressure, or between plates on which the top faces
+        do not slide; then ``Load(normal_pressure=...)`` is the mean.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> blocks = st.Blocks(height=0.05, thickness=0.006, drive=st.Platen(stiffness=2e7))
+    """
+
+    height: Annotated[Positive, BeforeValidator(_height)]
+    thickness: Positive | None = None
+    drive: Annotated[Platen | Pusher, OneOf(DRIVES, _drive)] = Platen()
+    pressing: Annotated[Literal["frictionless", "glued"], BeforeValidator(_pressing)] = (
+        "frictionless"
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Blocks:
+        drive, problems = self.drive, []
+        if isinstance(drive, Pusher):
+            low, high = drive.height - 0.5 * drive.width, drive.height + 0.5 * drive.width
+            if low < -1e-9 * self.height or high > (1.0 + 1e-9) * self.height:
+                problems.append(
+                    f"drive: the pusher reaches from {low:g} to {high:g} m above the interface, the"
+                    f" side of the block from 0 to {self.height:g} m;"
+                    f" {'raise' if low < 0.0 else 'lower'} or narrow it"
+                )
+        if 0.0 < drive.stiffness < math.inf and self.thickness is None:
+            problems.append(
+                "thickness: is needed with a machine's stiffness in N/m; give it, or"
+                " stiffness = 0 (dead load) or inf (rigid)"
+            )
+        if problems:
+            raise InputError(problems)
+        return self
+
+    @property
+    def pushes(self) -> Pushes | None:
+        """Sides, height and width (m) of the pushers; None for a platen."""
+        drive = self.drive
+        if isinstance(drive, Platen):
+            return None
+        sides: Any = ("left", "right") if drive.side == "both" else (drive.side,)
+        return Pushes(sides, drive.height, drive.width)
+
+    def driven(self, length: float, nodes: int, solid: Solid, mode: Mode) -> Driven:
+        """Return stiffness and profiles of the blocks behind their machine, at the nodes."""
+        machine = self.drive.stiffness
+        if 0.0 < machine < math.inf:  # half of the symmetric set-up is twice as stiff
+            machine *= 2.0 / (self.thickness or 1.0)
+        return driven(
+            length, nodes, self.height, solid.shear_modulus, solid.kolosov, mode == "III",
+            self.pushes, self.pressing == "glued", machine,
+        )  # fmt: skip
