@@ -61,7 +61,7 @@ def test_every_public_name_has_a_page(pages):
     import stiction as st
 
     built = {path.stem for path in pages}
-    modules = {"external", "paper", "plot", "statistics", "theory"}
+    modules = {"extensions", "external", "paper", "plot", "statistics", "theory"}
     names = set(st.__all__) - {"__version__", *modules}
     assert {name for name in names if f"stiction.{name}" not in built} == set()
     plots = {f"stiction.plot.{name}" for name in st.plot.__all__}
