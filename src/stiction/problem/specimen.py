@@ -86,7 +86,9 @@ class Pusher:
     type: Literal["pusher"] = "pusher"
 
 
-DRIVES = Kinds("drives", {"platen": "problem.specimen:Platen", "pusher": "problem.specimen:Pusher"})
+DRIVES = Kinds(
+    "drives", {"platen": "problem.specimen:Platen", "pusher": "problem.specimen:Pusher"}
+)
 
 
 def _drive(value: Any) -> Any:
