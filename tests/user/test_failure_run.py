@@ -135,9 +135,10 @@ def test_uncertain_parameters_are_interfaces_that_are_equally_likely(
         ).critical_stress.values
         for stress, chance in zip(found.stress.values, found.members.values, strict=True):
             share = (onsets < stress).mean()
-            assert share == pytest.approx(chance[number], rel=0.25, abs=0.012)
+            assert share == pytest.approx(np.nan_to_num(chance[number]), rel=0.25, abs=0.012)
     # A band is of some; samples of a plain run are of all.
-    assert (found.band_low < found.probability)[1:].all()
+    assert (found.band_low < found.probability)[found.band_low.notnull()][1:].all()
+    assert found.band_low.isnull().any()  # the strongest has few samples so low
     assert (found.probability < found.band_high)[1:].all()
     onsets = dataclasses.replace(one, ensemble=st.Ensemble(samples=4000, seed=3)).run(
         pilot=False

@@ -173,7 +173,7 @@ def test_the_pilot_that_chose_to_count_is_not_counted():
     assert f"P = {found.probability:.3g} (95 %: {low:.3g} to {high:.3g}, c.o.v." in str(found)
     spread = dataclasses.replace(found, members=np.linspace(0.0, 0.4, 101)[::-1])
     assert spread.band == pytest.approx((0.02, 0.38))
-    assert "5 % have at most P = 0.02 and 95 % at most 0.38" in str(spread)
+    assert "5 % have at most P = 0.02 and 95 % have at most P = 0.38" in str(spread)
 
 
 def test_first_instability_is_never_later_than_letting_go():

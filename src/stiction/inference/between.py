@@ -79,12 +79,13 @@ def likely_between(
     """
     freedom = logarithms.size - 1
     least = chi2.cdf(_weighed(logarithms, within, MOST_SCATTER)[2], freedom)
-    levels = chi2.ppf(least + (1.0 - least) * rng.random(count), freedom)
+    shares, errors = rng.spawn(2)  # each draw depends on its number only
+    levels = chi2.ppf(least + (1.0 - least) * shares.random(count), freedom)
     found = np.array([variance_between(logarithms, within, float(level)) for level in levels])
     middles = [_weighed(logarithms, within, float(s))[:2] for s in found]
     means = [
         m + math.sqrt(v) * z
-        for (m, v), z in zip(middles, rng.standard_normal(count), strict=True)
+        for (m, v), z in zip(middles, errors.standard_normal(count), strict=True)
     ]
     return found, np.array(means) + 0.5 * (found + within.mean())
 

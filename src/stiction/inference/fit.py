@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import cycle
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
@@ -48,9 +49,11 @@ ADVICE = {
 TOLD = 2.0
 """Difference of scores from which data tell two families apart."""
 DRAWN = 5.0
-"""Difference of scores from which a family is not drawn any more: weights below 1 %."""
+"""Difference of scores from which a family is not drawn any more."""
 FEW_SPECIMENS = 5
 """Specimens below which the scatter between them decides what is rare."""
+EVENLY = 0.5 * (math.sqrt(5.0) - 1.0)
+"""Step of a sequence that fills [0, 1) evenly, however long it is (Niederreiter, 1992)."""
 LEAST_SCATTER = 1e-8
 """Variance of the logarithm of a factor that stands for none."""
 STRESSES = ("mean", "standard_deviation", "noise", "low", "high", "loc", "scale")
@@ -76,8 +79,9 @@ class Goodness(NamedTuple):
     `distance` is Kolmogorov's. `score` is the log likelihood of so many independent values as tell
     families apart as well as the correlated ones of the records do, less the number of estimated
     parameters (Akaike, 1974), less that of the best family: 0 for the best, negative for the
-    others. Differences below 2 do not tell families apart. `weight` is the share of members
-    that `FieldFit.interfaces` draws from the family, in proportion to exp(score).
+    others. Differences below 2 do not tell families apart. `weight` is the share of members that
+    `FieldFit.interfaces` draws from the family, in proportion to this likelihood itself: what more
+    parameters leave open is in the scatter of its members, and need not be paid for twice.
     """
 
     marginal: Any
@@ -159,9 +163,9 @@ class FieldFit:
         """Return equally likely random interfaces, for a failure probability under all of them.
 
         Each is the estimate less the error of one repetition, so that bias and scatter are those
-        of the intervals. Families of the marginal have shares by their `weight` (Burnham and
-        Anderson, 2002, section 4.2). With `between`, each has a factor of its own likely scatter,
-        of a coefficient of variation of at most 1, and a likely mean with that scatter.
+        of the intervals. Families of the marginal have shares by their `weight`. With `between`, each has a factor of its own likely scatter,
+        of a coefficient of variation of at most 1, and a likely mean with that scatter. A longer
+        list of the same seed begins with the shorter one.
 
         Parameters
         ----------
@@ -193,15 +197,10 @@ class FieldFit:
             )
         rng = np.random.default_rng([seed, 5])
         ends = np.cumsum([one.weight for one in self.families.values() if one.weight > 0.0])
-        places = (rng.permutation(count) + rng.random()) / count * ends[-1]
+        places = (rng.random() + EVENLY * np.arange(count)) % 1.0 * ends[-1]
         family = np.minimum(np.searchsorted(ends, places), ends.size - 1)
-        chosen = [self._likely[0][0]] * count
-        for number, fields in enumerate(self._likely):
-            own = np.flatnonzero(family == number)
-            for place, i in zip(
-                own, np.resize(rng.permutation(len(fields)), own.size), strict=True
-            ):
-                chosen[place] = fields[i]
+        orders = [cycle(rng.permutation(len(own))) for own in self._likely]
+        chosen = [self._likely[one][next(orders[one])] for one in family.tolist()]
         if "between" not in self.parameters:
             return [RandomInterface(strength=field) for field in chosen]
         drawn = likely_between(np.log(self._levels), self._estimate.within, count, rng)
@@ -378,10 +377,8 @@ def fit_field(
     )
     found, *others = estimates
     levels, rows = np.array([row.mean() for row in rows]), found.as_of_one(rows)
-    best, *weights = (one.weight for one in compared.values())
-    counts = [
-        max(FEWEST, round(bootstrap * weight / best)) for weight in weights if weight > 0.0
-    ]
+    weights = [one.weight for one in compared.values() if one.weight > 0.0]
+    counts = [max(FEWEST, round(bootstrap * one / max(weights))) for one in weights[1:]]
     repeated, drawn = bootstrapped(
         found,
         bootstrap,
@@ -471,22 +468,21 @@ def _compared(
     if not fitted:
         raise InputError(problems)
     independent = max(fitted, key=lambda one: one[0])[1].independent
-    scored = [
-        (independent * mean - len(found.setting.marginal.parameters(found.own)), found)
-        for mean, found in fitted
-    ]
-    scored.sort(key=lambda one: -one[0])
-    scores = np.array([score for score, _ in scored]) - scored[0][0]
-    weights = np.where(scores > -DRAWN, np.exp(scores), 0.0)
+    estimates = [found for _, found in fitted]
+    likelihoods = independent * np.array([mean for mean, _ in fitted])
+    costs = [len(one.setting.marginal.parameters(one.own)) for one in estimates]
+    scores = likelihoods - costs
+    scores -= scores.max()
+    weights = np.exp(likelihoods - likelihoods.max()) * (scores > -DRAWN)
+    weights /= weights.sum()
+    order = np.argsort(-scores, kind="stable").tolist()
     compared = {
-        found.setting.marginal.label: Goodness(
-            found.marginal, found.distance, float(score), float(weight)
+        estimates[i].setting.marginal.label: Goodness(
+            estimates[i].marginal, estimates[i].distance, float(scores[i]), float(weights[i])
         )
-        for (_, found), score, weight in zip(
-            scored, scores, weights / weights.sum(), strict=True
-        )
+        for i in order
     }
-    return [found for _, found in scored], compared, independent
+    return [estimates[i] for i in order], compared, independent
 
 
 def _lengths_held(found: Estimate) -> float:

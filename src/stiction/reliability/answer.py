@@ -64,9 +64,9 @@ class Answer:
     algorithm, reason : str
         'plain', 'subset', 'two_level' or 'exact' (nothing had to be sampled), and why.
     members : (members,) array
-        Of a list of equally likely interfaces: the probability of each. `probability` is their
-        mean, the predictive probability: the one to decide with. Where no sample of an interface
-        slides below the stress, its entry is what one would stand for, about an upper bound.
+        Of a list of equally likely interfaces: the probability of each; NaN where fewer than three
+        samples of an interface slide below the stress. `probability` is the mean over all, the
+        predictive probability: the one to decide with.
     survived : float
         Share of plain samples in which the event does not happen, at any stress: behind a stiff
         machine nothing need become unstable, and a load that holds need not break anything.
@@ -134,8 +134,8 @@ class Answer:
 
         5 % of them have at most the one, 95 % at most the other. More tests make it narrower. It
         is too wide by the sampling error of each interface, up to a factor of two or three of alike
-        ones: a smaller `target_cv` lowers that. Of thousands few have a sample so low, and the band
-        is what one would stand for: take a list of tens. The error of the mean is `interval`.
+        ones: a smaller `target_cv` lowers that. An end is NaN if `members` is so at its rank, as of
+        lists of thousands: take one of tens. The error of the mean is `interval`.
         """
         return band_of(self.members)
 
@@ -168,21 +168,22 @@ class Answer:
             result += f"; {self.survived:.3g} of plain samples survive any stress"
         if self.members.size:
             result += f"; the mean over {self.members.size} equally likely interfaces"
-            if self.members.mean() < 2.0 * self.probability:  # else few had a sample so low
-                low, high = self.band
-                result += f", of which 5 % have at most P = {low:.2g}"
-                result += f" and 95 % at most {high:.2g}"
+            band = zip(("5 %", "95 %"), self.band, strict=True)
+            parts = [f"{share} have at most P = {p:.2g}" for share, p in band if p >= 0.0]
+            result += f", of which {' and '.join(parts)}" if parts else ""
             sampled = math.sqrt(max(self.cv**2 - self.members_cv**2, 0.0))
             result += f" (c.o.v. by the list {self.members_cv:.2g}, by sampling {sampled:.2g})"
         return f"{result}; {self.algorithm}, {self.evaluations} evaluations"
 
 
 def band_of(members: Array) -> tuple[float, float]:
-    """Return the 90 % band over equally likely interfaces; NaN without any."""
+    """Return the 90 % band over equally likely interfaces; NaN where too few are known."""
     if not members.size:
         return math.nan, math.nan
-    low, high = np.quantile(members, [0.05, 0.95])
-    return float(low), float(high)
+    unknown = np.isnan(members)
+    ends = np.quantile(np.where(unknown, 0.0, members), [0.05, 0.95]).tolist()
+    low, high = np.where(unknown.mean() > [0.05, 0.95], math.nan, ends).tolist()
+    return low, high
 
 
 def members_of(state: LimitState, tail: Tail, stress: float) -> Array:
@@ -258,10 +259,11 @@ def few_members(
     """Return a warning if the list makes the estimate less precise than `target_cv`."""
     if not (cv > target_cv and members_cv > LISTED * target_cv):
         return []
-    shares = np.cumsum(np.sort(np.bincount(random.kinds, members))[::-1])
+    shares = np.cumsum(np.sort(np.bincount(random.kinds, np.nan_to_num(members)))[::-1])
     count = 1 + int(np.searchsorted(shares, CARRIED * shares[-1]))
     advice = (
-        "give what it was drawn from, a fit or a posterior, in its place: more are then drawn"
+        "give what it was drawn from, a fit or a posterior, in its place: more are then drawn; or"
+        " a longer list (count of [uncertain])"
     )
     if random.source is not None:
         advice = (

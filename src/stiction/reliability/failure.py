@@ -204,21 +204,38 @@ def _answered(
 ) -> Answer:
     """Return an answer from as many members as the target needs, with all that it warned of."""
     with meter, merge_warnings() as warned:
-        answer = solve(experiment, meter)
-        while count := wanted_members(experiment.random, answer.members_cv, target_cv):
-            known = experiment.random
-            meter.note = f"{count:,} interfaces, c.o.v. by the list {answer.members_cv:.2g}"
-            larger = known.larger(count, experiment.seed)
-            if larger.kinds.max() <= known.kinds.max():  # the source has no others
-                break
-            experiment = replace(experiment, random=larger)
-            warned.clear()
-            answer = solve(experiment, meter)
-        random = experiment.random
-        doubts = few_members(random, answer.members, answer.cv, answer.members_cv, target_cv)
-        for text in doubts:
+
+        def solved(own: Experiment) -> tuple[float, tuple[Experiment, Answer]]:
+            answer = solve(own, meter)
+            return answer.members_cv, (own, answer)
+
+        own, answer = _of_enough_members(experiment, target_cv, meter, warned, solved)
+        for text in few_members(
+            own.random, answer.members, answer.cv, answer.members_cv, target_cv
+        ):
             warn_accuracy(text)
     return replace(answer, warnings=tuple(texts_of(warned)))
+
+
+def _of_enough_members(
+    experiment: Experiment,
+    target_cv: float,
+    meter: Meter,
+    warned: Any,
+    solve: Callable[[Experiment], tuple[float, Any]],
+) -> Any:
+    """Return what `solve` does beside the error by the list, with as many members as that needs."""
+    while True:
+        by_list, found = solve(experiment)
+        known = experiment.random
+        if not (count := wanted_members(known, by_list, target_cv)):
+            return found
+        meter.note = f"{count:,} interfaces, c.o.v. by the list {by_list:.2g}"
+        larger = known.larger(count, experiment.seed)
+        if larger.kinds.max() <= known.kinds.max():  # the source has no others
+            return found
+        experiment = replace(experiment, random=larger)
+        warned.clear()
 
 
 def _check_unit(state: LimitState, name: str, given: float, stress: float) -> None:
@@ -562,17 +579,15 @@ def failure_curve(
     True
     """
     experiment = Experiment(problem, random, method, seed=seed)
-    with Meter("failure_curve", show=progress) as meter, merge_warnings():
-        state, budget = prepare(experiment, event, workers, meter, max_evaluations)
-        # Fewer than usual where the budget would not even hold four levels.
-        size = min(SAMPLES, max(budget // 4, 20))
-        target = target_cv * (SAMPLED if state.several else 1.0)
-        found = repeat_until_precise(
-            lambda samples, number, left: repetition(state, number, smallest, samples, left),
-            lambda done: Tail(done).cv(Tail(done).quantile(smallest)),
-            target_cv=target, first=size, largest=size, max_evaluations=budget, meter=meter,
-        )  # fmt: skip
-        tail = Tail(found, spent=sum(one.evaluations for one in found))
+    with Meter("failure_curve", show=progress) as meter, merge_warnings() as warned:
+
+        def solve(own: Experiment) -> tuple[float, tuple[LimitState, Tail]]:
+            state, budget = prepare(own, event, workers, meter, max_evaluations)
+            tail = _curve_tail(state, smallest, target_cv, budget)
+            reached = tail.quantile(smallest) if tail.complete else tail.reached
+            return _members_cv(state, tail, reached), (state, tail)
+
+        state, tail = _of_enough_members(experiment, target_cv, meter, warned, solve)
         for text in curve_doubts(state, tail, smallest, target_cv):
             warn_accuracy(text)
         if not tail.complete:
@@ -583,6 +598,19 @@ def failure_curve(
         "repetitions": len(tail.repetitions),
     }
     return curve_of(tail, state, chances(smallest), attributes)
+
+
+def _curve_tail(state: LimitState, smallest: float, target_cv: float, budget: int) -> Tail:
+    """Return repetitions down to the end of a curve."""
+    # Fewer than usual where the budget would not even hold four levels.
+    size = min(SAMPLES, max(budget // 4, 20))
+    found = repeat_until_precise(
+        lambda samples, number, left: repetition(state, number, smallest, samples, left),
+        lambda done: Tail(done).cv(Tail(done).quantile(smallest)),
+        target_cv=target_cv * (SAMPLED if state.several else 1.0), first=size, largest=size,
+        max_evaluations=budget, meter=state.meter,
+    )  # fmt: skip
+    return Tail(found, spent=sum(one.evaluations for one in found))
 
 
 def curve_doubts(

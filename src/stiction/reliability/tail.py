@@ -24,6 +24,8 @@ PILOT = 500
 """Number of plain samples by which a less expensive method is judged as a guide."""
 ALIKE = 0.9
 """Share of the weakest of them that a guide must pick to lead to the rarest."""
+RESOLVED = 3
+"""Samples of one of equally likely interfaces that tell its probability from those of others."""
 POOR = 0.02
 """Least share of failures among the samples of a guide; below it the method is no guide."""
 
@@ -100,16 +102,16 @@ class Tail(NamedTuple):
     def of_members(self, stress: float, count: int) -> Array:
         """Return the probability of each of equally likely interfaces, (members,).
 
-        Where no sample of one is so low, it is not zero but what a single sample stands for.
+        NaN where fewer than `RESOLVED` samples of one are so low.
         """
         total = sum(one.samples for one in self.repetitions)
-        found, single = np.zeros(count), 0.0
+        found, seen = np.zeros(count), np.zeros(count)
         for one in self.repetitions:
             each, members, _ = one.below(stress)
-            each *= count * one.samples / total
-            found += each * np.bincount(members, minlength=count)
-            single += each / len(self.repetitions)
-        return np.minimum(np.where(found > 0.0, found, single), 1.0)
+            own = np.bincount(members, minlength=count)
+            seen += own
+            found += count * each * one.samples / total * own
+        return np.where(seen >= RESOLVED, np.minimum(found, 1.0), np.nan)
 
     def members_cv(self, stress: float, kinds: Array) -> float:
         """Return the coefficient of variation by the list of interfaces being a sample.
