@@ -163,9 +163,9 @@ class FieldFit:
         """Return equally likely random interfaces, for a failure probability under all of them.
 
         Each is the estimate less the error of one repetition, so that bias and scatter are those
-        of the intervals. Families of the marginal have shares by their `weight`. With `between`, each has a factor of its own likely scatter,
-        of a coefficient of variation of at most 1, and a likely mean with that scatter. A longer
-        list of the same seed begins with the shorter one.
+        of the intervals. Families of the marginal have shares by their `weight`. With `between`,
+        each has a factor of its own likely scatter, of a coefficient of variation of at most 1,
+        and a likely mean with that scatter. A longer list of one seed begins with a shorter one.
 
         Parameters
         ----------
