@@ -87,49 +87,22 @@ def correlated(correlation):
 
 
 test_numbers = refusals({
-    "low: must be greater than": lambda: st.Gamma(mean=1e6, cv=0.2, low=-1e300),
-    "slip: must be True or False": lambda: st.Equilibrium(slip=1),
-    "density ... number ... '1170'": lambda: solid(density="1170"),
-    "length ... True": lambda: st.Interface(length=True, nodes=64),
-    "length ... finite": lambda: st.Interface(length=10**400, nodes=64),
-    "length ... positive": lambda: st.Interface(length=0.0, nodes=64),
-    "length: the nodes must be at least": lambda: st.Interface(length=1e-308, nodes=64),
     "nodes ... 65 ... even": lambda: st.Interface(length=0.1, nodes=65),
-    "nodes ... whole": lambda: st.Interface(length=0.1, nodes=64.5),
     "nodes ... at most 2^24": lambda: st.Interface(length=0.1, nodes=10**30),
+    "length: the nodes must be at least": lambda: st.Interface(length=1e-308, nodes=64),
     "-2 ... positive": lambda: st.LinearWeakening(weakening_rate=[1.0, -2.0]),
     "profile ... finite ... entry 1": lambda: st.Load(profile=[1.0, np.nan]),
     "profile ... positive ... pressure ... positive on average":
         lambda: st.Load(profile=[1.0, 0.0], normal_pressure=[1.0, -1.0]),
     "low=2 ... high=1": lambda: st.Beta(alpha=1.0, beta=1.0, low=2.0, high=1.0),
-    "alpha ... 0": lambda: st.Beta(alpha=0.0, beta=1.0, low=1.0, high=2.0),
-    "mean: must be less than ... 1e+308": lambda: st.Lognormal(mean=1e308, cv=1e308),
-    "mean: must be greater than ... 5e-324": lambda: st.Gamma(mean=5e-324, cv=0.2),
     "slip ... got an array of shape ()": lambda: st.PiecewiseWeakening(
         slip=np.array(0.5), strength=[0.5, 0.0], critical_slip=1e-6
     ),
-    "correlation_length ... 0.000000000000001": lambda: st.PowerLawSpectrum(5e-324),
-    "truncation: must be greater than ... 1e-308":
-        lambda: st.PowerLawSpectrum(1.0, truncation=1e-308),
-    "truncation: must be less than ... 1e+308":
-        lambda: st.ExponentialSpectrum(1.0, truncation=1e308),
-    "power_kept: must be greater than 0.000001":
-        lambda: st.ExponentialSpectrum(1.0, power_kept=1e-12),
     "max_wavenumber: must be less than":
         lambda: st.CustomSpectrum(function=np.exp, max_wavenumber=1e307),
-    "high: must be less than ... 1e+308":
-        lambda: st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1e308),
-    "power_kept ... less than 1": lambda: st.ExponentialSpectrum(1.0, power_kept=1.0),
-    "slip ... must be True or False ... '1'": lambda: st.Equilibrium(slip="1"),
     "arrest ... must be True or False ... 'no'":
         lambda: st.theory.griffith_length(PROBLEM, 1e6, 1.0, arrest="no"),
-    "seed: must be greater than or equal to 0, got -1":
-        lambda: make_strength().sample(LINE, seed=-1),
-    "seed ... whole ... '1'":
-        lambda: st.monte_carlo(PROBLEM, make_strength(), method=LOCAL, samples=2, seed="1"),
-    "samples: must be greater than or equal to 1, got 0": lambda: monte_carlo(samples=0),
     "title ... valid string": lambda: make_study(title="\udcff"),
-    "events": lambda: st.Equilibrium(events=-1),
 })  # fmt: skip
 
 test_names_and_choices = refusals({

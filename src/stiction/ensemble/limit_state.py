@@ -130,9 +130,9 @@ class LimitState:
 
         From below: nothing slips at a load below min (tau_p - tau_i)/p, where the mean stress is
         <tau_i> + load <p>. Slip lowers it only behind a machine, and then the largest on the way,
-        `critical_stress`, is no lower. A rupture under a load that falls may begin at any stress,
-        and of other methods nothing is known. The weights of the local criterion are positive, but
-        behind a machine it knows no slip.
+        `critical_stress`, is no lower. A rupture begins at a largest mean stress, however the load
+        goes up and down: none is below that at the first slip. Of other methods nothing is known.
+        The weights of the local criterion are positive, but behind a machine it knows no slip.
 
         From above: in equilibrium stress is nowhere above strength, nor is its mean above the mean
         strength. By the local criterion load <g, p> <= <g, tau_p - tau_i> at each place, and
@@ -145,9 +145,7 @@ class LimitState:
             return not self.may_survive, not self.may_survive
         if method.type == "local_criterion":
             return specimen is None or specimen.drive.stiffness == 0.0, specimen is None
-        history = getattr(method, "load", None)
-        rises = history is None or bool((np.diff(history.values) >= 0.0).all())
-        return method.type == "rupture" and rises, False
+        return method.type == "rupture", False
 
     @cached_property
     def bounds(self) -> tuple[float, float]:
