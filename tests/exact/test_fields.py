@@ -351,3 +351,22 @@ def test_a_coarse_grid_is_told_how_many_nodes_suffice():
     shares = [rough.modes(st.Interface(0.1, nodes)).unresolved for nodes in (508, 506)]
     assert shares[0] <= 0.01 < shares[1]
     rough.sample(st.Interface(0.1, 508))
+
+
+@pytest.mark.parametrize(
+    "family",
+    [
+        lambda c: st.Gamma(mean=1.7e6 * c, cv=0.23, low=0.4e6 * c),
+        lambda c: st.Weibull(mean=1.7e6 * c, cv=0.31, low=0.2e6 * c),
+        lambda c: st.Beta(alpha=1.9, beta=3.3, low=0.4e6 * c, high=2.1e6 * c),
+    ],
+)
+def test_multiples_share_one_table(family):
+    z = np.random.default_rng(3).uniform(-6.5, 6.5, 500)
+    from_normal(family(0.97), z)
+    built = quantile_table.cache_info().misses
+    for factor in (1.1, 0.313, 7e-5):
+        marginal = family(factor)
+        exact = quantile_of_normal(marginal.distribution, z)
+        np.testing.assert_allclose(from_normal(marginal, z), exact, rtol=1e-9)
+    assert quantile_table.cache_info().misses == built

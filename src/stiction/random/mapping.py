@@ -9,7 +9,7 @@ or of a millionth of the standard deviation where the value is smaller than that
 """
 
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import ndtr
@@ -97,15 +97,44 @@ def from_normal(marginal: Any, z: Array) -> Array:
     if hasattr(marginal, "of_normal"):
         return np.asarray(marginal.of_normal(np.asarray(z, np.float64)))
     flat = np.ascontiguousarray(z, dtype=np.float64).ravel()
+    standard, low, scale = _standard(marginal)
     out = np.empty_like(flat)
-    if interpolate(flat, quantile_table(marginal, MOSTLY), out):
+    if interpolate(flat, quantile_table(standard, MOSTLY), out):
         missing = np.isnan(out)
         rest, found = flat[missing], out[missing]
-        if interpolate(rest, quantile_table(marginal, REACH), found):
+        if interpolate(rest, quantile_table(standard, REACH), found):
             never = np.isnan(found)
-            found[never] = quantile_of_normal(marginal.distribution, rest[never])
+            found[never] = quantile_of_normal(standard.distribution, rest[never])
         out[missing] = found
+    if standard is not marginal:
+        out *= scale
+        out += low
     return out.reshape(np.shape(z))
+
+
+class Standard(NamedTuple):
+    """A family of scipy at scale 1 from 0, whose table serves all multiples."""
+
+    family: Any
+    shapes: tuple[float, ...]
+
+    @property
+    def distribution(self) -> Any:
+        """The frozen distribution."""
+        return self.family(*self.shapes)
+
+
+def _standard(marginal: Any) -> tuple[Any, float, float]:
+    """Return a marginal that this one is a multiple of, its lower bound and scale.
+
+    Shapes are rounded to 12 digits: those of multiples are equal but for round-off. Below zero a
+    relative error of the multiple would be a larger one of the value: it keeps its own table.
+    """
+    family = getattr(marginal, "of_scipy", None)
+    if family is None or marginal.low < 0.0:
+        return marginal, 0.0, 1.0
+    *shapes, low, scale = marginal.distribution.args
+    return Standard(family, tuple(float(f"{one:.12g}") for one in shapes)), low, scale
 
 
 @lru_cache(maxsize=64)

@@ -61,6 +61,7 @@ class Beta(Marginal):
     low: Bound
     high: Bound
     type: Literal["beta"] = "beta"
+    of_scipy: ClassVar[Any] = scipy.stats.beta
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
