@@ -19,14 +19,9 @@ from reproduction import PARAMETERS
 
 BASIC = ("local", "moments", "exact", "ruptures", "printed", "theory", "representative",
          "dynamic")  # fmt: skip
-NEEDS = {
-    1: (), 2: (), 3: (), 4: (), 5: (), 6: (), 7: (), 8: (),
-    9: ("trend", "vanishing"), 10: ("convergence",), 11: ("growth", "mechanism"), 12: ("arrest",),
-    13: ("driving",), 14: ("wide_strength", "random_load", "random_residual"),
-    15: ("length", "normal_load", "free_end", "failure"),
-    16: ("skewness", "exponent"),
-}  # fmt: skip
-"""Studies of each figure besides the basic ones; the page needs all."""
+"""Studies that figures need besides those that `page.toml` names; the page needs all."""
+PAGE = tomllib.loads(Path(__file__).with_name("page.toml").read_text("utf-8"))
+NEEDS = {int(number): {*about.get("needs", ())} for number, about in PAGE["figure"].items()}
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -120,7 +115,7 @@ def _draw(run, data, chosen, folder: Path) -> dict:
     folder.mkdir(parents=True, exist_ok=True)
     images = {}
     with st.plot.paper_style():
-        for number in chosen or (n for n in NEEDS if {*NEEDS[n]} <= {*data.studies}):
+        for number in chosen or (n for n in NEEDS if NEEDS[n] <= {*data.studies}):
             module = paper if number <= 7 else beyond
             images[number] = folder / f"figure_{number:02}.png"
             figure = getattr(module, f"figure_{number}")(data)

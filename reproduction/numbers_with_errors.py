@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import binom
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,13 @@ def share(events) -> Number:
     n = events.size + 4.0
     adjusted = (events.sum() + 2.0) / n
     return Number(float(events.mean()), math.sqrt(adjusted * (1.0 - adjusted) / n))
+
+
+def chance_of_so_many(events, usual: Number) -> Number:
+    """Return the chance of at least so many events at the usual share plus three errors."""
+    events = np.ravel(events).astype(bool)
+    probability = min(usual.value + 3.0 * usual.error, 1.0)
+    return Number(float(binom.sf(events.sum() - 1, events.size, probability)))
 
 
 def root_mean_square(values) -> Number:

@@ -85,6 +85,11 @@ def write(path: Path, data: Data, groups, images, runner, warned) -> None:
         odds_otherwise=[odds(data, visible=visible)[0] for visible in (0.5, 2.0)],
         claims=sections,
         setting=setting,
+        taken={
+            name.replace("_", " ").replace("-", " with "): data[name].sizes["sample"]
+            for name in data.studies
+            if "sample" in data[name].dims
+        },
         size=data.size,
         runner=runner,
         seconds=time.monotonic() - runner.began,

@@ -1,6 +1,7 @@
 """Rules that turn numbers with errors into a verdict; three standard errors decide."""
 
 import contextlib
+import math
 from collections.abc import Callable, Iterable, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -39,10 +40,11 @@ def limits_times(factor: float):
 
 @dataclass(frozen=True)
 class Rule:
-    """What must be met, in words, and as a function of the judged series."""
+    """What must be met, in words, as a function of the judged series, and how many these are."""
 
     text: str
     judge: Callable[[Sequence[Numbers]], Verdict]
+    series: int = 1
 
     def __call__(self, series: Sequence[Numbers]) -> Verdict:
         return (
@@ -54,34 +56,54 @@ def _range(number: Number) -> tuple[float, float]:
     return number.value - SIGMAS * number.error, number.value + SIGMAS * number.error
 
 
-def within(low: float, high: float, why: str = "") -> Rule:
+def _moved(limit: float, share: bool, centre: float) -> float:
+    """Return a limit that is a choice, moved from a centre; limits of shares by their odds."""
+    factor = _FACTOR.get()
+    if share and math.isfinite(limit):
+        return factor * limit / (1.0 + (factor - 1.0) * limit)
+    return centre + factor * (limit - centre)
+
+
+def within(low: float, high: float, why: str = "", *, share: bool = False) -> Rule:
     """Every number lies between two limits; `why` is the reason of limits that are a choice."""
+    between = 0.0 < low < high < math.inf and not share
+    centre = 0.5 * (low + high) if between else 0.0
 
     def judge(series: Sequence[Numbers]) -> Verdict:
-        factor = _FACTOR.get() if why and (low <= 0.0 or high == float("inf")) else 1.0
+        least, most = (_moved(x, share, centre) if why else x for x in (low, high))
         ranges = [_range(number) for row in series for number in row]
-        if all(factor * low <= left and right <= factor * high for left, right in ranges):
+        if all(least <= left and right <= most for left, right in ranges):
             return Verdict.HOLDS
-        if any(left > factor * high or right < factor * low for left, right in ranges):
+        if any(left > most or right < least for left, right in ranges):
             return Verdict.FAILS
         return Verdict.OPEN
 
     text = f"between {low:g} and {high:g}"
-    if low == -float("inf"):
+    if low == -math.inf:
         text = f"below {high:g}"
-    elif high == float("inf"):
+    elif high == math.inf:
         text = f"above {low:g}"
     return Rule(text + (f" ({why})" if why else ""), judge)
 
 
-def below(limit: float, why: str = "") -> Rule:
+def below(limit: float, why: str = "", *, share: bool = False) -> Rule:
     """Every number is below a limit."""
-    return within(-float("inf"), limit, why)
+    return within(-math.inf, limit, why, share=share)
 
 
-def above(limit: float, why: str = "") -> Rule:
+def above(limit: float, why: str = "", *, share: bool = False) -> Rule:
     """Every number is above a limit."""
-    return within(limit, float("inf"), why)
+    return within(limit, math.inf, why, share=share)
+
+
+def to_factor(factor: float, why: str) -> Rule:
+    """Every number is one to a factor."""
+
+    def judge(series: Sequence[Numbers]) -> Verdict:
+        limit = factor ** _FACTOR.get()
+        return within(1.0 / limit, limit).judge(series)
+
+    return Rule(f"1 to a factor of {factor:g} ({why})", judge)
 
 
 def printed(digits: str) -> Rule:
@@ -118,14 +140,21 @@ def rising() -> Rule:
 _WORST = (Verdict.FAILS, Verdict.OPEN, Verdict.CORRECTED, Verdict.HOLDS)
 
 
+def _found(rules: Sequence[Rule], series: Sequence[Numbers]) -> list[Verdict]:
+    """Return the verdict of each rule on as many series as it takes."""
+    if len(series) != sum(rule.series for rule in rules):
+        raise ValueError(f"{len(series)} series for {len(rules)} rules")
+    rest = iter(series)
+    return [rule([next(rest) for _ in range(rule.series)]) for rule in rules]
+
+
 def each(*rules: Rule) -> Rule:
     """One rule for each judged series; the worst verdict counts."""
 
     def judge(series: Sequence[Numbers]) -> Verdict:
-        found = [rule([row]) for rule, row in zip(rules, series, strict=True)]
-        return min(found, key=_WORST.index)
+        return min(_found(rules, series), key=_WORST.index)
 
-    return Rule("; and ".join(rule.text for rule in rules), judge)
+    return Rule("; and ".join(rule.text for rule in rules), judge, len(rules))
 
 
 def graded(strict: Rule, weak: Rule) -> Rule:
@@ -141,24 +170,24 @@ def graded(strict: Rule, weak: Rule) -> Rule:
 
 
 def main(first: Rule, *others: Rule) -> Rule:
-    """The first series decides; a failure of another one earns a correction."""
+    """The first rule decides; a failure of another one earns a correction."""
 
     def judge(series: Sequence[Numbers]) -> Verdict:
-        verdict = first(series[:1])
-        rest = [rule([row]) for rule, row in zip(others, series[1:], strict=True)]
+        verdict, *rest = _found((first, *others), series)
         if verdict is Verdict.HOLDS and any(found is not Verdict.HOLDS for found in rest):
             return Verdict.OPEN if Verdict.FAILS not in rest else Verdict.CORRECTED
         return verdict
 
     rest = " and ".join(rule.text for rule in others)
-    return Rule(f"the first {first.text}; a correction if not the others {rest}", judge)
+    text = f"{first.text}; a correction if not, of what follows, {rest}"
+    return Rule(text, judge, first.series + sum(rule.series for rule in others))
 
 
 def never(limit: float) -> Rule:
     """It happens in no sample of so many that the share is below a limit."""
 
     def judge(series: Sequence[Numbers]) -> Verdict:
-        verdict = below(limit, "choice")(series)
+        verdict = below(limit, "choice", share=True)(series)
         seen = any(number.value > 0.0 for row in series for number in row)
         return Verdict.CORRECTED if verdict is Verdict.HOLDS and seen else verdict
 
@@ -175,14 +204,14 @@ def by_chance(level: float = 0.01) -> Rule:
     return Rule(f"smallest p-value times their number above {level:g}", judge)
 
 
-def corrected(rule: Rule) -> Rule:
-    """What the rule finds holds only with the correction that stands beside it."""
+def unlikely(level: float = 0.00135) -> Rule:
+    """Every chance is below that of three standard errors to one side."""
 
     def judge(series: Sequence[Numbers]) -> Verdict:
-        verdict = rule(series)
-        return Verdict.CORRECTED if verdict is Verdict.HOLDS else verdict
+        sure = all(number.value < level for row in series for number in row)
+        return Verdict.HOLDS if sure else Verdict.OPEN
 
-    return Rule(f"{rule.text} (with the correction beside it)", judge)
+    return Rule(f"a chance below {level:g}, undecided otherwise", judge)
 
 
 def together(verdicts: Iterable[Verdict]) -> Verdict:
@@ -194,13 +223,15 @@ def together(verdicts: Iterable[Verdict]) -> Verdict:
     return Verdict.OPEN if Verdict.OPEN in decided else sure.pop()
 
 
-def alike(rule: Rule) -> Rule:
-    """One rule for every judged measure of what the text does not define."""
+def alike(*rules: Rule) -> Rule:
+    """One rule for every measure of what the text does not define, or a rule for each."""
 
     def judge(series: Sequence[Numbers]) -> Verdict:
-        found = [rule([row]) for row in series]
+        every = rules if len(rules) > 1 else rules * (len(series) // rules[0].series)
+        found = _found(every, series)
         if Verdict.FAILS in found:
             return together(found)
         return min(found, key=(Verdict.CORRECTED, Verdict.OPEN, Verdict.HOLDS).index)
 
-    return Rule(f"by each measure: {rule.text}", judge)
+    text = "; or ".join(rule.text for rule in rules)
+    return Rule(f"by each measure: {text}", judge, sum(rule.series for rule in rules))

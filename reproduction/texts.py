@@ -3,13 +3,13 @@
 import numpy as np
 
 from reproduction import setting
+from reproduction import statements_onset as onset
+from reproduction import statements_rupture as rupture
 from reproduction.claims import Data, rounded
 from reproduction.modulus import at, odds
 from reproduction.numbers_with_errors import Number, lower_spread, mean, root_mean_square, share
 from reproduction.rules import Verdict
 from reproduction.setting import RATIOS, SIMULATED
-from reproduction.statements_onset import dynamic_mean, least, offsets, rate_offsets, trend
-from reproduction.statements_rupture import arrested, shares, with_inertia
 
 ABOVE = 1e-9  # relative; what is nearer than the tolerance of the solver is equal
 PER_CENT = 100.0
@@ -17,7 +17,7 @@ PER_CENT = 100.0
 
 def names(d: Data, found: dict) -> dict:
     """Return functions and numbers that a text may name; `found` has all findings by name."""
-    wide = trend(d, mean, 1e-6)
+    wide = onset.trend(d, mean, 1e-6)
 
     def over(function, ratios=RATIOS) -> list[Number]:
         return [function(ratio) for ratio in ratios]
@@ -25,41 +25,60 @@ def names(d: Data, found: dict) -> dict:
     def error(values) -> Number:
         return root_mean_square(values) * PER_CENT
 
-    def moving(name: str, point: int = 3, *, inertia: bool = True) -> Number:
-        return shares(d, name, (point,), inertia=inertia).rows[0][1] * PER_CENT
+    def shared(name: str, inertia: bool = True) -> list[tuple[str, Number]]:
+        return rupture.shares(d, name, inertia=inertia).rows
 
+    def counted(name: str) -> list[tuple[str, str]]:
+        size = d[f"{name}-inertia"].sizes["sample"]
+        return [(case, f"{n.value * size:.0f} of {size}") for case, n in shared(name)]
+
+    def over_mean(skew: int) -> list[Number]:
+        """Return the mean of tau_cr over that of the paper's strength, or of its mirror image."""
+        own = setting.LOW + setting.HIGH - setting.MEAN if skew else setting.MEAN
+        return over(lambda r: mean(rupture.skewed(d, skew, r)) / own)
+
+    widths = [1e-3 * onset.stress_density(d, ratio).bandwidth for ratio in RATIOS]
+    edge = d["driving"].sel(case="edge")
+    grown = d.at("growth", "patches", 0.25)[:, -1]
     return {
         "d": d,
         "h": setting.H,
         "numbers": lambda rows: ", ".join(rounded(number) for number in rows),
         "stress": lambda ratio: mean(d.stress(ratio)) * 1e-6,
         "spread": lambda ratio: lower_spread(d.stress(ratio)) * 1e-3,
-        "far_spread": dict(trend(d, lower_spread, 1e-3)),
+        "far_spread": dict(onset.trend(d, lower_spread, 1e-3)),
         "tiny_spread": lower_spread(d["vanishing"]["stress"][0].values) * 1e-3,
         "errors": over(lambda r: error(d.excess(r)), (0.25, 2.0)),
         "mixed": over(lambda r: error(at(d, "c", "excess", r)), (0.25, 2.0)),
-        "rate": dict(rate_offsets(d)),
+        "rate": dict(onset.rate_offsets(d)),
         "verb": verb(found["variability"].verdict),
-        "least": least(wide),
+        "least": onset.least(wide),
         "last": wide[-1],
         "odds": odds(d),
         "otherwise": [odds(d, visible=seen)[0] for seen in (0.5, 2.0)],
         "depends": sum(len({*each.readings.values()}) > 1 for each in found.values()),
-        "still": over(lambda r: arrested(d, r) * PER_CENT),
-        "moving": over(lambda r: with_inertia(d, r) * PER_CENT),
-        "share_moving": moving,
+        "still": over(lambda r: rupture.arrested(d, r) * PER_CENT),
+        "moving": over(lambda r: rupture.with_inertia(d, r) * PER_CENT),
+        "shared": shared,
+        "counted": counted,
+        "over_mean": over_mean,
+        "changes": lambda *cases: rounded(Number(max(onset.convergence(d, c) for c in cases))),
+        "patches": [mean(grown), *(number for _, number in rupture.patches_at_onset(d).rows)],
+        "far": over(lambda r: share(d.excess(r) > 0.02) * PER_CENT, RATIOS[:2]),
+        "furthest_above": [PER_CENT * d.excess(r).max() for r in RATIOS[:2]],
+        "smoothing": [f(widths) for f in (min, max)],
+        "endless": int((np.isinf(edge["griffith"]) & np.isfinite(edge["length"])).sum()),
         "bound": bound_holds(d),
         "below": dict(zip(RATIOS, over(lambda r: local_below(d, r)), strict=True)),
-        "over_ruptures": over(lambda r: mean(offsets(d, r, "local")) * PER_CENT, SIMULATED),
+        "over_ruptures": over(
+            lambda r: mean(onset.offsets(d, r, "local")) * PER_CENT, SIMULATED
+        ),
         "misplaced": lambda study: sum(over(lambda r: _misplaced(d, study, r), SIMULATED)),
-        "shifted": over(lambda r: dynamic_mean(d, r) * 1e-6, SIMULATED),
+        "shifted": over(lambda r: onset.dynamic_mean(d, r) * 1e-6, SIMULATED),
         "furthest": max(few_and_many(d), key=lambda row: abs(row[-2])),
         "arrested": sum(over(lambda r: int((d.at("exact", "arrested_events", r) > 0).sum()))),
-        "moved": lambda name: shares(d, name, inertia=True).rows,
         "driven": lambda case: d["driving"]["length"].sel(case=case).values / setting.H,
-        "by_ends": over(
-            lambda r: mean(d["free_end"]["change"].values[RATIOS.index(r)]) * PER_CENT
-        ),
+        "by_ends": over(lambda r: mean(rupture.ends_change(d, r))),
     }
 
 
@@ -105,7 +124,7 @@ def few_and_many(d: Data) -> list[tuple]:
     rows = []
     for ratio in SIMULATED:
         few = d.stress(ratio, "ruptures") * 1e-6
-        shift = float(np.mean(offsets(d, ratio, "exact")))
+        shift = float(np.mean(onset.offsets(d, ratio, "exact")))
         many = d.stress(ratio, "exact") * 1e-6 * (1.0 - shift)
         drawn = generator.choice(many, (4000, few.size))
         for name, function in (("mean", np.mean), ("standard deviation", np.std)):

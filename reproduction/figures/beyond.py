@@ -4,6 +4,7 @@ import dataclasses
 import math
 
 import numpy as np
+from scipy.stats import binomtest
 
 from reproduction import setting
 from reproduction.claims import Data
@@ -33,8 +34,11 @@ def figure_8(d: Data):
         (bottom, "the local criterion above the exact onset (%)"),
     ):
         axes.axvline(0, color=GREY, lw=0.8)
-        axes.set(xlim=(-0.1, 2.0), yscale="log", ylim=(1e-3, 1.3), xlabel=text,
+        axes.set(yscale="log", ylim=(0.7 / d.size.samples, 1.3), xlabel=text,
                  ylabel="share of samples above")  # fmt: skip
+        axes.set_xscale("symlog", linthresh=0.1, linscale=0.5)
+        axes.set_xlim(-0.06, 10)
+        common.plain_ticks(axes.xaxis, (0, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10))
     top.legend(title=XI, loc="upper right")
     common.letters((top, bottom))
     return figure
@@ -44,26 +48,22 @@ def figure_9(d: Data):
     """Draw mean and spread of tau_cr over the whole range of correlation lengths."""
     figure = common.new(5.6)
     top, bottom = figure.subplots(2, 1, sharex=True)
-    cases = ((0, COLOURS[0], "-", "o", "fixed mean of $z$, as in the paper"),
-             (1, COLOURS[2], "--", "^", "random mean of $z$"))  # fmt: skip
     tiny = d["vanishing"]["stress"]
     for axes, function, factor in ((top, mean, 1 / MEAN), (bottom, lower_spread, 1e-3)):
         found = [function(row.values) * factor for row in tiny]
         common.numbers(axes, tiny.ratio.values, found, color=COLOURS[0], marker="o", mfc="white",
                        ls="-", label="finer grid, other draws")  # fmt: skip
-    for mode, colour, dashes, marker, label in cases:
-        for axes, function, factor in ((top, mean, 1 / MEAN), (bottom, lower_spread, 1e-3)):
-            rows = trend(d, function, factor, mode)
-            style = {"color": colour, "ls": dashes, "marker": marker, "label": label}
-            common.numbers(axes, [r for r, _ in rows], [n for _, n in rows], **style)
+        rows = trend(d, function, factor)
+        common.numbers(axes, [r for r, _ in rows], [n for _, n in rows], color=COLOURS[0],
+                       marker="o", label="median less lower quartile")  # fmt: skip
     rows = trend(d, deviation, 1e-3)
     bottom.plot([r for r, _ in rows], [n.value for _, n in rows], ":", color=GREY,
-                label="standard deviation, fixed mean")  # fmt: skip
+                label="standard deviation")  # fmt: skip
     for axes in (top, bottom):
         axes.axvspan(RATIOS[0], RATIOS[-1], color="#eeeeee", lw=0, zorder=0)
     top.set(xscale="log", ylabel=rf"mean of $\tau_\mathrm{{cr}}{OVER_MEAN}", ylim=(0.68, 0.96))
     top.text(0.71, 0.69, "the paper's range", ha="center", color=GREY)
-    bottom.set(yscale="log", xlabel=XI, ylabel="median less lower quartile (kPa)")
+    bottom.set(yscale="log", xlabel=XI, ylabel="spread (kPa)")
     common.plain_ticks(bottom.xaxis, (1 / 64, 1 / 16, 0.25, 1, 4, 16))
     bottom.set_xticklabels(["1/64", "1/16", "1/4", "1", "4", "16"])
     common.plain_ticks(bottom.yaxis, (10, 20, 50, 100))
@@ -171,6 +171,10 @@ def figure_12(d: Data):
     return figure
 
 
+ENDLESS = 45.0
+"""Where a length over h_n that is infinite is drawn."""
+
+
 def figure_13(d: Data):
     """Draw arrested fronts under non-uniform loads beside Griffith's lengths."""
     figure = common.new(5.2)
@@ -188,7 +192,7 @@ def figure_13(d: Data):
         here = study.sel(case=case)
         style = {"color": COLOURS[2 - i], "ms": 4, "ls": "none"}
         length = here["length"].values.ravel() / H
-        griffith = np.minimum(here["griffith"].values.ravel() / H, 45.0)  # infinite if uniform
+        griffith = np.minimum(here["griffith"].values.ravel() / H, ENDLESS)
         bottom.plot(griffith, length, marker="osv"[i],
                     label=f"{case}, without inertia ({np.isfinite(length).sum()})",
                     **style)  # fmt: skip
@@ -197,27 +201,30 @@ def figure_13(d: Data):
                 color=RED, mfc="none", ms=5, label="edge, first event, with inertia"
                 f" ({np.isfinite(edge['dynamic_length'].values).sum()})")  # fmt: skip
     bottom.plot([5, 40], [5, 40], color=GREY, lw=0.8)
+    bottom.axvline(L / H, color=GREY, lw=0.8, ls=":")
     bottom.set(xscale="log", yscale="log", xlabel=r"Griffith's length over $h_\mathrm{n}$",
                ylabel=r"arrested length over $h_\mathrm{n}$")  # fmt: skip
-    for axis in (bottom.xaxis, bottom.yaxis):
-        common.plain_ticks(axis, (1, 2, 5, 10, 20, 40))
+    common.plain_ticks(bottom.yaxis, (1, 2, 5, 10, 20, 40))
+    common.plain_ticks(bottom.xaxis, (5, 10, 20, ENDLESS))
+    bottom.set_xticklabels(["5", "10", "20", r"$\infty$"])
     bottom.legend(loc="upper left")
     common.letters((top, bottom))
     return figure
 
 
 def _shares(axes, d: Data, name: str, title: str) -> None:
-    static, moving = shares(d, name), shares(d, name, inertia=True)
-    places = {case: i for i, (case, _) in enumerate(static.rows)}
-    for series, shift, colour, marker, text in (
-        (static, -0.12, COLOURS[0], "o", "without inertia"),
-        (moving, 0.12, RED, "D", "with inertia"),
+    places = {case: i for i, (case, _) in enumerate(shares(d, name).rows)}
+    for inertia, shift, colour, marker, text in (
+        (False, -0.12, COLOURS[0], "o", "without inertia"),
+        (True, 0.12, RED, "D", "with inertia"),
     ):
+        series = shares(d, name, inertia=inertia)
+        size = d[f"{name}-inertia" if inertia else name].sizes["sample"]
         y = [places[case] + shift for case, _ in series.rows]
         value = np.array([100 * number.value for _, number in series.rows])
-        error = np.array([200 * number.error for _, number in series.rows])
-        inside = (np.minimum(error, value), np.minimum(error, 100 - value))
-        axes.errorbar(value, y, xerr=inside, fmt=marker, color=colour, ms=4, label=text)
+        exact = [binomtest(round(0.01 * v * size), size).proportion_ci() for v in value]
+        error = np.abs(100 * np.transpose(exact) - value)
+        axes.errorbar(value, y, xerr=error, fmt=marker, color=colour, ms=4, label=text)
     axes.set_yticks(
         range(len(places)), [case.replace("h_n", r"$h_\mathrm{n}$") for case in places]
     )
@@ -260,7 +267,7 @@ def figure_15(d: Data):
         pressure.errorbar((1, 2, 4), [row.mean() for row in rows], [row.std() for row in rows],
                           color=colour, marker=marker, ms=4, capsize=3, label=text)  # fmt: skip
     pressure.set(xlabel="normal pressure (MPa)", ylabel="friction coefficient", xlim=(0.5, 4.5))
-    pressure.legend(title="mean, and its deviation")
+    pressure.legend(title="mean \N{PLUS-MINUS SIGN} sd of samples")
     change = d["free_end"]["change"].values * 100
     found = [mean(row) for row in change[:4]]
     common.numbers(end, np.log2(RATIOS), found, color=COLOURS[0], marker="o", label="$L$")
@@ -280,7 +287,10 @@ def figure_15(d: Data):
     ordered = np.sort(d.stress(RATIOS[1])) * 1e-6
     counted = np.arange(1, ordered.size + 1) / ordered.size
     tail.semilogy(ordered[: ordered.size // 2], counted[: ordered.size // 2], ".", color=RED, ms=2,
-                  label="counting", zorder=0)  # fmt: skip
+                  label="counting, 95 %", zorder=0)  # fmt: skip
+    error = 2 * np.sqrt(counted * (1 - counted) / ordered.size)
+    tail.fill_between(ordered, np.maximum(counted - error, 1e-9), counted + error, color=RED,
+                      alpha=0.2, lw=0, where=counted <= 0.5)  # fmt: skip
     tail.set(xlabel="stress (MPa)", ylabel="probability of failure", ylim=(5e-7, 1))
     tail.legend(loc="lower right")
     common.letters((length, pressure, end, tail))
@@ -291,17 +301,16 @@ def figure_16(d: Data):
     """Draw what other strengths and spectra do to the onset."""
     figure = common.new(4.6)
     skew, spectrum = figure.subplots(2, 1)
-    x = np.log2(RATIOS)
-    for start, colour, marker, text in (
-        (0, COLOURS[0], "o", "the paper's strength"),
-        (4, COLOURS[2], "^", "its mirror image"),
+    for own, start, colour, marker, text in (
+        (MEAN, 0, COLOURS[0], "o", "the paper's strength"),
+        (setting.LOW + HIGH - MEAN, 4, COLOURS[2], "^", "its mirror image"),
     ):
-        rows = [d.what_if("skewness", "critical_stress", start + i) / MEAN for i in range(4)]
-        skew.errorbar(x, [row.mean() for row in rows], [row.std() for row in rows], color=colour,
-                      marker=marker, ms=4, capsize=3, label=text)  # fmt: skip
-    skew.set(ylabel=r"$\tau_\mathrm{cr}/\langle\tau_\mathrm{p}\rangle$")
-    skew.set_ylim(0.65, 1.35)
-    skew.legend(title="mean, and its deviation", loc="upper right")
+        rows = [d.what_if("skewness", "critical_stress", start + i) / own for i in range(4)]
+        skew.errorbar(np.log2(RATIOS) + 0.01 * start, [row.mean() for row in rows],
+                      [row.std() for row in rows], color=colour, marker=marker, ms=4, capsize=3,
+                      label=text)  # fmt: skip
+    skew.set(ylabel=r"$\tau_\mathrm{cr}$ over own $\langle\tau_\mathrm{p}\rangle$")
+    skew.legend(title="mean \N{PLUS-MINUS SIGN} sd of samples", loc="upper right")
     for k, ratio in enumerate(SIMULATED):
         usual = d.what_if("exponent", "critical_stress", 4 * k + 2).mean()
         rows = [

@@ -8,20 +8,10 @@ import stiction as st
 from reproduction import setting
 from reproduction.claims import Data
 from reproduction.figures import common
-from reproduction.figures.common import (
-    COLOURS,
-    GREY,
-    INK,
-    MEAN_P,
-    OVER_MEAN,
-    PALE,
-    RED,
-    TAU_CR,
-    XI,
-)
+from reproduction.figures.common import COLOURS, GREY, INK, MEAN_P, OVER_MEAN, RED, TAU_CR, XI
 from reproduction.numbers_with_errors import mean, quantile
 from reproduction.setting import HIGH, LOW, MEAN, PROBLEM, RATIOS, SIMULATED, H, L
-from reproduction.statements_onset import dynamic_mean, offsets
+from reproduction.statements_onset import dynamic_mean, offsets, stress_density
 
 
 def figure_1(d: Data):
@@ -207,7 +197,7 @@ def figure_4(d: Data):
         stress = d.stress(ratio, "ruptures") / MEAN
         style = common.dots(ratio)
         middle.plot(stress, 100 * offsets(d, ratio, "local"), **style, ms=4, label=f"{ratio:g}")
-        middle.plot(stress, 100 * offsets(d, ratio, "printed"), **{**style, "color": PALE},
+        middle.plot(stress, 100 * offsets(d, ratio, "printed"), **{**style, "color": common.PALE},
                     ms=3, mfc="none", zorder=1)  # fmt: skip
     middle.axhline(0, color=GREY, lw=0.8)
     middle.set(xlabel=rf"$\tau_\mathrm{{cr}}{OVER_MEAN} of the rupture",
@@ -241,8 +231,7 @@ def figure_5(d: Data):
     lower = [figure.add_subplot(rows[1][i]) for i in range(3)]
     x = PROBLEM.interface.x / L
     s = np.linspace(LOW, HIGH, 300)
-    law = setting.MARGINAL.distribution.pdf(s) * MEAN
-    upper[0].plot(law, s / MEAN, color=INK)
+    upper[0].plot(setting.MARGINAL.distribution.pdf(s) * MEAN, s / MEAN, color=INK)
     for ratio, strip in zip(RATIOS, fields, strict=True):
         tau_p = setting.strength(ratio).sample(PROBLEM.interface)  # of the same draws for each
         strip.plot(x, tau_p[0] / MEAN, color=common.line(ratio)["color"], lw=0.9)
@@ -250,15 +239,10 @@ def figure_5(d: Data):
         strip.legend(loc="upper right", borderpad=0.1)
         strip.set(xlim=(0, 1), ylim=(0.62, 2.1), yticks=(0.75, 1.25))
         strip.tick_params(labelbottom=strip is fields[-1])
-        lower[0].plot(
-            x,
-            st.theory.nucleation_stress(PROBLEM, tau_p)[0] / MEAN,
-            **common.line(ratio),
-            lw=0.9,
-        )
-        least = st.statistics.density(
-            d.at("moments", "weakest_strength", ratio), bounds=(LOW, HIGH)
-        )
+        tau_n = st.theory.nucleation_stress(PROBLEM, tau_p)[0]
+        lower[0].plot(x, tau_n / MEAN, **common.line(ratio), lw=0.9)
+        weakest = d.at("moments", "weakest_strength", ratio)
+        least = st.statistics.density(weakest, bounds=(LOW, HIGH))
         upper[1].plot(least.value / least.value.max(), least.x / MEAN, **common.line(ratio))
         counts = d.at("moments", "counts", ratio).reshape(-1, 32).sum(axis=1)
         edges = np.linspace(LOW, HIGH, counts.size + 1)
@@ -285,8 +269,10 @@ def figure_5(d: Data):
     common.letter(lower[0], "b", x=-0.12)
     stress, place = figure.add_subplot(grid[2]), figure.add_subplot(grid[3])
     for ratio in RATIOS:
-        found = st.statistics.density(d.stress(ratio), bounds=(LOW, HIGH))
-        stress.plot(found.x / MEAN, found.value * MEAN, **common.line(ratio))
+        found, look = stress_density(d, ratio), common.line(ratio)
+        stress.plot(found.x / MEAN, found.value * MEAN, **look)
+        band = [(found.value + sign * 2 * found.error) * MEAN for sign in (-1, 1)]
+        stress.fill_between(found.x / MEAN, *band, color=look["color"], alpha=0.25, lw=0)
         share, edges = np.histogram(d.at("local", "critical_position", ratio) / L, 20, (0, 1))
         share = share / d.size.samples * 20
         place.stairs(share, edges, baseline=None, color=common.line(ratio)["color"],
