@@ -91,11 +91,6 @@ def _towards_zero(d: Data) -> list[Series]:
     return rows
 
 
-def least(rows) -> tuple[float, Number]:
-    """Return the key and the number of the row with the least number."""
-    return min(rows, key=lambda row: row[1].value)
-
-
 def _window(d: Data, function) -> list[tuple[float, Number]]:
     """Return function(onsets, weakest points) as the nucleation length vanishes."""
     study = d["window"]
@@ -107,19 +102,13 @@ def _excess(stress, weakest) -> Number:
     return mean(stress - weakest) * (1.0 / MEAN)
 
 
-def _halves(stress, weakest):
-    """Compare the two distributions, from different samples."""
+def _apart(stress, weakest) -> tuple[Number, Number]:
+    """Return the distance of the two distributions, from different samples, and its p-value."""
     half = stress.size // 2
-    return ks_2samp(stress[:half], weakest[half:])
-
-
-def _apart(stress, weakest) -> Number:
-    error = 0.5 / math.sqrt(stress.size)
-    return Number(float(_halves(stress, weakest).statistic), error)
-
-
-def _chance(stress, weakest) -> Number:
-    return Number(float(_halves(stress, weakest).pvalue))
+    found = ks_2samp(stress[:half], weakest[half:])
+    return Number(float(found.statistic), 0.5 / math.sqrt(stress.size)), Number(
+        float(found.pvalue)
+    )
 
 
 PARAMETERS = [
@@ -156,8 +145,9 @@ PARAMETERS = [
         lambda d: ([one("length where C = 1/e, over xi_0",
                         setting.strength(1.0).spectrum.efolding_length / setting.H)], [])),
     Check("fracture-energy-varies", above(0.0),
-        lambda d: ([one("coefficient of variation of the fracture energy", energy_variation())],
-                   [one("mean fracture energy", mean_energy(), "J/m²")])),
+        lambda d: ([one("coefficient of variation of the fracture energy",
+                        math.sqrt(_moment(4) - _moment(2) ** 2) / _moment(2))],
+                   [one("mean fracture energy", _moment(2) / (2.0 * setting.W), "J/m²")])),
     Claim("enough-samples", each(below(0.1, f"%: {TENTH}"), below(2.0, "%: a line in a plot")),
         lambda d: ([over_ratios("error of the mean", "%", lambda r: _relative(mean, d, r)),
                     over_ratios("error of the standard deviation", "%",
@@ -165,16 +155,9 @@ PARAMETERS = [
 ]  # fmt: skip
 
 
-def mean_energy() -> float:
-    """Return the mean fracture energy, J/m²."""
-    return (MEAN**2 + DEVIATION**2) / (2.0 * setting.W)
-
-
-def energy_variation() -> float:
-    """Return the coefficient of variation of the fracture energy along the interface."""
-    law = setting.MARGINAL.distribution
-    second = law.expect(lambda x: x**2)
-    return math.sqrt(law.expect(lambda x: x**4) - second**2) / second
+def _moment(order: int) -> float:
+    """Return the mean of a power of the strength."""
+    return setting.MARGINAL.distribution.expect(lambda x: x**order)
 
 
 def _relative(function, d: Data, ratio: float) -> Number:
@@ -248,7 +231,8 @@ def _positions(d: Data, ratio: float) -> np.ndarray:
 ONSET = [
     Claim("lower-friction", falling(),
         lambda d: ([over_ratios("mean tau_cr", "MPa", lambda r: mean(d.stress(r)) * MPA)],
-                   _by_dynamics(d, lambda v: mean(v) * MPA, "mean tau_cr", "MPa"))),
+                   [over_ratios("mean tau_cr, by ruptures", "MPa", lambda r:
+                                mean(d.stress(r, "dynamic")) * MPA)] if "dynamic" in d else [])),
     Beyond("lower-friction-short", falling(), _beyond({"mean tau_cr": mean}, 0.0, 0.25)),
     Beyond("lower-friction-long", falling(), _beyond({"mean tau_cr": mean}, 2.0, 30.0)),
     Claim("variability", alike(rising()), lambda d: (spreads(d), [])),
@@ -265,8 +249,10 @@ ONSET = [
         lambda d: _pair(Series("mean of (tau_cr - min tau_p)/<tau_p>, L/xi_0 fixed", "",
                                _window(d, _excess)), -1)),
     Claim("density-of-minimum", each(falling(), rules.by_chance()),
-        lambda d: ([Series("distance of the distributions", "", _window(d, _apart)),
-                    Series("p-value at the longest", "", _window(d, _chance)[-1:])], [])),
+        lambda d: ([Series("distance of the distributions", "",
+                           _window(d, lambda *row: _apart(*row)[0])),
+                    Series("p-value at the longest", "",
+                           _window(d, lambda *row: _apart(*row)[1])[-1:])], [])),
     Claim("near-the-bound", each(falling(), below(0.25, "the lower quarter", share=True)),
         lambda d: _pair(Series("share of the way from lower to upper bound, L/xi_0 fixed", "",
                                _window(d, lambda stress, weakest: _above_bound(mean(stress)))), -1,
@@ -290,14 +276,6 @@ ONSET = [
                         d.at("local", "critical_position", r),
                         d.at("moments", "weakest_position", r)) > 0.5 * setting.H))], [])),
 ]  # fmt: skip
-
-
-def _by_dynamics(d: Data, function, label: str, unit: str) -> list[Series]:
-    if "dynamic" not in d:
-        return []
-    return [
-        over_ratios(f"{label}, by ruptures", unit, lambda r: function(d.stress(r, "dynamic")))
-    ]
 
 
 def dynamic_mean(d: Data, ratio: float) -> Number:
@@ -401,6 +379,11 @@ def convergence(d: Data, case: str) -> float:
     stress = d["convergence"]["critical_stress"]
     change = stress.sel(case=case) / stress.sel(case="rate 1") - 1.0
     return PER_CENT * float(np.nanmax(np.abs(change)))
+
+
+def bound_above(d: Data, ratio: float) -> np.ndarray:
+    """Return the bound by the eigenvector of the grid over the exact onset, less one."""
+    return d.at("moments", "bound", ratio) / d.at("exact", "first_instability", ratio) - 1.0
 
 
 def stress_density(d: Data, ratio: float):

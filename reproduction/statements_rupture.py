@@ -45,8 +45,7 @@ def _near_length(d: Data, ratio: float) -> Number:
 
 
 def _neighbours(v) -> list[Series]:
-    """Return how close the places are where the onset is misplaced, and how far interaction
-    lowers it there, in a reading of the modulus."""
+    """Return how close two places are where the onset is misplaced, and what interaction does."""
     wrong, helped = v("misplaced", RATIOS[0]), v("helped", RATIOS[0]) * PER_CENT
     if wrong.sum() < 2:
         return []
@@ -96,8 +95,7 @@ def _lowering(d: Data) -> Series:
 
 
 def runaway_length(stress, key: str = "a"):
-    """Return the length at which the release rate exceeds the largest fracture energy, in h_n, in
-    a reading of the modulus."""
+    """Return the length over h_n from which on no fracture energy suffices, in a reading."""
     modulus = setting.STRAIN.effective_modulus if key == "b" else setting.G_STAR
     length = H if key == "a" else setting.PRINTED_H
     energy = HIGH**2 / (2.0 * setting.W)
@@ -230,8 +228,7 @@ def ends_change(d: Data, ratio: float) -> np.ndarray:
 
 
 SIZES = (("L/4", 4, 0.25), ("L/2", 5, 0.5), ("L", 0, 1.0))
-"""Lengths of the interface at xi_0 = h_n/4, or as good, four times, twice and once the usual h_n;
-their cases in the study of free ends, and their part of L."""
+"""Lengths at xi_0 = h_n/4, their cases in the study of free ends, and their part of L."""
 
 
 def _near_end(d: Data, low: float, high: float) -> Series:
@@ -264,19 +261,17 @@ def _pressure(d: Data, function, chosen, variable: str = "friction_coefficient")
 
 
 def _pressure_slope(d: Data) -> Number:
-    values = [mean(d.what_if("normal_load", "critical_patch_length", i)) for i in (0, 1, 2)]
-    slope = math.log(values[2].value / values[0].value) / math.log(4.0)
-    relative = [number.error / number.value for number in (values[0], values[2])]
-    return Number(slope, math.hypot(*relative) / math.log(4.0))
+    least, most = (mean(d.what_if("normal_load", "critical_patch_length", i)) for i in (0, 2))
+    ratio = most / least
+    return Number(math.log(ratio.value), ratio.error / ratio.value) * (1.0 / math.log(4.0))
 
 
 def _counted(d: Data) -> Series:
-    study, rows = d["failure"], []
+    rows, study = [], d["failure"]
     for target in (1e-1, 1e-2):
-        at = int(np.abs(np.log(study["probability"].values / target)).argmin())
-        stress = float(study["stress"].values[at])
-        plain, cv = share(d.stress(RATIOS[1]) < stress), float(study["cv"].values[at])
-        value = float(study["probability"].values[at])
+        at = study.isel(point=int(np.abs(np.log(study["probability"] / target)).argmin()))
+        plain = share(d.stress(RATIOS[1]) < float(at["stress"]))
+        value, cv = float(at["probability"]), float(at["cv"])
         found = Number(value, cv * value)
         rows.append((f"P = {target:g}", found / plain if plain.value else Number(math.nan)))
     return Series("probability over that by counting", "", rows)

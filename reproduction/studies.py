@@ -575,8 +575,7 @@ ARRESTS = {
 TIMES = {"random_load": 2}
 """Samples by equilibrium, in multiples of the usual number: more where shares are small."""
 TIMES_RUPTURES = {"random_residual": 6}
-"""Ruptures likewise: one in six is arrested there, and of 8 most often fewer than the two that
-random strength alone would not give."""
+"""Ruptures likewise: one in six is arrested there; of 8, most often fewer than the two needed."""
 
 
 def what_if(run: Runner, name: str) -> xr.Dataset:

@@ -39,6 +39,7 @@ def names(d: Data, found: dict) -> dict:
 
     widths = [1e-3 * onset.stress_density(d, ratio).bandwidth for ratio in RATIOS]
     edge = d["driving"].sel(case="edge")
+    bounds = np.array([onset.bound_above(d, ratio) for ratio in RATIOS])
     grown = d.at("growth", "patches", 0.25)[:, -1]
     return {
         "d": d,
@@ -52,7 +53,7 @@ def names(d: Data, found: dict) -> dict:
         "mixed": over(lambda r: error(at(d, "c", "excess", r)), (0.25, 2.0)),
         "rate": dict(onset.rate_offsets(d)),
         "verb": verb(found["variability"].verdict),
-        "least": onset.least(wide),
+        "least": min(wide, key=lambda row: row[1].value),
         "last": wide[-1],
         "odds": odds(d),
         "otherwise": [odds(d, visible=seen)[0] for seen in (0.5, 2.0)],
@@ -68,14 +69,11 @@ def names(d: Data, found: dict) -> dict:
         "furthest_above": [PER_CENT * d.excess(r).max() for r in RATIOS[:2]],
         "smoothing": [f(widths) for f in (min, max)],
         "endless": int((np.isinf(edge["griffith"]) & np.isfinite(edge["length"])).sum()),
-        "bound": bound_holds(d),
+        "bound": [int(np.sum(bounds >= -ABOVE)), bounds.size],
         "below": dict(zip(RATIOS, over(lambda r: local_below(d, r)), strict=True)),
-        "over_ruptures": over(
-            lambda r: mean(onset.offsets(d, r, "local")) * PER_CENT, SIMULATED
-        ),
+        "over_ruptures": over(lambda r: mean(onset.offsets(d, r, "local")) * 100.0, SIMULATED),
         "misplaced": lambda study: sum(over(lambda r: _misplaced(d, study, r), SIMULATED)),
         "shifted": over(lambda r: onset.dynamic_mean(d, r) * 1e-6, SIMULATED),
-        "furthest": max(few_and_many(d), key=lambda row: abs(row[-2])),
         "arrested": sum(over(lambda r: int((d.at("exact", "arrested_events", r) > 0).sum()))),
         "driven": lambda case: d["driving"]["length"].sel(case=case).values / setting.H,
         "by_ends": over(lambda r: mean(rupture.ends_change(d, r))),
@@ -85,15 +83,6 @@ def names(d: Data, found: dict) -> dict:
 def verb(verdict: Verdict) -> str:
     """Return a verdict as the verb of a sentence."""
     return f"is {verdict.value}" if verdict in (Verdict.OPEN, Verdict.TEXT) else verdict.value
-
-
-def bound_holds(d: Data) -> tuple[int, int]:
-    """Return how often the bound of the grid is above the exact onset, of how many samples."""
-    bound, exact = (
-        np.concatenate([d.at(study, name, ratio) for ratio in RATIOS])
-        for study, name in (("moments", "bound"), ("exact", "first_instability"))
-    )
-    return int(np.sum(bound >= exact * (1 - ABOVE))), bound.size
 
 
 def local_below(d: Data, ratio: float) -> tuple[Number, Number, Number]:

@@ -12,7 +12,7 @@ from reproduction.figures import common
 from reproduction.figures.common import COLOURS, GREY, INK, OVER_MEAN, RED, TAU_CR, XI
 from reproduction.numbers_with_errors import deviation, lower_spread, mean
 from reproduction.setting import HIGH, MEAN, PROBLEM, RATIOS, SIMULATED, H, L
-from reproduction.statements_onset import trend
+from reproduction.statements_onset import bound_above, trend
 from reproduction.statements_rupture import arrested, shares, with_inertia
 from reproduction.studies import DRIVING, LEVELS, RATES
 
@@ -21,23 +21,18 @@ def figure_8(d: Data):
     """Draw the local criterion and the bound that is strict on the grid against the exact onset."""
     figure = common.new(5.6)
     top, bottom = figure.subplots(2, 1)
-    for ratio in RATIOS:
-        exact = d.at("exact", "first_instability", ratio)
-        bound = 100 * (d.at("moments", "bound", ratio) / exact - 1)
-        local = 100 * d.excess(ratio)
-        for axes, values in ((top, bound), (bottom, local)):
-            ordered = np.sort(values)
-            above = 1.0 - np.arange(ordered.size) / ordered.size
-            axes.plot(ordered, above, **common.line(ratio), label=f"{ratio:g}")
-    for axes, text in (
-        (top, "the bound, by the grid's eigenvector, above the exact onset (%)"),
-        (bottom, "the local criterion above the exact onset (%)"),
+    for axes, text, above in (
+        (top, "the bound, by the grid's eigenvector, above the exact onset (%)", bound_above),
+        (bottom, "the local criterion above the exact onset (%)", Data.excess),
     ):
+        for ratio in RATIOS:
+            ordered = 100 * np.sort(above(d, ratio))
+            left = 1.0 - np.arange(ordered.size) / ordered.size
+            axes.plot(ordered, left, **common.line(ratio), label=f"{ratio:g}")
         axes.axvline(0, color=GREY, lw=0.8)
-        axes.set(yscale="log", ylim=(0.7 / d.size.samples, 1.3), xlabel=text,
-                 ylabel="share of samples above")  # fmt: skip
         axes.set_xscale("symlog", linthresh=0.1, linscale=0.5)
-        axes.set_xlim(-0.06, 10)
+        axes.set(yscale="log", ylim=(0.7 / d.size.samples, 1.3), xlabel=text, xlim=(-0.06, 10),
+                 ylabel="share of samples above")  # fmt: skip
         common.plain_ticks(axes.xaxis, (0, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10))
     top.legend(title=XI, loc="upper right")
     common.letters((top, bottom))
@@ -64,8 +59,8 @@ def figure_9(d: Data):
     top.set(xscale="log", ylabel=rf"mean of $\tau_\mathrm{{cr}}{OVER_MEAN}", ylim=(0.68, 0.96))
     top.text(0.71, 0.69, "the paper's range", ha="center", color=GREY)
     bottom.set(yscale="log", xlabel=XI, ylabel="spread (kPa)")
-    common.plain_ticks(bottom.xaxis, (1 / 64, 1 / 16, 0.25, 1, 4, 16))
-    bottom.set_xticklabels(["1/64", "1/16", "1/4", "1", "4", "16"])
+    common.plain_ticks(bottom.xaxis, (1 / 64, 1 / 16, 0.25, 1, 4, 16),
+                       ["1/64", "1/16", "1/4", "1", "4", "16"])  # fmt: skip
     common.plain_ticks(bottom.yaxis, (10, 20, 50, 100))
     bottom.legend(loc="upper left")
     common.letters((top, bottom))
@@ -113,14 +108,11 @@ def figure_11(d: Data):
     one.legend(loc="upper right")
     pair.plot(x, study["pair_strength"] / MEAN, "--", color=GREY, label=r"$\tau_\mathrm{p}$")
     pair.plot(x, study["pair_tau_n"] / MEAN, color=COLOURS[1], label=r"$\tau_\mathrm{n}$")
-    for name, marker, text in (
-        ("pair_local", "s", "local criterion"),
-        ("pair_exact", "o", "exact onset"),
-    ):
+    for name, marker, face, text in (("pair_local", "s", "none", "local criterion"),
+                                     ("pair_exact", "o", RED, "exact onset")):  # fmt: skip
         place = float(study[name])
         height = float(np.interp(place, PROBLEM.interface.x, study["pair_tau_n"] / MEAN))
-        pair.plot((place - 0.5 * L) / H, height, marker, color=RED, ms=6, label=text,
-                  mfc=RED if marker == "o" else "none")  # fmt: skip
+        pair.plot((place - 0.5 * L) / H, height, marker, color=RED, ms=6, mfc=face, label=text)
     pair.set(xlim=(-12, 12), ylim=(0.68, 1.3), xlabel=r"$x/h_\mathrm{n}$",
              ylabel=rf"stress ${OVER_MEAN}")  # fmt: skip
     pair.legend(loc="upper center", ncols=2)
@@ -179,23 +171,19 @@ def figure_13(d: Data):
     """Draw arrested fronts under non-uniform loads beside Griffith's lengths."""
     figure = common.new(5.2)
     top, bottom = figure.subplots(2, 1, height_ratios=(0.8, 1.2))
-    problem = setting.PROBLEM
-    x = problem.interface.x / L
+    x = PROBLEM.interface.x / L
     for (case, load), colour in zip(DRIVING.items(), COLOURS, strict=False):
-        found = dataclasses.replace(problem, load=load)
-        profile = np.broadcast_to(found.load_profile, x.shape)
-        top.plot(x, profile, color=colour, label=case)
+        profile = dataclasses.replace(PROBLEM, load=load).load_profile
+        top.plot(x, np.broadcast_to(profile, x.shape), color=colour, label=case)
     top.set(xlabel="$x/L$", ylabel="load over its mean", xlim=(0, 1), ylim=(0, None))
     top.legend()
     study = d["driving"]
     for i, case in enumerate(("edge", "gradient", "uniform")):
         here = study.sel(case=case)
-        style = {"color": COLOURS[2 - i], "ms": 4, "ls": "none"}
         length = here["length"].values.ravel() / H
         griffith = np.minimum(here["griffith"].values.ravel() / H, ENDLESS)
-        bottom.plot(griffith, length, marker="osv"[i],
-                    label=f"{case}, without inertia ({np.isfinite(length).sum()})",
-                    **style)  # fmt: skip
+        bottom.plot(griffith, length, "osv"[i], color=COLOURS[2 - i], ms=4,
+                    label=f"{case}, without inertia ({np.isfinite(length).sum()})")  # fmt: skip
     edge = study.sel(case="edge")
     bottom.plot(edge["griffith"].values[:, 0] / H, edge["dynamic_length"].values / H, "D",
                 color=RED, mfc="none", ms=5, label="edge, first event, with inertia"
@@ -205,8 +193,7 @@ def figure_13(d: Data):
     bottom.set(xscale="log", yscale="log", xlabel=r"Griffith's length over $h_\mathrm{n}$",
                ylabel=r"arrested length over $h_\mathrm{n}$")  # fmt: skip
     common.plain_ticks(bottom.yaxis, (1, 2, 5, 10, 20, 40))
-    common.plain_ticks(bottom.xaxis, (5, 10, 20, ENDLESS))
-    bottom.set_xticklabels(["5", "10", "20", r"$\infty$"])
+    common.plain_ticks(bottom.xaxis, (5, 10, 20, ENDLESS), ["5", "10", "20", r"$\infty$"])
     bottom.legend(loc="upper left")
     common.letters((top, bottom))
     return figure
@@ -225,9 +212,7 @@ def _shares(axes, d: Data, name: str, title: str) -> None:
         exact = [binomtest(round(0.01 * v * size), size).proportion_ci() for v in value]
         error = np.abs(100 * np.transpose(exact) - value)
         axes.errorbar(value, y, xerr=error, fmt=marker, color=colour, ms=4, label=text)
-    axes.set_yticks(
-        range(len(places)), [case.replace("h_n", r"$h_\mathrm{n}$") for case in places]
-    )
+    axes.set_yticks(range(len(places)), places)
     axes.set(xlim=(-3, 103), title=title, ylim=(len(places) - 0.5, -0.5))
 
 
@@ -268,13 +253,11 @@ def figure_15(d: Data):
                           color=colour, marker=marker, ms=4, capsize=3, label=text)  # fmt: skip
     pressure.set(xlabel="normal pressure (MPa)", ylabel="friction coefficient", xlim=(0.5, 4.5))
     pressure.legend(title="mean \N{PLUS-MINUS SIGN} sd of samples")
-    change = d["free_end"]["change"].values * 100
-    found = [mean(row) for row in change[:4]]
-    common.numbers(end, np.log2(RATIOS), found, color=COLOURS[0], marker="o", label="$L$")
-    for i, text, marker in ((5, "$L/2$", "s"), (4, "$L/4$", "^")):
-        common.numbers(
-            end, [-2], [mean(change[i])], color=COLOURS[2], marker=marker, label=text
-        )
+    change = [mean(row) * 100 for row in d["free_end"]["change"].values]
+    for x, found, look, text in ((np.log2(RATIOS), change[:4], 0, "$L$"),
+                                 ([-2], change[5:], 1, "$L/2$"),
+                                 ([-2], change[4:5], 2, "$L/4$")):  # fmt: skip
+        common.numbers(end, x, found, color=COLOURS[look], marker="os^"[look], label=text)
     end.axhline(0, color=GREY, lw=0.8)
     common.ratio_axis(end)
     end.set(ylabel=f"{TAU_CR} by free ends (%)")
@@ -313,11 +296,9 @@ def figure_16(d: Data):
     skew.legend(title="mean \N{PLUS-MINUS SIGN} sd of samples", loc="upper right")
     for k, ratio in enumerate(SIMULATED):
         usual = d.what_if("exponent", "critical_stress", 4 * k + 2).mean()
-        rows = [
-            d.what_if("exponent", "critical_stress", 4 * k + j) / usual - 1 for j in range(4)
-        ]
+        rows = [d.what_if("exponent", "critical_stress", 4 * k + j).mean() for j in range(4)]
         look = common.dots(ratio) | {"linestyle": "-", "ms": 4, "label": f"{ratio:g}"}
-        spectrum.plot((1.5, 2, 4, 8), [100 * row.mean() for row in rows], **look)
+        spectrum.plot((1.5, 2, 4, 8), [100 * (row / usual - 1) for row in rows], **look)
     spectrum.set(xlabel="exponent of the spectrum, at equal decay length", xscale="log",
                  ylabel=f"mean {TAU_CR} (%)")  # fmt: skip
     common.plain_ticks(spectrum.xaxis, (1.5, 2, 4, 8))

@@ -51,14 +51,13 @@ def numbers(axes, x, found, **style) -> None:
     axes.errorbar(x, values, errors, **{"ms": 4} | style)
 
 
-def plain_ticks(axis, places) -> None:
+def plain_ticks(axis, places, labels=None) -> None:
     """Put ticks at these places only, with plain labels."""
-    axis.set_ticks(places, [f"{place:g}" for place in places])
+    axis.set_ticks(places, labels or [f"{place:g}" for place in places])
     axis.set_ticks([], minor=True)
 
 
 def ratio_axis(axes) -> None:
     """Label an axis of log2(xi_0/h_n)."""
-    plain_ticks(axes.xaxis, np.log2(RATIOS))
-    axes.set_xticklabels([f"{ratio:g}" for ratio in RATIOS])
+    plain_ticks(axes.xaxis, np.log2(RATIOS), [f"{ratio:g}" for ratio in RATIOS])
     axes.set_xlabel(XI)
