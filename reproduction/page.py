@@ -57,10 +57,10 @@ def write(path: Path, data: Data, groups, images, runner, warned) -> None:
 
     template = environment.from_string(Path(__file__).with_name("page.html").read_text("utf-8"))
     readings = compare(data)
-    order = [Verdict.FAILS, Verdict.TEXT, Verdict.CORRECTED]
+    order = [Verdict.FAILS, Verdict.TEXT, Verdict.OPEN, Verdict.CORRECTED]
     exceptions = [f for f in found if f.verdict in order]
     exceptions.sort(key=lambda f: order.index(f.verdict))
-    title = "What does not hold, only under some readings, or only with a correction"
+    title = "What does not hold, is undecided, or holds only with a correction"
     sections = [(title, exceptions, True)]
     sections += [(title, rows, False) for title, rows in groups.items() if rows]
     text = template.render(
@@ -108,5 +108,6 @@ def _figure(number: int, image: Path, filled) -> dict:
     return about | {
         "number": number,
         "ours": filled(about["ours"]),
+        "caption": filled(about["caption"]),
         "image": f"data:image/png;base64,{encoded}",
     }

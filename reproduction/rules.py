@@ -66,8 +66,8 @@ def _moved(limit: float, share: bool, centre: float) -> float:
 
 def within(low: float, high: float, why: str = "", *, share: bool = False) -> Rule:
     """Every number lies between two limits; `why` is the reason of limits that are a choice."""
-    between = 0.0 < low < high < math.inf and not share
-    centre = 0.5 * (low + high) if between else 0.0
+    one_sign = low * high > 0.0 and math.isfinite(high - low)
+    centre = 0.5 * (low + high) if one_sign else 0.0
 
     def judge(series: Sequence[Numbers]) -> Verdict:
         least, most = (_moved(x, share, centre) if why else x for x in (low, high))
@@ -179,7 +179,7 @@ def main(first: Rule, *others: Rule) -> Rule:
         return verdict
 
     rest = " and ".join(rule.text for rule in others)
-    text = f"{first.text}; a correction if not, of what follows, {rest}"
+    text = f"{first.text}; a correction unless the last is {rest}"
     return Rule(text, judge, first.series + sum(rule.series for rule in others))
 
 

@@ -104,8 +104,8 @@ def figure_11(d: Data):
     load = float(study["one_load"])
     one.plot(x, study["one_stress"] / load, color=COLOURS[0], label="stress over load")
     one.plot(x, study["one_strength"] / load, "--", color=GREY, label="strength over load")
-    one.set(xlim=(-3, 3), ylim=(0.9, 1.2), xlabel=r"$x/h_\mathrm{n}$ from a single patch")
-    one.legend(loc="upper right")
+    one.set(xlim=(-3, 3), xlabel=r"$x/h_\mathrm{n}$ from a single patch")
+    one.legend(loc="lower right")
     pair.plot(x, study["pair_strength"] / MEAN, "--", color=GREY, label=r"$\tau_\mathrm{p}$")
     pair.plot(x, study["pair_tau_n"] / MEAN, color=COLOURS[1], label=r"$\tau_\mathrm{n}$")
     for name, marker, face, text in (("pair_local", "s", "none", "local criterion"),
@@ -131,7 +131,7 @@ def figure_12(d: Data):
     length = np.linspace(0, 4.5, 100)
     most = HIGH**2 / (2 * setting.W)
     for ratio in RATIOS:
-        stress = d.stress(ratio).mean()
+        stress = d.stress(ratio, "exact").mean()
         rate = math.pi * 0.5 * length * H * stress**2 / (2 * setting.G_STAR)
         top.plot(length, rate / most, **common.line(ratio), label=f"{ratio:g}")
     top.axhline(1, color=RED, lw=1)
@@ -191,7 +191,7 @@ def figure_13(d: Data):
     bottom.plot([5, 40], [5, 40], color=GREY, lw=0.8)
     bottom.axvline(L / H, color=GREY, lw=0.8, ls=":")
     bottom.set(xscale="log", yscale="log", xlabel=r"Griffith's length over $h_\mathrm{n}$",
-               ylabel=r"arrested length over $h_\mathrm{n}$")  # fmt: skip
+               ylabel=r"arrested length over $h_\mathrm{n}$", ylim=(0.8, 200))  # fmt: skip
     common.plain_ticks(bottom.yaxis, (1, 2, 5, 10, 20, 40))
     common.plain_ticks(bottom.xaxis, (5, 10, 20, ENDLESS), ["5", "10", "20", r"$\infty$"])
     bottom.legend(loc="upper left")
