@@ -239,6 +239,14 @@ def _last_digit(text: str) -> float:
     return 10.0 ** (int(power or 0) - len(digits.partition(".")[2]))
 
 
+def refusal(call: Callable[[], Any]) -> Any:
+    """What a call gives, or the text by which it is refused."""
+    try:
+        return call()
+    except ValueError as error:
+        return f"{type(error).__name__}: {error}"
+
+
 def read(path: Path) -> dict[str, dict[str, Any]]:
     """Recorded outputs of the calls of a file."""
     return json.loads(path.read_text()) if path.exists() else {}

@@ -19,6 +19,7 @@ MARGINALS = {
     "gamma": st.Gamma(mean=0.9e6, cv=0.27),
     "normal": st.TruncatedNormal(mean=1.05e6, cv=0.2, low=4e5),
     "scipy": scipy.stats.gumbel_l(loc=1.3e6, scale=1.4e5),
+    "named": {"type": "gamma", "a": 3.2, "loc": 4e5, "scale": 2.1e5},
 }
 SPECTRA = {
     "power": st.PowerLawSpectrum(3.1e-3, exponent=1.3, power_kept=0.97),
@@ -109,6 +110,10 @@ def a_field_that_is_known_in_places():
         "sample": known.sample(INTERFACE, samples=3, seed=5),
         "quantile": known.quantile(INTERFACE, 0.1),
     }
+    three = three_properties()
+    residual = three.residual_strength.given(1.4e5 + 0.2 * (scan() - 1e6), noise=9e3)
+    second = dataclasses.replace(three, residual_strength=residual)
+    found |= {"second": second.profiles(INTERFACE, samples=2, seed=6)}
     return found | {"both": both.profiles(INTERFACE, samples=2, seed=6)}
 
 
@@ -164,7 +169,6 @@ def an_ensemble_by_equilibrium_that_keeps_its_profiles():
         first=510,
         keep=("strength", "initial_stress"),
         workers=1,
-        progress=False,
     )
 
 
@@ -174,9 +178,7 @@ def an_ensemble_by_the_local_criterion_with_its_pilot():
         LINE, friction=st.LinearWeakening(weakening_rate=2.9e11, residual_strength=1.8e5)
     )
     field = st.RandomField(MARGINALS["beta"], SPECTRA["cut"])
-    return st.monte_carlo(
-        problem, field, method=st.LocalCriterion(), samples=700, seed=1, progress=False
-    )
+    return st.monte_carlo(problem, field, method=st.LocalCriterion(), samples=700, seed=1)
 
 
 @calls("order statistics and scipy, tests/oracle/test_statistics_estimates.py")

@@ -3,6 +3,7 @@
 import dataclasses
 
 import numpy as np
+import scipy.stats
 import xarray as xr
 from recording import Calls, compared
 from setups import LOCAL, make_problem
@@ -37,13 +38,7 @@ BOUNDED = st.RandomField(
 @calls(RECOVERED, close=2e-2)
 def a_fit_to_records_of_unlike_length():
     found = st.fit_field(
-        RECORDS,
-        marginal=["weibull", "gamma"],
-        detrend=1,
-        noise=True,
-        bootstrap=20,
-        seed=4,
-        progress=False,
+        RECORDS, marginal=["weibull", "gamma"], detrend=1, noise=True, bootstrap=20, seed=4
     )
     one, other = found.interfaces(2, seed=3)
     grid = st.Interface(0.03, 80)
@@ -60,15 +55,46 @@ def a_fit_with_scatter_between_specimens():
     records = [record(120, 0.024, 20 + i) * factor for i, factor in enumerate(factors)]
     for each in records:
         each.attrs["units"] = "Pa"
-    found = st.fit_field(
-        records, marginal="lognormal", between=True, bootstrap=20, seed=5, progress=False
-    )
+    found = st.fit_field(records, marginal="lognormal", between=True, bootstrap=20, seed=5)
     return {"fit": found, "drawn": [repr(one) for one in found.interfaces(2, seed=7)]}
+
+
+@calls(RECOVERED, close=2e-2)
+def a_fit_to_a_record_with_an_outlier():
+    outlier = RECORDS[0].copy()
+    outlier[31] = 4.1e6
+    found = st.fit_field(outlier, marginal=["gamma", "lognormal"], bootstrap=20, seed=2)
+    return {name: [one.distance, one.score, one.weight] for name, one in found.families.items()}
+
+
+@calls(RECOVERED, close=2e-2)
+def a_fit_to_a_map_of_known_and_of_fitted_anisotropy():
+    grid = st.Interface((0.02, 0.017), (40, 34))
+    field = dataclasses.replace(FIELD, anisotropy=1.6)
+    rows = field.sample(grid, samples=1, seed=6)
+    return {
+        str(given): repr(
+            st.fit_field(
+                rows, grid, marginal="weibull", anisotropy=given, noise=0.0, bootstrap=20
+            ).field
+        )
+        for given in (1.4, True, False)
+    }
+
+
+@calls(RECOVERED, close=1e-5)
+def the_scale_of_a_distribution_of_scipy():
+    marginal = scipy.stats.weibull_min(1.9, loc=6.1e5, scale=4.4e5)
+    field = dataclasses.replace(BOUNDED, marginal=marginal)
+    found = st.infer(
+        PROBLEM, field, PEAKS, prior={"marginal.scale": (2e5, 8e5)}, method=LOCAL, samples=300
+    )
+    return {"str": str(found), "at": repr(found.at(7)[1])}
 
 
 def inferred(**more):
     prior = {"correlation_length": (1e-3, 6e-3), "marginal.low": (5.6e5, 7.2e5)}
-    options = {"prior": prior, "method": LOCAL, "samples": 300, "seed": 3, "progress": False}
+    options = {"prior": prior, "method": LOCAL, "samples": 300, "seed": 3}
     return st.infer(PROBLEM, BOUNDED, PEAKS, **options | more)
 
 
@@ -107,16 +133,13 @@ def parameters_from_peaks_in_newtons_and_two_lengths():
             prior={"marginal.high": (1.2e6, 2.2e6)},
             method=LOCAL,
             samples=300,
-            progress=False,
         )
     )
 
 
 @calls("p-values uniform over campaigns, validation/inference.py", close=1e-5)
 def agreement_with_a_prediction_and_a_posterior():
-    predicted = st.monte_carlo(
-        PROBLEM, BOUNDED, method=LOCAL, samples=300, seed=6, pilot=False, progress=False
-    )
+    predicted = st.monte_carlo(PROBLEM, BOUNDED, method=LOCAL, samples=300, seed=6, pilot=False)
     return {
         "prediction": st.statistics.agreement(
             predicted, PEAKS[1:] * 1e-3, unit="kPa", load_cell_error=4.0, seed=2, replicates=299
@@ -141,7 +164,6 @@ def what_tests_would_tell():
         repetitions=10,
         samples=200,
         seed=2,
-        progress=False,
     )
 
 
@@ -160,7 +182,6 @@ def a_specimen_in_newtons():
             method=LOCAL,
             samples=200,
             load_cell_error=4.0,
-            progress=False,
         )
     )
 

@@ -46,25 +46,25 @@ def law(kind, **more):
 
 @calls(ORACLE)
 def local_criterion_of_two_strengths():
-    return st.onset(LINE, TWO, method=LOCAL, progress=False)
+    return st.onset(LINE, TWO, method=LOCAL)
 
 
 @calls("closed form of the mean stress; " + ORACLE)
 def local_criterion_with_forces_in_mode_three():
     problem = dataclasses.replace(of_width(LINE), mode="III")
-    return st.onset(problem, TWO, method=LOCAL, progress=False)
+    return st.onset(problem, TWO, method=LOCAL)
 
 
 @calls(ORACLE + "; sensitivity by difference quotients, tests/exact/test_equilibrium.py")
 def exact_onsets_with_slip_sensitivity_and_forces():
     method = st.Equilibrium(slip=True, sensitivity=True)
-    return st.onset(of_width(LINE), TWO, method=method, progress=False)
+    return st.onset(of_width(LINE), TWO, method=method)
 
 
 @calls(EVENTS)
 def arrested_events_of_two_strengths():
     both = np.stack([barred(INTERFACE), np.roll(barred(INTERFACE, 3.1e5), 17)])
-    return st.onset(LINE, both, method=st.Equilibrium(events=3), progress=False)
+    return st.onset(LINE, both, method=st.Equilibrium(events=3))
 
 
 @calls(EVENTS)
@@ -77,7 +77,7 @@ def a_law_of_two_pieces_with_critical_slip_along_x():
         slip=(0.4, 1.0),
         strength=(0.35, 0.0),
     )
-    return st.onset(problem, TWO, method=st.Equilibrium(events=2, slip=True), progress=False)
+    return st.onset(problem, TWO, method=st.Equilibrium(events=2, slip=True))
 
 
 @calls(EVENTS)
@@ -85,14 +85,14 @@ def a_law_that_rests_and_steepens():
     problem = law(
         st.PiecewiseWeakening, slip=(0.2, 0.5, 0.8, 1.0), strength=(0.7, 0.69, 0.15, 0.0)
     )
-    return st.onset(problem, TWO, method=st.Equilibrium(sensitivity=True), progress=False)
+    return st.onset(problem, TWO, method=st.Equilibrium(sensitivity=True))
 
 
 @calls("the same by the whole law in many pieces, tests/oracle/test_friction_laws.py")
 def an_exponential_law_in_pieces():
     exponential = law(st.ExponentialWeakening).friction
     problem = dataclasses.replace(LINE, friction=st.PiecewiseWeakening.from_law(exponential, 5))
-    return st.onset(problem, TWO[0], method=EXACT, progress=False)
+    return st.onset(problem, TWO[0], method=EXACT)
 
 
 @calls(EVENTS)
@@ -106,7 +106,7 @@ def several_profiles_by_name():
             [2.7e6 + 8e5 * uneven(INTERFACE, seed=s) for s in (16, 17)]
         ),
     }
-    return st.onset(LINE, profiles, method=EXACT, progress=False)
+    return st.onset(LINE, profiles, method=EXACT)
 
 
 @calls(EVENTS)
@@ -114,7 +114,7 @@ def fracture_energy_along_x_and_residual_ratio():
     energy = 1.1 + 0.2 * uneven(INTERFACE, seed=18)
     friction = st.LinearWeakening(fracture_energy=energy, residual_ratio=0.23)
     problem = dataclasses.replace(LINE, friction=friction)
-    return st.onset(problem, {"strength": TWO}, method=EXACT, progress=False)
+    return st.onset(problem, {"strength": TWO}, method=EXACT)
 
 
 @calls("states checked as equilibria, tests/exact/test_equilibrium.py")
@@ -163,7 +163,7 @@ def loads_with_an_edge_and_a_gradient():
     }.items():
         load = dataclasses.replace(LINE.load, profile=shape)
         problem = dataclasses.replace(LINE, load=load)
-        found[name] = st.onset(problem, TWO, method=EXACT, progress=False)
+        found[name] = st.onset(problem, TWO, method=EXACT)
     return found
 
 

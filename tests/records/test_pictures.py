@@ -35,8 +35,8 @@ def plain(problem):
 
 @calls(DRAWN)
 def onsets_on_a_line_and_a_plane():
-    both = [st.onset(LINE, TWO, method=method, progress=False) for method in (LOCAL, EXACT)]
-    plane = st.onset(PLANE, PLANE_STRENGTH, method=LOCAL, progress=False)
+    both = [st.onset(LINE, TWO, method=method) for method in (LOCAL, EXACT)]
+    plane = st.onset(PLANE, PLANE_STRENGTH, method=LOCAL)
     return {
         "line": st.plot.onset(both, TWO, problem=LINE, sample=1),
         "plane": st.plot.onset(plane, PLANE_STRENGTH, problem=PLANE),
@@ -55,9 +55,7 @@ def densities_and_quantiles():
         nodes=96, length=0.047, weakening_rate=0.31e12, ensemble={"samples": 40}, sweep=sweep
     )
     swept = st.Study.from_dict(study).run(progress=False)
-    one = st.monte_carlo(
-        plain(LINE), FIELD, method=LOCAL, samples=60, seed=2, pilot=False, progress=False
-    )
+    one = st.monte_carlo(plain(LINE), FIELD, method=LOCAL, samples=60, seed=2, pilot=False)
     return {
         "one": st.plot.monte_carlo(one),
         "several": st.plot.monte_carlo(
@@ -73,7 +71,7 @@ def densities_and_quantiles():
 @calls(DRAWN)
 def specimens_and_their_events():
     strength = rough(JOINT, 6)[0]
-    found = st.onset(JOINT, strength, method=st.Equilibrium(events=5), progress=False)
+    found = st.onset(JOINT, strength, method=st.Equilibrium(events=5))
     path = st.equilibrium_path(JOINT, strength, np.linspace(2e5, 1.5e6, 9))
     return {
         "specimen": st.plot.specimen(JOINT, strength, found),
@@ -88,9 +86,7 @@ def failure_curves():
     problem = dataclasses.replace(
         problem, interface=dataclasses.replace(problem.interface, width=0.012)
     )
-    curve = st.failure_curve(
-        problem, FIELD, method=LOCAL, smallest=1e-2, target_cv=0.4, seed=3, progress=False
-    )
+    curve = st.failure_curve(problem, FIELD, method=LOCAL, smallest=1e-2, target_cv=0.4, seed=3)
     return {
         "curve": st.plot.failure_curve(curve),
         "asked": st.plot.failure_curve(curve, stress=7.4e5),
@@ -105,9 +101,7 @@ def posteriors_and_agreement():
         "correlation_length": {"low": 8e-4, "high": 6e-3, "spacing": "log"},
         "marginal.low": (5.2e5, 7.2e5),
     }
-    found = st.infer(
-        problem, FIELD, peaks, prior=prior, method=LOCAL, samples=200, progress=False
-    )
+    found = st.infer(problem, FIELD, peaks, prior=prior, method=LOCAL, samples=200)
     agreed = st.statistics.agreement(found, replicates=199)
     return {"posterior": st.plot.posterior(found), "agreement": st.plot.agreement(agreed)}
 
@@ -116,7 +110,7 @@ def posteriors_and_agreement():
 def a_fit_of_two_records():
     grid = st.Interface(0.03, 140)
     rows = FIELD.sample(grid, samples=2, seed=9)
-    found = st.fit_field(rows, grid, marginal="beta", bootstrap=20, seed=1, progress=False)
+    found = st.fit_field(rows, grid, marginal="beta", bootstrap=20, seed=1)
     return st.plot.fit(found)
 
 
@@ -124,9 +118,9 @@ def a_fit_of_two_records():
 def a_rupture_and_its_film():
     save = st.Save(["slip", "slip_rate", "shear_stress"], every=30)
     method = st.Rupture(loading_rate=9e8, kernel_tolerance=1e-5)
-    run = st.simulate_rupture(LINE, TWO[0], method=method, save=save, progress=False)
+    run = st.simulate_rupture(LINE, TWO[0], method=method, save=save)
     with tempfile.TemporaryDirectory() as folder:
-        path = st.plot.film(run, Path(folder) / "film.gif", frames=4, progress=False)
+        path = st.plot.film(run, Path(folder) / "film.gif", frames=4)
         with Image.open(path) as film:
             film_is = [film.n_frames, *film.size, film.info["duration"]]
     return {"rupture": st.plot.rupture(run, problem=LINE), "film": film_is}

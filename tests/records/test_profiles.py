@@ -15,7 +15,7 @@ from crooked import (
     as_measured,
     write_table,
 )
-from recording import Calls, compared
+from recording import Calls, compared, refusal
 
 import stiction as st
 
@@ -31,6 +31,8 @@ TABLES = {
     "blanks without a heading": "\n".join(
         f"{2e-3 * i:.4f} {1e6 * v:.0f}" for i, v in enumerate(EIGHT)
     ),
+    "comments and a first row without a value": "# rig 4, 12 bar\n# x (mm);strength (MPa)\n"
+    + "\n".join(f"{2 * i};{'-' if i == 0 else v}" for i, v in enumerate(EIGHT)),
     "one column": "strength [MPa]\n" + "\n".join(f"{v}" for v in EIGHT),
     "unsorted with empty cells": "x (mm),strength (MPa),note\n"
     + "\n".join(f"{2 * i},{'' if i == 3 else EIGHT[i]},n{i}" for i in (4, 0, 7, 2, 1, 6, 5, 3)),
@@ -78,6 +80,15 @@ def friction_coefficients_and_pressures():
 
 
 @calls(BACK)
+def heights_of_a_matrix_without_a_unit():
+    heights = 1e-3 * np.cos(np.arange(96.0)).reshape(12, 8)
+    heights[5, 3] = np.nan
+    with tempfile.TemporaryDirectory() as folder:
+        np.save(Path(folder) / "h.npy", heights)
+        return st.read_profile(Path(folder) / "h.npy", quantity="height")
+
+
+@calls(BACK)
 def gaps_across_the_seam():
     found = {}
     for name, problem, strength, gap in (
@@ -88,9 +99,7 @@ def gaps_across_the_seam():
         read = st.read_profile(holes, interface=problem.interface, gaps="fill")
         found[name] = {
             "read": read,
-            "onset": st.onset(
-                problem, holes, method=st.LocalCriterion(), gaps="fill", progress=False
-            ),
+            "onset": st.onset(problem, holes, method=st.LocalCriterion(), gaps="fill"),
         }
     return found
 
@@ -123,6 +132,12 @@ def peaks_of_tests():
             path = Path(folder) / f"{name}.csv"
             path.write_text(text)
             found[name] = st.read_peaks(path)
+        for name, unit in (("stresses", "kPa"), ("forces", "N"), ("stresses", "MPa")):
+            path = Path(folder) / f"{name}.csv"
+            given = refusal(lambda path=path, unit=unit: st.read_peaks(path, unit=unit))
+            found[f"{name} in {unit}"] = (
+                given.replace(folder, "") if isinstance(given, str) else given
+            )
     return found
 
 
@@ -130,7 +145,7 @@ def peaks_of_tests():
 def onsets_of_labelled_arrays():
     measured = as_measured(LINE.interface, LINE_STRENGTH)
     both = xr.Dataset({"strength": measured, "residual_strength": 0.21 * measured})
-    return st.onset(LINE, both, method=st.Equilibrium(), progress=False)
+    return st.onset(LINE, both, method=st.Equilibrium())
 
 
 test_outputs_are_as_recorded = compared(calls, __file__)

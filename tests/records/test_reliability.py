@@ -37,7 +37,7 @@ PRESSED = st.RandomInterface(
         st.Gamma(mean=2.3e6, cv=0.1), st.SquaredExponentialSpectrum(4e-3)
     ),
 )
-OPTIONS = {"progress": False, "workers": 1}
+OPTIONS = {"workers": 1}
 
 
 @calls(COUNTED, close=1e-5)

@@ -1,8 +1,11 @@
 """Recorded outputs: ruptures on lines with every kind of law, load, start and stop."""
 
+import tempfile
+from pathlib import Path
+
 import numpy as np
 from crooked import across_the_seam, uneven
-from recording import Calls, compared
+from recording import Calls, compared, refusal
 from setups import make_problem
 
 import stiction as st
@@ -34,7 +37,7 @@ def run(problem, strength, save=None, **options):
     save = save or st.Save(
         ["slip", "slip_rate", "strength"], every=60, stations={"a": 0.011, "b": 0.0371}
     )
-    return st.simulate_rupture(problem, strength, method=method, save=save, progress=False)
+    return st.simulate_rupture(problem, strength, method=method, save=save)
 
 
 @calls(WAVES, close=CLOSE)
@@ -67,6 +70,25 @@ def a_load_history_that_is_held_and_lowered():
     return run(problem, strength, loading_rate=None, load=history, end_time=1.6e-3, stop="rest")
 
 
+@calls("every number of the setting enters the digest, read", close=CLOSE)
+def a_folder_that_holds_the_run_of_another_load():
+    problem, strength = line(nodes=96)
+    with tempfile.TemporaryDirectory() as folder:
+        save = st.Save(["slip"], every=40, stations={"a": 0.013}, to=Path(folder) / "run")
+        given, times = {"loading_rate": None, "stop": "onset", "save": save}, [0.0, 1e-3, 2e-3]
+        ends = {"same": 9e5, "again": 9e5, "other": 8e5}
+        found = {
+            name: refusal(
+                lambda at=at: run(problem, strength, load=(times, [0, 9e5, at]), **given)
+            )
+            for name, at in ends.items()
+        }
+    return {
+        name: one.replace(folder, "") if isinstance(one, str) else one.critical_stress
+        for name, one in found.items()
+    }
+
+
 @calls(WAVES, close=CLOSE)
 def barriers_that_arrest():
     problem, strength = line()
@@ -82,9 +104,7 @@ def an_ensemble():
         st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6), st.PowerLawSpectrum(2.1e-3)
     )
     method = st.Rupture(loading_rate=9e8, kernel_tolerance=FASTER, stop="onset")
-    return st.monte_carlo(
-        problem, field, method=method, samples=3, seed=7, workers=1, progress=False
-    )
+    return st.monte_carlo(problem, field, method=method, samples=3, seed=7, workers=1)
 
 
 test_outputs_are_as_recorded = compared(calls, __file__)

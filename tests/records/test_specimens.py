@@ -16,7 +16,7 @@ EVENTS = st.Equilibrium(events=4, slip=True, sensitivity=True)
 
 
 def solved(problem, seed=5, method=EVENTS, samples=2):
-    return st.onset(problem, rough(problem, seed, samples), method=method, progress=False)
+    return st.onset(problem, rough(problem, seed, samples), method=method)
 
 
 @calls(STEPS)
@@ -62,9 +62,7 @@ def glued_pressing_of_friction_coefficients():
         st.ExponentialSpectrum(6e-3, power_kept=0.95),
         of="friction_coefficient",
     )
-    return st.monte_carlo(
-        problem, field, method=st.Equilibrium(events=2), samples=3, seed=2, progress=False
-    )
+    return st.monte_carlo(problem, field, method=st.Equilibrium(events=2), samples=3, seed=2)
 
 
 @calls(STEPS)
@@ -101,6 +99,7 @@ def stiffness_and_response_of_blocks():
         "pushers": crooked(nodes=60, drive=drive, nu=0.21),
         "platen": crooked(nodes=60, plane="strain", nu=0.45, height=0.07),
         "three": crooked(nodes=60, mode="III", drive=st.Platen(stiffness=3e7)),
+        "three pushed": crooked(nodes=60, mode="III", drive=drive, height=0.023),
     }.items():
         blocks = problem.blocks
         found[name] = {

@@ -1,0 +1,104 @@
+"""Recorded refusals of what several keys, or calls, are wrong about, beside what is just taken."""
+
+import numpy as np
+import scipy.stats
+from crooked import LINE, LINE_STRENGTH, PLANE
+from recording import Calls, compared, refusal
+from setups import EXACT, LOCAL, make_problem
+from small_study import small_study
+
+import stiction as st
+
+calls = Calls()
+READ = "read beside the rule that refuses"
+RISING = np.linspace(1e11, 2e11, 256)
+FINE = st.PowerLawSpectrum(2e-9)
+
+
+def field(mean=1.1e6, spectrum=None, **more):
+    marginal = st.Lognormal(mean=mean, cv=0.2)
+    return st.RandomField(marginal, spectrum or st.PowerLawSpectrum(4e-3), **more)
+
+
+def ensemble(random, problem=None, **more):
+    found = st.monte_carlo(
+        problem or make_problem(),
+        random,
+        **{"method": LOCAL, "samples": 2, "pilot": False} | more,
+    )
+    return found.critical_stress
+
+
+def studied(**tables):
+    return len(st.Study.from_dict(small_study(**tables)).points)
+
+
+def steep(critical_slip, **more):
+    problem = make_problem(256, 0.1, critical_slip=critical_slip, residual_strength=3e5)
+    strength = 1.1e6 + 2e5 * np.sin(np.arange(256) / 7.0)
+    return st.onset(problem, strength, method=EXACT, **more).critical_stress
+
+
+CALLS = {
+    "rates that vary": [
+        lambda: make_problem(weakening_rate=RISING * 60.0),
+        lambda: make_problem(weakening_rate=RISING * 6.0).nodes_in_nucleation_length(1.2e12),
+        lambda: make_problem(weakening_rate=RISING).nodes_in_nucleation_length(2e11),
+    ],
+    "samples that are steep": [lambda: steep(4e-7), lambda: steep(2.1e-6)],
+    "fields that are too fine": [
+        lambda: ensemble(st.RandomInterface(strength=field(spectrum=FINE),
+                                            residual_strength=field(2e5, FINE))),
+        lambda: ensemble(field(), keep=("residual_strength", "strenght")),
+    ],
+    "moments": [
+        lambda: st.Lognormal(mean=2e5, cv=0.1, low=2e5),
+        lambda: st.Weibull(mean=2.1e5, cv=0.1, low=2e5),
+        lambda: st.Gamma(mean=1e6, cv=10.0),
+        lambda: st.TruncatedNormal(mean=1e6, cv=0.4, low=8e5),
+        lambda: st.RandomField({"type": "gamma", "a": 2.0, "cv": 0.2}, FINE),
+        lambda: st.RandomField(scipy.stats.lognorm(-0.3), FINE),
+    ],
+    "long values": [
+        lambda: st.Solid(shear_modulus=[1.0] * 40, poisson_ratio="x" * 90, density=np.ones(3)),
+        lambda: make_problem(mode="i" * 58),
+    ],
+    "studies": [
+        lambda: studied(
+            uncertain={"count": 3, "strength.marginal.low": [5e5, 6e5]},
+            sweep=[{"random.strength.marginal": [
+                {"type": "beta", "alpha": a, "beta": 3.0, "low": low, "high": 1.6e6}
+                for a, low in ((1.5, 6e5), (2.5, 6e5))
+            ]}],
+        ),
+        lambda: studied(
+            uncertain={"count": 3, "strength.marginal.low": [5e5, 6e5]},
+            sweep=[{"random.strength.marginal.low": [5e5, 6e5]}],
+        ),
+        lambda: studied(sweep=[{"problem.solid.poisson_ratio": [0.2, 0.7]}, {"mehtod": [1, 2]}]),
+    ],
+    "fits": [
+        lambda: st.fit_field(LINE_STRENGTH, LINE.interface, anisotropy=1.4),
+        lambda: st.fit_field(LINE_STRENGTH, LINE.interface, quantity="strenght"),
+    ],
+    "planes": [
+        lambda: st.onset(PLANE, np.full((20, 24), 1e6), method=LOCAL),
+        lambda: st.onset(PLANE, np.full((24, 20), np.nan), method=LOCAL),
+    ],
+    "densities": [
+        lambda: st.statistics.density(np.linspace(0.1, 1.0, 40), bounds=(0.2, 0.9)),
+        lambda: st.statistics.density(np.linspace(0.1, 1.0, 40), bounds=(None, 1.0)).value[:9],
+    ],
+}  # fmt: skip
+
+
+@calls(READ)
+def what_several_keys_are_wrong_about():
+    return {
+        f"{name} {number}": refusal(one)
+        for name, some in CALLS.items()
+        for number, one in enumerate(some)
+    }
+
+
+test_outputs_are_as_recorded = compared(calls, __file__)
