@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from brute_force import Along, BruteForce, along, stepped
-from stiction.equilibrium.patches import line_patch
 
 import stiction as st
+from stiction.methods.equilibrium.patches import line_patch
 
 LENGTH = 0.083  # m
 INF = math.inf

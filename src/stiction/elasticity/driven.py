@@ -22,8 +22,12 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.elasticity.blocks import Pushes, block_response, glued_pressure
 
-POSITIVE = 1e-12
+ROUND_OFF = 1e-12
 """Share of the diagonal up to which a positive entry of K beside it is round-off."""
+FAINT = 1e-3
+"""Share of its largest value to which the profile of a drive is known where it has died away."""
+LEAST = 1e-9
+"""Share of its largest value that the profile of a drive has at least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +44,8 @@ class Driven:
         h, Pa/m: how much stress the mean of q d takes off the drive.
     drive_stiffness : float
         C, Pa.
+    error : float
+        To which the entries of K are known, Pa/m.
     """
 
     stiffness: Array
@@ -47,13 +53,17 @@ class Driven:
     pressure: Array
     relief: float
     drive_stiffness: float
+    error: float
 
     @property
     def positive(self) -> float:
-        """Largest positive entry of K off its diagonal, as a share of the diagonal; 0 for none."""
+        """Largest positive entry of K off its diagonal, as a share of the diagonal; 0 for none.
+
+        None, if it is within the error.
+        """
         off = self.stiffness - np.diag(np.diag(self.stiffness))
-        share = float(off.max() / np.diag(self.stiffness).min())
-        return share if share > POSITIVE else 0.0
+        own, most = float(np.diag(self.stiffness).min()), float(off.max())
+        return most / own if most > max(self.error, ROUND_OFF * own) else 0.0
 
     def mean_relief(self, slip: Array) -> Array:
         """Return h <q, d>/n: by how much slip (..., n) lowers the mean stress, Pa."""
@@ -85,11 +95,15 @@ def driven(
     """
     kind = None if anti_plane else kappa
     found = block_response(length, nodes, height, modulus, kind, pushes)
+    shear, most = found.shear, found.shear.max()
+    if -FAINT * most < shear.min() < LEAST * most:  # far from a pusher: within the error
+        shear = np.maximum(shear, LEAST * most)
+        shear /= shear.mean()
     pressure = glued_pressure(length, nodes, height, kappa) if glued else np.ones(nodes)
     drive = found.drive_stiffness
     share = 1.0 / (1.0 + drive / machine) if machine > 0.0 else 0.0
     relief = 0.5 * share * drive / length
     stiffness = found.stiffness
     if relief > 0.0:
-        stiffness = stiffness + relief / nodes * np.outer(found.shear, found.shear)
-    return Driven(np.ascontiguousarray(stiffness), found.shear, pressure, relief, drive)
+        stiffness = stiffness + relief / nodes * np.outer(shear, shear)
+    return Driven(np.ascontiguousarray(stiffness), shear, pressure, relief, drive, found.error)

@@ -309,7 +309,7 @@ class Problem:
     def _warn_if_short(self, rate: float) -> None:
         patch = self.nucleation_lengths(rate * self.friction.steepening)[0]
         length = min(self.interface.lengths)
-        if patch >= length:
+        if self.specimen is None and patch >= length:
             warn_user(
                 f"the critical patch (nucleation length {patch:.3g} m) fills the interface"
                 f" ({length:.3g} m), which slides as a whole; if this is not intended, check"

@@ -27,7 +27,10 @@ VARIABLES = {
     "arrested_events": Variable("1", "instabilities that came to rest so far", ("load",)),
     "sliding": Variable("1", "whether the interface as a whole slides", ("load",)),
 }
-TRAVEL = Variable("m", "travel of both drives together", ("load",))
+TRAVEL = {
+    "travel": Variable("m", "travel of both drives together", ("load",)),
+    "crosshead_travel": Variable("m", "travel of the machine's far ends", ("load",)),
+}
 EVENT = Variable("1", "event number", ("event",))
 CLOSE = 1e-9
 """Relative distance of loads that count as the same."""
@@ -74,8 +77,9 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
         `event_length` (m) of the patch that slipped, `event_mean_slip` (m, over that length) and
         `event_moment` (N per unit depth: G times the slip added, integrated over the interface).
         On specimens the load is the drive, the mean stress that it would cause if nothing slipped;
-        `travel` (m) is that of both drives together, on top of which a machine gives by its force
-        over its stiffness; and events have `event_stress_drop` (Pa), `event_travel` (m, before it),
+        `travel` (m) is that of both drives together, and `crosshead_travel` (m) has on top of it
+        what the machine gives, its force over its stiffness (NaN under dead load); events have
+        `event_stress_drop` (Pa), `event_travel` and `event_crosshead_travel` (m, before it),
         `event_travel_step` (m) and `event_start` (m), the left end of the patch. With a thickness,
         width or area each mean stress is given as a force, too: `force`, `event_force` and
         `event_force_drop` (N).
@@ -114,7 +118,7 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
     whole = follow(program, sample)
     passed, end, known = whole.events, whole.last.load, whole.known
     slip, stress = np.full((2, given.size, interface.size), np.nan)
-    travel = np.full(given.size, np.nan)
+    travel, far = np.full((2, given.size), np.nan)
     at = np.array([event.before.load for event in passed])
     events = (at[None, :] < given[:, None]).sum(axis=1)
     sliding = given > end
@@ -132,10 +136,11 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
             break
         state = there
         slip[i] = state.slip
-        if isinstance(program, BlockProgram):
-            travel[i] = program.travel(load, state.slip)
         released = program.stress_released(state)
         stress[i] = rows.initial_stress[0].reshape(-1) + load * sample.profile - released
+        if isinstance(program, BlockProgram):
+            travel[i] = program.travel(load, state.slip)
+            far[i] = travel[i] + program.elongation(stress[i].mean())
     if not known and sliding.any():
         warn_accuracy(
             f"no equilibrium was found beyond {end:g} Pa, and none was ruled out; the"
@@ -152,7 +157,8 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
     variables = VARIABLES | event_variables(interface)
     variables |= {name: along(interface, VARIABLES[name]) for name in ("slip", "stress")}
     if interface.is_free:
-        values["travel"], variables["travel"] = travel, TRAVEL
+        values |= {"travel": travel, "crosshead_travel": far}
+        variables |= TRAVEL
     if problem.area is not None:
         values |= forces(values, problem.area)
         variables |= force_variables(variables)

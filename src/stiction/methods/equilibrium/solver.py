@@ -45,9 +45,15 @@ ROUGHLY = {
 OF_SPECIMENS = {
     "event_stress_drop": Variable("Pa", "fall of the mean interface stress", ("event",)),
     "event_travel": Variable("m", "travel of the drives before the event", ("event",)),
+    "event_crosshead_travel": Variable(
+        "m", "travel of the machine's far ends before the event", ("event",)
+    ),
     "event_travel_step": Variable("m", "travel of the drives in the event", ("event",)),
     "event_start": Variable("m", "left end of the patch that slipped", ("event",)),
 }
+SLIDING_ONLY = 0.02
+"""Height of the peak above the mean residual strength, as a share of the fall of strength, below
+which nothing but sliding is left of it."""
 EVENT_CORE = 1e-3
 """Share of the largest added slip above which a node belongs to the patch of an event."""
 
@@ -104,7 +110,8 @@ def event_table(
             left = after.load - program.relief(after.slip)
             moved, on = (program.travel(one.load, one.slip) for one in (before, after))
             start = float(np.argmax(inside)) * interface.spacing
-            values += ((held - left) * profile, moved, on - moved, start)
+            far = moved + program.elongation(stress)
+            values += ((held - left) * profile, moved, far, on - moved, start)
         table.append((before.load, stress, *values))
     names = event_variables(interface)
     if not table:
@@ -189,16 +196,17 @@ class OnsetSolver:
             known.append(path.known)
             table.append(self._values(rows, row, sample, path))
         values = {name: np.array([each[name] for each in table]) for name in table[0]}
-        at_first, proved = values["first_instability"], values.pop("certified")
-        self._warn(values["certificate_gap"], at_first, ~proved, ~np.array(known))
-        _warn_if_stopped(values.pop("stopped") & np.isfinite(at_first))
         values["critical_stress"] = rows.mean_stress(values["critical_stress"])
-        values["first_instability"] = rows.mean_stress(at_first)
-        values["certificate_gap"] *= rows.load_profile.mean()
+        first = values["first_instability"] = rows.mean_stress(values["first_instability"])
+        gap, proved = values["certificate_gap"], values.pop("certified")
+        gap *= rows.load_profile.mean()
+        self._warn(gap, first, ~proved, ~np.array(known))
+        _warn_if_stopped(values.pop("stopped") & np.isfinite(first))
+        _warn_if_residual(rows, values["critical_stress"], values["residual_reached"])
         if self.problem.interface.is_plane:
             values["certified"] = proved
         if self.options.sensitivity:
-            _warn_if_lost(values["sensitivity"], np.isfinite(at_first))
+            _warn_if_lost(values["sensitivity"], np.isfinite(first))
         return values
 
     def _values(self, rows: Samples, row: int, sample: Sample, path: Path) -> dict[str, Any]:
@@ -260,10 +268,10 @@ class OnsetSolver:
         return critical_patch(direction.reshape(interface.shape), interface)[1]
 
     def _warn(
-        self, gap: Array, load: Array, unproved: NDArray[np.bool_], lost: NDArray[np.bool_]
+        self, gap: Array, first: Array, unproved: NDArray[np.bool_], lost: NDArray[np.bool_]
     ) -> None:
         """Warn where bounds are wide or absent, or where a path was not followed to its end."""
-        share = gap / np.maximum(np.abs(load), 1e-300)
+        share = gap / np.maximum(np.abs(first), 1e-300)
         warn_of_samples(
             f"the bounds of the first instability did not close to {self.program.widest_gap:g} of"
             " it in {samples}: they hold, and are up to {worst:.2g} of it apart; take more nodes",
@@ -281,7 +289,7 @@ class OnsetSolver:
         warn_of_samples(
             "no patch becomes unstable in {samples}: behind so stiff a machine their interface"
             " slides stably, and first_instability is NaN",
-            np.isnan(load),
+            np.isnan(first),
         )
         warn_of_samples(
             "a jump was not followed to its end in {samples}: their critical load is the last with"
@@ -310,6 +318,20 @@ def _warn_if_stopped(stopped: NDArray[np.bool_]) -> None:
         "a node that slipped stops before the first instability in {samples}: its equilibria are no"
         " longer the least ones, so that nothing bounds it from above, and certificate_gap is NaN",
         stopped,
+    )
+
+
+def _warn_if_residual(rows: Samples, peak: Array, reached: NDArray[np.bool_]) -> None:
+    """Warn where all but the last nodes are at their residual strength before the peak."""
+    residual = rows.residual_strength.mean(axis=rows.axes)
+    fall = np.median((rows.strength - rows.residual_strength).reshape(rows.samples, -1), axis=1)
+    above = (peak - residual) / np.maximum(fall, 1e-300)
+    warn_of_samples(
+        "all but the last nodes are at their residual strength before the peak in {samples}: static"
+        " friction is then the mean residual strength, to {worst:.2g} of what strength falls by,"
+        " and depends on little else",
+        reached & (above < SLIDING_ONLY),
+        above,
     )
 
 

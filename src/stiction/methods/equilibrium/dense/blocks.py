@@ -79,6 +79,17 @@ class BlockProgram(LineProgram):
         force = (load - self.relief(slip)) * self.problem.interface.extent
         return float(self.blocks.travel(force, slip))
 
+    def elongation(self, stress: float) -> float:
+        """Return by how much the machine gives at a mean stress of the interface (Pa), m.
+
+        NaN under dead load, whose far end is not defined.
+        """
+        assert self.problem.specimen is not None
+        machine, area = self.problem.specimen.drive.stiffness, self.problem.area
+        if machine == 0.0:
+            return np.nan
+        return 0.0 if area is None else stress * area / machine  # without an area it is rigid
+
     def next(self, sample: Sample, state: State | None = None, target: float = np.inf) -> State:
         """Return the next instability, or the state at a load before it; see `LineProgram`."""
         if self.machine:
