@@ -244,7 +244,7 @@ def test_families_are_compared_by_one_number_of_independent_values():
     assert fit.tied == tuple(name for name, score in found.items() if score > -2.0)
     weights = {name: one.weight for name, one in fit.families.items() if one.weight}
     free = {label: 3 if label.startswith("beta") else 2 for label in weights}
-    likelihoods = np.array([found[label] + free[label] for label in weights])
+    likelihoods = np.array([found[label] + free[label] / 2 for label in weights])
     shares = np.exp(likelihoods) / np.exp(likelihoods).sum()
     assert list(weights.values()) == pytest.approx(shares)
     assert len(weights) > len(fit.tied) > 1

@@ -80,8 +80,9 @@ class Goodness(NamedTuple):
     families apart as well as the correlated ones of the records do, less the number of estimated
     parameters (Akaike, 1974), less that of the best family: 0 for the best, negative for the
     others. Differences below 2 do not tell families apart. `weight` is the share of members that
-    `FieldFit.interfaces` draws from the family, in proportion to this likelihood itself: what more
-    parameters leave open is in the scatter of its members, and need not be paid for twice.
+    `FieldFit.interfaces` draws from the family, in proportion to the likelihood of its members:
+    they scatter about the estimate, and the logarithm of theirs is on average half a unit for
+    each parameter below the greatest.
     """
 
     marginal: Any
@@ -192,8 +193,9 @@ class FieldFit:
         """
         if self.quantity not in ("strength", "friction_coefficient"):
             raise InputError(
-                f"interfaces: need a strength, and the fit is of {self.quantity}; put"
-                " `repetitions` into random interfaces of your own"
+                f"interfaces: need a strength, and the fit is of {self.quantity}; fit one of"
+                " quantity='strength' or 'friction_coefficient', or put the `repetitions` of this"
+                " into random interfaces of your own"
             )
         rng = np.random.default_rng([seed, 5])
         ends = np.cumsum([one.weight for one in self.families.values() if one.weight > 0.0])
@@ -470,10 +472,10 @@ def _compared(
     independent = max(fitted, key=lambda one: one[0])[1].independent
     estimates = [found for _, found in fitted]
     likelihoods = independent * np.array([mean for mean, _ in fitted])
-    costs = [len(one.setting.marginal.parameters(one.own)) for one in estimates]
+    costs = np.array([len(one.setting.marginal.parameters(one.own)) for one in estimates])
     scores = likelihoods - costs
     scores -= scores.max()
-    weights = np.exp(likelihoods - likelihoods.max()) * (scores > -DRAWN)
+    weights = np.exp(scores + 0.5 * costs) * (scores > -DRAWN)
     weights /= weights.sum()
     order = np.argsort(-scores, kind="stable").tolist()
     compared = {

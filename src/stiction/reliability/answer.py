@@ -173,6 +173,8 @@ class Answer:
             result += f", of which {' and '.join(parts)}" if parts else ""
             sampled = math.sqrt(max(self.cv**2 - self.members_cv**2, 0.0))
             result += f" (c.o.v. by the list {self.members_cv:.2g}, by sampling {sampled:.2g})"
+        if self.algorithm == "exact":
+            return f"{result}; {self.reason}"
         return f"{result}; {self.algorithm}, {self.evaluations} evaluations"
 
 
