@@ -255,14 +255,21 @@ def report(
     run: RunPath,
     out: Annotated[Path | None, Option(help="HTML file; RUN/report.html by default.")] = None,
 ) -> None:
-    """Write one self-contained HTML page: figures, tables, failures, the study and versions."""
+    """Write one self-contained HTML page: figures, tables, failures, the study and versions.
+
+    Exit code 0: complete; 1: samples are missing, and the page is of those that are there.
+    """
     from stiction.cli.report import write_report
     from stiction.study.study import open_run
 
-    path = out or run / "report.html"
+    path, stored = out or run / "report.html", open_run(run)
     with Meter("writing the report"):
-        write_report(open_run(run), path)
+        write_report(stored, path)
     echo(f"report: {path}")
+    state = stored.status()
+    if not state.complete:
+        echo(f"it is of {state.done} of {state.samples} {stored.counted}", err=True)
+        raise typer.Exit(1)
 
 
 # -- what a study would do -----------------------------------------------------------------------

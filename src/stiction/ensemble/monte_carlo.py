@@ -10,9 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from stiction.base.errors import InputError, RunError, Warned, merge_warnings, warn_accuracy
+from stiction.base.errors import (
+    InputError,
+    RunError,
+    Warned,
+    merge_warnings,
+    warn_accuracy,
+    warn_user,
+)
 from stiction.base.model import Count, Flag, Names, Number, Progress, checked
-from stiction.base.progress import Meter, Show
+from stiction.base.progress import Meter, Show, duration
 from stiction.ensemble.batches import missing_spans, solve_spans, usable_cores
 from stiction.ensemble.dataset import Gathered, GridAxes, distinct, labels_of
 from stiction.ensemble.experiment import Ensemble, Experiment
@@ -28,6 +35,8 @@ if TYPE_CHECKING:
 
 SHOWN = 3
 """Number of failures that are reported one by one."""
+LONG = 3600.0
+"""Estimated seconds from which a run says so before it begins."""
 HOPELESS = 16
 """Failed samples, with none solved, after which the whole ensemble is given up."""
 
@@ -37,6 +46,18 @@ def check_fields(points: Sequence[Experiment]) -> None:
     with merge_warnings():
         for point in distinct(points, "random", "problem"):
             point.check_fields()
+
+
+def _warn_if_long(points: Sequence[Experiment], missing: NDArray[Any], workers: int) -> None:
+    """Say how long an ensemble takes that takes hours, before it begins."""
+    each = zip(points, missing.sum(axis=1), strict=True)
+    seconds = sum(one.seconds * count for one, count in each) / workers
+    if seconds > LONG:
+        warn_user(
+            f"samples: {int(missing.sum()):,} samples take about {duration(seconds)} on {workers}"
+            f" core{'s' * (workers > 1)}; `stiction check` times some of a study",
+            UserWarning,
+        )
 
 
 def gather(
@@ -65,6 +86,8 @@ def gather(
     if spans:
         check_fields(points)
         points[0].prepare()  # here and not in a thread, so that it warns at the caller's line
+        if executor is None:
+            _warn_if_long(points, ~done, workers or usable_cores())
     label = " and ".join({one.method.label: None for one in distinct(points, "method")})
     with ExitStack() as stack:
         if store:  # also on Ctrl-C, and when workers are lost: what is done is kept

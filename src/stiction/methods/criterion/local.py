@@ -75,7 +75,8 @@ class LocalCriterion:
 
     def seconds_per_sample(self, problem: Problem) -> float:
         """Return the approximate time of a sample on one core, s."""
-        return (3e-8 if not problem.interface.is_plane else 6e-8) * problem.interface.size
+        own, each = (5e-4, 8e-8) if problem.interface.is_plane else (3e-5, 3e-8)
+        return own + each * problem.interface.size
 
     def seconds_per_rate(self, problem: Problem) -> float:
         """Return the approximate time that each further weakening rate takes, s."""

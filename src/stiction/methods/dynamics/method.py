@@ -163,7 +163,7 @@ class Rupture:
         shape = problem.interface.shape
         if len(shape) == 1:
             usual = 0.1 if self.start == "rest" else 0.05
-            return usual * (shape[0] / 1024) ** 2
+            return 8e-3 + usual * (shape[0] / 1024) ** 2
         # As many steps as the longer side has nodes, each in proportion to all nodes.
         return 1.5 * (max(shape) / 128) * (problem.interface.size / 128**2)
 

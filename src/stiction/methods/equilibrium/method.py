@@ -115,11 +115,11 @@ class Equilibrium:
         if interface.is_plane:
             return 1e-5 * interface.size
         linear, corners = problem.friction.linear, pieces_of(problem.friction).ends.size
-        more = 1.0 if linear else 9.0 * corners**0.5
+        more = 1.0 if linear else 6.0 * corners**0.5
         if problem.specimen is not None:  # more events, and jumps are followed to their end
             drive = problem.specimen.drive
-            more *= 100.0 if drive.type == "platen" and not drive.stiffness else 500.0
-        return 3e-4 * more * (interface.size / 1024) ** 1.5
+            more *= 60.0 if drive.type == "platen" and not drive.stiffness else 300.0
+        return 2e-4 + 5e-4 * more * (interface.size / 1024) ** 1.5
 
     def supports(self, problem: Problem) -> list[str]:
         """Return the reasons why it cannot solve a problem; none if it can."""
