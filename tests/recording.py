@@ -124,7 +124,7 @@ def _numeric(value: Any) -> bool:
 def numbers(value: Any, path: str) -> Any:
     """The numbers of an output: all of them, or of many their shape and four sums."""
     array = np.asarray(value, dtype=float)
-    if path.endswith(ROUND_OFF):
+    if any(name in path for name in ROUND_OFF):
         array = np.where(np.isnan(array), np.nan, array > 1.0)
     if array.size <= WHOLE:
         return [_short(one) for one in array.reshape(-1)]

@@ -190,7 +190,7 @@ def test_a_report_without_a_sweep_of_a_run_with_failures(tmp_path, monkeypatch, 
     with monkeypatch.context() as patch:
         patch.setattr(Experiment, "results", results)
         study.run(out=path, workers=1, progress=False)
-    runs(f"report {path}")
+    runs(f"report {path}", "it is of ", code=1)
     page = (path / "report.html").read_text("utf-8")
     assert "29 of 30 samples by equilibrium." in page
     assert "The run is not complete." in page
