@@ -168,6 +168,13 @@ def test_errors_are_the_scatter_of_repeated_samples(function, exact):
     assert np.mean([n.error for n in found]) == pytest.approx(values.std(), rel=0.2)
 
 
+def test_so_many_events_at_a_rare_share_are_counted_exactly():
+    p = 0.0019 + 3 * 0.0007
+    fewer = (1 - p) ** 8 + 8 * p * (1 - p) ** 7 + 28 * p**2 * (1 - p) ** 6
+    assert chance(3, 8)[0].value == pytest.approx(1.0 - fewer, rel=1e-9)
+    assert chance(0, 8)[0].value == 1.0
+
+
 def test_paired_changes_know_their_error():
     draws = np.random.default_rng(1).normal(size=(300, 400))
     found = [estimates.relative_changes(10 + 1.1 * x, 10 + x) for x in draws]
@@ -231,7 +238,6 @@ MOVING = [Number(0.0001, 1e-4), Number(0.0019, 7e-4), Number(0.0003, 1.6e-4), ST
 MORE = [counted(events, 10_000)[0] for events in (6, 48, 9, 90)]
 FEWER_AT_2 = n(-0.006, -0.0048, error=7e-4)
 WIDE = [counted(events, 200)[0] for events in (1, 49, 129, 158)]
-TEN = counted(10, 400)
 EXACT_VERDICTS = {
     "arrest-beyond": [
         (OPEN, [STILL, n(-0.0006, error=3.2e-4) + n(-0.0048, error=7e-4), MOVING,
