@@ -154,7 +154,8 @@ def each(*rules: Rule) -> Rule:
     def judge(series: Sequence[Numbers]) -> Verdict:
         return min(_found(rules, series), key=_WORST.index)
 
-    return Rule("; and ".join(rule.text for rule in rules), judge, len(rules))
+    number = sum(rule.series for rule in rules)
+    return Rule("; and ".join(rule.text for rule in rules), judge, number)
 
 
 def graded(strict: Rule, weak: Rule) -> Rule:
@@ -169,18 +170,17 @@ def graded(strict: Rule, weak: Rule) -> Rule:
     return Rule(f"{strict.text}; a correction if only {weak.text}", judge)
 
 
-def main(first: Rule, *others: Rule) -> Rule:
-    """The first rule decides; a failure of another one earns a correction."""
+def main(first: Rule, other: Rule) -> Rule:
+    """The first rule decides; a failure of the other one earns a correction."""
 
     def judge(series: Sequence[Numbers]) -> Verdict:
-        verdict, *rest = _found((first, *others), series)
-        if verdict is Verdict.HOLDS and any(found is not Verdict.HOLDS for found in rest):
-            return Verdict.OPEN if Verdict.FAILS not in rest else Verdict.CORRECTED
+        verdict, rest = _found((first, other), series)
+        if verdict is Verdict.HOLDS and rest is not Verdict.HOLDS:
+            return Verdict.CORRECTED if rest is Verdict.FAILS else Verdict.OPEN
         return verdict
 
-    rest = " and ".join(rule.text for rule in others)
-    text = f"{first.text}; a correction unless the last is {rest}"
-    return Rule(text, judge, first.series + sum(rule.series for rule in others))
+    text = f"{first.text}; a correction unless the last is {other.text}"
+    return Rule(text, judge, first.series + other.series)
 
 
 def never(limit: float) -> Rule:
