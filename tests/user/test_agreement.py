@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+import scipy.stats
 import xarray as xr
 from refusals import refuses
 from setups import LOCAL
@@ -53,7 +54,6 @@ def test_a_wrong_prediction_is_seen_in_the_unit_of_the_peaks():
     shown = [float(p) for p in re.findall(r"= (\S+) \(Cra.*, (\S+) \(largest", str(agrees))[0]]
     assert shown == pytest.approx([*agrees.p_values.values()], rel=6e-3)
     assert "against the prediction: p" in str(agrees)
-    assert not agrees.fitted
     axes = st.plot.agreement(agrees)
     (steps,) = [line for line in axes.lines if line.get_label() == "5 tests"]
     np.testing.assert_allclose(steps.get_xdata()[1:-1], np.sort(PEAKS) / 1e6)
@@ -90,21 +90,20 @@ def test_forces_need_an_area(posterior):
     refuses("0.71 Pa ... unit=", lambda: st.statistics.agreement(posterior, PEAKS / 1e6))
 
 
-def test_what_was_fitted_to_the_peaks_lies_nearer_than_chance(posterior):
-    """Each campaign is fitted, too: without that, p would be larger."""
-    fitted = st.statistics.agreement(posterior, replicates=300)
-    assert fitted.fitted
-    assert 0.0 < fitted.p_values["cramer_von_mises"] < 1.0
-    # The same peaks as those of further tests: nothing is fitted to them.
+def test_further_peaks_are_compared_with_what_the_posterior_leaves_open(posterior):
+    refuses("was fitted to them", lambda: st.statistics.agreement(posterior, PEAKS[::-1]))
     further = st.statistics.agreement(posterior, PEAKS + 1.0, replicates=300)
-    assert not further.fitted
-    assert further.p_values["cramer_von_mises"] > fitted.p_values["cramer_von_mises"]
-    assert further.cramer_von_mises == pytest.approx(fitted.cramer_von_mises, rel=0.05)
-    # The weighted parameters predict what the posterior's draws do: 4,000 of them are farther
-    # from their law than 0.03 once in a thousand times.
+    assert 0.2 < further.p_values["cramer_von_mises"] <= 1.0
+    # A thousand draws predict what the posterior's 4,000 do: both are farther from their law than
+    # 0.06 once in a thousand times.
     at, share = further.predicted[0]
     drawn = np.searchsorted(np.sort(posterior.predicted[0]), at, side="right") / 4000
-    assert np.abs(drawn - share).max() < 0.03
+    assert np.abs(drawn - share).max() < 0.06
+    # As uncertain as a posterior of few peaks is, campaigns differ more than peaks of all draws.
+    known = scipy.stats.kstwo(PEAKS.size).ppf(0.9) * PEAKS.size**0.5
+    assert further.band > 1.05 * known
+    far = st.statistics.agreement(posterior, 1.08 * PEAKS, replicates=300)
+    assert max(far.p_values.values()) < 0.1
 
 
 def test_likely_interfaces_scatter_as_the_posterior_does(posterior):

@@ -110,7 +110,7 @@ def test_what_comes_out_is_a_posterior(joined):
     )
     assert "interfaces, weighed by the peaks, are worth" in str(joined)
     assert "member" not in str(joined)
-    assert st.statistics.agreement(joined).p_values["cramer_von_mises"] > 0.05
+    assert st.statistics.agreement(joined, PEAKS + 1.0).p_values["cramer_von_mises"] > 0.05
     assert len(st.plot.posterior(joined).subfigs[0].axes) == 9
     theta = np.stack([own[:3] for own in joined.draws.values()], axis=1)
     assert joined.log_likelihood(theta) == pytest.approx(joined.likelihood(joined.u[:3]))

@@ -272,9 +272,8 @@ def agreement(found: Agreement, *, ax: Axes | None = None) -> Axes:
         axes.set_ylim(0.0, 1.02)
         axes.set_xlabel(with_unit(_peak_name(peaks.coefficients), unit))
         axes.set_ylabel("share of tests up to it")
-        after = ", parameters fitted to them" if found.fitted else ""
         p = found.p_values["cramer_von_mises"]
-        axes.set_title(f"p = {p:.2g}{after}", fontsize=8, loc="left", color=QUIET)
+        axes.set_title(f"p = {p:.2g}", fontsize=8, loc="left", color=QUIET)
         axes.legend()
     return axes
 
