@@ -252,7 +252,9 @@ def _distances(share: Array) -> tuple[Array, Array]:
     """Return both distances of predicted shares at sorted peaks from a uniform distribution."""
     size = share.shape[1]
     steps = np.arange(size + 1) / size
-    squares = np.sum((0.5 * (steps[1:] + steps[:-1]) - share) ** 2, axis=1) + 1.0 / (12.0 * size)
+    squares = np.sum((0.5 * (steps[1:] + steps[:-1]) - share) ** 2, axis=1) + 1.0 / (
+        12.0 * size
+    )
     most = np.maximum((steps[1:] - share).max(axis=1), (share - steps[:-1]).max(axis=1))
     return squares, np.sqrt(size) * most
 
