@@ -33,6 +33,8 @@ TABLES = {
     ),
     "comments and a first row without a value": "# rig 4, 12 bar\n# x (mm);strength (MPa)\n"
     + "\n".join(f"{2 * i};{'-' if i == 0 else v}" for i, v in enumerate(EIGHT)),
+    "rows without values": "strength [MPa];run\n-;3\n-;-\n"
+    + "\n".join(f"{v};{i}" for i, v in enumerate(EIGHT[2:])),
     "one column": "strength [MPa]\n" + "\n".join(f"{v}" for v in EIGHT),
     "unsorted with empty cells": "x (mm),strength (MPa),note\n"
     + "\n".join(f"{2 * i},{'' if i == 3 else EIGHT[i]},n{i}" for i in (4, 0, 7, 2, 1, 6, 5, 3)),

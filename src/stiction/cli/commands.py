@@ -24,7 +24,6 @@ from stiction.base.progress import Meter, duration, interrupted
 
 SHOWN = 12
 """Points, failures or damaged chunks that are listed."""
-LEVELS = (0.05, 0.5, 0.95)
 PROBED = 5
 """Points of a sweep at which samples are timed."""
 BUDGET = 2.0
@@ -152,42 +151,23 @@ def run(
     """
     import pandas as pd
 
+    from stiction.cli.report import Page, add_tables
     from stiction.study.study import Study, open_run
 
     loaded = Study.from_toml(study)
     with _resumable(out), _executor(scheduler) as executor:
         result = loaded.run(out=out, workers=workers, executor=executor, part=part, pilot=pilot)
-    dims = list(loaded.axes)
-    for name in ("critical_stress", "friction_coefficient", "critical_force"):
-        if name in result:
-            scale, unit = {"Pa": (1e-6, ", MPa"), "N": (1.0, ", N")}.get(
-                result[name].attrs["units"], (1.0, "")
-            )
-            values = (result[name] * scale).transpose(*dims, "sample")
-            labels: Any = [name]
-            if dims:
-                labels = values.isel(sample=0, drop=True).to_series().index
-                labels = labels.set_names(
-                    [f"{dim} ({result[dim].attrs['units']})" for dim in dims]
-                )
-            rows = pd.DataFrame(values.values.reshape(len(labels), -1), index=labels)
-            table = rows.T.describe(percentiles=LEVELS).T
-            for level in LEVELS:  # as the report estimates them
-                table[f"{level:.0%}"] = [_quantile(row, level) for row in rows.to_numpy()]
-            echo(f"{name}{unit}\n{table.to_string(max_rows=48)}")
+    page = Page("")
+    add_tables(page, result, loaded.axes)
+    for table in page.parts:
+        rows = pd.DataFrame(table["rows"], columns=table["columns"])
+        echo(f"{table['title']}\n{rows.to_string(index=False, max_rows=48)}")
     state = open_run(out).status()
     echo(f"part {part}: " * bool(part) + f"{state.done} of {state.samples} samples in {out}")
     if state.failures:
         echo(f"{len(state.failures)} samples failed; the same command retries:", err=True)
         _show_some(state.failures, "  ", err=True)
         raise typer.Exit(1)
-
-
-def _quantile(row: Any, level: float) -> float:
-    from stiction.statistics.estimates import quantiles
-
-    known = row[row == row]
-    return float(quantiles(known, level).value[0]) if known.size else float("nan")
 
 
 def status(

@@ -21,6 +21,7 @@ from stiction import __version__, plot
 from stiction.base.errors import InputError
 from stiction.base.files import write_whole
 from stiction.base.variables import DIRECTION
+from stiction.ensemble.dataset import GridAxes
 from stiction.plot.axes import scaled, shown_quantity, with_unit
 from stiction.plot.style import PAGE, panel, paper_style
 from stiction.reliability.answer import bounded
@@ -122,7 +123,7 @@ def add_samples(page: Page, run: StoredRun) -> None:
     names = [*QUANTITIES, "critical_position", "arrested_events"]
     result, axes = run.dataset(only=names), run.study.axes
     add_figures(page, result, list(axes))
-    add_tables(page, result, list(axes), [name for own in axes.values() for name in own])
+    add_tables(page, result, axes)
 
 
 def add_curves(page: Page, run: StoredCurves) -> None:
@@ -212,8 +213,9 @@ def densities(result: xr.Dataset, along: str | None) -> Figure:
     return figure
 
 
-def add_tables(page: Page, result: xr.Dataset, dims: list[str], keys: list[str]) -> None:
+def add_tables(page: Page, result: xr.Dataset, axes: GridAxes) -> None:
     """Add mean, spread and quantiles of the onset at every point, with errors."""
+    dims, keys = list(axes), [name for own in axes.values() for name in own]
     flat = result.stack(point=dims) if dims else result.expand_dims("point")
     scales = [scaled(result[key]) for key in keys]
     swept = [*(label for _, _, label in scales), "samples"]
