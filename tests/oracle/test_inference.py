@@ -7,6 +7,7 @@ import pytest
 import scipy.stats
 from checks import standard_error
 from setups import EXACT, LOCAL, QUARTER, ensemble, turns
+from specimens import crooked
 
 import stiction as st
 
@@ -46,6 +47,12 @@ CASES = {
         problem(profile=st.GradientLoad(amplitude=0.6)), beta, LOCAL, *LARGE, 30,
     ),
     "residual strength": (problem(64, 0.25, residual_ratio=0.5), beta, EXACT, *LARGE, 30),
+    "lap joint in which nodes stop": (
+        crooked(
+            nodes=24, height=0.009, rate=0.04e12, residual=0.2e6,
+            drive=st.Pusher(height=0.004, width=0.003, side="both", stiffness=np.inf),
+        ), beta, EXACT, *LARGE, 30,
+    ),
     "beyond what the local criterion finds": (
         problem(64, 0.25), lognormal, EXACT, "marginal.cv", (0.1, 1.5), 0.9, 60,
     ),
@@ -77,6 +84,7 @@ def by_counting(base, field, method, values, peaks, samples):
         "coefficients",
         "gradient load",
         "residual strength",
+        pytest.param("lap joint in which nodes stop", marks=SLOW),
         pytest.param("coefficients under a pressure that varies", marks=SLOW),
         pytest.param("beyond what the local criterion finds", marks=SLOW),
     ],

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
+from brute_force import BruteForce
 from checks import assert_mean, standard_error
 from crooked import LINE
 from importance import by_importance, longer, mixture
@@ -189,3 +190,28 @@ def test_failure_probability_of_blocks_is_that_of_counting(method):
     found = by((problem, field), stress, "subset", 0.15, method=method)
     error = np.hypot((probability * count) ** -0.5, found.cv)
     assert abs(np.log(found.probability / probability)) < 3.5 * error
+
+
+@pytest.mark.parametrize("event", ["critical_stress", "first_instability"])
+def test_failure_probability_of_a_lap_joint_is_that_of_counting(event):
+    """Behind a rigid machine, where nodes stop: fields of its own, some by brute force."""
+    drive = st.Pusher(height=0.004, width=0.003, side="both", stiffness=math.inf)
+    problem = crooked(nodes=24, height=0.009, rate=0.04e12, residual=0.2e6, drive=drive)
+    field = st.RandomField(st.Weibull(mean=1e6, cv=0.2), st.PowerLawSpectrum(8e-3))
+    strength = field.sample(problem.interface, samples=1500, seed=11)
+    counted = st.onset(problem, strength, method=EXACT, progress=False)
+    stops = np.isnan(counted.certificate_gap.values) & np.isfinite(
+        counted.first_instability.values
+    )
+    assert stops.mean() > 0.1
+    for i in np.flatnonzero(stops)[:4]:
+        brute = BruteForce(problem, strength[i : i + 1]).run()
+        assert counted.critical_stress[i].item() == pytest.approx(brute.peak, rel=1e-9)
+        assert counted.first_instability[i].item() == pytest.approx(brute.first, rel=1e-9)
+    own, share = counted[event].values, 0.05
+    stress = float(np.nanquantile(own, share))
+    share = float((own < stress).mean())
+    options = {"method": EXACT, "algorithm": "subset", "target_cv": 0.15, "event": event}
+    found = st.failure_probability(problem, field, stress, progress=False, **options)
+    error = np.hypot((share * len(own)) ** -0.5, found.cv)
+    assert abs(np.log(found.probability / share)) < 3.5 * error
