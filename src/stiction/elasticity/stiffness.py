@@ -46,22 +46,58 @@ def _apply(
     raise NotImplementedError
 
 
+def _apply_outside(
+    stiffness: Any,
+    members: Array,
+    size: int,
+    values: Array,
+    inside: Array,
+    halves: Array,
+    result: Array,
+) -> None:
+    """Stand for the product at the nodes that are not inside."""
+    raise NotImplementedError
+
+
 @jit
 def _apply_rows(
-    stiffness: BlockStiffness, members: Array, size: int, values: Array, result: Array
+    stiffness: BlockStiffness,
+    members: Array,
+    size: int,
+    values: Array,
+    start: int,
+    target: Array,
 ) -> None:
-    """`result` (n,) = K times a field that has `values` at the first `size` of the `members`."""
+    """`target` = K times a field that has `values` at some members, from a node `start` on."""
     n = stiffness.nodes
-    target = result[:n]
-    for q in range(n):
+    for q in range(target.shape[0]):
         target[q] = 0.0
     for first in range(ZERO, size, 4):
         p0 = p1 = p2 = p3 = ZERO
         z0 = z1 = z2 = z3 = 0.0
         for t in range(first, min(first + 4, size)):
-            p0, p1, p2, p3 = members[t] * n, p0, p1, p2
+            p0, p1, p2, p3 = members[t] * n + start, p0, p1, p2
             z0, z1, z2, z3 = values[t], z0, z1, z2
         add_four(target, stiffness.rows, (p0, p1, p2, p3), (z0, z1, z2, z3))
+
+
+@jit
+def _apply_runs(
+    stiffness: BlockStiffness,
+    members: Array,
+    size: int,
+    values: Array,
+    inside: Array,
+    result: Array,
+) -> None:
+    """Multiply at each run of nodes that are not inside."""
+    end = ZERO
+    while end < stiffness.nodes:
+        start = end
+        while end < stiffness.nodes and inside[end] == inside[start]:
+            end += 1
+        if not inside[start]:
+            _apply_rows(stiffness, members, size, values, start, result[start:end])
 
 
 @overload(_entry)
@@ -94,7 +130,18 @@ def _apply_of(stiffness, members, size, values, halves, result):
             stiffness, members, size, values, halves, result
         )
     return lambda stiffness, members, size, values, halves, result: _apply_rows(
-        stiffness, members, size, values, result
+        stiffness, members, size, values, ZERO, result[: stiffness.nodes]
+    )
+
+
+@overload(_apply_outside)
+def _apply_outside_of(stiffness, members, size, values, inside, halves, result):
+    if stiffness.instance_class is Stiffness:
+        return lambda stiffness, members, size, values, inside, halves, result: apply_stiffness(
+            stiffness, members, size, values, halves, result
+        )
+    return lambda stiffness, members, size, values, inside, halves, result: _apply_runs(
+        stiffness, members, size, values, inside, result
     )
 
 
@@ -116,3 +163,20 @@ def apply(
 ) -> None:
     """`result` (n,) = K times a field that has `values` at the first `size` of the `members`."""
     _apply(stiffness, members, size, values, halves, result)
+
+
+@jit
+def apply_outside(
+    stiffness: Any,
+    members: Array,
+    size: int,
+    values: Array,
+    inside: Array,
+    halves: Array,
+    result: Array,
+) -> None:
+    """Multiply as `apply` does, at least at the nodes that are not inside, where K is dense.
+
+    On a line all of the product costs as much.
+    """
+    _apply_outside(stiffness, members, size, values, inside, halves, result)

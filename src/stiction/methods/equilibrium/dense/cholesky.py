@@ -14,7 +14,7 @@ from stiction.base.arrays import Array
 from stiction.base.jit import ZERO, jit, jit_inside
 from stiction.base.lanes import LANES, load, multiply_add, totals, zeros
 from stiction.elasticity.linear import dot
-from stiction.elasticity.stiffness import apply, entry
+from stiction.elasticity.stiffness import apply, apply_outside, entry
 
 GROUP = 4
 """Rows that are appended together: each row of the factor is then read once for four new ones."""
@@ -339,6 +339,15 @@ def substitute_members(
 def multiply_members(workspace: Workspace, size: int, values: Array, result: Array) -> None:
     """Multiply K by a field given on the members; the result is at all nodes."""
     apply(workspace.stiffness, workspace.members, size, values, workspace.halves, result)
+
+
+@jit_inside
+def multiply_outside(workspace: Workspace, size: int, values: Array, result: Array) -> None:
+    """Multiply K by a field given on the members; `result` holds the product there already."""
+    apply_outside(
+        workspace.stiffness, workspace.members, size, values, workspace.inside,
+        workspace.halves, result,
+    )  # fmt: skip
 
 
 @jit_inside

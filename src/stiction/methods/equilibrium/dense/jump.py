@@ -23,6 +23,7 @@ from stiction.methods.equilibrium.dense.cholesky import (
     back_substitute,
     factor_inside,
     multiply_members,
+    multiply_outside,
     singular_direction,
     substitute_members,
     take_off_resting,
@@ -152,7 +153,8 @@ def _relax(
         i = members[t]
         slip[i] = max(slip[i], solution[t])
         solution[t] = slip[i]
-    multiply_members(workspace, size, solution, stiff)
+        stiff[i] = drive[i]
+    multiply_outside(workspace, size, solution, stiff)
     for i in range(slip.shape[0]):
         stiff[i] += resting[i]
     return _join(sample, load, slip, stiff, workspace, size, tolerance)

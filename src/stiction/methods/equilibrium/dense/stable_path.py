@@ -30,6 +30,7 @@ from stiction.methods.equilibrium.dense.cholesky import (
     back_substitute,
     factor_inside,
     multiply_members,
+    multiply_outside,
     raise_diagonal,
     remove,
     singular_direction,
@@ -292,8 +293,11 @@ def advance(
             size = _stop(workspace, size, first, slip, speed)
             _substitute(sample, strength, workspace, ZERO, size)
         for t in range(size):
-            speed[members[t]] = max(rate[t], 0.0)
-        multiply_members(workspace, size, rate, stiff_rate)
+            i = members[t]
+            speed[i] = max(rate[t], 0.0)
+            weakening = entry(workspace.stiffness, i, i) - workspace.diagonal[i]
+            stiff_rate[i] = sample.profile[i] + weakening * rate[t]
+        multiply_outside(workspace, size, rate, stiff_rate)
         if event % REFRESH == 0:
             solve_forward(workspace, size, load, solution)
             multiply_members(workspace, size, solution, stiff)
