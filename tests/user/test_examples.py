@@ -129,6 +129,28 @@ def test_scripts_of_validation(tmp_path):
     assert len(list(tmp_path.glob("*.png"))) == 3
 
 
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning", "ignore::stiction.UnitWarning")
+def test_stick_slips_of_a_fault(monkeypatch):
+    """The page's rig, in small: its machine, a cycle's drop over slip, and where ruptures begin."""
+    slips = load("stick_slips")
+    monkeypatch.setattr(slips, "SAMPLES", 20)
+    machine, blocks = slips.machine_of(0.594e9)
+    problem = slips.rig(machine, slips.CENTRAL[0], nodes=64)
+    # Both ends push: relief is h of docs/specimens.md, and the stiffnesses are in series.
+    assert problem.blocks.relief == pytest.approx(0.594e9, rel=1e-3)
+    assert 1.0 / (1.0 / machine + 1.0 / blocks) == pytest.approx(0.594e9 * 0.4, rel=1e-3)
+    found, slid = slips.onsets(problem, slips.strength_of(slips.CENTRAL[1], 0.5, 0.2))
+    drop, slip, spread = slips.of_model(problem, found, slid)
+    # Slip before the rupture, at the ends, is some microns; after it nothing is left to slip.
+    assert np.all((drop / slip > 0.5e9) & (drop / slip < 0.594e9))
+    assert 1.5e-6 < spread.mean() < 3e-6
+    most = problem.interface.x[found.slip.to_numpy().argmax(axis=1)]
+    assert np.all(np.abs(most - 2.0) > 1.0)
+    start = slips.read_table()
+    line = np.polyfit(start.time[1:], slips.without_trend(start[1:], "before"), 1)
+    assert abs(line[0]) < 1e-6
+
+
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 def test_line_and_plane_in_small(tmp_path, monkeypatch, capsys):
     """Eight nodes in h_n, six samples, and one correlation length."""
