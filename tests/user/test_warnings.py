@@ -6,6 +6,7 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 import pytest
 import tomli_w
+from refusals import refuses
 from small_study import small_study
 
 import stiction as st
@@ -161,3 +162,59 @@ def test_the_same_doubts_in_python_in_a_study_and_in_a_command(
     assert found[0] == found[1]
     assert {commands.in_options(text, command) for text in found[0]} == printed
     assert found[0]
+
+
+METHODS = {
+    "local": ({"type": "local_criterion"}, st.LocalCriterion()),
+    "events": ({"type": "equilibrium", "events": 2}, st.Equilibrium(events=2)),
+    "rupture": (
+        {"type": "rupture", "loading_rate": 3e8, "stop": "onset"},
+        st.Rupture(loading_rate=3e8, stop="onset"),
+    ),
+}
+QUESTION = {"stress": 0.8e6, "target_cv": 0.5}
+JOINT = changed(
+    problem__specimen={
+        "height": 0.04,
+        "thickness": 0.006,
+        "drive": {"type": "pusher", "height": 0.01, "width": 0.004},
+    },
+    problem__friction__weakening_rate=0.06e12,
+    problem__friction__residual_strength=0.2e6,
+)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("plain", [changed(), JOINT], ids=["half-spaces", "joint"])
+def test_the_same_numbers_in_python_in_a_study_and_in_a_command(
+    plain, method, tmp_path, monkeypatch, runs
+):
+    """Of every variable of samples, and of one answer between half-spaces."""
+    monkeypatch.chdir(tmp_path)
+    table, own = METHODS[method]
+    (tmp_path / "study.toml").write_text(
+        tomli_w.dumps(plain | {"method": table, "reliability": QUESTION})
+    )
+    given = {
+        "problem": st.Problem(**plain["problem"]),
+        "random": st.RandomInterface(**plain["random"]),
+        "method": own,
+        "seed": 3,
+    }
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        if own.supports(given["problem"]):
+            words = "method: the rupture cannot take this: problem.specimen"
+            refuses(words, lambda: st.monte_carlo(**given, samples=6))
+            refuses(words, lambda: st.Study.from_toml("study.toml"))
+            runs("run study.toml --out B", words, code=2)
+            return
+        study = st.Study.from_toml("study.toml")
+        expected = st.monte_carlo(**given, samples=6)
+        runs("run study.toml --out B")
+        for found in (study.run(), st.open_run("B").dataset()):
+            assert found[list(expected.data_vars)].drop_attrs().equals(expected.drop_attrs())
+        if method != "rupture" and plain is not JOINT:
+            answer = str(st.failure_probability(**given, **QUESTION))
+            assert str(study.reliability.answer(study.experiments[0])) == answer
+            assert answer in runs("reliability study.toml").splitlines()
