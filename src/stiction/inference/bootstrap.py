@@ -360,14 +360,14 @@ def intervals(
     inversion; Carpenter, 1999): the longer one at the upper end of parameters whose estimates rise
     with the correlation length. Intervals of bounds end outside of `values` without noise.
     """
-    around, *ends = repeated
+    around, *moved = repeated
     found, estimated = around.truth, around.truth.parameters
     tail = 0.5 * (1.0 - confidence)
     lengths = [math.log(one.parameters["efolding_length"]) for one in around.fits]
     result = {}
     for name in estimated:
         scale = scale_of(name, repeated)
-        shorter, longer = ends if ends and name != "noise" else (around, around)
+        shorter, longer = moved if moved and name != "noise" else (around, around)
         if np.cov([scale.of(one)[0] for one in around.fits], lengths)[0, 1] < 0.0:
             shorter, longer = longer, shorter
         low, high = scale.end(found, shorter, 1.0 - tail), scale.end(found, longer, tail)
@@ -378,7 +378,11 @@ def intervals(
     noise = result["noise"][1] if "noise" in result else found.model.noise
     limits = limits_of(found, values, noise)
     for name in limits.keys() & result.keys():
-        result[name] = cut(result[name], limits[name], estimated[name])
+        ends = limits[name]
+        low, high = np.clip(result[name], *ends).tolist()
+        if high - low <= (SAME * high if np.isfinite(ends).all() else 0.0):  # nothing is left
+            low, high = (end if math.isfinite(end) else estimated[name] for end in ends)
+        result[name] = low, high
     return result
 
 
@@ -431,13 +435,3 @@ def likely(repeated: Repetitions, measured: Array) -> list[Estimate]:
         marginal = with_parameters(found.marginal, parts["marginal"])
         result.append(replace(found, marginal=marginal, model=model))
     return result
-
-
-def cut(
-    interval: tuple[float, float], limits: tuple[float, float], at: float
-) -> tuple[float, float]:
-    """Cut an interval at limits; one beyond becomes the whole range, or reaches to the estimate."""
-    low, high = np.clip(interval, *limits).tolist()
-    if high - low <= (SAME * high if np.isfinite(limits).all() else 0.0):
-        low, high = (end if math.isfinite(end) else at for end in limits)
-    return low, high

@@ -342,10 +342,8 @@ def fit_field(
     (Sykulski et al., 2019; Guillaumin et al., 2022). Correlations of values follow from
     those of the Gaussian field z by Hermite expansion (Grigoriu, 1995).
 
-    Families are compared by Akaike's criterion for one number of independent values. Fitted to the
-    same values, they agree in about mean and variance, so that the logarithm of the ratio of their
-    densities has Hermite orders of z from 3 on: its sum over N values of correlations rho_ij has
-    mean and variance of that over N^2/sum rho_ij^3 independent ones.
+    Families are compared by Akaike's criterion for one number of independent values: of N with
+    correlations rho_ij as many as N^2/sum rho_ij^3.
 
     Intervals come from a studentised bootstrap (Davison and Hinkley, 1997, section 5.2), their
     upper and lower ends from fields of longer and shorter correlation (Carpenter, 1999).
@@ -382,14 +380,9 @@ def fit_field(
     weights = [one.weight for one in compared.values() if one.weight > 0.0]
     counts = [max(FEWEST, round(bootstrap * one / max(weights))) for one in weights[1:]]
     repeated, drawn = bootstrapped(
-        found,
-        bootstrap,
-        confidence,
-        seed,
-        progress,
-        workers,
+        found, bootstrap, confidence, seed, progress, workers,
         list(zip(others, counts, strict=False)),
-    )
+    )  # fmt: skip
     tests = {"marginal": "distance", "spectrum": "roughness"}
     p_values = {name: _p_value(of, *repeated[0]) for name, of in tests.items()}
     failed = len(repeated) * bootstrap - sum(len(one.fits) for one in repeated)
