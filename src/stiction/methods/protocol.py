@@ -23,9 +23,10 @@ from stiction.base.variables import (
     force_variables,
     forces,
 )
-from stiction.problem.problem import Problem, Sample, refusals
+from stiction.problem.problem import Problem, refusals
 from stiction.problem.profiles.placing import with_gaps
 from stiction.problem.results import study_attributes, to_dataset
+from stiction.problem.sample import Sample
 
 if TYPE_CHECKING:
     import xarray as xr

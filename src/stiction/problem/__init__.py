@@ -1,6 +1,6 @@
 """What is not random: the interface, its solids, friction and load, and a sample's profiles.
 
 Read `interface`, `solid`, `load`, `specimen` and `friction`, each a part of a problem; then
-`problem`, which puts them together and makes a `Sample` of profiles. `profiles` reads those from
-files and places them at the nodes; `results` labels what comes out.
+`problem`, which puts them together, and `sample`, the profiles that every method starts from.
+`profiles` reads those from files and places them at the nodes; `results` labels what comes out.
 """

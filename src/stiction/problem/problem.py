@@ -1,4 +1,4 @@
-"""The physical problem: two solids, an interface, a friction law and a load; and its samples."""
+"""The physical problem: two solids, an interface, a friction law and a load."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Collection, Mapping
 from functools import reduce
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from pydantic import model_validator
@@ -16,20 +16,20 @@ from stiction.base.errors import (
     InputError,
     UnitWarning,
     prefixed,
-    unknown_name,
     warn_accuracy,
     warn_user,
 )
-from stiction.base.model import Mode, as_numbers, describe, differing, is_unplaced, model
+from stiction.base.model import Mode, describe, differing, is_unplaced, model
 from stiction.base.units import Doubt, doubt_units, in_words
-from stiction.base.variables import PROFILES, QUANTITIES
+from stiction.base.variables import PROFILES
 from stiction.elasticity.driven import Driven
 from stiction.problem.friction import SCALES, Friction, contradictions
 from stiction.problem.friction.parameters import SMALLEST_EIGENVALUE
 from stiction.problem.interface import Interface
 from stiction.problem.load import Load, LoadShape
 from stiction.problem.profiles.placing import Gaps, turned
-from stiction.problem.profiles.reading import at_nodes, is_coefficient
+from stiction.problem.profiles.reading import at_nodes
+from stiction.problem.sample import FRICTION, Sample, named_profiles, no_coefficients, rows_of
 from stiction.problem.solid import Solid
 from stiction.problem.specimen import Blocks
 
@@ -37,13 +37,9 @@ FEWEST_NODES = 4
 """Nodes in a nucleation length."""
 HUGE = 1e8
 """Strength of a node over the median beyond which others are lost in round-off."""
-LARGEST = 1e100
-"""Of a profile, in SI units; sums and products of larger numbers overflow."""
 RIGIDITY = (1e-8, 1.0), (0.0, math.inf)
 """Strength over shear modulus that is usual, and what is possible; steel (8e10 Pa) under 10 kPa at
 a coefficient of 0.1 has 1e-8."""
-FRICTION = (1e-3, 10.0), (1e-4, 100.0)
-"""Mean strength over normal pressure, from superlubricity to adhesive gels."""
 SLIP = (1e-8, math.inf), (1e-10, math.inf)
 """Slip over which strength falls, m; an atom measures 1e-10 m."""
 SHORT = 4.0
@@ -59,89 +55,6 @@ NO_AREA = (
     " interface.width of a line (m)"
 )
 """What to do with a force where the area is unknown."""
-BARRIER = 10.0
-"""A node is a barrier where tau_p - tau_r is above so many times its lower quartile, of nodes that
-weaken."""
-
-
-def steepest_rate(strength: Array, residual: Array, rate: Array) -> float:
-    """Return the largest weakening rate of nodes that may break, Pa/m; arrays (samples, *shape).
-
-    Barriers are left out: with a uniform critical slip they weaken steeply, but never slip.
-    """
-    drop = strength - residual
-    if drop.max() <= BARRIER * drop.min():
-        return float(rate.max())
-    drop = drop.reshape(drop.shape[0], -1)
-    weakens = np.isfinite(drop) & (drop > 0.0)
-    typical = np.nanquantile(np.where(weakens, drop, np.nan), 0.25, axis=1)
-    return float(rate.reshape(drop.shape)[drop <= BARRIER * typical[:, None]].max())
-
-
-class Sample(NamedTuple):
-    """One interface or many: the profiles that every method starts from.
-
-    Attributes
-    ----------
-    strength, residual_strength, weakening_rate, initial_stress : (samples, *shape) arrays
-        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa); not to be written to. Strength
-        may be infinite for methods that accept barriers. Where it is at or below the residual
-        strength, both are equal and W has no effect.
-    load_profile : (*shape) array
-        p, dimensionless, positive.
-    normal_pressure : (samples, *shape) array
-        Pa; NaN where the problem has none.
-    problem : Problem, optional
-        That made it, and the only one that takes it; None if it was put together by hand.
-    """
-
-    strength: Array
-    residual_strength: Array
-    weakening_rate: Array
-    initial_stress: Array
-    load_profile: Array
-    normal_pressure: Array
-    problem: Problem | None = None
-
-    @property
-    def samples(self) -> int:
-        """Number of samples."""
-        return int(self.strength.shape[0])
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Number of nodes in each direction."""
-        return self.load_profile.shape
-
-    @property
-    def axes(self) -> tuple[int, ...]:
-        """Axes of the nodes, counted from the last."""
-        return tuple(range(-self.load_profile.ndim, 0))
-
-    def part(self, some: slice) -> Sample:
-        """Return some samples of the batch."""
-        own = {name: rows[some] for name, rows in self._asdict().items() if name in PROFILES}
-        return self._replace(**own)
-
-    @property
-    def uniform_weakening(self) -> bool:
-        """Whether W is the same at all nodes of each sample."""
-        flat = self.weakening_rate.reshape(self.samples, -1)
-        return bool(np.all(flat == flat[:, :1]))
-
-    @property
-    def mean_strength(self) -> float:
-        """Mean strength where it is finite, Pa."""
-        return float(self.strength.mean(where=np.isfinite(self.strength)))
-
-    @property
-    def steepest_rate(self) -> float:
-        """Largest weakening rate of nodes that may break, Pa/m."""
-        return steepest_rate(self.strength, self.residual_strength, self.weakening_rate)
-
-    def mean_stress(self, load: Array) -> Array:
-        """Return <tau_i> + tau_0 <p>, Pa, at the loads tau_0 of shape (samples,)."""
-        return self.initial_stress.mean(axis=self.axes) + load * self.load_profile.mean()
 
 
 @model
@@ -588,7 +501,7 @@ class Problem:
                 if not np.all(known):
                     measured.append(known.reshape(-1, *interface.shape))
                 with prefixed(name):
-                    return _rows(name, value, interface, samples, "barriers" in accept)
+                    return rows_of(name, value, interface, samples, "barriers" in accept)
             except InputError as error:
                 problems.extend(error.problems)
                 return np.ones((samples or 1, *interface.shape))
@@ -602,7 +515,7 @@ class Problem:
             if own in ((), (samples, 1)):  # that of each sample, which its blocks distribute
                 pressure = pressure * self.pressing
         if of != "strength":
-            problems += _no_coefficients(strength, pressure)
+            problems += no_coefficients(strength, pressure)
             strength = strength * pressure
         residual = friction.residual(np.where(np.isinf(strength), 0.0, strength))
         residual = read("residual_strength", residual, samples)
@@ -706,74 +619,6 @@ class Problem:
             own = np.where(barriers, 0.0, rates).max(axis=along, keepdims=True)
             rates = np.where(barriers, own, rates)
         return rates
-
-
-def _rows(
-    name: str, value: Any, interface: Interface, samples: int | None, barriers: bool
-) -> Array:
-    """Return `value` as a (samples, *shape) float64 array, or raise an `InputError`.
-
-    A single profile (*shape) is one sample. Where `samples` is given, a number, a profile
-    or one number a sample, of shape (samples, 1), is broadcast to all.
-    """
-    shape, array = interface.shape, as_numbers(value)
-    valid = f"{shape} or ({samples or 'samples'}, {', '.join(map(str, shape))})"
-    if samples is None:
-        fits = array.size > 0 and shape in (array.shape, array.shape[1:])
-    else:
-        valid += f", ({samples}, 1) or a number"
-        column = (samples, *(1 for _ in shape))
-        array = array.reshape(column) if array.shape == (samples, 1) else array
-        fits = array.shape in ((), shape, column, (samples, *shape))
-    if not fits:
-        hint = turned(array.shape[-2:], shape)
-        raise InputError(f"must have shape {valid}, got shape {array.shape}{hint}")
-    infinite = barriers and name == "strength"
-    bad = ~(np.abs(array) <= LARGEST) & ~(infinite & (array == np.inf))
-    if bad.any():
-        entry = tuple(np.argwhere(bad)[0].tolist())
-        given = f"{array[entry]:g} (at most {LARGEST:g})"
-        raise InputError(f"must be finite; entry {entry} is {given}")
-    least = f"{array.min():g} {QUANTITIES[name].units}"
-    if name in SCALES and array.min() <= 0.0:
-        raise InputError(f"must be positive, got {least}")
-    if name == "residual_strength" and array.min() < 0.0:
-        raise InputError(f"must not be negative, got {least}")
-    if samples is None:
-        return array.reshape(-1, *shape)
-    return np.broadcast_to(array, (samples, *shape))
-
-
-def _no_coefficients(values: Array, pressure: Array) -> list[str]:
-    """Return why values are no friction coefficients, or what they lack."""
-    if np.isnan(pressure).all():
-        return [
-            "friction_coefficient: needs a normal pressure (load.normal_pressure, Pa, or"
-            " load.pressing_force, N)"
-        ]
-    mean = float(np.mean(values))
-    large = (
-        f"friction_coefficient: its mean is {mean:.3g}; if that is a strength, state its unit,"
-    )
-    return [f"{large} as .assign_attrs(units='Pa') does"] * (mean >= FRICTION[1][1])
-
-
-def named_profiles(given: Any) -> dict[str, Any]:
-    """Return profiles by name: of a mapping or dataset, or of the strength alone.
-
-    The strength may be given as friction coefficients: by this name, or by the unit that it states.
-    """
-    if not isinstance(given, Mapping):  # a Dataset is one too
-        return {"friction_coefficient" if is_coefficient(given) else "strength": given}
-    known = (*PROFILES, "friction_coefficient")
-    unknown = [
-        unknown_name("profiles", str(name), known) for name in given if name not in known
-    ]
-    if "strength" in given and "friction_coefficient" in given:
-        unknown.append("profiles: give either strength (Pa) or friction_coefficient (1)")
-    if unknown and not hasattr(given, "data_vars"):
-        raise InputError(unknown)
-    return {name: given[name] for name in given if name in known}
 
 
 def refusals(problem: Problem, method: Any) -> list[str]:

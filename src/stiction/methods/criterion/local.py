@@ -16,8 +16,9 @@ from stiction.elasticity.weakest import Places, weakest_place
 from stiction.methods.criterion.average import averages, least_average
 from stiction.methods.criterion.windows import Window, windows_of
 from stiction.problem.friction import ExponentialWeakening
-from stiction.problem.problem import Problem, Sample, named_profiles, refusals
+from stiction.problem.problem import Problem, refusals
 from stiction.problem.results import onset_variables, position
+from stiction.problem.sample import Sample, named_profiles
 
 INSTEAD = "; use st.Equilibrium() or st.Rupture()"
 

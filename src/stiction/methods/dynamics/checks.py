@@ -8,7 +8,8 @@ from stiction.base.errors import InputError, warn_accuracy
 from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.loading import value_at
 from stiction.methods.dynamics.state import Reason, State
-from stiction.problem.problem import FEWEST_NODES, Problem, Sample
+from stiction.problem.problem import FEWEST_NODES, Problem
+from stiction.problem.sample import Sample
 
 # In units of the stress scale: load in one explicit step, and stress below minus the strength.
 _COARSE, _COARSEST, _REVERSED = 5e-3, 0.2, 1e-3

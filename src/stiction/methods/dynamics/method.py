@@ -22,8 +22,9 @@ from stiction.methods.dynamics.slow_start import slow_start, static_program
 from stiction.methods.dynamics.state import History, Nodes, Setting, State, Thresholds
 from stiction.methods.dynamics.summary import scalars, summary
 from stiction.problem.friction.parameters import SMALLEST_EIGENVALUE
-from stiction.problem.problem import Problem, Sample, steepest_rate
+from stiction.problem.problem import Problem
 from stiction.problem.results import onset_variables
+from stiction.problem.sample import Sample, steepest_rate
 
 Fraction = Annotated[Real, Field(gt=0, le=1)]
 

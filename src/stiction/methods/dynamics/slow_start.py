@@ -20,7 +20,8 @@ from stiction.methods.dynamics.summary import energy_balance
 from stiction.methods.equilibrium.dense.line import LineProgram
 from stiction.methods.equilibrium.sample import Sample as StaticSample
 from stiction.methods.equilibrium.sample import exceeds, refused
-from stiction.problem.problem import Problem, Sample
+from stiction.problem.problem import Problem
+from stiction.problem.sample import Sample
 
 _TOLERANCE = 2e-5  # in units of the stress scale: a fifth of the fall that counts as an event
 _CROSSINGS = 10.0  # times shear waves cross h_n between the first trial and the onset

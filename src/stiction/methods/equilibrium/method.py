@@ -12,8 +12,8 @@ from stiction.base.variables import Variable
 from stiction.methods.equilibrium.sample import pieces_of, refused
 from stiction.methods.equilibrium.solver import OnsetSolver, event_variables
 from stiction.problem.problem import Problem
-from stiction.problem.problem import Sample as Samples
 from stiction.problem.results import along, onset_variables, position
+from stiction.problem.sample import Sample as Samples
 
 Gap: TypeAlias = Annotated[Real, Field(ge=1e-10, le=1e-2)]
 

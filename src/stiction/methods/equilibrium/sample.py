@@ -17,7 +17,7 @@ from stiction.base.jit import jit, jit_inside
 from stiction.elasticity.linear import inner
 from stiction.problem.friction import FrictionLaw
 from stiction.problem.friction.parameters import Linear, Polygon
-from stiction.problem.problem import Sample as Samples
+from stiction.problem.sample import Sample as Samples
 
 FLAT = 1e-11
 """Share of the mean strength by which a node must weaken to count as weakening. A smaller fall

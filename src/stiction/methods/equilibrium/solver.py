@@ -32,8 +32,8 @@ from stiction.methods.equilibrium.sample import (
 from stiction.methods.equilibrium.transforms.plane import PlaneProgram
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
-from stiction.problem.problem import Sample as Samples
 from stiction.problem.results import position
+from stiction.problem.sample import Sample as Samples
 
 FINE = 8.0
 """Nodes in the nucleation length below which there is a warning."""

@@ -1,0 +1,173 @@
+"""The profiles of samples, and how given arrays become them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, unknown_name
+from stiction.base.model import as_numbers
+from stiction.base.variables import PROFILES, QUANTITIES
+from stiction.problem.friction import SCALES
+from stiction.problem.interface import Interface
+from stiction.problem.profiles.placing import turned
+from stiction.problem.profiles.reading import is_coefficient
+
+LARGEST = 1e100
+"""Of a profile, in SI units; sums and products of larger numbers overflow."""
+FRICTION = (1e-3, 10.0), (1e-4, 100.0)
+"""Mean strength over normal pressure, from superlubricity to adhesive gels."""
+BARRIER = 10.0
+"""A node is a barrier where tau_p - tau_r is above so many times its lower quartile, of nodes that
+weaken."""
+
+
+def steepest_rate(strength: Array, residual: Array, rate: Array) -> float:
+    """Return the largest weakening rate of nodes that may break, Pa/m; arrays (samples, *shape).
+
+    Barriers are left out: with a uniform critical slip they weaken steeply, but never slip.
+    """
+    drop = strength - residual
+    if drop.max() <= BARRIER * drop.min():
+        return float(rate.max())
+    drop = drop.reshape(drop.shape[0], -1)
+    weakens = np.isfinite(drop) & (drop > 0.0)
+    typical = np.nanquantile(np.where(weakens, drop, np.nan), 0.25, axis=1)
+    return float(rate.reshape(drop.shape)[drop <= BARRIER * typical[:, None]].max())
+
+
+class Sample(NamedTuple):
+    """One interface or many: the profiles that every method starts from.
+
+    Attributes
+    ----------
+    strength, residual_strength, weakening_rate, initial_stress : (samples, *shape) arrays
+        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa); not to be written to. Strength
+        may be infinite for methods that accept barriers. Where it is at or below the residual
+        strength, both are equal and W has no effect.
+    load_profile : (*shape) array
+        p, dimensionless, positive.
+    normal_pressure : (samples, *shape) array
+        Pa; NaN where the problem has none.
+    problem : Problem, optional
+        That made it, and the only one that takes it; None if it was put together by hand.
+    """
+
+    strength: Array
+    residual_strength: Array
+    weakening_rate: Array
+    initial_stress: Array
+    load_profile: Array
+    normal_pressure: Array
+    problem: Any = None
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return int(self.strength.shape[0])
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of nodes in each direction."""
+        return self.load_profile.shape
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """Axes of the nodes, counted from the last."""
+        return tuple(range(-self.load_profile.ndim, 0))
+
+    def part(self, some: slice) -> Sample:
+        """Return some samples of the batch."""
+        own = {name: rows[some] for name, rows in self._asdict().items() if name in PROFILES}
+        return self._replace(**own)
+
+    @property
+    def uniform_weakening(self) -> bool:
+        """Whether W is the same at all nodes of each sample."""
+        flat = self.weakening_rate.reshape(self.samples, -1)
+        return bool(np.all(flat == flat[:, :1]))
+
+    @property
+    def mean_strength(self) -> float:
+        """Mean strength where it is finite, Pa."""
+        return float(self.strength.mean(where=np.isfinite(self.strength)))
+
+    @property
+    def steepest_rate(self) -> float:
+        """Largest weakening rate of nodes that may break, Pa/m."""
+        return steepest_rate(self.strength, self.residual_strength, self.weakening_rate)
+
+    def mean_stress(self, load: Array) -> Array:
+        """Return <tau_i> + tau_0 <p>, Pa, at the loads tau_0 of shape (samples,)."""
+        return self.initial_stress.mean(axis=self.axes) + load * self.load_profile.mean()
+
+
+def rows_of(
+    name: str, value: Any, interface: Interface, samples: int | None, barriers: bool
+) -> Array:
+    """Return `value` as a (samples, *shape) float64 array, or raise an `InputError`.
+
+    A single profile (*shape) is one sample. Where `samples` is given, a number, a profile
+    or one number a sample, of shape (samples, 1), is broadcast to all.
+    """
+    shape, array = interface.shape, as_numbers(value)
+    valid = f"{shape} or ({samples or 'samples'}, {', '.join(map(str, shape))})"
+    if samples is None:
+        fits = array.size > 0 and shape in (array.shape, array.shape[1:])
+    else:
+        valid += f", ({samples}, 1) or a number"
+        column = (samples, *(1 for _ in shape))
+        array = array.reshape(column) if array.shape == (samples, 1) else array
+        fits = array.shape in ((), shape, column, (samples, *shape))
+    if not fits:
+        hint = turned(array.shape[-2:], shape)
+        raise InputError(f"must have shape {valid}, got shape {array.shape}{hint}")
+    infinite = barriers and name == "strength"
+    bad = ~(np.abs(array) <= LARGEST) & ~(infinite & (array == np.inf))
+    if bad.any():
+        entry = tuple(np.argwhere(bad)[0].tolist())
+        given = f"{array[entry]:g} (at most {LARGEST:g})"
+        raise InputError(f"must be finite; entry {entry} is {given}")
+    least = f"{array.min():g} {QUANTITIES[name].units}"
+    if name in SCALES and array.min() <= 0.0:
+        raise InputError(f"must be positive, got {least}")
+    if name == "residual_strength" and array.min() < 0.0:
+        raise InputError(f"must not be negative, got {least}")
+    if samples is None:
+        return array.reshape(-1, *shape)
+    return np.broadcast_to(array, (samples, *shape))
+
+
+def no_coefficients(values: Array, pressure: Array) -> list[str]:
+    """Return why values are no friction coefficients, or what they lack."""
+    if np.isnan(pressure).all():
+        return [
+            "friction_coefficient: needs a normal pressure (load.normal_pressure, Pa, or"
+            " load.pressing_force, N)"
+        ]
+    mean = float(np.mean(values))
+    large = (
+        f"friction_coefficient: its mean is {mean:.3g}; if that is a strength, state its unit,"
+    )
+    return [f"{large} as .assign_attrs(units='Pa') does"] * (mean >= FRICTION[1][1])
+
+
+def named_profiles(given: Any) -> dict[str, Any]:
+    """Return profiles by name: of a mapping or dataset, or of the strength alone.
+
+    The strength may be given as friction coefficients: by this name, or by the unit that it states.
+    """
+    if not isinstance(given, Mapping):  # a Dataset is one too
+        return {"friction_coefficient" if is_coefficient(given) else "strength": given}
+    known = (*PROFILES, "friction_coefficient")
+    unknown = [
+        unknown_name("profiles", str(name), known) for name in given if name not in known
+    ]
+    if "strength" in given and "friction_coefficient" in given:
+        unknown.append("profiles: give either strength (Pa) or friction_coefficient (1)")
+    if unknown and not hasattr(given, "data_vars"):
+        raise InputError(unknown)
+    return {name: given[name] for name in given if name in known}
