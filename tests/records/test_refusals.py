@@ -42,7 +42,7 @@ def steep(critical_slip, **more):
 CALLS = {
     "rates that vary": [
         lambda: make_problem(weakening_rate=RISING * 60.0),
-        lambda: make_problem(weakening_rate=RISING * 6.0).nodes_in_nucleation_length(1.2e12),
+        lambda: make_problem(weakening_rate=RISING * 5.55).nodes_in_nucleation_length(1.2e12),
         lambda: make_problem(weakening_rate=RISING).nodes_in_nucleation_length(2e11),
     ],
     "samples that are steep": [lambda: steep(4e-7), lambda: steep(2.1e-6)],

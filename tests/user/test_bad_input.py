@@ -107,9 +107,7 @@ test_numbers = refusals({
 
 test_names_and_choices = refusals({
     "'plan' ... did you mean 'plane'": lambda: st.Solid(1e9, 0.3, 1170.0, plan="stress"),
-    "plane ... 'strain' ... 'stran'": lambda: solid(plane="stran"),
     "'II' or 'III' ... 'iii'": lambda: SOLID.effective_modulus("iii"),
-    "poisson_ratio ... missing": lambda: st.Solid(shear_modulus=1e9, density=1.0),
     "by name ... alpha, beta, low, high": lambda: st.Beta(1.5, 3.0, 1.0, 2.0),
     "weakening_rate ... critical_slip ... got none": lambda: st.LinearWeakening(),
     "rate and critical_slip": lambda: st.LinearWeakening(1.0, critical_slip=1.0),
@@ -121,7 +119,6 @@ test_names_and_choices = refusals({
         lambda: make_strength(marginal={"type": "lognorm", "sigma": 0.3}),
     "did you mean 'edge'": lambda: st.Load(profile={"type": "egde", "excess": 1.0}),
     "progress ... a function of (done, total) ... int": lambda: monte_carlo(progress=int),
-    "progress ... a function of (done, total) ... 3": lambda: monte_carlo(progress=3),
     "keep ... 'initial_stress' ... valid: strength":
         lambda: monte_carlo(keep=("initial_stress",)),
     "sweep ... unknown 'type' ... valid: problem":
@@ -154,13 +151,10 @@ test_objects_in_the_place_of_others = refusals({
     "sweep: slip cannot be kept ... an interface that is swept": lambda: make_study(
         method=st.Equilibrium(slip=True), sweep=[{"problem.interface.nodes": [128, 256]}]
     ),
-    "shear_modulus ... poisson_ratio ... density":
-        lambda: st.Solid(shear_modulus=-1.0, poisson_ratio=2.0, density=0.0),
     "problem ... random ... seed": lambda: monte_carlo(problem=3, random=4, seed="x"),
 })  # fmt: skip
 
 test_fields_that_cannot_be = refusals({
-    "lognorm ... finite": lambda: make_strength(marginal=scipy.stats.lognorm(-0.3)),
     "function ... >= 0": lambda: st.CustomSpectrum(np.cos, max_wavenumber=9.0),
     "modes ... must be positive": lambda: make_strength(
         spectrum=st.CustomSpectrum(function=lambda k: 0.0 * k, max_wavenumber=1e3)
@@ -194,9 +188,6 @@ test_random_interfaces = refusals({
     "contradict each other": lambda: correlated(THREE),
     "at most one of weakening_rate":
         lambda: several("strength", "weakening_rate", "critical_slip"),
-    "mean must be above low": lambda: st.Lognormal(mean=1e5, cv=0.1, low=2e5),
-    "Weibull.cv: must be greater than 0": lambda: st.Weibull(mean=1e5, cv=-0.1),
-    "these limit the scatter": lambda: st.TruncatedNormal(mean=1e6, cv=0.5, low=0.6e6),
     "must lie between": lambda: st.TruncatedNormal(mean=1e6, cv=0.1, high=0.5e6),
     "cv: missing": lambda: make_strength(marginal={"type": "lognormal", "mean": 1.0}),
     "mean 'weibull'": lambda: make_strength(marginal={"type": "wiebull", "mean": 1.0}),
@@ -540,16 +531,6 @@ def test_representations_fit_on_a_screen():
     assert len(repr(system)) < 600
     assert "<256 array, 1e+06 to 2e+06>" in repr(system)
     assert len(repr(st.statistics.density(np.random.default_rng(0).random(1000)))) < 300
-
-
-def test_fewer_nodes_than_are_needed_are_not_rounded_to_them():
-    rate = 2.0 * 0.57888694185 * (1e9 / 0.7) / 3.999e-3
-    with pytest.raises(st.InputError, match=r"spans 3\.99 nodes; at least 4 are needed"):
-        st.Problem(
-            st.Solid(1e9, 0.3, 1200.0),
-            st.Interface(0.064, 64),
-            st.LinearWeakening(weakening_rate=rate),
-        )
 
 
 def test_gaps_name_the_calls_that_fill_them():

@@ -42,13 +42,10 @@ def same(found, expected):
 
 
 test_wrong_options = refusals({
-    "loading_rate": {"loading_rate": 0.0},
     "did you mean 'loading_rate'": {"loading_rat": 1e7},
     "loading_rate: give either loading_rate or load": {},
     "give either loading_rate or load": {"loading_rate": 1e7, "load": ([0.0, 1.0], [0.0, 1e7])},
-    "stop": {"loading_rate": 1e7, "stop": "never"},
     "end_time: needed with stop='time'": {"loading_rate": 1e7, "stop": "time"},
-    "arrival ... 1 ... 1.5": {"loading_rate": 1e7, "arrival": 1.5},
     "times must begin at 0 s and increase": {"load": ([0.0, 1.0, 0.5], [0.0, 1e5, 2e6])},
     "must be finite": {"load": ([0.0, 1.0], [0.0, np.nan])},
     "equally long": {"load": ([0.0, 1.0], [0.0])},
@@ -56,7 +53,6 @@ test_wrong_options = refusals({
     "two arrays": {"load": lambda t: 1e8 * t},
 }, Rupture)  # fmt: skip
 test_what_cannot_be_saved = refusals({
-    "every": {"every": 0},
     "to": {"to": 3},
     "fields": {"fields": None},
     "fields ... 1": {"fields": [1]},

@@ -179,30 +179,6 @@ def test_a_reader_beside_a_writer_sees_no_damage(tmp_path, often):
 # -- damage --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("gone", [False, True])
-def test_damaged_chunks_are_found_and_computed_again(run, reference, gone):
-    """More kinds of damage are in tests/fuzz."""
-    before = {path: path.stat().st_mtime_ns for path in chunks(run)}
-    victim = chunks(run)[1]
-    # How many samples a chunk holds depends on how long they took.
-    with np.load(victim) as stored:
-        lost = len(stored["rows"])
-    if gone:
-        victim.unlink()
-    else:
-        victim.write_bytes(chunks(run)[0].read_bytes())
-    state = st.open_run(run).status()
-    assert [victim.name in text for text in state.damaged] == ([] if gone else [True])
-    assert state.done == ALL - lost
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        part = st.open_run(run).dataset()
-    assert any("samples are missing" in str(w.message) for w in caught) != gone
-    assert int(part["critical_stress"].isnull().sum()) == lost
-    assert again(run, None if gone else "its samples are computed again").identical(reference)
-    assert all(path.stat().st_mtime_ns == before[path] for path in before if path != victim)
-
-
 def displaced(path):
     path.write_bytes(path.with_name("pilot.json").read_bytes())
 

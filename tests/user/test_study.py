@@ -334,23 +334,14 @@ def test_events_are_those_of_the_path():
 test_mistakes_are_named = refusals({
     "problem: missing": {"problem": None},
     "problem.solid.density: missing": {"problem__solid__density": None},
-    "problem.solid.density ... greater than 0 ... -1": {"problem__solid__density": -1.0},
     "problem.solid ... 'densty' ... did you mean 'density'": {"problem__solid__densty": 1.0},
-    "problem.interface.nodes ... 'many'": {"problem__interface__nodes": "many"},
     "load.profile ... missing.npy": {"problem__load": {"profile": "missing.npy"}},
     "'betta' ... did you mean 'beta'": {"random__strength__marginal__type": "betta"},
     "strength.marginal ... low must be below high": {"random__strength__marginal__low": 2e6},
     "strength ... no mode is left": {"random__strength__spectrum__correlation_length": 10.0},
     "method.type ... 'local' ... local_criterion": {"method__type": "local"},
     "method ... 'typ' ... did you mean 'type'": {"method__typ": "exact"},
-    "ensemble.samples ... whole number ... 2.5": {"ensemble__samples": 2.5},
     "keep ... 'stregth' ... strength": {"ensemble__keep": ["stregth"]},
-    "solid.density ... ensemble.samples ... 'sed' ... strength.spectrum ... 'type'": {
-        "problem__solid__density": -1.0,
-        "ensemble": {"samples": -5, "sed": 1},
-        "sweep": [{"method.typ": ["exact"]}],
-        "random__strength__spectrum": None,
-    },
 }, loaded)  # fmt: skip
 
 SPAN = {"start": 1e-3, "stop": 2e-3}
