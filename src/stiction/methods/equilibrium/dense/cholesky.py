@@ -20,6 +20,8 @@ GROUP = 4
 """Rows that are appended together: each row of the factor is then read once for four new ones."""
 PIVOT = 1e-13
 """Share of the diagonal below which a pivot is round-off."""
+TURNING = 4
+"""Time of a rotation of two rows, in units of that of a row in a group that is appended."""
 MOST_MEMBERS = 8192
 """Slipping nodes for which a dense factor has space (268 MB if all of it is used)."""
 
@@ -294,35 +296,42 @@ def remove(workspace: Workspace, size: int, position: int) -> int:
 def factor_inside(workspace: Workspace) -> int:
     """Factor A on the nodes that are `inside`; returns what `append` returns.
 
-    Nodes that weaken no more come first, in the order in which they stand in the factor already:
-    as a crack grows most nodes are such, and their rows need not be computed again.
+    Rows stay up to the first node that is not inside any more, or that weakens more steeply than
+    before; those of nodes that weaken less are turned. Nodes that weaken no more come first in what
+    is appended: as a crack grows most nodes are such, and their rows stay longest.
     """
     stiffness, diagonal = workspace.stiffness, workspace.diagonal
     members, order, inside = workspace.members, workspace.order, workspace.inside
-    held = workspace.held[0]
-    count = ZERO
-    for t in range(held):
+    entries, held = workspace.entries, workspace.held[0]
+    kept = first = turned = ZERO
+    while kept < held and inside[members[kept]] and diagonal[members[kept]] >= entries[kept]:
+        if diagonal[members[kept]] > entries[kept]:
+            turned += 1
+        elif turned == 0:
+            first += 1
+        kept += 1
+    if TURNING * turned * (kept - first) > kept * kept:
+        kept = first  # it is faster to compute their rows again
+    for t in range(kept):
         i = members[t]
-        if inside[i] and diagonal[i] == entry(stiffness, i, i):
-            inside[i] = False
-            order[count] = i
-            count += 1
+        inside[i] = False
+        if diagonal[i] > entries[t]:
+            raise_diagonal(
+                workspace.factor, kept, t, diagonal[i] - entries[t], workspace.vectors
+            )
+            entries[t] = diagonal[i]
+    count = ZERO
     for weakening in (False, True):
         for i in range(inside.shape[0]):
             if inside[i] and (weakening or diagonal[i] == entry(stiffness, i, i)):
                 inside[i] = False
                 order[count] = i
                 count += 1
-    kept = ZERO
     for t in range(count):
-        i = order[t]
-        inside[i] = True
-        same = kept == t and t < held and members[t] == i
-        if same and workspace.entries[t] == diagonal[i]:
-            kept += 1
-        else:
-            order[t - kept] = i
-    return append(workspace, kept, count - kept)
+        inside[order[t]] = True
+    for t in range(kept):
+        inside[members[t]] = True
+    return append(workspace, kept, count)
 
 
 @jit_inside

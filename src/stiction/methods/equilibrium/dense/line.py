@@ -193,7 +193,7 @@ class LineProgram(Program):
         state = state or self.at_rest(sample)
         slip, stiff, direction = state.slip.copy(), state.stiff.copy(), state.direction.copy()
         load, peak, stopped, status = advance(
-            sample, state.load, target, slip, stiff, direction, self._workspace, self.stops
+            sample, state.load, target, slip, stiff, direction, self._workspaces[1], self.stops
         )
         found = State(
             load, slip, stiff, direction,
