@@ -150,6 +150,12 @@ def test_a_run_cut_short_goes_on_to_the_same_numbers(tmp_path, monkeypatch, ever
         assert "critical_stress" in found
 
 
+def test_a_run_killed_while_it_wrote_its_first_file_begins_again(tmp_path):
+    (tmp_path / "checkpoint.npz.1a2b.part").write_bytes(b"half")
+    found = simulate(st.Save(to=tmp_path))
+    same(found, simulate(st.Save()))
+
+
 def test_a_run_killed_after_its_last_frame_takes_no_further_step(tmp_path, monkeypatch):
     save, whole = st.Save(to=tmp_path / "run"), simulate(st.Save(to=tmp_path / "whole"))
     with monkeypatch.context() as patch:

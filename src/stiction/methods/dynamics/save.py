@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
 from stiction.base.errors import InputError, unknown_name
-from stiction.base.files import UNREADABLE, read_arrays, write_arrays, write_whole
+from stiction.base.files import PART, UNREADABLE, read_arrays, write_arrays, write_whole
 from stiction.base.model import Count, FilePath, Names, Real, Text, checked, model
 from stiction.base.variables import Variable
 from stiction.methods.dynamics.integrator import Run
@@ -214,7 +214,9 @@ class Recorder:
             return False
         checkpoint = folder / _CHECKPOINT
         if not checkpoint.exists():
-            if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            there = folder.iterdir() if folder.is_dir() else [folder] * folder.exists()
+            # A run that was killed in its first write leaves a part of it.
+            if any(path.suffix != PART for path in there):
                 raise InputError(
                     f"to: {str(folder)!r} is not empty and holds no rupture; give a new folder"
                 )
