@@ -147,7 +147,7 @@ def _spectrum(axes: Axes, found: FieldFit, one: Observed, simulated: list[Array]
     dimension = "m" if len(one.window.shape) == 1 else "m²"
     axes.set_xlabel("wavenumber (rad/m)")
     axes.set_ylabel(f"spectral density ({f'{unit}² ' if unit else ''}{dimension})")
-    axes.legend()
+    axes.legend(loc="lower left")  # spectra fall to the right
 
 
 def _compare(
