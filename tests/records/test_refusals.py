@@ -30,7 +30,8 @@ def ensemble(random, problem=None, **more):
 
 
 def studied(**tables):
-    return len(st.Study.from_dict(small_study(**tables)).points)
+    study = st.Study.from_dict(small_study(**tables))
+    return {"points": len(study.points), "axes": " ".join(study.axes)}
 
 
 def steep(critical_slip, **more):
@@ -74,6 +75,12 @@ CALLS = {
         lambda: studied(
             uncertain={"count": 3, "strength.marginal.low": [5e5, 6e5]},
             sweep=[{"random.strength.marginal.low": [5e5, 6e5]}],
+        ),
+        lambda: studied(
+            ensemble={"samples": 3, "keep": ["strength"]},
+            sweep=[{"random.strength": [
+                small_study(correlation_length=one)["random"]["strength"] for one in (4e-3, 6e-3)
+            ]}],
         ),
         lambda: studied(sweep=[{"problem.solid.poisson_ratio": [0.2, 0.7]}, {"mehtod": [1, 2]}]),
     ],
