@@ -15,9 +15,9 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-import scipy.special
 import scipy.stats
 from scipy.optimize import brentq
+from scipy.special import comb
 
 import stiction as st
 from stiction.plot.style import ACCENT, INK, PAGE, QUIET, panel, paper_style
@@ -31,7 +31,8 @@ CENTRAL = (6.5e9, 32e3)
 """Weakening rate (Pa/m) and mean excess that give the mean peak and the share of both ends."""
 CVS = (0.2, 0.5)
 """Its variation from place to place, over a correlation length of 0.2 m."""
-SENSORS = 16
+SENSORS = 0.19 + 0.24 * np.arange(16)
+"""Places of the slip sensors, m: in the authors' p03_save_eventdata.m, less the first 0.08 m."""
 SHARE = 0.25
 """Share of the weaker end in the unstable patches above which a rupture is one of both ends."""
 SHARES = (1.0 / 3.0, SHARE, 1.0 / 6.0)
@@ -48,6 +49,16 @@ def read_table():
     table[["before", "after", "drop"]] *= 1e6
     table[["slip", "spread"]] *= 1e-3
     return table
+
+
+def error_of_slope(x, y, lags=8):
+    """Return the standard error of a slope with correlated residuals (Newey and West, 1987)."""
+    x = x - x.mean()
+    score = x * (y - np.polyval(np.polyfit(x, y, 1), x))
+    total = score @ score
+    for lag in range(1, lags + 1):
+        total += 2.0 * (1.0 - lag / (lags + 1)) * score[lag:] @ score[:-lag]
+    return np.sqrt(total) / (x @ x)
 
 
 def without_trend(events, name):
@@ -131,21 +142,21 @@ def of_model(problem, found, slid):
     before = found.slip.to_numpy()[slid]
     whole = found.critical_load.to_numpy()[slid] / problem.blocks.relief
     drop = found.critical_stress.to_numpy()[slid] - RESIDUAL
-    step = before.shape[1] // SENSORS
-    spread = before[:, step // 2 :: step].std(axis=1, ddof=1)
+    at_sensors = [np.interp(SENSORS, problem.interface.x, one) for one in before]
+    spread = np.std(at_sensors, axis=1, ddof=1)
     return drop, whole - before.mean(axis=1), spread
 
 
 def memory(table):
-    """Print how often W follows W, beside an order without memory."""
+    """Print how often an end follows itself, beside an order without memory."""
     ends = table.end.to_numpy()
-    count, found = (ends == "W").sum(), np.sum((ends[1:] == "W") & (ends[:-1] == "W"))
-    expected = count * (count - 1) / ends.size
-    assert found == 0  # the chance is that of no two neighbours among all places of the W
-    chance = scipy.special.comb(ends.size - count + 1, count) / scipy.special.comb(
-        ends.size, count
-    )
-    print(f"W after W: {found} times, {expected:.1f} in random order, p = {chance:.0e}")
+    for end in "EW":
+        these = ends == end
+        found, count = np.sum(these[1:] & these[:-1]), these.sum()
+        expected = count * (count - 1) / ends.size
+        print(f"{end} after {end}: {found} times, {expected:.1f} in random order")
+    chance = comb(ends.size - count + 1, count) / comb(ends.size, count)
+    print(f"chance that none of the {count} W follows another: p = {chance:.0e}")
 
 
 def record(table):
@@ -157,10 +168,14 @@ def record(table):
     first = table.before[0] / events.before.mean() - 1.0
     print(f"first event: {100 * first:.1f} % above the mean of the others,", end=" ")
     print(f"{(table.before[0] - peaks.mean()) / peaks.std(ddof=2):.0f} standard deviations")
-    slope = np.polyfit(events.time, events.before, 1, cov=True)
-    error = 1e2 * slope[1][0, 0] ** 0.5
+    time, before = events.time.to_numpy(), events.before.to_numpy()
+    slope, error = 0.1 * np.polyfit(time, before, 1)[0], 0.1 * error_of_slope(time, before)
+    print(f"drift of the peaks: {slope:.1f} +- {error:.1f} kPa in 100 s")
+    left = without_trend(events, "after")[:-1]
+    kept = np.corrcoef(peaks[1:], left)[0, 1]
+    rest = np.sqrt(1.0 - kept**2) * peaks.std(ddof=2)
     print(
-        f"drift of the peaks: {1e2 * slope[0][0] / 1e3:.1f} +- {error / 1e3:.1f} kPa in 100 s"
+        f"peaks on the stress that the last event left: r = {kept:.2f}, {rest / 1e3:.1f} kPa stay"
     )
     for name in ("before", "after", "drop"):
         free = without_trend(events, name)
@@ -168,35 +183,32 @@ def record(table):
             f"{name}: {free.mean() / 1e3:.1f} kPa, without drift"
             f" +- {free.std(ddof=2) / 1e3:.2f} kPa ({100 * free.std(ddof=2) / free.mean():.2f} %)"
         )
-    print(f"coefficients: {events.before.mean() / PRESSURE:.3f} before,", end=" ")
-    print(f"{events.after.mean() / PRESSURE:.3f} after")
     east, west = (events[events.end == end] for end in "EW")
-    for name, unit, label in (("spread", 1e-6, "um"), ("speed", 1.0, "m/s")):
+    for name in ("spread", "speed"):
         chance = scipy.stats.mannwhitneyu(east[name], west[name]).pvalue
+        print(f"{name} from E and W: p = {chance:.0e}")
+    print(f"speed from E {east.speed.mean():.0f} m/s, from W {west.speed.mean():.0f} m/s")
+    for name, some in (("all", events), ("from the eleventh", events[9:])):
+        line, error = drop_on_slip(some["drop"], some.slip)
         print(
-            f"{name} from E and W: {east[name].mean() / unit:.2f} +- {east[name].std() / unit:.2f}"
-            f" and {west[name].mean() / unit:.2f} +- {west[name].std() / unit:.2f} {label},"
-            f" p = {chance:.0e}"
+            f"drop on slip, {name}: {line[0] / 1e9:.3f} +- {error[0] / 1e9:.3f} MPa/mm, intercept"
+            f" {line[1] / 1e3:.1f} +- {error[1] / 1e3:.1f} kPa"
         )
-    line, error = drop_on_slip(events["drop"], events.slip)
-    print(
-        f"drop on slip: {line[0] / 1e9:.3f} +- {error[0] / 1e9:.3f} MPa/mm, intercept"
-        f" {line[1] / 1e3:.1f} +- {error[1] / 1e3:.1f} kPa"
-    )
-    spread = events.spread * 1e6
-    of_both = spread[events.end == "B"]
-    print(f"scatter of slip: {spread.mean():.2f} +- {spread.sem():.2f} um,", end=" ")
-    print(f"from both ends {of_both.mean():.2f} +- {of_both.std():.2f} um")
-    both = scipy.stats.binomtest(len(east), len(east) + len(west)).pvalue
-    print(f"from E {len(east)}, from W {len(west)}: p = {both:.2f} for equal chances;", end=" ")
-    print(f"30 to 15 would be p = {scipy.stats.binomtest(30, 45).pvalue:.2f}")
+    for name, some in (("all", events), *events.groupby("end")):
+        spread = 1e6 * some.spread
+        print(f"scatter of slip, {name}: {spread.mean():.2f} +- {spread.sem():.2f} um")
     return events, peaks
+
+
+def share_of_both(events):
+    """Return how many events are listed as from both ends, and the 95 % interval of their share."""
+    measured = (events.end == "B").sum()
+    return measured, *scipy.stats.binomtest(measured, len(events)).proportion_ci()
 
 
 def constrain(machine, events):
     """Print what each mean excess would need and give; return one row each."""
-    measured = (events.end == "B").sum()
-    low, high = scipy.stats.binomtest(measured, len(events)).proportion_ci()
+    measured, low, high = share_of_both(events)
     print(f"from both ends: {measured} of {len(events)}, {low:.2f} to {high:.2f} (95 %)")
     rows = []
     for excess, cv in itertools.product(EXCESS, CVS):
@@ -207,6 +219,7 @@ def constrain(machine, events):
         weaker = share_of_weaker_end(found)
         drop, slip, spread = of_model(problem, found, slid)
         line, error = drop_on_slip(drop, slip)
+        one, two = spread[weaker[slid] <= SHARE], spread[weaker[slid] > SHARE]
         row = {
             "excess": excess,
             "cv": cv,
@@ -216,7 +229,6 @@ def constrain(machine, events):
             "arrests": 1.0 - slid.mean(),
             **{f"both{i}": np.mean(weaker > share) for i, share in enumerate(SHARES)},
             "spread": spread.mean(),
-            "spread_error": spread.std(ddof=1),
             "slope": line[0],
             "slope_error": error[0],
             "intercept": line[1],
@@ -227,10 +239,22 @@ def constrain(machine, events):
             f" d_c {1e6 * row['critical_slip']:.1f} um, W {rate / 1e9:.1f} GPa/m,"
             f" scatter {row['scatter'] / 1e3:.2f} kPa, arrests {row['arrests']:.2f}, both ends"
             f" {row['both0']:.2f}/{row['both1']:.2f}/{row['both2']:.2f}, slip scatter"
-            f" {1e6 * row['spread']:.2f} um, drop on slip {row['slope'] / 1e9:.3f} +-"
+            f" {1e6 * row['spread']:.2f} um (from one end {1e6 * one.mean():.2f}, from both"
+            f" {1e6 * two.mean():.2f}), drop on slip {row['slope'] / 1e9:.3f} +-"
             f" {row['slope_error'] / 1e9:.3f} MPa/mm, intercept {row['intercept'] / 1e3:.1f} kPa"
         )
-    return pd.DataFrame(rows)
+    rows = pd.DataFrame(rows)
+    for cv, (i, share) in itertools.product(CVS, enumerate(SHARES)):
+        some = rows[rows.cv == cv][::-1]  # by critical slip, with which the share rises
+        rising = np.maximum.accumulate(some[f"both{i}"]) + 1e-9 * np.arange(len(some))
+        slips = np.interp((low, high), rising, some.critical_slip)
+        rates = np.interp((low, high), rising, some.rate)
+        print(
+            f"measured share with {100 * cv:.0f} % and a weaker end of {share:.2f}: d_c"
+            f" {1e6 * slips[0]:.1f} to {1e6 * slips[1]:.1f} um, W {rates[1] / 1e9:.1f} to"
+            f" {rates[0] / 1e9:.1f} GPa/m"
+        )
+    return rows
 
 
 def product(machine, rate, excess):
@@ -244,7 +268,7 @@ def product(machine, rate, excess):
         )
 
 
-def infer(machine, peaks, rows):
+def infer(machine, table, peaks, rows):
     """Print what the peaks say of parameters that one would defend beforehand.
 
     Weakening rates are drawn near those that give the mean peak: others would have no weight.
@@ -275,20 +299,25 @@ def infer(machine, peaks, rows):
     )
     print(found)
     problem, strength = rig(machine, CENTRAL[0]), strength_of(CENTRAL[1], 0.5, 0.2)
-    agree = st.statistics.agreement(onsets(problem, strength)[0], peaks)
-    print(f"agreement of the central parameters: p = {agree.p_values['cramer_von_mises']:.2f}")
+    found, _ = onsets(problem, strength)
+    for name, some in (("without drift", peaks), ("as measured", table.before)):
+        agree = st.statistics.agreement(found, np.asarray(some))
+        print(f"agreement, {name}: p = {agree.p_values['cramer_von_mises']:.3f}")
 
 
-def predict(machine, rate, excess):
+def predict(machine, rate, excess, cv=0.5, count=None):
     """Print peaks of other set-ups, in which nothing is fitted any more."""
-    strength = strength_of(excess, 0.5, 0.2)
-    for what, changed in (
-        ("the rig", {}),
+    print(f"W {rate / 1e9:.1f} GPa/m, excess {excess / 1e3:.0f} kPa +- {100 * cv:.0f} %:")
+    strength = strength_of(excess, cv, 0.2)
+    set_ups = (
         ("half as long", {"length": 0.5 * LENGTH}),
         ("pushed from the left only", {"side": "left"}),
+        ("the rig", {}),
+        ("on twice the nodes", {"nodes": 2 * NODES}),
         ("under a platen", {"drive": st.Platen(stiffness=machine)}),
         ("from rest without stress", {"start": 0.0}),
-    ):
+    )
+    for what, changed in set_ups[:count]:
         problem = rig(machine, rate=rate, **changed)
         found, _ = onsets(problem, strength)
         peak, x = (
@@ -297,12 +326,12 @@ def predict(machine, rate, excess):
         )
         most = x[found.slip.to_numpy().argmax(axis=1)]
         print(
-            f"{what}: {peak.mean() / 1e3:.1f} +- {peak.std(ddof=1) / 1e3:.1f} kPa, most slip in the"
-            f" left quarter {np.mean(most < 0.25):.2f}, in the right one {np.mean(most > 0.75):.2f}"
+            f"  {what}: {peak.mean() / 1e3:.1f} +- {peak.std(ddof=1) / 1e3:.1f} kPa, most slip at"
+            f" the left {np.mean(most < 0.25):.2f}, at the right {np.mean(most > 0.75):.2f}"
         )
         if "side" not in changed and "drive" not in changed:
             weaker = share_of_weaker_end(found, problem.interface.length)
-            print(f"  from both ends {np.mean(weaker > SHARE):.2f}")
+            print(f"    from both ends {np.mean(weaker > SHARE):.2f}")
 
 
 def draw_record(table, events, model):
@@ -344,16 +373,17 @@ def draw_rows(rows, events):
         axes[0].plot(x, some.both1, "o-", color=color, ms=3)
         axes[1].plot(x, some.arrests, "o-", color=color, ms=3, label=label)
         axes[2].plot(x, 1e6 * some.spread, "o-", color=color, ms=3)
-    measured = (events.end == "B").sum()
-    low, high = scipy.stats.binomtest(measured, len(events)).proportion_ci()
+    _, low, high = share_of_both(events)
     axes[0].axhspan(low, high, color=QUIET, alpha=0.3, lw=0)
+    axes[0].text(16, 0.5 * (low + high), "measured, 95 %", ha="right", va="center")
     axes[0].set(ylabel="share that begins at both ends")
     axes[1].set(ylabel="share with an arrest before")
     axes[1].legend(loc="upper right")
-    for end, at in (("E", 14.2), ("B", 14.9), ("W", 15.6)):
+    for end, name in (("E", "measured, from E"), ("B", "from both"), ("W", "from W")):
         some = 1e6 * events.spread[events.end == end]
-        axes[2].errorbar(at, some.mean(), some.std(), fmt="s", color=QUIET, ms=4)
-        axes[2].annotate(end, (at, some.mean()), xytext=(3, 3), textcoords="offset points")
+        low, high = some.mean() - some.sem(), some.mean() + some.sem()
+        axes[2].axhspan(low, high, color=QUIET, alpha=0.3, lw=0)
+        axes[2].text(16, some.mean(), name, ha="right", va="center")
     axes[2].set(ylabel="scatter of slip along the fault [µm]", ylim=(0, 2.6))
     for one, letter in zip(axes, "abc", strict=True):
         one.set(xlabel="critical slip [µm]", xlim=(2, 16.5))
@@ -363,6 +393,10 @@ def draw_rows(rows, events):
 
 def main():
     """Print all, and draw the two figures into a folder if one is given."""
+    folders = [Path(name) for name in sys.argv[1:] if name != "--quick"]
+    for folder in folders:
+        if not folder.is_dir():
+            sys.exit(f"{folder}: no such folder; give one for the figures, --quick, or nothing")
     warnings.simplefilter("ignore")
     table = read_table()
     events, peaks = record(table)
@@ -378,13 +412,13 @@ def main():
     model = rows[(rows.excess == 30e3) & (rows.cv == 0.5)][["slope", "intercept"]].to_numpy()[0]
     product(machine, *CENTRAL)
     predict(machine, *CENTRAL)
-    for folder in [name for name in sys.argv[1:] if not name.startswith("--")]:
+    for row in rows[rows.excess.isin((30e3, 45e3))].itertuples():
+        predict(machine, row.rate, row.excess, row.cv, count=2)
+    for folder in folders:
         with paper_style():
-            draw_record(table, events, model).savefig(Path(folder) / "stick_slips.png", dpi=200)
-            draw_rows(rows, events).savefig(
-                Path(folder) / "stick_slips_parameters.png", dpi=200
-            )
-    infer(machine, peaks, rows)
+            draw_record(table, events, model).savefig(folder / "stick_slips.png", dpi=200)
+            draw_rows(rows, events).savefig(folder / "stick_slips_parameters.png", dpi=200)
+    infer(machine, table, peaks, rows)
 
 
 if __name__ == "__main__":

@@ -149,6 +149,12 @@ def test_stick_slips_of_a_fault(monkeypatch):
     start = slips.read_table()
     line = np.polyfit(start.time[1:], slips.without_trend(start[1:], "before"), 1)
     assert abs(line[0]) < 1e-6
+    # Residuals are correlated: 8.824 Pa/s by sums of outer products, 5.0 as if they were not.
+    error = slips.error_of_slope(start.time[1:].to_numpy(), start.before[1:].to_numpy())
+    assert error == pytest.approx(8.824, rel=1e-3)
+    monkeypatch.setattr("sys.argv", ["stick_slips.py", "--quik"])
+    with pytest.raises(SystemExit, match="--quik: no such folder"):
+        slips.main()
 
 
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
