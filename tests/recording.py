@@ -182,7 +182,10 @@ def _axes(axes: Axes, path: str) -> Iterator[tuple[str, Any]]:
             )
     for number, image in enumerate(axes.images):
         yield f"{path} image {number}", numbers(np.ma.filled(image.get_array(), np.nan), "")
-    boxes = [patch.get_path().vertices @ np.eye(2) for patch in axes.patches]
+    boxes = [
+        patch.get_patch_transform().transform(patch.get_path().vertices)
+        for patch in axes.patches
+    ]
     if boxes:
         yield f"{path} patches", numbers(np.concatenate(boxes), "")
 
