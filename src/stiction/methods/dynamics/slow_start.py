@@ -18,8 +18,7 @@ from stiction.methods.dynamics.memory import grown_memory
 from stiction.methods.dynamics.state import State
 from stiction.methods.dynamics.summary import energy_balance
 from stiction.methods.equilibrium.dense.line import LineProgram
-from stiction.methods.equilibrium.sample import Sample as StaticSample
-from stiction.methods.equilibrium.sample import exceeds, refused
+from stiction.methods.equilibrium.sample import StaticSample, exceeds, refused
 from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
 

@@ -13,7 +13,7 @@ from stiction.methods.equilibrium.sample import pieces_of, refused
 from stiction.methods.equilibrium.solver import OnsetSolver, event_variables
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, onset_variables, position
-from stiction.problem.sample import Sample as Samples
+from stiction.problem.sample import Sample
 
 Gap: TypeAlias = Annotated[Real, Field(ge=1e-10, le=1e-2)]
 
@@ -142,6 +142,6 @@ class Equilibrium:
                 variables[name] = along(interface, variable)
         return variables
 
-    def prepare(self, problem: Problem) -> Callable[[Samples], dict[str, NDArray[Any]]]:
+    def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, NDArray[Any]]]:
         """Return a solver for samples of this problem."""
         return OnsetSolver(problem, self)

@@ -17,7 +17,7 @@ from stiction.base.jit import jit, jit_inside
 from stiction.elasticity.linear import inner
 from stiction.problem.friction import FrictionLaw
 from stiction.problem.friction.parameters import Linear, Polygon
-from stiction.problem.sample import Sample as Samples
+from stiction.problem.sample import Sample
 
 FLAT = 1e-11
 """Share of the mean strength by which a node must weaken to count as weakening. A smaller fall
@@ -79,7 +79,7 @@ class Outcome(IntEnum):
     UNDECIDED = 2
 
 
-class Sample(NamedTuple):
+class StaticSample(NamedTuple):
     """One strength profile; all arrays of shape (nodes,).
 
     Stress is counted from the initial one: `excess` is the strength excess tau_p - tau_i and
@@ -98,7 +98,7 @@ class Sample(NamedTuple):
 
 def make_sample(
     excess: Array, residual: Array, profile: Array, rate: Array, pieces: Pieces
-) -> Sample:
+) -> StaticSample:
     """Return one sample, or many over the first axis.
 
     Nodes whose strength is residual, but for round-off, do not weaken.
@@ -113,10 +113,10 @@ def make_sample(
     with np.errstate(invalid="ignore", divide="ignore"):
         critical = np.where(rate > 0.0, pieces.first * fall / rate, 0.0)
     # A copy: of a read-only array, as of a law, each kernel would be compiled a second time.
-    return Sample(excess, residual, profile, rate.copy(), critical, pieces)
+    return StaticSample(excess, residual, profile, rate.copy(), critical, pieces)
 
 
-def sample_of(rows: Samples, pieces: Pieces, row: int | slice = slice(None)) -> Sample:
+def sample_of(rows: Sample, pieces: Pieces, row: int | slice = slice(None)) -> StaticSample:
     """Return one sample of a batch, or all of them, as the kernels take them."""
     initial = rows.initial_stress[row]
     shape = (*initial.shape[: initial.ndim - rows.load_profile.ndim], -1)
@@ -126,10 +126,10 @@ def sample_of(rows: Samples, pieces: Pieces, row: int | slice = slice(None)) -> 
     return make_sample(excess, residual, rows.load_profile.flatten(), rate, pieces)
 
 
-def row_of(samples: Sample, row: int) -> Sample:
+def row_of(samples: StaticSample, row: int) -> StaticSample:
     """Return one sample of a batch."""
     excess, residual, profile, rate, critical, pieces = samples
-    return Sample(excess[row], residual[row], profile, rate[row], critical[row], pieces)
+    return StaticSample(excess[row], residual[row], profile, rate[row], critical[row], pieces)
 
 
 class Present(NamedTuple):
@@ -173,20 +173,20 @@ class Program:
 
     pieces: Pieces
 
-    def sample_of(self, rows: Samples, row: int) -> Sample:
+    def sample_of(self, rows: Sample, row: int) -> StaticSample:
         """Return one sample of a batch."""
         return sample_of(rows, self.pieces, row)
 
-    def at_rest(self, sample: Sample) -> State:
+    def at_rest(self, sample: StaticSample) -> State:
         """Return the state in which the first node is about to slip."""
         load = float((sample.excess / sample.profile).min())
         return State(load, *np.zeros((3, sample.excess.size)))
 
-    def at_turn(self, sample: Sample, state: State) -> State:
+    def at_turn(self, sample: StaticSample, state: State) -> State:
         """Return an instability with its exact direction, as it is on lines."""
         return state
 
-    def of_stress(self, sample: Sample, state: State, y: Array) -> Array:
+    def of_stress(self, sample: StaticSample, state: State, y: Array) -> Array:
         """Return the derivative of the mean stress at an instability from y, that of its load."""
         return y
 
@@ -195,7 +195,7 @@ class Program:
         return 0.0
 
 
-def multiplier_of(sample: Sample, state: State) -> Array:
+def multiplier_of(sample: StaticSample, state: State) -> Array:
     """Return the multiplier y of an instability, <p, y> = 1: the direction, normalised.
 
     Where `ahead` is known it is normalised already.
@@ -216,13 +216,13 @@ class Jump(NamedTuple):
     counts: bool = True
 
 
-def residual_nodes(sample: Sample, slip: Array) -> NDArray[np.bool_]:
+def residual_nodes(sample: StaticSample, slip: Array) -> NDArray[np.bool_]:
     """Return which weakening nodes have reached their residual strength."""
     reached: NDArray[np.bool_] = slip >= sample.pieces.at_corner * sample.critical
     return reached & (sample.critical > 0.0)
 
 
-def exceeds(sample: Sample, slip: Array, piece: NDArray[np.int64] | None = None) -> bool:
+def exceeds(sample: StaticSample, slip: Array, piece: NDArray[np.int64] | None = None) -> bool:
     """Whether a slip goes beyond the piece of each node that it rests on, by default the first."""
     pieces = sample.pieces
     end = pieces.ends[0] if piece is None else np.append(pieces.ends, 1e300)[piece]
@@ -242,21 +242,21 @@ def piece_at(pieces: Pieces, critical: float, slip: float) -> int:
 
 
 @jit_inside
-def start_of(sample: Sample, i: int, piece: int) -> float:
+def start_of(sample: StaticSample, i: int, piece: int) -> float:
     """Value of a piece of node i at zero slip, Pa: tau_p on the first, tau_r on the last."""
     share = sample.pieces.starts[piece]
     return share * sample.excess[i] + (1.0 - share) * sample.residual[i]
 
 
 @jit_inside
-def strength_at(sample: Sample, slip: Array, i: int) -> float:
+def strength_at(sample: StaticSample, slip: Array, i: int) -> float:
     """Strength less initial stress of node i after some slip, Pa."""
     piece = piece_at(sample.pieces, sample.critical[i], slip[i])
     return start_of(sample, i, piece) - sample.pieces.slopes[piece] * sample.rate[i] * slip[i]
 
 
 @jit
-def _find_pieces(sample: Sample, slip: Array, present: Present) -> None:
+def _find_pieces(sample: StaticSample, slip: Array, present: Present) -> None:
     for i in range(slip.size):
         piece = piece_at(sample.pieces, sample.critical[i], slip[i])
         present.piece[i] = piece
@@ -264,7 +264,7 @@ def _find_pieces(sample: Sample, slip: Array, present: Present) -> None:
         present.rate[i] = sample.pieces.slopes[piece] * sample.rate[i]
 
 
-def present_pieces(sample: Sample, slip: Array) -> Present:
+def present_pieces(sample: StaticSample, slip: Array) -> Present:
     """Return the pieces on which the nodes are after a slip."""
     present = Present(np.empty(slip.size, dtype=np.int64), *np.empty((2, slip.size)))
     _find_pieces(sample, slip, present)
@@ -272,7 +272,9 @@ def present_pieces(sample: Sample, slip: Array) -> Present:
 
 
 @jit
-def step_to_corner(sample: Sample, slip: Array, direction: Array, longest: float) -> float:
+def step_to_corner(
+    sample: StaticSample, slip: Array, direction: Array, longest: float
+) -> float:
     """Move along a direction until the first node reaches a corner, at most `longest` of it."""
     step = longest
     ends = sample.pieces.ends
@@ -289,7 +291,7 @@ def step_to_corner(sample: Sample, slip: Array, direction: Array, longest: float
 
 
 @jit_inside
-def unsupported(sample: Sample, load: float, slip: Array) -> bool:
+def unsupported(sample: StaticSample, load: float, slip: Array) -> bool:
     """Whether the whole interface, at its present strengths, cannot carry the load."""
     balance = 0.0
     for i in range(slip.shape[0]):

@@ -20,8 +20,8 @@ from stiction.methods.equilibrium.patches import (
     with_ends,
 )
 from stiction.methods.equilibrium.sample import (
-    Sample,
     State,
+    StaticSample,
     multiplier_of,
     present_pieces,
     refused,
@@ -33,7 +33,7 @@ from stiction.methods.equilibrium.transforms.plane import PlaneProgram
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
 from stiction.problem.results import position
-from stiction.problem.sample import Sample as Samples
+from stiction.problem.sample import Sample
 
 FINE = 8.0
 """Nodes in the nucleation length below which there is a warning."""
@@ -90,7 +90,7 @@ class Event(NamedTuple):
 
 
 def event_table(
-    problem: Problem, program: AnyProgram, rows: Samples, row: int, events: list[Event]
+    problem: Problem, program: AnyProgram, rows: Sample, row: int, events: list[Event]
 ) -> dict[str, Array]:
     """Return the variables of the arrested events of one sample, (events, ...) arrays."""
     interface, plane = problem.interface, problem.interface.is_plane
@@ -136,7 +136,7 @@ class Path:
     known: bool = True
 
 
-def follow(program: AnyProgram, sample: Sample) -> Path:
+def follow(program: AnyProgram, sample: StaticSample) -> Path:
     """Follow a sample from rest to global sliding.
 
     Arrest is overdamped: the patch stops at the least equilibrium of the same load. Inertia may
@@ -180,7 +180,7 @@ class OnsetSolver:
         self.problem, self.options = problem, options
         self.program = make_program(problem, options.gap)
 
-    def __call__(self, rows: Samples) -> dict[str, NDArray[Any]]:
+    def __call__(self, rows: Sample) -> dict[str, NDArray[Any]]:
         """Return the onset of each sample; see `Equilibrium`."""
         self.problem.warn_if_coarse(rows, FINE, ROUGHLY[len(self.problem.interface.shape)])
         samples, table, known = sample_of(rows, self.program.pieces), [], []
@@ -209,7 +209,9 @@ class OnsetSolver:
             _warn_if_lost(values["sensitivity"], np.isfinite(first))
         return values
 
-    def _values(self, rows: Samples, row: int, sample: Sample, path: Path) -> dict[str, Any]:
+    def _values(
+        self, rows: Sample, row: int, sample: StaticSample, path: Path
+    ) -> dict[str, Any]:
         """Return the variables of one sample, the first instability as a load."""
         interface, shape = self.problem.interface, rows.strength[row].shape
         first, last = path.first, path.last
@@ -298,7 +300,7 @@ class OnsetSolver:
         )
 
 
-def _sensitivity(program: AnyProgram, sample: Sample, state: State) -> Array:
+def _sensitivity(program: AnyProgram, sample: StaticSample, state: State) -> Array:
     """Derivative of the stress of an instability by the peak strengths, from its multiplier.
 
     NaN where a node passed a corner beyond which it weakens more steeply, or stopped.
@@ -321,7 +323,7 @@ def _warn_if_stopped(stopped: NDArray[np.bool_]) -> None:
     )
 
 
-def _warn_if_residual(rows: Samples, peak: Array, reached: NDArray[np.bool_]) -> None:
+def _warn_if_residual(rows: Sample, peak: Array, reached: NDArray[np.bool_]) -> None:
     """Warn where all but the last nodes are at their residual strength before the peak."""
     residual = rows.residual_strength.mean(axis=rows.axes)
     fall = np.median((rows.strength - rows.residual_strength).reshape(rows.samples, -1), axis=1)

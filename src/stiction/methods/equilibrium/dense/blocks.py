@@ -17,8 +17,8 @@ from stiction.elasticity.weakest import weakest_place
 from stiction.methods.equilibrium.dense.line import LineProgram
 from stiction.methods.equilibrium.sample import (
     Outcome,
-    Sample,
     State,
+    StaticSample,
     present_pieces,
     step_to_corner,
 )
@@ -52,7 +52,7 @@ class BlockProgram(LineProgram):
                 " and bounds rigorous, is then not proved (docs/specimens.md)"
             )
 
-    def at_rest(self, sample: Sample) -> State:
+    def at_rest(self, sample: StaticSample) -> State:
         """Return the state in which the first node is about to slip."""
         return replace(super().at_rest(sample), stuck=self.machine)
 
@@ -60,7 +60,7 @@ class BlockProgram(LineProgram):
         """Return by how much slip lowers the mean stress of the interface, Pa."""
         return float(self.blocks.mean_relief(slip))
 
-    def of_stress(self, sample: Sample, state: State, y: Array) -> Array:
+    def of_stress(self, sample: StaticSample, state: State, y: Array) -> Array:
         """Return the derivative of the mean stress at an instability from y, that of its drive.
 
         Until the instability (K - W) d = D q - s on the nodes that slip, none of which rests.
@@ -90,13 +90,17 @@ class BlockProgram(LineProgram):
             return np.nan
         return 0.0 if area is None else stress * area / machine  # without an area it is rigid
 
-    def next(self, sample: Sample, state: State | None = None, target: float = np.inf) -> State:
+    def next(
+        self, sample: StaticSample, state: State | None = None, target: float = np.inf
+    ) -> State:
         """Return the next instability, or the state at a load before it; see `LineProgram`."""
         if self.machine:
             state = state or self.at_rest(sample)
         return super().next(sample, state, target)
 
-    def _bound(self, sample: Sample, multiplier: Array, work: Array) -> tuple[float, float]:
+    def _bound(
+        self, sample: StaticSample, multiplier: Array, work: Array
+    ) -> tuple[float, float]:
         """Return the bound of the weakest window, or of sliding as a whole under dead load."""
         rates = sample.rate[sample.rate > 0.0]
         low, high = float(rates.min(initial=np.inf)), float(rates.max(initial=0.0))
@@ -118,11 +122,11 @@ class BlockProgram(LineProgram):
         multiplier /= multiplier @ sample.profile
         return best, np.inf if steps == 0 else -np.inf
 
-    def _by_transforms(self, sample: Sample, state: State | None) -> State | None:
+    def _by_transforms(self, sample: StaticSample, state: State | None) -> State | None:
         """Return None: a specimen has no transforms."""
         return None
 
-    def _runs_away(self, sample: Sample, found: State, slip: Array) -> tuple[int, float]:
+    def _runs_away(self, sample: StaticSample, found: State, slip: Array) -> tuple[int, float]:
         """Move the slip on as far as the unstable direction goes; the jump decides."""
         step = step_to_corner(sample, slip, found.direction, np.inf)
         return (Outcome.SLIDING if step == np.inf else Outcome.UNDECIDED), np.inf

@@ -32,7 +32,7 @@ from stiction.methods.equilibrium.dense.linear_program import sort_by, stress_to
 from stiction.methods.equilibrium.dense.stable_path import AT_STRENGTH, REVERSED, all_slip
 from stiction.methods.equilibrium.sample import (
     Outcome,
-    Sample,
+    StaticSample,
     piece_at,
     step_to_corner,
     strength_at,
@@ -49,7 +49,7 @@ PATIENCE = 16
 
 
 @jit_inside
-def _residual_runs(sample: Sample, slip: Array) -> tuple[int, int]:
+def _residual_runs(sample: StaticSample, slip: Array) -> tuple[int, int]:
     """Longest run of residual nodes on the circle, and the number of corners passed in all."""
     n = slip.shape[0]
     longest = 0
@@ -69,7 +69,12 @@ def _residual_runs(sample: Sample, slip: Array) -> tuple[int, int]:
 
 @jit_inside
 def _overstressed(
-    sample: Sample, load: float, slip: Array, stiff: Array, workspace: Workspace, least: float
+    sample: StaticSample,
+    load: float,
+    slip: Array,
+    stiff: Array,
+    workspace: Workspace,
+    least: float,
 ) -> int:
     """Put the nodes at rest above their strength into `order`, most overstressed first."""
     count = ZERO
@@ -88,7 +93,7 @@ def _overstressed(
 
 @jit_inside
 def _join(
-    sample: Sample,
+    sample: StaticSample,
     load: float,
     slip: Array,
     stiff: Array,
@@ -116,7 +121,7 @@ def _join(
 
 @jit_inside
 def _relax(
-    sample: Sample,
+    sample: StaticSample,
     load: float,
     slip: Array,
     stiff: Array,
@@ -181,7 +186,7 @@ def _leave_reversed(other: Workspace, size: int, least: float, share: float) -> 
 
 @jit_inside
 def _settle(
-    sample: Sample,
+    sample: StaticSample,
     load: float,
     slip: Array,
     stiff: Array,
@@ -244,7 +249,7 @@ def _settle(
 
 @jit
 def jump(
-    sample: Sample,
+    sample: StaticSample,
     load: float,
     slip: Array,
     stiff: Array,

@@ -34,8 +34,8 @@ from stiction.methods.equilibrium.sample import (
     Jump,
     Outcome,
     Program,
-    Sample,
     State,
+    StaticSample,
     exceeds,
     multiplier_of,
     pieces_of,
@@ -113,12 +113,14 @@ class LineProgram(Program):
         moving = rate[rate > 0.0]
         return windows_between(self.nodes, float(moving.min()), float(moving.max()), self.unit)
 
-    def bound(self, sample: Sample) -> tuple[float, Array]:
+    def bound(self, sample: StaticSample) -> tuple[float, Array]:
         """Return the discrete local bound of one sample (Pa), and its multiplier."""
         work, multiplier = np.empty((2, self.nodes))
         return self._bound(sample, multiplier, work)[0], multiplier
 
-    def _bound(self, sample: Sample, multiplier: Array, work: Array) -> tuple[float, float]:
+    def _bound(
+        self, sample: StaticSample, multiplier: Array, work: Array
+    ) -> tuple[float, float]:
         """Return the bound of the weakest window, and where `solve_program` begins."""
         windows = self._windows(sample.rate)
         bound = window_bound(sample, windows, work, multiplier)
@@ -126,7 +128,7 @@ class LineProgram(Program):
 
     def solve(
         self,
-        sample: Sample,
+        sample: StaticSample,
         cap: float = np.inf,
         state: State | None = None,
     ) -> State | None:
@@ -151,7 +153,7 @@ class LineProgram(Program):
         )
         return State(load, slip, stiff, multiplier) if status == SOLVED else None
 
-    def _by_transforms(self, sample: Sample, state: State | None) -> State | None:
+    def _by_transforms(self, sample: StaticSample, state: State | None) -> State | None:
         """Solve a programme in which many nodes slip; None if its bounds stay apart."""
         plane = Plane((self.extent,), self.modulus, 0.0)
         found = plane_onset(
@@ -168,7 +170,9 @@ class LineProgram(Program):
         stiff = np.fft.irfft(symbol * np.fft.rfft(found.slip), self.nodes)
         return State(found.lower, found.slip, stiff, multiplier)
 
-    def next(self, sample: Sample, state: State | None = None, target: float = np.inf) -> State:
+    def next(
+        self, sample: StaticSample, state: State | None = None, target: float = np.inf
+    ) -> State:
         """Return the next instability from a state or from rest, or the state at a load before it.
 
         The programme of the present pieces gives it if no node reaches a further corner before.
@@ -208,11 +212,11 @@ class LineProgram(Program):
             self._certify(present, found, multiplier_of(sample, found))
         return found
 
-    def _certify(self, present: Sample, found: State, multiplier: Array) -> None:
+    def _certify(self, present: StaticSample, found: State, multiplier: Array) -> None:
         """Write the distance of the bounds of an instability; K y is left in the workspace."""
         found.gap = certificate(present, found.slip, found.stiff, multiplier, self._workspace)
 
-    def at(self, sample: Sample, state: State, load: float, fresh: bool) -> State | None:
+    def at(self, sample: StaticSample, state: State, load: float, fresh: bool) -> State | None:
         """Return the equilibrium at a load from a state below, None if it is not found."""
         if load <= state.load:
             return state
@@ -223,7 +227,7 @@ class LineProgram(Program):
         there = self.next(sample, replace(state, stuck=True), load)
         return None if there.unstable or not there.known else there
 
-    def jump(self, sample: Sample, found: State) -> Jump:
+    def jump(self, sample: StaticSample, found: State) -> Jump:
         """Let an unstable state jump to another equilibrium, or to sliding."""
         slip, stiff, direction = found.slip.copy(), found.stiff, found.direction
         outcome, griffith = self._runs_away(sample, found, slip)
@@ -242,7 +246,7 @@ class LineProgram(Program):
         )
         return Jump(outcome == Outcome.ARRESTED, outcome != Outcome.UNDECIDED, state)
 
-    def _runs_away(self, sample: Sample, found: State, slip: Array) -> tuple[int, float]:
+    def _runs_away(self, sample: StaticSample, found: State, slip: Array) -> tuple[int, float]:
         """Try whether the patch certainly slides; return that and the length that would show it.
 
         The slip moves on to a lower bound of the next equilibrium.

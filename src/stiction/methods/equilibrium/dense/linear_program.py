@@ -22,7 +22,7 @@ from stiction.methods.equilibrium.dense.cholesky import (
     solve_forward,
     substitute_members,
 )
-from stiction.methods.equilibrium.sample import Sample
+from stiction.methods.equilibrium.sample import StaticSample
 
 SOLVED = 0
 STALLED = 1
@@ -53,7 +53,7 @@ def sort_by(keys: Array, order: Array, count: int) -> None:
 
 @jit_inside
 def overstressed(
-    sample: Sample, load: float, stiff: Array, workspace: Workspace, tolerance: float
+    sample: StaticSample, load: float, stiff: Array, workspace: Workspace, tolerance: float
 ) -> int:
     """Put the nodes at rest above their strength into `order`, most overstressed first."""
     count = ZERO
@@ -69,7 +69,7 @@ def overstressed(
 
 
 @jit_inside
-def stress_tolerance(sample: Sample, load: float) -> float:
+def stress_tolerance(sample: StaticSample, load: float) -> float:
     """Overstress, Pa, that counts as round-off."""
     scale = 0.0
     n = sample.excess.shape[0]
@@ -80,7 +80,7 @@ def stress_tolerance(sample: Sample, load: float) -> float:
 
 @jit_inside
 def _back_off(
-    sample: Sample, load: float, workspace: Workspace, size: int, stiff: Array
+    sample: StaticSample, load: float, workspace: Workspace, size: int, stiff: Array
 ) -> None:
     """Lower the load of the slip by so little that no node at rest is overstressed.
 
@@ -121,7 +121,7 @@ def _without_reversed(workspace: Workspace, size: int, load: float) -> int:
 
 @jit
 def solve_program(
-    sample: Sample,
+    sample: StaticSample,
     start: float,
     bound: float,
     cap: float,
@@ -213,7 +213,7 @@ def solve_program(
 
 @jit
 def certificate(
-    sample: Sample, slip: Array, stiff: Array, multiplier: Array, workspace: Workspace
+    sample: StaticSample, slip: Array, stiff: Array, multiplier: Array, workspace: Workspace
 ) -> float:
     """Distance of the rigorous bounds from below (by the slip) and from above (by y), Pa.
 

@@ -17,7 +17,7 @@ from stiction.elasticity.line import griffith_length
 from stiction.methods.equilibrium.dense.cholesky import back_substitute, row_start, substitute
 from stiction.methods.equilibrium.sample import (
     Outcome,
-    Sample,
+    StaticSample,
     step_to_corner,
     strength_at,
     unsupported,
@@ -66,7 +66,7 @@ class Runs(NamedTuple):
 
 
 @jit
-def unstoppable_length(sample: Sample, load: float, runs: Runs) -> float:
+def unstoppable_length(sample: StaticSample, load: float, runs: Runs) -> float:
     """Nodes in a row at their residual strength that nothing on the interface stops.
 
     Griffith's length with the least stress drop and the largest fracture energy, which is
@@ -83,7 +83,7 @@ def unstoppable_length(sample: Sample, load: float, runs: Runs) -> float:
 
 @jit
 def runs_away(
-    sample: Sample,
+    sample: StaticSample,
     runs: Runs,
     load: float,
     slip: Array,

@@ -39,7 +39,7 @@ from stiction.methods.equilibrium.dense.cholesky import (
     take_off_resting,
 )
 from stiction.methods.equilibrium.dense.linear_program import stress_tolerance
-from stiction.methods.equilibrium.sample import Sample, piece_at, start_of, strength_at
+from stiction.methods.equilibrium.sample import StaticSample, piece_at, start_of, strength_at
 
 REACHED = 0
 UNSTABLE = 1
@@ -59,7 +59,7 @@ REVERSED = 1e-10
 
 @jit_inside
 def _begin(
-    sample: Sample,
+    sample: StaticSample,
     load: float,
     slip: Array,
     stiff: Array,
@@ -160,7 +160,7 @@ def _keep_members(workspace: Workspace, size: int, slip: Array, speed: Array) ->
 
 @jit_inside
 def _substitute(
-    sample: Sample, strength: Array, workspace: Workspace, first: int, size: int
+    sample: StaticSample, strength: Array, workspace: Workspace, first: int, size: int
 ) -> None:
     """Extend both forward substitutions by the members first..size-1."""
     right, resting = workspace.vectors[0], workspace.vectors[4]
@@ -182,7 +182,7 @@ def all_slip(workspace: Workspace, slip: Array) -> bool:
 
 @jit_inside
 def _next_event(
-    sample: Sample,
+    sample: StaticSample,
     load: float,
     target: float,
     slip: Array,
@@ -236,7 +236,7 @@ def _change_slope(
 
 @jit_allocating
 def advance(
-    sample: Sample,
+    sample: StaticSample,
     load: float,
     target: float,
     slip: Array,

@@ -18,7 +18,7 @@ from stiction.base.arrays import Array
 from stiction.base.jit import jit, jit_inside
 from stiction.elasticity.line import stiffness_column
 from stiction.elasticity.linear import dot
-from stiction.methods.equilibrium.sample import Sample
+from stiction.methods.equilibrium.sample import StaticSample
 from stiction.problem.friction.parameters import SMALLEST_EIGENVALUE
 
 GROWTH = 1.25
@@ -159,7 +159,9 @@ def _count_fast(rate: Array, threshold: float, length: Array) -> None:
 
 
 @jit
-def window_bound(sample: Sample, windows: Windows, allowed: Array, multiplier: Array) -> float:
+def window_bound(
+    sample: StaticSample, windows: Windows, allowed: Array, multiplier: Array
+) -> float:
     """Lowest bound over the windows and the uniform field, Pa, and its multiplier.
 
     A weighted mean over a window hardly changes as the window moves by a sixteenth of its width:

@@ -14,7 +14,7 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.elasticity.linear import SOLVED, Mask, inner, no_spring, solve_inside
 from stiction.elasticity.operator import Operator, product
-from stiction.methods.equilibrium.sample import Sample, present_pieces
+from stiction.methods.equilibrium.sample import StaticSample, present_pieces
 from stiction.methods.equilibrium.transforms.held_equilibrium import ITERATIONS
 from stiction.methods.equilibrium.transforms.relaxation import residual_tolerance, slip_under
 
@@ -48,7 +48,9 @@ def _solution(operator: Operator, inside: Mask, right: Array) -> Array | None:
     return x if status == SOLVED else None
 
 
-def _balanced(operator: Operator, sample: Sample, load: float, slip: Array) -> Array | None:
+def _balanced(
+    operator: Operator, sample: StaticSample, load: float, slip: Array
+) -> Array | None:
     """Slip at a load from a rough one; None if there is none."""
     tolerance = residual_tolerance(sample, load, PRECISE)
     for _ in range(ROUNDS):
@@ -63,7 +65,7 @@ def _balanced(operator: Operator, sample: Sample, load: float, slip: Array) -> A
 
 
 def follow_to_turn(
-    operator: Operator, sample: Sample, load: float, target: float, slip: Array
+    operator: Operator, sample: StaticSample, load: float, target: float, slip: Array
 ) -> Turn | None:
     """Follow a stable path, from a slip that is roughly that at a load, up to a higher load.
 

@@ -10,7 +10,7 @@ from stiction.base.jit import jit
 from stiction.elasticity.linear import SOLVED, Spring, inner, residual_of, solve_inside
 from stiction.elasticity.operator import Operator, filtered, make_transform
 from stiction.methods.equilibrium.patches import span
-from stiction.methods.equilibrium.sample import Sample, piece_at, present_pieces, start_of
+from stiction.methods.equilibrium.sample import StaticSample, piece_at, present_pieces, start_of
 from stiction.methods.equilibrium.transforms.held_equilibrium import ITERATIONS
 
 FIRST = 0.02
@@ -42,7 +42,9 @@ PART = 0.01
 
 
 @jit
-def longest_step(sample: Sample, rest: Array, slip: Array, move: Array, image: Array) -> float:
+def longest_step(
+    sample: StaticSample, rest: Array, slip: Array, move: Array, image: Array
+) -> float:
     """Return the largest t at which no node that moves to slip + t `move` is held back.
 
     `rest` is the overload at the slip (Pa), not negative where a node moves, and `image` K times
@@ -72,14 +74,14 @@ def longest_step(sample: Sample, rest: Array, slip: Array, move: Array, image: A
     return longest
 
 
-def _strength(sample: Sample, slip: Array) -> Array:
+def _strength(sample: StaticSample, slip: Array) -> Array:
     """Strength less initial stress after a slip, Pa."""
     now = present_pieces(sample, slip)
     return now.strength - now.rate * slip
 
 
 @jit
-def secants(sample: Sample, slip: Array, move: Array, rate: Array) -> float:
+def secants(sample: StaticSample, slip: Array, move: Array, rate: Array) -> float:
     """`rate` = weakening on the way to slip + `move` (Pa/m); return the largest fall, Pa."""
     pieces = sample.pieces
     largest = 0.0
@@ -138,7 +140,7 @@ def window_around(operator: Operator, growth: Array, wide: float) -> Window:
 
 
 def _push(
-    window: Window, sample: Sample, rest: Array, slip: Array, growth: Array, share: float,
+    window: Window, sample: StaticSample, rest: Array, slip: Array, growth: Array, share: float,
     tolerance: float, workspace: Array,
 ) -> tuple[Array, float] | None:  # fmt: skip
     """Slip that a growing patch adds where it is overloaded by `rest`; None if it has no bound.
@@ -150,7 +152,7 @@ def _push(
     nodes, operator = window
     every, (*fields, pieces) = slip.size, sample
     excess, strength, profile, slope, critical = (field[nodes] for field in fields)
-    sample = Sample(excess, strength, profile, slope, critical, pieces)
+    sample = StaticSample(excess, strength, profile, slope, critical, pieces)
     rest, slip, growth = rest[nodes], slip[nodes], growth[nodes]
     inside, residual = rest >= 0.0, workspace[: slip.size]
     move = np.where(inside, growth, 0.0)
@@ -178,7 +180,7 @@ def _push(
 
 def grown(
     operator: Operator,
-    sample: Sample,
+    sample: StaticSample,
     load: float,
     slip: Array,
     growth: Array,

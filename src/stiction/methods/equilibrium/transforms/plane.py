@@ -20,8 +20,8 @@ from stiction.methods.equilibrium.sample import (
     Jump,
     Outcome,
     Program,
-    Sample,
     State,
+    StaticSample,
     exceeds,
     pieces_of,
 )
@@ -195,12 +195,12 @@ class PlaneProgram(Program):
         self.requested = gap
         self.widest_gap = 1.01 * gap  # round-off
 
-    def _operator(self, sample: Sample) -> Operator:
+    def _operator(self, sample: StaticSample) -> Operator:
         return make_operator(
             self.plane.symbol(self.shape), sample.rate.reshape(self.shape), self.shape
         )
 
-    def next(self, sample: Sample, state: State | None = None) -> State:
+    def next(self, sample: StaticSample, state: State | None = None) -> State:
         """Return the next instability on the path from a stable state or from rest."""
         if state is not None:
             return self._step_on(sample, state, FIRST_STEP * state.load)
@@ -222,7 +222,7 @@ class PlaneProgram(Program):
         gap = found.upper - found.lower
         return State(found.lower, slip, np.zeros(slip.size), multiplier, gap)
 
-    def _step_on(self, sample: Sample, state: State, step: float) -> State:
+    def _step_on(self, sample: StaticSample, state: State, step: float) -> State:
         """Follow the stable path in steps of the load.
 
         A step is shortened if it may be unstable, which a long one may only because nodes begin to
@@ -260,7 +260,7 @@ class PlaneProgram(Program):
             load, slip, step = beyond, there, 1.5 * step
             passed = [*passed[-3:], (load, slip)]
 
-    def at_turn(self, sample: Sample, state: State) -> State:
+    def at_turn(self, sample: StaticSample, state: State) -> State:
         """Return an instability with the direction in which the path turns, NaN if not found."""
         if state.ahead is not None or state.gap == 0.0:
             return state
@@ -274,7 +274,7 @@ class PlaneProgram(Program):
             slip = np.zeros(slip.size)  # that which proves the bound may be beyond the turn
         return replace(state, direction=np.full(slip.size, np.nan))
 
-    def jump(self, sample: Sample, found: State) -> Jump:
+    def jump(self, sample: StaticSample, found: State) -> Jump:
         """Let an unstable state jump to another equilibrium, or to sliding."""
         beyond = found.load + found.gap
         beyond += self.requested * abs(beyond)
@@ -288,7 +288,7 @@ class PlaneProgram(Program):
         counts = not arrested or bool(moved[weakens].any())
         return Jump(arrested, ahead.status != Outcome.UNDECIDED, after, counts)
 
-    def at(self, sample: Sample, state: State, load: float, fresh: bool) -> State | None:
+    def at(self, sample: StaticSample, state: State, load: float, fresh: bool) -> State | None:
         """Return the equilibrium at a load from a state below, None if it is not found."""
         if load <= state.load:
             return state

@@ -24,7 +24,7 @@ from stiction.elasticity.operator import Operator, product
 from stiction.methods.equilibrium.sample import (
     Outcome,
     Present,
-    Sample,
+    StaticSample,
     present_pieces,
     residual_nodes,
     step_to_corner,
@@ -50,7 +50,7 @@ ROUGH = 0.05
 """Largest residual stress of a step, as a share of the weakening left out in the step before."""
 
 
-def residual_tolerance(sample: Sample, load: float, accuracy: float) -> float:
+def residual_tolerance(sample: StaticSample, load: float, accuracy: float) -> float:
     """Residual stress that is allowed, Pa, from its share of the mean strength or load.
 
     Strength beyond the load, such as that of barriers, does not count.
@@ -93,7 +93,12 @@ def _definite(operator: Operator, rate: Array, growth: Array, slip: Array) -> bo
 
 
 def stable_equilibrium(
-    operator: Operator, sample: Sample, load: float, slip: Array, accuracy: float, guess: Array
+    operator: Operator,
+    sample: StaticSample,
+    load: float,
+    slip: Array,
+    accuracy: float,
+    guess: Array,
 ) -> Array | None:
     """Return the equilibrium at a load to which a stable path leads from one at a lower load.
 
@@ -132,7 +137,7 @@ def stable_equilibrium(
 
 def _bound(
     operator: Operator,
-    sample: Sample,
+    sample: StaticSample,
     load: float,
     slip: Array,
     now: Present,
@@ -168,7 +173,7 @@ def _bound(
 
 
 def _weakening_step(
-    operator: Operator, sample: Sample, load: float, slip: Array, tolerance: float
+    operator: Operator, sample: StaticSample, load: float, slip: Array, tolerance: float
 ) -> Array:
     """Slip moved with the true states until the first node reaches a corner.
 
@@ -209,7 +214,7 @@ class Relaxed(NamedTuple):
 
 def least_equilibrium(
     operator: Operator,
-    sample: Sample,
+    sample: StaticSample,
     load: float,
     slip: Array,
     accuracy: float = 1e-7,
