@@ -9,8 +9,9 @@ import stiction as st
 from stiction.elasticity.operator import make_operator
 from stiction.methods.criterion.average import _between_nodes, least_average
 from stiction.methods.criterion.windows import ellipse_window
-from stiction.methods.equilibrium import growing_patch, relaxation, transforms
 from stiction.methods.equilibrium.sample import Outcome
+from stiction.methods.equilibrium.transforms import growing_patch, relaxation
+from stiction.methods.equilibrium.transforms import plane as program
 from stiction.methods.equilibrium.transforms.plane import Plane, plane_onset
 from stiction.methods.equilibrium.transforms.relaxation import least_equilibrium
 
@@ -115,7 +116,7 @@ def test_sensitivity_is_the_gradient_of_the_mean_stress(name):
 def test_a_coarse_grid_only_says_where_the_path_is_begun(monkeypatch):
     problem, strength = crooked("residual"), strength_of(3)
     quick = exact_onset(problem, strength)
-    monkeypatch.setattr(transforms, "FEWEST", 100)
+    monkeypatch.setattr(program, "FEWEST", 100)
     slow = exact_onset(problem, strength)
     assert quick["arrested_events"].item() == slow["arrested_events"].item()
     for name in ("first_instability", "critical_load"):
@@ -124,7 +125,7 @@ def test_a_coarse_grid_only_says_where_the_path_is_begun(monkeypatch):
 
 
 def test_no_sensitivity_where_the_turning_point_is_not_found(monkeypatch):
-    monkeypatch.setattr(transforms, "follow_to_turn", lambda *_: None)
+    monkeypatch.setattr(program, "follow_to_turn", lambda *_: None)
     for name in ("straight", "both"):
         problem = crooked(name)
         with pytest.warns(st.AccuracyWarning, match=r"\(0\), so sensitivity is NaN"):

@@ -75,7 +75,7 @@ def command(line):
     with (
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(err),
-        warnings.catch_warnings(),
+        warnings.catch_warnings(action="ignore", category=ResourceWarning),  # of other tests
         mock.patch.object(progress, "AFTER", math.inf),
     ):
         try:

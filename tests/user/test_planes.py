@@ -14,8 +14,9 @@ from setups import RATE, make_problem, smooth_noise
 from small_study import lengths, small_study
 
 import stiction as st
-from stiction.methods.equilibrium import solver, transforms
+from stiction.methods.equilibrium import solver
 from stiction.methods.equilibrium.sample import Jump, Outcome
+from stiction.methods.equilibrium.transforms import plane as program
 from stiction.methods.equilibrium.transforms.relaxation import Relaxed
 
 
@@ -59,8 +60,8 @@ def test_what_comes_back(found):
 
 def test_bounds_that_do_not_close_are_warned_of_with_their_distance(monkeypatch):
     # As if Newton's method and bisection had got nowhere.
-    monkeypatch.setattr(transforms, "close", lambda *a, **k: (False, 0.0))
-    monkeypatch.setattr(transforms, "_narrow", lambda *a, **k: 0.0)
+    monkeypatch.setattr(program, "close", lambda *a, **k: (False, 0.0))
+    monkeypatch.setattr(program, "_narrow", lambda *a, **k: 0.0)
     with pytest.warns(st.AccuracyWarning, match=r"2 of 2 samples \(0, 1\).*apart"):
         found = onset()
     assert (found["certificate_gap"] > 1e-3 * found["first_instability"]).all()
@@ -81,19 +82,19 @@ def test_no_certificate_where_the_residual_strength_is_reached_first():
 
 def test_a_path_that_is_lost_is_warned_of(monkeypatch, found):
     """In its first jump, before it, or after a jump that came to rest."""
-    follow_on = transforms.PlaneProgram.next
+    follow_on = program.PlaneProgram.next
 
     def path_lost(*given):
         return dataclasses.replace(follow_on(*given), unstable=False, known=False)
 
-    def at_rest(program, sample, state):
-        monkeypatch.setattr(transforms.PlaneProgram, "next", path_lost)
+    def at_rest(own, sample, state):
+        monkeypatch.setattr(program.PlaneProgram, "next", path_lost)
         return Jump(True, True, state)
 
     for owner, name, lost in (
-        (transforms, "least_equilibrium", lambda *given: Relaxed(Outcome.UNDECIDED, given[3])),
-        (transforms.PlaneProgram, "next", path_lost),
-        (transforms.PlaneProgram, "jump", at_rest),
+        (program, "least_equilibrium", lambda *given: Relaxed(Outcome.UNDECIDED, given[3])),
+        (program.PlaneProgram, "next", path_lost),
+        (program.PlaneProgram, "jump", at_rest),
     ):
         monkeypatch.setattr(owner, name, lost)
         text = r"not followed .* in 1 of 1 samples \(0\): .* a lower bound"
