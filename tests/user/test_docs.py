@@ -108,6 +108,16 @@ def test_python_of_the_page_on_reliability():
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+def test_python_of_the_page_on_peaks(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(ROOT / "examples" / "data" / "peaks.csv", tmp_path)
+    scope = run_blocks("docs/what-do-twenty-five-tests-tell-me.md", {})
+    assert scope["first"].size == 13
+    assert scope["found"].p_values["cramer_von_mises"] > 0.05
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 def test_the_road_from_files_to_a_force(monkeypatch, tmp_path):
     """Every block of the page on decisions, with fewer repetitions and interfaces."""
     monkeypatch.chdir(tmp_path)
