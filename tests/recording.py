@@ -162,6 +162,7 @@ def _axes(axes: Axes, path: str) -> Iterator[tuple[str, Any]]:
     texts += [axes.get_xscale(), axes.get_yscale()]
     texts += [text.get_text() for text in legend.get_texts()] if legend else []
     texts += [text.get_text() for text in axes.texts]
+    texts += [one.get_label() for one in axes.lines if not one.get_label().startswith("_")]
     yield path, " | ".join(texts)
     for number, line in enumerate(axes.lines):
         x, y = (np.asarray(one, dtype=float) for one in line.get_data())
@@ -188,6 +189,10 @@ def _axes(axes: Axes, path: str) -> Iterator[tuple[str, Any]]:
     ]
     if boxes:
         yield f"{path} patches", numbers(np.concatenate(boxes), "")
+    for number, scale in enumerate(axes.child_axes):
+        axes.figure.draw_without_rendering()  # which sets the limits of a second scale
+        texts = scale.get_xlabel() + scale.get_ylabel()
+        yield f"{path} scale {number} ({texts})", [*scale.get_xlim(), *scale.get_ylim()]
 
 
 def differences(

@@ -25,28 +25,30 @@ from faults import Fault, faults_of
 
 ROOT = Path(__file__).parents[2]
 NEAREST = {
-    "cli": "cli reliability conditional_study planes",
-    "criterion": "criterion griffith crooked statistics_*",
-    "dynamics": "dynamics_* rupture_stations plane_rupture misfit examples",
-    "elasticity": "blocks block_response specimens dynamics_kernels dynamics_waves criterion"
-    " dynamics_convolution equilibrium",
-    "ensemble": "store ensemble study progress own_method reliability",
-    "equilibrium": "crooked specimens equilibrium plane_equilibrium planes plane_gaps"
-    " instability friction_laws",
-    "friction": "friction_laws friction_coefficients crooked dynamics_properties",
-    "inference": "inference* fit_* profiles agreement",
+    "base": "refusals progress cache warnings own_method",
+    "cli": "runs cli warnings",
+    "criterion": "lines planes specimens criterion griffith crooked statistics_*",
+    "dynamics": "ruptures dynamics_* rupture_stations plane_rupture",
+    "elasticity": "specimens lines planes blocks block_response dynamics_kernels dynamics_waves"
+    " criterion dynamics_convolution equilibrium",
+    "ensemble": "runs fields store ensemble study progress own_method reliability",
+    "equilibrium": "lines planes specimens crooked equilibrium plane_equilibrium instability"
+    " friction_laws",
+    "friction": "lines ruptures friction_laws friction_coefficients crooked dynamics_properties",
+    "inference": "inference* pictures fit_* agreement joined",
     "jit": "cache architecture own_method",
-    "plot": "plot shown specimens agreement planes inference examples",
-    "problem": "specimens bad_input crooked criterion equilibrium profiles friction_coefficients",
-    "profiles": "profiles plane_gaps crooked fit_field",
-    "random": "fields conditional* random_interface marginal_families plane_fields reliability",
-    "reliability": "reliability* failure_run",
-    "report": "shown cli study planes",
-    "statistics": "statistics_* criterion inference",
-    "study": "study store cli planes own_method failure_run",
+    "plot": "pictures runs",
+    "problem": "refusals specimens bad_input crooked criterion equilibrium profiles"
+    " friction_coefficients",
+    "profiles": "profiles refusals plane_gaps crooked fit_field",
+    "random": "fields refusals conditional* random_interface marginal_families plane_fields"
+    " reliability",
+    "reliability": "reliability* failure_run runs pictures",
+    "statistics": "fields statistics_* criterion inference",
+    "study": "runs refusals study store planes own_method failure_run",
 }
 """Names of test files; the rest of the package is tested by what uses it."""
-REST = "bad_input specimens crooked criterion study dynamics_input own_method"
+REST = "refusals bad_input specimens crooked criterion study dynamics_input own_method"
 
 
 def tests_near(target: str) -> list[str]:

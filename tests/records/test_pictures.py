@@ -6,17 +6,18 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+import xarray as xr
 from crooked import LINE, LINE_STRENGTH, PLANE, PLANE_STRENGTH, uneven
 from PIL import Image
 from recording import Calls, compared
-from setups import EXACT, LOCAL
+from setups import EXACT, LOCAL, make_problem
 from small_study import lengths, small_study
 from specimens import crooked, rough
 
 import stiction as st
 
 calls = Calls()
-DRAWN = "numbers of the results beside those drawn, tests/user/test_plot.py; looked at"
+DRAWN = "the same numbers in the records of what is drawn; looked at"
 TWO = np.stack(
     [LINE_STRENGTH, 1.04 * np.roll(LINE_STRENGTH, 31) - 2e4 * uneven(LINE.interface, seed=8)]
 )
@@ -24,6 +25,7 @@ FIELD = st.RandomField(
     st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
     st.PowerLawSpectrum(2.3e-3, truncation=2.5),
 )
+EXACTLY = st.Equilibrium(slip=True, sensitivity=True)
 JOINT = crooked(nodes=64, drive=st.Pusher(height=0.008, width=0.004))
 
 
@@ -33,13 +35,40 @@ def plain(problem):
     return dataclasses.replace(problem, friction=friction, load=st.Load(normal_pressure=2.9e6))
 
 
+def of_width(problem):
+    return dataclasses.replace(
+        problem, interface=dataclasses.replace(problem.interface, width=0.012)
+    )
+
+
+@calls(DRAWN)
+def coefficients_measured_and_drawn():
+    x = LINE.interface.x
+    measured = xr.DataArray(TWO[0] / 2.9e6, {"x": x}, "x", name="mu")
+    mu = st.read_profile(measured, quantity="friction_coefficient")
+    field = st.RandomField(
+        st.Lognormal(mean=0.4, cv=0.2), FIELD.spectrum, of="friction_coefficient"
+    ).given(mu[40:60], noise=5e-3)
+    problem = plain(LINE)
+    found = st.onset(problem, mu, method=LOCAL)
+    return {
+        "measured": st.plot.field(problem, mu),
+        "drawn": st.plot.field(problem, field),
+        "bare": st.plot.field(problem, mu.values, quantity="friction_coefficient"),
+        "onset": st.plot.onset(found, mu, problem=problem),
+    }
+
+
 @calls(DRAWN)
 def onsets_on_a_line_and_a_plane():
     both = [st.onset(LINE, TWO, method=method) for method in (LOCAL, EXACT)]
     plane = st.onset(PLANE, PLANE_STRENGTH, method=LOCAL)
+    exact = st.onset(PLANE, PLANE_STRENGTH, method=EXACTLY)
     return {
         "line": st.plot.onset(both, TWO, problem=LINE, sample=1),
         "plane": st.plot.onset(plane, PLANE_STRENGTH, problem=PLANE),
+        "two": st.plot.onset([plane, exact], PLANE_STRENGTH),
+        "weak": st.plot.onset([0.1 * one for one in both], TWO, problem=LINE, sample=0),
         "field": st.plot.field(LINE, TWO[1]),
         "field of a plane": st.plot.field(PLANE.interface, PLANE_STRENGTH),
     }
@@ -55,13 +84,18 @@ def densities_and_quantiles():
         nodes=96, length=0.047, weakening_rate=0.31e12, ensemble={"samples": 40}, sweep=sweep
     )
     swept = st.Study.from_dict(study).run(progress=False)
-    one = st.monte_carlo(plain(LINE), FIELD, method=LOCAL, samples=60, seed=2, pilot=False)
+    many = {"method": LOCAL, "samples": 60, "seed": 2, "pilot": False}
+    one = st.monte_carlo(plain(LINE), FIELD, **many)
+    wide = st.monte_carlo(of_width(dataclasses.replace(LINE, load=st.Load())), FIELD, **many)
+    weak = one.map(lambda values: 0.01 * values, keep_attrs=True)
     return {
         "one": st.plot.monte_carlo(one),
         "several": st.plot.monte_carlo(
             {"a": one, "b": one.isel(sample=slice(7, None))}, quantity="critical_position"
         ),
         "swept": st.plot.monte_carlo(swept.isel(residual_strength=1)),
+        "weak": st.plot.monte_carlo([weak, one], quantity="critical_stress"),
+        "forces": st.plot.monte_carlo(wide),
         "quantiles": st.plot.quantiles(
             swept.isel(residual_strength=0), along="correlation_length"
         ),
@@ -82,14 +116,15 @@ def specimens_and_their_events():
 
 @calls(DRAWN, close=1e-4)
 def failure_curves():
-    problem = plain(LINE)
-    problem = dataclasses.replace(
-        problem, interface=dataclasses.replace(problem.interface, width=0.012)
-    )
-    curve = st.failure_curve(problem, FIELD, method=LOCAL, smallest=1e-2, target_cv=0.4, seed=3)
+    options = {"method": LOCAL, "smallest": 1e-2, "target_cv": 0.4, "seed": 3}
+    curve = st.failure_curve(of_width(plain(LINE)), FIELD, **options)
+    without = curve.drop_vars("force")
     return {
         "curve": st.plot.failure_curve(curve),
         "asked": st.plot.failure_curve(curve, stress=7.4e5),
+        "force": st.plot.failure_curve(curve, force=310.0),
+        "coefficient": st.plot.failure_curve(without, stress=7.2e5),
+        "area": st.plot.failure_curve(without, stress=0.7e6, area=2e-3),
     }
 
 
@@ -123,7 +158,18 @@ def a_rupture_and_its_film():
         path = st.plot.film(run, Path(folder) / "film.gif", frames=4)
         with Image.open(path) as film:
             film_is = [film.n_frames, *film.size, film.info["duration"]]
-    return {"rupture": st.plot.rupture(run, problem=LINE), "film": film_is}
+            first = np.asarray(film.convert("L")).astype(float)
+            film.seek(3)
+            moved = np.abs(np.asarray(film.convert("L")) - first).max() > 50.0
+    at_once = run.assign(onset_time=run.onset_time * 0.0)  # it begins with the run
+    slow = run.assign_coords(time=run.time * 1e6).assign(onset_time=run.onset_time * 1e6)
+    large = make_problem(96, 5e4, weakening_rate=0.2e6)
+    return {
+        "rupture": st.plot.rupture(run, problem=LINE),
+        "at once": st.plot.rupture(at_once),
+        "large": st.plot.rupture(slow.drop_attrs(), problem=large),
+        "film": [*film_is, moved],
+    }
 
 
 test_outputs_are_as_recorded = compared(calls, __file__)

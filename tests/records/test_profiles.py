@@ -4,6 +4,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from crooked import (
     LINE,
@@ -16,8 +17,10 @@ from crooked import (
     write_table,
 )
 from recording import Calls, compared, refusal
+from setups import EXACT, LOCAL
 
 import stiction as st
+from stiction.study.export import export
 
 calls = Calls()
 BACK = "values written out above, tests/oracle/test_crooked.py and tests/user/test_profiles.py"
@@ -99,10 +102,13 @@ def gaps_across_the_seam():
     ):
         holes = as_measured(problem.interface, np.where(gap, np.nan, strength))
         read = st.read_profile(holes, interface=problem.interface, gaps="fill")
-        found[name] = {
-            "read": read,
-            "onset": st.onset(problem, holes, method=st.LocalCriterion(), gaps="fill"),
-        }
+        local, onset = (
+            st.onset(problem, holes, method=method, gaps="fill") for method in (LOCAL, EXACT)
+        )
+        with tempfile.TemporaryDirectory() as folder:
+            export(onset, Path(folder) / "onset.csv")
+            table = pd.read_csv(Path(folder) / "onset.csv")
+        found[name] = {"read": read, "local": local, "exact": onset, "table": table}
     return found
 
 
@@ -147,7 +153,7 @@ def peaks_of_tests():
 def onsets_of_labelled_arrays():
     measured = as_measured(LINE.interface, LINE_STRENGTH)
     both = xr.Dataset({"strength": measured, "residual_strength": 0.21 * measured})
-    return st.onset(LINE, both, method=st.Equilibrium())
+    return st.onset(LINE, both, method=EXACT)
 
 
 test_outputs_are_as_recorded = compared(calls, __file__)

@@ -6,18 +6,23 @@ import math
 import re
 import sys
 import tempfile
+import tomllib
 import warnings
 from pathlib import Path
 from unittest import mock
 
 import numpy as np
 import pandas as pd
+import tomli_w
+import xarray as xr
 from recording import Calls, compared
 from small_study import lengths, small_study
 
 import stiction as st
 from stiction.base import progress
 from stiction.cli import commands
+from stiction.cli.report import Page
+from stiction.ensemble.experiment import Experiment
 
 calls = Calls()
 SAME = "the same numbers by st.monte_carlo, tests/user/test_study.py"
@@ -25,16 +30,18 @@ SWEPT = small_study(
     nodes=96,
     length=0.047,
     weakening_rate=0.31e12,
-    ensemble={"samples": 20, "seed": 11},
+    ensemble={"samples": 9, "seed": 11},
     sweep=[
         *lengths(2.2e-3, 5.1e-3),
         {
             "problem.friction.residual_strength": [5e4, 1.6e5, 2.3e5],
             "problem.solid.poisson_ratio": [0.2, 0.3, 0.4],
         },
+        {"problem.load.normal_pressure": [1.9e6, 2.7e6]},
     ],
-    title="two axes",
+    title="three axes",
 )
+SWEPT["problem"]["interface"]["width"] = 0.013
 SPECIMEN = small_study(
     nodes=64,
     length=0.083,
@@ -57,6 +64,7 @@ PLAIN = re.compile(
 )
 CHANGES = re.compile(
     r"\d+(\.\d+)? (us|ms|s|min|h)\b|(numpy|numba|scipy|stiction|Python) [\d.]+\S*|\S*/tmp\S*"
+    r"|(?<=chunks )\d+|(?<=on the )\d+(?= here)|probed at \d+|\d+ of \d+ (?=probed)"
 )
 
 
@@ -89,21 +97,30 @@ def command(line):
 def quiet(text):
     """A text without times, versions and folders."""
     return "\n".join(
-        " ".join(CHANGES.sub("...", line).split()) for line in text.splitlines() if line.strip()
+        CHANGES.sub("...", " ".join(line.split())) for line in text.splitlines() if line.strip()
     )
 
 
 def of_commands(study, *lines):
     """What commands print in a folder with a study, and the table and page that they leave."""
-    with inside(study) as folder:
-        found = {line: command(line) for line in lines}
+    found = {}
+
+    def figure(page, drawn, caption):
+        found[caption] = drawn
+        original(page, drawn, caption)
+
+    original = Page.figure
+    with inside(study) as folder, mock.patch.object(Page, "figure", figure):
+        found |= {line: command(line) for line in lines}
         found["table"] = pd.read_csv(folder / "all.csv")
+        if (folder / "all.nc").exists():
+            found["array"] = xr.load_dataset(folder / "all.nc")
         found["page"] = quiet(PLAIN.sub(" ", (folder / "run/report.html").read_text()))
     return found
 
 
 @calls(SAME)
-def a_sweep_of_two_axes():
+def a_sweep_of_three_axes():
     return st.Study.from_dict(SWEPT).run(progress=False)
 
 
@@ -142,11 +159,78 @@ def onset_and_rupture_of_a_profile():
         np.savetxt(
             "scan.csv", table, delimiter=";", header="x (mm);strength (MPa)", comments=""
         )
-        for line in (
-            "onset study.toml --strength scan.csv",
-            "rupture study.toml --strength scan.csv --out found",
-            "onset study.toml --strength scan.csv --method equilibrium --unit GPa",
-        ):
+        strength[20:31] = np.nan
+        np.savetxt("gaps.csv", np.column_stack([x, 1e6 * strength]), delimiter=",")
+        np.savetxt("three.csv", np.ones((2, 3)), delimiter=",")
+        plain = tomllib.loads(Path("study.toml").read_text())
+        plain["problem"]["load"] = {"normal_pressure": 2e6}
+        Path("problem.toml").write_text(tomli_w.dumps({"problem": plain["problem"]}))
+        head = "Weg [mm];Reibzahl [-]"
+        table = np.column_stack([1e3 * x, table[:, 1] / 2.0])
+        np.savetxt("mu.csv", table, delimiter=";", header=head, comments="")
+        varying = plain["problem"] | {"friction": {"critical_slip": 3e-6}}
+        Path("varying.toml").write_text(tomli_w.dumps({"problem": varying}))
+        Path("wrong.toml").write_text("title = 'nothing'\n[randon]\na = 1\n")
+        for line in """onset study.toml --strength scan.csv
+rupture study.toml --strength scan.csv --out found
+onset study.toml --strength scan.csv --method equilibrium --unit GPa
+onset problem.toml --strength scan.csv
+onset problem.toml --strength mu.csv --quantity friction_coefficient
+onset problem.toml --strength mu.csv
+onset varying.toml --strength scan.csv
+onset wrong.toml --strength scan.csv
+onset study.toml --strength gaps.csv
+onset study.toml --strength gaps.csv --gaps fill
+onset study.toml --strength three.csv
+onset study.toml --strength p.npy --method local
+onset study.toml --strength missing.npy
+onset study.toml --strength missing.tif
+rupture study.toml --out study.toml""".splitlines():
+            found[line] = command(line)
+    return found
+
+
+@calls("the same answers by st.failure_probability, tests/user/test_warnings.py", close=1e-4)
+def answers_of_commands():
+    plain = small_study(
+        nodes=96, length=0.047, weakening_rate=0.31e12, sweep=lengths(4e-3, 6e-3)
+    )
+    plain["problem"]["interface"]["width"] = 0.013
+    plain["problem"]["load"] = {"normal_pressure": 2.7e6}
+    plain["reliability"] = {"force": 430.0, "target_cv": 0.5}
+    lines = """
+ --probability 0.02
+ --friction-coefficient 0.26
+ --stress 7e5 --force 7e3
+ --probability 2
+ --out run --stress 7e5
+ --part 1/3 --stress 7e5""".splitlines()
+    with inside(plain):
+        found = {line: command(f"reliability study.toml{line}") for line in lines}
+        del plain["reliability"], plain["problem"]["interface"]["width"]
+        Path("other.toml").write_text(tomli_w.dumps(plain))
+        asked = ("", " --force 7e3")
+        return found | {f"other{one}": command(f"reliability other.toml{one}") for one in asked}
+
+
+@calls("read beside the folder")
+def mistakes_of_commands():
+    """And two points of a sweep that have one label."""
+    twice = {"problem.interface.nodes": [96, 96], "random.strength.marginal.alpha": [1.5, 3.0]}
+    plain = small_study(nodes=96, length=0.047, ensemble={"samples": 12}, sweep=[twice])
+    with inside(plain):
+        found = {"twice": command("run study.toml --out run --no-pilot")}
+        other = plain | {"ensemble": {"samples": 12, "seed": 4}}
+        Path("other.toml").write_text(tomli_w.dumps(other))
+        for line in """run missing.toml --out run
+run study.toml --out run --part 3/2
+run study.toml --out run --part 65/64
+run study.toml --out study.toml
+run other.toml --out run
+status .
+export nothing result.nc
+export run out.txt
+report study.toml""".splitlines():
             found[line] = command(line)
     return found
 
@@ -154,6 +238,7 @@ def onset_and_rupture_of_a_profile():
 @calls("st.failure_curve and counting, tests/user/test_failure_run.py", close=1e-4)
 def reliability_of_uncertain_interfaces():
     study = small_study(nodes=96, length=0.047, weakening_rate=0.31e12)
+    study["problem"]["interface"]["width"] = 0.013
     study["uncertain"] = {"count": 3, "strength.marginal.alpha": [1.4, 1.9]}
     study["sweep"] = [{"random.strength.marginal.low": [6.1e5, 7.0e5]}]
     return of_commands(
@@ -163,6 +248,26 @@ def reliability_of_uncertain_interfaces():
         "export run all.csv",
         "report run",
     )
+
+
+@calls("the samples that fail are those that are said to")
+def a_run_with_failures():
+    """And its command again, without them."""
+    original = Experiment.results
+
+    def results(self, first, count):
+        if first <= 9 < first + count:
+            raise FloatingPointError("not finite")
+        return original(self, first, count)
+
+    sweep = lengths(2.2e-3, 5.1e-3)
+    plain = small_study(
+        nodes=96, length=0.047, ensemble={"samples": 12, "seed": 4}, sweep=sweep
+    )
+    lines = ["run study.toml --out run --workers 1", "status run", "check study.toml"]
+    with mock.patch.object(Experiment, "results", results):
+        lines += ["report run", "export run all.csv --partial"]
+        return of_commands(plain, *lines)
 
 
 @calls("counted: a third of the samples, and what is left of them")
