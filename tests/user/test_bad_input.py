@@ -119,6 +119,7 @@ test_names_and_choices = refusals({
         lambda: make_strength(marginal={"type": "lognorm", "sigma": 0.3}),
     "did you mean 'edge'": lambda: st.Load(profile={"type": "egde", "excess": 1.0}),
     "progress ... a function of (done, total) ... int": lambda: monte_carlo(progress=int),
+    "run: give the arguments by name (valid: out,": lambda: make_study().run("folder"),
     "keep ... 'initial_stress' ... valid: strength":
         lambda: monte_carlo(keep=("initial_stress",)),
     "sweep ... unknown 'type' ... valid: problem":
@@ -147,6 +148,12 @@ test_objects_in_the_place_of_others = refusals({
     ),
     "profile ... places must be known": lambda: make_strength().given(
         xr.DataArray([1e6, 1.1e6], {"x": [0.01, np.nan]}, "x"), noise=1e4
+    ),
+    "profile: x is in s, which cannot be converted to m": lambda: make_strength().given(
+        xr.DataArray([1e6, 1.1e6], {"x": ("x", [0.01, 0.02], {"units": "s"})}, "x"), noise=1e4
+    ),
+    "state a known unit, not 'kN', which no property has": lambda: make_strength().given(
+        xr.DataArray([1e3, 1.1e3], {"x": [0.01, 0.02]}, "x", attrs={"units": "kN"}), noise=1e4
     ),
     "sweep: slip cannot be kept ... an interface that is swept": lambda: make_study(
         method=st.Equilibrium(slip=True), sweep=[{"problem.interface.nodes": [128, 256]}]
@@ -277,6 +284,8 @@ test_profiles_and_loads = refusals({
     ),
     "weakening_rate ... must be finite":
         lambda: onset(ONE, st.Equilibrium(), weakening_rate=np.nan),
+    "normal_pressure: must be positive on average, that of sample 1 is -5e+06 Pa":
+        lambda: onset(np.stack([ONE, ONE]), normal_pressure=np.array([[5e6], [-5e6]])),
     "strength ... residual_strength ... initial_stress ... weakening_rate": lambda: onset(
         np.full(256, np.nan), residual_strength=-1.0, initial_stress="x", weakening_rate=-1.0
     ),
@@ -408,6 +417,7 @@ DOUBTS = {
         length=4e-4, weakening_rate=2e14
     ).warn_of_units(1e6),
     "percentages": lambda: scaled(pressure=5e4).warn_of_units(1e6),
+    "is 20 of the normal pressure": lambda: onset(ONE, normal_pressure=5e4),
     "for 2 % give 0.02": lambda: st.Lognormal(mean=1e6, cv=2),
     "each sample is uniform; check its unit": lambda: monte_carlo(
         random=st.RandomField(FIELD.marginal, st.PowerLawSpectrum(4.0), mean_mode=True)

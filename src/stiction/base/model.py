@@ -244,6 +244,7 @@ def mistakes(
     there. Pydantic adds the members of a union to the path of a `call`; they are left out.
     """
     found: dict[tuple[str, str, str], list[str]] = {}  # a union has an item for each member
+    shown = [name for name in valid if name != "self"]
     for item in error.errors():
         kind, given = item["type"], f", got {describe(item.get('input'))}"
         context, steps = item.get("ctx") or {}, list(item["loc"])
@@ -261,11 +262,11 @@ def mistakes(
             continue
         text, member = str(wrong), ""
         if kind == "unexpected_positional_argument":
-            return [("", f"give the arguments by name (valid: {', '.join(valid)})")]
+            return [("", f"give the arguments by name (valid: {', '.join(shown)})")]
         if kind.startswith("missing"):
             text, given = "missing", ""
         elif kind in ("unexpected_keyword_argument", "extra_forbidden"):
-            path, text, given = "", unknown(path, valid), ""
+            path, text, given = "", unknown(path, shown), ""
         elif wrong is None:
             name = str(context.get("class_name") or context.get("class") or "")
             text, member = "must be ", item["msg"].removeprefix("Input should be ")

@@ -279,7 +279,7 @@ def onset(
         raise InputError(refused)
     attributes = study_attributes(problem=problem, method=method)
     sample, measured = problem.placed_sample(profiles, getattr(method, "accepts", ()), gaps)
-    problem.warn_of_units(sample.mean_strength, float(sample.residual_strength.mean()))
+    problem.doubt(sample)
     own_rate = bool(np.ptp(sample.weakening_rate[:, *np.zeros(len(sample.shape), int)]))
     solver, parts, size = prepared(problem, method), [], batch_size(problem, method, own_rate)
     meter = Meter(f"onset by {method.label}", sample.samples, progress)

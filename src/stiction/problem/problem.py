@@ -244,15 +244,30 @@ class Problem:
                 UnitWarning,
             )
 
+    def doubt(self, sample: Sample) -> None:
+        """Doubt the units of given profiles, as `warn_of_units` does."""
+        pressure = float(sample.normal_pressure.mean())
+        self.warn_of_units(
+            sample.mean_strength,
+            float(sample.residual_strength.mean()),
+            pressure=None if math.isnan(pressure) else pressure,
+        )
+
     def warn_of_units(
-        self, strength: float, residual: float = 0.0, scales: Mapping[str, Any] | None = None
+        self,
+        strength: float,
+        residual: float = 0.0,
+        scales: Mapping[str, Any] | None = None,
+        pressure: float | None = None,
     ) -> None:
         """Doubt mean peak and residual strengths (Pa) that do not fit the rest of the problem.
 
         It is an `InputError` if they cannot, if a normal pressure is rather a force, or if scales
-        of slip by name are not resolved at these strengths.
+        of slip by name are not resolved at these strengths. The `pressure` is the problem's own
+        if left out.
         """
-        modulus, pressure = self.solid.shear_modulus, self.given_pressure
+        modulus = self.solid.shear_modulus
+        pressure = self.given_pressure if pressure is None else pressure
         compared = [("strength", strength, "shear modulus", modulus, RIGIDITY)]
         rate, slip = self.friction.weakening_rate, math.inf
         if rate is not None and (drop := self._mean_drop(strength)) > 0.0:

@@ -136,6 +136,11 @@ def rows_of(
         raise InputError(f"must be positive, got {least}")
     if name == "residual_strength" and array.min() < 0.0:
         raise InputError(f"must not be negative, got {least}")
+    if name == "normal_pressure":
+        means = np.atleast_1d(array.mean(axis=interface.axes) if array.ndim else array)
+        if means.min() <= 0.0:
+            worst = f"that of sample {int(np.argmin(means))} is {means.min():g} Pa"
+            raise InputError(f"must be positive on average, {worst}")
     if samples is None:
         return array.reshape(-1, *shape)
     return np.broadcast_to(array, (samples, *shape))

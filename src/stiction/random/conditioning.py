@@ -29,10 +29,12 @@ from scipy.special import ndtri
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
-from stiction.base.model import PROFILE_SCHEMA, Numbers, Positive, check, model
-from stiction.base.units import parse
+from stiction.base.model import PROFILE_SCHEMA, Positive, model
+from stiction.base.units import is_in
+from stiction.base.variables import QUANTITIES
 from stiction.problem.interface import Interface
 from stiction.problem.profiles.placing import MEASURED
+from stiction.problem.profiles.reading import in_si, unit_of
 from stiction.random.mapping import from_normal, quantile_of_normal
 from stiction.random.synthesis import condition
 from stiction.random.transport import Ratio, make_transport, transport
@@ -75,8 +77,8 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
             )
         if MEASURED in value.coords:  # what was filled in was not measured
             value = value.where(value[MEASURED].astype(bool))
-        places = np.meshgrid(*(_in_si(value[name]) for name in names), indexing="ij")
-        rows = [*places, _in_si(value.transpose(*names))]
+        each = (in_si(value[name], name, "m") for name in names)
+        rows = [*np.meshgrid(*each, indexing="ij"), _values(value.transpose(*names))]
     points = np.array([np.ravel(row) for row in rows], dtype=np.float64)
     if np.isinf(points).any() or np.isnan(points[:-1]).any():
         raise ValueError("places must be known, and values finite, or NaN where not measured")
@@ -87,13 +89,15 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
     return points.view(Kept)
 
 
-def _in_si(array: Any) -> Array:
-    """Values of a labelled array, in SI if it states a unit."""
-    stated = str(array.attrs.get("units") or array.attrs.get("unit") or "1")
-    unit = parse(stated)
-    if unit is None:
-        raise ValueError(f"must be in SI or state a known unit, not {stated!r}")
-    return np.asarray(check("values", array.values, Numbers)) * unit.factor
+def _values(array: Any) -> Array:
+    """Values of a labelled array, in the SI unit of whichever property has the one it states."""
+    stated = unit_of(array)
+    for one in QUANTITIES.values():
+        if is_in(stated or "1", one.units):
+            return np.asarray(in_si(array, "values", one.units if stated else "1"))
+    raise ValueError(
+        f"must be in SI or state a known unit, not {stated!r}, which no property has"
+    )
 
 
 def _table(points: Array) -> dict[str, list[float]]:

@@ -92,7 +92,7 @@ def simulate_rupture(
     if rows.samples != 1:
         raise InputError(f"profiles: one sample at a time, got {rows.samples}")
     stations = save.nodes(problem.interface)
-    problem.warn_of_units(rows.mean_strength, float(rows.residual_strength.mean()))
+    problem.doubt(rows)
     checks.warn_if_coarse(problem, rows)
     run = make_run(method, method.medium(problem), rows, 0, stations)
     state = checks.at_first_slip(run)

@@ -111,6 +111,7 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
     rows = problem.sample(profiles)
     if rows.samples != 1:
         raise InputError(f"profiles: must be one sample, got {rows.samples}")
+    problem.doubt(rows)
     interface = problem.interface
     check_memory("loads", 16.0 * given.size * interface.size)
     program = make_program(problem, GAP)

@@ -176,7 +176,7 @@ def is_labelled(value: Any) -> bool:
 
 def is_coefficient(value: Any) -> bool:
     """Whether a labelled array states that it holds pure numbers: friction coefficients."""
-    return is_labelled(value) and is_in(_unit_of(value), "1")
+    return is_labelled(value) and is_in(unit_of(value), "1")
 
 
 def simplified(value: Any, quantity: str) -> Any:
@@ -184,7 +184,7 @@ def simplified(value: Any, quantity: str) -> Any:
     si = QUANTITIES[quantity].units
     if is_labelled(value):
         plain = not value.dims and not hasattr(value, "data_vars")
-        return _in_si(value, quantity, si) if plain else value
+        return in_si(value, quantity, si) if plain else value
     kind = getattr(getattr(getattr(value, "index", None), "dtype", None), "kind", "")
     if kind == "f" and hasattr(value, "to_xarray"):
         return value.to_xarray()
@@ -204,9 +204,9 @@ def _magnitude(value: Any, si: str) -> Any:
     return value
 
 
-def _in_si(array: Any, what: str, si: str, given: str | None = None) -> Any:
+def in_si(array: Any, what: str, si: str, given: str | None = None) -> Any:
     """Return the values of a DataArray in SI, by its unit or the one that the caller gives."""
-    stated = _unit_of(array)
+    stated = unit_of(array)
     with prefixed(what, " "):
         values = as_numbers(_magnitude(array.data, si))
         factor = factor_to(si, given or stated or si)
@@ -216,7 +216,7 @@ def _in_si(array: Any, what: str, si: str, given: str | None = None) -> Any:
     return values * factor
 
 
-def _unit_of(array: Any) -> str:
+def unit_of(array: Any) -> str:
     return str(array.attrs.get("units") or array.attrs.get("unit") or "").strip()
 
 
@@ -290,8 +290,8 @@ def labelled(
     array = _directed(array.drop_vars(own).assign_coords(at), dims)
     if len({*dims} & {*array.coords}) == 1 < len(dims):
         raise InputError("has the coordinate x or y only; a map has both, or none")
-    values = _in_si(array, quantity, si, unit)
-    stated = unit or _unit_of(array) or hasattr(array.data, "units")
+    values = in_si(array, quantity, si, unit)
+    stated = unit or unit_of(array) or hasattr(array.data, "units")
     finite = values[np.isfinite(values)]
     if quantity == "height" and not stated and finite.size and np.ptp(finite) > TALL:
         warn_user(
@@ -300,7 +300,7 @@ def labelled(
             UnitWarning,
         )
     for dim in {*dims} & {*array.coords}:
-        place = _in_si(array[dim], dim, "m", x_unit)
+        place = in_si(array[dim], dim, "m", x_unit)
         if not np.all(np.isfinite(place)):
             entry = int(np.argmin(np.isfinite(place)))
             line = f" (line {data.attrs['lines'][entry]})" if "lines" in data.attrs else ""
@@ -328,7 +328,7 @@ def _choose(data: Any, names: list[Any], called: tuple[str, ...], si: str = "") 
     for word in called:
         if found := [name for name in names if _plain(name) == word]:
             return found[0]
-    fitting = [name for name in names if is_in(_unit_of(data[name]), si)]
+    fitting = [name for name in names if is_in(unit_of(data[name]), si)]
     return fitting[0] if len(fitting) == 1 else None
 
 
@@ -344,7 +344,7 @@ def _column(data: Any, names: list[Any], what: str, wanted: Column) -> Any:
 
 
 def _unclear(data: Any, names: list[Any], quantity: str, dims: tuple[str, ...]) -> str:
-    units = {name: _unit_of(data[name]) for name in names if not str(name).isdecimal()}
+    units = {name: unit_of(data[name]) for name in names if not str(name).isdecimal()}
     shown = [f"{name!r} in {unit}" if unit else repr(name) for name, unit in units.items()]
     listed = ", ".join(shown) or f"{len(names)} columns without names, as of a matrix"
     if len(dims) == 2 and not {*dims} <= {_plain(name) for name in data.variables}:
