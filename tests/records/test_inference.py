@@ -132,6 +132,23 @@ def parameters_from_peaks_in_newtons_and_two_lengths():
     )
 
 
+@calls("weights of closed likelihoods, tests/user/test_joined.py", close=1e-5)
+def a_list_weighed_by_peaks():
+    likely = [
+        dataclasses.replace(BOUNDED, marginal=st.Lognormal(mean=mean, cv=cv), mean_mode=True)
+        for mean, cv in ((0.96e6, 0.14), (1.03e6, 0.11), (1.01e6, 0.19), (1.12e6, 0.16))
+    ]
+    found = st.infer(PROBLEM, likely, PEAKS, method=LOCAL, samples=200, load_cell_error=4e3)
+    return {
+        "str": str(found),
+        "draws": found.draws,
+        "information": found.information,
+        "members": [repr(one.strength) for one in found.interfaces(2, seed=4)],
+        "at": repr(found.at(7)[1]),
+        "picture": st.plot.posterior(found),
+    }
+
+
 @calls("p-values uniform over campaigns, validation/inference.py", close=1e-5)
 def agreement_with_a_prediction_and_a_posterior():
     predicted = st.monte_carlo(PROBLEM, BOUNDED, method=LOCAL, samples=300, seed=6, pilot=False)

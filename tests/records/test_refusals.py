@@ -2,6 +2,7 @@
 
 import numpy as np
 import scipy.stats
+import xarray as xr
 from crooked import LINE, LINE_STRENGTH, PLANE
 from recording import Calls, compared, refusal
 from setups import EXACT, LOCAL, make_problem
@@ -40,6 +41,8 @@ def steep(critical_slip, **more):
     return st.onset(problem, strength, method=EXACT, **more).critical_stress
 
 
+PREDICTED = xr.Dataset({"critical_stress": ("sample", 7e5 + 1e4 * np.sin(np.arange(90.0)))})
+ONSET = st.onset(LINE, LINE_STRENGTH, method=LOCAL)
 CALLS = {
     "rates that vary": [
         lambda: make_problem(weakening_rate=RISING * 60.0),
@@ -91,6 +94,25 @@ CALLS = {
     "planes": [
         lambda: st.onset(PLANE, np.full((20, 24), 1e6), method=LOCAL),
         lambda: st.onset(PLANE, np.full((24, 20), np.nan), method=LOCAL),
+    ],
+    "agreement": [
+        lambda: st.statistics.agreement(PREDICTED, [1015.0, 998.0, 1031.0]),
+        lambda: st.statistics.agreement(PREDICTED, [7e5, 7.1e5, 6.9e5], unit="N"),
+        lambda: st.statistics.agreement(PREDICTED),
+        lambda: st.statistics.agreement(xr.Dataset({"load": 1.0}), [7e5, 7.1e5, 6.9e5]),
+        lambda: st.statistics.agreement(np.nan * PREDICTED, [7e5, 7.1e5, 6.9e5]),
+    ],
+    "pictures": [
+        lambda: st.plot.onset(ONSET, LINE_STRENGTH[:50]),
+        lambda: st.plot.onset(ONSET, LINE_STRENGTH, sample=3),
+        lambda: st.plot.onset(ONSET, np.stack([LINE_STRENGTH] * 3)),
+        lambda: st.plot.field(LINE, LINE_STRENGTH, quantity="rough"),
+        lambda: st.plot.field(LINE, LINE_STRENGTH, ax=LINE_STRENGTH),
+        lambda: st.plot.monte_carlo(ONSET, quantity="slip_patches"),
+        lambda: st.plot.quantiles(PREDICTED),
+        lambda: st.plot.rupture(ONSET.drop_attrs()),
+        lambda: st.plot.rupture(ONSET, problem=LINE),
+        lambda: st.plot.film(ONSET, "film.avi"),
     ],
     "densities": [
         lambda: st.statistics.density(np.linspace(0.1, 1.0, 40), bounds=(0.2, 0.9)),

@@ -143,6 +143,21 @@ def commands_of_a_specimen():
     )
 
 
+@calls("each sample by st.onset, tests/user/test_warnings.py")
+def commands_of_a_plane():
+    plain = small_study(
+        nodes=[24, 20],
+        length=[0.023, 0.0164],
+        weakening_rate=0.28e12,
+        method={"type": "equilibrium", "slip": True},
+        ensemble={"samples": 3, "seed": 2, "keep": ["strength"]},
+    )
+    plain["random"]["strength"]["anisotropy"] = 1.4
+    plain["problem"]["load"] = {"normal_pressure": 2.7e6}
+    lines = ("run study.toml --out run", "status run", "export run all.csv", "report run")
+    return of_commands(plain, "check study.toml", *lines)
+
+
 @calls("st.onset and st.simulate_rupture of the same profile", close=1e-5)
 def onset_and_rupture_of_a_profile():
     study = small_study(

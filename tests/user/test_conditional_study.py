@@ -49,25 +49,6 @@ def test_a_study_file_is_the_same_as_the_calls(study):
     assert found.critical_stress.sizes == {"noise": 2, "cv": 2, "sample": 3}
 
 
-def test_measured_values_and_their_places_may_state_other_units():
-    plain = FIELD.given(KNOWN, noise=20e3)
-    places = ("x", KNOWN.x.values * 1e3, {"units": "mm"})
-    stated = xr.DataArray(KNOWN.values * 1e-6, {"x": places}, "x", attrs={"units": "MPa"})
-    found = FIELD.given(stated, noise=20e3).conditions.profile
-    np.testing.assert_allclose(found, plain.conditions.profile, rtol=1e-15)
-    with pytest.raises(st.InputError, match="state a known unit, not 'furlong'"):
-        FIELD.given(stated.assign_attrs(units="furlong"), noise=20e3)
-
-
-@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
-def test_values_that_were_filled_in_were_not_measured():
-    holes = xr.DataArray(SCANNED, {"x": LINE.x}, "x").copy()
-    holes[50:60] = np.nan
-    filled = st.read_profile(holes, interface=LINE, gaps="fill")
-    given = FIELD.given(filled, noise=20e3)
-    assert given.conditions.values.size == SCANNED.size - 10
-
-
 @pytest.mark.parametrize(
     ("name", "heading", "unit"),
     [("strength", "mu", 1.0), ("critical_slip", "d_c (um)", 1e-6)],
@@ -124,15 +105,6 @@ test_impossible_values_and_places_are_refused = refusals({
         prior={"marginal.low": (0.5e6, 0.65e6)},
     ),
 })  # fmt: skip
-
-
-def test_what_was_measured_is_copied():
-    scan = KNOWN.copy(deep=True)
-    given = FIELD.given(scan, noise=20e3)
-    before = hash(given)
-    scan.values[:] = 0.9e6
-    assert hash(given) == before
-    np.testing.assert_array_equal(given.conditions.values, KNOWN.values)
 
 
 def test_unlikely_values_are_warned_of():

@@ -130,18 +130,6 @@ def test_an_initial_stress_below_minus_the_strength_is_said(method):
         critical_stress(method, problem=problem)
 
 
-def test_an_ensemble_takes_a_load_history():
-    strength = st.paper.strength(PROBLEM, correlation_ratio=2.0)
-    load = st.Rupture(load=([0.0, 1.0], [0.0, 1e8]), stop="onset")
-    rate = st.Rupture(loading_rate=1e8, start="rest", stop="onset")
-    one, other = (
-        st.monte_carlo(PROBLEM, strength, method=method, samples=2, seed=0).critical_stress
-        for method in (load, rate)
-    )
-    # Rounded otherwise, a load may tip the size of a step.
-    np.testing.assert_allclose(one, other, rtol=1e-5)
-
-
 @pytest.mark.parametrize("stop", ["sliding", "onset", "rest"])
 def test_a_load_that_goes_down_and_up_again_is_no_instability(exact, stop):
     run = simulate(load=DETOUR, stop=stop)
@@ -283,16 +271,6 @@ def test_the_place_of_a_slow_onset_is_that_of_equilibrium():
         nodes = (found - exact) / problem.interface.spacing
         # A node, and what the maximum moves while the mean stress falls by 1e-5.
         assert abs((nodes + 256) % 512 - 256) < 2.0
-
-
-def test_a_negative_poisson_ratio():
-    solid = dataclasses.replace(PROBLEM.solid, poisson_ratio=-0.6, plane="strain")
-    rate = 0.2e12 * solid.effective_modulus() / 1.33e9
-    problem = make_problem(NODES, 0.05, solid=solid, weakening_rate=rate)
-    slow = st.Rupture(loading_rate=1e5, kernel_tolerance=1e-4)
-    exact = exact_onset(problem, TAU_P).critical_stress.item()
-    # By a loose kernel.
-    assert critical_stress(slow, problem=problem) == pytest.approx(exact, rel=1e-4)
 
 
 def test_one_node_of_no_strength_costs_next_to_nothing():

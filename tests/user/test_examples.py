@@ -4,7 +4,6 @@ import ast
 import itertools
 import re
 import runpy
-from dataclasses import replace
 from importlib import import_module as load
 from pathlib import Path
 
@@ -94,18 +93,6 @@ def test_friction_laws(capsys):
     assert "exponential" in capsys.readouterr().out
 
 
-def test_path(tmp_path):
-    example = load("equilibrium_path")
-    tau_p, onset, path = example.compute(nodes=256)
-    # The last state is 1e-9 below the onset: its stress is the critical stress, its patches too.
-    assert path.mean_stress.values[-1] == pytest.approx(onset.critical_stress.item(), rel=2e-9)
-    slipping = path.slip.values[-1] > 0.0
-    starts = np.count_nonzero(slipping & ~np.roll(slipping, 1))
-    assert starts == onset.slip_patches.item()
-    example.draw(tmp_path, tau_p, onset, path)
-    assert (tmp_path / "equilibrium_path.png").stat().st_size > 10_000
-
-
 @pytest.mark.slow
 def test_scripts_of_validation(tmp_path):
     """What they compute is checked in exact/, oracle/ and paper/."""
@@ -155,31 +142,6 @@ def test_stick_slips_of_a_fault(monkeypatch):
     monkeypatch.setattr("sys.argv", ["stick_slips.py", "--quik"])
     with pytest.raises(SystemExit, match="--quik: no such folder"):
         slips.main()
-
-
-@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
-def test_line_and_plane_in_small(tmp_path, monkeypatch, capsys):
-    """Eight nodes in h_n, six samples, and one correlation length."""
-    study = load("line_and_plane")
-    coarse = [replace(case, nodes=16 if "fine" in case.name else 8) for case in study.CASES]
-    monkeypatch.setattr(study, "CASES", tuple(coarse))
-    monkeypatch.setattr(study, "RATIOS", (0.5,))
-    monkeypatch.setattr(study, "NEIGHBOURS", 2)
-    drawn = []  # laying out and writing the figures takes longer than all the rest
-    monkeypatch.setattr(study, "draw", lambda folder, *shown: drawn.append(shown))
-    study.main([str(tmp_path / "runs"), "--samples", "6", "--figures", str(tmp_path)])
-    heads = "| xi_0/h_n | line, 16 h_n | line, 64 h_n | plane, 4 h_n by 4 h_n |"
-    assert heads in capsys.readouterr().out
-    figures = load("line_and_plane_figures").figures(*drawn[0])
-    assert [len(figure.axes) for figure in figures.values()] == [3, 4, 4]
-    found = study.compute(tmp_path / "runs", 6, progress=False)  # what is stored
-    plane, line = found["plane, small"], found["line, small"]
-    # The local criterion is an upper bound of the discrete problem, up to the gap of 1e-6.
-    assert np.all(study.lowering(plane) > -1e-4)
-    assert study.lowering(plane).mean() > study.lowering(line).mean()
-    # Slip that is held back near the critical patch can only raise the onset.
-    (far,) = study.far_lowering(study.CASES[2], plane)
-    assert far.value > 0.0
 
 
 def test_weakest_link_is_the_mean_over_all_choices():

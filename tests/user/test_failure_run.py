@@ -253,28 +253,3 @@ def test_in_memory_it_is_the_same_curve_with_the_same_doubts(tmp_path):
     assert memory.evaluations == stored.evaluations
     assert memory.repetitions > 1
     xr.testing.assert_equal(memory, stored)
-
-
-def test_commands_print_export_and_report_its_numbers(runs, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    study().to_toml("study.toml")
-    line = f"reliability study.toml --out RUN --smallest {SMALLEST}"
-    runs(f"{line} --repetitions 1 --part 1/3", "part 1/3: 1 of 3 repetitions in RUN")
-    runs("status RUN --parts 3", "1 of 3", "missing     parts 2/3, 3/3", code=1)
-    printed = runs(f"{line} --repetitions 2", "6 of 6 repetitions in RUN")
-    found = st.open_run("RUN").dataset()
-    last = found.isel(correlation_length=2, point=-1)
-    row = printed.splitlines()[-2].split()
-    assert "stress (Pa)" in printed
-    assert float(row[0]) == 5e-3
-    assert float(row[2]) == pytest.approx(float(last.stress), rel=1e-6)
-    assert float(row[4]) == pytest.approx(float(last.probability), rel=1e-6)
-    runs("export RUN curve.csv")
-    table = np.genfromtxt("curve.csv", delimiter=",", names=True)
-    np.testing.assert_array_equal(table["stress_Pa"], found.stress.values.ravel())
-    runs("report RUN")
-    page = (tmp_path / "RUN" / "report.html").read_text(encoding="utf-8")
-    assert "6 of 6 repetitions by local criterion" in page
-    cells = re.findall(r"<td[^>]*>([^<]+)</td>", page)
-    assert f"{1e-6 * float(last.stress):.5g}" in cells
-    assert page.count("data:image/png") == 3

@@ -95,13 +95,6 @@ def test_a_trend_that_is_removed_leaves_the_fit_of_the_record_without(plain):
         assert found.parameters[name] == pytest.approx(value, rel=0.25)
 
 
-def test_units_and_places_decide_and_not_the_order(plain):
-    order = np.random.default_rng(0).permutation(COUNT)
-    x = 1e3 * (PIECE.x[order] + 0.3)
-    other = fitted(labelled(VALUES[order] * 1e-6, x, "MPa", "mm"))
-    assert other.parameters == pytest.approx(plain.parameters, rel=1e-6)
-
-
 def test_missing_values_are_left_out_and_counted(plain):
     values = VALUES.copy()
     values[100:110] = np.nan
@@ -117,70 +110,6 @@ def test_missing_values_are_left_out_and_counted(plain):
     assert fitted(filled).parameters == fit.parameters
 
 
-def test_several_records_are_of_one_field(plain):
-    many = fitted([labelled(), labelled(VALUES[::-1])])
-    assert many.lengths_held == pytest.approx(2.0 * plain.lengths_held, rel=0.2)
-
-
-def test_the_figure_of_a_fit_is_the_record_and_the_fit():
-    values, _ = record_of(FIELD, COUNT, SPACING, seed=5, noise=8e4)
-    fit = fitted(values, PIECE, noise=True)
-    histogram, quantiles, correlation, spectrum = st.plot.fit(fit).axes
-    noise = fit.parameters["noise"]
-    assert noise == pytest.approx(8e4, rel=0.3)
-    heights = np.array([bar.get_height() * bar.get_width() for bar in histogram.patches])
-    assert heights.sum() == pytest.approx(1.0)
-    middles = [bar.get_x() + 0.5 * bar.get_width() for bar in histogram.patches]
-    assert heights @ middles == pytest.approx(values.mean() * 1e-6, abs=0.01)
-    x, y = histogram.lines[0].get_data()
-    distribution = fit.field.marginal.distribution
-    assert y == pytest.approx(distribution.pdf(x * 1e6) * 1e6)
-    share = (np.arange(200) + 0.5) / 200
-    line, points = quantiles.lines
-    assert line.get_xdata() == pytest.approx(distribution.ppf(share) * 1e-6)
-    # The noise is taken off the values.
-    spread = points.get_ydata().std() / (values.std() * 1e-6)
-    assert spread == pytest.approx((1.0 - noise**2 / values.var()) ** 0.5, rel=0.03)
-    line, points = correlation.lines[:2]
-    assert points.get_xdata()[1] == pytest.approx(SPACING * 1e3)
-    residue = values - values.mean()
-    products = [residue[: COUNT - lag] @ residue[lag:] / (residue @ residue) for lag in (1, 4)]
-    assert points.get_ydata()[[1, 4]] == pytest.approx(products, abs=0.08)  # its taper
-    assert line.get_ydata()[1] < 0.95  # not without the noise
-    line, points, level = spectrum.lines
-    assert points.get_xdata()[0] == pytest.approx(2.0 * np.pi / (COUNT * SPACING))
-    excess = np.log(points.get_ydata() / line.get_ydata())[-12:-1]  # of many values each
-    assert np.abs(excess).max() < 0.7
-    assert excess.mean() == pytest.approx(0.0, abs=0.15)
-    assert level.get_ydata()[0] == pytest.approx(noise**2 * SPACING * 1e-12)
-    assert 1.0 < line.get_ydata()[-1] / level.get_ydata()[0] < 3.0
-    axes = (histogram, quantiles, correlation, spectrum)
-    labels = [one.get_xlabel() for one in axes] + [spectrum.get_ylabel()]
-    assert labels == [
-        "strength (MPa)", "quantile of the fit (MPa)", "lag along x (mm)", "wavenumber (rad/m)",
-        "spectral density (MPa² m)",
-    ]  # fmt: skip
-
-
-def test_maps_are_fitted_too():
-    truth = st.RandomField(
-        st.Weibull(mean=2e6, cv=0.3), st.SquaredExponentialSpectrum(1e-3), mean_mode=True
-    )
-    plane = st.Interface(length=(16e-3, 16e-3), nodes=(64, 64))
-    values = truth.sample(plane, seed=1)[0, :48, :40]
-    x, y = plane.coordinates.values()
-    units = {"units": "MPa"}
-    pressure = xr.DataArray(values * 1e-6, {"x": x[:48], "y": y[:40]}, ("x", "y"), attrs=units)
-    fit = fitted(
-        pressure.transpose("y", "x"), quantity="normal_pressure", marginal="weibull",
-        spectrum="squared_exponential", noise=True,
-    )  # fmt: skip
-    # 120 correlation areas.
-    assert fit.field.mean == pytest.approx(2e6, rel=0.15)
-    assert fit.parameters["spectrum.correlation_length"] == pytest.approx(1e-3, rel=0.15)
-    assert st.plot.fit(fit).axes
-
-
 INFINITE = np.where(np.arange(COUNT) == 3, np.inf, VALUES)
 REPEATED = xr.DataArray(
     VALUES.reshape(20, 20), {"x": PIECE.x[[*range(19), 18]], "y": PIECE.x[:20]}, ("x", "y")
@@ -191,13 +120,7 @@ test_what_cannot_be_fitted_is_refused = refusals({
     "not equally spaced": {"record": labelled(x=PIECE.x**1.2)},
     "40 measured points, too short": {"record": labelled(VALUES[:40], PIECE.x[:40])},
     "is constant, 1e+06 everywhere": {"record": labelled(np.full(COUNT, 1e6))},
-    "must be finite; entry 3": {"record": labelled(INFINITE)},
-    "x or y repeats": {"record": REPEATED},
-    "must be numbers": {"record": "profile.csv"},
-    "must not be empty": {"record": []},
     "400 of 400 values ... do not lie between the bounds": {"record": labelled(-VALUES)},
-    "unknown unit 'banana'": {"record": labelled(x_unit="banana")},
-    "cannot be converted to Pa": {"record": labelled(unit="um")},
     "detrend ... noise ... bootstrap ... confidence ... seed ... progress": {
         "record": labelled(), "detrend": 7, "noise": -1.0, "bootstrap": 3, "confidence": 90,
         "seed": -1, "progress": "x",
@@ -305,28 +228,3 @@ def test_a_field_of_coefficients_says_so():
     fit = fitted(VALUES * 3e-7, PIECE, quantity="friction_coefficient")
     assert fit.field.of == "friction_coefficient"
     assert {field.of for field in fit.repetitions} == {"friction_coefficient"}
-
-
-@pytest.mark.slow
-def test_shapes_of_scipy_may_be_negative():
-    fit = fitted(labelled(), marginal="skewnorm")
-    low, high = fit.interval["marginal.a"]
-    assert low < fit.parameters["marginal.a"] < high
-    assert low < 0.0
-
-
-@pytest.mark.slow
-def test_intervals_hold_nothing_that_cannot_be(bounded):
-    record, families = bounded
-    fit, values = fitted(record, **families, noise=True), record.values
-    interval = fit.interval
-    # Noise may have carried values beyond the bounds: as far as the estimate has it, or as the most
-    # there may be of it does.
-    share = 1.0 - (interval["noise"][1] / values.std()) ** 2
-    quiet = values.mean() + np.sqrt(share) * (values - values.mean())
-    low, high = fit.parameters["marginal.low"], fit.parameters["marginal.high"]
-    assert interval["marginal.low"][1] <= max(low, quiet.min()) * (1.0 + 1e-9)
-    assert interval["marginal.high"][0] >= min(high, quiet.max()) * (1.0 - 1e-9)
-    # The estimate is the end of the range; repetitions end there too, which tells nothing.
-    assert interval["spectrum.exponent"] == (0.65, 16.0)
-    assert "exponent 16 lies at an end" in str(fit)

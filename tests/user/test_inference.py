@@ -1,9 +1,7 @@
 """Inference as a user meets it: results, mistakes, libraries of others, the page and its data."""
 
 import dataclasses
-import re
 import runpy
-import shutil
 from functools import partial
 from pathlib import Path
 
@@ -21,7 +19,6 @@ PROBLEM = st.paper.problem(nodes=256)
 H_N = PROBLEM.nucleation_length
 STRENGTH = st.paper.strength(PROBLEM, correlation_ratio=0.6)
 LOCAL = st.LocalCriterion()
-PRESSED = dataclasses.replace(PROBLEM, load=st.Load(normal_pressure=2e6))
 PRIOR = {
     "correlation_length": {"low": 0.25 * H_N, "high": 4.0 * H_N, "spacing": "log"},
     "marginal.low": (0.4e6, 0.9e6),
@@ -61,76 +58,6 @@ def test_peaks_out_of_reach_of_the_prior():
     assert infer(rare, random=lots, prior={"marginal.low": (0.5e6, 0.7e6)}).names == (
         "marginal.low",
     )
-
-
-def test_what_a_posterior_says(posterior):
-    assert posterior.names == tuple(PRIOR)
-    low, high = posterior.interval("marginal.low")
-    assert 0.4e6 < low < 0.66e6 < high < 0.9e6
-    assert low < posterior.mean("marginal.low") < high
-    # Peaks tell the lower bound of the strength, and next to nothing of the upper one.
-    assert posterior.information["marginal.low"] > 1.0 > posterior.information["marginal.high"]
-    before = {  # 5 % and 95 % of uniform priors, one of a logarithm
-        "correlation_length": (0.25 * 16.0**0.05 * H_N, 0.25 * 16.0**0.95 * H_N),
-        "marginal.low": (4.25e5, 8.75e5),
-        "marginal.high": (1.25e6, 2.15e6),
-    }
-    for line, (name, ends) in zip(
-        str(posterior).splitlines()[1:4], before.items(), strict=True
-    ):
-        assert line.split()[0] == name
-        shown = [float(one) for one in re.findall(r"\d[\d.e+-]*", line.partition("mean")[2])]
-        found = posterior.mean(name), 90.0, *posterior.interval(name), *ends
-        assert shown == pytest.approx([*found, posterior.information[name]], rel=1e-3, abs=6e-3)
-    assert posterior.monte_carlo_error == pytest.approx(np.sqrt(30 / 1000))
-    problem, random = posterior.at(0)
-    assert random.strength.marginal.low == posterior.draws["marginal.low"][0]
-    assert problem == PROBLEM
-
-
-def test_a_posterior_is_drawn_in_the_units_of_its_axes(posterior):
-    figure = st.plot.posterior(posterior)
-    panels, (peaks,) = (part.axes for part in figure.subfigs)
-    panels = np.reshape(panels, (3, 3))
-    units = {"correlation_length": "mm", "marginal.low": "MPa", "marginal.high": "MPa"}
-    values = [
-        posterior.draws[name] * {"mm": 1e3, "MPa": 1e-6}[unit] for name, unit in units.items()
-    ]
-    for i, (name, unit) in enumerate(units.items()):
-        assert panels[2, i].get_xlabel() == f"{name} ({unit})"
-        assert panels[i, 0].get_ylabel() == (f"{name} ({unit})" if i else "")
-        assert panels[i, i].get_title("left") == f"{posterior.information[name]:.2f} nats"
-        before, after = (patch.get_xy() for patch in panels[i, i].patches)
-        heights = np.histogram(values[i], np.unique(after[:, 0]))[0] / values[i].size
-        assert {*after[:, 1].round(9)} == {0.0, *heights.round(9)}
-        # 45 bins hold 99.6 % of 20,000 draws of a prior that is uniform on the axis.
-        assert before[1:91, 1] == pytest.approx(0.996 / 45, rel=0.25)
-        assert panels[i, i].get_xscale() == ("linear" if i else "log")
-        for j in range(i):
-            x, y = panels[i, j].lines[0].get_data()
-            assert len(x) >= min(1500, values[i].size)
-            assert np.isin(x + 1j * y, values[j] + 1j * values[i]).all()
-        assert not any(axes.axison for axes in panels[i, i + 1 :])
-    curve, (points, _, (bars,)) = peaks.lines[0], peaks.containers[0]
-    middle = np.interp(0.5, curve.get_ydata(), curve.get_xdata())
-    # Between levels .4 % apart.
-    assert middle == pytest.approx(np.median(posterior.predicted[0]) * 1e-6, rel=1e-3)
-    assert points.get_xdata() == pytest.approx(np.sort(PEAKS) * 1e-6)
-    assert points.get_ydata() == pytest.approx((np.arange(30) + 0.5) / 30)
-    assert np.ptp(bars.get_segments()[4][:, 0]) == pytest.approx(2 * 5e-3)  # of the load cell
-    assert peaks.get_xlabel() == "peak (MPa)"
-    assert peaks.get_title("left") == "30 tests"
-
-
-def test_units_and_labels_do_not_change_it():
-    plain = infer()
-    for other in (
-        infer(xr.DataArray(PEAKS / 1e3, attrs={"units": "kPa"})),
-        infer(PEAKS / 2e6, problem=PRESSED, unit="1"),
-        infer(list(PEAKS / 1e6), unit="MPa"),
-    ):
-        # A coefficient is the stress over the pressure: to round-off.
-        assert other.mean("marginal.low") == pytest.approx(plain.mean("marginal.low"), rel=1e-6)
 
 
 def test_arviz(posterior):
@@ -245,14 +172,6 @@ def test_a_posterior_between_the_points_of_a_grid_counts_in_a_design_of_tests():
     xr.testing.assert_allclose(same, force, rtol=1e-9)
 
 
-def test_a_second_length_tells_more():
-    short = dataclasses.replace(PROBLEM, interface=st.Interface(length=0.05, nodes=128))
-    both = infer({0.1: PEAKS, 0.05: peaks_of(short, 5)})
-    assert both.peaks.lengths == (0.1, 0.05)
-    assert len(both.predicted) == 2
-    assert np.mean(both.predicted[1]) > np.mean(both.predicted[0])  # fewer weak places
-
-
 def test_equilibrium_after_the_local_criterion():
     local = infer(samples=None)
     exact = infer(method=st.Equilibrium(), samples=150)
@@ -284,7 +203,6 @@ def test_doubts_are_named_where_the_caller_stands():
 FIVE = [f"marginal.{name}" for name in ("alpha", "beta")] + ["exponent", "truncation"]
 FIVE = {key: (1.0, 2.0) for key in FIVE} | {"problem.friction.weakening_rate": (4e11, 6e11)}
 test_mistakes = refusals({
-    "unit ... Mstone ... Pa": {"unit": "Mstone"},
     "peaks ... forces ... area": {"unit": "kN"},
     "30 of 30 ... below all that ... unit": {"peaks": PEAKS / 1e6},
     "200000, which lies below ... lowest come from marginal.low = 400000":
@@ -292,31 +210,20 @@ test_mistakes = refusals({
     "lies above ... highest come from ... marginal.low = 900000":
         {"peaks": PEAKS + 1e6, "prior": PRIOR},
     "at least 3 different ... got 2 in 2 peaks": {"peaks": PEAKS[:2]},
-    "at least 3 different ... got 1 in 5 peaks": {"peaks": [0.7e6] * 5},
     "number 1 is nan": {"peaks": [0.7e6, np.nan, 0.71e6]},
-    "positive ... number 1": {"peaks": [0.7e6, -0.7e6, 0.71e6]},
-    "peaks ... numbers": {"peaks": ["0.7", "0.8", "0.9"]},
-    "one list of numbers ... map each length": {"peaks": [PEAKS[:5], PEAKS[5:10]]},
     "each length (m) ... 'short'": {"peaks": {"short": PEAKS}},
     "0.001": {"peaks": {0.1: PEAKS, 1e-3: PEAKS}},
     "coefficients of friction ... normal_pressure": {"peaks": PEAKS / 2e6, "unit": "1"},
-    "load_cell_error ... equal to 0": {"load_cell_error": -1.0},
     "load_cell_error ... unit of the peaks":
         {"peaks": PEAKS / 1e6, "unit": "MPa", "load_cell_error": 5e3},
     "corelation": {"prior": {"corelation_length": (1.0, 2.0)}},
     "did you mean 'marginal.mean'": {"prior": {"mean": (1.0, 2.0)}},
-    "prior ... must map": {"prior": {}},
-    "same parameter": {"prior": LOW | {"random.strength.marginal.low": (0.1e6, 0.2e6)}},
-    "low < high": {"prior": {"marginal.low": (0.9e6, 0.4e6)}},
     "of a positive range":
         {"prior": {"marginal.low": {"low": 0.0, "high": 1e6, "spacing": "log"}}},
-    "frozen": {"prior": {"marginal.low": scipy.stats.uniform}},
-    "continuous": {"prior": {"marginal.low": scipy.stats.poisson(3)}},
     "prior: at marginal.low = 2e+06 ... below high": {"prior": {"marginal.low": (1e6, 2e6)}},
     "prior: at correlation_length = 0.5005 ... no mode":
         {"prior": {"correlation_length": (1e-3, 1.0)}},
     "method": {"method": "local"},
-    "problem ... Problem": {"problem": STRENGTH, "random": PROBLEM},
     "5 parameters would have to be simulated": {"prior": FIVE},
 }, infer)  # fmt: skip
 
@@ -325,20 +232,6 @@ def written(tmp_path, text):
     path = tmp_path / "peaks.csv"
     path.write_text(text)
     return path
-
-
-def test_peaks_from_a_file(tmp_path):
-    text = "test; peak [MPa]; length [mm]; note [1]\n1;0,71;100;\n2;0,69;50;12,5\n3;0,7;50;30\n"
-    found = st.read_peaks(written(tmp_path, text))
-    assert found.lengths == (0.05, 0.1)
-    np.testing.assert_allclose(found.values[0], [0.69e6, 0.7e6])
-    coefficients = st.read_peaks(written(tmp_path, "friction [-]\n0.31\n0.33\n0.35\n"))
-    assert coefficients.coefficients
-    assert coefficients.values[0][0] == 0.31
-    both = written(tmp_path, "peak [MPa]\n0.71\n0.69\n0.7\n")
-    assert st.read_peaks(both, unit="MPa").values[0][0] == pytest.approx(0.71e6)
-    refuses("peaks is MPa ... unit = 'kPa'", lambda: st.read_peaks(both, unit="kPa"))
-    refuses("nowhere.csv", lambda: st.read_peaks("nowhere.csv"))
 
 
 BAD_FILES = {
@@ -377,7 +270,6 @@ def test_limit_states_and_simulators_are_those_of_monte_carlo():
 
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-DATA = EXAMPLES / "data"
 
 
 @pytest.fixture
@@ -411,23 +303,3 @@ def test_dynesty_finds_the_same_posterior(example):
     smoothing = 0.5 * 25 * np.log1p(750.0**-0.4)
     expected = found["posterior"].log_evidence - smoothing
     assert found["evidence"] == pytest.approx(expected, abs=0.66)
-
-
-@pytest.mark.slow
-def test_the_page_runs_and_says_what_it_prints(monkeypatch, tmp_path):
-    page = "what-do-twenty-five-tests-tell-me.md"
-    shutil.copy(DATA / "peaks.csv", tmp_path)
-    monkeypatch.chdir(tmp_path)
-    text = (EXAMPLES.parent / "docs" / page).read_text("utf-8")
-    assert "synthetic" in text
-    scope = {}
-    for block in re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL):
-        exec(compile(block, page, "exec"), scope)
-    posterior, told = scope["posterior"], scope["plans"].information
-    low, high = posterior.interval("marginal.low", 0.99)
-    assert low < 0.66e6 < high  # the truth of the data
-    low, high = posterior.interval("correlation_length", 0.99)
-    assert low < 3.08e-3 < high
-    length = told.sel(parameter="correlation_length")
-    assert length.sel(design="marginal measured") > length.sel(design="25 tests")
-    assert told.sel(parameter="marginal.low", design="25 tests") > length.sel(design="25 tests")

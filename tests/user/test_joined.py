@@ -90,35 +90,6 @@ def test_weights_are_those_of_closed_likelihoods(lengths, error):
         np.testing.assert_array_equal(exact_forces.u, again.u)
 
 
-@pytest.fixture(scope="module")
-def joined():
-    """Posterior of a list in which one member stands three times."""
-    return st.infer(PROBLEM, [LIST[2], *LIST, LIST[2]], PEAKS, samples=400, **LOCAL)
-
-
-def test_what_comes_out_is_a_posterior(joined):
-    draws = joined.draws["strength.mean"]
-    own = joined.likelihood(joined.prior.u(np.arange(20.0)[:, None]))
-    order = list(dict.fromkeys([LIST[2], *LIST]))
-    wanted = np.exp(own - own.max()) * np.where(np.arange(20) == 0, 3.0, 1.0)
-    for one, share in zip(order, wanted / wanted.sum(), strict=True):
-        error = 5.0 * np.sqrt(share * (1.0 - share) / draws.size) + 1e-3
-        assert abs(np.mean(np.isclose(draws, one.strength.mean)) - share) < error
-    chosen = joined.interfaces(600, seed=1)
-    assert np.mean([one.strength.mean for one in chosen]) == pytest.approx(
-        draws.mean(), abs=0.3 * draws.std()
-    )
-    assert "interfaces, weighed by the peaks, are worth" in str(joined)
-    assert "member" not in str(joined)
-    assert st.statistics.agreement(joined, PEAKS + 1.0).p_values["cramer_von_mises"] > 0.05
-    assert len(st.plot.posterior(joined).subfigs[0].axes) == 9
-    theta = np.stack([own[:3] for own in joined.draws.values()], axis=1)
-    assert joined.log_likelihood(theta) == pytest.approx(joined.likelihood(joined.u[:3]))
-    assert joined.at(0)[1] in LIST
-    pytest.importorskip("arviz")
-    assert joined.to_arviz().posterior["strength.mean"].shape == (4, 1000)
-
-
 def test_equal_interfaces_keep_equal_weights():
     """Which differ in what the peaks do not see, the length of a variation of 1e-4."""
     field = LIST[0].strength

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from refusals import refuses
-from setups import make_problem
-from small_study import small_study
 
 import stiction as st
 from stiction.problem.profiles.reading import at_nodes
@@ -55,19 +53,6 @@ def test_a_filled_gap_is_harmonic():
     np.testing.assert_allclose(found, plane, rtol=1e-12)
 
 
-def test_an_onset_in_a_gap_of_a_map_says_so():
-    problem = make_problem((32, 16), (0.02, 0.01), weakening_rate=3e11)
-    values = VALUES.copy()
-    values[22:27, 5:9] = np.nan  # around the weakest line, x = 15 mm
-    values[24, 4] = values[24, 9] = 0.3e6
-    given = {"method": st.LocalCriterion()}
-    refuses("values are missing", lambda: st.onset(problem, values, **given))
-    with pytest.warns(st.AccuracyWarning, match="reaches into a gap of the profile"):
-        found = st.onset(problem, values, **given, gaps="fill")
-    assert bool(found["in_gap"].item())
-    assert "in_gap" not in st.onset(problem, VALUES, **given)
-
-
 @pytest.fixture(params=[".csv", ".nc", ".npy"])
 def heights(request, tmp_path):
     """A file of VALUES as heights of micrometres, one for each MPa, and how it is read."""
@@ -80,35 +65,6 @@ def heights(request, tmp_path):
         array.to_dataset(name="z").to_netcdf(path)
         return path, {}
     return text(path, "x (mm); y (mm); z (um)"), {}
-
-
-def test_heights_of_a_map_are_no_strength_and_no_line(heights):
-    path, options = heights
-    with pytest.raises(st.InputError, match="clearly the strength|cannot be converted to Pa"):
-        read(path, **options)
-    found = read(path, quantity="height", **options)
-    np.testing.assert_allclose(found, VALUES * 1e-12, rtol=1e-8)
-    assert found.attrs["units"] == "m"
-    found = st.read_profile(path, quantity="height", **options)  # keeps its coordinates
-    np.testing.assert_allclose(found, VALUES * 1e-12, rtol=1e-8)
-    assert found.dims == ("x", "y")
-    if path.suffix != ".npy":
-        np.testing.assert_allclose(found.x, PLANE.x, rtol=1e-8)
-    np.savetxt(path.parent / "matrix.csv", VALUES, delimiter=",")
-    line = st.Interface(length=0.02, nodes=32)
-    for source in (path, path.parent / "matrix.csv", MAP):
-        for wrong in ({}, {"quantity": "height", "unit": "um"}):
-            with pytest.raises(st.InputError, match="an interface of two lengths"):
-                st.read_profile(source, interface=line, **wrong)
-
-
-def test_a_study_file_reads_maps(heights):
-    path, options = heights
-    study = small_study(nodes=[32, 16], length=[0.02, 0.01], method={"type": "equilibrium"})
-    slip = {"file": path.name} | (options or {"value": "z"})
-    study["problem"]["friction"] = {"critical_slip": slip}
-    found = st.Study.from_dict(study, folder=path.parent).problem.friction.critical_slip
-    np.testing.assert_allclose(found, VALUES * 1e-12, rtol=1e-8)
 
 
 OTHERS = {
@@ -129,12 +85,6 @@ def test_other_maps_are_refused(tmp_path, words):
     np.save(tmp_path / "turned.npy", VALUES.T)
     source = OTHERS[words]
     refuses(words, lambda: read(tmp_path / source if isinstance(source, str) else source))
-
-
-def test_options_of_lines_and_other_names_are_refused():
-    refuses("interpolate: is an option of profiles of a", lambda: read(MAP, interpolate=True))
-    words = "value: 'q' is not the name of the only variable, 'strength'"
-    refuses(words, lambda: read(MAP, value="q"))
 
 
 @pytest.mark.parametrize("order", ["descending", "shuffled"])

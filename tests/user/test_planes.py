@@ -1,14 +1,11 @@
 """Planes as a user meets them: results, warnings, refusals, study files, commands, figures."""
 
 import dataclasses
-import functools
 import warnings
 
 import numpy as np
 import pytest
-import tomli_w
 import xarray as xr
-from PIL import Image
 from refusals import refusals
 from setups import RATE, make_problem, smooth_noise
 from small_study import lengths, small_study
@@ -42,20 +39,6 @@ def found():
     """Two samples with everything that can be asked for; a fine grid, certified: no warning."""
     with warnings.catch_warnings(action="error"):
         return onset(slip=True, sensitivity=True)
-
-
-def test_what_comes_back(found):
-    variables = st.Equilibrium(slip=True, sensitivity=True).variables(PLANE)
-    assert set(found.data_vars) == {*variables, "critical_force", "first_instability_force"}
-    for name, variable in variables.items():
-        assert found[name].dims == variable.dims
-        assert found[name].attrs["units"] == variable.units
-    assert list(found["direction"].values) == ["x", "y"]
-    assert found["slip"].dims == ("sample", "x", "y")
-    assert found["certified"].values.all()
-    assert (found["certificate_gap"] <= 1e-6 * found["first_instability"]).all()
-    assert "critical_patch_length" not in found
-    assert onset(SAMPLES[1])["critical_load"].item() == found["critical_load"].values[1]
 
 
 def test_bounds_that_do_not_close_are_warned_of_with_their_distance(monkeypatch):
@@ -155,18 +138,6 @@ def test_the_sample_that_fails_is_named(monkeypatch):
     assert caught.value.__notes__ == ["in sample 1 of the 3 that were solved together"]
 
 
-def test_labelled_strength_and_the_path_of_a_plane_that_just_slides(found):
-    load = found["critical_load"].values[0]
-    # A conversion of units rounds.
-    assert onset(labelled())["critical_load"].item() == pytest.approx(load, rel=1e-12)
-    path = st.equilibrium_path(PLANE, STRENGTH, load * np.array([0.5, 0.99, 1.01]))
-    assert path.sizes["event"] == 0
-    assert path["event_extent"].dims == ("event", "direction")
-    assert list(path["sliding"].values) == [False, False, True]
-    assert path["slip"].dims == ("load", "x", "y")
-    assert np.isnan(path["slip"].values[2]).all()
-
-
 STUDY = small_study(
     nodes=[72, 60],
     length=[0.02, 0.014],
@@ -184,77 +155,6 @@ RUPTURES = small_study(
     ensemble={"samples": 2, "seed": 4},
 )
 RUPTURES["problem"]["friction"]["residual_strength"] = 1e5
-
-
-@pytest.fixture
-def written(tmp_path, monkeypatch):
-    """Write a study into the folder in which commands run."""
-    monkeypatch.chdir(tmp_path)
-    return lambda study: (tmp_path / "plane.toml").write_text(tomli_w.dumps(study))
-
-
-def test_a_study_in_memory_on_disk_and_by_commands(written, runs):
-    written(STUDY)
-    study = st.Study.from_toml("plane.toml")
-    assert st.Study.from_dict(study.to_dict()) == study
-    memory = study.run()
-    assert memory.critical_position.dims == ("correlation_length", "sample", "direction")
-    assert memory.strength.shape == (2, 30, 72, 60)
-    runs("check plane.toml", "L / h_n along x      5.787", "L / h_n along y      4.0509")
-    runs("run plane.toml --out run")
-    runs("status run", "60 of 60")
-    xr.testing.assert_equal(memory, st.open_run("run").dataset())
-    runs("export run run.nc")
-    xr.testing.assert_equal(xr.load_dataset("run.nc"), memory)
-    runs("report run")
-
-
-@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
-def test_ruptures_on_disk_and_by_commands(written, runs, monkeypatch):
-    written(RUPTURES)
-    runs("run plane.toml --out run")
-    stored = st.open_run("run").dataset()
-    assert "rupture_speed" not in stored  # an apparent one, above any speed of waves
-    for name in ("critical_position", "median_rupture_speed"):
-        assert stored[name].dims == ("sample", "direction")
-    assert np.all(stored.stress_drop.values > 5e5)
-    monkeypatch.setattr(st.plot, "film", functools.partial(st.plot.film, frames=12))
-    words = ("position of the critical patch: ", " and ", "ended by: sliding")
-    runs("rupture plane.toml --film --out . --sample 1", *words)
-    assert Image.open("rupture.gif").n_frames > 10
-    assert Image.open("rupture.png").size[0] > 500
-    with xr.open_dataset("rupture.nc") as run:
-        assert run.slip_rate.dims == ("time", "x", "y")
-        assert run.critical_stress.item() == stored.critical_stress.values[1]
-        assert run.arrival_time.dims == ("x", "y")
-
-
-def test_onset_of_a_profile_of_ones_own(written, runs):
-    problem = {
-        "solid": STUDY["problem"]["solid"],
-        "interface": {"length": [0.0208, 0.0156], "nodes": [72, 64]},
-        "friction": {"weakening_rate": RATE},
-    }
-    written({"problem": problem})
-    own = "onset plane.toml --strength tau.npy --unit MPa --method equilibrium"
-    np.save("tau.npy", STRENGTH * 1e-6)
-    runs(own, "critical_position_x (m)", "critical_position_y (m)")
-    np.save("tau.npy", STRENGTH.T * 1e-6)
-    runs(own, "are swapped", code=2)
-
-
-def test_load_of_a_plane_from_a_file(written):
-    profile = 1.0 + 0.1 * np.random.default_rng(0).random((72, 60))
-    np.save("load.npy", profile)
-    np.save("turned.npy", profile.T)
-    problem = STUDY["problem"]
-    written(STUDY | {"problem": problem | {"load": {"profile": "load.npy"}}})
-    study = st.Study.from_toml("plane.toml")
-    assert np.array_equal(study.experiments[0].problem.load.profile, profile)
-    assert st.Study.from_dict(study.to_dict()) == study
-    written(STUDY | {"problem": problem | {"load": {"profile": "turned.npy"}}})
-    with pytest.raises(st.InputError, match="load.profile.*x and y are swapped"):
-        st.Study.from_toml("plane.toml")
 
 
 def test_failing_profiles_are_kept():

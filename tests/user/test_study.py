@@ -100,18 +100,6 @@ def test_a_sweep_in_toml_python_and_the_result(tmp_path):
     assert st.Study.from_toml(path) == study
 
 
-def test_distributions_of_scipy_and_profiles_in_files(tmp_path):
-    np.save(tmp_path / "profile.npy", np.linspace(1.0, 1.2, 128))
-    np.savetxt(tmp_path / "stress.csv", np.full(128, 1e4), delimiter=",")
-    load = {"profile": "profile.npy", "initial_stress": "stress.csv"}
-    study = loaded(tmp_path, random__strength__marginal=LOGNORMAL, problem__load=load)
-    np.testing.assert_array_equal(study.problem.load.profile, np.linspace(1.0, 1.2, 128))
-    expected = scipy.stats.lognorm(0.2, scale=1e6)
-    assert study.random.strength.mean == pytest.approx(expected.mean(), rel=1e-14)
-    study.to_toml(tmp_path / "written.toml")
-    assert st.Study.from_toml(tmp_path / "written.toml") == study
-
-
 def test_a_function_cannot_be_written_down(tmp_path):
     def bell(k):
         return np.exp(-((k * 1e-3) ** 2))
@@ -149,21 +137,6 @@ def test_every_point_is_the_study_with_its_values():
         part = result.isel(correlation_length=point.number // 2, poisson_ratio=point.number % 2)
         for name in alone.data_vars:
             np.testing.assert_array_equal(part[name], alone[name])
-
-
-def test_keys_of_one_table_vary_together():
-    study = swept(
-        {"problem.interface.length": [0.1, 0.2], "problem.interface.nodes": [128, 256]},
-        {"ensemble.seed": [3, 4]},
-        ensemble__samples=2,
-    )
-    points = [tuple(point.values.values()) for point in study.points]
-    assert points == [(0.1, 128, 3), (0.1, 128, 4), (0.2, 256, 3), (0.2, 256, 4)]
-    result = study.run()
-    assert result["critical_stress"].dims == ("length", "seed", "sample")
-    assert result["nodes"].dims == ("length",)
-    spacings = [plan.problem.interface.spacing for plan in study.experiments]
-    assert spacings == [0.1 / 128] * 4
 
 
 @pytest.mark.parametrize(
@@ -260,61 +233,10 @@ def test_a_correlation_coefficient_is_swept():
     refuses("did you mean 'residual_strength'", lambda: swept(misspelt, **given))
 
 
-def test_warnings_of_many_points_are_one_with_their_range():
-    with pytest.warns(st.AccuracyWarning) as caught:
-        swept(*lengths(*np.linspace(20e-3, 30e-3, 9)), ensemble={"samples": 2}).run()
-    texts = [str(warning.message) for warning in caught]
-    (text,) = [text for text in texts if "no mean mode" in text]
-    assert "hold 20 to 31 % of the variance" in text
-
-
 # -- what is kept --------------------------------------------------------------------------------
 
 
-def test_kept_profiles():
-    keeping = {"samples": 2, "seed": 3, "keep": ["strength"]}
-    study = swept(*lengths(4e-3, 6e-3), ensemble=keeping)
-    result = study.run()
-    assert result["strength"].dims == ("correlation_length", "sample", "x")
-    field, interface = study.experiments[1].random.strength, study.problem.interface
-    direct = field.sample(interface, samples=2, seed=3)
-    np.testing.assert_array_equal(result["strength"].values[1], direct)
-    refuses("GiB of memory", loaded(ensemble=keeping | {"samples": 10**9}).run)
-
-
 # -- load shapes, and events under a load --------------------------------------------------------
-
-
-def under(profile):
-    return dataclasses.replace(BASE.problem, load=st.Load(profile=profile))
-
-
-def test_load_shapes_have_mean_one_and_their_ends():
-    gradient = under(st.GradientLoad(amplitude=0.5, centre=0.25)).load_profile
-    assert gradient.mean() == pytest.approx(1.0, abs=1e-14)
-    assert (gradient.max(), gradient.min()) == (pytest.approx(1.5), pytest.approx(0.5))
-    assert gradient.argmax() == 32
-    edge = under(st.EdgeLoad(excess=4.0, decay=0.005)).load_profile
-    assert edge.mean() == pytest.approx(1.0, abs=1e-14)
-    # Half a period away exp(-10) of the excess is left, 2e-4.
-    assert edge[0] / edge[64] == pytest.approx(5.0, rel=2e-4)
-    plane = st.Interface(length=(0.1, 0.05), nodes=(64, 32))
-    assert np.ptp(st.EdgeLoad(excess=1.0, decay=0.01).on(plane), axis=1).max() == 0.0
-
-
-def test_load_shapes_in_a_study_file_and_swept(tmp_path):
-    study = in_python(
-        problem=under(st.EdgeLoad(excess=2.0, decay=0.01)),
-        method=st.Equilibrium(events=3),
-        ensemble=st.Ensemble(samples=2),
-        sweep=({"problem.load.profile.excess": [0.5, 4.0]},),
-    )
-    study.to_toml(tmp_path / "study.toml")
-    again = st.Study.from_toml(tmp_path / "study.toml")
-    assert again.problem == study.problem
-    result = again.run()
-    assert result["event_length"].dims == ("excess", "sample", "event")
-    assert result["critical_stress"][0].mean() > result["critical_stress"][1].mean()
 
 
 def test_events_are_those_of_the_path():
@@ -332,34 +254,22 @@ def test_events_are_those_of_the_path():
 # -- mistakes ------------------------------------------------------------------------------------
 
 test_mistakes_are_named = refusals({
-    "problem: missing": {"problem": None},
-    "problem.solid.density: missing": {"problem__solid__density": None},
     "problem.solid ... 'densty' ... did you mean 'density'": {"problem__solid__densty": 1.0},
     "load.profile ... missing.npy": {"problem__load": {"profile": "missing.npy"}},
-    "'betta' ... did you mean 'beta'": {"random__strength__marginal__type": "betta"},
-    "strength.marginal ... low must be below high": {"random__strength__marginal__low": 2e6},
     "strength ... no mode is left": {"random__strength__spectrum__correlation_length": 10.0},
-    "method.type ... 'local' ... local_criterion": {"method__type": "local"},
-    "method ... 'typ' ... did you mean 'type'": {"method__typ": "exact"},
-    "keep ... 'stregth' ... strength": {"ensemble__keep": ["stregth"]},
 }, loaded)  # fmt: skip
 
 SPAN = {"start": 1e-3, "stop": 2e-3}
 AXES = {
     "mean 'correlation_length'": [{"random.strength.spectrum.corelation_length": [1]}],
-    "did you mean 'problem'": [{"problm.solid.density": [1.0]}],
     "correlation_length ... greater than 0 ... point 1": [{LENGTH: [4e-3, -1.0]}],
     f"{LENGTH} ... list of values or a range": [{LENGTH: 4e-3}],
     f"{LENGTH} ... list": [{LENGTH: []}],
     "count: missing": [{LENGTH: SPAN}],
-    "'num' ... count: missing": [{LENGTH: SPAN | {"num": 3}}],
-    "positive": [{LENGTH: SPAN | {"start": 0.0, "count": 3, "spacing": "log"}}],
-    "count: must be greater than or equal to 2": [{LENGTH: SPAN | {"count": 1}}],
     "as many values each ... has 2 ... has 3": [{LENGTH: [1, 2], "ensemble.seed": [1, 2, 3]}],
     "swept twice": [{LENGTH: [1e-3]}, {LENGTH: [2e-3]}],
     "random.strength.spectrum": [{"random.strength.spectrum": []}, {LENGTH: [2e-3]}],
     "ensemble.samples: cannot be swept": [{"ensemble.samples": [10, 20]}],
-    "problem.solid.density ... 'heavy'": [{"problem.solid.density": [1.0, "heavy"]}],
     "1000000 points": [{"ensemble.seed": list(range(1000))}, {"x": [1] * 1000}],
     "list of tables": {LENGTH: [1e-3], "ensemble.seed": [1]},
 }
