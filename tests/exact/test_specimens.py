@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from brute_force import BruteForce, along
-from matplotlib.patches import Rectangle
 from refusals import refusals
 from specimens import crooked, rough
 
@@ -396,81 +395,19 @@ test_refused = refusals(
             load=st.Load(profile=st.GradientLoad(amplitude=0.2))
         ),
         "specimen.height ... spacings": lambda: crooked(height=1e-3),
-        "0.0235 times the length": lambda: crooked(height=0.0235 * 0.083),
         "height ... 373 times ... units": lambda: crooked(height=31.0),
         "reverse ... st.Platen": lambda: crooked(drive=PUSHER),
-        "lower or narrow": lambda: st.Blocks(height=0.0299, drive=PUSHER),
-        "unlike blocks": lambda: st.Blocks(height=(0.05, 0.02)),
-        "rigid base": lambda: st.Blocks(height=INF),
-        "tilt": lambda: st.Blocks(height=0.05, pressing="free"),
         "thickness": lambda: st.Blocks(height=0.05, drive=st.Platen(stiffness=2e7)),
-        "stiffness": lambda: st.Platen(stiffness=-1.0),
         "blocks meet on a line": lambda: of(interface=plane()),
         "width ... area": lambda: plane(width=0.1),
-        "thickness of a specimen": lambda: of(interface=st.Interface(0.1, 64, width=0.1)),
-        "specimen=st.Blocks": lambda: of(specimen=None),
         "rupture ... half-spaces": lambda: solved(
             lambda p, s: st.onset(p, s, method=st.Rupture(loading_rate=1e9))
         ),
         "with another specimen.height ... problem.sample": lambda: solved(
             lambda p, s: p.sample(of(specimen=st.Blocks(height=0.02)).sample(s))
         ),
-        "nucleation_stress": lambda: solved(st.theory.nucleation_stress),
-        "cracks": lambda: solved(lambda p, s: st.theory.griffith_length(p, 1e6, 1.0)),
     }
 )
-
-
-def test_figures():
-    """Blocks and profiles; the machine's curve goes through every event, down its drop."""
-    problem = crooked(drive=DRIVES["right pusher, rigid"])
-    strength = rough(problem, 3)
-    found = st.onset(problem, strength, method=st.Equilibrium())
-    above, below = st.plot.specimen(problem, strength, found).axes
-    drawn = dict(zip(("strength", "shear", "pressure"), below.lines, strict=False))
-    for name, values in {
-        "strength": strength[0] / strength[0].mean(),
-        "shear": problem.load_profile,
-        "pressure": np.ones(96),
-    }.items():
-        assert str(drawn[name].get_label()).startswith(name)
-        np.testing.assert_allclose(drawn[name].get_ydata(), values)
-        np.testing.assert_allclose(drawn[name].get_xdata(), 1e3 * problem.interface.x)
-    boxes = [patch for patch in above.patches if isinstance(patch, Rectangle)]
-    ends = [(*box.get_xy(), box.get_width(), box.get_height()) for box in boxes]
-    middle, length = found.critical_position.item(), found.critical_patch_length.item()
-    patch = 1e3 * (middle - 0.5 * length), 0.0, 1e3 * length, 1.0
-    expected = [(0.0, -31.0, 83.0, 31.0), (0.0, 0.0, 83.0, 31.0), patch]
-    np.testing.assert_allclose(ends, expected)
-    pushers = [line.get_xydata() for line in above.lines[1:]]
-    np.testing.assert_allclose(pushers[0], [(83.0, 9.5), (83.0, 14.5)])
-    np.testing.assert_allclose(pushers[1], [(83.0, -14.5), (83.0, -9.5)])
-    path = st.equilibrium_path(problem, strength, np.linspace(0.0, 1.1e6, 30))
-    axes = st.plot.force_travel(path)
-    force = axes.lines[0].get_ydata()
-    assert (
-        np.isclose(force[:, None], path.event_force - path.event_force_drop).any(axis=0).all()
-    )
-    assert path.sizes["event"] > 2
-    np.testing.assert_allclose(axes.lines[1].get_ydata(), path.event_force)
-    np.testing.assert_allclose(axes.lines[1].get_xdata(), 1e6 * path.event_travel)
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("travel (µm)", "force (N)")
-    axes = st.plot.force_travel(path.drop_vars("force"))
-    np.testing.assert_allclose(axes.lines[1].get_ydata(), 1e-6 * path.event_stress)
-    assert axes.get_ylabel() == "mean stress (MPa)"
-    at = path.event_load.values
-    around = np.unique([at * (1.0 - 1e-9), at * (1.0 + 1e-9)])
-    slip = st.equilibrium_path(problem, strength, around).slip.values
-    added = slip[1::2] - slip[::2]
-    moved = added > 1e-3 * added.max(axis=1, keepdims=True)
-    cell = problem.interface.cell
-    np.testing.assert_allclose(path.event_start, moved.argmax(axis=1) * cell)
-    below = st.plot.precursors(path).axes[1]
-    assert below.get_ylim() == (0.0, 83.0)
-    bars = np.array(below.collections[0].get_segments())
-    np.testing.assert_allclose(bars[:, 0, 0], 1e6 * path.event_travel)
-    np.testing.assert_allclose(bars[:, 0, 1], 1e3 * path.event_start)
-    np.testing.assert_allclose(np.ptp(bars[..., 1], axis=1), 1e3 * moved.sum(axis=1) * cell)
 
 
 def test_a_swept_rigid_machine_is_stored(tmp_path):

@@ -36,6 +36,7 @@ FIELDS = {  # an object, where it stands in a study, and what its fields may hol
     st.GradientLoad(amplitude=0.2, centre=0.3): ("problem.load.profile", {
         "amplitude": "[0, 1)", "centre": "[0, 1)",
     }),
+    st.Load(pressing_force=4e3): ("", {"pressing_force": ANY}),
     st.Platen(stiffness=1e7): ("", {"stiffness": "[0, inf]"}),
     st.Pusher(height=0.01, width=0.004, stiffness=1e7): ("", {
         "height": ANY, "width": ANY, "side": ("left", "right", "both"), "stiffness": "[0, inf]",
@@ -79,7 +80,7 @@ FIELDS = {  # an object, where it stands in a study, and what its fields may hol
 WHOLE = ("nodes", "events", "samples", "seed", "first", "every", "max_steps", "workers")
 WHOLE += ("max_evaluations", "bootstrap")
 OPTIONAL = ("width", "thickness", "truncation", "power_kept", "anisotropy", "end_time")
-OPTIONAL += ("loading_rate", "workers", "max_evaluations")
+OPTIONAL += ("loading_rate", "workers", "max_evaluations", "pressing_force")
 CALLS = {
     partial(st.monte_carlo, PROBLEM, FIELD, method=LOCAL, samples=1): {
         "samples": "[1, 9]", "seed": "[0, 9]", "first": "[0, 9]", "workers": "[1, 2]",

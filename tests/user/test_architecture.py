@@ -7,6 +7,7 @@ import shutil
 import tomllib
 from pathlib import Path
 
+import pytest
 from checks import python
 from refusals import refuses
 
@@ -182,6 +183,7 @@ assert np.allclose(found, expected, rtol=1e-12) and found.attrs["units"] == "m"
 """
 
 
+@pytest.mark.slow
 def test_a_quantity_of_each_step_is_added_as_the_page_shows(tmp_path):
     """In a copy of the package."""
     shutil.copytree(

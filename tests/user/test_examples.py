@@ -88,6 +88,7 @@ def test_the_tables_list_every_how_to():
     assert [name for name in HOW_TOS if f"examples/{name}.py" not in text] == []
 
 
+@pytest.mark.slow
 def test_friction_laws(capsys):
     load("friction_laws").main(nodes=256)
     assert "exponential" in capsys.readouterr().out
@@ -160,10 +161,9 @@ FAULT = load("community_benchmark")
 
 
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
-@pytest.mark.parametrize("spacing", [200.0, 50.0])
-def test_line_arrives_with_a_spectral_element_code_and_converges(spacing):
+def test_line_arrives_with_a_spectral_element_code():
     """When half of the strength is lost at five places on the line in mode II, s."""
-    line = st.Interface(length=60e3, nodes=round(60e3 / spacing))
+    line = st.Interface(length=60e3, nodes=300)
     away = np.abs(line.x - 30e3)
     friction = st.LinearWeakening(
         critical_slip=FAULT.CRITICAL_SLIP, residual_strength=FAULT.RESIDUAL
@@ -181,8 +181,6 @@ def test_line_arrives_with_a_spectral_element_code_and_converges(spacing):
     found = np.interp(places, line.x - 30e3, run.arrival_time.values)
     # An independent spectral-element code, nodes 250 m apart; 0.7 % between the two at 12.5 m.
     assert found == pytest.approx([1.083, 2.119, 3.120, 4.105, 5.048], rel=0.01)
-    if spacing == 50.0:  # This package, 12.5 m.
-        assert found == pytest.approx([1.081, 2.116, 3.115, 4.099, 5.041], rel=0.008)
 
 
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")

@@ -14,7 +14,6 @@ import numpy as np
 import pandas as pd
 import pytest
 import scipy.stats
-import xarray as xr
 from crooked import LINE
 from executors import Counting, Forbidding
 from refusals import refuses
@@ -81,18 +80,6 @@ def again(folder, words=None, executor=None):
 # -- what is stored is what is computed ----------------------------------------------------------
 
 
-def test_a_stored_run_is_the_run_in_memory(run, reference, tmp_path):
-    assert len(chunks(run)) > 4
-    stored = st.open_run(run)
-    assert stored.study == make_study()
-    assert stored.dataset().identical(reference)
-    stored.export(tmp_path / "result.nc")
-    with xr.open_dataset(tmp_path / "result.nc") as written:
-        assert written.load().identical(reference)
-    some = stored.dataset(only=["critical_stress"])
-    assert list(some.data_vars) == ["critical_stress"]
-
-
 def test_growing_computes_only_the_new_samples(tmp_path, often, reference):
     make_study(samples=80).run(out=tmp_path / "run")
     counting = Counting()
@@ -144,13 +131,6 @@ def test_every_sample_is_in_one_part_and_parts_are_alike(points, samples, of):
     sizes = [mask.sum() for mask in masks]
     # Eight blocks a part or more: no part is longer than another by more than one.
     assert max(sizes) - min(sizes) <= max(1, points * samples // (8 * of))
-
-
-@pytest.mark.parametrize(
-    "value", ["0/3", "4/3", "3", "a/b", "1/ 2", "1/2\n", "\u0661/2", (1, 2), 1.5]
-)
-def test_what_is_no_part_is_refused(value):
-    refuses("part: must be", lambda: make_study().run(out="none", part=value))
 
 
 def test_parts_in_one_folder_are_one_run(tmp_path, often, reference):
@@ -431,17 +411,6 @@ def test_the_pilot_says_how_far_the_local_criterion_is_from_the_exact_onset():
         assert found.attrs[f"{name}_samples"] == 32
         assert found.attrs[f"{name}_bias"] == pytest.approx(difference.mean(), rel=1e-9)
         assert found.attrs[f"{name}_scatter"] == pytest.approx(difference.std(ddof=1), rel=1e-9)
-
-
-def test_the_pilot_looks_at_the_weakest_samples():
-    """The first 32 of this seed are nearly exact, 4 % of all samples are 3 to 12 % off."""
-    solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1200.0, plane="stress")
-    problem = make_problem(256, 0.1, solid=solid, weakening_rate=2.5e11)
-    field = st.RandomField(st.Lognormal(mean=1e6, cv=0.25), st.PowerLawSpectrum(7e-3), True)
-    given = {"method": st.LocalCriterion(), "samples": 1000, "seed": 8, "progress": False}
-    with pytest.warns(st.AccuracyWarning, match="in the 32 weakest of more"):
-        found = st.monte_carlo(problem, field, **given)
-    assert max(abs(found.attrs[f"pilot_{name}"]) for name in ("bias", "scatter")) < 0.01
 
 
 def test_the_pilot_has_the_workers_of_the_run(monkeypatch):
