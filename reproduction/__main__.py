@@ -7,6 +7,7 @@ import argparse
 import dataclasses
 import importlib
 import os
+import re
 import sys
 import tomllib
 import warnings
@@ -16,12 +17,6 @@ if not __package__:  # `python reproduction`
     sys.path[0] = str(Path(__file__).resolve().parent.parent)
 
 from reproduction import PARAMETERS
-
-BASIC = ("local", "moments", "exact", "ruptures", "printed", "theory", "representative",
-         "dynamic")  # fmt: skip
-"""Studies that figures need besides those that `page.toml` names; the page needs all."""
-PAGE = tomllib.loads(Path(__file__).with_name("page.toml").read_text("utf-8"))
-NEEDS = {int(number): {*about.get("needs", ())} for number, about in PAGE["figure"].items()}
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -43,19 +38,15 @@ def main(arguments: list[str] | None = None) -> None:
     rows |= {"Which modulus": modulus.CLAIMS}
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", st.AccuracyWarning)
-        with run.started(_chosen(jobs(size), options.figures)) as studies:
+        with run.started(jobs(size)) as studies:
             data = claims.Data(studies, size)
-            images = _draw(run, data, options.figures, out / "figures")
-            if options.figures:
-                run.say(f"figures in {out / 'figures'}")
-                return
+            images = _draw(run, data, page.TEXTS["figure"], out / "figures")
             groups = {
                 title: [one for claim in each if (one := claims.judge(claim, data))]
                 for title, each in rows.items()
             }
-    warned = sorted(
-        {str(w.message) for w in caught if issubclass(w.category, st.AccuracyWarning)}
-    )
+    texts = (str(w.message) for w in caught if issubclass(w.category, st.AccuracyWarning))
+    warned = sorted({re.sub(r"\d\S*", "", text): text for text in texts}.values())
     claims.write_csv([found for each in groups.values() for found in each], out / "claims.csv")
     page.write(out / "report.html", data, groups, images, run, warned)
     run.say(f"done: {out / 'report.html'}")
@@ -71,14 +62,10 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
                         help="of each correlation length, 100 or more")  # fmt: skip
     parser.add_argument("--parameters", type=Path, metavar="FILE",
                         help="TOML, in SI units, such as length = 0.2")  # fmt: skip
-    parser.add_argument("--figures", type=_numbers, default=(), metavar="N,N",
-                        help="only these figures, without the page, such as 5,6")  # fmt: skip
     parser.add_argument("--out", default="stiction-paper", metavar="FOLDER")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=_cores(), help="threads")
     options = parser.parse_args(arguments)
-    if unknown := [number for number in options.figures if number not in NEEDS]:
-        parser.error(f"--figures: there are figures 1 to {max(NEEDS)}, not {unknown[0]}")
     if options.samples is not None and options.samples < 100:
         parser.error(f"--samples: must be 100 or more, got {options.samples}")
     if options.parameters:
@@ -87,27 +74,14 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
             importlib.import_module("reproduction.setting")
         except (OSError, ValueError) as error:
             parser.error(f"--parameters: {options.parameters}: {error}")
-        if lost := [number for number in options.figures if number >= 14]:
-            parser.error(
-                f"--figures: {lost[0]} shows what-ifs, which state their own parameters"
-            )
     return options
-
-
-def _numbers(text: str) -> tuple[int, ...]:
-    return tuple(int(part) for part in text.split(","))
 
 
 def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
 
 
-def _chosen(jobs, figures) -> list:
-    wanted = {*BASIC, *(name for number in figures for name in NEEDS[number])}
-    return [job for job in jobs if not figures or job[0].removesuffix("-inertia") in wanted]
-
-
-def _draw(run, data, chosen, folder: Path) -> dict:
+def _draw(run, data, texts: dict, folder: Path) -> dict:
     """Draw figures as soon as their studies are done."""
     import stiction as st
     from reproduction.figures import beyond, paper
@@ -115,8 +89,10 @@ def _draw(run, data, chosen, folder: Path) -> dict:
     folder.mkdir(parents=True, exist_ok=True)
     images = {}
     with st.plot.paper_style():
-        for number in chosen or (n for n in NEEDS if NEEDS[n] <= {*data.studies}):
-            module = paper if number <= 7 else beyond
+        for key, about in texts.items():
+            if not {*about.get("needs", ())} <= {*data.studies}:
+                continue
+            number, module = int(key), paper if int(key) <= 7 else beyond
             images[number] = folder / f"figure_{number:02}.png"
             figure = getattr(module, f"figure_{number}")(data)
             run.say(f"figure {number}")

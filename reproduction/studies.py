@@ -185,39 +185,49 @@ def readings(run: Runner) -> xr.Dataset:
     return along("reading", list(READINGS), parts)
 
 
-@kept()
-def representative(run: Runner) -> xr.Dataset:
-    """One rupture in space and time at the shortest correlation length."""
-    ratio = SIMULATED[0]
-    tau_p = strength(ratio).sample(PROBLEM.interface, seed=run.seed_of(ratio))[0]
-    found = st.simulate_rupture(
-        PROBLEM, tau_p, method=RUPTURE, save=st.Save(["slip_rate", "slip"], every=6),
-        progress=False,
-    )  # fmt: skip
-    slip, interface = found["slip"].values, PROBLEM.interface
-    # Share of the slipping area at its residual strength once it is 6 h_n long.
-    node = round(float(found["critical_position"]) / interface.spacing)
+def _weakened(slip, tau_p, node: int) -> float:
+    """Return the share of a rupture at its residual strength once it is 6 h_n long."""
+    interface = PROBLEM.interface
     turn = interface.size // 2 - node
     residual = np.roll(tau_p / setting.W, turn)
-    weakened = np.nan
     for row in np.roll(slip, turn, axis=1):
         stopped = np.flatnonzero(row <= 1e-3 * row.max())
         left = stopped[stopped < interface.size // 2].max(initial=-1)
         right = stopped[stopped > interface.size // 2].min(initial=interface.size)
         if (right - left - 1) * interface.spacing >= 6.0 * H:
             inside = slice(left + 1, right)
-            weakened = float(np.mean(row[inside] >= 0.999 * residual[inside]))
-            break
-    # The patch around the onset when the mean stress is largest.
-    labels = patches(slip[int(found["mean_stress"].argmax())] > 0.0)
-    here = labels[node % interface.size]
-    patch_length = np.sum(labels == here) * interface.spacing if here >= 0 else np.nan
+            return float(np.mean(row[inside] >= 0.999 * residual[inside]))
+    return np.nan
+
+
+@kept(count=lambda size: 8 if size.few >= 24 else 2)
+def representative(run: Runner, count: int) -> xr.Dataset:
+    """Ruptures in space and time at the shortest correlation length, the first one whole."""
+    ratio, interface = SIMULATED[0], PROBLEM.interface
+
+    def one(sample):
+        tau_p = strength(ratio).sample(interface, seed=run.seed_of(ratio), first=sample)[0]
+        save = st.Save(["slip_rate", "slip"], every=6)
+        found = st.simulate_rupture(PROBLEM, tau_p, method=RUPTURE, save=save, progress=False)
+        slip = found["slip"].values
+        node = round(float(found["critical_position"]) / interface.spacing)
+        share = _weakened(slip, tau_p, node)
+        if sample:
+            return None, share
+        # The patch around the onset when the mean stress is largest.
+        labels = patches(slip[int(found["mean_stress"].argmax())] > 0.0)
+        here = labels[node % interface.size]
+        length = np.sum(labels == here) * interface.spacing if here >= 0 else np.nan
+        return (tau_p, found, length), share
+
+    parts = run.map(one, [(sample,) for sample in range(count)])
+    tau_p, found, patch_length = parts[0][0]
     return xr.Dataset(
         {
             "slip_rate": (("time", "x"), found["slip_rate"].values.astype(np.float32)),
             "mean_stress": ("time", found["mean_stress"].values),
             "critical_position": float(found["critical_position"]),
-            "weakened": weakened,
+            "weakened": ("rupture", [share for _, share in parts]),
             "patch_length": patch_length,
             "strength": ("x", tau_p),
             "tau_n": ("x", np.ravel(st.theory.nucleation_stress(PROBLEM, tau_p))),

@@ -63,7 +63,7 @@ def names(d: Data, found: dict) -> dict:
         "shared": shared,
         "counted": counted,
         "over_mean": over_mean,
-        "changes": lambda *cases: rounded(Number(max(onset.convergence(d, c) for c in cases))),
+        "changes": lambda *cases: f"{max(onset.convergence(d, c) for c in cases):.2g}",
         "patches": [mean(grown), *(number for _, number in rupture.patches_at_onset(d).rows)],
         "far": over(lambda r: share(d.excess(r) > 0.02) * PER_CENT, RATIOS[:2]),
         "furthest_above": [PER_CENT * d.excess(r).max() for r in RATIOS[:2]],

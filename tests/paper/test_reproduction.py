@@ -24,7 +24,7 @@ from reproduction import numbers_with_errors as estimates
 from reproduction.__main__ import main
 from reproduction.numbers_with_errors import Number
 from reproduction.rules import Verdict
-from reproduction.studies import READINGS
+from reproduction.studies import READINGS, jobs
 
 ROOT = Path(__file__).parents[2]
 CLAIMS = [
@@ -482,10 +482,12 @@ def test_numbers_in_the_documentation_are_those_that_are_computed(pipeline):
     assert f"{', '.join(quoted[:3])} and {quoted[3]} % too high on average" in methods
 
 
-def test_a_second_call_computes_nothing_and_figures_can_be_chosen(pipeline):
+def test_a_second_call_computes_nothing(pipeline):
     out, _ = pipeline
     before = {path: path.stat().st_mtime_ns for path in (out / "studies").rglob("*.nc")}
-    quick(out, "--figures", "5")
+    run = runner.Runner(out, FEWER, seed=0, workers=2)
+    with run.started(jobs(FEWER)):
+        pass
     after = {path: path.stat().st_mtime_ns for path in (out / "studies").rglob("*.nc")}
     assert after == before
 
@@ -507,8 +509,6 @@ def test_samples_and_parameters_of_ones_own(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "own", "text"),
     [
-        (("--figures", "17"), OWN, "there are figures 1 to 16, not 17"),
-        (("--figures", "1,14"), OWN, "14 shows what-ifs"),
         (("--quick", "--full"), OWN, "not allowed"),
         (("--samples", "20"), OWN, "must be 100 or more, got 20"),
         ((), "lenght = 0.15", "my.toml: unknown 'lenght' (valid: shear_modulus,"),
