@@ -1,8 +1,5 @@
 """Estimates, quantiles and densities against simulation and known distributions."""
 
-import runpy
-from pathlib import Path
-
 import numpy as np
 import pytest
 import scipy.stats
@@ -11,7 +8,6 @@ from stiction.statistics.densities import density
 from stiction.statistics.estimates import WithError, mean, quantiles, standard_deviation
 
 RNG = np.random.default_rng(20)
-EXAMPLE = Path(__file__).parents[2] / "examples" / "rupture_ensemble_on_a_plane.py"
 
 
 @pytest.mark.parametrize("estimator", [mean, standard_deviation])
@@ -140,16 +136,3 @@ def test_errors_of_a_density_are_its_scatter_also_where_the_kernel_narrows():
         value, error = (np.interp(middle, one.x, row) for row in (one.value, one.error))
         kernel = value / (2.0 * np.pi**0.5 * 4000 * error**2)
         assert one.bandwidth == pytest.approx(kernel, rel=0.02)
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
-def test_eight_ruptures_on_a_plane_are_worth_many(capsys):
-    found = runpy.run_path(str(EXAMPLE))
-    ruptures, onsets = found["ruptures"], found["onsets"]
-    assert found["alone"] > 10.0 * found["variance"]
-    # The same samples: what inertia adds at this rate is small and positive.
-    added = ruptures.first_instability.values / onsets.first_instability.values[:8] - 1.0
-    assert np.all((added > -1e-5) & (added < 5e-3))
-    assert abs(1e6 * found["value"] / float(onsets.first_instability.mean()) - 1.0) < 0.02
-    assert "MPa" in capsys.readouterr().out
