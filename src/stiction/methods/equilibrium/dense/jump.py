@@ -120,6 +120,13 @@ def _join(
 
 
 @jit_inside
+def _forget(workspace: Workspace) -> None:
+    """Let no row of the factor have a forward substitution."""
+    for t in range(workspace.forward.shape[1]):
+        workspace.forward[1, t] = np.nan
+
+
+@jit_inside
 def _relax(
     sample: StaticSample,
     load: float,
@@ -132,17 +139,25 @@ def _relax(
 ) -> int:
     """Take one elastic step with frozen strengths; the nodes that it overstresses then join.
 
-    Returns what `_join` returns.
+    Returns what `_join` returns. Of rows whose drive is that of the step before, as it is at
+    residual strength, the forward substitution stays; `_forget` them with the factor.
     """
     solution, drive = workspace.vectors[1], workspace.vectors[3]
     resting, members = workspace.vectors[4], workspace.members
+    forward, before = workspace.forward[0], workspace.forward[1]
     if stops:
         take_off_resting(workspace, slip)
     while True:
         for t in range(size):
             i = members[t]
             drive[i] = load * sample.profile[i] - strength_at(sample, slip, i) - resting[i]
-        substitute_members(workspace, ZERO, size, drive, solution)
+        known = ZERO
+        while known < size and drive[members[known]] == before[known]:
+            known += 1
+        substitute_members(workspace, known, size, drive, forward)
+        for t in range(size):
+            before[t] = drive[members[t]]
+            solution[t] = forward[t]
         back_substitute(workspace.factor, size, solution)
         stay = size
         for t in range(size if stops else ZERO):
@@ -153,6 +168,7 @@ def _relax(
         if stay == size:
             break
         size = factor_inside(workspace)
+        _forget(workspace)
         take_off_resting(workspace, slip)
     for t in range(size):
         i = members[t]
@@ -275,6 +291,7 @@ def jump(
     if count > MOST_MEMBERS:
         return Outcome.UNDECIDED
     size = factor_inside(workspace)
+    _forget(workspace)
     if size < count or count == slip.shape[0]:
         return Outcome.SLIDING
     waited = 0

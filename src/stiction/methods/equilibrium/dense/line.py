@@ -179,7 +179,8 @@ class LineProgram(Program):
         That is not tried again after it once failed, but for from rest.
         """
         stuck = state is not None and state.stuck
-        if state is None or not state.slip.any():
+        first = state is None or not state.slip.any()
+        if first:
             for workspace in self._workspaces:  # what is held is of another sample
                 workspace.held[0] = 0
         if target == np.inf and not stuck:
@@ -206,7 +207,7 @@ class LineProgram(Program):
         )  # fmt: skip
         # No multiplier bounds the load from above where a law steepens, or a node stopped.
         found.certified = found.unstable and not (self.pieces.steepens or found.stopped)
-        if found.certified:
+        if found.certified and first:
             _, strength, rate = present_pieces(sample, slip)
             present = sample._replace(excess=strength, rate=rate)
             self._certify(present, found, multiplier_of(sample, found))
