@@ -95,21 +95,18 @@ def heights_of_a_matrix_without_a_unit():
 
 @calls(BACK)
 def gaps_across_the_seam():
-    found = {}
-    for name, problem, strength, gap in (
-        ("line", LINE, LINE_STRENGTH, LINE_GAP),
-        ("plane", PLANE, PLANE_STRENGTH, PLANE_GAP),
-    ):
-        holes = as_measured(problem.interface, np.where(gap, np.nan, strength))
-        read = st.read_profile(holes, interface=problem.interface, gaps="fill")
-        local, onset = (
-            st.onset(problem, holes, method=method, gaps="fill") for method in (LOCAL, EXACT)
-        )
-        with tempfile.TemporaryDirectory() as folder:
-            export(onset, Path(folder) / "onset.csv")
-            table = pd.read_csv(Path(folder) / "onset.csv")
-        found[name] = {"read": read, "local": local, "exact": onset, "table": table}
-    return found
+    holes = as_measured(LINE.interface, np.where(LINE_GAP, np.nan, LINE_STRENGTH))
+    read = st.read_profile(holes, interface=LINE.interface, gaps="fill")
+    local, onset = (
+        st.onset(LINE, holes, method=method, gaps="fill") for method in (LOCAL, EXACT)
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        export(onset, Path(folder) / "onset.csv")
+        table = pd.read_csv(Path(folder) / "onset.csv")
+    of_line = {"read": read, "local": local, "exact": onset, "table": table}
+    of_plane = as_measured(PLANE.interface, np.where(PLANE_GAP, np.nan, PLANE_STRENGTH))
+    read = st.read_profile(of_plane, interface=PLANE.interface, gaps="skip")
+    return {"line": of_line, "plane": {"read": read}}
 
 
 @calls(BACK)

@@ -199,27 +199,17 @@ def test_a_spreadsheet_as_it_comes(tmp_path, monkeypatch):
     for name in ("p.csv", "p.xlsx"):
         found = st.read_profile(tmp_path / name, interface=LINE)
         np.testing.assert_allclose(found, STRENGTH, rtol=1e-9)
-    book["remarks"].append([400])
-    book.save(tmp_path / "p.xlsx")
-    refuses("one sheet, got Sheet, remarks", lambda: st.read_profile(tmp_path / "p.xlsx"))
     (tmp_path / "p.xlsx").write_text("x;tau")
     refuses("is not a workbook", lambda: st.read_profile(tmp_path / "p.xlsx"))
     monkeypatch.setitem(sys.modules, "openpyxl", None)
     refuses("needs openpyxl ... save it as .csv", lambda: st.read_profile(tmp_path / "p.xlsx"))
 
 
-def test_the_text_of_a_matrix_has_its_rows_along_x(tmp_path):
-    """And its places are no values."""
-    path, heights = tmp_path / "h.txt", 1e-3 * np.cos(np.arange(96.0)).reshape(12, 8)
-    np.savetxt(path, heights)
-    found = st.read_profile(path, quantity="height", unit="um")
-    np.testing.assert_allclose(found, heights * 1e-6, rtol=1e-12)
+def test_axes_of_a_matrix_are_not_swapped(tmp_path):
+    np.save(tmp_path / "h.npy", 1e-3 * np.cos(np.arange(96.0)).reshape(12, 8))
     plane = st.Interface(length=(0.02, 0.01), nodes=(8, 12))
-    given = {"quantity": "height", "unit": "um"}
-    refuses("swapped", lambda: st.read_profile(path, interface=plane, **given))
-    np.savetxt(path, np.add.outer(np.arange(9.0), np.arange(9.0)), delimiter=";")
-    words = "the first row and the first column of the matrix are places"
-    refuses(words, lambda: st.read_profile(path, **given))
+    given = {"interface": plane, "quantity": "height", "unit": "um"}
+    refuses("swapped", lambda: st.read_profile(tmp_path / "h.npy", **given))
 
 
 COEFFICIENTS = {  # as a laboratory exports them, and the scale of x
@@ -302,6 +292,7 @@ def test_columns_are_chosen_by_name_heading_number_or_meaning(table):
         ("given in kPa, but the source states MPa", {"unit": "kPa", "x": 1}),
         ("unknown 'stress'", {"quantity": "stress"}),
         ("interface: needed", {"interpolate": True}),
+        ("x: unknown", {"value": 3, "x": 3}),
     ],
 )
 def test_columns_that_are_not_taken(table, words, options):
@@ -379,6 +370,9 @@ test_what_is_no_profile_is_refused = refusals({
     "interpolate=True": read(TENT, interface=LINE),
     "values are missing ... the first at x = 0.0265625 m":
         read(TENT.drop_isel(x=[11, 12, 13, 14]), interface=LINE, interpolate=True),
+    "at 1 of 128 nodes, ... are filled on periodic lines only": lambda: onset(
+        without(3), dataclasses.replace(SYSTEM, specimen=st.Blocks(height=0.1)), gaps="fill"
+    ),
     "clearly the strength ... 'z'": read(labelled().to_dataset(name="z")),
     "value: unknown '1' ... strength, tau_i":
         read(labelled().to_dataset(name="strength").assign(tau_i=labelled()), x=0, value=1),

@@ -2,7 +2,7 @@
 
 The nodes are x_i = i L/n in each direction, periodically: points may come in any order and begin
 anywhere. Those of a specimen are x_i = (i + 1/2) L/n, and nothing continues beyond its ends. What
-is missing stays NaN unless it is filled on request.
+is missing is refused, stays NaN, or is filled on request, on lines that continue periodically.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ WIDE = 4.0
 IN_GAP, MEASURED = "in_gap", "measured"
 """Variable of a result; coordinate of results and profiles with gaps, False where none was."""
 OF_A_PLANE = (
-    "; a map has columns or coordinates x and y, or is a matrix of shape (nx, ny), and needs an"
+    "; a map has columns or coordinates x and y, or is an .npy of shape (nx, ny), and needs an"
     " interface of two lengths and two numbers of nodes"
 )
 """What to do with two dimensions where a line was expected."""
@@ -177,7 +177,7 @@ def _check_repeats(
 
 
 def _interpolated(x: Array, values: Array, interface: Interface) -> Array:
-    """Linear between points, and NaN in intervals that are gaps."""
+    """Linear between points, constant a little beyond those at free ends, NaN in gaps."""
     length, nodes = interface.extent, interface.x
     margin = TOLERANCE * interface.spacing
     if not interface.is_free:
@@ -191,23 +191,21 @@ def _interpolated(x: Array, values: Array, interface: Interface) -> Array:
         known = np.flatnonzero(~np.isnan(row))
         if known.size == 0:
             raise InputError("has no value at all")
-        begin = x[known]
-        if interface.is_free:  # constant beyond the outermost points, or a gap
-            inner = np.searchsorted(begin, nodes).clip(1, max(known.size - 1, 1))
-            apart = np.diff(begin, append=begin[-1])[inner - 1]
-            cut = (apart > widest) | (np.diff(known, append=known[-1] + 1)[inner - 1] > 1)
-            near = np.abs(nodes[:, None] - begin).min(axis=1)
-            outside = (nodes < begin[0]) | (nodes > begin[-1])
-            found = np.interp(nodes, begin, row[known])
-            hole = np.where(outside, near > 0.5 * widest, cut & (near > margin))
-            return np.where(hole, np.nan, found)
-        width = np.diff(begin, append=begin[0] + length)
-        is_gap = (width > widest) | (np.diff(known, append=known[0] + x.size) > 1)
-        interval = np.searchsorted(begin, nodes, side="right") - 1
-        into = np.mod(nodes - begin[interval], length)
-        inside = (into > margin) & (into < width[interval] - margin)
-        found = np.interp(nodes, begin, row[known], period=length)
-        return np.where(inside & is_gap[interval], np.nan, found)
+        at, value, around = x[known], row[known], False
+        if interface.is_free:
+            ends = at[0] - 0.5 * widest, at[-1] + 0.5 * widest
+            value = np.r_[value[0], value, value[-1]]
+        else:
+            ends = at[-1] - length, at[0] + length
+            value = np.r_[value[-1], value, value[0]]
+            around = known[0] + x.size > known[-1] + 1
+        at = np.r_[ends[0], at, ends[1]]
+        is_gap = (np.diff(at) > widest) | np.r_[around, np.diff(known) > 1, around]
+        interval = np.searchsorted(at, nodes, side="right").clip(1, at.size - 1) - 1
+        apart = np.minimum(np.abs(nodes - at[interval]), np.abs(at[interval + 1] - nodes))
+        outside = (nodes < ends[0]) | (nodes > ends[1])
+        hole = outside | (is_gap[interval] & (apart > margin))
+        return np.where(hole, np.nan, np.interp(nodes, at, value))
 
     return np.apply_along_axis(at_nodes, -1, values[..., order])
 
@@ -226,81 +224,46 @@ def close_gaps(
         f"{f' of sample {row}' * (len(rows) > 1)}, the first at"
         f" {interface.describe_node(int(np.argmax(holes[row])))}"
     )
-    how = "smoothly from their rim" if interface.is_plane else "with straight lines"
-    if gaps == "refuse":
+    if interface.is_plane or interface.is_free:
+        if gaps != "skip":
+            raise InputError(f"{text}; give them: gaps are filled on periodic lines only")
+    elif gaps == "refuse":
         raise InputError(
             f"{text}; give them, make interface.length that of the record, or pass gaps='fill'"
-            f" to st.onset or st.read_profile, which fills them {how}"
+            " to st.onset or st.read_profile, which fills them with straight lines"
         )
-    if gaps == "fill":
-        rows = rows.copy()
-        for one, hole in zip(rows, holes, strict=True):
-            if hole.any():
-                _fill(one, hole, interface)
+    elif gaps == "fill":
+        if holes.all(axis=-1).any():
+            raise InputError("has no value at all")
+        x, length = interface.x, interface.extent
+        for one, hole in zip(rows := rows.copy(), holes, strict=True):
+            one[hole] = np.interp(x[hole], x[~hole], one[~hole], period=length)
         values = rows.reshape(values.shape)
         doubt = "; check interface.length and the unit of x" if missing.mean() > 0.5 else ""
-        warn_accuracy(f"{text}; filled {how}{doubt}")
+        warn_accuracy(f"{text}; filled with straight lines{doubt}")
     return values, ~missing & measured
-
-
-def _fill(values: Array, hole: Mask, interface: Interface) -> None:
-    """Solve Laplace's equation of the nodes in the hole, periodically or up to free ends.
-
-    On a line that is the straight line between its ends; nothing is higher or lower than its rim.
-    """
-    from scipy.sparse import csr_array
-    from scipy.sparse.linalg import spsolve
-
-    if hole.all():
-        raise InputError("has no value at all")
-    known, own = np.where(hole, 0.0, values), np.flatnonzero(hole)
-    nodes = np.arange(hole.size).reshape(hole.shape)
-    right, columns = np.zeros(own.size), [own]
-    entries: list[Array] = [np.zeros(own.size)]
-    for axis, spacing in enumerate(interface.spacings):
-        for step in (1, -1):
-            weight: Array = np.full(hole.shape, (min(interface.spacings) / spacing) ** 2)
-            if interface.is_free:
-                weight[0 if step == 1 else -1] = 0.0
-            weight = weight[hole]
-            right += weight * np.roll(known, step, axis)[hole]
-            columns.append(np.roll(nodes, step, axis)[hole])
-            entries.append(-weight)
-            entries[0] += weight
-    rows = np.tile(np.arange(own.size), len(columns))
-    index = (rows, np.concatenate(columns))
-    matrix = csr_array((np.concatenate(entries), index), shape=(own.size, hole.size))
-    values[hole] = spsolve(matrix.tocsc()[:, own], right)
 
 
 def with_gaps(problem: Any, result: xr.Dataset, measured: Any) -> xr.Dataset:
     """Return a result with the gaps of its profiles, and a mark of patches that reach into one."""
-    if np.all(measured):
-        return result
     interface, position = problem.interface, result["critical_position"]
-    places = position.values.reshape(-1, len(interface.shape))
-    rate, spacings, missing = problem.uniform_rate, interface.spacings, ~measured
-    patch = spacings if rate is None else problem.nucleation_lengths(rate)
-    for axis, nodes in enumerate(interface.coordinates.values()):
-        half, reach = 0.5 * interface.lengths[axis], max(0.5 * patch[axis], spacings[axis])
-        apart = np.abs(nodes - places[:, axis, None])
-        if not interface.is_free:
-            apart = np.abs(np.mod(nodes - places[:, axis, None] + half, 2.0 * half) - half)
-        others = [other + 1 for other in range(len(spacings)) if other != axis]
-        missing = missing & np.expand_dims(apart < (1.0 - 1e-9) * reach, others)
-    found = missing.any(axis=interface.axes)
+    if np.all(measured) or interface.is_plane or interface.is_free:  # nothing was filled
+        return result
+    rate, length, place = problem.uniform_rate, interface.extent, position.values.reshape(-1, 1)
+    patch = interface.spacing if rate is None else problem.nucleation_lengths(rate)[0]
+    apart = np.abs(np.mod(interface.x - place + 0.5 * length, length) - 0.5 * length)
+    near = apart < (1.0 - 1e-9) * max(0.5 * patch, interface.spacing)
+    found = (near & ~measured).any(axis=-1)
     if found.any():
-        first = zip(interface.dims, places[int(np.argmax(found))], strict=True)
+        first = float(place[int(np.argmax(found)), 0])
         warn_accuracy(
-            f"the critical patch at {', '.join(f'{dim} = {at:.6g} m' for dim, at in first)} reaches"
-            f" into a gap of the profile ({found.sum()} of {found.size} samples): the strength"
-            " there was filled in, not measured"
+            f"the critical patch at x = {first:.6g} m reaches into a gap of the profile"
+            f" ({found.sum()} of {found.size} samples): the strength there was filled in, not"
+            " measured"
         )
-    dims = tuple(dim for dim in position.dims if dim != "direction")
     about = {"units": "1", "long_name": "whether the critical patch reaches into a gap"}
-    result[IN_GAP] = (dims, found.reshape([position.sizes[dim] for dim in dims]), about)
-    nodes = {dim: (dim, at, {"units": "m"}) for dim, at in interface.coordinates.items()}
-    along = (("sample", *interface.dims), measured)
-    return result.assign_coords(
-        nodes | {MEASURED: along if len(measured) > 1 else (interface.dims, measured[0])}
-    )
+    result[IN_GAP] = (position.dims, found.reshape(position.shape), about)
+    along = ("sample", "x") if len(measured) > 1 else ("x",)
+    known = measured if len(measured) > 1 else measured[0]
+    x = ("x", interface.x, {"units": "m"})
+    return result.assign_coords({"x": x, MEASURED: (along, known)})

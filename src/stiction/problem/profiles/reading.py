@@ -42,8 +42,6 @@ SAMPLES = ("sample", "samples")
 _UNNAMED = re.compile(r"\d+$|values?$")
 """Columns that say nothing of what they hold; without a heading they are called by numbers."""
 
-NARROWEST = 8
-"""Rows, and columns without headings, that are a matrix, its rows along x."""
 TALL = 1e-3
 """Range of heights, m, from which on a unit must be stated: numbers in um or nm have more."""
 
@@ -71,7 +69,7 @@ def read_profile(
         ``.npy``: shape (nodes,) or (nx, ny). ``.csv``, ``.txt``, ``.dat``, ``.tsv``, ``.xlsx``:
         columns, with or without a line of names such as ``x (mm); strength (MPa)``. ``.nc``:
         variables with `units`, and x as a coordinate. A map is over 'x' and 'y'; a table has both
-        as columns, or is a matrix of eight columns or more without names, its rows along x.
+        as columns.
     x, value : str or int, optional
         Name, heading or number (from 0) of the column, coordinate or variable. By default the one
         with such a name (``x``, ``position``; ``strength``, ``tau_p``), the only one in a unit of
@@ -87,8 +85,8 @@ def read_profile(
         Interpolate linearly if the points of a line do not coincide with the nodes.
     gaps : {"refuse", "fill", "skip"}
         Refuse missing values (NaN, empty cells, missing points), fill them with straight
-        lines (on a plane smoothly from their rim), or leave NaN, for `stiction.fit_field`.
-        Without an interface, they always stay.
+        lines (not on planes and specimens), or leave NaN, for `stiction.fit_field`. Without an
+        interface, they always stay.
 
     Returns
     -------
@@ -240,21 +238,50 @@ def labelled(
     data: Any = load(Path(source)) if isinstance(source, str | Path) else source
     if not is_labelled(data):
         raise InputError(f"must be a path, a DataArray or a Dataset, got {describe(source)}")
-    numbered = "row" in data.dims and all(str(name).isdecimal() for name in data.variables)
-    wide = numbered and min(len(data.variables), data.sizes["row"]) >= NARROWEST
-    if wide and x is value is None and dims != ("x",):
-        data = data.to_array("y").transpose("row", "y").drop_vars("y").rename(row="x")
-        if all(map(_equidistant, (data.values[0, 1:], data.values[1:, 0]))):
-            raise InputError(
-                "the first row and the first column of the matrix are places, not values; leave"
-                " them out, and give the interface"
-            )
     if not hasattr(data, "data_vars"):
         if value not in (None, data.name):
             only = f"the name of the only variable, {data.name!r}"
             raise InputError(f"value: {value!r} is not {only}")
         data, value = data.to_dataset(name=quantity), quantity
     dims = dims or (("x", "y") if _is_map(data) else ("x",))
+    chosen, places = _chosen(data, quantity, dims, x, value)
+    texts = [data[name].attrs.get("text") for name in (chosen, *places.values())]
+    if "row" in data.dims and any(texts):
+        raise InputError(filter(None, texts))
+    array = data[chosen]
+    at = {dim: data[name].variable for dim, name in places.items()}
+    at = {dim: one for dim, one in at.items() if {*one.dims} <= {*array.dims}}
+    own = [name for name in array.coords if name not in (MEASURED, *array.dims)]
+    array = _directed(array.drop_vars(own).assign_coords(at), dims)
+    if len({*dims} & {*array.coords}) == 1 < len(dims):
+        raise InputError("has the coordinate x or y only; a map has both, or none")
+    values = in_si(array, quantity, QUANTITIES[quantity].units, unit)
+    if quantity == "height" and not (unit or unit_of(array) or hasattr(array.data, "units")):
+        _doubt_metres(values[np.isfinite(values)])
+    for dim in {*dims} & {*array.coords}:
+        place = in_si(array[dim], dim, "m", x_unit)
+        if not np.all(np.isfinite(place)):
+            entry = int(np.argmin(np.isfinite(place)))
+            line = f" (line {data.attrs['lines'][entry]})" if "lines" in data.attrs else ""
+            raise InputError(f"{dim} must be finite; entry {entry}{line} is not")
+        array = array.assign_coords({dim: (array[dim].dims, place)})
+    return array.copy(data=values)
+
+
+def _doubt_metres(heights: Array) -> None:
+    """Warn of heights without a unit that are rather in um or nm."""
+    if heights.size and np.ptp(heights) > TALL:
+        warn_user(
+            f"height: has no unit, is taken in m, and ranges over {np.ptp(heights):.3g} m; give"
+            " unit='um' or another, or unit='m' if that is right",
+            UnitWarning,
+        )
+
+
+def _chosen(
+    data: Any, quantity: str, dims: tuple[str, ...], x: Column, value: Column
+) -> tuple[Any, dict[str, Any]]:
+    """Return the names of the variable, and of its places by direction if there are any."""
     names, table, si = list(data.data_vars), "row" in data.dims, QUANTITIES[quantity].units
     words = (quantity, *NAMES.get(quantity, ()))
     chosen = None if value is None else _column(data, names, "value", value)
@@ -280,38 +307,7 @@ def labelled(
     unplaced = len(places) < len(dims) and (len(dims) == 2 or many)
     if chosen is None or (table and (unplaced or (rivals and x is None and len(dims) == 1))):
         raise InputError(_unclear(data, names, quantity, dims))
-    array = data[chosen]
-    texts = [data[name].attrs.get("text") for name in (chosen, *places.values()) if table]
-    if any(texts):
-        raise InputError(filter(None, texts))
-    at = {dim: data[name].variable for dim, name in places.items()}
-    at = {dim: one for dim, one in at.items() if {*one.dims} <= {*array.dims}}
-    own = [name for name in array.coords if name not in (MEASURED, *array.dims)]
-    array = _directed(array.drop_vars(own).assign_coords(at), dims)
-    if len({*dims} & {*array.coords}) == 1 < len(dims):
-        raise InputError("has the coordinate x or y only; a map has both, or none")
-    values = in_si(array, quantity, si, unit)
-    stated = unit or unit_of(array) or hasattr(array.data, "units")
-    finite = values[np.isfinite(values)]
-    if quantity == "height" and not stated and finite.size and np.ptp(finite) > TALL:
-        warn_user(
-            f"height: has no unit, is taken in m, and ranges over {np.ptp(finite):.3g} m; give"
-            " unit='um' or another, or unit='m' if that is right",
-            UnitWarning,
-        )
-    for dim in {*dims} & {*array.coords}:
-        place = in_si(array[dim], dim, "m", x_unit)
-        if not np.all(np.isfinite(place)):
-            entry = int(np.argmin(np.isfinite(place)))
-            line = f" (line {data.attrs['lines'][entry]})" if "lines" in data.attrs else ""
-            raise InputError(f"{dim} must be finite; entry {entry}{line} is not")
-        array = array.assign_coords({dim: (array[dim].dims, place)})
-    return array.copy(data=values)
-
-
-def _equidistant(values: Array) -> bool:
-    steps = np.diff(values)
-    return bool(np.ptp(steps) < 1e-3 * np.abs(steps.mean()))
+    return chosen, places
 
 
 def _is_map(data: Any) -> bool:
@@ -336,7 +332,7 @@ def _column(data: Any, names: list[Any], what: str, wanted: Column) -> Any:
     """Return the variable of this name, heading or number."""
     columns = list(data.data_vars)
     if isinstance(wanted, int) and "row" in data.dims and 0 <= wanted < len(columns):
-        return columns[wanted]
+        wanted = columns[wanted]
     for name in names:
         if wanted in (name, data[name].attrs.get("heading")):
             return name
@@ -346,7 +342,7 @@ def _column(data: Any, names: list[Any], what: str, wanted: Column) -> Any:
 def _unclear(data: Any, names: list[Any], quantity: str, dims: tuple[str, ...]) -> str:
     units = {name: unit_of(data[name]) for name in names if not str(name).isdecimal()}
     shown = [f"{name!r} in {unit}" if unit else repr(name) for name, unit in units.items()]
-    listed = ", ".join(shown) or f"{len(names)} columns without names, as of a matrix"
+    listed = ", ".join(shown) or f"{len(names)} columns without names"
     if len(dims) == 2 and not {*dims} <= {_plain(name) for name in data.variables}:
         return f"has no columns x and y: got {listed}{OF_A_PLANE}"
     return (

@@ -67,64 +67,55 @@ def _read_npy(path: Path) -> Array:
 
 
 def read_table(path: Path) -> xr.Dataset:
-    """Read a table of numbers from a text file, or from the sheet of a workbook that has numbers.
+    """Read a table of numbers from a text file, or from the first sheet of a workbook.
 
     Columns are separated by semicolons, tabs, commas or blanks, in this order; the decimal sign may
-    be a comma unless commas separate. Lines that begin with ``#`` are comments; the last one before
-    the numbers names the columns if no other line does. Names may have a line of units below them,
-    and titles above them. Columns become variables along 'row', NaN where a cell is empty; those
-    without names are called by their numbers, from 0. What is empty at the end is left out. The
-    attribute `lines` has the number of each row's line; `text` of a column without any number says
-    what it holds.
+    be a comma unless commas separate. Lines that begin with ``#`` are comments. The last line above
+    the numbers names the columns, or states their units below a line of names; without one, the
+    last comment may name them. Columns become variables along 'row', NaN where a cell is empty;
+    those without names are called by their numbers, from 0. What is empty at the end is left out.
+    The attribute `lines` has the number of each row's line; `text` of a column without any number
+    says what it holds.
     """
     import xarray as xr
 
-    lines: list[tuple[int, str]] = []
-    comment, separator = "", ""
     if path.suffix.lower() == EXCEL:
-        rows = _sheet(path)
+        rows, comment, separator = _sheet(path), "", ""
     else:
-        for number, line in enumerate(_text(path).splitlines(), 1):
-            if line.lstrip().startswith("#"):
-                comment = comment if lines else line.strip().lstrip("#").strip()
-            elif line.strip():
-                lines.append((number, line))
-        separator = _separator([line for _, line in lines])
-        rows = [(number, _split(line, separator)) for number, line in lines]
+        rows, comment, separator = _lines(path)
     while rows and not any(rows[-1][1]):
         rows.pop()
     width = max((i for _, cells in rows for i, cell in enumerate(cells, 1) if cell), default=0)
     rows = [(number, cells[:width]) for number, cells in rows]
-    header: list[tuple[int, list[str]]] = []
-    numeric = [_number(cell, separator) is not None for cell in rows[-1][1]] if rows else []
-    while rows and _is_heading(rows[0][1], numeric, separator):
-        if header and _states(header[-1][1]) and _is_gap(rows[0][1]):
-            break  # below units: a row of missing values
-        header.append(rows.pop(0))
-    while header and _has_number(header[-1][1], separator):  # refused below
-        rows.insert(0, header.pop())
-    while any(
-        _has_number(cells, separator) for _, cells in header
-    ):  # titles such as 'Probe;12'
-        header.pop(0)
+    last = rows[-1][1] if rows else []
+    numeric = [i for i, cell in enumerate(last) if _number(cell, separator) is not None]
+    start = 0
+    while start < len(rows) and not _holds_values(rows[start][1], numeric, separator):
+        start += 1
+    header, rows = rows[:start], rows[start:]
     if not rows:
         raise InputError("holds no numbers")
-    start, first = rows[0]
+    for number, cells in header[-1:]:
+        named = [cells[i] for i in numeric if i < len(cells)]
+        wrong = [cell for cell in named if _number(cell, separator) is None]
+        if len(wrong) < len(named):  # no names: a value that went wrong
+            raise InputError(f"line {number}: {describe(wrong[0])} is not a number")
     if not header and comment:
-        cells = [comment] if len(first) == 1 else _split(comment, separator)
-        header = [(0, cells)] if len(cells) == len(first) else []
+        cells = [comment] if width == 1 else _split(comment, separator)
+        header = [(0, cells)] if len(cells) == width else []
     integers = all(re.fullmatch(r"[+-]?\d+", cell) for _, cells in rows for cell in cells)
-    if separator == "," and not header and len(first) == 2 and integers:
+    if separator == "," and not header and width == 2 and integers:
         raise InputError(
-            f"line {start}: {','.join(first)!r} may be one number or two; separate columns"
-            " with ';', or write decimal points"
+            f"line {rows[0][0]}: {','.join(rows[0][1])!r} may be one number or two; separate"
+            " columns with ';', or write decimal points"
         )
-    columns = np.full((len(first), len(rows)), np.nan)
+    first = len(rows[0][1])
+    columns = np.full((first, len(rows)), np.nan)
     texts: dict[int, str] = {}  # such as dates: nobody may want a column without a number
     for place, (number, cells) in enumerate(rows):
-        if len(cells) != len(first):
+        if len(cells) != first:
             raise InputError(
-                f"line {number} has {len(cells)} columns, line {start} has {len(first)}"
+                f"line {number} has {len(cells)} columns, line {rows[0][0]} has {first}"
             )
         for column, cell in enumerate(cells):
             value = _number(cell, separator)
@@ -135,47 +126,47 @@ def read_table(path: Path) -> xr.Dataset:
     if mixed := [text for column, text in texts.items() if np.isfinite(columns[column]).any()]:
         raise InputError(mixed)
     data = xr.Dataset(attrs={"lines": [number for number, _ in rows]})
-    for number, (name, about) in enumerate(_headings(header, len(first))):
+    for number, (name, about) in enumerate(_headings(header, first)):
         if name in data:
             name = about["heading"] if about["heading"] not in data else f"{name} {number}"
         data[name] = ("row", columns[number], about | {"text": texts.get(number, "")})
     return data
 
 
+def _lines(path: Path) -> tuple[list[tuple[int, list[str]]], str, str]:
+    """Return the cells of each line with its number, the last comment above them, and what
+    separates them.
+    """
+    lines, comment = [], ""
+    for number, line in enumerate(_text(path).splitlines(), 1):
+        if line.lstrip().startswith("#"):
+            comment = comment if lines else line.strip().lstrip("#").strip()
+        elif line.strip():
+            lines.append((number, line))
+    separator = _separator([line for _, line in lines])
+    return [(number, _split(line, separator)) for number, line in lines], comment, separator
+
+
 def _sheet(path: Path) -> list[tuple[int, list[str]]]:
-    """Return the rows of the one sheet of a workbook that holds numbers."""
+    """Return the rows of the first sheet of a workbook."""
     import pandas as pd
 
-    options: Any = {"sheet_name": None, "header": None, "dtype": str, "na_filter": False}
+    options: Any = {"header": None, "dtype": str, "na_filter": False, "engine": "openpyxl"}
     try:
-        sheets = pd.read_excel(io.BytesIO(content_of(path)), engine="openpyxl", **options)
+        sheet = pd.read_excel(io.BytesIO(content_of(path)), **options)
     except ImportError:
         raise InputError("needs openpyxl (pip install openpyxl), or save it as .csv") from None
     except Exception as error:  # the library lets through whatever a broken file leads to
         raise InputError(f"is not a workbook: {error}") from None
-    tables = {str(name): sheet.to_numpy().tolist() for name, sheet in sheets.items()}
-    found = [name for name, rows in tables.items() if any(map(_has_number, rows))]
-    if len(found) != 1:
-        raise InputError(f"must have numbers on one sheet, got {', '.join(found) or 'none'}")
-    return [(n, [cell.strip() for cell in row]) for n, row in enumerate(tables[found[0]], 1)]
+    rows = enumerate(sheet.to_numpy().tolist(), 1)
+    return [(number, [cell.strip() for cell in row]) for number, row in rows]
 
 
-def _is_heading(cells: list[str], numeric: list[bool], separator: str) -> bool:
-    """Whether a row has no numbers, or other text where there are numbers in the end."""
-    pairs = zip(cells, numeric, strict=False)
-    text = any(
-        n and c.lower() not in _EMPTY and _number(c, separator) is None for c, n in pairs
-    )
-    return text or not _has_number(cells, separator)
-
-
-def _is_gap(cells: list[str]) -> bool:
-    """Whether a row says that its values are missing, as '-' or 'nan' do."""
-    return any(cells) and all(cell.lower() in _EMPTY for cell in cells)
-
-
-def _has_number(cells: list[str], separator: str = "") -> bool:
-    return any(_number(cell, separator) is not None for cell in cells)
+def _holds_values(cells: list[str], numeric: list[int], separator: str) -> bool:
+    """Whether a row has numbers, or says that they are missing, where the last one has numbers."""
+    found = [cells[i] for i in numeric if i < len(cells)]
+    known = (c.lower() in _EMPTY or _number(c, separator) is not None for c in found)
+    return any(found) and all(known)
 
 
 def _text(path: Path) -> str:
@@ -226,25 +217,16 @@ def _headings(
     """Return the name and the attributes of each column."""
     if not header:
         return [(str(number), {}) for number in range(width)]
-    rows = [(number, cells) for number, cells in header if len(cells) == width]
-    if not rows:
-        number, cells = header[-1]
+    number, names = header[-1]
+    if len(names) != width:
         raise InputError(
-            f"line {number} names {len(cells)} columns, the numbers below it have"
-            f" {width}; begin comment lines with '#'"
+            f"line {number} names {len(names)} columns, the numbers below it have {width}; begin"
+            " comment lines with '#'"
         )
-    # Titles stand above the names, and units below them: the last line that states units counts.
-    filled = [sum(map(bool, cells)) for _, cells in rows]
-    first = filled.index(max(filled))
-    names, units = rows[first][1], [""] * width
-    for number, cells in rows[first + 1 :]:
-        bare = [cell.strip("()[]{} ") for cell in cells]
-        if any(map(parse, filter(None, bare))):
-            if any(units):
-                raise InputError(f"line {number} is a second line of units")
-            units = bare
-        elif sum(map(bool, cells)) == max(filled) and (_states(cells) or not _states(names)):
-            names = cells
+    units = [""] * width
+    bare = [cell.strip("()[]{} ") for cell in names]
+    if len(header) > 1 and len(header[-2][1]) == width and any(map(parse, filter(None, bare))):
+        names, units = header[-2][1], bare
     found = []
     for heading, below in zip(names, units, strict=True):
         name, unit = name_and_unit(heading)
@@ -253,11 +235,6 @@ def _headings(
         unit = unit or below
         found.append((name, {"heading": heading} | ({"units": unit} if unit else {})))
     return found
-
-
-def _states(headings: list[str]) -> bool:
-    """Whether any of them states a unit."""
-    return any(name_and_unit(heading)[1] for heading in headings)
 
 
 def name_and_unit(text: str) -> tuple[str, str]:
