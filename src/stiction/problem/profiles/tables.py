@@ -137,7 +137,8 @@ def _lines(path: Path) -> tuple[list[tuple[int, list[str]]], str, str]:
     """Return the cells of each line with its number, the last comment above them, and what
     separates them.
     """
-    lines, comment = [], ""
+    lines: list[tuple[int, str]] = []
+    comment = ""
     for number, line in enumerate(_text(path).splitlines(), 1):
         if line.lstrip().startswith("#"):
             comment = comment if lines else line.strip().lstrip("#").strip()
