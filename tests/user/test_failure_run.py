@@ -67,12 +67,8 @@ def test_a_curve_is_that_of_samples_of_its_point(whole):
     assert one.cv.values[0] == pytest.approx(np.sqrt(0.5 / SAMPLES), rel=0.2)
 
 
-@pytest.mark.parametrize("uncertain", [False, True])
-def test_interrupted_in_parts_and_grown_it_has_the_same_bits(uncertain, whole, tmp_path):
-    one = study(uncertain=UNCERTAIN) if uncertain else study()
-    if uncertain:
-        whole = computed(tmp_path / "whole", one=one)
-        assert whole.members.dims == ("correlation_length", "point", "member")
+def test_interrupted_in_parts_and_grown_it_has_the_same_bits(whole, tmp_path):
+    one = study()
 
     def stop(done, total):
         if done == 2:
