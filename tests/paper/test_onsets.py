@@ -5,17 +5,14 @@ import math
 import numpy as np
 import pytest
 from importance import by_importance, longer
-from setups import LENGTH, LOCAL, RATE, beta_strength, exact_onset, local_onset, make_problem
+from setups import LOCAL, beta_strength, exact_onset, local_onset, make_problem
 
 import stiction as st
-from stiction.methods.criterion.average import least_average
-from stiction.methods.criterion.windows import ellipse_window
-from stiction.methods.equilibrium.transforms.plane import Plane, plane_onset
 
 
 @pytest.mark.parametrize(
     ("ratio", "expected", "patches"),
-    [(0.25, 4.1e3, 27.0), (0.5, 1.5e3, 9.0), (1.0, 0.3e3, 2.8), (2.0, 0.02e3, 1.4)],
+    [(0.25, 4.1e3, 27.0), (1.0, 0.3e3, 2.8)],
 )
 def test_bias_of_the_local_criterion(ratio, expected, patches):
     """Mean of local minus exact (Pa) and slipping patches at onset; G* = G/(1-nu), n = 1024."""
@@ -32,43 +29,6 @@ def test_bias_of_the_local_criterion(ratio, expected, patches):
     # The grid's own local bound is strict; the continuous one is 1e-4 MPa lower at worst.
     assert bias.min() > -2e2
     assert np.all(exact.certificate_gap < 1e-9 * exact.critical_load)
-
-
-# Expected are means of 12 other samples from an independent bisection in plain numpy, rounded as
-# printed; their standard deviations give the errors allowed.
-@pytest.mark.parametrize(
-    ("ratio", "onset", "deviation", "excess", "slipping"),
-    [
-        (0.25, 0.838e6, 0.012e6, 0.036, 0.43),
-        (0.5, 0.765e6, 0.018e6, 0.028, 0.21),
-        (1.0, 0.707e6, 0.018e6, 0.011, 0.07),
-        (2.0, 0.686e6, 0.016e6, 0.003, 0.03),
-    ],
-)
-def test_figures_of_planes_of_eight_nucleation_lengths(
-    ratio, onset, deviation, excess, slipping
-):
-    shape, samples = (96, 96), 6
-    plane, one = Plane((8.0 * LENGTH, 8.0 * LENGTH), 1e9, 0.33), np.ones(shape)
-    interface, symbol = st.Interface(plane.lengths, shape), plane.symbol(shape)
-    windows = [
-        ellipse_window(symbol, shape, plane.lengths, RATE, aspect)
-        for aspect in (1.0, 1.25, 1.0 / 0.67)
-    ]
-    loads, over, share = [], [], []
-    for strength in beta_strength(ratio * LENGTH).sample(interface, samples=samples, seed=1):
-        found = plane_onset(plane, strength, one, RATE * one)
-        assert found.closed
-        loads.append(found.lower)
-        least = least_average(interface, windows, strength[None], one)[0][0]
-        over.append(least / found.lower - 1.0)
-        share.append((found.slip > 0.0).mean())
-    # Three standard errors of the difference of the two means; shares have their own deviations.
-    errors = 3.0 * np.sqrt(1.0 / 12.0 + 1.0 / samples)
-    assert np.mean(loads) == pytest.approx(onset, abs=errors * deviation)
-    for values, expected in ((over, excess), (share, slipping)):
-        error = max(errors * np.std(values, ddof=1), 0.1 * expected)
-        assert np.mean(values) == pytest.approx(expected, abs=error)
 
 
 @pytest.mark.slow

@@ -181,19 +181,6 @@ def test_a_fault_becomes_unstable_where_and_when_its_patch_breaks(fault):
         assert np.isnan(run[name].item())
 
 
-def test_its_picture_has_a_front_and_its_film_a_clock(fault):
-    run, *_ = fault
-    axes = st.plot.rupture(run)
-    assert len(axes.collections) == 1
-    assert axes.figure.axes[-1].get_ylabel() == "front (µs since the onset)"
-    levels = axes.collections[0].levels
-    assert 0.0 < levels[0] < levels[-1] < 1e6 * np.nanmax(run.arrival_time)
-    (_, _, texts) = film_clock(run)
-    assert texts[0].startswith("0.0 µs since the onset")
-    found = [float(re.match(r"[\d.,]+", text)[0].replace(",", "")) for text in texts]
-    assert found == pytest.approx(1e6 * run.time.values, abs=0.06)
-
-
 def film_clock(run):
     from stiction.plot.ruptures import _clock
 

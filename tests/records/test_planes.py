@@ -1,6 +1,7 @@
 """Recorded outputs: planes where nothing is symmetric."""
 
 import dataclasses
+import tempfile
 
 import numpy as np
 from crooked import PLANE, PLANE_STRENGTH, across_the_seam, uneven
@@ -108,10 +109,23 @@ def a_rupture_with_stations():
         - 3e5 * np.roll(across_the_seam(problem.interface, 4e-3), (14, 9), (0, 1))
     )
     save = st.Save(
-        ["slip", "shear_stress"], every=40, stations={"a": (0.004, 0.021), "b": (0.02, 0.003)}
+        ["slip", "slip_rate", "shear_stress"],
+        every=40,
+        stations={"a": (0.004, 0.021), "b": (0.02, 0.003)},
     )
     method = st.Rupture(loading_rate=6e8, kernel_tolerance=1e-5)
-    return st.simulate_rupture(problem, strength, method=method, save=save)
+    found = st.simulate_rupture(problem, strength, method=method, save=save)
+    with tempfile.TemporaryDirectory() as folder:
+        options = {"origin": (0.012, 0.011), "normal_stress": -5e6}
+        files = st.external.write_scec(found, folder, **options)
+        written = {path.name: path.read_text().split("\n") for path in files}
+    return {"run": found} | {
+        name: {
+            "head": "\n".join(line for line in lines if line.startswith("# ")),
+            "last": np.array([line.split() for line in lines[-40:-1]], dtype=float),
+        }
+        for name, lines in written.items()
+    }
 
 
 test_outputs_are_as_recorded = compared(calls, __file__)
