@@ -2,18 +2,14 @@
 
 Work of the load, less friction, less the static strain energy of the slip, is radiated: never
 negative, and steady once everything rests.
-Run: python validation/energy.py [folder for the figure]
+Run: python validation/energy.py
 """
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 import stiction as st
-from stiction.plot.style import PAGE, panel, paper_style, series
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0, plane="strain")
 LOAD = 7.5e5
@@ -42,24 +38,8 @@ def compute() -> list[tuple[int, float]]:
     return [(steps, abs(radiated(steps) / reference - 1.0)) for steps in (400, 800, 1600)]
 
 
-def draw(folder: Path) -> None:
-    """Shares of the work over time, of a rupture that runs and of one that is arrested."""
-    with paper_style():
-        figure = Figure(figsize=(PAGE, 2.6))
-        runs = (rupture(800), rupture(4000, barrier=4e6, end=200e-6))
-        names = ("work", "fracture_energy", "strain_energy", "radiated_energy")
-        for letter, axes, run in zip("ab", figure.subplots(1, 2), runs, strict=True):
-            for i, name in enumerate(names):
-                label = name.replace("_", " ")
-                axes.plot(run["time"] * 1e6, run[name], label=label, **series(i))
-            axes.set(xlabel="$t$ (µs)", ylabel="energy (J/m)")
-            axes.legend(loc="upper left" if letter == "a" else (0.5, 0.5))
-            panel(axes, letter)
-        figure.savefig(folder / "validation_energy.png")
-
-
 def main() -> None:
-    """Print and draw."""
+    """Print them."""
     errors = compute()
     for steps, error in errors:
         print(f"{steps:5d} steps: radiated energy off by {error:.2e}")
@@ -67,7 +47,6 @@ def main() -> None:
     held = rupture(4000, barrier=4e6, end=200e-6)["radiated_energy"].values
     print(f"arrested: radiated {held[-1]:.6f} J/m, smallest {held.min():.1e}, change over the last "
           f"half {abs(held[-1] / held[held.size // 2] - 1.0):.1e}")  # fmt: skip
-    draw(Path(sys.argv[1] if len(sys.argv) > 1 else "."))
 
 
 if __name__ == "__main__":

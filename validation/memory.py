@@ -2,19 +2,15 @@
 
 The same predictor-corrector steps through a rupture: with sums of exponentials, with the full
 history, and with a history cut off at |k| c_s t = 100, as tables of the kernel are.
-Run: python validation/memory.py [folder for the figure]
+Run: python validation/memory.py
 """
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 import stiction as st
 from stiction.elasticity.memory_kernels import arc_quadrature
-from stiction.plot.style import COLUMN, paper_style, series
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
 NODES, STEPS, LOADING = 128, 1200, 3e9
@@ -81,24 +77,11 @@ def compute() -> dict[str, np.ndarray]:
     return {name: np.abs(slip - full).max(axis=1) / full.max() for name, slip in slips.items()}
 
 
-def draw(folder: Path, found: dict[str, np.ndarray]) -> None:
-    """Differences over the steps."""
-    with paper_style():
-        figure = Figure(figsize=(COLUMN * 1.2, 2.8))
-        axes = figure.subplots()
-        for i, (name, error) in enumerate(found.items()):
-            axes.semilogy(np.maximum(error, 1e-16), label=name, **series(i))
-        axes.set(xlabel="step", ylabel="largest difference in slip", ylim=(1e-12, 1.0))
-        axes.legend(loc="upper left")
-        figure.savefig(folder / "validation_memory.png")
-
-
 def main() -> None:
-    """Print and draw."""
+    """Print them."""
     found = compute()
     for name, error in found.items():
         print(f"{name:22s} largest difference in slip {error.max():.1e} of the largest slip")
-    draw(Path(sys.argv[1] if len(sys.argv) > 1 else "."), found)
 
 
 if __name__ == "__main__":

@@ -2,19 +2,15 @@
 
 Random strength at xi_0/h_n = 0.25, 0.5 and 2: the difference is smooth in the loading rate and
 vanishes with it.
-Run: python validation/onset.py [folder for the figure]
+Run: python validation/onset.py
 """
 
-import sys
 import warnings
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 import stiction as st
-from stiction.plot.style import COLUMN, paper_style, series
 
 RATES = (1e3, 1e4, 1e5, 1e6, 2e7, 1e8, 1e9)
 
@@ -40,30 +36,13 @@ def compute(
     return found
 
 
-def draw(folder: Path, found: dict[float, np.ndarray]) -> None:
-    """Difference over loading rate."""
-    with paper_style():
-        figure = Figure(figsize=(COLUMN * 1.2, 2.8))
-        axes = figure.subplots()
-        for i, (ratio, difference) in enumerate(found.items()):
-            style = series(i, marker=True)
-            label = rf"$\xi_0/h_n = {ratio:g}$"
-            axes.loglog(RATES, np.abs(difference).mean(axis=1), label=label, **style)
-        axes.axhline(1e-3, color="0.6", linewidth=0.7)
-        axes.text(1.2e3, 1.2e-3, "0.1 %", va="bottom")
-        axes.set(xlabel="loading rate (Pa/s)", ylabel="mean |rupture/equilibrium - 1|")
-        axes.legend()
-        figure.savefig(folder / "validation_onset.png")
-
-
 def main() -> None:
-    """Print and draw."""
+    """Print them."""
     found = compute()
     for ratio, difference in found.items():
         for rate, values in zip(RATES, difference, strict=True):
             print(f"xi_0/h_n = {ratio:4.2f}, {rate:7.0e} Pa/s: mean {values.mean():+.2e}, "
                   f"largest {np.abs(values).max():.2e}")  # fmt: skip
-    draw(Path(sys.argv[1] if len(sys.argv) > 1 else "."), found)
 
 
 if __name__ == "__main__":
