@@ -23,6 +23,7 @@ from scipy.optimize import linprog
 from scipy.special import ndtr
 
 import stiction as st
+from stiction.methods.equilibrium.sample import sample_of
 from stiction.methods.equilibrium.solver import make_program
 
 RATIOS = (0.25, 0.5, 1.0, 2.0)
@@ -280,7 +281,7 @@ def planes():
         row("  local criterion", ours, [("five plain convolutions", plain)])
         row("  equilibrium", solver_time(problem, st.Equilibrium(), sample(), 3)[0])
         program = make_program(problem)
-        one = program.sample_of(problem.sample(sample()), 0)
+        one = sample_of(problem.sample(sample()), program.pieces, 0)
         onset = timed(lambda p=program, s=one: p.next(s), 3)
         found = program.next(one)
         ours = timed(lambda p=program, s=one, f=found: p.jump(s, f), 3)

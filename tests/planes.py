@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from stiction.elasticity.half_spaces import HalfSpaces
 from stiction.methods.equilibrium.sample import LINEAR, make_sample
-from stiction.methods.equilibrium.transforms.plane import AT_CORNER, Plane
+from stiction.methods.equilibrium.transforms.plane import AT_CORNER
 
 
-class Lattice(Plane):
+class Lattice(HalfSpaces):
     """A plane with the wavenumbers (2/h) sin(k h/2) of a lattice, up to nu = 0.45 a Z-matrix."""
 
     def symbol(self, shape):
@@ -23,12 +24,15 @@ class Lattice(Plane):
         )
         k = np.hypot(first, second)
         k[0, 0] = 1.0
-        return (
-            0.5 * self.shear_modulus * (first**2 / (1.0 - self.poisson_ratio) + second**2) / k
-        )
+        return 0.5 * (self.moduli[0] * first**2 + self.moduli[1] * second**2) / k
 
 
-WAVENUMBERS = {"spectral": Plane, "lattice": Lattice}
+WAVENUMBERS = {"spectral": HalfSpaces, "lattice": Lattice}
+
+
+def moduli(modulus, ratio):
+    """G* along x and G along y, of a shear modulus and Poisson's ratio."""
+    return modulus / (1.0 - ratio), modulus
 
 
 def plane_sample(strength, residual, rate):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from checks import assert_second_order
 from oracles import angle_rule
-from planes import WAVENUMBERS
+from planes import WAVENUMBERS, moduli
 from setups import LENGTH, RATE, exact_onset, make_problem, turns
 
 from stiction.methods.criterion import eigenfunction
@@ -47,7 +47,7 @@ def plane_errors(nodes, wavenumbers):
         x, y = turns(count)[:, None], turns(count)[None, :]
         strength = 1e6 - 1.5e5 * np.cos(x) * np.cos(y) - 1e5 * np.cos(2.0 * x + y + 0.3)
         one = np.ones((count, count))
-        plane = WAVENUMBERS[name]((8.0 * LENGTH, 8.0 * LENGTH), 1e9, 0.33)
+        plane = WAVENUMBERS[name]((8.0 * LENGTH, 8.0 * LENGTH), moduli(1e9, 0.33))
         found = plane_onset(plane, strength, one, RATE * one, 1e-8)
         assert found.closed
         return found.upper

@@ -6,6 +6,7 @@ from scipy.special import jv
 from setups import QUARTER, ROUND_OFF, SOLID, local_onset, make_problem, turns
 
 import stiction as st
+from stiction.elasticity.half_spaces import SMALLEST_EIGENVALUE
 from stiction.methods.criterion.eigenfunction import (
     around,
     eigenvalue_and_vector,
@@ -15,7 +16,6 @@ from stiction.methods.criterion.eigenfunction import (
     weight,
 )
 from stiction.methods.criterion.windows import windows_of
-from stiction.problem.friction.parameters import SMALLEST_EIGENVALUE
 
 
 def first_onset(problem, tau_p):

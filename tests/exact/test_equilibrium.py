@@ -7,7 +7,13 @@ from oracles import symbol_of, times
 from setups import beta_strength, exact_onset, make_problem, turns
 
 import stiction as st
-from stiction.elasticity.line import apply_stiffness, make_stiffness, stiffness_column
+from stiction.elasticity.line import (
+    circular_entries,
+    smallest_window,
+    stiffness_column,
+    window_mode,
+)
+from stiction.elasticity.stiffness import apply_circular
 from stiction.methods.equilibrium.dense.cholesky import (
     append,
     back_substitute,
@@ -17,12 +23,11 @@ from stiction.methods.equilibrium.dense.cholesky import (
     row_start,
     substitute,
 )
-from stiction.methods.equilibrium.dense.line import LineProgram
 from stiction.methods.equilibrium.dense.linear_program import certificate
+from stiction.methods.equilibrium.dense.program import DenseProgram
 from stiction.methods.equilibrium.dense.runaway import Runs, block_factor, unstoppable_length
-from stiction.methods.equilibrium.dense.windows import smallest_window, window_mode
 from stiction.methods.equilibrium.patches import count_patches, main_patch
-from stiction.methods.equilibrium.sample import LINEAR, make_sample, pieces_of
+from stiction.methods.equilibrium.sample import LINEAR, make_sample, pieces_of, sample_of
 
 COLUMN = stiffness_column(256, 0.1, 1e9)
 
@@ -36,13 +41,13 @@ def test_closed_form_of_the_stiffness_and_sparse_products(problem):
     members, values = rng.choice(256, 77, replace=False), rng.standard_normal(77)
     field, result = np.zeros(256), np.empty(256)
     field[members] = values
-    apply_stiffness(make_stiffness(column), members, 77, values, np.empty((2, 128)), result)
+    apply_circular(circular_entries(column), members, 77, values, np.empty((2, 128)), result)
     np.testing.assert_allclose(result, times(symbol, field), atol=1e-13 * column[0])
 
 
 def growing_factor(nodes, column, diagonal, groups):
     """The factor of A on these nodes, appended group by group, and how many are in it."""
-    workspace = make_workspace(make_stiffness(column), column.size)
+    workspace = make_workspace(circular_entries(column), column.size)
     workspace.diagonal[:] = diagonal
     size = 0
     for group in groups:
@@ -97,7 +102,7 @@ def test_factor_of_a_matrix_with_a_raised_diagonal_entry(position):
 def test_factor_of_a_crack_that_grows_keeps_rows_that_stand():
     """Nodes that weaken no more come first; another rate, or another node, is a row made anew."""
     rng = np.random.default_rng(5)
-    workspace = make_workspace(make_stiffness(COLUMN), COLUMN.size)
+    workspace = make_workspace(circular_entries(COLUMN), COLUMN.size)
     workspace.inside[:] = False
     workspace.diagonal[:] = 0.8 * COLUMN[0]
     nodes = rng.permutation(256)[:60]
@@ -160,7 +165,7 @@ def test_conditions_of_optimality(problem, make_strength, ratio):
 
 def test_first_bound_is_a_bound(problem, make_strength):
     """A y <= 0 for the window chosen, where the weakening rate varies."""
-    program, symbol = LineProgram(problem), symbol_of(problem)
+    program, symbol = DenseProgram(problem), symbol_of(problem)
     tau_p = make_strength(0.5).sample(problem.interface, samples=50, seed=6)
     for number, excess in enumerate(tau_p):
         rate = 0.4e12 * (1.0 + 0.6 * np.sin((number % 9 + 1) * turns(256)))
@@ -176,17 +181,19 @@ def test_kernels_are_compiled_for_one_kind_of_array():
     problem = make_problem(weakening_rate=np.full(256, 0.5e12))
     rows = problem.sample(np.full(256, 1e6))
     assert not rows.weakening_rate.flags.writeable
-    assert all(field.flags.writeable for field in LineProgram(problem).sample_of(rows, 0)[:-1])
+    assert all(
+        field.flags.writeable for field in sample_of(rows, pieces_of(problem.friction), 0)[:-1]
+    )
 
 
 def test_certificate_is_the_distance_of_both_bounds(problem, make_strength):
     """From slip and multiplier that are allowed but not optimal."""
-    program = LineProgram(problem)
+    program = DenseProgram(problem)
     excess = make_strength(0.5).sample(problem.interface, samples=1, seed=4)[0]
-    sample = program.sample_of(problem.sample(excess), 0)
+    sample = sample_of(problem.sample(excess), program.pieces, 0)
     load, multiplier = program.bound(sample)
     # Without slip nothing below the weakest node is overstressed; above is the local bound.
-    workspace = make_workspace(program.stiffness, program.nodes)
+    workspace = make_workspace(program.elastic.entries, program.nodes)
     gap = certificate(sample, *np.zeros((2, 256)), multiplier, workspace)
     assert gap == pytest.approx(load - excess.min(), rel=1e-9)
 

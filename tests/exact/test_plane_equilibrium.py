@@ -2,15 +2,16 @@
 
 import numpy as np
 import pytest
-from planes import Lattice
+from planes import Lattice, moduli
 from setups import RATE, exact_onset, make_problem, repeated, turns
 
 import stiction as st
+from stiction.elasticity.half_spaces import HalfSpaces
 from stiction.elasticity.operator import make_operator, product
 from stiction.methods.criterion.windows import ellipse_window
 from stiction.methods.equilibrium.patches import labelled_patches, patch_of
 from stiction.methods.equilibrium.transforms.growing_patch import window_around
-from stiction.methods.equilibrium.transforms.plane import Plane, doubled, halved, plane_onset
+from stiction.methods.equilibrium.transforms.plane import doubled, halved, plane_onset
 
 NODES, LENGTH = 128, 0.04
 UNEVEN = {
@@ -123,7 +124,7 @@ def test_critical_disc_at_zero_poisson_ratio():
     length = 24.0 * radius  # images change the eigenvalue by some (radius/length)^3
     errors = []
     for nodes in (96, 192, 384):
-        symbol = Lattice((length, length), 1e9, 0.0).symbol((nodes, nodes))
+        symbol = Lattice((length, length), moduli(1e9, 0.0)).symbol((nodes, nodes))
         window = ellipse_window(symbol, (nodes, nodes), (length, length), RATE, 1.0)
         effective = np.sqrt(window.area / np.pi)
         errors.append(1.0 - effective * window.eigenvalue / RATE / radius)
@@ -134,7 +135,9 @@ def test_critical_disc_at_zero_poisson_ratio():
 
 def test_symbol_of_single_waves():
     shape = (32, 24)
-    operator = make_operator(Plane((2.0, 3.0), 1e9, 0.25).symbol(shape), 1e8, shape)
+    operator = make_operator(
+        HalfSpaces((2.0, 3.0), moduli(1e9, 0.25)).symbol(shape), 1e8, shape
+    )
     x = np.arange(32)[:, None] / 32 * 2.0 + np.zeros(shape)
     y = np.arange(24)[None, :] / 24 * 3.0 + np.zeros(shape)
     for kx, ky, wave in ((2, 0, np.cos(2 * np.pi * x)), (0, 1, np.sin(2 * np.pi * y / 3.0))):
@@ -148,14 +151,16 @@ def test_symbol_of_single_waves():
 def test_a_window_is_a_smaller_plane_around_a_patch():
     shape, small = (64, 48), (16, 24)
     rate = 1e8 * (1.0 + np.arange(64 * 48).reshape(shape))
-    operator = make_operator(Plane((2.0, 3.0), 1e9, 0.25).symbol(shape), rate, shape)
+    operator = make_operator(
+        HalfSpaces((2.0, 3.0), moduli(1e9, 0.25)).symbol(shape), rate, shape
+    )
     growth = np.zeros(shape)
     growth[30, 40] = 0.9e-2  # too little to be part of the patch
     growth[np.ix_([61, 62, 63, 0, 1], range(5, 15))] = 1.0
     nodes, window = window_around(operator, growth.reshape(-1), 2.0)
     # 2 times 5 and 10 nodes, at least 16: 64 over 4 and 48 over 2, around the middle.
     assert window.transform.shape == small
-    expected = Plane((0.5, 1.5), 1e9, 0.25).symbol(small).reshape(-1)
+    expected = HalfSpaces((0.5, 1.5), moduli(1e9, 0.25)).symbol(small).reshape(-1)
     np.testing.assert_allclose(window.symbol, expected, rtol=1e-14)
     rows, columns = np.unravel_index(nodes, shape)
     np.testing.assert_array_equal(rows.reshape(small)[:, 3], np.arange(56, 72) % 64)
@@ -170,7 +175,7 @@ def test_plane_too_small_for_a_patch_slides_near_the_mean():
     """Stiffness evens out the stress of a plane much smaller than the critical patch."""
     one = np.ones((16, 16))
     strength = np.random.default_rng(0).uniform(0.9e6, 1.1e6, one.shape)
-    found = plane_onset(Plane((2e-4, 2e-4), 1e9, 0.33), strength, one, RATE * one)
+    found = plane_onset(HalfSpaces((2e-4, 2e-4), moduli(1e9, 0.33)), strength, one, RATE * one)
     assert found.closed
     assert found.upper == pytest.approx(strength.mean(), rel=1e-3)
     assert found.upper <= strength.mean() * (1.0 + 1e-9)
@@ -185,7 +190,7 @@ def test_grid_transfer_keeps_linear_and_uniform_fields():
 
 @pytest.mark.parametrize("nodes", [16, 32, 128])
 def test_onset_close_to_the_weakest_node_or_to_the_mean(nodes):
-    one, plane = np.ones((nodes, nodes)), Plane((0.03, 0.03), 1e9, 0.33)
+    one, plane = np.ones((nodes, nodes)), HalfSpaces((0.03, 0.03), moduli(1e9, 0.33))
     for strength in (0.7e6, 0.9e6):
         uniform = plane_onset(plane, strength * one, one, RATE * one)
         assert uniform.lower == uniform.upper == strength

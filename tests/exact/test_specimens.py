@@ -13,8 +13,8 @@ from refusals import refusals
 from specimens import crooked, rough
 
 import stiction as st
-from stiction.elasticity.places import places_of
-from stiction.methods.equilibrium.dense.blocks import BlockProgram
+from stiction.methods.equilibrium.dense.program import DenseProgram
+from stiction.methods.equilibrium.sample import sample_of
 from stiction.random.stresses import mean_in_stress, support_in_stress
 
 INF = float("inf")
@@ -156,10 +156,10 @@ def test_the_multiplier_of_the_weakest_window_proves_its_bound(wavy, close):
     problem = crooked(rate=rate, residual=0.0)
     strength = rough(problem, 11, 8)
     exact = st.onset(problem, strength, method=st.Equilibrium()).first_instability.values
-    program, rows = BlockProgram(problem), problem.sample(strength)
+    program, rows = DenseProgram(problem), problem.sample(strength)
     above = []
     for i, stress in enumerate(exact):
-        sample = program.sample_of(rows, i)
+        sample = sample_of(rows, program.pieces, i)
         bound, multiplier = program.bound(sample)
         assert multiplier.min() >= 0.0
         assert multiplier @ sample.profile == pytest.approx(1.0)
@@ -193,7 +193,7 @@ def test_positive_entries_of_the_stiffness_are_doubted():
         assert off.max() > 0.0 or not isinstance(drive, st.Pusher)
         said = [
             "off its diagonal, up to 2e-07" in t
-            for t in texts(lambda p=problem: BlockProgram(p))
+            for t in texts(lambda p=problem: DenseProgram(p))
         ]
         assert said == [True] * doubted
 
@@ -222,7 +222,7 @@ def test_the_peak_is_said_to_be_residual_and_gaps_are_shares_of_the_first_instab
     monkeypatch,
 ):
     """A pusher near the interface: of three samples, those closer than a fiftieth of the fall."""
-    monkeypatch.setattr(BlockProgram, "widest_gap", -1.0)
+    monkeypatch.setattr(DenseProgram, "widest_gap", -1.0)
     problem = crooked(
         nodes=128, residual=0.61e6, rate=0.25e12, drive=st.Pusher(height=0.004, width=0.003)
     )
@@ -245,7 +245,7 @@ def test_the_peak_is_said_to_be_residual_and_gaps_are_shares_of_the_first_instab
 def test_nucleation_length_at_a_free_end_and_in_the_middle(mode, end):
     """In units of G*/W; 1.158 in the middle, half of it at an end in mode III."""
     problem = crooked(nodes=512, height=0.4, mode=mode, rate=0.12e12)
-    places = places_of(problem.blocks, 0.12e12)
+    places = problem.blocks.windows(0.12e12, 0.12e12)
     unit = problem.effective_modulus / 0.12e12 / problem.interface.spacing
     lengths = places.widths / unit
     assert lengths[0] == pytest.approx(end, rel=0.03) == lengths[-1]

@@ -9,6 +9,7 @@ from setups import make_problem, turns
 import stiction as st
 from stiction.methods.dynamics import slow_start as module
 from stiction.methods.dynamics.slow_start import slow_start, static_program
+from stiction.methods.equilibrium.sample import sample_of
 
 RATES = (2e5, 2e7, 2e8)
 RATIOS = (0.25, 0.5, 1.0, 2.0)
@@ -143,7 +144,7 @@ def test_the_state_at_the_start_is_that_of_the_slow_path():
     run = run_of(CROOKED, CROOKED_STRENGTH, st.Rupture(loading_rate=1e7))
     program, rows = static_program(CROOKED), CROOKED.sample(CROOKED_STRENGTH)
     state = slow_start(program, run, rows, 0, 1e7)
-    static, impedance = program.sample_of(rows, 0), run.medium.impedance
+    static, impedance = sample_of(rows, program.pieces, 0), run.medium.impedance
     load = state.now["load"] - impedance * state.rate.mean() / 1.2  # <p>
     step = 0.01 * (program.solve(static).load - load)
     slips = [program.solve(static, load + side * step).slip for side in (-1.0, 1.0)]

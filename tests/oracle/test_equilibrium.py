@@ -8,10 +8,12 @@ from oracles import by_relaxation, largest_load, symbol_of
 from setups import RATE, exact_onset, make_problem, turns
 
 import stiction as st
-import stiction.methods.equilibrium.dense.line
-from stiction.methods.equilibrium.dense.line import LineProgram
+import stiction.methods.equilibrium.dense.program
+from stiction.elasticity.half_spaces import HalfSpaces
+from stiction.methods.equilibrium.dense.program import DenseProgram
+from stiction.methods.equilibrium.sample import at_rest, sample_of
 from stiction.methods.equilibrium.solver import follow
-from stiction.methods.equilibrium.transforms.plane import Plane, plane_onset
+from stiction.methods.equilibrium.transforms.plane import plane_onset
 
 
 def relaxed(problem, strength, load, rate=RATE):
@@ -39,10 +41,10 @@ def assert_first(problem, tau_p, rate=None):
 def test_linear_programme_and_path_of_events(problem, make_strength, ratio):
     tau_p = make_strength(ratio).sample(problem.interface, samples=5, seed=7)
     loads = assert_first(problem, tau_p).first_instability.values
-    rows, program = problem.sample(tau_p), LineProgram(problem)
+    rows, program = problem.sample(tau_p), DenseProgram(problem)
     for row, load in enumerate(loads):
-        sample = program.sample_of(rows, row)
-        found = program.next(sample, replace(program.at_rest(sample), stuck=True))
+        sample = sample_of(rows, program.pieces, row)
+        found = program.next(sample, replace(at_rest(sample), by_events=True))
         assert found.unstable
         assert found.load == pytest.approx(load, rel=1e-11)
 
@@ -81,11 +83,11 @@ def test_transforms_agree_with_the_dense_factor(make_strength, monkeypatch, roug
     """Lines on which very many nodes slip are solved as planes are."""
     rate = 0.5e12 * (1.0 + rough * np.sin(5 * turns(2048)))
     problem = make_problem(2048, 0.2, weakening_rate=rate)
-    program = LineProgram(problem)
+    program = DenseProgram(problem)
     rows = problem.sample(make_strength(0.25).sample(problem.interface, samples=4, seed=12))
-    samples = [program.sample_of(rows, row) for row in range(4)]
+    samples = [sample_of(rows, program.pieces, row) for row in range(4)]
     dense = [program.solve(sample) for sample in samples]
-    monkeypatch.setattr(stiction.methods.equilibrium.dense.line, "MANY_NODES", 10)
+    monkeypatch.setattr(stiction.methods.equilibrium.dense.program, "MANY_NODES", 10)
     for sample, exact in zip(samples, dense, strict=True):
         found = program.solve(sample)
         assert found.load == pytest.approx(exact.load, rel=1e-9)
@@ -99,7 +101,7 @@ def test_transforms_agree_with_the_dense_factor(make_strength, monkeypatch, roug
 def test_a_patch_that_does_not_slip_yet_is_no_division_by_zero(solid):
     """One dip, so wide that hardly a node slips before the instability."""
     strength, one = 1e6 + 3e5 * np.cos(turns(4096)), np.ones(4096)
-    line = Plane((0.4,), solid.effective_modulus(), 0.0)
+    line = HalfSpaces((0.4,), (solid.effective_modulus(),))
     found = plane_onset(line, strength, one, RATE * one, 1e-9)
     assert found.closed
     assert 0.7e6 < found.lower < 0.701e6
@@ -124,8 +126,8 @@ def test_patches_alike_on_a_long_interface():
     for periods in (1, 32):
         problem = make_problem(128 * periods, 0.0135 * periods)
         tau_p = np.tile(1e6 + 0.3e6 * np.cos(turns(128)), periods)
-        program = LineProgram(problem)
-        loads.append(program.solve(program.sample_of(problem.sample(tau_p), 0)).load)
+        program = DenseProgram(problem)
+        loads.append(program.solve(sample_of(problem.sample(tau_p), program.pieces, 0)).load)
     assert loads[1] == pytest.approx(loads[0], rel=1e-11)
 
 
@@ -230,11 +232,11 @@ def test_sliding_is_proved(problem, make_strength, high):
     """Without any length taken for unstoppable, the same loads and events."""
     tau_p = make_strength(0.5, high=high).sample(problem.interface, samples=200, seed=17)
     plain = exact_onset(problem, tau_p)
-    program = LineProgram(problem)
+    program = DenseProgram(problem)
     # Griffith's length grows with the modulus, of which the test for arrest knows only here.
     program.runs = program.runs._replace(modulus=np.inf)
     rows = problem.sample(tau_p)
-    paths = [follow(program, program.sample_of(rows, row)) for row in range(200)]
+    paths = [follow(program, sample_of(rows, program.pieces, row)) for row in range(200)]
     loads = [path.last.load for path in paths]
     np.testing.assert_allclose(plain.critical_load, loads, rtol=1e-12)
     np.testing.assert_array_equal(plain.arrested_events, [len(path.events) for path in paths])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from crooked import crooked
 from oracles import by_linear_programme, by_relaxation, dense, largest_load, symbol_of
-from planes import WAVENUMBERS, Lattice, plane_sample
+from planes import WAVENUMBERS, Lattice, moduli, plane_sample
 from scipy.linalg import eigh
 from setups import (
     LENGTH,
@@ -18,12 +18,13 @@ from setups import (
 )
 
 import stiction as st
+from stiction.elasticity.half_spaces import HalfSpaces
 from stiction.elasticity.linear import SOLVED, lowest_eigenvector, no_spring, solve_inside
 from stiction.elasticity.operator import make_operator
-from stiction.methods.equilibrium.sample import Outcome, present_pieces
+from stiction.methods.equilibrium.sample import Outcome, present_pieces, sample_of
 from stiction.methods.equilibrium.solver import follow
 from stiction.methods.equilibrium.transforms.bracket import make_bracket
-from stiction.methods.equilibrium.transforms.plane import Plane, PlaneProgram, plane_onset
+from stiction.methods.equilibrium.transforms.plane import PlaneProgram, plane_onset
 from stiction.methods.equilibrium.transforms.relaxation import (
     least_equilibrium,
     stable_equilibrium,
@@ -63,7 +64,7 @@ def test_onset_and_sensitivity_equal_the_linear_programme(seed):
 def test_bounds_and_multiplier_equal_the_linear_programme(seed, wavenumbers):
     rng = np.random.default_rng(seed)
     shape = (24, 24) if seed % 2 else (26, 24)
-    plane = WAVENUMBERS[wavenumbers](SQUARE, 1e9, 0.33)
+    plane = WAVENUMBERS[wavenumbers](SQUARE, moduli(1e9, 0.33))
     strength = 0.66e6 + 1e6 * smooth_noise(rng.choice([2.0, 4.0, 8.0]), rng, shape)
     if seed % 3 == 0:  # rough
         strength *= rng.uniform(0.9, 1.1, shape)
@@ -83,7 +84,7 @@ def test_bounds_and_multiplier_equal_the_linear_programme(seed, wavenumbers):
 def test_any_multiplier_bounds_the_onset_where_some_nodes_do_not_weaken():
     """What is lifted to A y <= 0 bounds the linear programme from above; A z < 0 throughout."""
     rng, shape = np.random.default_rng(8), (14, 12)
-    symbol = Lattice((3.0 * LENGTH, 2.3 * LENGTH), 1e9, 0.33).symbol(shape)
+    symbol = Lattice((3.0 * LENGTH, 2.3 * LENGTH), moduli(1e9, 0.33)).symbol(shape)
     rate = np.maximum(RATE * (noise(3.0, rng, shape) - 0.3), 0.0)
     strength, profile = 0.7e6 + 1e6 * noise(2.0, rng, shape), 1.3 + 0.4 * noise(3.0, rng, shape)
     assert 20 < np.sum(rate == 0.0) < 120
@@ -110,7 +111,7 @@ def test_any_multiplier_bounds_the_onset_where_some_nodes_do_not_weaken():
 @pytest.mark.parametrize("size", [1.0, 1e-170])  # of the guess; the square of the other is zero
 def test_lowest_eigenvector_equals_a_dense_one(size):
     shape = (20, 16)
-    symbol = Plane((3.0 * LENGTH, 2.0 * LENGTH), 1e9, 0.33).symbol(shape)
+    symbol = HalfSpaces((3.0 * LENGTH, 2.0 * LENGTH), moduli(1e9, 0.33)).symbol(shape)
     inside = noise(4.0, 0, shape) < 0.5
     matrix = dense(symbol, shape) - RATE * np.eye(inside.size)
     nodes = np.flatnonzero(inside)
@@ -125,7 +126,7 @@ def test_lowest_eigenvector_equals_a_dense_one(size):
 def test_a_slow_direction_saves_iterations():
     """A with one eigenvalue that is far below all others, as close to a turning point."""
     shape, inside = (20, 16), noise(4.0, 0, (20, 16)).reshape(-1) < 0.5
-    symbol = Plane((3.0 * LENGTH, 2.0 * LENGTH), 1e9, 0.33).symbol(shape)
+    symbol = HalfSpaces((3.0 * LENGTH, 2.0 * LENGTH), moduli(1e9, 0.33)).symbol(shape)
     nodes = np.flatnonzero(inside)
     block = dense(symbol, shape)[np.ix_(nodes, nodes)]
     (lowest, second), vectors = eigh(block, subset_by_index=[0, 1])
@@ -273,7 +274,7 @@ def test_a_step_of_the_stable_path_passes_no_steeper_weakening_that_is_unstable(
     friction = st.PiecewiseWeakening(**law, residual_strength=1.5e5)
     problem, strength = crooked((24, 20), (0.023, 0.0164), friction=friction)
     program = PlaneProgram(problem)
-    sample = program.sample_of(problem.sample(strength), 0)
+    sample = sample_of(problem.sample(strength), program.pieces, 0)
     operator = program._operator(sample)
     stiffness, slopes = dense(symbol_of(problem), (24, 20)), sample.pieces.slopes
     first = (sample.excess / sample.profile).min()
@@ -305,7 +306,7 @@ def test_a_step_of_the_stable_path_passes_no_steeper_weakening_that_is_unstable(
 def program():
     """Equilibria of a small plane on a lattice."""
     found = PlaneProgram(make_problem((40, 40), WIDE))  # as few nodes as SMALL are refused
-    found.plane, found.shape = Lattice(WIDE, 1e9, 0.33), SMALL
+    found.elastic, found.shape = Lattice(WIDE, moduli(1e9, 0.33)), SMALL
     return found
 
 
@@ -322,7 +323,7 @@ def test_arrest_and_sliding_on_a_lattice_equal_relaxation(program, seed, events)
     # Before and after each instability, at some distance: near one, relaxation takes for ever.
     marks = [path.first.load] + [event.before.load for event in path.events] + [path.last.load]
     loads = np.unique(np.r_[[m * (1.0 + e) for m in marks for e in (-2e-3, 2e-3)]])
-    symbol = program.plane.symbol(SMALL)
+    symbol = program.elastic.symbol(SMALL)
     operator = make_operator(symbol, RATE, SMALL)
     critical, rest = sample.critical.reshape(SMALL), 1e-8 * sample.excess.mean()
 

@@ -2,17 +2,18 @@
 
 import numpy as np
 import pytest
-from planes import WAVENUMBERS, Lattice, plane_sample
+from planes import WAVENUMBERS, Lattice, moduli, plane_sample
 from setups import LENGTH, RATE, exact_onset, make_problem, smooth_noise
 
 import stiction as st
+from stiction.elasticity.half_spaces import HalfSpaces
 from stiction.elasticity.operator import make_operator
 from stiction.methods.criterion.average import _between_nodes, least_average
 from stiction.methods.criterion.windows import ellipse_window
 from stiction.methods.equilibrium.sample import Outcome
 from stiction.methods.equilibrium.transforms import growing_patch, relaxation
 from stiction.methods.equilibrium.transforms import plane as program
-from stiction.methods.equilibrium.transforms.plane import Plane, plane_onset
+from stiction.methods.equilibrium.transforms.plane import plane_onset
 from stiction.methods.equilibrium.transforms.relaxation import least_equilibrium
 
 NODES, SHAPE = (48, 40), (40, 32)
@@ -20,7 +21,8 @@ LENGTHS = (6.0 * LENGTH, 4.0 * LENGTH)
 PLANE = make_problem(NODES, LENGTHS)
 ONE = np.ones(SHAPE)
 PLANES = {
-    name: plane((5.0 * LENGTH, 4.0 * LENGTH), 1e9, 0.33) for name, plane in WAVENUMBERS.items()
+    name: plane((5.0 * LENGTH, 4.0 * LENGTH), moduli(1e9, 0.33))
+    for name, plane in WAVENUMBERS.items()
 }
 
 
@@ -154,7 +156,7 @@ def rough_case(seed):
     strength = rng.uniform(0.66e6, 0.66e6 + rng.choice([1e4, 1e5, 1e6, 1e7]), shape)
     profile = np.ones(shape) if seed % 2 else rng.uniform(0.8, 1.3, shape)
     rate = RATE * (np.ones(shape) if seed % 3 else rng.uniform(0.3, 1.0, shape))
-    return Lattice(lengths, 1e9, nu), strength, profile, rate
+    return Lattice(lengths, moduli(1e9, nu)), strength, profile, rate
 
 
 def test_bounds_hold_where_they_do_not_meet():
@@ -162,7 +164,7 @@ def test_bounds_hold_where_they_do_not_meet():
     for seed in range(30):
         lattice, strength, profile, rate = rough_case(seed)
         bounds = plane_onset(lattice, strength, profile, rate, 1e-4)
-        spectral = plane_onset(Plane(*lattice), strength, profile, rate)
+        spectral = plane_onset(HalfSpaces(*lattice), strength, profile, rate)
         closed.append(spectral.closed)
         assert spectral.lower <= spectral.upper
         # Far fewer nodes than it takes: they agree to the error of such a grid.

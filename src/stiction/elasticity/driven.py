@@ -14,13 +14,16 @@ with h = (k/(k + C)) C/(2 L). Under dead load h = 0, and for a rigid machine h =
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
 from stiction.base.arrays import Array
+from stiction.elasticity.block_windows import joined, rungs_between, windows_at
 from stiction.elasticity.blocks import Pushes, block_response, glued_pressure
+from stiction.elasticity.half_spaces import HalfSpaces
+from stiction.elasticity.protocol import DenseEntries, Windows
 
 ROUND_OFF = 1e-12
 """Share of the diagonal up to which a positive entry of K beside it is round-off."""
@@ -32,7 +35,7 @@ LEAST = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Driven:
-    """Two blocks behind their machine; arrays are not to be written to.
+    """Two blocks behind their machine, an `Elasticity`; arrays are not to be written to.
 
     Attributes
     ----------
@@ -56,6 +59,16 @@ class Driven:
     error: float
 
     @property
+    def half_spaces(self) -> HalfSpaces | None:
+        """None: K of blocks has no symbol."""
+        return None
+
+    @cached_property
+    def entries(self) -> DenseEntries:
+        """K as kernels take it."""
+        return DenseEntries(self.stiffness.reshape(-1), len(self.stiffness), self.relief)
+
+    @cached_property
     def positive(self) -> float:
         """Largest positive entry of K off its diagonal, as a share of the diagonal; 0 for none.
 
@@ -70,10 +83,21 @@ class Driven:
         mean: Array = self.relief * (slip * self.shear).mean(axis=-1)
         return mean
 
+    def windows(self, low: float, high: float) -> Windows:
+        """Return the windows for weakening rates from `low` to `high`, Pa/m; each has its place."""
+        if high <= low:
+            return _windows_at(self, low)
+        return joined([_windows_at(self, rate) for rate in rungs_between(low, high)])
+
     def travel(self, force: Any, slip: Array) -> Any:
         """Return the travel of both drives together, m, at a force per unit depth, N/m."""
         moved = 2.0 * force / self.drive_stiffness + (slip * self.shear).mean(axis=-1)
         return moved
+
+
+@lru_cache(maxsize=32)
+def _windows_at(blocks: Driven, rate: float) -> Windows:
+    return windows_at(blocks.stiffness, rate)
 
 
 @lru_cache(maxsize=8)

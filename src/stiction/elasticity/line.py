@@ -1,4 +1,4 @@
-"""The static stiffness K of a line on its nodes: the first column in closed form, its product.
+"""Half-spaces that meet on a line: K on the nodes in closed form, and its critical windows.
 
 K is the circulant matrix of the symbol (G*/2)|k|. For an even number n of nodes it has
 
@@ -7,13 +7,24 @@ K is the circulant matrix of the symbol (G*/2)|k|. For an even number n of nodes
 0 for even j > 0: nodes of one parity act on those of the other only, which halves products.
 """
 
-from typing import NamedTuple
+import bisect
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 
 from stiction.base.arrays import Array
-from stiction.base.jit import ZERO, jit
-from stiction.base.lanes import multiply_add
+from stiction.elasticity.half_spaces import SMALLEST_EIGENVALUE, HalfSpaces
+from stiction.elasticity.protocol import ANYWHERE, CircularEntries, Windows
+
+GROWTH = 1.25
+"""Ratio of successive widths tried where the weakening rate varies."""
+DENSE = 300
+"""Widest window whose eigenvector is found with a dense matrix."""
+WIDEST = 4096
+"""Widest window tried."""
 
 
 def stiffness_column(nodes: int, length: float, modulus: float) -> Array:
@@ -26,84 +37,122 @@ def stiffness_column(nodes: int, length: float, modulus: float) -> Array:
     return column
 
 
-class Stiffness(NamedTuple):
-    """K of a line: its first column (n,), and its odd entries three times in a row, Pa/m."""
-
-    column: Array
-    strip: Array
+def circular_entries(column: Array) -> CircularEntries:
+    """Return K with a first column as kernels take it."""
+    return CircularEntries(column, np.ascontiguousarray(np.tile(column[1::2], 3)))
 
 
-def make_stiffness(column: Array) -> Stiffness:
-    """Return the stiffness with a first column; the strip spares products index arithmetic."""
-    return Stiffness(column, np.ascontiguousarray(np.tile(column[1::2], 3)))
+@dataclass(frozen=True, eq=False)
+class Line:
+    """Half-spaces that meet on this number of nodes, an `Elasticity`; read-only."""
+
+    half_spaces: HalfSpaces
+    nodes: int
+    entries: CircularEntries
+    relief: float = 0.0
+    positive: float = 0.0
+
+    def mean_relief(self, slip: Array) -> float:
+        """Return 0: slip takes nothing off a load that is far away."""
+        return 0.0
+
+    def windows(self, low: float, high: float) -> Windows:
+        """Return the windows for weakening rates from `low` to `high`, Pa/m, narrowest first."""
+        (length,), (modulus,) = self.half_spaces
+        unit = np.pi * modulus / length
+        return _windows(self.nodes, _widths_between(self.nodes, low / unit, high / unit), unit)
 
 
-@jit
-def add_four(
-    target: Array, strip: Array, places: tuple[int, int, int, int], values: tuple[float, ...]
-) -> None:
-    """Add the contribution of four nodes to one half of a product."""
-    half = target.shape[0]
-    p0, p1, p2, p3 = places
-    z0, z1, z2, z3 = values
-    a = strip[p0 : p0 + half]
-    b = strip[p1 : p1 + half]
-    c = strip[p2 : p2 + half]
-    d = strip[p3 : p3 + half]
-    for q in range(half):
-        more = multiply_add(z0, a[q], target[q])
-        more = multiply_add(z1, b[q], more)
-        more = multiply_add(z2, c[q], more)
-        target[q] = multiply_add(z3, d[q], more)
+@functools.lru_cache(maxsize=4)
+def line_of(half_spaces: HalfSpaces, nodes: int) -> Line:
+    """Return K and the windows of a line."""
+    column = stiffness_column(nodes, half_spaces.lengths[0], half_spaces.moduli[0])
+    return Line(half_spaces, nodes, circular_entries(column))
 
 
-@jit
-def apply_stiffness(
-    stiffness: Stiffness, members: Array, size: int, values: Array, halves: Array, result: Array
-) -> None:
-    """`result` (n,) = K times a field that has `values` at the first `size` of the `members`.
+@functools.lru_cache(maxsize=512)
+def window_mode(nodes: int, width: int) -> tuple[float, Array]:
+    """Smallest eigenvalue of a block of K with (G*/2)(2 pi/L) = 1, and its positive eigenvector."""
+    first = stiffness_column(nodes, np.pi, 1.0)[:width]
+    if width <= DENSE:
+        values, vectors = scipy.linalg.eigh(
+            scipy.linalg.toeplitz(first), subset_by_index=[0, 0]
+        )
+        value, mode = float(values[0]), np.abs(vectors[:, 0])
+        mode /= mode.sum()
+    else:
+        # Inverse iteration; the next eigenvalue is more than twice as large.
+        mode = np.sqrt(np.arange(1.0, width + 1.0) * np.arange(width, 0.0, -1.0))
+        mode /= mode.sum()
+        for _ in range(60):
+            new = scipy.linalg.solve_toeplitz(first, mode)
+            value = 1.0 / float(new.sum())
+            new *= value
+            change = float(np.abs(new - mode).max())
+            mode = new
+            if change < 1e-14 * float(mode.max()):
+                break
+    mode.flags.writeable = False
+    return value, mode
 
-    Elsewhere the field is zero; `halves` (2, n/2) is a workspace.
+
+def _estimated_width(nodes: int, rate: float) -> int:
+    """Width of an unstable window by h_n = 2 lambda_0 G*/W of the continuum.
+
+    The rate is W in units of (G*/2)(2 pi/L), so that h_n/L = 2 lambda_0/(pi rate).
     """
-    strip = stiffness.strip
-    half = halves.shape[1]
-    for parity in range(2):
-        # Sources of this parity act on targets of the other one.
-        target = halves[1 - parity]
-        for q in range(half):
-            target[q] = 0.0
-        held = 0
-        p0 = p1 = p2 = p3 = ZERO
-        z0 = z1 = z2 = z3 = 0.0
-        for t in range(size):
-            node = members[t]
-            if (node & 1) != parity or values[t] == 0.0:
-                continue
-            # Target q of the other parity lies at odd distance 2 (q - (node >> 1)) + 1 - 2 parity.
-            p0, p1, p2, p3 = half - (node >> 1) - parity, p0, p1, p2
-            z0, z1, z2, z3 = values[t], z0, z1, z2
-            held += 1
-            if held == 4:
-                add_four(target, strip, (p0, p1, p2, p3), (z0, z1, z2, z3))
-                held = 0
-                z0 = z1 = z2 = z3 = 0.0
-        if held > 0:
-            add_four(target, strip, (p0, p1, p2, p3), (z0, z1, z2, z3))
-    for q in range(half):
-        result[2 * q] = halves[0, q]
-        result[2 * q + 1] = halves[1, q]
-    for t in range(size):
-        result[members[t]] += stiffness.column[0] * values[t]
+    return int(np.clip(2.0 * SMALLEST_EIGENVALUE / (np.pi * rate) * nodes, 1, nodes))
 
 
-@jit
-def griffith_length(drop: float, energy: float, modulus: float) -> float:
-    """Critical length of a crack (m), infinite without a stress drop.
+def _narrowest(nodes: int, widths: Sequence[int], guess: int, rate: float) -> int:
+    """Index of the first of rising widths that is unstable, their number if none is."""
+    i = min(guess, len(widths) - 1)
+    while i < len(widths) and window_mode(nodes, widths[i])[0] > rate:
+        i += 1
+    while i > 0 and window_mode(nodes, widths[i - 1])[0] <= rate:
+        i -= 1
+    return i
 
-    A crack of half-length a with stress drop D (Pa) releases pi a D^2/(2 G*) at each tip
-    (Griffith, 1921), and grows where that is more than the fracture energy (J/m²); the
-    modulus is G* (Pa).
-    """
-    if drop <= 0.0:
-        return np.inf
-    return 4.0 * modulus * energy / (np.pi * drop * drop)
+
+@functools.lru_cache(maxsize=64)
+def smallest_window(nodes: int, rate: float) -> int | None:
+    """Fewest nodes that are unstable by themselves at a weakening rate; None beyond `WIDEST`."""
+    widest = min(nodes - 1, WIDEST)
+    width = _estimated_width(nodes, rate)
+    if width > 1.2 * widest:
+        return None
+    # The estimate is a node or so off, more where the window is a fair part of the circle.
+    width = _narrowest(nodes, range(1, widest + 1), width - 1, rate) + 1
+    return width if width <= widest else None
+
+
+def _ladder(nodes: int) -> list[int]:
+    """Widths tried where the weakening rate varies: the same for all samples."""
+    widths = [1]
+    while widths[-1] < min(nodes // 2, WIDEST):
+        widths.append(max(widths[-1] + 1, int(widths[-1] * GROWTH)))
+    return widths[:-1]
+
+
+def _widths_between(nodes: int, lowest: float, highest: float) -> tuple[int, ...]:
+    """Widths for weakening rates from `lowest` to `highest`, the widest unstable at `lowest`."""
+    if lowest >= highest:
+        width = smallest_window(nodes, highest)
+        return () if width is None else (width,)
+    rungs = _ladder(nodes)
+
+    def rung(rate: float) -> int:
+        guess = bisect.bisect_left(rungs, _estimated_width(nodes, rate))
+        return _narrowest(nodes, rungs, guess, rate)
+
+    return tuple(rungs[rung(highest) : rung(lowest) + 1])
+
+
+@functools.lru_cache(maxsize=64)
+def _windows(nodes: int, widths: tuple[int, ...], unit: float) -> Windows:
+    modes = np.zeros((max(len(widths), 1), max(widths, default=1)))
+    for i, width in enumerate(widths):
+        modes[i, :width] = window_mode(nodes, width)[1]
+    rates = np.array([window_mode(nodes, width)[0] * unit for width in widths])
+    anywhere = np.full(len(widths), ANYWHERE, dtype=np.int64)
+    return Windows(rates, anywhere, np.array(widths, dtype=np.int64), modes)

@@ -1,12 +1,7 @@
 """K - W of an interface by fast Fourier transform, inside compiled kernels and without allocating.
 
-Slip has one component, along x, the direction of the load. With a wave vector (kx, ky) of
-length k and a = (kx/k)^2, the static stiffness of two half-spaces is
-
-    K(k) = (G* a + G (1 - a)) k/2,
-
-mode II along x and mode III along y (Geubelle and Rice 1995); a line has the modulus of its
-mode. Kernels take flat arrays, so that the same code serves lines and planes.
+K is given by its symbol (`half_spaces`). Kernels take flat arrays, so that the same code serves
+lines and planes.
 """
 
 from typing import NamedTuple
@@ -17,24 +12,6 @@ from rocket_fft import c2c, c2r, r2c
 
 from stiction.base.arrays import Array
 from stiction.base.jit import jit, jit_inside
-
-
-def stiffness_symbol(
-    shape: tuple[int, ...], lengths: tuple[float, ...], in_plane: float, anti_plane: float
-) -> Array:
-    """K(k) for the modes of ``numpy.fft.rfftn`` of an interface with these nodes and periods, Pa/m.
-
-    `in_plane` is G* of mode II (of a line: of its mode), `anti_plane` G, Pa.
-    """
-    last = 2.0 * np.pi / lengths[-1] * np.arange(shape[-1] // 2 + 1)
-    if len(shape) == 1:
-        line: Array = 0.5 * in_plane * last
-        return line
-    first = 2.0 * np.pi * np.fft.fftfreq(shape[0], lengths[0] / shape[0])[:, None]
-    k = np.hypot(first, last[None, :])
-    k[0, 0] = 1.0  # both terms are zero there
-    symbol: Array = 0.5 * (in_plane * first**2 + anti_plane * last**2) / k
-    return symbol
 
 
 class Transform(NamedTuple):

@@ -13,7 +13,6 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.model import Count, Numbers, check, checked, describe
 from stiction.base.progress import SILENT, Meter
-from stiction.elasticity.places import places_of
 from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.monte_carlo import check_fields
@@ -219,7 +218,7 @@ def no_single_length(problem: Problem, random: Any) -> str | None:
     try:
         if problem.specimen is None:
             windows_of(problem, rate)
-        elif not places_of(problem.blocks, rate).starts.size:
+        elif not problem.blocks.windows(rate, rate).starts.size:
             return "no part of the specimen becomes unstable by itself"
     except InputError:
         return "a critical patch does not fit on the interface"

@@ -23,8 +23,8 @@ from stiction.base.model import Mode, describe, differing, is_unplaced, model
 from stiction.base.units import Doubt, doubt_units, in_words
 from stiction.base.variables import PROFILES
 from stiction.elasticity.driven import Driven
+from stiction.elasticity.half_spaces import HalfSpaces
 from stiction.problem.friction import SCALES, Friction, contradictions
-from stiction.problem.friction.parameters import SMALLEST_EIGENVALUE
 from stiction.problem.interface import Interface
 from stiction.problem.load import Load, LoadShape
 from stiction.problem.profiles.placing import Gaps, turned
@@ -332,6 +332,13 @@ class Problem:
         return self.specimen.driven(interface.extent, interface.size, self.solid, self.mode)
 
     @property
+    def half_spaces(self) -> HalfSpaces:
+        """The solids, if they were half-spaces: what gives K(k) and nucleation lengths."""
+        lengths = self.interface.lengths
+        moduli = (self.effective_modulus, self.solid.shear_modulus)
+        return HalfSpaces(lengths, moduli[: len(lengths)])
+
+    @property
     def area(self) -> float | None:
         """Area of the interface, m², if its width, or the specimen's thickness, is known."""
         interface, specimen = self.interface, self.specimen
@@ -415,8 +422,7 @@ class Problem:
         """
         if not rate > 0.0:
             raise InputError(f"rate: must be a positive number, got {describe(rate)}")
-        moduli = (self.effective_modulus, self.solid.shear_modulus)[: len(self.interface.shape)]
-        return tuple(2.0 * SMALLEST_EIGENVALUE * modulus / rate for modulus in moduli)
+        return self.half_spaces.nucleation_lengths(rate)
 
     def nodes_in_nucleation_length(self, rate: float) -> tuple[float, ...]:
         """Return how many nodes the nucleation length of a weakening rate (Pa/m) spans.

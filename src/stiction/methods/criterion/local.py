@@ -11,8 +11,8 @@ from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import checked, model
 from stiction.base.variables import Variable
 from stiction.elasticity.driven import Driven
-from stiction.elasticity.places import places_of
-from stiction.elasticity.weakest import Places, weakest_place
+from stiction.elasticity.protocol import Windows
+from stiction.elasticity.weakest import weakest_window
 from stiction.methods.criterion.average import averages, least_average
 from stiction.methods.criterion.windows import Window, windows_of
 from stiction.problem.friction import ExponentialWeakening
@@ -157,16 +157,22 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
     excess, spacing = excess_of(sample), problem.interface.spacing
     load, start, width, relief = np.zeros((4, sample.samples))
     allowed, blocks = np.empty(problem.interface.size), problem.blocks
-    for places, same in _places_by_rate(problem, sample):
+    for rate, same in _rates(sample):
+        windows = _windows_of_blocks(blocks, rate)
         for i in same:
-            load[i], c = weakest_place(
-                excess[i], sample.load_profile, sample.weakening_rate[i], places, allowed
+            load[i], c, start[i] = weakest_window(
+                excess[i],
+                sample.load_profile,
+                sample.weakening_rate[i],
+                windows,
+                np.inf,
+                allowed,
             )
-            start[i], width[i] = places.starts[c], places.widths[c]
+            width[i] = windows.widths[c]
             if blocks.relief > 0.0:
-                run = slice(places.starts[c], places.starts[c] + places.widths[c])
+                run = slice(int(start[i]), int(start[i] + width[i]))
                 drive = load[i] * sample.load_profile - excess[i]
-                relief[i] = _relief_of_patch(blocks, places.rate, run, drive)
+                relief[i] = _relief_of_patch(blocks, rate, run, drive)
     stress = sample.mean_stress(load - relief)
     return {
         "critical_load": load,
@@ -192,18 +198,14 @@ def _relief_of_patch(blocks: Driven, rate: float, run: slice, drive: Array) -> f
     return float(blocks.mean_relief(np.maximum(slip, 0.0)))
 
 
-def _places_by_rate(
-    problem: Problem, sample: Sample
-) -> Iterator[tuple[Places, NDArray[np.int64]]]:
-    """Yield the critical windows of a specimen at each rate, and the samples of this rate."""
-    for rate, same in _rates(sample):
-        places = places_of(problem.blocks, rate)
-        if not places.starts.size:
-            raise InputError(
-                "interface.length: no part of the specimen becomes unstable by itself, so the local"
-                " criterion does not hold; use st.Equilibrium()"
-            )
-        yield places, same
+def _windows_of_blocks(blocks: Driven, rate: float) -> Windows:
+    windows = blocks.windows(rate, rate)
+    if not windows.starts.size:
+        raise InputError(
+            "interface.length: no part of the specimen becomes unstable by itself, so the local"
+            " criterion does not hold; use st.Equilibrium()"
+        )
+    return windows
 
 
 @checked

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
+from stiction.elasticity.half_spaces import HalfSpaces
 from stiction.elasticity.linear import lowest_eigenvector
-from stiction.elasticity.operator import make_operator, stiffness_symbol
+from stiction.elasticity.operator import make_operator
 from stiction.methods.criterion.eigenfunction import around, grid_weights
 from stiction.problem.problem import Problem
 
@@ -66,10 +67,9 @@ def windows_of(
         weights = _line_weights(0.5 * length / interface.spacing, interface.size)
         return [Window(1.0, (length,), length, rate, *weights)]
     middle = float(1.0 / np.sqrt(1.0 - solid.poisson_ratio))
-    moduli = solid.shear_modulus / (1.0 - solid.poisson_ratio), solid.shear_modulus
     found = []
     for aspect in (middle * stretch for stretch in stretches):
-        window = _ellipse(interface.shape, interface.lengths, moduli, rate, aspect)
+        window = _ellipse(problem.half_spaces, interface.shape, rate, aspect)
         if window is None:
             size = " x ".join(f"{one:.4g}" for one in interface.lengths)
             raise InputError(
@@ -92,14 +92,10 @@ def _line_weights(half_width: float, nodes: int) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=64)
 def _ellipse(
-    shape: tuple[int, ...],
-    lengths: tuple[float, ...],
-    moduli: tuple[float, float],
-    rate: float,
-    aspect: float,
+    half_spaces: HalfSpaces, shape: tuple[int, ...], rate: float, aspect: float
 ) -> Window | None:
-    symbol = stiffness_symbol(shape, lengths, *moduli)
-    return ellipse_window(symbol, shape, lengths, rate, aspect)
+    symbol = half_spaces.symbol(shape)
+    return ellipse_window(symbol, shape, half_spaces.lengths, rate, aspect)
 
 
 def ellipse_window(

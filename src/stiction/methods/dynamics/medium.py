@@ -77,19 +77,19 @@ def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:
     """Stiffness and memory on the modes of the interface.
 
     On a plane a wave vector has a = (kx/k)² of mode II and b = 1 - a of mode III (Geubelle and Rice
-    1995): K = (k/2)(G* a + G b), and the memory is (G k/2)[a C_II + b C_III] * V.
+    1995), as K has, and the memory is (G k/2)[a C_II + b C_III] * V.
     """
     solid, interface = problem.solid, problem.interface
     k, share = interface.wavenumbers, interface.in_plane_share
     entry, offset, multiplicity = offsets(k.shape)
-    modulus = (problem.effective_modulus * share + solid.shear_modulus * (1.0 - share)) * k
+    stiffness = problem.half_spaces.symbol(interface.shape)
     # Modes with entries in the tables: on a plane kx >= 0, on a line k > 0.
     own = slice(0, interface.shape[0] // 2 + 1) if interface.is_plane else slice(1, None)
     return Grid(
         transform=make_transform(interface.shape),
         impedance=solid.shear_modulus / (2.0 * solid.shear_wave_speed),
         cell=interface.cell,
-        stiffness=0.5 * np.stack([modulus.ravel(), solid.shear_modulus * k.ravel()]),
+        stiffness=np.stack([stiffness.ravel(), 0.5 * solid.shear_modulus * k.ravel()]),
         entry=entry,
         offset=offset,
         multiplicity=multiplicity,

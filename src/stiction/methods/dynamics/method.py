@@ -21,7 +21,6 @@ from stiction.methods.dynamics.medium import Medium, prepare_medium
 from stiction.methods.dynamics.slow_start import slow_start, static_program
 from stiction.methods.dynamics.state import History, Nodes, Setting, State, Thresholds
 from stiction.methods.dynamics.summary import scalars, summary
-from stiction.problem.friction.parameters import SMALLEST_EIGENVALUE
 from stiction.problem.problem import Problem
 from stiction.problem.results import onset_variables
 from stiction.problem.sample import Sample, steepest_rate
@@ -271,10 +270,9 @@ def make_run(
 
 def _least_load(medium: Medium, nodes: Nodes, steepest: float) -> float:
     """Return the mean load, Pa, at which the weakest nodes of half a nucleation length slip."""
-    interface, solid = medium.interface, medium.problem.solid
-    moduli = (medium.problem.effective_modulus, solid.shear_modulus)[: len(interface.shape)]
+    interface = medium.interface
     # Of a line, or on a plane along x times along y.
-    half = float(np.prod([SMALLEST_EIGENVALUE * modulus / steepest for modulus in moduli]))
+    half = float(np.prod(medium.problem.half_spaces.nucleation_lengths(2.0 * steepest)))
     weakens = np.isfinite(nodes.strength) & (nodes.critical > 0.0)
     loads = ((nodes.strength - nodes.initial) / nodes.profile)[weakens]
     weakest = round(min(max(half / interface.cell, 1.0), loads.size))

@@ -17,8 +17,8 @@ from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.memory import grown_memory
 from stiction.methods.dynamics.state import State
 from stiction.methods.dynamics.summary import energy_balance
-from stiction.methods.equilibrium.dense.line import LineProgram
-from stiction.methods.equilibrium.sample import StaticSample, exceeds, refused
+from stiction.methods.equilibrium.dense.program import DenseProgram
+from stiction.methods.equilibrium.sample import StaticSample, exceeds, refused, sample_of
 from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
 
@@ -28,21 +28,21 @@ _BACK = 0.25  # share of the distance to the onset over which the rate is measur
 _TRIALS = 5
 
 
-def static_program(problem: Problem) -> LineProgram | None:
+def static_program(problem: Problem) -> DenseProgram | None:
     """Return the programme for equilibria of a problem; None where they are not followed."""
     if problem.interface.is_plane or refused(problem.friction):
         return None
-    return LineProgram(problem)
+    return DenseProgram(problem)
 
 
 def slow_start(
-    program: LineProgram, run: Run, rows: Sample, number: int, rate: float
+    program: DenseProgram, run: Run, rows: Sample, number: int, rate: float
 ) -> State | None:
     """The state closest to the onset whose error is small enough, None if there is none."""
     nodes = run.setting.nodes
     if not np.all(np.isfinite(nodes.strength)) or np.any(nodes.strength <= nodes.initial):
         return None
-    static = program.sample_of(rows, number)
+    static = sample_of(rows, program.pieces, number)
     onset = program.solve(static)
     if onset is None:
         return None
@@ -65,7 +65,7 @@ def slow_start(
 
 
 def _at(
-    program: LineProgram,
+    program: DenseProgram,
     run: Run,
     static: StaticSample,
     onset: float,

@@ -9,12 +9,14 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Numbers, check, check_memory
 from stiction.base.variables import Variable, force_variables, forces
-from stiction.methods.equilibrium.dense.blocks import BlockProgram
+from stiction.methods.equilibrium.sample import at_rest, sample_of
 from stiction.methods.equilibrium.solver import (
+    elongation_of,
     event_table,
     event_variables,
     follow,
     make_program,
+    travel_of,
 )
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset
@@ -115,7 +117,7 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
     interface = problem.interface
     check_memory("loads", 16.0 * given.size * interface.size)
     program = make_program(problem, GAP)
-    sample = program.sample_of(rows, 0)
+    sample = sample_of(rows, program.pieces, 0)
     whole = follow(program, sample)
     passed, end, known = whole.events, whole.last.load, whole.known
     slip, stress = np.full((2, given.size, interface.size), np.nan)
@@ -123,12 +125,12 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
     at = np.array([event.before.load for event in passed])
     events = (at[None, :] < given[:, None]).sum(axis=1)
     sliding = given > end
-    state = program.at_rest(sample)
+    state = at_rest(sample)
     for i, load in enumerate(map(float, given[~sliding])):
         if events[i]:
             after = passed[events[i] - 1].after
             state = max(after, state, key=lambda one: one.load)
-        there = program.at(sample, state, load, fresh=not events[i])
+        there = program.at(sample, state, load)
         ahead = passed[events[i]].before if events[i] < len(passed) else None
         if there is None and ahead is not None and load > (1.0 - CLOSE) * ahead.load:
             there = ahead  # the state about to jump
@@ -139,9 +141,9 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
         slip[i] = state.slip
         released = program.stress_released(state)
         stress[i] = rows.initial_stress[0].reshape(-1) + load * sample.profile - released
-        if isinstance(program, BlockProgram):
-            travel[i] = program.travel(load, state.slip)
-            far[i] = travel[i] + program.elongation(stress[i].mean())
+        if problem.specimen is not None:
+            travel[i] = travel_of(problem, load, state.slip)
+            far[i] = travel[i] + elongation_of(problem, stress[i].mean())
     if not known and sliding.any():
         warn_accuracy(
             f"no equilibrium was found beyond {end:g} Pa, and none was ruled out; the"
@@ -154,7 +156,7 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
         "mean_stress": stress.mean(axis=1),
         "arrested_events": events,
         "sliding": sliding,
-    } | event_table(problem, program, rows, 0, passed)
+    } | event_table(problem, rows, 0, passed)
     variables = VARIABLES | event_variables(interface)
     variables |= {name: along(interface, VARIABLES[name]) for name in ("slip", "stress")}
     if interface.is_free:

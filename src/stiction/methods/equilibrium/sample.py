@@ -5,9 +5,9 @@ residual strength. Between corners everything is linear, and a corner is an even
 has one piece: its start is tau_p, to the bit.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,64 +144,62 @@ class Present(NamedTuple):
 class State:
     """An equilibrium on the path of one sample, by default one at which it is unstable.
 
-    Load tau_0 (Pa), slip d (m), K d (Pa; of lines only), the direction in which it is unstable,
-    and the distance to a load without equilibrium (Pa), NaN where none is known.
-    `certified` is true if that is proved, `unstable` if the path is unstable there, `known` if it
-    could be followed so far, `stuck` if the programme failed to find the next instability before.
-    `peak` is the largest mean stress on the way there, over the mean of the load profile: the load
-    itself (None), unless a machine drives; `stopped` says whether a node that slipped stopped on
-    the way. `ahead` is what is known beyond: on lines K times the direction, on planes the turn of
-    the path.
+    Attributes
+    ----------
+    load : float
+        tau_0, Pa.
+    slip, direction : (n,) arrays
+        d (m) and the direction in which it is unstable.
+    stiff : (n,) array
+        K d, Pa; empty on planes.
+    stiff_direction : (n,) array, optional
+        K times the direction, if it is known.
+    multiplier : (n,) array, optional
+        The exact y with <p, y> = 1, if the direction is that; else the direction stands for it.
+    gap : float
+        Distance to a load without equilibrium, Pa; NaN where none is known.
+    peak : float, optional
+        Largest mean stress on the way here over the mean of the load profile, Pa: the load itself
+        (None), unless a machine drives.
+    certified, unstable, known : bool
+        Whether the gap is proved, the path is unstable here, and it could be followed so far.
+    by_events, jumped, stopped : bool
+        Whether a programme failed to find the next instability before, an instability came to rest
+        on the way, or a node that slipped stopped.
     """
 
     load: float
     slip: Array
-    stiff: Array
     direction: Array
+    stiff: Array = field(default_factory=lambda: np.empty(0))
     gap: float = np.nan
     certified: bool = True
     unstable: bool = True
     known: bool = True
-    stuck: bool = False
-    ahead: Any = None
-    peak: float | None = None
+    by_events: bool = False
+    jumped: bool = False
     stopped: bool = False
+    peak: float | None = None
+    multiplier: Array | None = None
+    stiff_direction: Array | None = None
+
+    @property
+    def highest(self) -> float:
+        """Largest load that the interface carried on the way here, Pa."""
+        return self.load if self.peak is None else self.peak
 
 
-class Program:
-    """Base of the programmes of lines and planes, which find equilibria; thread-safe."""
-
-    pieces: Pieces
-
-    def sample_of(self, rows: Sample, row: int) -> StaticSample:
-        """Return one sample of a batch."""
-        return sample_of(rows, self.pieces, row)
-
-    def at_rest(self, sample: StaticSample) -> State:
-        """Return the state in which the first node is about to slip."""
-        load = float((sample.excess / sample.profile).min())
-        return State(load, *np.zeros((3, sample.excess.size)))
-
-    def at_turn(self, sample: StaticSample, state: State) -> State:
-        """Return an instability with its exact direction, as it is on lines."""
-        return state
-
-    def of_stress(self, sample: StaticSample, state: State, y: Array) -> Array:
-        """Return the derivative of the mean stress at an instability from y, that of its load."""
-        return y
-
-    def relief(self, slip: Array) -> float:
-        """Return by how much slip lowers the load that the interface carries, Pa."""
-        return 0.0
+def at_rest(sample: StaticSample) -> State:
+    """Return the state in which the first node is about to slip."""
+    load = float((sample.excess / sample.profile).min())
+    return State(load, *np.zeros((3, sample.excess.size)))
 
 
 def multiplier_of(sample: StaticSample, state: State) -> Array:
-    """Return the multiplier y of an instability, <p, y> = 1: the direction, normalised.
-
-    Where `ahead` is known it is normalised already.
-    """
-    y = state.direction
-    return y if state.ahead is not None else y / max(inner(y, sample.profile), 1e-300)
+    """Return the multiplier y of an instability, <p, y> = 1."""
+    if state.multiplier is not None:
+        return state.multiplier
+    return state.direction / max(inner(state.direction, sample.profile), 1e-300)
 
 
 class Jump(NamedTuple):
@@ -214,6 +212,34 @@ class Jump(NamedTuple):
     known: bool
     state: State
     counts: bool = True
+
+
+class Program(Protocol):
+    """What finds equilibria of samples: `DenseProgram` or `PlaneProgram`; thread-safe.
+
+    `widest_gap` is the certificate gap, as a share of the load, above which there is a warning.
+    """
+
+    pieces: Pieces
+    widest_gap: float
+
+    def next(self, sample: StaticSample, state: State | None = None) -> State:
+        """Return the next instability from a stable state, or from rest."""
+
+    def jump(self, sample: StaticSample, found: State) -> Jump:
+        """Let an unstable state jump to another equilibrium, or to sliding."""
+
+    def at(self, sample: StaticSample, state: State, load: float) -> State | None:
+        """Return the equilibrium at a load from a state below, None if it is not found."""
+
+    def gradient(self, sample: StaticSample, state: State) -> Array:
+        """Return the derivative of the mean stress at an instability by the strengths there.
+
+        Over the mean of the load profile; the strengths are those continued to zero slip.
+        """
+
+    def stress_released(self, state: State) -> Array:
+        """Return the stress that the slip takes off the interface, K d, Pa."""
 
 
 def residual_nodes(sample: StaticSample, slip: Array) -> NDArray[np.bool_]:

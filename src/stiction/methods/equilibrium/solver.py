@@ -1,7 +1,7 @@
 """The solver of the equilibrium method: samples in, onsets out, on lines and planes."""
 
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_of_samples
 from stiction.base.variables import Variable
-from stiction.methods.equilibrium.dense.blocks import BlockProgram
-from stiction.methods.equilibrium.dense.line import LineProgram
+from stiction.methods.equilibrium.dense.program import DenseProgram
 from stiction.methods.equilibrium.patches import (
     Patch,
     critical_patch,
@@ -20,6 +19,7 @@ from stiction.methods.equilibrium.patches import (
     with_ends,
 )
 from stiction.methods.equilibrium.sample import (
+    Program,
     State,
     StaticSample,
     multiplier_of,
@@ -57,8 +57,6 @@ which nothing but sliding is left of it."""
 EVENT_CORE = 1e-3
 """Share of the largest added slip above which a node belongs to the patch of an event."""
 
-AnyProgram: TypeAlias = LineProgram | PlaneProgram
-
 
 def event_variables(interface: Interface) -> dict[str, Variable]:
     """Return the variables of each arrested event on a line or a plane."""
@@ -90,7 +88,7 @@ class Event(NamedTuple):
 
 
 def event_table(
-    problem: Problem, program: AnyProgram, rows: Sample, row: int, events: list[Event]
+    problem: Problem, rows: Sample, row: int, events: list[Event]
 ) -> dict[str, Array]:
     """Return the variables of the arrested events of one sample, (events, ...) arrays."""
     interface, plane = problem.interface, problem.interface.is_plane
@@ -99,18 +97,18 @@ def event_table(
     for before, after in events:
         added = (after.slip - before.slip).reshape(interface.shape)
         inside, patch = largest_patch(np.maximum(added, 0.0), interface, EVENT_CORE)
-        held = before.load - program.relief(before.slip)
+        held = before.load - relief_of(problem, before.slip)
         stress = initial + held * profile
         moment = problem.solid.shear_modulus * float(added.sum()) * interface.cell
         measures = (
             (patch.centre, patch.extents, patch.area) if plane else (*patch.centre, patch.area)
         )
         values: tuple[Any, ...] = (*measures, added[inside].mean(), moment)
-        if isinstance(program, BlockProgram):
-            left = after.load - program.relief(after.slip)
-            moved, on = (program.travel(one.load, one.slip) for one in (before, after))
+        if problem.specimen is not None:
+            left = after.load - relief_of(problem, after.slip)
+            moved, on = (travel_of(problem, one.load, one.slip) for one in (before, after))
             start = float(np.argmax(inside)) * interface.spacing
-            far = moved + program.elongation(stress)
+            far = moved + elongation_of(problem, stress)
             values += ((held - left) * profile, moved, far, on - moved, start)
         table.append((before.load, stress, *values))
     names = event_variables(interface)
@@ -136,7 +134,7 @@ class Path:
     known: bool = True
 
 
-def follow(program: AnyProgram, sample: StaticSample) -> Path:
+def follow(program: Program, sample: StaticSample) -> Path:
     """Follow a sample from rest to global sliding.
 
     Arrest is overdamped: the patch stops at the least equilibrium of the same load. Inertia may
@@ -145,7 +143,7 @@ def follow(program: AnyProgram, sample: StaticSample) -> Path:
     found = program.next(sample)
     first: State | None = None
     events: list[Event] = []
-    known, peak = found.known, peak_of(found)
+    known, peak = found.known, found.highest
     while found.unstable:
         jump = program.jump(sample, found)
         if jump.counts:
@@ -155,22 +153,38 @@ def follow(program: AnyProgram, sample: StaticSample) -> Path:
                 break
             events.append(Event(found, jump.state))
         found = program.next(sample, jump.state)
-        known, peak = found.known, max(peak, peak_of(found))
+        known, peak = found.known, max(peak, found.highest)
     return Path(first or found, found, peak, events, known)
 
 
-def peak_of(state: State) -> float:
-    """Return the largest load that the interface carried on the way to a state."""
-    return state.load if state.peak is None else state.peak
+def relief_of(problem: Problem, slip: Array) -> float:
+    """Return by how much slip lowers the mean stress below the load, Pa: behind a machine."""
+    return 0.0 if problem.specimen is None else float(problem.blocks.mean_relief(slip))
 
 
-def make_program(problem: Problem, gap: float = 1e-6) -> AnyProgram:
+def travel_of(problem: Problem, load: float, slip: Array) -> float:
+    """Return the travel of both drives of a specimen together from the unloaded state, m."""
+    force = (load - relief_of(problem, slip)) * problem.interface.extent
+    return float(problem.blocks.travel(force, slip))
+
+
+def elongation_of(problem: Problem, stress: float) -> float:
+    """Return by how much the machine gives at a mean stress of the interface (Pa), m.
+
+    NaN under dead load, whose far end is not defined.
+    """
+    assert problem.specimen is not None
+    machine, area = problem.specimen.drive.stiffness, problem.area
+    if machine == 0.0:
+        return np.nan
+    return 0.0 if area is None else stress * area / machine  # without an area it is rigid
+
+
+def make_program(problem: Problem, gap: float = 1e-6) -> Program:
     """Return the programme that finds equilibria of a problem, or raise an `InputError`."""
     if reasons := refused(problem.friction):
         raise InputError(reasons)
-    if problem.specimen is not None:
-        return BlockProgram(problem)
-    return PlaneProgram(problem, gap) if problem.interface.is_plane else LineProgram(problem)
+    return PlaneProgram(problem, gap) if problem.interface.is_plane else DenseProgram(problem)
 
 
 class OnsetSolver:
@@ -215,17 +229,15 @@ class OnsetSolver:
         """Return the variables of one sample, the first instability as a load."""
         interface, shape = self.problem.interface, rows.strength[row].shape
         first, last = path.first, path.last
-        y = multiplier_of(sample, first)
-        patch = self._patch(y)
-        # On lines a programme knows what is ahead, and passes no corner.
-        straight = last is first and first.ahead is not None and not interface.is_plane
-        slides = patch
+        slides = patch = self._patch(multiplier_of(sample, first))
+        # On lines the multiplier is known of a programme, which passes no corner.
+        straight = last is first and first.multiplier is not None and not interface.is_plane
         if last is not first and last.direction.any():
             slides = self._patch(last.direction)
         values: dict[str, Any] = {
             "critical_load": last.load,
             "critical_stress": path.peak,
-            "first_instability": first.load - self.program.relief(first.slip),
+            "first_instability": first.load - relief_of(self.problem, first.slip),
             "certificate_gap": first.gap,
             "critical_position": patch.centre,
             "sliding_position": slides.centre,
@@ -251,13 +263,12 @@ class OnsetSolver:
         if self.options.slip:
             values["slip"] = first.slip.reshape(shape)
         if self.options.sensitivity:
-            turn = self.program.at_turn(sample, first)
-            derivative = _sensitivity(self.program, sample, turn) * rows.load_profile.mean()
+            derivative = _sensitivity(self.program, sample, first) * rows.load_profile.mean()
             if path.known and not first.unstable:
                 derivative[:] = np.nan
             values["sensitivity"] = derivative.reshape(shape)
         if most := self.options.events:
-            events = event_table(self.problem, self.program, rows, row, path.events[:most])
+            events = event_table(self.problem, rows, row, path.events[:most])
             for name, column in events.items():
                 values[name] = np.full((most, *column.shape[1:]), np.nan)
                 values[name][: len(column)] = column
@@ -300,18 +311,17 @@ class OnsetSolver:
         )
 
 
-def _sensitivity(program: AnyProgram, sample: StaticSample, state: State) -> Array:
-    """Derivative of the stress of an instability by the peak strengths, from its multiplier.
+def _sensitivity(program: Program, sample: StaticSample, state: State) -> Array:
+    """Derivative of the stress of an instability by the peak strengths.
 
     NaN where a node passed a corner beyond which it weakens more steeply, or stopped.
     """
-    pieces, y = sample.pieces, multiplier_of(sample, state)
+    pieces = sample.pieces
     if state.stopped or (pieces.steepens and not state.certified):
-        return np.full(y.size, np.nan)
-    y = program.of_stress(sample, state, y)
+        return np.full(state.slip.size, np.nan)
     # A piece starts from share tau_p + (1 - share) tau_r; the share of the last piece is 0.
-    piece = present_pieces(sample, state.slip).piece
-    return y * np.where(sample.critical > 0.0, pieces.starts[piece], 1.0)
+    share = pieces.starts[present_pieces(sample, state.slip).piece]
+    return program.gradient(sample, state) * np.where(sample.critical > 0.0, share, 1.0)
 
 
 def _warn_if_stopped(stopped: NDArray[np.bool_]) -> None:

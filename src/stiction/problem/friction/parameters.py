@@ -5,9 +5,6 @@ from typing import NamedTuple, Protocol
 
 from stiction.base.arrays import Array
 
-SMALLEST_EIGENVALUE = 0.5788869418506
-"""lambda_0 in the nucleation length h_n = 2 lambda_0 G*/W (Uenishi and Rice, 2003)."""
-
 
 class Parameters(Protocol):
     """What kernels take of a law: a NamedTuple with these members, of a type of its own."""

@@ -24,6 +24,8 @@ TURNING = 4
 """Time of a rotation of two rows, in units of that of a row in a group that is appended."""
 MOST_MEMBERS = 8192
 """Slipping nodes for which a dense factor has space (268 MB if all of it is used)."""
+CROWDED = -2
+"""In the place of a number of members or a status: more members than that."""
 
 
 @jit
@@ -178,9 +180,11 @@ class Workspace(NamedTuple):
 
     `members[:size]` are the slipping nodes in the order of the rows of `factor`, `inside` marks
     them, `diagonal` is that of A; `forward` holds the forward substitutions of the load profile
-    and of the strength. `order` is a list of nodes to append. Rows of the factor up to `held` are
-    valid for these members and `entries`, their diagonal entries of A. The last of the `vectors` is
-    the stress that nodes take off the interface which slipped and rest.
+    and of the strength. `order` is a list of nodes to append, `keys` that by which it is sorted.
+    Rows of the factor up to `held` are valid for these members and their diagonal entries of A,
+    `held_diagonal`. The others are fields: a `right` side and `resting`, the stress that nodes take
+    off the interface which slipped and rest, at nodes; a `solution` and slip `rates` of members;
+    a `direction`, and a `product` of K. `turns` are the cosines and sines of rotations.
     """
 
     stiffness: Any
@@ -190,10 +194,17 @@ class Workspace(NamedTuple):
     inside: NDArray[np.bool_]
     diagonal: Array
     forward: Array
-    vectors: Array
+    turns: Array
     halves: Array
     held: NDArray[np.int64]
-    entries: Array
+    held_diagonal: Array
+    keys: Array
+    right: Array
+    resting: Array
+    solution: Array
+    rates: Array
+    direction: Array
+    product: Array
 
 
 def make_workspace(stiffness: Any, n: int) -> Workspace:
@@ -207,10 +218,10 @@ def make_workspace(stiffness: Any, n: int) -> Workspace:
         np.empty(n, dtype=np.bool_),
         np.empty(n),
         np.empty((2, n + 4)),
-        np.zeros((5, n + 4)),
+        np.empty((2, n + 4)),
         np.empty((2, n // 2)),
         np.zeros(1, dtype=np.int64),
-        np.empty(n + 4),
+        *np.zeros((8, n + 4)),
     )
 
 
@@ -256,7 +267,7 @@ def append(workspace: Workspace, size: int, count: int) -> int:
                 workspace.held[0] = size + r
                 return size + r
             row[size + r] = math.sqrt(pivot)
-            workspace.entries[size + r] = diagonal[node]
+            workspace.held_diagonal[size + r] = diagonal[node]
         size += group
         done += group
     workspace.held[0] = size
@@ -269,7 +280,7 @@ def remove(workspace: Workspace, size: int, position: int) -> int:
 
     The rows below it move up, and plane rotations spread its column over the others.
     """
-    factor, members, turns = workspace.factor, workspace.members, workspace.vectors
+    factor, members, turns = workspace.factor, workspace.members, workspace.turns
     for r in range(position + 1, size):
         start = row_start(r)
         row = factor[start : start + r + 1]
@@ -287,7 +298,7 @@ def remove(workspace: Workspace, size: int, position: int) -> int:
         turns[1, r - 1] = extra / pivot
         above[r - 1] = pivot
         members[r - 1] = members[r]
-        workspace.entries[r - 1] = workspace.entries[r]
+        workspace.held_diagonal[r - 1] = workspace.held_diagonal[r]
     workspace.held[0] = size - 1
     return size - 1
 
@@ -302,10 +313,10 @@ def factor_inside(workspace: Workspace) -> int:
     """
     stiffness, diagonal = workspace.stiffness, workspace.diagonal
     members, order, inside = workspace.members, workspace.order, workspace.inside
-    entries, held = workspace.entries, workspace.held[0]
+    known, held = workspace.held_diagonal, workspace.held[0]
     kept = first = turned = ZERO
-    while kept < held and inside[members[kept]] and diagonal[members[kept]] >= entries[kept]:
-        if diagonal[members[kept]] > entries[kept]:
+    while kept < held and inside[members[kept]] and diagonal[members[kept]] >= known[kept]:
+        if diagonal[members[kept]] > known[kept]:
             turned += 1
         elif turned == 0:
             first += 1
@@ -315,11 +326,9 @@ def factor_inside(workspace: Workspace) -> int:
     for t in range(kept):
         i = members[t]
         inside[i] = False
-        if diagonal[i] > entries[t]:
-            raise_diagonal(
-                workspace.factor, kept, t, diagonal[i] - entries[t], workspace.vectors
-            )
-            entries[t] = diagonal[i]
+        if diagonal[i] > known[t]:
+            raise_diagonal(workspace.factor, kept, t, diagonal[i] - known[t], workspace.turns)
+            known[t] = diagonal[i]
     count = ZERO
     for weakening in (False, True):
         for i in range(inside.shape[0]):
@@ -361,15 +370,16 @@ def multiply_outside(workspace: Workspace, size: int, values: Array, result: Arr
 
 @jit_inside
 def take_off_resting(workspace: Workspace, slip: Array) -> None:
-    """Multiply K by the slip of the nodes that rest, into the last of the vectors."""
-    values, count = workspace.vectors[0], ZERO
+    """Multiply K by the slip of the nodes that rest, into `resting`."""
+    values, count = workspace.right, ZERO
     for i in range(slip.shape[0]):
         if slip[i] > 0.0 and not workspace.inside[i]:
             workspace.order[count] = i
             values[count] = slip[i]
             count += 1
-    resting = workspace.vectors[4]
-    apply(workspace.stiffness, workspace.order, count, values, workspace.halves, resting)
+    apply(
+        workspace.stiffness, workspace.order, count, values, workspace.halves, workspace.resting
+    )
 
 
 @jit_inside
@@ -387,7 +397,7 @@ def singular_direction(workspace: Workspace, size: int, direction: Array) -> Non
     It is not negative and A y <= 0, as A is a Z-matrix: a bound for the load, and the direction in
     which slip runs away.
     """
-    solution = workspace.vectors[1]
+    solution = workspace.solution
     start = row_start(size)
     for t in range(size):
         solution[t] = -workspace.factor[start + t]

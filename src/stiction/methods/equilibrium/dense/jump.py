@@ -17,6 +17,7 @@ from stiction.base.arrays import Array
 from stiction.base.jit import ZERO, jit, jit_inside
 from stiction.elasticity.stiffness import entry, mean_relief
 from stiction.methods.equilibrium.dense.cholesky import (
+    CROWDED,
     MOST_MEMBERS,
     Workspace,
     append,
@@ -40,7 +41,7 @@ from stiction.methods.equilibrium.sample import (
 )
 
 ALL = -1
-CROWDED = -2
+"""In the place of a number of members: no node remains that never slipped."""
 
 STEPS = 4000
 """Largest number of elastic steps."""
@@ -78,7 +79,7 @@ def _overstressed(
 ) -> int:
     """Put the nodes at rest above their strength into `order`, most overstressed first."""
     count = ZERO
-    keys = workspace.vectors[2]
+    keys = workspace.keys
     for i in range(stiff.shape[0]):
         if not workspace.inside[i]:
             present = strength_at(sample, slip, i) if slip[i] > 0.0 else sample.excess[i]
@@ -142,8 +143,8 @@ def _relax(
     Returns what `_join` returns. Of rows whose drive is that of the step before, as it is at
     residual strength, the forward substitution stays; `_forget` them with the factor.
     """
-    solution, drive = workspace.vectors[1], workspace.vectors[3]
-    resting, members = workspace.vectors[4], workspace.members
+    solution, drive = workspace.solution, workspace.right
+    resting, members = workspace.resting, workspace.members
     forward, before = workspace.forward[0], workspace.forward[1]
     if stops:
         take_off_resting(workspace, slip)
@@ -187,7 +188,7 @@ def _leave_reversed(other: Workspace, size: int, least: float, share: float) -> 
 
     By at least the stress `least` at the node, or the `share` of the largest.
     """
-    solution = other.vectors[1]
+    solution = other.solution
     largest = 1.0
     for t in range(size):
         largest = max(largest, solution[t])
@@ -217,14 +218,14 @@ def _settle(
     Returns ARRESTED if the step ends in the equilibrium of the members, SLIDING if nothing bounds
     it, else UNDECIDED.
     """
-    drive = workspace.vectors[2]
+    drive = workspace.right
     for i in range(slip.shape[0]):
         own = entry(workspace.stiffness, i, i)
         other.inside[i] = workspace.inside[i]
         piece = piece_at(sample.pieces, sample.critical[i], slip[i])
         other.diagonal[i] = own - sample.pieces.slopes[piece] * sample.rate[i]
         drive[i] = load * sample.profile[i] - strength_at(sample, slip, i) - stiff[i]
-    direction, solution = other.vectors[3], other.vectors[1]
+    direction, solution = other.direction, other.solution
     near = AT_STRENGTH * tolerance
     count = size
     while True:
@@ -248,7 +249,7 @@ def _settle(
     step = step_to_corner(sample, slip, direction, longest)
     if step == np.inf:
         return Outcome.SLIDING
-    solution, resting = workspace.vectors[1], workspace.vectors[4]
+    solution, resting = workspace.solution, workspace.resting
     for t in range(size):
         solution[t] = slip[workspace.members[t]]
     multiply_members(workspace, size, solution, stiff)
@@ -286,7 +287,7 @@ def jump(
     for i in range(slip.shape[0]):
         workspace.diagonal[i] = entry(workspace.stiffness, i, i)
         workspace.inside[i] = slip[i] > 0.0
-        workspace.vectors[4, i] = 0.0
+        workspace.resting[i] = 0.0
         count += workspace.inside[i]
     if count > MOST_MEMBERS:
         return Outcome.UNDECIDED

@@ -11,7 +11,7 @@ import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.base.jit import ZERO, jit, jit_inside
-from stiction.elasticity.stiffness import apply
+from stiction.elasticity.stiffness import apply, entry
 from stiction.methods.equilibrium.dense.cholesky import (
     MOST_MEMBERS,
     Workspace,
@@ -23,10 +23,6 @@ from stiction.methods.equilibrium.dense.cholesky import (
     substitute_members,
 )
 from stiction.methods.equilibrium.sample import StaticSample
-
-SOLVED = 0
-STALLED = 1
-OVERFULL = 2
 
 OVERSTRESS = 1e-12
 """Share of the mean strength below which an overstress is round-off."""
@@ -57,7 +53,7 @@ def overstressed(
 ) -> int:
     """Put the nodes at rest above their strength into `order`, most overstressed first."""
     count = ZERO
-    keys = workspace.vectors[2]
+    keys = workspace.keys
     for i in range(stiff.shape[0]):
         margin = sample.excess[i] - load * sample.profile[i] + stiff[i]
         if margin < -tolerance and not workspace.inside[i]:
@@ -87,8 +83,8 @@ def _back_off(
     Close to the onset slip grows so fast with the load that round-off in the load alone may leave
     a node overstressed. One step along the tangent d d/d load mends it.
     """
-    solution = workspace.vectors[1]
-    stiff_rate = workspace.vectors[2]
+    solution = workspace.solution
+    stiff_rate = workspace.product
     for t in range(size):
         solution[t] = workspace.forward[0, t]
     back_substitute(workspace.factor, size, solution)
@@ -105,7 +101,7 @@ def _back_off(
 @jit_inside
 def _without_reversed(workspace: Workspace, size: int, load: float) -> int:
     """Remove the members that would slip backwards at a load; return the number that stay."""
-    solution = workspace.vectors[1]
+    solution = workspace.solution
     while size > 0:
         kept = 0
         while kept < size and solution[kept] >= 0.0:
@@ -129,49 +125,42 @@ def solve_program(
     slip: Array,
     stiff: Array,
     workspace: Workspace,
-) -> tuple[float, int]:
+) -> tuple[float, bool]:
     """Critical load with slip d, K d and multiplier, from an upper bound and its multiplier.
 
     The load is first `start`, then each time three quarters nearer to the bound until close to
-    it: at too high a load far too many nodes join. If `start` is -inf, the first load lies that
-    much nearer to the bound than the load of first slip. Nodes that already slip (`slip`) join
-    first. If `cap` is below the critical load, the result is the least equilibrium there. The
-    workspace holds the diagonal of A. The status is SOLVED, STALLED after too many passes, or
-    OVERFULL: more members than the workspace can hold.
+    it: at too high a load far too many nodes join. Nodes that already slip (`slip`) join
+    first. If `cap` is below the critical load, the result is the least equilibrium there. It is not
+    solved after too many passes, or if the workspace cannot hold the members.
     """
     top = min(bound, cap)
-    if start == -np.inf:
-        start = top
-        for i in range(slip.shape[0]):
-            start = min(start, sample.excess[i] / sample.profile[i])
-        start = 0.25 * start + 0.75 * top
     load = min(start, top)
     tolerance = stress_tolerance(sample, top)
     members, inside = workspace.members, workspace.inside
-    solution = workspace.vectors[1]
+    solution = workspace.solution
     size = ZERO
     known = ZERO
     for i in range(slip.shape[0]):
+        workspace.diagonal[i] = entry(workspace.stiffness, i, i) - sample.rate[i]
         inside[i] = False
         stiff[i] = 0.0
         if slip[i] > 0.0:
             workspace.order[known] = i
             known += 1
-    status = STALLED
+    solved = False
     for _ in range(PASSES):
         count = known or overstressed(sample, load, stiff, workspace, tolerance)
         known = ZERO
         if count == 0:
             top = min(bound, cap)
             if load >= top:
-                status = SOLVED
+                solved = True
                 break
             load = top if top - load <= CLOSE * abs(top) else 0.25 * load + 0.75 * top
             solve_forward(workspace, size, load, solution)
             multiply_members(workspace, size, solution, stiff)
             continue
         if size + count > MOST_MEMBERS:
-            status = OVERFULL
             break
         before = size
         size = append(workspace, size, count)
@@ -182,7 +171,7 @@ def solve_program(
         failed = size < before + count
         settled = False
         if failed:
-            direction = workspace.vectors[3]
+            direction = workspace.direction
             singular_direction(workspace, size, direction)
             above = 0.0
             below = 0.0
@@ -201,14 +190,14 @@ def solve_program(
             size = _without_reversed(workspace, size, load)
         multiply_members(workspace, size, solution, stiff)
         if settled:  # a cut that lowers the load by round-off only: this is the optimum
-            status = SOLVED
+            solved = True
             _back_off(sample, load, workspace, size, stiff)
             break
     for i in range(slip.shape[0]):
         slip[i] = 0.0
     for t in range(size):
         slip[members[t]] = max(solution[t], 0.0)
-    return load, status
+    return load, solved
 
 
 @jit
@@ -217,13 +206,13 @@ def certificate(
 ) -> float:
     """Distance of the rigorous bounds from below (by the slip) and from above (by y), Pa.
 
-    K y is left in ``workspace.vectors[2]``.
+    K y is left in ``workspace.product``.
     """
     n = slip.shape[0]
     lower = np.inf
     count = ZERO
-    values = workspace.vectors[1]
-    product = workspace.vectors[2]
+    values = workspace.solution
+    product = workspace.product
     for i in range(n):
         balance = sample.excess[i] + stiff[i] - sample.rate[i] * slip[i]
         lower = min(lower, balance / sample.profile[i])

@@ -13,7 +13,7 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.jit import ZERO, jit
 from stiction.base.lanes import multiply_add
-from stiction.elasticity.line import griffith_length
+from stiction.elasticity.half_spaces import HalfSpaces
 from stiction.methods.equilibrium.dense.cholesky import back_substitute, row_start, substitute
 from stiction.methods.equilibrium.sample import (
     Outcome,
@@ -27,6 +27,10 @@ STEPS = 30
 """Elastic steps; most samples need five to eight."""
 SHARE = 1e-3
 """Growth in a step, as a share of the largest slip, below which the test gives up."""
+LONGEST_RUN = 2048
+"""Nodes up to which the test follows a run."""
+MARGIN = 1.5
+"""Safety factor on the length beyond which a rupture counts as unstoppable."""
 
 
 def block_factor(column: Array, width: int) -> Array:
@@ -65,6 +69,27 @@ class Runs(NamedTuple):
     modulus: float
 
 
+def make_runs(column: Array, half_spaces: HalfSpaces) -> Runs:
+    """Return what the test needs of a line, of the first column of its K."""
+    (length,), (modulus,) = half_spaces
+    longest = min(LONGEST_RUN, column.size - 1)
+    factor = block_factor(column, longest)
+    return Runs(np.tile(column, 3), factor, longest, length / column.size, modulus)
+
+
+@jit
+def griffith_length(drop: float, energy: float, modulus: float) -> float:
+    """Critical length of a crack (m), infinite without a stress drop.
+
+    A crack of half-length a with stress drop D (Pa) releases pi a D^2/(2 G*) at each tip
+    (Griffith, 1921), and grows where that is more than the fracture energy (J/m²); the
+    modulus is G* (Pa).
+    """
+    if drop <= 0.0:
+        return np.inf
+    return 4.0 * modulus * energy / (np.pi * drop * drop)
+
+
 @jit
 def unstoppable_length(sample: StaticSample, load: float, runs: Runs) -> float:
     """Nodes in a row at their residual strength that nothing on the interface stops.
@@ -93,20 +118,21 @@ def runs_away(
     first: int,
     length: int,
     work: Array,
-) -> Outcome:
+) -> tuple[Outcome, float]:
     """Whether the patch of an instability certainly becomes global sliding: SLIDING or UNDECIDED.
 
-    Slip d and K d are those of the state that became unstable; afterwards slip is a lower bound of
-    the next equilibrium. K times the unstable direction is given beside it, and the first node and
-    the length of its patch; `work` (4, n) is work space.
+    Returned is, too, the number of residual nodes in a row that would show it in a jump. Slip d and
+    K d are those of the state that became unstable; afterwards slip is a lower bound of the next
+    equilibrium. K times the unstable direction is given beside it, and the first node and the
+    length of its patch; `work` (4, n) is work space.
     """
     n = slip.shape[0]
     griffith = unstoppable_length(sample, load, runs)
     step = step_to_corner(sample, slip, direction, np.inf)
     if step == np.inf:
-        return Outcome.SLIDING
+        return Outcome.SLIDING, MARGIN * griffith
     if (griffith > runs.longest and griffith < np.inf) or length > runs.longest:
-        return Outcome.UNDECIDED
+        return Outcome.UNDECIDED, MARGIN * griffith
     # Everything below is numbered from `origin`, so that the patch lies in the middle.
     begin = (n - length) // 2
     end = begin + length
@@ -135,7 +161,7 @@ def runs_away(
             end += 1
         length = end - begin
         if length > runs.longest:
-            return Outcome.UNDECIDED
+            return Outcome.UNDECIDED, MARGIN * griffith
         for t in range(length):
             q = begin + t
             i = (origin + q) % n
@@ -155,9 +181,9 @@ def runs_away(
             run = run + 1 if slip[i] >= sample.pieces.at_corner * sample.critical[i] else 0
             longest = max(longest, run)
         if longest >= griffith or unsupported(sample, load, slip):
-            return Outcome.SLIDING
+            return Outcome.SLIDING, MARGIN * griffith
         if fastest < SHARE * largest:
-            return Outcome.UNDECIDED
+            return Outcome.UNDECIDED, MARGIN * griffith
         low = max(begin - length // 2, 0)
         high = min(end + length // 2, n)
         near = extra[low:high]
@@ -168,4 +194,4 @@ def runs_away(
             factor = grown[q]
             for t in range(near.shape[0]):
                 near[t] = multiply_add(factor, source[t], near[t])
-    return Outcome.UNDECIDED
+    return Outcome.UNDECIDED, MARGIN * griffith

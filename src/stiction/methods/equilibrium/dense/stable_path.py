@@ -24,6 +24,7 @@ from stiction.base.arrays import Array
 from stiction.base.jit import ZERO, jit_allocating, jit_inside
 from stiction.elasticity.stiffness import entry, mean_relief
 from stiction.methods.equilibrium.dense.cholesky import (
+    CROWDED,
     MOST_MEMBERS,
     Workspace,
     append,
@@ -43,7 +44,6 @@ from stiction.methods.equilibrium.sample import StaticSample, piece_at, start_of
 
 REACHED = 0
 UNSTABLE = 1
-CROWDED = 2
 
 ONE: Any = np.int64(1)
 """An index that is no literal, as `ZERO`."""
@@ -129,7 +129,7 @@ def _fails(workspace: Workspace, size: int, speed: Array, direction: Array, stop
     singular_direction(workspace, size, direction)
     if not stops:
         return -1
-    solution = workspace.vectors[1]
+    solution = workspace.solution
     solution[size] = 1.0
     return _first_to_stop(workspace, size + 1, solution, speed, True)
 
@@ -163,7 +163,7 @@ def _substitute(
     sample: StaticSample, strength: Array, workspace: Workspace, first: int, size: int
 ) -> None:
     """Extend both forward substitutions by the members first..size-1."""
-    right, resting = workspace.vectors[0], workspace.vectors[4]
+    right, resting = workspace.right, workspace.resting
     for t in range(first, size):
         i = workspace.members[t]
         right[i] = strength[i] + resting[i]
@@ -193,7 +193,7 @@ def _next_event(
 ) -> tuple[float, int, int]:
     """Step of the load to the next event, the node that begins to slip and the member that reaches
     a corner, -1 for none."""
-    rate, stiff_rate = workspace.vectors[3], workspace.vectors[2]
+    rate, stiff_rate = workspace.rates, workspace.product
     pieces = sample.pieces
     step = target - load
     starts = -1
@@ -225,8 +225,8 @@ def _change_slope(
     node = workspace.members[member]
     workspace.diagonal[node] = entry(workspace.stiffness, node, node) - after
     if after <= before:
-        raise_diagonal(workspace.factor, size, member, before - after, workspace.vectors)
-        workspace.entries[member] = workspace.diagonal[node]
+        raise_diagonal(workspace.factor, size, member, before - after, workspace.turns)
+        workspace.held_diagonal[member] = workspace.diagonal[node]
         return size
     # It weakens more steeply: the factor is made anew from there on.
     for t in range(member, size):
@@ -254,12 +254,8 @@ def advance(
     members than the workspace holds.
     """
     n = slip.shape[0]
-    solution, stiff_rate, rate = (
-        workspace.vectors[1],
-        workspace.vectors[2],
-        workspace.vectors[3],
-    )
-    resting = workspace.vectors[4]
+    solution, stiff_rate, rate = workspace.solution, workspace.product, workspace.rates
+    resting = workspace.resting
     pieces = sample.pieces
     piece = np.zeros(n, np.int64)
     strength = np.empty(n)

@@ -7,22 +7,23 @@ law, as long as no node reaches a corner before it. Where one does, and after a 
 followed in steps of the load.
 """
 
-import functools
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from stiction.base.arrays import Array
+from stiction.elasticity.half_spaces import HalfSpaces
 from stiction.elasticity.linear import inner
-from stiction.elasticity.operator import Operator, make_operator, stiffness_symbol
+from stiction.elasticity.operator import Operator, make_operator
 from stiction.methods.equilibrium.sample import (
     Jump,
     Outcome,
-    Program,
     State,
     StaticSample,
+    at_rest,
     exceeds,
+    multiplier_of,
     pieces_of,
 )
 from stiction.methods.equilibrium.transforms.bracket import Bracket, bisect, make_bracket
@@ -56,25 +57,6 @@ AT_CORNER = 1.0 - 1e-9
 """Share of the slip at a corner above which a node counts as beyond it."""
 ACCURACY = 1e-7
 """Largest residual stress of the slip at a given load, as a share of the mean strength."""
-
-
-class Plane(NamedTuple):
-    """Periods (m), G (Pa) and nu of a plane between two half-spaces; for a line, G* and 0."""
-
-    lengths: tuple[float, ...]
-    shear_modulus: float
-    poisson_ratio: float
-
-    def symbol(self, shape: tuple[int, ...]) -> Array:
-        """Return K(k) on a grid; see `stiffness_symbol`."""
-        return _symbol(*self, shape)
-
-
-@functools.lru_cache(maxsize=16)
-def _symbol(
-    lengths: tuple[float, ...], modulus: float, ratio: float, shape: tuple[int, ...]
-) -> Array:
-    return stiffness_symbol(shape, lengths, modulus / (1.0 - ratio), modulus)
 
 
 def halved(fine: Array) -> Array:
@@ -125,7 +107,7 @@ def _narrow(bracket: Bracket, gap: float) -> float:
 
 
 def plane_onset(
-    plane: Plane,
+    half_spaces: HalfSpaces,
     excess: Array,
     profile: Array,
     rate: Array,
@@ -144,7 +126,7 @@ def plane_onset(
     levels = [tuple(np.asarray(given, dtype=np.float64) for given in fields)]
     while slip is None:
         shape = levels[-1][0].shape
-        stiffest, weakest = float(plane.symbol(shape).max()), float(levels[-1][2].max())
+        stiffest, weakest = float(half_spaces.symbol(shape).max()), float(levels[-1][2].max())
         odd = any(nodes % 2 for nodes in shape)
         if odd or min(shape) < 2 * FEWEST or 0.5 * stiffest < COARSEST * weakest:
             break
@@ -154,7 +136,9 @@ def plane_onset(
     for number in range(len(levels) - 1, -1, -1):
         goal = gap if number == 0 else max(ROUGH, gap)
         strength, load_profile, weakening, end = levels.pop()
-        bracket = make_bracket(plane.symbol(strength.shape), weakening, strength, load_profile)
+        bracket = make_bracket(
+            half_spaces.symbol(strength.shape), weakening, strength, load_profile
+        )
         if slip is not None:
             bracket.raise_slip(slip.flatten())
         closed = False
@@ -176,7 +160,7 @@ def plane_onset(
     )  # fmt: skip
 
 
-class PlaneProgram(Program):
+class PlaneProgram:
     """Equilibria of a plane; safe to use from several threads.
 
     Parameters
@@ -187,9 +171,7 @@ class PlaneProgram(Program):
     """
 
     def __init__(self, problem: Problem, gap: float = 1e-6) -> None:
-        x, y = problem.interface.lengths
-        solid = problem.solid
-        self.plane = Plane((x, y), solid.shear_modulus, solid.poisson_ratio)
+        self.elastic = problem.half_spaces
         self.shape = problem.interface.shape
         self.pieces = pieces_of(problem.friction)._replace(at_corner=AT_CORNER)
         self.requested = gap
@@ -197,30 +179,43 @@ class PlaneProgram(Program):
 
     def _operator(self, sample: StaticSample) -> Operator:
         return make_operator(
-            self.plane.symbol(self.shape), sample.rate.reshape(self.shape), self.shape
+            self.elastic.symbol(self.shape), sample.rate.reshape(self.shape), self.shape
         )
 
+    def _onset(self, sample: StaticSample, corner: Array) -> PlaneOnset:
+        """Return the onset without corners, of a coarse grid if a node there passes its corner."""
+        fields = (sample.excess, sample.profile, sample.rate, corner)
+        excess, profile, rate, corner = (field.reshape(self.shape) for field in fields)
+        return plane_onset(self.elastic, excess, profile, rate, self.requested, corner=corner)
+
     def next(self, sample: StaticSample, state: State | None = None) -> State:
-        """Return the next instability on the path from a stable state or from rest."""
+        """Return the next instability on the path from a stable state or from rest.
+
+        From rest it is the onset without corners, if no node reaches its corner before. A coarse
+        grid shows most often whether one does; then the path is followed, and if it turns before
+        any node does, the onset is computed after all, with its certificate.
+        """
         if state is not None:
             return self._step_on(sample, state, FIRST_STEP * state.load)
         first = float(self.pieces.ends[0])
-        corner = sample.critical if first == 1.0 else first * sample.critical
-        fields = (sample.excess, sample.profile, sample.rate, corner)
-        excess, profile, rate, corner = (field.reshape(self.shape) for field in fields)
-        rest = self.at_rest(sample)
-        for end in (corner, None):
-            found = plane_onset(self.plane, excess, profile, rate, self.requested, corner=end)
-            slip, multiplier = found.slip.reshape(-1), found.multiplier.reshape(-1)
-            coarse = slip.size < sample.excess.size
-            if not coarse and not exceeds(sample, slip):
-                break
-            step = max(AHEAD * (found.lower - rest.load), FIRST_STEP * rest.load)
-            reached = self._step_on(sample, rest, step)
-            if not coarse or exceeds(sample, reached.slip):
+        found = self._onset(
+            sample, sample.critical if first == 1.0 else first * sample.critical
+        )
+        if found.slip.size < sample.excess.size:
+            reached = self._from_rest(sample, found)
+            if exceeds(sample, reached.slip):
                 return reached
-        gap = found.upper - found.lower
-        return State(found.lower, slip, np.zeros(slip.size), multiplier, gap)
+            found = self._onset(sample, np.zeros_like(sample.excess))
+        slip, multiplier = found.slip.reshape(-1), found.multiplier.reshape(-1)
+        if exceeds(sample, slip):
+            return self._from_rest(sample, found)
+        return State(found.lower, slip, multiplier, gap=found.upper - found.lower)
+
+    def _from_rest(self, sample: StaticSample, found: PlaneOnset) -> State:
+        """Follow the path from rest, at first most of the way to the onset without corners."""
+        rest = at_rest(sample)
+        step = max(AHEAD * (found.lower - rest.load), FIRST_STEP * rest.load)
+        return self._step_on(sample, rest, step)
 
     def _step_on(self, sample: StaticSample, state: State, step: float) -> State:
         """Follow the stable path in steps of the load.
@@ -249,9 +244,9 @@ class PlaneProgram(Program):
                 turn = next((one for one in turns if one is not None), None)
                 if turn is None:
                     direction = slip - passed[0][1]
-                    return State(load, slip, state.stiff, direction, step, certified=False)
+                    return State(load, slip, direction, gap=step, certified=False)
                 if turn.direction.any():
-                    return _turned(turn, state, beyond, certified=False)
+                    return _turned(turn, beyond)
                 there = turn.slip
             growth = there - slip
             work = step * inner(sample.profile, growth)
@@ -260,19 +255,22 @@ class PlaneProgram(Program):
             load, slip, step = beyond, there, 1.5 * step
             passed = [*passed[-3:], (load, slip)]
 
-    def at_turn(self, sample: StaticSample, state: State) -> State:
-        """Return an instability with the direction in which the path turns, NaN if not found."""
-        if state.ahead is not None or state.gap == 0.0:
-            return state
+    def gradient(self, sample: StaticSample, state: State) -> Array:
+        """Return the derivative of the mean stress at an instability by the strengths there.
+
+        It is the direction in which the path turns; NaN if that is not found.
+        """
+        if state.multiplier is not None or state.gap == 0.0:
+            return multiplier_of(sample, state)
         operator, beyond = self._operator(sample), state.load + 2.0 * state.gap
         slip = state.slip
         for retreat in RETREATS if state.certified else ():
             load = state.load - retreat * abs(state.load)
             turn = follow_to_turn(operator, sample, load, beyond, slip)
             if turn is not None and turn.direction.any():
-                return _turned(turn, state, beyond, certified=True)
+                return turn.direction
             slip = np.zeros(slip.size)  # that which proves the bound may be beyond the turn
-        return replace(state, direction=np.full(slip.size, np.nan))
+        return np.full(slip.size, np.nan)
 
     def jump(self, sample: StaticSample, found: State) -> Jump:
         """Let an unstable state jump to another equilibrium, or to sliding."""
@@ -284,28 +282,30 @@ class PlaneProgram(Program):
         arrested = ahead.status == Outcome.ARRESTED
         weakens = sample.critical > 0.0
         moved = ahead.slip - found.slip > MOVED * sample.critical
-        after = State(beyond, ahead.slip, found.stiff, found.direction)
+        after = State(beyond, ahead.slip, found.direction, jumped=True)
         counts = not arrested or bool(moved[weakens].any())
         return Jump(arrested, ahead.status != Outcome.UNDECIDED, after, counts)
 
-    def at(self, sample: StaticSample, state: State, load: float, fresh: bool) -> State | None:
+    def at(self, sample: StaticSample, state: State, load: float) -> State | None:
         """Return the equilibrium at a load from a state below, None if it is not found."""
         if load <= state.load:
             return state
         found = least_equilibrium(self._operator(sample), sample, load, state.slip, ACCURACY)
         if found.status != Outcome.ARRESTED:
             return None
-        return State(load, found.slip, state.stiff, state.direction, unstable=False)
+        return replace(state, load=load, slip=found.slip, unstable=False)
 
     def stress_released(self, state: State) -> Array:
         """Return the stress that the slip takes off the interface, K d, Pa."""
-        symbol = self.plane.symbol(self.shape)
+        symbol = self.elastic.symbol(self.shape)
         slip = state.slip.reshape(self.shape)
         released: Array = np.fft.irfft2(symbol * np.fft.rfft2(slip), self.shape).reshape(-1)
         return released
 
 
-def _turned(turn: Turn, state: State, beyond: float, certified: bool) -> State:
+def _turned(turn: Turn, beyond: float) -> State:
     """Return the instability at a turn; the path does not reach the load `beyond`."""
-    gap = beyond - turn.load
-    return State(turn.load, turn.slip, state.stiff, turn.direction, gap, certified, ahead=turn)
+    return State(
+        turn.load, turn.slip, turn.direction,
+        gap=beyond - turn.load, certified=False, multiplier=turn.direction,
+    )  # fmt: skip

@@ -1,23 +1,20 @@
 """Critical windows of a specimen, where the nucleation length depends on the place.
 
-A run of nodes whose block of K has its smallest eigenvalue at or below the weakening rate is
-unstable by itself. Its eigenvector y is positive where K has no positive entry off its diagonal,
-and K y <= W y: so <s, y>/<q, y> bounds the load of the first instability from above, s being the
-strength less initial stress and q the load profile. Blocks inside others have larger eigenvalues:
-the shortest unstable run that begins at a node ends the further on the later it begins.
+Blocks of K inside others have larger eigenvalues: the shortest unstable run that begins at a node
+ends the further on the later it begins.
 """
-
-from functools import lru_cache
 
 import numpy as np
 import scipy.linalg
 
 from stiction.base.arrays import Array
-from stiction.elasticity.driven import Driven
-from stiction.elasticity.weakest import Places
+from stiction.elasticity.protocol import Windows
 
 FINEST = 32
 """Windows that begin within the length of one, at most."""
+RUNG = 1.5
+"""Ratio of successive weakening rates whose windows are tried where the rate varies."""
+MOST_RUNGS = 12
 
 
 def _unstable(matrix: Array, rate: float, begin: int, end: int) -> bool:
@@ -26,8 +23,8 @@ def _unstable(matrix: Array, rate: float, begin: int, end: int) -> bool:
     return bool(scipy.linalg.lapack.dpotrf(block, lower=1, overwrite_a=1)[1] > 0)
 
 
-def make_places(matrix: Array, rate: float) -> Places:
-    """Return the shortest unstable runs of a stiffness K (n, n) at a weakening rate, Pa/m."""
+def shortest_runs(matrix: Array, rate: float) -> list[tuple[int, int]]:
+    """Return first node and end of the shortest unstable runs of K (n, n) at a rate, Pa/m."""
     n, runs = len(matrix), []
     begin, end, step = 0, 1, 1
     while begin < n:
@@ -44,6 +41,12 @@ def make_places(matrix: Array, rate: float) -> Places:
             begin, end = begin + step, end + step
         else:  # the last run ends with the specimen
             begin, end, step = begin - step + 1, n, 1
+    return runs
+
+
+def windows_at(matrix: Array, rate: float) -> Windows:
+    """Return the windows of a stiffness K (n, n) at one weakening rate, Pa/m."""
+    runs = shortest_runs(matrix, rate)
     modes = np.zeros((len(runs), max((end - begin for begin, end in runs), default=1)))
     for row, (begin, end) in zip(modes, runs, strict=True):
         _, vectors = scipy.linalg.eigh(
@@ -52,10 +55,19 @@ def make_places(matrix: Array, rate: float) -> Places:
         row[: end - begin] = np.abs(vectors[:, 0])
         row /= row.sum()
     starts, ends = np.array(runs, dtype=np.int64).reshape(-1, 2).T
-    return Places(rate, starts.copy(), ends - starts, modes)
+    return Windows(np.full(len(runs), rate), starts.copy(), ends - starts, modes)
 
 
-@lru_cache(maxsize=32)
-def places_of(blocks: Driven, rate: float) -> Places:
-    """Return the shortest unstable runs of blocks; none if they are stable as a whole."""
-    return make_places(blocks.stiffness, rate)
+def rungs_between(low: float, high: float) -> list[float]:
+    """Return the rates of a fixed ladder, falling, whose windows serve rates from low to high."""
+    steps = min(int(np.ceil(np.log(high / low) / np.log(RUNG))), MOST_RUNGS)
+    first = np.floor(np.log(high) / np.log(RUNG))
+    return [float(RUNG ** (first - step)) for step in range(steps + 1)]
+
+
+def joined(several: list[Windows]) -> Windows:
+    """Return windows of falling rates as one record."""
+    widest = max(one.modes.shape[1] for one in several)
+    modes = [np.pad(one.modes, ((0, 0), (0, widest - one.modes.shape[1]))) for one in several]
+    rates, starts, widths, _ = zip(*several, strict=True)
+    return Windows(*map(np.concatenate, (rates, starts, widths, modes)))

@@ -1,0 +1,96 @@
+"""What methods need of the solids on both sides of an interface.
+
+`Line` (half-spaces that meet on a line) and `Driven` (two blocks behind a machine) have all of it.
+`HalfSpaces` on a plane have the symbol of K, and slip relieves no load; K itself would not fit in
+memory. Records only: kernels that take them stand in `stiffness` and `weakest`.
+"""
+
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction.base.arrays import Array
+from stiction.elasticity.half_spaces import HalfSpaces
+
+ANYWHERE = -1
+"""In the place of a first node: K is the same everywhere, and the interface is periodic."""
+
+
+class Windows(NamedTuple):
+    """Runs of nodes that are just unstable by themselves.
+
+    The smallest eigenvalue of the block of K on a run is at most the weakening rate W in it. The
+    eigenvector y is positive where K has no positive entry off its diagonal, and K y <= W y: so
+    <s, y>/<p, y> bounds the load of the first instability from above, s being the strength less
+    initial stress and p the load profile. This is the criterion of Uenishi and Rice (2003) in the
+    form that is strict on the grid.
+
+    Attributes
+    ----------
+    rates : (count,) array
+        Weakening rate from which each is unstable, Pa/m, never rising.
+    starts, widths : (count,) int arrays
+        First node, or `ANYWHERE`, and number of nodes.
+    modes : (count or 1, largest width) array
+        Eigenvectors of unit sum, zero beyond their width.
+    """
+
+    rates: Array
+    starts: NDArray[np.int64]
+    widths: NDArray[np.int64]
+    modes: Array
+
+
+_NO_NODES = np.empty(0, dtype=np.int64)
+NONE = Windows(np.empty(0), _NO_NODES, _NO_NODES, np.empty((1, 1)))
+
+
+class CircularEntries(NamedTuple):
+    """K of a periodic line: its first column (n,), and its odd entries three times in a row, Pa/m.
+
+    The strip spares products index arithmetic.
+    """
+
+    column: Array
+    strip: Array
+
+
+class DenseEntries(NamedTuple):
+    """K of two blocks, row by row in a flat array, and what slip takes off their drive.
+
+    Slip d lowers the mean stress by relief <q, d>/n (Pa/m; 0 under dead load).
+    """
+
+    rows: Array
+    nodes: int
+    relief: float
+
+
+class Elasticity(Protocol):
+    """Two solids that meet on nodes."""
+
+    @property
+    def entries(self) -> Any:
+        """K as kernels take it: `CircularEntries` or `DenseEntries`."""
+
+    @property
+    def half_spaces(self) -> HalfSpaces | None:
+        """What gives the symbol of K; None for blocks, of which there is none."""
+
+    @property
+    def relief(self) -> float:
+        """h, Pa/m: how much stress the mean of p d takes off the load; 0 without a machine."""
+
+    @property
+    def positive(self) -> float:
+        """Largest positive entry of K off its diagonal, over the diagonal: slip may stop others."""
+
+    def mean_relief(self, slip: Array) -> Any:
+        """Return by how much slip (..., n) lowers the mean stress, Pa."""
+
+    def windows(self, low: float, high: float) -> Windows:
+        """Return the windows for weakening rates from `low` to `high`, Pa/m.
+
+        Exact if these are the same; else those of a fixed ladder, the same for all samples.
+        """
