@@ -15,7 +15,7 @@ ROWS = """
     failure_probability failure_curve design_stress external.limit_state
     failure_curve plot.failure_curve
     fit_field plot.fit
-    infer read_peaks design_of_tests plot.posterior external.simulator
+    infer read_peaks design_of_tests external.simulator
     statistics.density statistics.quantiles
     theory.nucleation_stress theory.nucleation_statistics
     theory.griffith_length theory.energy_release_rate

@@ -11,7 +11,6 @@ from scipy.stats import kstest
 from setups import beta_strength, ensemble, make_problem
 
 import stiction as st
-from stiction.random.conditioning import Measured
 from stiction.random.fields import _conditioned
 from stiction.random.mapping import from_normal
 
@@ -248,53 +247,3 @@ def test_a_factor_changes_no_other_draw_and_is_constant_along_each_specimen():
     assert np.ptp(factors, axis=1).max() < 1e-14
     assert kstest(factors[:, 0], FACTOR.distribution.cdf).pvalue > 1e-3
     assert random.dimension(LINE) == plain.dimension(LINE) + 1
-
-
-def test_a_factor_so_small_that_scipy_has_no_quantile_for_the_values():
-    """Of this beta distribution it is NaN from z = 30 on."""
-    marginal = st.Beta(alpha=3.02, beta=2.82, low=0.5e6, high=2e6)
-    field, places = st.RandomField(marginal, FIELD.spectrum), LINE.x[:20]
-    values = scan(LINE, places[None], field)
-    given = given_on(places, values, 20e3, field)
-    random = st.RandomInterface(strength=given, between={"strength": FACTOR})
-    found = strengths(random, 200, 0)[:, :20].mean(axis=0)
-    assert np.abs(found - values).max() < 20e3  # an error of a value, of 200 samples
-
-
-@pytest.mark.parametrize("u", [-2.1, 3.0])
-def test_values_under_a_factor_are_those_of_a_field_without_divided_by_it(u):
-    """And so is their error: the same Gaussians stand for them."""
-    factor, places = st.Lognormal(mean=1.0, cv=0.3), LINE.x[3:9]
-    size = float(factor.distribution.ppf(scipy.stats.norm.cdf(u)))
-    values = size * np.array([0.7e6, 0.8e6, 0.95e6, 1.1e6, 1.3e6, 1.5e6])
-    mean, variance = np.linspace(-1.0, 0.8, 6), np.linspace(0.2, 0.9, 6)
-    found, expected = (
-        Measured(given_on(places, *given).conditions, BETA, np.zeros((6, 1)), own).gaussian(
-            u, mean, variance
-        )
-        for given, own in (((values, 60e3), factor), ((values / size, 60e3 / size), None))
-    )
-    for one, other in zip(found, expected, strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-9)
-
-
-def test_a_scan_tells_of_the_factor_of_its_specimen():
-    """Ranks of the true factors in their posteriors are uniform over 50 specimens."""
-    factor, noise = st.Lognormal(mean=1.0, cv=0.15), 10e3
-    rng = np.random.default_rng(2)
-    ranks, spreads = [], []
-    for i, profile in enumerate(FIELD.sample(LINE, samples=50, seed=11)):
-        truth = float(factor.distribution.ppf(rng.uniform()))
-        measured = truth * profile[:20] + noise * rng.standard_normal(20)
-        given = given_on(LINE.x[:20], measured, noise)
-        random = st.RandomInterface(strength=given, between={"strength": factor})
-        ((_, known),) = _conditioned(random, LINE)
-        u = np.random.default_rng(i).standard_normal(400)
-        factors = from_normal(factor, np.interp(u, known.score, known.quantile))
-        ranks.append(np.mean(factors < truth))
-        spreads.append(factors.std())
-        if i == 0:
-            found = strengths(random, 100, 0)
-            assert np.abs(found[:, :20] - measured).mean() < 1.5 * noise
-    assert kstest(ranks, "uniform").pvalue > 1e-3
-    assert np.median(spreads) < 0.05  # of 0.15 before

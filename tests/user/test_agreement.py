@@ -51,6 +51,12 @@ def posterior():
     return st.infer(problem, strength, PEAKS, prior=prior, method=LOCAL, samples=300)
 
 
+def test_peaks_are_in_the_unit_of_those_of_the_posterior(posterior):
+    refuses(
+        "peaks in Pa, got ... in N", lambda: st.statistics.agreement(posterior, PEAKS, unit="N")
+    )
+
+
 def test_further_peaks_are_compared_with_what_the_posterior_leaves_open(posterior):
     refuses("was fitted to them", lambda: st.statistics.agreement(posterior, PEAKS[::-1]))
     further = st.statistics.agreement(posterior, PEAKS + 1.0, replicates=300)

@@ -1,4 +1,4 @@
-"""A field that was measured in part and factors between specimens, in study files and tails."""
+"""A field that was measured in part, in study files and tails."""
 
 from functools import partial
 
@@ -19,14 +19,13 @@ BETWEEN = {"type": "lognormal", "mean": 1.0, "cv": 0.1}
 
 @pytest.fixture
 def study(tmp_path, monkeypatch):
-    """The plain form of a study whose strength was scanned over a third, and has a factor."""
+    """The plain form of a study whose strength was scanned over a third."""
     monkeypatch.chdir(tmp_path)
     plain = small_study()
     header = "x (mm),strength (MPa)"
     table = np.column_stack([LINE.x[:40] * 1e3, SCANNED[:40] * 1e-6])
     np.savetxt("scan.csv", table, delimiter=",", header=header, comments="")
     plain["random"]["strength"]["given"] = {"profile": "scan.csv", "noise": 20e3}
-    plain["random"]["between"] = {"strength": dict(BETWEEN)}
     return plain
 
 
@@ -34,19 +33,15 @@ def test_a_study_file_is_the_same_as_the_calls(study):
     read = st.Study.from_dict(study, folder=".")
     result = read.run()
     given = FIELD.given(st.read_profile("scan.csv"), noise=20e3)
-    between = {"strength": st.Lognormal(mean=1.0, cv=0.1)}
-    random = st.RandomInterface(strength=given, between=between)
-    called = st.monte_carlo(read.problem, random, method=read.method, samples=30, seed=3)
+    called = st.monte_carlo(read.problem, given, method=read.method, samples=30, seed=3)
     assert np.array_equal(result.critical_stress, called.critical_stress)
     assert st.Study.from_result(result) == read
     read.run(out="RUN")
     assert st.open_run("RUN").study == read
-    sweep = [
-        {"random.strength.given.noise": [5e3, 20e3]}, {"random.between.strength.cv": [0.05, 0.2]}
-    ]  # fmt: skip
+    sweep = [{"random.strength.given.noise": [5e3, 20e3]}]
     swept = study | {"sweep": sweep, "ensemble": {"samples": 3}}
     found = st.Study.from_dict(swept, folder=".").run()
-    assert found.critical_stress.sizes == {"noise": 2, "cv": 2, "sample": 3}
+    assert found.critical_stress.sizes == {"noise": 2, "sample": 3}
 
 
 @pytest.mark.parametrize(
@@ -80,11 +75,12 @@ def test_a_file_holds_the_property_that_was_measured(study, name, heading, unit)
         ("strength", {"profile": "scam.csv"}, "scam.csv: cannot be read"),
         ("between", {"strenght": BETWEEN}, "unknown 'strenght'; did you mean 'strength'"),
         ("between", {"strength": BETWEEN | {"mean": 1.2}}, "must be positive with mean 1"),
+        ("between", {"strength": BETWEEN}, "strength.given was measured on one"),
     ],
 )
 def test_a_mistake_is_named(study, table, change, text):
     random = study["random"]
-    given = random["strength"]["given"] if table == "strength" else random["between"]
+    given = random["strength"]["given"] if table == "strength" else random.setdefault(table, {})
     given.update(change)
     if None in change.values():
         del given["profile"]
@@ -113,7 +109,7 @@ def test_unlikely_values_are_warned_of():
         FIELD.given(rough, noise=1e3).sample(LINE)
 
 
-def test_the_tail_of_a_scanned_specimen_and_of_specimens_with_factors(study):
+def test_the_tail_of_a_scanned_specimen(study):
     """Failure probability against counting ten times as many samples."""
     read = st.Study.from_dict(study, folder=".")
     given = {"problem": read.problem, "random": read.random, "method": read.method}
@@ -122,18 +118,6 @@ def test_the_tail_of_a_scanned_specimen_and_of_specimens_with_factors(study):
     found = st.failure_probability(**given, stress=stress, algorithm="subset", target_cv=0.15)
     error = np.hypot(0.1, found.cv)  # of 100 failures, and of the answer
     assert abs(np.log(found.probability / 0.01)) < 3.5 * error
-
-
-def test_a_factor_may_carry_measured_values_beyond_the_marginal():
-    high = 1.5 * xr.DataArray(SCANNED, {"x": LINE.x}, "x")
-    assert high.max() > 1.66e6 + 4.0 * 20e3
-    random = st.RandomInterface(
-        strength=FIELD.given(high, noise=20e3),
-        between={"strength": st.Lognormal(mean=1.0, cv=0.3)},
-    )
-    found = st.monte_carlo(OWN.problem, random, method=OWN.method, samples=50, seed=0)
-    exact = st.onset(OWN.problem, high, method=OWN.method).critical_stress.item()
-    assert found.critical_stress.mean() == pytest.approx(exact, rel=0.03)  # the scan's error
 
 
 @pytest.mark.filterwarnings(

@@ -13,6 +13,7 @@ from refusals import refuses
 from small_study import lengths, small_study
 
 import stiction as st
+from stiction.ensemble import batches
 from stiction.reliability import repetitions
 from stiction.reliability.repetitions import SAMPLES
 from stiction.study.study import Setup
@@ -84,7 +85,8 @@ def test_interrupted_in_parts_and_grown_it_has_the_same_bits(whole, tmp_path):
     xr.testing.assert_equal(computed(tmp_path / "broken", one=one), whole)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(repetitions, "versions", lambda: "stiction 99.0")
+        for one_file in (batches, repetitions):
+            patch.setattr(one_file, "versions", lambda: "stiction 99.0")
         computed(tmp_path / "parts", 1, one, part="2/2")
     assert st.open_run(tmp_path / "parts").missing_parts(2) == [1]
     for part in ("1/2", "2/2"):

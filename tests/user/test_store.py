@@ -337,7 +337,9 @@ class Dying(Executor):
 
 def test_a_lost_worker_leaves_what_is_done(tmp_path, often, reference):
     options = {"out": tmp_path / "run", "executor": Dying(), "workers": 1}
-    refuses("samples ... is gone", lambda: make_study().run(**options), WorkerError)
+    refuses(
+        "items ... of point 0 ... is gone", lambda: make_study().run(**options), WorkerError
+    )
     assert 0 < st.open_run(tmp_path / "run").status().done < ALL
     assert again(tmp_path / "run").identical(reference)
 

@@ -135,8 +135,7 @@ def add_curves(page: Page, run: StoredCurves) -> None:
             continue
         if point.number < MOST_FIGURES:
             figure = Figure(figsize=(0.75 * PAGE, 3.2))
-            area = run.study.experiments[point.number].problem.area
-            plot.failure_curve(curve, area=area, ax=figure.subplots())
+            plot.failure_curve(curve, ax=figure.subplots())
             page.figure(figure, f"Probability of an onset below a stress{where}.")
         same = "stress_above_bound" if not bounded(curve.attrs["lower_bound"]) else ""
         own = [v for name, v in curve.items() if v.dims == ("point",) and name != same]

@@ -79,11 +79,6 @@ class Table(NamedTuple):
     versions: str  # of the packages that computed them
     warned: tuple[Warned, ...] = ()  # which a store does not keep
 
-    @property
-    def size(self) -> int:
-        """Samples dealt with, failed ones included."""
-        return self.rows.size + len(self.failures)
-
 
 def _rows(point: int, first: int, values: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
     """Return the values of consecutive samples of a point, the number of the first given."""
@@ -168,18 +163,29 @@ def _workers_of(executor: Executor, workers: int) -> int:
     return int(getattr(executor, "_max_workers", 0) or workers)
 
 
+class Here(Executor):
+    """Runs what is submitted at once, in the thread that submits it."""
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Return the result, as a future that is done."""
+        future: Future[Any] = Future()
+        future.set_result(fn(*args, **kwargs))
+        return future
+
+
 def solve_spans(
-    points: Sequence[Experiment],
+    points: Sequence[Any],
     spans: Sequence[Span],
+    solve: Callable[[Any, Span], Table],
     *,
     executor: Executor | None = None,
     workers: int = 1,
-) -> Generator[Table, None, None]:
-    """Solve spans of samples, and yield tables as they are done.
+) -> Generator[tuple[Span, Table], None, None]:
+    """Solve spans of items, and yield pieces of them with their tables as they are done.
 
     At most two pieces of work a worker are under way, so that memory stays bounded. Closing the
     generator cancels what has not begun. A worker that is lost, or has other versions, is a
-    `WorkerError`.
+    `WorkerError`. Only experiments can have spans of more than one item.
     """
     waiting = deque(spans)
     left = sum(span.samples for span in spans)
@@ -194,32 +200,36 @@ def solve_spans(
                 slots = _workers_of(executor, workers)
                 while waiting and len(running) < 2 * slots:
                     point, first, samples = whole = waiting.popleft()
-                    experiment = points[point]
-                    size = piece_size(experiment, whole, pace, left, slots)
+                    size = 1
+                    if samples > 1:
+                        size = piece_size(points[point], whole, pace, left, slots)
                     if size < samples:
                         waiting.appendleft(Span(point, first + size, samples - size))
                     left -= size
                     span = Span(point, first, size)
-                    running[executor.submit(solve_span, experiment, span)] = span
+                    future = executor.submit(solve, points[point], span)
+                    running[future] = span
+                    if future.done():
+                        break
                 done, _ = wait(running, timeout=TICK, return_when=FIRST_COMPLETED)
                 for future in done:
                     span = running.pop(future)
-                    table = _result(future, span, points[span.point].seed)
-                    pace = table.seconds / table.size
-                    yield table
+                    table = _result(future, span)
+                    pace = table.seconds / span.samples
+                    yield span, table
         finally:
             for future in running:
                 future.cancel()
 
 
-def _result(future: Future[Table], span: Span, seed: int) -> Table:
+def _result(future: Future[Table], span: Span) -> Table:
     try:
         table = future.result()
     except Exception as error:
         last = span.first + span.samples - 1
         raise WorkerError(
-            f"the worker on samples {span.first} to {last} of point {span.point} (seed {seed}) was"
-            f" lost: {type(error).__name__}: {error}"
+            f"the worker on items {span.first} to {last} of point {span.point} was lost:"
+            f" {type(error).__name__}: {error}"
         ) from error
     if table.versions != versions():
         raise WorkerError(
@@ -229,10 +239,10 @@ def _result(future: Future[Table], span: Span, seed: int) -> Table:
     return table
 
 
-def missing_spans(done: NDArray[np.bool_], first: int) -> list[Span]:
-    """Return the stretches of samples, from `first` on, that are not `done` (points, samples)."""
+def spans_of(missing: NDArray[np.bool_], first: int) -> list[Span]:
+    """Return the stretches of samples, from `first` on, that are missing, (points, samples)."""
     found = []
-    for point, row in enumerate(done):
-        edges = np.flatnonzero(np.diff(row, prepend=True, append=True)).reshape(-1, 2)
+    for point, row in enumerate(missing):
+        edges = np.flatnonzero(np.diff(row, prepend=False, append=False)).reshape(-1, 2)
         found += [Span(point, first + start, stop - start) for start, stop in edges.tolist()]
     return found

@@ -4,25 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import ExitStack, closing
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from stiction.base.errors import (
-    InputError,
-    RunError,
-    Warned,
-    merge_warnings,
-    warn_accuracy,
-    warn_user,
-)
+from stiction.base.errors import merge_warnings, warn_accuracy, warn_user
 from stiction.base.model import Count, Flag, Names, Number, Progress, checked
 from stiction.base.progress import Meter, Show, duration
-from stiction.ensemble.batches import missing_spans, solve_spans, usable_cores
+from stiction.ensemble.batches import solve_span, spans_of, usable_cores
 from stiction.ensemble.dataset import Gathered, GridAxes, distinct, labels_of
 from stiction.ensemble.experiment import Ensemble, Experiment
+from stiction.ensemble.items import complete
 from stiction.ensemble.pilot import compare, doubt
 from stiction.ensemble.store import Store
 from stiction.methods.protocol import MethodObject
@@ -37,8 +30,6 @@ SHOWN = 3
 """Number of failures that are reported one by one."""
 LONG = 3600.0
 """Estimated seconds from which a run says so before it begins."""
-HOPELESS = 16
-"""Failed samples, with none solved, after which the whole ensemble is given up."""
 
 
 def check_fields(points: Sequence[Experiment]) -> None:
@@ -78,34 +69,26 @@ def gather(
     Samples go to the `store` as they are done. `others`, of shape (points, samples), are samples
     that another job computes. For the rest see `monte_carlo`.
     """
-    rows = Gathered(points, ensemble)
+    rows, cores = Gathered(points, ensemble), workers or usable_cores()
     if store:
         store.resume(rows.add)
-    done = others | rows.done
-    spans, total, lost = missing_spans(done, ensemble.first), int((~done).sum()), 0
-    if spans:
+    missing = ~(others | rows.done)
+    if missing.any():
         check_fields(points)
         points[0].prepare()  # here and not in a thread, so that it warns at the caller's line
         if executor is None:
-            _warn_if_long(points, ~done, workers or usable_cores())
+            _warn_if_long(points, missing, cores)
     label = " and ".join({one.method.label: None for one in distinct(points, "method")})
-    with ExitStack() as stack:
-        if store:  # also on Ctrl-C, and when workers are lost: what is done is kept
-            stack.callback(store.save)
-        warned = stack.enter_context(merge_warnings())  # of samples: one for all batches
-        meter = stack.enter_context(Meter(label, total, progress))
-        work = solve_spans(points, spans, executor=executor, workers=workers or usable_cores())
-        for table in stack.enter_context(closing(work)):
-            if store:
-                store.add(table)
-            rows.add(table)
-            warned += table.warned if len(points) == 1 else map(Warned.unnumbered, table.warned)
-            meter.advance(table.size)
-            lost += len(table.failures)
-            if lost >= min(HOPELESS, total) and not rows.done.any():
-                failure = table.failures[0]
-                texts = [f"{failure.name}: {text}" for text in failure.error.splitlines()]
-                raise InputError(texts) if failure.input else RunError("\n".join(texts))
+    complete(
+        rows,
+        points,
+        spans_of(missing, ensemble.first),
+        solve_span,
+        Meter(label, int(missing.sum()), progress),
+        store=store,
+        executor=executor,
+        workers=cores,
+    )
     found = store.pilot if store else None
     if found is None and pilot:
         found = compare(points, ensemble.first, ensemble.samples, progress is True, workers)

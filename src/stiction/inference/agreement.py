@@ -15,7 +15,6 @@ import xarray as xr
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Number, at_least, brief, checked
-from stiction.inference.likelihood import area_of, variable_of
 from stiction.inference.peaks import Peaks, factor_of, make_peaks
 from stiction.inference.posterior import Posterior
 from stiction.problem.load import NotNegative
@@ -139,29 +138,11 @@ def agreement(
     if isinstance(prediction, Posterior):
         if load_cell_error:
             raise InputError("load_cell_error: the posterior has its own; leave it out")
-        return _with_posterior(prediction, _as_fitted(prediction, measured), replicates, rng)
+        return _with_posterior(prediction, measured, replicates, rng)
     values = _values(prediction, measured)
     factor = 1.0 if isinstance(peaks, Peaks) else factor_of(unit)
     values = values + factor * load_cell_error * rng.standard_normal(values.size)
     return _with_sample(values, measured, replicates, rng)
-
-
-def _as_fitted(posterior: Posterior, measured: Peaks) -> Peaks:
-    """Return peaks as forces, or stresses, as those are that the posterior was fitted to."""
-    if measured.coefficients or posterior.peaks.coefficients:
-        return measured
-    if measured.forces == posterior.peaks.forces:
-        return measured
-    prior, method = posterior.prior, posterior.likelihood.method
-    variable_of(prior, "N")
-    areas = [area_of(prior, method, length) for length in measured.lengths]
-    if any(area.powers.any() for area in areas):
-        names = [n for n, p in zip(prior.names, areas[0].powers, strict=True) if p]
-        raise InputError(
-            f"peaks: are in {measured.unit}, those of the posterior in {posterior.peaks.unit}, and"
-            f" the area between the two is uncertain ({', '.join(names)}); give both in one unit"
-        )
-    return measured.over([area.unit for area in areas])
 
 
 def _values(prediction: xr.Dataset, measured: Peaks) -> Array:
@@ -210,10 +191,11 @@ def _with_posterior(
 ) -> Agreement:
     """Compare with campaigns drawn from the posterior, each at one point of it."""
     fitted = posterior.peaks
-    if measured.coefficients != fitted.coefficients or not set(measured.lengths) <= set(
-        fitted.lengths
-    ):
-        raise InputError(f"peaks: the posterior predicts {fitted}, got {measured}")
+    if measured.unit != fitted.unit or not {*measured.lengths} <= {*fitted.lengths}:
+        raise InputError(
+            f"peaks: the posterior predicts {fitted} in {fitted.unit}, got {measured} in"
+            f" {measured.unit}"
+        )
     seen = np.concatenate(fitted.values)
     if np.isin(np.concatenate(measured.values), seen).all():
         raise InputError(

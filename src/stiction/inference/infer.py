@@ -99,8 +99,8 @@ def infer(
     Returns
     -------
     Posterior
-        With `draws`, `mean`, `interval`, `information` (nats) and `to_arviz()`;
-        `stiction.plot.posterior` draws it.
+        With `draws`, `mean`, `interval` and `information` (nats); ArviZ draws and compares
+        `to_arviz()`.
 
     Raises
     ------

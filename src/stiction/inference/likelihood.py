@@ -2,7 +2,6 @@
 
 import itertools
 import math
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Self
@@ -38,7 +37,6 @@ SPECIMEN = 2**20
 """Samples of a specimen of another length begin at multiples of this."""
 LONG = 60.0
 """Seconds from which on it is said beforehand how long the simulation takes."""
-TIMED = 8
 BEYOND = 2.0
 """Spreads beyond the extremes of these at which a peak is out of reach."""
 
@@ -395,11 +393,8 @@ def worth_of(alike: float, many: int, few: int) -> float:
 
 
 def _warn_if_long(experiment: Experiment, samples: int, workers: int | None) -> None:
-    """Warn of a simulation that takes long, by the time of a few samples."""
-    experiment.results(0, 1)  # compiles and prepares
-    begun = time.perf_counter()
-    experiment.results(0, TIMED)
-    each = (time.perf_counter() - begun) / TIMED
+    """Warn of a simulation that takes long."""
+    each = experiment.seconds
     seconds = samples * each / (workers or usable_cores())
     if seconds > LONG:
         warn_user(

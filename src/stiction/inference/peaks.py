@@ -30,21 +30,14 @@ class Peaks(NamedTuple):
     lengths : tuple of float or None
         Length of each kind of specimen, m; None for that of the problem.
     values : tuple of arrays
-        Peaks of each kind: Pa, coefficients of friction, or forces, N.
-    coefficients, forces : bool
-        Whether the peaks are coefficients of friction, or forces.
+        Peaks of each kind, in that unit.
+    unit : str
+        Of the peaks: "Pa", "N" of forces, or "1" of coefficients of friction.
     """
 
     lengths: tuple[float | None, ...]
     values: tuple[Array, ...]
-    coefficients: bool
-    forces: bool = False
-
-    def over(self, areas: Sequence[float]) -> Peaks:
-        """Return forces as stresses, and stresses as forces, on areas (m²) of each kind."""
-        factors = [1.0 / area if self.forces else area for area in areas]
-        values = tuple(v * one for v, one in zip(self.values, factors, strict=True))
-        return self._replace(values=values, forces=not self.forces)
+    unit: str
 
     def refuse_far(self, predicted: Sequence[Array]) -> None:
         """Refuse peaks so far from those predicted of each kind that their unit must be wrong."""
@@ -59,14 +52,8 @@ class Peaks(NamedTuple):
     @property
     def variable(self) -> str:
         """Name of the measured quantity among the results of a method."""
-        if self.forces:
-            return "critical_force"
-        return "friction_coefficient" if self.coefficients else "critical_stress"
-
-    @property
-    def unit(self) -> str:
-        """SI unit of the peaks."""
-        return "N" if self.forces else "1" if self.coefficients else "Pa"
+        names = {"Pa": "critical_stress", "N": "critical_force", "1": "friction_coefficient"}
+        return names[self.unit]
 
     def __str__(self) -> str:
         pairs = zip(self.lengths, self.values, strict=True)
@@ -95,14 +82,18 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
             f" {np.unique(every).size} in {every.size} peaks; fewer than about ten"
             " constrain little: see st.design_of_tests"
         )
-    return Peaks(lengths, values, is_in(unit, "1"), is_in(unit, "N"))
+    return Peaks(lengths, values, si_of(unit))
+
+
+def si_of(unit: str) -> str:
+    """Return the SI unit of what has a unit: "1", "N", else "Pa"."""
+    return next((one for one in ("1", "N") if is_in(unit, one)), "Pa")
 
 
 def factor_of(unit: str) -> float:
     """Return the factor from a unit of stress, of force or of a pure number to SI."""
-    si = next((one for one in ("1", "N") if is_in(unit, one)), "Pa")
     try:
-        return factor_to(si, unit)
+        return factor_to(si_of(unit), unit)
     except InputError as error:
         raise InputError(
             f"unit: {error}; give a stress, a force (N), or a coefficient of friction (unit = '1')"
@@ -112,7 +103,7 @@ def factor_of(unit: str) -> float:
 def _values(given: Any, unit: str) -> Array:
     """Return the peaks of one kind of specimen, in SI."""
     stated = str(getattr(given, "attrs", {}).get("units", unit))
-    if any(is_in(stated, one) != is_in(unit, one) for one in ("1", "N")):
+    if si_of(stated) != si_of(unit):
         raise InputError(f"peaks: are in {stated}, but unit = {unit!r}")
     values: Array = check("peaks", getattr(given, "values", given), Numbers)
     if values.ndim != 1:

@@ -196,7 +196,7 @@ class Posterior:
             ) from None
         before = self.prior.theta(np.random.default_rng(self.seed).random(self.u.shape))
         measured = np.concatenate(self.peaks.values)
-        name = "friction_coefficient" if self.peaks.coefficients else "peak"
+        name = "friction_coefficient" if self.peaks.unit == "1" else "peak"
         groups = {
             "posterior": {key: _in_chains(own) for key, own in self.draws.items()},
             "prior": {key: _in_chains(before[:, i]) for i, key in enumerate(self.names)},

@@ -1,17 +1,18 @@
 """Plots of results.
 
 A plot of one panel draws on `ax`, or on new axes, and returns the axes. A plot of several panels
-(`fit`, `posterior`, `precursors`, `specimen`) returns a figure. `film` writes a file and returns
-its path.
+(`fit`, `precursors`, `specimen`) returns a figure. `film` writes a file and returns its path.
 
 Units follow the size of what is drawn: mm and µs, or km and s. Where the problem has a normal
-pressure, friction coefficients are drawn too.
+pressure, friction coefficients are drawn too. `axes` and `style` are what all files share;
+`onsets`, `specimens`, `ruptures`, `distributions`, `failure` and `fits` draw a kind of result each,
+`fields` profiles and maps.
 """
 
 from stiction.plot.distributions import monte_carlo, quantiles
 from stiction.plot.failure import failure_curve
 from stiction.plot.fields import field
-from stiction.plot.fits import agreement, fit, posterior
+from stiction.plot.fits import agreement, fit
 from stiction.plot.onsets import onset
 from stiction.plot.ruptures import film, rupture
 from stiction.plot.specimens import force_travel, precursors, specimen
@@ -27,7 +28,6 @@ __all__ = [
     "monte_carlo",
     "onset",
     "paper_style",
-    "posterior",
     "precursors",
     "quantiles",
     "rupture",

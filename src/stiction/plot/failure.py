@@ -30,7 +30,6 @@ def failure_curve(
     *,
     stress: Real | None = None,
     force: Positive | None = None,
-    area: Positive | None = None,
     ax: Axes | None = None,
 ) -> Axes:
     """Draw P(onset < s) over decades, with its interval.
@@ -43,17 +42,16 @@ def failure_curve(
         Demand, Pa: the mean shear stress to carry. It is marked, with its probability.
     force : float, optional
         Instead of `stress`: demand, N.
-    area : float, optional
-        Nominal area of contact, m², if the problem has none: for a scale of forces at the top.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on; new ones by default.
 
     Returns
     -------
     matplotlib.axes.Axes
-        Where the area is not known, friction coefficients are at the top if there is a normal
-        pressure. A dotted line marks the lower bound of the strength. Of a list of equally likely
-        interfaces the line is their mean, and a wider band holds 90 % of them.
+        At the top are forces where the area of the interface is known, else friction
+        coefficients if there is a normal pressure. A dotted line marks the lower bound of the
+        strength. Of a list of equally likely interfaces the line is their mean, and a wider band
+        holds 90 % of them.
 
     Raises
     ------
@@ -65,11 +63,13 @@ def failure_curve(
     bound, chance = float(curve.attrs["lower_bound"]), curve["probability"].values
     factor, unit = unit_for("Pa", curve["stress"].values)
     x = curve["stress"].values * factor
-    if area is None and "force" in curve:
-        area = float(curve["force"][0] / curve["stress"][0])
+    area = float(curve["force"][0] / curve["stress"][0]) if "force" in curve else None
     if force is not None:
         if area is None or stress is not None:
-            raise InputError("force: give force or stress, and with a force area=... (m2)")
+            raise InputError(
+                "force: give force or stress; a force needs a curve of an interface whose area is"
+                " known: Blocks(thickness=...), or Interface(width=...) of a line"
+            )
         stress, shown = force / area, in_words("N", force)
     elif stress is not None:
         shown = f"{stress * factor:.4g} {unit}"

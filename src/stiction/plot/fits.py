@@ -1,4 +1,4 @@
-"""Figures for checking fits: a field fitted to profiles, a posterior, peaks and predictions."""
+"""Figures for checking fits: a field fitted to profiles, measured and predicted peaks."""
 
 from dataclasses import replace
 from typing import Any
@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 from numpy.typing import NDArray
 from scipy import fft
 
@@ -15,7 +14,6 @@ from stiction.base.variables import QUANTITIES
 from stiction.inference.agreement import Agreement
 from stiction.inference.bootstrap import bands
 from stiction.inference.fit import FieldFit
-from stiction.inference.posterior import MEMBER, Posterior
 from stiction.inference.whittle import Observed, observe
 from stiction.plot.axes import on_axes, with_unit
 from stiction.plot.style import (
@@ -33,8 +31,6 @@ Array = NDArray[np.float64]
 
 SHOWN = 100
 """Repetitions, or simulated records, that a band is drawn from: it holds 90 % of them."""
-LEVELS = np.linspace(0.002, 0.998, 250)
-"""Quantiles of the predicted peaks that are joined to a curve."""
 LAGS = 2.5
 """Correlation lengths that the panel of the correlation shows."""
 
@@ -165,57 +161,6 @@ def _band(axes: Axes, at: Any, rows: Any) -> None:
     axes.fill_between(at, low, high, color=color(1), alpha=0.25, linewidth=0.0)
 
 
-def posterior(found: Posterior) -> Figure:
-    """Draw a posterior against its prior, pairs of parameters, and the predicted peaks.
-
-    Parameters
-    ----------
-    found : Posterior
-        From `stiction.infer`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        On the diagonal, each parameter before (grey) and after the tests, with the
-        information gained (nats); pairs below; on the right the measured and predicted peaks.
-    """
-    names = [name for name in found.names if name != MEMBER]
-    count = len(names)
-    size = max(2.0 * count, 4.0)
-    drawn = found.prior.theta(np.random.default_rng(0).random((20_000, len(found.names))))
-    before, after, labels = [], [], []
-    for values, name in zip(drawn.T[-count:], names, strict=True):
-        factor, unit = _unit_of(name, values)
-        before.append(values * factor)
-        after.append(found.draws[name].ravel() * factor)
-        labels.append(with_unit(name, unit))
-    ends = [np.quantile(values, [0.002, 0.998]) for values in before]
-    with paper_style():
-        figure = Figure(figsize=(size + 3.2, size))
-        parts: Any = figure.subfigures(1, 2, width_ratios=[size, 3.2])
-        panels = parts[0].subplots(count, count, squeeze=False)
-        for i, j in np.ndindex(count, count):
-            axes = panels[i, j]
-            if j > i:
-                axes.set_axis_off()
-            elif i == j:
-                _draw_marginal(axes, before[i], after[i], ends[i])
-                text = f"{found.information[names[i]]:.2f} nats"
-                axes.set_title(text, fontsize=8, loc="left")
-            else:
-                step = max(1, after[i].size // 1500)
-                style = {"color": INK, "markersize": 1.5, "alpha": 0.35}
-                axes.plot(after[j][::step], after[i][::step], ".", **style)
-                _make_scale(axes, "y", ends[i])
-            _make_scale(axes, "x", ends[j])
-            axes.tick_params(labelbottom=i == count - 1, labelleft=j == 0 < i)
-            axes.set_xlabel(labels[j] if i == count - 1 else "")
-            axes.set_ylabel(labels[i] if j == 0 < i else "")
-        panels[0, 0].legend()
-        _draw_peaks(parts[1], found)
-    return figure
-
-
 def agreement(found: Agreement, *, ax: Axes | None = None) -> Axes:
     """Draw measured peaks as steps on the predicted distribution.
 
@@ -270,69 +215,11 @@ def agreement(found: Agreement, *, ax: Axes | None = None) -> Axes:
             axes.step(steps, reached, where="post", label=f"{values.size} tests{of}", **style)
         axes.set_xlim(min(ends), max(ends))
         axes.set_ylim(0.0, 1.02)
-        axes.set_xlabel(with_unit(_peak_name(peaks.coefficients), unit))
+        axes.set_xlabel(
+            with_unit("coefficient of friction" if peaks.unit == "1" else "peak", unit)
+        )
         axes.set_ylabel("share of tests up to it")
         p = found.p_values["cramer_von_mises"]
         axes.set_title(f"p = {p:.2g}", fontsize=8, loc="left", color=QUIET)
         axes.legend()
     return axes
-
-
-def _peak_name(coefficients: bool) -> str:
-    return "coefficient of friction" if coefficients else "peak"
-
-
-def _unit_of(name: str, values: Array) -> tuple[float, str]:
-    """Return the unit of a parameter by the last part of its key."""
-    last = name.split(".")[-1]
-    if last.endswith(("length", "slip")):
-        return unit_for("m", values)
-    stresses = ("low", "high", "loc", "scale", "mean", "strength", "stress", "pressure")
-    if last.endswith(stresses) and np.abs(values).max() > 1e3:
-        return unit_for("Pa", values)
-    return 1.0, ""
-
-
-def _is_wide(ends: Array) -> bool:
-    return bool(ends[1] > 6.0 * ends[0] > 0.0)
-
-
-def _draw_marginal(axes: Axes, before: Array, after: Array, ends: Array) -> None:
-    low, high = ends.tolist()
-    bins: Any = (np.geomspace if _is_wide(ends) else np.linspace)(low, high, 46)
-    prior: Any = {"color": PALE, "histtype": "stepfilled", "label": "prior"}
-    own: Any = {"color": INK, "histtype": "step", "label": "posterior", "linewidth": 1.2}
-    for values, style in ((before, prior), (after, own)):
-        axes.hist(values, bins=bins, weights=np.full(values.size, 1.0 / values.size), **style)
-    axes.set_yticks([])
-
-
-def _make_scale(axes: Axes, name: str, ends: Array) -> None:
-    """Show an axis between two ends; logarithmic, with plain numbers, if they lie far apart."""
-    axes.set(**{f"{name}lim": ends})
-    if _is_wide(ends):
-        axes.set(**{f"{name}scale": "log"})
-        axis = axes.xaxis if name == "x" else axes.yaxis
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.set_major_formatter(ScalarFormatter())
-        axis.set_minor_formatter(NullFormatter())
-
-
-def _draw_peaks(figure: Any, found: Posterior) -> None:
-    """Draw the distribution functions of the measured and predicted peaks."""
-    peaks, error = found.peaks, found.likelihood.error
-    panels = figure.subplots(len(peaks.values), 1, squeeze=False)[:, 0]
-    rows = zip(panels, peaks.lengths, peaks.values, found.predicted, strict=True)
-    for axes, length, values, more in rows:
-        factor, unit = unit_for(peaks.unit, values)
-        ordered, expected = np.sort(values) * factor, np.quantile(more, LEVELS) * factor
-        steps = (np.arange(ordered.size) + 0.5) / ordered.size
-        axes.plot(expected, LEVELS, color=INK, label="predicted")
-        style: dict[str, Any] = {"fmt": "o", "color": ACCENT, "markersize": 3.5}
-        bars = error * factor or None
-        axes.errorbar(ordered, steps, xerr=bars, elinewidth=0.6, label="measured", **style)
-        axes.set_xlabel(with_unit(_peak_name(peaks.coefficients), unit))
-        axes.set_ylabel("share of tests")
-        text = f"{values.size} tests" + ("" if length is None else f", length {length:g} m")
-        axes.set_title(text, fontsize=8, loc="left", color=QUIET)
-        axes.legend()

@@ -35,7 +35,7 @@ from stiction.base.variables import QUANTITIES
 from stiction.problem.interface import Interface
 from stiction.problem.profiles.placing import MEASURED
 from stiction.problem.profiles.reading import in_si, unit_of
-from stiction.random.mapping import from_normal, quantile_of_normal
+from stiction.random.mapping import from_normal
 from stiction.random.synthesis import condition
 from stiction.random.transport import Ratio, make_transport, transport
 
@@ -50,7 +50,7 @@ NARROWINGS = 6  # of a range that holds a peak, each to two of its intervals at 
 TURNS, SETTLED = 8, 1e-3  # between likelihood and regression; change of z that ends them
 NEGLIGIBLE = 1e-8  # singular value below which a direction of the draws stays as it is
 FAINT, LEAST = 1e-10, -0.9  # precisions: of places, as scaled; of all, less that of the prior
-FLAT, SHARP = 1e-4, 1e-4  # least precision of a measured z; its error that needs no turns
+SHARP = 1e-4  # error of a measured z that needs no turns
 TINY, LOWEST = 1e-12, -1e9  # least variance, and least logarithm of a likelihood
 
 
@@ -130,7 +130,7 @@ class Conditions:
         """The measured values, (points,)."""
         return np.asarray(self.profile[-1])
 
-    def check(self, marginal: Any, interface: Interface, factor: Any = None) -> None:
+    def check(self, marginal: Any, interface: Interface) -> None:
         """Raise an `InputError` if places or values are impossible for a field."""
         names, places = interface.dims, self.places
         if len(places) != len(names):
@@ -146,7 +146,7 @@ class Conditions:
         ]
         low, high = marginal.distribution.support()
         away = np.maximum(low - self.values, self.values - high)
-        if factor is None and away.max() > IMPOSSIBLE * self.noise:
+        if away.max() > IMPOSSIBLE * self.noise:
             *place, value = self.profile[:, away.argmax()]
             at = ", ".join(f"{name} = {x:g} m" for name, x in zip(names, place, strict=True))
             problems.append(
@@ -158,38 +158,26 @@ class Conditions:
 
 
 class Measured(NamedTuple):
-    """Measured values of one property: z at its places is phi @ draws, (points, dimension).
-
-    `factor` is the marginal of the factor between specimens, by whose draw it is multiplied.
-    """
+    """Measured values of one property: z at its places is phi @ draws, (points, dimension)."""
 
     conditions: Conditions
     marginal: Any
     phi: Array
-    factor: Any = None
 
-    def logarithm(self, u: float, at: NDArray[np.int64], z: Array) -> Array:
+    def logarithm(self, at: NDArray[np.int64], z: Array) -> Array:
         """Return the log likelihood of places `at` at z (places, ...); -inf without a quantile."""
-        factor = self.scale(u)
-        value = self.conditions.values[at].reshape(-1, *(1 for _ in z.shape[1:])) / factor
-        miss = (value - from_normal(self.marginal, z)) * (factor / self.conditions.noise)
+        value = self.conditions.values[at].reshape(-1, *(1 for _ in z.shape[1:]))
+        miss = (value - from_normal(self.marginal, z)) * (1.0 / self.conditions.noise)
         # Far out in the tail scipy may have no quantile.
         return np.where(np.isnan(miss), -np.inf, -0.5 * miss**2)
 
-    def scale(self, u: float) -> float:
-        """Return the factor between specimens at its draw u; 1 without one."""
-        if self.factor is None:
-            return 1.0
-        return float(quantile_of_normal(self.factor.distribution, np.array(u)))
-
-    def gaussian(self, u: float, mean: Array, variance: Array) -> tuple[Array, Array, float]:
+    def gaussian(self, mean: Array, variance: Array) -> tuple[Array, Array]:
         """Replace the likelihood of z at each place by a Gaussian, given z from all else.
 
-        `u` is the draw of the factor. Returned are precisions p, which may be negative, and p z,
-        (points,), and the logarithm of the factor of the product of all exp(p z x - p x^2/2).
+        Returned are p z, and precisions p, which may be negative, (points,).
         """
-        factor, law = self.scale(u), self.marginal.distribution
-        noise, value = self.conditions.noise / factor, self.conditions.values / factor
+        law, noise = self.marginal.distribution, self.conditions.noise
+        value = self.conditions.values
         # Where the likelihood and z from all else overlap.
         edges = value + REACH * noise * np.array([[-1.0], [1.0]])
         score = _normal_score(law.cdf(edges), law.sf(edges)).clip(-FURTHEST, FURTHEST)
@@ -202,7 +190,7 @@ class Measured(NamedTuple):
             half = np.maximum(0.5 * (high - low), TINY)[:, None]
             z = 0.5 * (low + high)[:, None] + half * np.linspace(-1.0, 1.0, NODES)
             off = (z - mean[:, None]) ** 2 / variance[:, None]
-            return half, z, self.logarithm(u, np.arange(len(z)), z) - 0.5 * off
+            return half, z, self.logarithm(np.arange(len(z)), z) - 0.5 * off
 
         half, z, density = evaluate()
         # Where a value contradicts the others, their product peaks outside or at an end.
@@ -228,10 +216,7 @@ class Measured(NamedTuple):
         spread = (weight * (z - centre[:, None]) ** 2).sum(axis=1) / total
         spread = np.maximum(spread, (half[:, 0] / NODES) ** 2)
         precision = 1.0 / spread - 1.0 / variance
-        weighted = centre / spread - mean / variance
-        scale = np.log(total * half[:, 0] / np.sqrt(spread)) + top[:, 0]
-        scale += 0.5 * (mean**2 / variance - centre**2 / spread)
-        return weighted, precision, float(scale.sum())
+        return centre / spread - mean / variance, precision
 
 
 def _normal_score(below: Array, above: Array) -> Array:
@@ -240,49 +225,35 @@ def _normal_score(below: Array, above: Array) -> Array:
 
 
 class Conditioning:
-    """Standard normal draws, given what was measured of properties, one with a factor at most.
-
-    The draw u of a factor between specimens has the posterior
-
-        log p(u | values) = -u^2/2 + log scale(u) - chi^2(u)/2 - sum log(1 + s^2(u))/2,
-
-    with the Gaussians for one place at a time. It is tabulated, and u mapped to it
-    quantile by quantile. The regression is made at its mean; elsewhere values of z move by
-    as much as the Gaussians for one place at a time do.
-    """
+    """Standard normal draws, given what was measured of properties."""
 
     def __init__(self, measured: Sequence[Measured]) -> None:
         self.measured = measured
         self.phi = np.concatenate([one.phi for one in measured])
-        self.grid: Array | None = None
         self.data = np.zeros((1, 0))
-        others = alone = np.zeros(len(self.phi)), np.ones(len(self.phi))
-        self.middle, moves = 0.0, np.zeros((1, len(self.phi)))
-        if any(one.factor is not None for one in measured):
-            moves = self._tabulate(alone)
-        weighted, precision, _ = self._gaussian(self.middle, others)
+        others = np.zeros(len(self.phi)), np.ones(len(self.phi))
+        weighted, precision = self._gaussian(others)
         for _ in range(TURNS):
             weighted, precision = self._regress(weighted, precision)
             before, others = others, self._others(weighted, precision)
             if np.abs(others[0] - before[0]).max() < SETTLED:
                 break
-            weighted, precision, _ = self._gaussian(self.middle, others)
+            weighted, precision = self._gaussian(others)
         along, share = self.phi @ self.right, np.sqrt(1.0 + self.power)
         middle = along @ (self.data[0] / share**2)
         ratio = self._ratio(weighted, precision, middle)
         self.found, self.left_over = make_transport(ratio, middle, along / share)
         self.directions = np.ascontiguousarray(self.found.basis @ self.right.T)
         self.misfit = self._misfit(middle)
-        self.data = (weighted + precision * moves) @ self.left
+        self.data = weighted[None, :] @ self.left
 
-    def _gaussian(self, u: float, others: tuple[Array, Array]) -> tuple[Array, Array, float]:
+    def _gaussian(self, others: tuple[Array, Array]) -> tuple[Array, Array]:
         """Gaussians that stand for the measured values, given z from all others."""
         ends = np.cumsum([len(one.phi) for one in self.measured])[:-1]
         each = zip(self.measured, *(np.split(part, ends) for part in others), strict=True)
-        weighted, precision, scale = zip(
-            *(one.gaussian(u, *given) for one, *given in each), strict=True
-        )
-        return np.concatenate(weighted), np.concatenate(precision), sum(scale)
+        found = (one.gaussian(*given) for one, *given in each)
+        weighted, precision = map(np.concatenate, zip(*found, strict=True))
+        return weighted, precision
 
     def _ratio(self, weighted: Array, precision: Array, middle: Array) -> Ratio:
         """Logarithm of the likelihood over the Gaussian that stands for it, by place and z."""
@@ -291,7 +262,7 @@ class Conditioning:
             out, shape, begin = np.empty(z.shape), (-1, *(1 for _ in z.shape[1:])), 0
             for one in self.measured:
                 here = (at >= begin) & (at < begin + len(one.phi))
-                out[here] = one.logarithm(self.middle, at[here] - begin, z[here])
+                out[here] = one.logarithm(at[here] - begin, z[here])
                 begin += len(one.phi)
             off = z - middle[at].reshape(shape)
             slope = (weighted - precision * middle)[at].reshape(shape)
@@ -335,50 +306,16 @@ class Conditioning:
         found = (mean / deviation**2 - weighted) / rest
         return np.where(sharp, 0.0, found), np.where(sharp, 1.0, 1.0 / rest)
 
-    def _tabulate(self, alone: tuple[Array, Array]) -> Array:
-        """Find the posterior of u and its mean; return how z moves along the grid."""
-        middle, spread = 0.0, 1.0
-        for _ in range(3):
-            grid = middle + spread * np.linspace(-REACH, REACH, NODES)
-            grid = np.clip(grid, -FURTHEST, FURTHEST)
-            weighted, precision, _ = self._gaussian(middle, alone)
-            precision = np.maximum(precision, FLAT)
-            self._regress(weighted, precision)
-            values = [self._gaussian(u, alone) for u in grid]
-            density = -0.5 * grid**2
-            for i, (here, own, scale) in enumerate(values):
-                own = np.maximum(own, FLAT)
-                z, ratio = here / own, float(np.exp(np.log(own / precision).mean()))
-                power, data = ratio * self.power, ratio * (precision * z) @ self.left
-                chi_square = ratio * precision @ z**2 - data / (1.0 + power) @ data
-                density[i] += scale + 0.5 * (own @ z**2 - chi_square - np.log1p(power).sum())
-            weight = np.exp(density - density.max())
-            weight /= weight.sum()
-            middle = float(weight @ grid)
-            spread = max(float(weight @ (grid - middle) ** 2) ** 0.5, REACH * spread / NODES)
-        mass = 0.5 * (weight[1:] + weight[:-1])
-        score = _normal_score(np.cumsum(mass)[:-1], np.cumsum(mass[::-1])[-2::-1])
-        usable = np.isfinite(score)
-        self.grid, self.score, self.quantile = grid, score[usable], grid[1:-1][usable]
-        self.middle = middle
-        # By as much as z itself moves, where there is one.
-        now, errors, _ = self._gaussian(middle, alone)
-        each = [here / np.maximum(own, FLAT) for here, own, _ in values]
-        return np.array(each) - now / np.maximum(errors, FLAT)
-
     def draws(self, draws: Array) -> Array:
-        """Return conditioned draws (samples, dimension), a factor between specimens in the last."""
-        data, out = self.data, np.array(draws)
-        if self.grid is not None:
-            u = out[:, -1] = np.interp(out[:, -1], self.score, self.quantile)
-            data = np.stack([np.interp(u, self.grid, row) for row in data.T], axis=1)
+        """Return conditioned draws (samples, dimension)."""
+        out = np.array(draws)
         if len(self.directions):
             transport(*self.found._replace(basis=self.directions), out, np.zeros(len(out)))
-        return self._regressed(out, data)
+        return self._regressed(out)
 
-    def _regressed(self, out: Array, data: Array) -> Array:
+    def _regressed(self, out: Array) -> Array:
         share, transposed = 1.0 + self.power, np.ascontiguousarray(self.right.T)
-        condition(self.right, transposed, data / share, share**-0.5 - 1.0, out)
+        condition(self.right, transposed, self.data / share, share**-0.5 - 1.0, out)
         return out
 
     def moments(self, phi: Array) -> tuple[Array, Array]:
@@ -394,7 +331,7 @@ class Conditioning:
         found = mean + float(ndtri(probability)) * deviation
         if len(self.directions):
             draws = np.random.default_rng(0).standard_normal((PROBES, phi.shape[1]))
-            pair = [self.draws(draws), self._regressed(draws.copy(), self.data)]
+            pair = [self.draws(draws), self._regressed(draws.copy())]
             for i, row in enumerate(phi):  # the difference scatters less than either
                 ends = [np.quantile(one @ row, probability) for one in pair]
                 found[i] += ends[0] - ends[1]

@@ -371,6 +371,11 @@ class RandomInterface:
             if name not in self.names
         ]
         for name, marginal in between.items():
+            if getattr(self.properties.get(name), "conditions", None) is not None:
+                problems.append(
+                    f"between.{name}: scatters between specimens, but {name}.given was measured on"
+                    " one; leave one of them out"
+                )
             mean, low = marginal.distribution.mean(), marginal.distribution.support()[0]
             if low < 0.0 or abs(float(mean) - 1.0) > 1e-6:
                 problems.append(
@@ -554,43 +559,30 @@ def layout(random: RandomInterface, interface: Interface) -> list[Stream]:
 def _conditioned(
     random: RandomInterface, interface: Interface
 ) -> list[tuple[NDArray[np.int64], Conditioning]]:
-    """Measured values of each group of correlated properties, with the columns of its draws.
-
-    The last column is that of the factor between specimens on which it depends, if any.
-    """
+    """Measured values of each group of correlated properties, with the columns of its draws."""
     fields = list(random.properties.values())
     if all(field.conditions is None for field in fields):
         return []
     streams = layout(random, interface)
-    columns, between = [np.r_[stream.columns] for stream in streams], random.between or {}
+    columns = [np.r_[stream.columns] for stream in streams]
     factor, found = lower_factor(random.matrix), []
     for group in np.unique(random.linked, axis=0):
-        members, measured, factors = np.flatnonzero(group), [], []
+        members, measured = np.flatnonzero(group), []
         of_group = np.concatenate([columns[j] for j in members])
         for i in members:
             name, given = random.names[i], fields[i].conditions
             if given is None:
                 continue
-            if name in between:
-                factors.append(name)
-            given.check(fields[i].marginal, interface, between.get(name))
+            given.check(fields[i].marginal, interface)
             size = given.values.size * random.dimension(interface)
             check_memory(f"{name}.given.profile", 24.0 * size, "give fewer places")
             own = fields[i].modes(interface).basis(given.places)
             phi = np.zeros((len(own), random.dimension(interface)))
             for j in np.flatnonzero(factor[i]):
                 phi[:, columns[j][streams[i].own]] = factor[i, j] * own
-            measured.append(
-                Measured(given, fields[i].marginal, phi[:, of_group], between.get(name))
-            )
-        if len(factors) > 1:
-            raise InputError(
-                f"between: {' and '.join(factors)} are correlated, were measured and have factors;"
-                " at most one of them may have one"
-            )
+            measured.append(Measured(given, fields[i].marginal, phi[:, of_group]))
         if measured:
-            last = [columns[len(fields) + list(between).index(name)] for name in factors]
-            found.append((np.concatenate([of_group, *last]), Conditioning(measured)))
+            found.append((of_group, Conditioning(measured)))
     return found
 
 

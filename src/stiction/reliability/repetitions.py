@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.base.errors import collect_warnings, merged
-from stiction.ensemble.batches import NUMBER, POINT, Table, versions
+from stiction.ensemble.batches import NUMBER, POINT, Span, Table, versions
 from stiction.ensemble.limit_state import LimitState
 from stiction.reliability.subset import Descent, Population, descend
 from stiction.reliability.tail import DEEPER
@@ -60,9 +60,9 @@ def repetition(
     )
 
 
-def table_of(state: LimitState, point: int, number: int, smallest: float) -> Table:
-    """Return a repetition as a table of a store."""
-    begin = time.perf_counter()
+def table_of(smallest: float, state: LimitState, span: Span) -> Table:
+    """Return the repetition that is the first of a span, as a table of a store."""
+    begin, (point, number, _) = time.perf_counter(), span
     with collect_warnings() as warned:
         found = repetition(state, number, smallest)
     rows = np.empty(sum(one.values.size for one in found.populations), ROW)

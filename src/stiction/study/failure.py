@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import Executor, as_completed
-from contextlib import ExitStack
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from stiction.base.errors import InputError, Warned, merge_warnings, texts_of, warn_accuracy
+from stiction.base.errors import InputError, merge_warnings, texts_of, warn_accuracy
 from stiction.base.progress import Meter, Show
 from stiction.base.variables import Variable
-from stiction.ensemble.batches import Table, usable_cores
+from stiction.ensemble.batches import Here, Span, Table, usable_cores
+from stiction.ensemble.items import complete
 from stiction.ensemble.limit_state import LimitState, weakest_first
 from stiction.ensemble.monte_carlo import check_fields
 from stiction.ensemble.pilot import exact_counterpart
@@ -131,53 +132,31 @@ def compute(
     states = [LimitState(point, settings["event"]) for point in study.experiments]
     rows = Repetitions(len(states), repetitions)
     store.resume(rows.add)
-    wanted = ~rows.done
+    missing = ~rows.done
     if part is not None:
-        wanted &= samples_of_part(part, *wanted.shape)
-    jobs = [(point, number) for number, point in np.argwhere(wanted.T).tolist()]
-    smallest, cores = settings["smallest"], workers or usable_cores()
-    meter = Meter("failure curve", len(jobs), progress, unit="repetitions")
-    with ExitStack() as stack:
-        stack.callback(store.save)  # also on Ctrl-C
-        stack.enter_context(meter)
-        warned = stack.enter_context(merge_warnings())
-        if jobs:
-            check_fields(study.experiments)
-            states = list(map(weakest_first, states))
-        for table in _tables(states, smallest, jobs, cores, executor):
-            warned += map(Warned.unnumbered, table.warned)
-            store.add(table)
-            rows.add(table)
-            meter.advance(1)
-        if store.pilot is None and (part is None or part[0] == 1):
-            before = len(warned)
+        missing &= samples_of_part(part, *missing.shape)
+    smallest = settings["smallest"]
+    if missing.any():
+        check_fields(study.experiments)
+        threads = workers or usable_cores() if executor is None else 1
+        states = [replace(weakest_first(state), workers=threads) for state in states]
+    complete(
+        rows,
+        states,
+        [Span(point, number, 1) for number, point in np.argwhere(missing.T).tolist()],
+        partial(table_of, smallest),
+        Meter("failure curve", int(missing.sum()), progress, unit="repetitions"),
+        store=store,
+        executor=executor or Here(),
+        workers=1,
+    )
+    if store.pilot is None and (part is None or part[0] == 1):
+        with merge_warnings() as warned:
             for point, state in enumerate(states):
                 tail = rows.tail(point)
                 if exact_counterpart(state.experiment):  # stored repetitions have no draws
                     tail = Tail([repetition(state, 0, smallest)])
                 for text in curve_doubts(state, tail, smallest) if tail else ():
                     warn_accuracy(text)
-            store.note_pilot({"doubts": texts_of(warned[before:])})
+        store.note_pilot({"doubts": texts_of(warned)})
     return StoredCurves(store, study, settings).labelled(rows)
-
-
-def _tables(
-    states: Sequence[LimitState],
-    smallest: float,
-    jobs: Sequence[tuple[int, int]],
-    workers: int,
-    executor: Executor | None,
-) -> Iterator[Table]:
-    """Yield repetitions as they are done: one after the other, or all by an executor."""
-    if executor is None:
-        for point, number in jobs:
-            state = replace(states[point], workers=workers)
-            yield table_of(state, point, number, smallest)
-        return
-    running = [executor.submit(table_of, states[p], p, number, smallest) for p, number in jobs]
-    try:
-        for future in as_completed(running):
-            yield future.result()
-    finally:
-        for future in running:
-            future.cancel()
