@@ -145,7 +145,6 @@ def a_list_weighed_by_peaks():
         "information": found.information,
         "members": [repr(one.strength) for one in found.interfaces(2, seed=4)],
         "at": repr(found.at(7)[1]),
-        "picture": st.plot.posterior(found),
     }
 
 

@@ -225,6 +225,8 @@ def solve_spans(
 def _result(future: Future[Table], span: Span) -> Table:
     try:
         table = future.result()
+    except InputError:
+        raise
     except Exception as error:
         last = span.first + span.samples - 1
         raise WorkerError(

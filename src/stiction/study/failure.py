@@ -136,27 +136,28 @@ def compute(
     if part is not None:
         missing &= samples_of_part(part, *missing.shape)
     smallest = settings["smallest"]
-    if missing.any():
-        check_fields(study.experiments)
-        threads = workers or usable_cores() if executor is None else 1
-        states = [replace(weakest_first(state), workers=threads) for state in states]
-    complete(
-        rows,
-        states,
-        [Span(point, number, 1) for number, point in np.argwhere(missing.T).tolist()],
-        partial(table_of, smallest),
-        Meter("failure curve", int(missing.sum()), progress, unit="repetitions"),
-        store=store,
-        executor=executor or Here(),
-        workers=1,
-    )
-    if store.pilot is None and (part is None or part[0] == 1):
-        with merge_warnings() as warned:
-            for point, state in enumerate(states):
-                tail = rows.tail(point)
-                if exact_counterpart(state.experiment):  # stored repetitions have no draws
-                    tail = Tail([repetition(state, 0, smallest)])
-                for text in curve_doubts(state, tail, smallest) if tail else ():
-                    warn_accuracy(text)
-        store.note_pilot({"doubts": texts_of(warned)})
+    with merge_warnings():
+        if missing.any():
+            check_fields(study.experiments)
+            threads = workers or usable_cores() if executor is None else 1
+            states = [replace(weakest_first(state), workers=threads) for state in states]
+        complete(
+            rows,
+            states,
+            [Span(point, number, 1) for number, point in np.argwhere(missing.T).tolist()],
+            partial(table_of, smallest),
+            Meter("failure curve", int(missing.sum()), progress, unit="repetitions"),
+            store=store,
+            executor=executor or Here(),
+            workers=1,
+        )
+        if store.pilot is None and (part is None or part[0] == 1):
+            with merge_warnings() as warned:
+                for point, state in enumerate(states):
+                    tail = rows.tail(point)
+                    if exact_counterpart(state.experiment):  # stored repetitions have no draws
+                        tail = Tail([repetition(state, 0, smallest)])
+                    for text in curve_doubts(state, tail, smallest) if tail else ():
+                        warn_accuracy(text)
+            store.note_pilot({"doubts": texts_of(warned)})
     return StoredCurves(store, study, settings).labelled(rows)

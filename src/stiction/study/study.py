@@ -43,7 +43,7 @@ from stiction.random.fields import RandomField, RandomInterface, as_random_inter
 from stiction.reliability.answer import Probability
 from stiction.study.question import Question
 from stiction.study.run import AnyPart, PlainRun, StoredRun, samples_of_part
-from stiction.study.sweep import Point, Sweep, Uncertain, grid_axes, varies, with_first_values
+from stiction.study.sweep import Point, Sweep, Uncertain, grid_axes, with_first_values
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -206,8 +206,10 @@ class Study(_Parts):
         """Return the equally likely interfaces of uncertain parameters."""
         parameters = dict(self.uncertain)
         count = parameters.pop("count")
-        axes = [pair for axis in self.sweep for pair in axis.items()]
-        swept = [key for key in parameters if any(varies(key, *pair) for pair in axes)]
+        axes = [key for axis in self.sweep for key in axis]
+        swept = [
+            key for key in parameters if any(f"{key}.".startswith(f"{one}.") for one in axes)
+        ]
         if swept or isinstance(random, list):
             raise InputError(
                 f"uncertain: {swept[0]} is swept, too; take it out of one of them"

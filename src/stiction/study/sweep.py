@@ -218,18 +218,6 @@ Uncertain: TypeAlias = Annotated[
 """Distributions by dotted key, and the number of interfaces."""
 
 
-def varies(key: str, swept: str, values: Sequence[Any]) -> bool:
-    """Whether a swept key is this one, or holds it with values that differ."""
-    if not f"{key}.".startswith(f"{swept}."):
-        return False
-    found = []
-    for one in values:
-        for step in key.removeprefix(swept).split(".")[1:]:
-            one = one.get(step) if isinstance(one, Mapping) else getattr(one, step, None)
-        found.append(one)
-    return key == swept or any(one != found[0] for one in found)
-
-
 def with_first_values(given: dict[str, Any]) -> dict[str, Any]:
     """Return a study in plain form, each swept key without a value with the first of its sweep.
 
