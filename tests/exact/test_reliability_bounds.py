@@ -12,7 +12,7 @@ from setups import EXACT, LOCAL, ensemble, local_onset, turns
 
 import stiction as st
 from stiction.base.progress import SILENT
-from stiction.reliability.counting import Count, count_failures
+from stiction.reliability.counting import Counted, count_failures
 from stiction.reliability.failure import curve_of
 from stiction.reliability.subset import Descent, Population
 from stiction.reliability.tail import Tail, repeat_until_precise
@@ -232,11 +232,11 @@ def test_counting_is_unbiased_whenever_it_stops(chance, target_cv, least, most):
 
 def test_errors_and_intervals_of_counts():
     """Until a failure: the interval of the negative binomial law."""
-    assert Count(0, 100).cv == math.inf
+    assert Counted(0, 100).cv == math.inf
     # All of a count is no certainty: as if one in 101 had held.
-    assert Count(100, 100).cv == pytest.approx(1.0 / math.sqrt(101 * 100))
-    assert Count(50, 100).cv == pytest.approx(0.1)
-    count = Count(5, 200, until_failure=True)
+    assert Counted(100, 100).cv == pytest.approx(1.0 / math.sqrt(101 * 100))
+    assert Counted(50, 100).cv == pytest.approx(0.1)
+    count = Counted(5, 200, until_failure=True)
     low, high = count.interval()
     # So many or fewer samples until the fifth failure; so many or more.
     assert nbinom.cdf(195, 5, low) == pytest.approx(0.025)

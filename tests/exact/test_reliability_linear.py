@@ -17,7 +17,7 @@ import stiction as st
 from stiction.random import equally_likely
 from stiction.random.equally_likely import EquallyLikely
 from stiction.reliability.subset import Descent, Population, descend
-from stiction.reliability.tail import Tail, agreement, repeat_until_precise
+from stiction.reliability.tail import Tail, repeat_until_precise, share_picked
 from stiction.reliability.two_level import _covered, bridge
 from stiction.reliability.uncertainty import generator, log_width
 
@@ -242,13 +242,13 @@ def test_evaluations_are_the_samples_that_were_solved():
 def test_a_poor_first_stage_is_told_by_its_ranks():
     rng = np.random.default_rng(0)
     exact = rng.standard_normal(1000)
-    assert agreement(exact, exact) == 1.0
-    assert agreement(3.0 * exact**3 + 7.0, exact) == 1.0
+    assert share_picked(exact, exact) == 1.0
+    assert share_picked(3.0 * exact**3 + 7.0, exact) == 1.0
     # Independent ranks: a tenth, and 20 samples to tell it from.
-    assert agreement(rng.standard_normal(1000), exact) < 0.5
+    assert share_picked(rng.standard_normal(1000), exact) < 0.5
     # Half of the failures come from what the cheap limit state does not see.
     draws = rng.standard_normal((1000, 2))
-    assert agreement(draws[:, 0], draws.min(axis=1)) < 0.8
+    assert share_picked(draws[:, 0], draws.min(axis=1)) < 0.8
 
 
 def test_runs_over_two_levels_that_find_no_failure_count_as_well():

@@ -188,7 +188,7 @@ def band_of(members: Array) -> tuple[float, float]:
     return low, high
 
 
-def members_of(state: LimitState, tail: Tail, stress: float) -> Array:
+def chances_of_members(state: LimitState, tail: Tail, stress: float) -> Array:
     """Return the probability of each of equally likely interfaces; none of a single one."""
     lows, highs = np.array(state.bounds_of_members()).T
     if lows.size == 1:
@@ -291,7 +291,7 @@ def imprecise(cv: float, target_cv: float, evaluations: int) -> list[str]:
     return [text] if cv > target_cv else []
 
 
-def distinct(values: Array, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
+def different(values: Array, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
     """Return up to `count` positions with different values, in random order."""
     _, first = np.unique(values, return_index=True)  # chains repeat states
     chosen: NDArray[np.int64] = rng.permutation(first)[:count]
@@ -309,7 +309,7 @@ def exact_doubts(
     if exact is None or not values.size:
         return []
     count = int(np.clip(10.0 / exact.seconds, *CHECKED))
-    chosen = distinct(values, count, np.random.default_rng(0))
+    chosen = different(values, count, np.random.default_rng(0))
     state.meter.note = "checking by equilibrium"
     with collect_warnings():
         below = replace(state, experiment=exact)(draws[chosen]) < stress

@@ -14,7 +14,7 @@ from stiction.reliability.uncertainty import binomial_interval
 BATCH = 1024
 
 
-class Count(NamedTuple):
+class Counted(NamedTuple):
     """Failures among the first samples of an ensemble; a failure that ended it does not count."""
 
     failures: int
@@ -57,8 +57,8 @@ def count_failures(
     least: int,
     max_evaluations: int,
     start: int = 0,
-) -> tuple[Count, Descent]:
-    """Count until there are enough failures, among at least `least` samples from `start` on.
+) -> tuple[Counted, Descent]:
+    """Counted until there are enough failures, among at least `least` samples from `start` on.
 
     The number of failures is fixed beforehand: stopping at a precise estimate would favour early
     failures. Samples beyond the last of them do not count, but are among those returned.
@@ -79,11 +79,11 @@ def count_failures(
         done, failures = done + size, failures + int(np.sum(parts[-1] < stress))
         state.meter.note = f"{failures:,} failures of {wanted:,} wanted"
     values = np.concatenate(parts)
-    count = Count(failures, done)
+    count = Counted(failures, done)
     if failures >= wanted:
         last = int(np.flatnonzero(values < stress)[wanted - 1])
         if last >= least:
-            count = Count(wanted, last + 1, until_failure=True)
+            count = Counted(wanted, last + 1, until_failure=True)
     level = Population(
         math.inf, 0.0, values, np.arange(done), np.concatenate(members), np.empty((0, 0))
     )

@@ -27,11 +27,11 @@ from stiction.reliability.answer import (
     Probability,
     TargetCv,
     band_of,
-    distinct,
+    chances_of_members,
+    different,
     exact_doubts,
     few_members,
     imprecise,
-    members_of,
     prepare,
     too_slow,
     wanted_members,
@@ -340,7 +340,7 @@ def _by_counting(
         "interval": lognormal_interval(count.probability, cv) if by_list else interval,
         "evaluations": start + stresses.size,
         "survived": counted.survived,
-        "members": members_of(state, tail, stress),
+        "members": chances_of_members(state, tail, stress),
         "failing_profiles": _profiles(state, drawn(failed[:SHOWN])),
         "doubts": doubts,
     }
@@ -372,13 +372,13 @@ def _by_tail(state: LimitState, stress: float, tail: Tail, target_cv: float) -> 
         interval = 0.0, lognormal_interval(*there)[1]
         doubts = [f"{tail.short_of(f'{stress:.7g} Pa')}; the interval ends there"]
     draws, stresses = last.failing(stress)
-    chosen = distinct(stresses, SHOWN, generator(state.experiment.seed, 2))
+    chosen = different(stresses, SHOWN, generator(state.experiment.seed, 2))
     return tail.attributes | {
         "probability": probability,
         "cv": cv,
         "members_cv": by_list,
         "interval": interval,
-        "members": members_of(state, tail, stress),
+        "members": chances_of_members(state, tail, stress),
         "failing_profiles": _profiles(state, draws[chosen]),
         "doubts": doubts,
     }
@@ -512,7 +512,7 @@ def _quantile(
         "cv": cv,
         "members_cv": by_list,
         "interval": interval,
-        "members": members_of(state, tail, stress),
+        "members": chances_of_members(state, tail, stress),
         "of_stress": True,
         "quantity": "stress" if state.experiment.problem.area is None else "force",
         "doubts": doubts,
@@ -621,7 +621,7 @@ def curve_doubts(
         return [f"{tail.short_of(f'P = {smallest:g}')}; the curve ends there"]
     stress = tail.quantile(smallest)
     by_list = _members_cv(state, tail, stress)
-    cv, members = math.hypot(tail.cv(stress), by_list), members_of(state, tail, stress)
+    cv, members = math.hypot(tail.cv(stress), by_list), chances_of_members(state, tail, stress)
     doubts = few_members(state.experiment.random, members, cv, by_list, target_cv)
     near = tail.repetitions[-1].around(stress)
     return doubts + exact_doubts(state, near, stress, smallest)
@@ -649,7 +649,7 @@ def curve_of(
         ends = lognormal_interval(found, cv)
         sides = tail.stress_interval(chance, cv, lowest)
         values = stress, stress - lowest, stress / pressure, stress * area
-        members.append(members_of(state, tail, stress))
+        members.append(chances_of_members(state, tail, stress))
         rows.append((*values, found, *ends, cv, *sides, *band_of(members[-1]), by_list))
     table: dict[str, Any] = dict(zip(CURVE, np.array(rows).T, strict=False))
     table["members"] = np.array(members)

@@ -60,7 +60,7 @@ def repetition(
     )
 
 
-def table_of(smallest: float, state: LimitState, span: Span) -> Table:
+def solve_repetition(smallest: float, state: LimitState, span: Span) -> Table:
     """Return the repetition that is the first of a span, as a table of a store."""
     begin, (point, number, _) = time.perf_counter(), span
     with collect_warnings() as warned:

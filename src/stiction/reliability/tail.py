@@ -220,7 +220,7 @@ def two_levels_refused(state: LimitState) -> str | None:
     return no_single_length(experiment.problem, experiment.random)
 
 
-def agreement(guide: Array, exact: Array) -> float:
+def share_picked(guide: Array, exact: Array) -> float:
     """Return the share of the exactly weakest fiftieth of samples in the guide's weakest tenth."""
     weakest = np.argsort(exact)[: max(5, exact.size // 50)]
     seen = np.argsort(guide)[: max(10, exact.size // 10)]
@@ -252,7 +252,7 @@ def sample_tail(
         pilot = draws, state(draws)
     spent = 0 if pilot is None else pilot[1].size
     if auto and guide and pilot:
-        share = agreement(guide(pilot[0]), pilot[1])
+        share = share_picked(guide(pilot[0]), pilot[1])
         label = guide.experiment.method.label
         reason += f"; of {spent} plain samples the {label} picks {share:.0%} of the weakest"
         guide = guide if share >= ALIKE else None

@@ -23,7 +23,7 @@ from stiction.ensemble.pilot import exact_counterpart
 from stiction.ensemble.store import Store
 from stiction.problem.results import to_dataset
 from stiction.reliability.failure import chances, curve_doubts, curve_of
-from stiction.reliability.repetitions import repetition, repetitions_in, table_of
+from stiction.reliability.repetitions import repetition, repetitions_in, solve_repetition
 from stiction.reliability.subset import Descent
 from stiction.reliability.tail import Tail
 from stiction.study.run import StoredRun, samples_of_part
@@ -33,7 +33,7 @@ CURVES = "failure_curve"
 BOUND = "stress below which no interface slides"
 
 
-class Repetitions:
+class StoredRepetitions:
     """The repetitions of all points of a study that are there, in memory."""
 
     failed = ()  # none does
@@ -66,7 +66,7 @@ class StoredCurves(StoredRun):
         super().__init__(store, study)
         self.settings = settings
 
-    def labelled(self, rows: Repetitions) -> xr.Dataset:
+    def labelled(self, rows: StoredRepetitions) -> xr.Dataset:
         """Return the curves from repetitions, over the axes of a sweep and 'point'.
 
         As from `stiction.failure_curve`; NaN at points of the sweep without a repetition.
@@ -87,7 +87,7 @@ class StoredCurves(StoredRun):
             result = to_dataset(values, variables, coordinates, result.attrs)
         return result[list(rows.only)] if rows.only else result
 
-    def curves(self, rows: Repetitions | None = None) -> list[xr.Dataset]:
+    def curves(self, rows: StoredRepetitions | None = None) -> list[xr.Dataset]:
         """Return the curve of each point of the sweep, NaN without a repetition."""
         rows = rows or self._read(None)
         wanted = chances(self.settings["smallest"])
@@ -106,8 +106,8 @@ class StoredCurves(StoredRun):
         empty = some.where(False).assign_attrs(lower_bound=np.nan)
         return [empty if one is None else one for one in found]
 
-    def _rows(self, only: Sequence[str] | None) -> Repetitions:
-        return Repetitions(len(self.study.experiments), self.study.ensemble.samples, only)
+    def _rows(self, only: Sequence[str] | None) -> StoredRepetitions:
+        return StoredRepetitions(len(self.study.experiments), self.study.ensemble.samples, only)
 
 
 def compute(
@@ -130,7 +130,7 @@ def compute(
     study = replace(study, ensemble=replace(study.ensemble, samples=repetitions))
     store = Store.open(out, study.to_dict() | {CURVES: settings})
     states = [LimitState(point, settings["event"]) for point in study.experiments]
-    rows = Repetitions(len(states), repetitions)
+    rows = StoredRepetitions(len(states), repetitions)
     store.resume(rows.add)
     missing = ~rows.done
     if part is not None:
@@ -145,7 +145,7 @@ def compute(
             rows,
             states,
             [Span(point, number, 1) for number, point in np.argwhere(missing.T).tolist()],
-            partial(table_of, smallest),
+            partial(solve_repetition, smallest),
             Meter("failure curve", int(missing.sum()), progress, unit="repetitions"),
             store=store,
             executor=executor or Here(),
