@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction.base.arrays import one_blas_thread
 from stiction.base.errors import collect_warnings, merged
 from stiction.ensemble.batches import NUMBER, POINT, Span, Table, versions
 from stiction.ensemble.limit_state import LimitState
@@ -48,16 +49,17 @@ def repetition(
     max_evaluations: float = math.inf,
 ) -> Descent:
     """Return a repetition that goes down to a probability."""
-    return descend(
-        state,
-        state.dimension,
-        rng=generator(state.experiment.seed, STREAM, number),
-        samples=samples,
-        max_evaluations=max_evaluations,
-        probability=DEEPER * smallest,
-        floor=state.bounds[0],
-        label=state.member,
-    )
+    with one_blas_thread():  # their number changes last bits
+        return descend(
+            state,
+            state.dimension,
+            rng=generator(state.experiment.seed, STREAM, number),
+            samples=samples,
+            max_evaluations=max_evaluations,
+            probability=DEEPER * smallest,
+            floor=state.bounds[0],
+            label=state.member,
+        )
 
 
 def solve_repetition(smallest: float, state: LimitState, span: Span) -> Table:
