@@ -5,7 +5,7 @@ import pytest
 from setups import beta_strength
 
 import stiction as st
-from stiction.inference.bootstrap import bands
+from stiction.inference.estimate import bands
 from stiction.inference.whittle import Observed, SpectrumFamily, Whittle
 from stiction.inference.window import RecordWindow
 

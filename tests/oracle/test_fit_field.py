@@ -10,7 +10,7 @@ from scipy.stats import binom
 
 import stiction as st
 from stiction.inference.between import likely_between, scatter_between
-from stiction.inference.bootstrap import FitSetting, estimate
+from stiction.inference.estimate import FitSetting, estimate
 from stiction.inference.marginal_fit import family_of, mean_log_likelihood
 from stiction.inference.whittle import SpectrumFamily
 from stiction.inference.window import RecordWindow

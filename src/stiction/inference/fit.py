@@ -15,19 +15,11 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, unknown_name, warn_accuracy
 from stiction.base.model import Count, Flag, Number, Positive, Progress, at_least, checked
 from stiction.base.variables import QUANTITIES
-from stiction.inference.between import likely_between, scatter_between
-from stiction.inference.bootstrap import (
-    FEWEST,
-    Estimate,
-    FitSetting,
-    Repetitions,
-    bootstrapped,
-    estimate,
-    intervals,
-    likely,
-)
-from stiction.inference.marginal_fit import Family, family_of, mean_log_likelihood, multiplied
-from stiction.inference.records import Record, records_of
+from stiction.inference.between import levels_of, likely_between, scatter_between
+from stiction.inference.bootstrap import FEWEST, Repetitions, bootstrapped, intervals, likely
+from stiction.inference.estimate import Estimate, FitSetting, Goodness, compare, windowed
+from stiction.inference.marginal_fit import Family, family_of, multiplied
+from stiction.inference.records import records_of
 from stiction.inference.whittle import SpectrumFamily, spectrum_of
 from stiction.inference.window import RecordWindow
 from stiction.problem.interface import Interface
@@ -48,8 +40,6 @@ ADVICE = {
 }
 TOLD = 2.0
 """Difference of scores from which data tell two families apart."""
-DRAWN = 5.0
-"""Difference of scores from which a family is not drawn any more."""
 FEW_SPECIMENS = 5
 """Specimens below which the scatter between them decides what is rare."""
 EVENLY = 0.5 * (math.sqrt(5.0) - 1.0)
@@ -71,24 +61,6 @@ def _families(given: Any) -> list[Family]:
 DEFAULT_TOO = Field(validate_default=True)
 Marginals = Annotated[Any, BeforeValidator(_families), DEFAULT_TOO]
 Spectrum = Annotated[Any, BeforeValidator(spectrum_of), DEFAULT_TOO]
-
-
-class Goodness(NamedTuple):
-    """Quality of a family of marginals: its best member, and two measures of the fit.
-
-    `distance` is Kolmogorov's. `score` is the log likelihood of so many independent values as tell
-    families apart as well as the correlated ones of the records do, less the number of estimated
-    parameters (Akaike, 1974), less that of the best family: 0 for the best, negative for the
-    others. Differences below 2 do not tell families apart. `weight` is the share of members that
-    `FieldFit.interfaces` draws from the family, in proportion to the likelihood of its members:
-    they scatter about the estimate, and the logarithm of theirs is on average half a unit for
-    each parameter below the greatest.
-    """
-
-    marginal: Any
-    distance: float
-    score: float
-    weight: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +91,6 @@ class FieldFit:
     p_values : dict of str to float
         Probability of records as far from their own marginal, and spectrum, as the data are
         from the fitted ones, from the repetitions; small if a family does not fit.
-    lengths_held : float
-        Correlation lengths (on a plane, areas) that the records hold together.
     missing : (int, int)
         Number of points without a value, which are left out, and of all points.
     doubts : tuple of str
@@ -135,7 +105,6 @@ class FieldFit:
     families: Mapping[str, Goodness]
     independent: float
     p_values: Mapping[str, float]
-    lengths_held: float
     missing: tuple[int, int]
     quantity: str
     doubts: tuple[str, ...]
@@ -146,6 +115,11 @@ class FieldFit:
     @property
     def _estimate(self) -> Estimate:
         return self._repeated[0].truth
+
+    @property
+    def lengths_held(self) -> float:
+        """Number of correlation lengths, or on a plane areas, that the records hold together."""
+        return self._estimate.lengths_held
 
     @property
     def tied(self) -> tuple[str, ...]:
@@ -371,54 +345,28 @@ def fit_field(
     longest = max(max(np.multiply(one.values.shape, one.spacings)) for one in records)
     (name, fixed), deviation = spectrum, None if noise is True else float(noise)
     family = SpectrumFamily(name, fixed, ratio, deviation, (spacing, 2.0 * float(longest)))
-    windows, rows = _windowed(records, detrend)
-    estimates, compared, independent = _compared(
-        [FitSetting(windows, one, family, between) for one in marginal], rows
-    )
-    found, *others = estimates
-    levels, rows = np.array([row.mean() for row in rows]), found.as_of_one(rows)
-    weights = [one.weight for one in compared.values() if one.weight > 0.0]
+    windows, rows = windowed(records, detrend)
+    settings = [FitSetting(windows, one, family, between) for one in marginal]
+    estimates, families, independent = compare(settings, rows)
+    weights = [one.weight for one in families.values() if one.weight > 0.0]
     counts = [max(FEWEST, round(bootstrap * one / max(weights))) for one in weights[1:]]
-    repeated, drawn = bootstrapped(
-        found, bootstrap, confidence, seed, progress, workers,
-        list(zip(others, counts, strict=False)),
+    repeated, others = bootstrapped(
+        estimates[0], bootstrap, confidence, seed, progress, workers,
+        list(zip(estimates[1:], counts, strict=False)),
     )  # fmt: skip
-    tests = {"marginal": "distance", "spectrum": "roughness"}
-    p_values = {name: _p_value(of, *repeated[0]) for name, of in tests.items()}
-    failed = len(repeated) * bootstrap - sum(len(one.fits) for one in repeated)
     points = sum(record.values.size for record in records)
-    parameters = dict(found.parameters)
-    ends = intervals(repeated, confidence, np.concatenate(rows))
-    if between:
-        cv, ends["between"], width = scatter_between(np.log(levels), found.within, confidence)
-        for name in {"mean", "marginal.mean"} & parameters.keys():  # of other specimens, too
-            ends[name] = parameters[name] * math.exp(-width), parameters[name] * math.exp(width)
-        parameters["between"] = cv
-    doubts = _doubts(found, p_values, failed)
-    if between and len(rows) < FEW_SPECIMENS:
-        low, high = ends["between"]
-        doubts.append(
-            f"{len(rows)} specimens leave the coefficient of variation between them at {low:.2g} to"
-            f" {high:.2g}, which decides small probabilities under `interfaces`: measure at least"
-            f" {FEW_SPECIMENS}, or state it, as in RandomInterface(strength=fit.field,"
-            " between={'strength': Lognormal(mean=1.0, cv=0.1)})"
-        )
     fit = FieldFit(
-        field=found.field(quantity),
-        parameters=parameters,
-        interval=ends,
+        **_judged(repeated, rows, confidence, bootstrap),
+        field=estimates[0].field(quantity),
         confidence=confidence,
         repetitions=tuple(one.field(quantity) for one in repeated[0].fits),
-        families=compared,
+        families=families,
         independent=independent,
-        p_values=p_values,
-        lengths_held=_lengths_held(found),
         missing=(points - sum(row.size for row in rows), points),
         quantity=quantity,
-        doubts=tuple(doubts),
-        _repeated=[repeated[0], *drawn],
-        _rows=rows,
-        _levels=levels,
+        _repeated=[repeated[0], *others],
+        _rows=estimates[0].as_of_one(rows),
+        _levels=np.array([row.mean() for row in rows]),
     )
     for doubt in fit.doubts:
         warn_accuracy(doubt)
@@ -428,64 +376,34 @@ def fit_field(
     return fit
 
 
-def _windowed(
-    records: Sequence[Record], degree: int
-) -> tuple[tuple[RecordWindow, ...], list[Array]]:
-    """A window for each record, which those of one geometry share, and values without trend."""
-    made: dict[Any, RecordWindow] = {}
-    windows, rows = [], []
-    for values, spacings in records:
-        measured = np.isfinite(values)
-        key = (values.shape, spacings, measured.tobytes())
-        if key not in made:
-            made[key] = RecordWindow(spacings, measured, degree)
-        windows.append(made[key])
-        rows.append(made[key].without_trend(values[measured]))
-    return tuple(windows), rows
-
-
-def _compared(
-    settings: Sequence[FitSetting], rows: Sequence[Array]
-) -> tuple[list[Estimate], dict[str, Goodness], float]:
-    """Estimates with each family, the best first, how good each is, and for how many values."""
-    fitted: list[tuple[float, Estimate]] = []
-    problems: list[str] = []
-    for setting in settings:
-        try:
-            if setting.spectrum.noise == 0.0:
-                setting.marginal.check(np.concatenate(rows))
-            found = estimate(rows, setting)
-        except InputError as error:
-            problems += error.problems
-            continue
-        values = np.concatenate(found.as_of_one(rows))
-        fitted.append((mean_log_likelihood(found.own, values, found.model.noise), found))
-    if not fitted:
-        raise InputError(problems)
-    independent = max(fitted, key=lambda one: one[0])[1].independent
-    estimates = [found for _, found in fitted]
-    likelihoods = independent * np.array([mean for mean, _ in fitted])
-    costs = np.array([len(one.setting.marginal.parameters(one.own)) for one in estimates])
-    scores = likelihoods - costs
-    scores -= scores.max()
-    weights = np.exp(scores + 0.5 * costs) * (scores > -DRAWN)
-    weights /= weights.sum()
-    order = np.argsort(-scores, kind="stable").tolist()
-    compared = {
-        estimates[i].setting.marginal.label: Goodness(
-            estimates[i].marginal, estimates[i].distance, float(scores[i]), float(weights[i])
-        )
-        for i in order
-    }
-    return [estimates[i] for i in order], compared, independent
-
-
-def _lengths_held(found: Estimate) -> float:
-    """Correlation lengths, or on a plane areas, that the windows hold together."""
-    windows = found.setting.windows
-    area = sum(float(one.measured.sum()) * math.prod(one.spacings) for one in windows)
-    length, ratio = found.model.spectrum.correlation_length, found.model.anisotropy
-    return area / (length if windows[0].measured.ndim == 1 else length * length * ratio)
+def _judged(
+    repeated: Sequence[Repetitions], rows: Sequence[Array], confidence: float, count: int
+) -> dict[str, Any]:
+    """Return parameters, their intervals, p-values and doubts; `count` repetitions were tried."""
+    found, fits = repeated[0]
+    parameters = dict(found.parameters)
+    ends = intervals(repeated, confidence, np.concatenate(found.as_of_one(rows)))
+    tests = {"marginal": "distance", "spectrum": "roughness"}
+    p_values = {name: _p_value(of, found, fits) for name, of in tests.items()}
+    doubts = _doubts(found, p_values)
+    if failed := len(repeated) * count - sum(len(one.fits) for one in repeated):
+        doubts.append(f"the family does not fit {failed} repetitions, which the intervals omit")
+    if found.setting.between:
+        logarithms = np.log(levels_of(rows))
+        cv, (low, high), width = scatter_between(logarithms, found.within, confidence)
+        for name in {"mean", "marginal.mean"} & parameters.keys():  # of other specimens, too
+            ends[name] = parameters[name] * math.exp(-width), parameters[name] * math.exp(width)
+        parameters["between"], ends["between"] = cv, (low, high)
+        if len(rows) < FEW_SPECIMENS:
+            doubts.append(
+                f"{len(rows)} specimens leave the coefficient of variation between them at"
+                f" {low:.2g} to {high:.2g}, which decides small probabilities under `interfaces`:"
+                f" measure at least {FEW_SPECIMENS}, or state it, as in RandomInterface("
+                "strength=fit.field, between={'strength': Lognormal(mean=1.0, cv=0.1)})"
+            )
+    return {
+        "parameters": parameters, "interval": ends, "p_values": p_values, "doubts": tuple(doubts)
+    }  # fmt: skip
 
 
 def _p_value(name: str, truth: Estimate, fits: Sequence[Estimate]) -> float:
@@ -495,10 +413,10 @@ def _p_value(name: str, truth: Estimate, fits: Sequence[Estimate]) -> float:
     return float(student.sf(away, others.size - 1))
 
 
-def _doubts(found: Estimate, p_values: Mapping[str, float], failed: int) -> list[str]:
+def _doubts(found: Estimate, p_values: Mapping[str, float]) -> list[str]:
     """Reasons not to trust a fit."""
     doubts = []
-    held, noise = _lengths_held(found), found.model.noise
+    held, noise = found.lengths_held, found.model.noise
     if held < ENOUGH_LENGTHS:
         doubts.append(
             f"the records hold {held:.2g} correlation lengths, too few for reliable intervals:"
@@ -521,8 +439,6 @@ def _doubts(found: Estimate, p_values: Mapping[str, float], failed: int) -> list
         for name, p in p_values.items()
         if p <= FAR
     ]
-    if failed:
-        doubts.append(f"the family does not fit {failed} repetitions, which the intervals omit")
     return doubts
 
 

@@ -349,7 +349,9 @@ def make_likelihood(
             )
             most = SAMPLES["local_criterion"] if prior.cells is None else 0
             options["samples"] = max(count, most)
-            many = simulate([one.by(LocalCriterion()) for one in experiments], **options)
+            meter.stage("onsets by the local criterion", len(thetas) * options["samples"])
+            nearby = [one.by(LocalCriterion()) for one in experiments]
+            many = simulate(nearby, meter=meter, **options)
             alike = np.mean(
                 [np.corrcoef(*pair)[0, 1] for pair in zip(found, known, strict=True)]
             )
@@ -358,7 +360,8 @@ def make_likelihood(
                 worth = worth_of(float(alike), many.shape[1], count)
             else:
                 _warn_if_long(experiments[0], len(thetas) * count, workers)
-                found = simulate(experiments, **options | {"samples": count})
+                meter.stage("simulated onsets", len(thetas) * count)
+                found = simulate(experiments, **options | {"samples": count, "meter": meter})
         bounds = [bounds_of(own, variable)[0] for own in experiments]
         densities.append(tabulate(found, np.array(bounds)))
     none = Area(1.0, np.zeros(prior.dimension))

@@ -12,7 +12,7 @@ from scipy import fft
 from stiction.base.units import unit_for
 from stiction.base.variables import QUANTITIES
 from stiction.inference.agreement import Agreement
-from stiction.inference.bootstrap import bands
+from stiction.inference.estimate import bands
 from stiction.inference.fit import FieldFit
 from stiction.inference.whittle import Observed, observe
 from stiction.plot.axes import on_axes, with_unit

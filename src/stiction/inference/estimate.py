@@ -1,0 +1,308 @@
+"""One fit of a marginal, a spectrum and noise to records, and the comparison of families."""
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError
+from stiction.inference.between import as_of_one, levels_of, scatter_between
+from stiction.inference.marginal_fit import Family, distance, mean_log_likelihood
+from stiction.inference.records import Record
+from stiction.inference.whittle import (
+    Model,
+    Observed,
+    SpectrumFamily,
+    Whittle,
+    hermite_shares,
+    observe,
+)
+from stiction.inference.window import RecordWindow
+from stiction.random.fields import RandomField
+from stiction.random.mapping import from_normal
+
+NEGLIGIBLE = 1e-4
+"""Share of noise that does not change a marginal."""
+LAGS = np.concatenate(([0.0], np.geomspace(0.01, 4.0, 400)))
+"""Lags in correlation lengths; the correlation of every spectrum falls to 1/e within them."""
+NAMES = {name: f"spectrum.{name}" for name in ("correlation_length", "exponent")}
+NAMES["anisotropy"] = "anisotropy"
+"""Estimated parameters of a spectrum, by their names in study files."""
+LEAST_LEFT = 0.2
+"""Least share of the variance that is taken to be left by mean and trend."""
+ROUNDS = 2
+"""In each, the error of the field's share in the scatter of means falls to that share of it."""
+DRAWN = 5.0
+"""Difference of scores from which a family is not drawn any more."""
+
+
+@dataclass(frozen=True, eq=False)
+class FitSetting:
+    """Families to fit, and a window for each record (equal windows are shared)."""
+
+    windows: tuple[RecordWindow, ...]
+    marginal: Family
+    spectrum: SpectrumFamily
+    between: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """The result of one fit."""
+
+    setting: FitSetting
+    marginal: Any  # of the field
+    own: Any  # of the values, from which mean and trend have taken variance
+    model: Model
+    distance: float  # Kolmogorov's, between values and marginal
+    roughness: float  # mean square of log(periodogram/expectation), both averaged over bands
+    noise: tuple[float, float]  # its variance, which may be negative, and the error of that
+    between: float = 0.0  # coefficient of variation of the factor between specimens
+
+    @cached_property
+    def parameters(self) -> dict[str, float]:
+        """All estimated parameters, and what follows from them, by name."""
+        spectrum = self.model.spectrum
+        if self.model.end_seen or not hasattr(spectrum, "untruncated_correlation"):
+            efolding = spectrum.efolding_length
+        else:
+            lags = spectrum.correlation_length * LAGS
+            correlation = spectrum.untruncated_correlation(lags)
+            efolding = float(np.interp(-math.exp(-1.0), -correlation, lags))
+        values = {
+            "efolding_length": efolding,
+            "mean": float(self.marginal.distribution.mean()),
+            "standard_deviation": float(self.marginal.distribution.std()),
+        }
+        own = self.setting.marginal.parameters(self.marginal)
+        values |= {f"marginal.{name}": value for name, value in own.items()}
+        free = self.setting.spectrum.of(self.model)
+        values |= {NAMES[name]: value for name, value in free.items() if name in NAMES}
+        if "noise_share" in free:
+            values["noise"] = self.model.noise
+        return values
+
+    def field(self, quantity: str) -> RandomField:
+        """Return the field to simulate with."""
+        anisotropy = self.model.anisotropy if self.model.anisotropy != 1.0 else None
+        of: Any = quantity if quantity == "friction_coefficient" else None
+        return RandomField(
+            self.marginal, self.model.spectrum, mean_mode=True, anisotropy=anisotropy, of=of
+        )
+
+    def simulate(self, rng: np.random.Generator) -> list[Array]:
+        """Simulate records with their noise: measured values (points,) of each."""
+        windows = self.setting.windows
+        power = {window: self.model.power(window) for window in dict.fromkeys(windows)}
+        rows = []
+        for window in windows:
+            field = from_normal(self.marginal, window.sample(power[window], rng))
+            noise = self.model.noise * rng.standard_normal(field.size)
+            rows.append(window.without_trend(field + noise))
+        if not self.between:
+            return rows
+        variance = math.log1p(self.between**2)
+        scatter = math.sqrt(variance) * rng.standard_normal(len(rows)) - 0.5 * variance
+        return [row * factor for row, factor in zip(rows, np.exp(scatter), strict=True)]
+
+    @property
+    def within(self) -> Array:
+        """Variance of the logarithm of the mean of each record from the field alone."""
+        own = self.parameters["standard_deviation"] / self.parameters["mean"]
+        windows, model = self.setting.windows, self.model
+        shares = {w: w.variance_of_mean(model.correlation(w)) for w in set(windows)}
+        result: Array = np.log1p(own**2 * np.array([shares[window] for window in windows]))
+        return result
+
+    @property
+    def independent(self) -> float:
+        """Number of independent values that tell families of the marginal apart as well.
+
+        Families fitted to the same values agree in about mean and variance; the logarithm of the
+        ratio of their densities then has Hermite orders of z from 3 on. Its sum over N values with
+        correlations rho_ij has mean and variance of that over N^2/sum rho_ij^3 independent ones.
+        """
+        points, alike = 0.0, 0.0
+        for window, count in Counter(self.setting.windows).items():
+            rho = (1.0 - self.model.noise_share) * self.model.correlation(window)
+            rho.flat[0] = 1.0
+            points += count * float(window.measured.sum())
+            alike += count * float(np.sum(window.pairs * rho**3))
+        return points**2 / max(alike, points)
+
+    @property
+    def lengths_held(self) -> float:
+        """Number of correlation lengths, or on a plane areas, that the windows hold together."""
+        windows, length = self.setting.windows, self.model.spectrum.correlation_length
+        area = sum(float(one.measured.sum()) * math.prod(one.spacings) for one in windows)
+        if windows[0].measured.ndim == 1:
+            return area / length
+        return area / (length * length * self.model.anisotropy)
+
+    def as_of_one(self, rows: Sequence[Array]) -> list[Array]:
+        """Return records without the scatter between specimens, if that is estimated."""
+        return as_of_one(rows, self.within) if self.setting.between else list(rows)
+
+
+def estimate(
+    rows: Sequence[Array], setting: FitSetting, start: Estimate | None = None
+) -> Estimate:
+    """Fit measured values (points,) of each record, without trend; from a start if there is one.
+
+    Records of several specimens are scaled by what the fit itself finds of the field's own share
+    in the scatter of their means, in a few rounds.
+    """
+    if not setting.between:
+        return _estimate(rows, setting, start)
+    equal = as_of_one(rows, np.zeros(len(rows)))
+    found = start or _estimate(equal, setting, None)
+    for _ in range(ROUNDS):
+        found = _estimate(found.as_of_one(rows), setting, found)
+    between, *_ = scatter_between(np.log(levels_of(rows)), found.within, 0.5)
+    return replace(found, between=between)
+
+
+def _estimate(rows: Sequence[Array], setting: FitSetting, start: Estimate | None) -> Estimate:
+    """Fit records of one field.
+
+    The noise is found with the marginal of the values, which it widens; then both are fitted again.
+    """
+    family = setting.spectrum
+    values = np.concatenate(rows)
+    observed = observe(rows, setting.windows)
+    vector: Any = None
+    marginal, noise = None, family.noise or 0.0
+    if start is not None:
+        vector = family.vector_of(start.model)
+        marginal, noise = start.marginal, start.model.noise
+    for _ in range(2):
+        marginal = own = setting.marginal.fit(values, noise, marginal)
+        likelihood = Whittle(family, hermite_shares(marginal), observed)
+        vector = likelihood.fit(likelihood.coarse() if vector is None else vector)
+        model = family.model(vector, likelihood.shares)
+        if model.noise_share < 0.0:  # zero is the best possible
+            without = likelihood._replace(family=replace(family, noise=0.0))
+            model = without.family.model(without.fit(vector[:-1]), likelihood.shares)
+        if abs(model.noise**2 - noise**2) < NEGLIGIBLE * model.variance:
+            break
+        noise = model.noise
+    ratios = [
+        math.log((measured + one.floor) / (predicted + one.floor))
+        for one in observed
+        for _, measured, predicted in bands(one, model.expectation(one.window))
+    ]
+    return Estimate(
+        setting=setting,
+        marginal=setting.marginal.widened(own, _left(setting.windows, model) ** -0.5),
+        own=own,
+        model=model,
+        distance=distance(own, setting.marginal.quiet(values, model.noise)),
+        roughness=float(np.mean(np.square(ratios))),
+        noise=likelihood.noise_variance(vector) if family.noise is None else (0.0, 0.0),
+    )
+
+
+def _left(windows: Sequence[RecordWindow], model: Model) -> float:
+    """Return the share of its variance that a field is expected to show about mean and trend.
+
+    Of N values v with correlation R it is tr(M R)/N, with M the projection that takes the trend of
+    each record, and the mean of all, from them.
+    """
+    taken, mean, points = 0.0, 0.0, 0.0
+    for window, count in Counter(windows).items():
+        correlation, size = model.correlation(window), float(window.measured.sum())
+        points += count * size
+        taken += count * window.taken_by_trend(correlation)
+        mean += count * size**2 * window.variance_of_mean(correlation)
+    return max(1.0 - (taken + mean / points) / points, LEAST_LEFT)
+
+
+def bands(one: Observed, expected: Array, per_octave: int = 3) -> Array:
+    """Return wavenumber (rad/m), periodogram and expectation averaged over bands, (bands, 3)."""
+    weights = one.window.weights
+    k = np.broadcast_to(np.sqrt(sum(v**2 for v in one.window.wave_vectors)), weights.shape)
+    kept = weights > 0.0
+    k = k[kept]
+    band = np.unique(np.round(per_octave * np.log2(k / k.min())), return_inverse=True)[1]
+    sums = [np.bincount(band, weights=w) for w in (k, one.average[kept], expected[kept])]
+    means: Array = np.transpose(sums) / np.bincount(band)[:, None]
+    return means
+
+
+class Goodness(NamedTuple):
+    """Quality of a family of marginals: its best member, and two measures of the fit.
+
+    `distance` is Kolmogorov's. `score` is the log likelihood of so many independent values as tell
+    families apart as well as the correlated ones of the records do, less the number of estimated
+    parameters (Akaike, 1974), less that of the best family: 0 for the best, negative for the
+    others. Differences below 2 do not tell families apart. `weight` is the share of members that
+    `FieldFit.interfaces` draws from the family, in proportion to the likelihood of its members:
+    they scatter about the estimate, and the logarithm of theirs is on average half a unit for
+    each parameter below the greatest.
+    """
+
+    marginal: Any
+    distance: float
+    score: float
+    weight: float
+
+
+def windowed(
+    records: Sequence[Record], degree: int
+) -> tuple[tuple[RecordWindow, ...], list[Array]]:
+    """Return a window for each record, which those of one geometry share, and trendless values."""
+    made: dict[Any, RecordWindow] = {}
+    windows, rows = [], []
+    for values, spacings in records:
+        measured = np.isfinite(values)
+        key = (values.shape, spacings, measured.tobytes())
+        if key not in made:
+            made[key] = RecordWindow(spacings, measured, degree)
+        windows.append(made[key])
+        rows.append(made[key].without_trend(values[measured]))
+    return tuple(windows), rows
+
+
+def compare(
+    settings: Sequence[FitSetting], rows: Sequence[Array]
+) -> tuple[list[Estimate], dict[str, Goodness], float]:
+    """Return estimates with each family, the best first, how good each is, and for how many values.
+
+    Those to which the values cannot be fitted are missing; an `InputError` if that is so of all.
+    """
+    fitted: list[tuple[float, Estimate]] = []
+    problems: list[str] = []
+    for setting in settings:
+        try:
+            if setting.spectrum.noise == 0.0:
+                setting.marginal.check(np.concatenate(rows))
+            found = estimate(rows, setting)
+        except InputError as error:
+            problems += error.problems
+            continue
+        values = np.concatenate(found.as_of_one(rows))
+        fitted.append((mean_log_likelihood(found.own, values, found.model.noise), found))
+    if not fitted:
+        raise InputError(problems)
+    independent = max(fitted, key=lambda one: one[0])[1].independent
+    scored = []
+    for mean, found in fitted:
+        cost = len(found.setting.marginal.parameters(found.own))
+        scored.append((independent * mean - cost, cost, found))
+    scored.sort(key=lambda one: -one[0])
+    estimates = [found for *_, found in scored]
+    scores = np.array([score for score, *_ in scored]) - scored[0][0]
+    costs = np.array([cost for _, cost, _ in scored])
+    weights = np.exp(scores + 0.5 * costs) * (scores > -DRAWN)
+    weights /= weights.sum()
+    pairs = zip(estimates, scores.tolist(), weights.tolist(), strict=True)
+    families = {
+        one.setting.marginal.label: Goodness(one.marginal, one.distance, score, weight)
+        for one, score, weight in pairs
+    }
+    return estimates, families, independent
