@@ -7,6 +7,7 @@ from refusals import refusals
 
 import stiction as st
 from stiction.inference.bootstrap import bootstrapped
+from stiction.inference.records import records_of
 
 FIELD = st.RandomField(
     st.Lognormal(mean=1e6, cv=0.2), st.ExponentialSpectrum(1e-3), mean_mode=True
@@ -108,6 +109,11 @@ def test_missing_values_are_left_out_and_counted(plain):
     with pytest.warns(st.AccuracyWarning, match="filled"):  # which is no measurement
         filled = st.read_profile(labelled(values), interface=PIECE, gaps="fill")
     assert fitted(filled).parameters == fit.parameters
+
+
+def test_a_profile_that_is_there_twice_is_no_further_measurement():
+    with pytest.warns(st.AccuracyWarning, match="1 of 3 profiles repeat another"):
+        records_of([labelled(), labelled(VALUES[::-1]), labelled()], None, "strength")
 
 
 INFINITE = np.where(np.arange(COUNT) == 3, np.inf, VALUES)

@@ -47,6 +47,11 @@ def records_of(profiles: Any, interface: Interface | None, quantity: str) -> lis
         problems.append("profiles: lines and planes are mixed; fit them separately")
     if problems:
         raise InputError(problems)
+    if (again := len(found) - len({one.values.tobytes() for one in found})) > 0:
+        warn_accuracy(
+            f"{again} of {len(found)} profiles repeat another one, value by value: they count as"
+            " further measurements, and make intervals too narrow; leave them out"
+        )
     return found
 
 
