@@ -1,18 +1,12 @@
 """Decisions under uncertain parameters: total probability over simulated campaigns.
 
-A campaign draws a truth, measures it (five profiles, or the peaks of 5, 12 or 50 tests), estimates
-its parameters, and designs for a failure probability of 1 %: once for the estimate alone (plug-in),
-once for the mean over 30 equally likely interfaces (predictive). The true failure probability at
-these stresses is then known. Its mean over the campaigns should be 1 %.
+A campaign draws a truth from the prior that `infer` is given, measures the peaks of 5, 12 or 50
+tests of it, estimates its parameters, and designs for a failure probability of 1 %: once for the
+estimate alone (plug-in), once for the mean over 30 equally likely interfaces (predictive). The true
+failure probability at these stresses is then known. Its mean over the campaigns should be 1 %.
+Campaigns of profiles, and of profiles and tests, are in families.py.
 
-Profiles are of one truth and are fitted by `fit_field`; the truths behind the peaks are drawn from
-the prior that `infer` is given. Twenty campaigns take about five minutes on one free core.
-
-With ``joined`` in the place of the figure five profiles and the peaks of twelve tests are of one
-truth, apart and joined by ``infer(problem, fit, peaks)``: the 90 % intervals of mean and standard
-deviation, how often they hold the truth, and the true failure probability of the design for 1 %.
-
-Run: ``python validation/decisions.py [CAMPAIGNS [FIGURE.png | joined]]``
+Run: ``python validation/decisions.py [CAMPAIGNS [FIGURE.png]]``
 """
 
 import sys
@@ -60,19 +54,6 @@ def design(random, seed):
     return st.design_stress(PROBLEM, random, probability=TARGET, **options).stress
 
 
-def by_profiles(seed):
-    """Return the true probabilities at both design stresses after five profiles."""
-    truth = strength(st.Lognormal(mean=1e6, cv=0.2), 4e-3)
-    records = truth.sample(PROBLEM.interface, samples=5, seed=1000 + seed)
-    fit = st.fit_field(
-        records, PROBLEM.interface, marginal="lognormal", spectrum="power_law", noise=0.0,
-        bootstrap=40, seed=seed, progress=False,
-    )  # fmt: skip
-    known = onsets(truth, 20_000, 7)
-    stresses = [design(one, seed) for one in (fit.field, fit.interfaces(INTERFACES, seed))]
-    return np.searchsorted(known, stresses) / known.size, stresses, np.quantile(known, TARGET)
-
-
 def by_tests(tests, seed):
     """Return the same after some tests of a truth that is drawn from the prior."""
     rng = np.random.default_rng([seed, 9])
@@ -87,62 +68,6 @@ def by_tests(tests, seed):
     alone = strength(beta(*ends), length)
     stresses = [design(one, seed) for one in (alone, posterior.interfaces(INTERFACES, seed))]
     return np.searchsorted(known, stresses) / known.size, stresses, np.quantile(known, TARGET)
-
-
-BROAD = {
-    "marginal.mean": (0.7e6, 1.4e6),
-    "marginal.cv": (0.08, 0.4),
-    "correlation_length": {"low": 2e-3, "high": 1.2e-2, "spacing": "log"},
-}
-BY = ("5 profiles", "12 tests", "both")
-
-
-def by_both(seed):
-    """Return true probabilities, 90 % intervals of mean and deviation (kinds, 2, 2), by `BY`."""
-    truth = strength(st.Lognormal(mean=1e6, cv=0.2), 4e-3)
-    records = truth.sample(PROBLEM.interface, samples=5, seed=1000 + seed)
-    fit = st.fit_field(
-        records, PROBLEM.interface, marginal="lognormal", spectrum="power_law", noise=0.0,
-        bootstrap=100, seed=seed, progress=False,
-    )  # fmt: skip
-    peaks = onsets(truth, 12, 3000 + seed)
-    options = {"method": LOCAL, "samples": 400, "seed": seed, "progress": False}
-    lists = [
-        fit.interfaces(100, seed),
-        st.infer(PROBLEM, truth, peaks, prior=BROAD, **options).interfaces(100, seed),
-        st.infer(PROBLEM, fit, peaks, **options).interfaces(100, seed),
-    ]
-    known, chances, ends = onsets(truth, 20_000, 7), [], []
-    for likely in lists:
-        chances.append(np.searchsorted(known, design(likely, seed)) / known.size)
-        fields = [one.strength for one in likely]
-        both = [[one.mean for one in fields], [one.standard_deviation for one in fields]]
-        ends.append(np.quantile(both, (0.05, 0.95), axis=1).T)
-    return chances, ends
-
-
-def joined(campaigns):
-    """Print what five profiles, twelve tests and both leave open."""
-    rows = []
-    for seed in range(campaigns):
-        rows.append(by_both(seed))
-        if seed < 1 or ((seed + 1) % 10 and seed + 1 < campaigns):
-            continue
-        chances, ends = (np.array(part) for part in zip(*rows, strict=True))
-        inside = ((ends[..., 0] < (1e6, 0.2e6)) & (ends[..., 1] > (1e6, 0.2e6))).mean(axis=0)
-        widths = np.diff(ends)[..., 0].mean(axis=0)
-        print(
-            f"{seed + 1} campaigns: width of the 90 % interval of mean and deviation (kPa), how"
-        )
-        print("often it holds the truth, and the true P of a predictive design for 1 %")
-        for place, name in enumerate(BY):
-            wide, often = 1e-3 * widths[place], inside[place]
-            error = chances[:, place].std(ddof=1) / len(rows) ** 0.5
-            print(
-                f"| {name} | {wide[0]:.0f} ({often[0]:.0%}) | {wide[1]:.0f} ({often[1]:.0%}) |"
-                f" {100 * chances[:, place].mean():.2f} +- {100 * error:.2f} % |",
-                flush=True,
-            )
 
 
 def table(name, campaigns, run):
@@ -187,14 +112,11 @@ def figure(path, shares):
 def main(campaigns=20, path=None):
     """Print the table, and draw the figure if it has a path."""
     warnings.simplefilter("ignore")
-    if path == "joined":
-        return joined(campaigns)
     shares = {}
     for tests in TESTS:
         shares[tests] = table(
             f"{tests} tests", campaigns, lambda seed, n=tests: by_tests(n, seed)
         )
-    table("5 profiles", campaigns, by_profiles)
     if path:
         figure(path, shares)
 

@@ -21,8 +21,8 @@ LARGEST = 1e100
 FRICTION = (1e-3, 10.0), (1e-4, 100.0)
 """Mean strength over normal pressure, from superlubricity to adhesive gels."""
 BARRIER = 10.0
-"""A node is a barrier where tau_p - tau_r is above so many times its lower quartile, of nodes that
-weaken."""
+"""A node is a barrier where tau_p - tau_r is above so many times its lower quartile, by rank, of
+nodes that weaken."""
 
 
 def steepest_rate(strength: Array, residual: Array, rate: Array) -> float:
@@ -31,12 +31,16 @@ def steepest_rate(strength: Array, residual: Array, rate: Array) -> float:
     Barriers are left out: with a uniform critical slip they weaken steeply, but never slip.
     """
     drop = strength - residual
-    if drop.max() <= BARRIER * drop.min():
+    if drop.max() <= BARRIER * drop.min() or rate.max() == rate.min():
         return float(rate.max())
     drop = drop.reshape(drop.shape[0], -1)
     weakens = np.isfinite(drop) & (drop > 0.0)
-    typical = np.nanquantile(np.where(weakens, drop, np.nan), 0.25, axis=1)
-    return float(rate.reshape(drop.shape)[drop <= BARRIER * typical[:, None]].max())
+    count = weakens.sum(axis=1, keepdims=True)
+    ordered = np.sort(
+        np.where(weakens, drop, -np.inf), axis=1
+    )  # numpy's quantile: 20 times as long
+    typical = np.take_along_axis(ordered, drop.shape[1] - count + (count - 1) // 4, axis=1)
+    return float(rate.reshape(drop.shape)[drop <= BARRIER * typical].max())
 
 
 class Sample(NamedTuple):
