@@ -62,8 +62,9 @@ class Equilibrium:
     ----------
     sensitivity : bool
         Also return d first_instability / d tau_p at every node, at fixed weakening rates. NaN
-        where a law steepens and a node passes a corner before the first instability, where a
-        node of a specimen stops before it, or where the turning point of a plane is not found.
+        where a law steepens and a node passes a corner before the first instability, or where
+        the turning point of a plane is not found. Where a node of a specimen stops before it,
+        difference quotients take as many paths to it as there are nodes.
     slip : bool
         Also return the slip at the first instability.
     events : int

@@ -22,6 +22,7 @@ from stiction.methods.equilibrium.sample import (
     Program,
     State,
     StaticSample,
+    make_sample,
     multiplier_of,
     present_pieces,
     refused,
@@ -54,6 +55,8 @@ OF_SPECIMENS = {
 SLIDING_ONLY = 0.02
 """Height of the peak above the mean residual strength, as a share of the fall of strength, below
 which nothing but sliding is left of it."""
+QUOTIENT = 1e-7
+"""Rise of the strength of a node for a difference quotient, as a share of the mean."""
 EVENT_CORE = 1e-3
 """Share of the largest added slip above which a node belongs to the patch of an event."""
 
@@ -257,16 +260,17 @@ class OnsetSolver:
             values["critical_position"], values["sliding_position"] = (
                 *patch.centre, *slides.centre,
             )  # fmt: skip
-        if path.known and not first.unstable:  # behind a stiff machine
+        stable = path.known and not first.unstable  # behind a stiff machine
+        if stable:
             of_patch = ("first_instability", "critical_position", "critical_patch_length")
             values |= dict.fromkeys(of_patch, np.nan)
         if self.options.slip:
             values["slip"] = first.slip.reshape(shape)
         if self.options.sensitivity:
-            derivative = _sensitivity(self.program, sample, first) * rows.load_profile.mean()
-            if path.known and not first.unstable:
-                derivative[:] = np.nan
-            values["sensitivity"] = derivative.reshape(shape)
+            derivative = np.full(first.slip.size, np.nan)
+            if not stable:
+                derivative = _sensitivity(self.problem, self.program, sample, first)
+            values["sensitivity"] = derivative.reshape(shape) * rows.load_profile.mean()
         if most := self.options.events:
             events = event_table(self.problem, rows, row, path.events[:most])
             for name, column in events.items():
@@ -311,17 +315,36 @@ class OnsetSolver:
         )
 
 
-def _sensitivity(program: Program, sample: StaticSample, state: State) -> Array:
+def _sensitivity(
+    problem: Problem, program: Program, sample: StaticSample, state: State
+) -> Array:
     """Derivative of the stress of an instability by the peak strengths.
 
-    NaN where a node passed a corner beyond which it weakens more steeply, or stopped.
+    NaN where a node passed a corner beyond which it weakens more steeply.
     """
     pieces = sample.pieces
-    if state.stopped or (pieces.steepens and not state.certified):
+    if state.stopped:
+        return _quotients(problem, program, sample, state)
+    if pieces.steepens and not state.certified:
         return np.full(state.slip.size, np.nan)
     # A piece starts from share tau_p + (1 - share) tau_r; the share of the last piece is 0.
     share = pieces.starts[present_pieces(sample, state.slip).piece]
     return program.gradient(sample, state) * np.where(sample.critical > 0.0, share, 1.0)
+
+
+def _quotients(problem: Problem, program: Program, sample: StaticSample, first: State) -> Array:
+    """Derivative of the stress of a first instability, node by node: paths are straight."""
+    before = first.load - relief_of(problem, first.slip)
+    step = QUOTIENT * float(np.abs(sample.excess).mean())
+    found = np.empty(sample.excess.size)
+    for node in range(found.size):
+        excess, residual = sample.excess.copy(), sample.residual.copy()
+        excess[node] += step
+        residual[node] += step * (sample.critical[node] == 0.0)  # its strength is constant
+        rise = make_sample(excess, residual, sample.profile, sample.rate, sample.pieces)
+        state = program.next(rise)
+        found[node] = (state.load - relief_of(problem, state.slip) - before) / step
+    return found
 
 
 def _warn_if_stopped(stopped: NDArray[np.bool_]) -> None:
@@ -351,7 +374,7 @@ def _warn_if_lost(sensitivity: Array, unstable: NDArray[np.bool_]) -> None:
     """Warn where a first instability has no derivative."""
     warn_of_samples(
         "the first instability has no known derivative in {samples}, so sensitivity is NaN: nodes"
-        " stop, or pass a corner from which their law falls more steeply, or the turning point was"
-        " not resolved",
+        " pass a corner from which their law falls more steeply, or the turning point was not"
+        " resolved",
         unstable & np.isnan(sensitivity).reshape(len(sensitivity), -1).any(axis=1),
     )
