@@ -55,7 +55,8 @@ def a_fit_with_scatter_between_specimens():
     records = [record(120, 0.024, 20 + i) * factor for i, factor in enumerate(factors)]
     for each in records:
         each.attrs["units"] = "Pa"
-    found = st.fit_field(records, marginal="lognormal", between=True, bootstrap=20, seed=5)
+    options = {"between": True, "bootstrap": 20, "seed": 5, "confidence": 0.8}
+    found = st.fit_field(records, marginal="lognormal", **options)
     return {"fit": found, "drawn": [repr(one) for one in found.interfaces(2, seed=7)]}
 
 

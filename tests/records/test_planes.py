@@ -116,7 +116,7 @@ def a_rupture_with_stations():
     method = st.Rupture(loading_rate=6e8, kernel_tolerance=1e-5)
     found = st.simulate_rupture(problem, strength, method=method, save=save)
     with tempfile.TemporaryDirectory() as folder:
-        options = {"origin": (0.012, 0.011), "normal_stress": -5e6}
+        options = {"origin": (0.012, 0.011), "normal_stress": -5e6, "benchmark": "TPV5"}
         files = st.external.write_scec(found, folder, **options)
         written = {path.name: path.read_text().split("\n") for path in files}
     return {"run": found} | {

@@ -69,6 +69,12 @@ def other_places_and_units():
         "interpolated": table(shifted, interface=SMALL, interpolate=True),
         "stated": table("\n".join(f"{v}" for v in EIGHT), unit="MPa", interface=SMALL),
         "as read": table(shifted),
+        "bare": table(
+            "\n".join(f"{2 * i} {1e3 * v}" for i, v in enumerate(EIGHT)),
+            x_unit="mm",
+            unit="kPa",
+            interface=SMALL,
+        ),
     }
 
 

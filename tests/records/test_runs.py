@@ -120,11 +120,6 @@ def of_commands(study, *lines):
 
 
 @calls(SAME)
-def a_sweep_of_three_axes():
-    return st.Study.from_dict(SWEPT).run(progress=False)
-
-
-@calls(SAME)
 def commands_of_a_sweep():
     return of_commands(
         SWEPT,
