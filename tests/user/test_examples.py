@@ -67,8 +67,12 @@ HOW_TOS = [
 
 
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
-@pytest.mark.parametrize("name", HOW_TOS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=() if name in CHECKS else pytest.mark.slow) for name in HOW_TOS],
+)
 def test_a_how_to(name, monkeypatch, tmp_path, capsys):
+    """Those without a check run whenever the pages are built: their gallery is made of them."""
     monkeypatch.chdir(tmp_path)
     path = EXAMPLES / f"{name}.py"
     found = runpy.run_path(str(path))
