@@ -194,22 +194,6 @@ def equilibrium():
 
 
 @case
-def long_lines():
-    """Exact onsets of a thousand nucleation lengths, beside one dense factor of what slips."""
-    problem = line(32_768)
-    for ratio in (2.0, 0.5, 0.25):
-        strength = field(ratio * problem.nucleation_length)
-        tau_p = strength.sample(problem.interface, samples=2, seed=0)
-        ours, found = solver_time(problem, st.Equilibrium(slip=True), tau_p, 3)
-        nodes = np.flatnonzero(found["slip"][0] > 0.0)
-        symbol = 0.5 * problem.effective_modulus * problem.interface.wavenumbers
-        column = np.fft.irfft(symbol, problem.interface.size)
-        column[0] -= problem.friction.weakening_rate
-        factor = timed(lambda n=nodes, c=column: np.linalg.cholesky(c[abs(n[:, None] - n)]), 1)
-        row(f"xi_0/h_n = {ratio}, {nodes.size} slip", ours, [("dense factor", factor)])
-
-
-@case
 def residual_strength():
     """Exact onsets where nodes reach their residual strength, and where events are arrested."""
     marginal = st.Lognormal(mean=1e6, cv=0.3)
@@ -368,25 +352,6 @@ def reliability():
     cv = result.getCoefficientOfVariation()
     note = f"P = {result.getProbabilityEstimate():.1e} ({cv:.2f})"
     row("OpenTURNS, local, 661.6 kPa", spent, (), note)
-
-
-@case
-def equally_likely():
-    """Thirty interfaces of a prior at P = 1e-4 by the local criterion, beside their middle."""
-    problem = st.paper.problem(nodes=512)
-    middle = st.RandomInterface(strength=st.paper.strength(problem, correlation_ratio=0.5))
-    length = middle.strength.spectrum.correlation_length
-    likely = middle.uncertain(
-        {"correlation_length": (0.5 * length, 2.0 * length), "marginal.low": (0.64e6, 0.68e6)},
-        30,
-    )
-    options = {"target_cv": 0.1, "workers": 1, "progress": False, "method": st.LocalCriterion()}
-    for probability in (1e-2, 1e-4):
-        design = partial(st.design_stress, problem, probability=probability, **options)
-        alone, together = (timed(partial(design, each), 1) for each in (middle, likely))
-        counts = " and ".join(str(design(each).evaluations) for each in (middle, likely))
-        note = f"{together / alone:.1f} times one, {counts} onsets"
-        row(f"P = {probability:g}", together, [("thirty alone", 30.0 * alone)], note)
 
 
 @case

@@ -3,16 +3,13 @@
 The local strength is a friction coefficient times the pressure; the critical slip belongs to the
 surface, so that the weakening rate is proportional to the pressure.
 
-    python validation/trends.py [--samples 24] [--pressure 2.5e6]
+Run: ``python validation/trends.py [PRESSURE]``, 2.5e6 Pa if not given
 """
 
-import argparse
+import sys
 import warnings
-from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
-import xarray as xr
 
 import stiction as st
 
@@ -25,9 +22,7 @@ FIELD = st.RandomField(
 PUSHERS = (0.025, 0.015, 0.01, 0.005)  # heights, m
 
 
-def rig(
-    drive: Any, pressure: float, length: float = 0.1, pressing: Any = "frictionless"
-) -> st.Problem:
+def rig(drive, pressure, length=0.1, pressing="frictionless"):
     """Two acrylic blocks, 50 mm high and 6 mm thick, nodes 0.39 mm apart."""
     return st.Problem(
         solid=st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress"),
@@ -38,12 +33,12 @@ def rig(
     )
 
 
-def pusher(height: float) -> st.Pusher:
+def pusher(height):
     """A pusher 4 mm wide."""
     return st.Pusher(height=height, width=0.004, stiffness=MACHINE)
 
 
-def cases(usual: float) -> Iterator[tuple[str, st.Problem]]:
+def cases(usual):
     """All rigs by name, under the usual pressure (Pa) where it is not swept."""
     platen = st.Platen(stiffness=MACHINE)
     yield "platen", rig(platen, usual)
@@ -58,23 +53,18 @@ def cases(usual: float) -> Iterator[tuple[str, st.Problem]]:
             yield f"{name}, {1e3 * length:g} mm long", rig(drive, usual, length)
 
 
-def of(problem: st.Problem, samples: int) -> xr.Dataset:
-    """Onsets and events of the same random surfaces."""
-    method = st.Equilibrium(events=200)
-    return st.monte_carlo(problem, FIELD, method=method, samples=samples, seed=0, pilot=False)
-
-
-def main() -> None:
-    """Print means, with standard errors, of coefficients and events."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--samples", type=int, default=24)
-    parser.add_argument("--pressure", type=float, default=2.5e6)
-    options = parser.parse_args()
-    samples = options.samples
-    warnings.simplefilter("ignore", st.AccuracyWarning)
-    warnings.simplefilter("ignore", st.UnitWarning)
-    for name, problem in cases(options.pressure):
-        found = of(problem, samples)
+def main(pressure=2.5e6, samples=24):
+    """Print means, with standard errors, of coefficients and events of the same surfaces."""
+    warnings.simplefilter("ignore")
+    for name, problem in cases(pressure):
+        found = st.monte_carlo(
+            problem,
+            FIELD,
+            method=st.Equilibrium(events=200),
+            samples=samples,
+            seed=0,
+            pilot=False,
+        )
         mu, share = found.friction_coefficient, found.event_length / problem.interface.extent
         error = float(mu.std()) / np.sqrt(samples - 1)
         print(
@@ -88,4 +78,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(*map(float, sys.argv[1:]))

@@ -92,11 +92,6 @@ def test_the_tables_list_every_how_to():
 
 
 @pytest.mark.slow
-def test_friction_laws(capsys):
-    load("friction_laws").main(nodes=256)
-    assert "exponential" in capsys.readouterr().out
-
-
 @pytest.mark.slow
 def test_scripts_of_validation(tmp_path):
     """What they compute is checked in exact/, oracle/ and paper/."""
