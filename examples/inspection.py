@@ -2,13 +2,9 @@
 
 Each of forty simulated specimens is scanned over a tenth, a third and all of its length, with an
 error of 20 kPa, and its failure probability computed given the scan.
-Run: python examples/inspection.py [folder for the figure]
+Run: python examples/inspection.py
 """
 
-import sys
-from pathlib import Path
-
-import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
 
@@ -41,23 +37,6 @@ def probabilities(specimens: int = 40, samples: int = 1000):
     return failing(strength, 20_000), {name: np.array(each) for name, each in found.items()}
 
 
-def draw(before: float, after: dict[str, np.ndarray]):
-    """Draw a dot for each specimen, and the mean of each column."""
-    with st.plot.paper_style():
-        figure, axes = plt.subplots(figsize=(4.5, 3.0))
-        rng = np.random.default_rng(0)
-        for place, values in enumerate(after.values()):
-            around = place + rng.uniform(-0.2, 0.2, values.size)
-            axes.plot(around, values, "o", ms=3, mfc="none")
-            axes.plot([place - 0.3, place + 0.3], [values.mean()] * 2, color="k")
-        axes.axhline(before, color="0.6", ls="--", lw=0.8)
-        axes.text(2.45, before, "without a scan", ha="right", va="bottom", color="0.4")
-        axes.set_xticks(range(len(after)), after)
-        axes.set(xlabel="scanned part of the interface", ylabel="failure probability")
-        axes.set_ylim(-0.02, 1.02)
-    return figure
-
-
 if __name__ == "__main__":
     before, after = probabilities()
     print(f"without a scan P = {before:.3f}")
@@ -67,5 +46,3 @@ if __name__ == "__main__":
             f" {np.mean(values < 0.1 * before):.0%} of specimens below a tenth of it,"
             f" {np.mean(values > 0.9):.0%} above 0.9"
         )
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
-    draw(before, after).savefig(folder / "inspection.png", dpi=150)

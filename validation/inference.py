@@ -2,18 +2,15 @@
 
 Simulation-based calibration (Talts et al., 2018): parameters from the prior, peaks from them by
 fresh samples and a load cell's error, and the rank of each true parameter among 99 draws from its
-posterior. The ranks must be uniform. Draws inference_calibration.png of the first case into a
-folder.
+posterior. The ranks must be uniform.
 
-    python validation/inference.py [--folder .] [--campaigns 100] [--only NAME]
+Run: ``python validation/inference.py [--campaigns 100] [--only NAME]``
 """
 
 import argparse
 import warnings
-from pathlib import Path
 from typing import Any, NamedTuple
 
-import matplotlib.pyplot as plt
 import numpy as np
 import scipy.stats
 
@@ -152,23 +149,9 @@ def coverage(own, confidence=0.9):
     return float(np.mean((own >= tail) & (own < DRAWS + 1 - tail)))
 
 
-def draw(names, found, path):
-    """Draw histograms of the ranks, with the band that holds 99 % of counts."""
-    figure, axes = plt.subplots(1, len(names), figsize=(9, 2.6), layout="constrained")
-    low, high = scipy.stats.binom.ppf([0.005, 0.995], len(found), 1.0 / BINS)
-    for own, name, ax in zip(found.T, names, axes, strict=True):
-        ax.hist(own, bins=BINS, range=(0, DRAWS + 1), color="#14213d", rwidth=0.92)
-        ax.axhspan(low, high, color="#d9d9d9", zorder=0)
-        ax.set(xlabel=f"rank of the true {name}", ylabel="campaigns")
-        ax.set_title(f"p = {p_value(own):.2f}, coverage {coverage(own):.0%}", loc="left")
-        ax.spines[["top", "right"]].set_visible(False)
-    figure.savefig(path, dpi=130)
-
-
 def main():
     """Print p-values and coverage of every case."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--folder", type=Path, default=Path())
     parser.add_argument("--campaigns", type=int, default=100)
     parser.add_argument("--only", default="")
     options = parser.parse_args()
@@ -182,8 +165,6 @@ def main():
                 f"{title}: {name:20s} chi-square p = {p_value(own):.3f};"
                 f" {coverage(own):.1%} in their 90 % intervals", flush=True,
             )  # fmt: skip
-        if title == "three parameters":
-            draw(names, found, options.folder / "inference_calibration.png")
 
 
 if __name__ == "__main__":

@@ -3,18 +3,13 @@
 Uniform interface, a weak patch that breaks at once. For weak driving the speed tends to the
 Rayleigh speed from below; for strong driving the rupture becomes supershear (Burridge 1973,
 Andrews 1976: in an unbounded medium below S of about 1.77).
-Run: python validation/rupture_speed.py [folder for the figure]
+Run: python validation/rupture_speed.py
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
-from matplotlib.figure import Figure
 
 import stiction as st
 from stiction.methods.dynamics.summary import rupture_speed
-from stiction.plot.style import COLUMN, paper_style, series
 
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0, plane="strain")
 RATE, STRENGTH = 1e12, 1e6
@@ -46,34 +41,13 @@ def compute(ratios: tuple[float, ...] = (0.5, 0.8, 1.2, 1.6, 2.0, 3.5)) -> dict[
     return {ratio: speed(ratio) for ratio in ratios}
 
 
-def draw(folder: Path, curves: dict[float, tuple]) -> None:
-    """Speed over distance."""
-    with paper_style():
-        figure = Figure(figsize=(COLUMN * 1.3, 3.0))
-        axes = figure.subplots()
-        for i, (ratio, (x, found)) in enumerate(curves.items()):
-            # Speeds beyond c_d belong to a daughter crack that is born ahead of the front.
-            shown = np.where(found > 2.0, np.nan, found)
-            axes.plot(x, shown, label=f"$S = {ratio:g}$", **series(i))
-        shear = SOLID.shear_wave_speed / SOLID.rayleigh_wave_speed
-        fast = SOLID.dilatational_wave_speed / SOLID.rayleigh_wave_speed
-        for value, name in ((1.0, "$c_R$"), (np.sqrt(2) * shear, r"$\sqrt{2} c_s$"),
-                            (fast, "$c_d$")):  # fmt: skip
-            axes.axhline(value, color="0.7", linewidth=0.6, zorder=0)
-            axes.text(1.01, value, name, transform=axes.get_yaxis_transform(), va="center")
-        axes.set(xlabel="distance ($h_n$)", ylabel="rupture speed ($c_R$)", ylim=(0.0, 2.1))
-        axes.legend(ncols=2, loc="lower right")
-        figure.savefig(folder / "validation_rupture_speed.png")
-
-
 def main() -> None:
-    """Print and draw."""
+    """Print them."""
     curves = compute()
     for ratio, (_, found) in curves.items():
         last = found[np.isfinite(found)][-20:]
         kind = "supershear" if last.mean() > 1.1 else "below c_R"
         print(f"S = {ratio:3.1f}: final speed {last.mean():.4f} c_R, {kind}")
-    draw(Path(sys.argv[1] if len(sys.argv) > 1 else "."), curves)
 
 
 if __name__ == "__main__":

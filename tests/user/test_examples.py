@@ -93,7 +93,7 @@ def test_the_tables_list_every_how_to():
 
 @pytest.mark.slow
 @pytest.mark.slow
-def test_scripts_of_validation(tmp_path):
+def test_scripts_of_validation():
     """What they compute is checked in exact/, oracle/ and paper/."""
     found = load("memory").compute()
     # 4.8e-8 and 1.3e-3 on the page.
@@ -111,9 +111,8 @@ def test_scripts_of_validation(tmp_path):
     (_, coarse), (_, fine), *_ = load("waves").compute()
     assert np.log2(coarse / fine) == pytest.approx(2.0, abs=0.3)
     assert all(error < tol for (_, tol), (_, error) in load("kernels").compute().items())
-    speeds = load("rupture_speed")
-    speeds.draw(tmp_path, speeds.compute((0.5, 2.0)))
-    assert len(list(tmp_path.glob("*.png"))) == 1
+    fast, slow = (speed[-1] for _, speed in load("rupture_speed").compute((0.5, 2.0)).values())
+    assert slow < 1.0 < 1.5 < fast
 
 
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning", "ignore::stiction.UnitWarning")
