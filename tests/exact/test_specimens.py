@@ -3,6 +3,7 @@
 import dataclasses
 import runpy
 import warnings
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -207,11 +208,10 @@ def test_positive_entries_of_the_stiffness_are_doubted():
         problem = crooked(height=flat, drive=drive, mode=mode)
         off = problem.blocks.stiffness - np.diag(np.diag(problem.blocks.stiffness))
         assert off.max() > 0.0 or not isinstance(drive, st.Pusher)
-        said = [
-            "off its diagonal, up to 2e-07" in t
-            for t in texts(lambda p=problem: DenseProgram(p))
-        ]
-        assert said == [True] * doubted
+        solve, rows = st.Equilibrium().prepare(problem), problem.sample(rough(problem, 3))
+        for _ in range(2):  # of what is prepared once, too
+            said = texts(partial(solve, rows))
+            assert sum("off its diagonal, up to 2e-07" in text for text in said) == doubted
 
 
 @pytest.mark.parametrize("ratio", [20.0, 7.5])

@@ -17,6 +17,7 @@ from stiction.methods.equilibrium.solver import (
     follow,
     make_program,
     travel_of,
+    warn_of_signs,
 )
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset
@@ -117,6 +118,7 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
     interface = problem.interface
     check_memory("loads", 16.0 * given.size * interface.size)
     program = make_program(problem, GAP)
+    warn_of_signs(problem)
     sample = sample_of(rows, program.pieces, 0)
     whole = follow(program, sample)
     passed, end, known = whole.events, whole.last.load, whole.known

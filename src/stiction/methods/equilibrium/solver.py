@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError, warn_of_samples
+from stiction.base.errors import InputError, warn_accuracy, warn_of_samples
 from stiction.base.variables import Variable
 from stiction.methods.equilibrium.dense.program import DenseProgram
 from stiction.methods.equilibrium.patches import (
@@ -190,6 +190,16 @@ def make_program(problem: Problem, gap: float = 1e-6) -> Program:
     return PlaneProgram(problem, gap) if problem.interface.is_plane else DenseProgram(problem)
 
 
+def warn_of_signs(problem: Problem) -> None:
+    """Warn where it is not proved that equilibria are the least ones."""
+    if problem.specimen is not None and problem.blocks.positive:
+        warn_accuracy(
+            "the stiffness of these blocks has positive entries off its diagonal, up to"
+            f" {problem.blocks.positive:.1g} of the diagonal: that equilibria are the least ones,"
+            " and bounds rigorous, is then not proved (docs/specimens.md)"
+        )
+
+
 class OnsetSolver:
     """Solves samples of a problem with options of `Equilibrium`; safe in several threads."""
 
@@ -199,6 +209,7 @@ class OnsetSolver:
 
     def __call__(self, rows: Sample) -> dict[str, NDArray[Any]]:
         """Return the onset of each sample; see `Equilibrium`."""
+        warn_of_signs(self.problem)
         self.problem.warn_if_coarse(rows, FINE, ROUGHLY[len(self.problem.interface.shape)])
         samples, table, known = sample_of(rows, self.program.pieces), [], []
         for row in range(rows.samples):

@@ -13,7 +13,6 @@ from functools import lru_cache
 import numpy as np
 
 from stiction.base.arrays import Array
-from stiction.base.errors import warn_accuracy
 from stiction.elasticity.half_spaces import HalfSpaces
 from stiction.elasticity.line import line_of
 from stiction.elasticity.protocol import NONE, Elasticity
@@ -78,11 +77,6 @@ class DenseProgram:
         self._own = threading.local()
         if self.stops:
             self.widest_gap = max(self.widest_gap, 1e-4)
-            warn_accuracy(
-                "the stiffness of these blocks has positive entries off its diagonal, up to"
-                f" {self.elastic.positive:.1g} of the diagonal: that equilibria are the least ones,"
-                " and bounds rigorous, is then not proved (docs/specimens.md)"
-            )
 
     @property
     def _workspaces(self) -> tuple[Workspace, Workspace]:
