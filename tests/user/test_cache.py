@@ -43,7 +43,7 @@ def test_an_edited_kernel_is_another_folder_for_those_who_call_it(tmp_path, monk
     for edited in (
         None,
         "base/errors.py",
-        "methods/dynamics/explicit.py",
+        "methods/dynamics/loading.py",  # kernels, called from explicit.py, and messages
         "problem/friction/__init__.py",
     ):
         if edited:
