@@ -90,14 +90,13 @@ def test_density_does_not_leak_through_bounds():
     ids=["ties", "far apart"],
 )
 def test_density_of_spikes_still_has_mass_one(sample):
-    """A kernel as narrow as a cell rings; what is cut off below zero must not be added."""
+    """Also where the kernel is as narrow as a cell."""
     found = density(sample, bounds=(0.0, None))
     assert found.value.min() >= 0.0
     assert_mass_one(found)
 
 
 def test_density_of_even_values_is_uniform():
-    """No time of diffusion is a fixed point there; one in twenty uniform samples is as even."""
     found = density((np.arange(1024) + 0.5) / 1024, bounds=(0.0, 1.0))
     # Values at the lower ends of their cells: half a cell over the bandwidth of 0.07 is 1.7e-3.
     np.testing.assert_allclose(found.value, 1.0, atol=2e-3)
