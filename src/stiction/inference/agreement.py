@@ -81,6 +81,9 @@ def agreement(
 ) -> Agreement:
     """Test whether measured peaks agree with a prediction.
 
+    Distributions are compared: the order of the tests does not count. Take off a trend first,
+    ``peaks - np.polyval(np.polyfit(time, peaks, 1), time) + peaks.mean()``, and say so.
+
     Parameters
     ----------
     prediction : Dataset or Posterior

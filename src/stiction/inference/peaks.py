@@ -123,6 +123,8 @@ def _values(given: Any, unit: str) -> Array:
 def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
     """Read the peaks of repeated tests from a text file or a workbook (.xlsx).
 
+    Peaks that drift from test to test are no sample of one distribution: look at them in order.
+
     Parameters
     ----------
     path : path
