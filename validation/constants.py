@@ -225,7 +225,7 @@ def holders(name, value):
 def main(places, seconds):
     before, _ = solved(PROBLEMS)
     again, base = solved(PROBLEMS)
-    print(f"{base:.1f} s; by itself: {'%.2g %s' % change(again, before)}", flush=True)
+    print(f"{base:.1f} s; by itself: {change(again, before)}", flush=True)
     assert not any(":" in name for name in before), [name for name in before if ":" in name]
     begun, of_kernels = time.monotonic(), []
     for module, name, value in constants(places):
