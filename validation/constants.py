@@ -1,14 +1,14 @@
 """Named constants of the package: what changes if each is half, or twice, as large?
 
-    python validation/constants.py [FOLDER or FILE ...] [--seconds 600]
+    python validation/constants.py [FOLDER or FILE ...] [--problems fields ...] [--seconds 600]
 
 For each constant, a number or several, that stands at the top of a module (below the folders, if
 any are given), a fixed set of small problems is solved with half and with twice its value. One line
 is printed for each: the largest change of a result, as a share of it, with the name of the result,
-and the time over that without a change. Results are compared with those of two calls without a
-change, so that what differs by itself is known. A constant that changes nothing may go; one that
-changes a result by more than its stated accuracy is a fault. What a compiled kernel has taken in is
-left out, with its name: it changes only if the package is compiled anew.
+and the time over that without a change. Two calls without a change tell what differs by itself;
+what is round-off itself is left out. A constant that changes nothing may go; one that changes a
+result by more than its stated accuracy is a fault. What a compiled kernel has taken in is left out,
+with its name: it changes only if the package is compiled anew.
 """
 
 import argparse
@@ -22,6 +22,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 
 import stiction as st
 
@@ -88,25 +89,23 @@ def ruptures():
 
 
 def fields():
-    """Samples, correlation, a conditioned field, and two moments of its onset."""
-    system = problem()
-    whole = FIELD.sample(system.interface, samples=2, seed=1)
-    places = whole[0, ::8]
-    scan = st.read_profile(_labelled(system.interface.x[::8], places))
-    given = FIELD.given(scan, noise=2e4)
-    return {
+    """Samples, correlation, and fields conditioned on few, many and contradicting values."""
+    line = problem().interface
+    whole = FIELD.sample(line, samples=2, seed=1)
+    found = {
         "sample": whole,
-        "correlation": FIELD.correlation(system.interface),
+        "correlation": FIELD.correlation(line),
         "length": FIELD.efolding_length(),
-        "given": given.sample(system.interface, samples=2, seed=1),
-        "quantile": given.quantile(system.interface, 0.05),
     }
-
-
-def _labelled(x, values):
-    import xarray as xr
-
-    return xr.DataArray(values, {"x": x}, "x")
+    for count, noise, apart in ((16, 2e4, 0.0), (16, 3e5, 0.0), (60, 1e3, 0.0), (40, 2e4, 8e4)):
+        at = np.random.default_rng(count).choice(line.size, count, replace=False)
+        values = whole[0, at] + apart * np.random.default_rng(1).standard_normal(count)
+        given = FIELD.given(xr.DataArray(values, {"x": line.x[at]}, "x"), noise=noise)
+        found[f"given {count} {noise:g}"] = {
+            "sample": given.sample(line, samples=2, seed=1),
+            "quantile": given.quantile(line, 0.05),
+        }
+    return found
 
 
 def answers():
@@ -129,7 +128,8 @@ def answers():
     }
 
 
-PROBLEMS = (lines, planes, specimens, ruptures, fields, answers)
+PROBLEMS = {one.__name__: one for one in (lines, planes, specimens, ruptures, fields, answers)}
+ROUND_OFF = ("certificate_gap", "start_error", "kinetic_stress")
 
 
 def numbers(found, name=""):
@@ -173,6 +173,8 @@ def change(found, before):
     """Largest change of a number, as a share of the largest of its array, and where."""
     worst, where = 0.0, ""
     for name in {**before, **found}:
+        if name.endswith(ROUND_OFF):
+            continue
         if name not in found or name not in before or found[name].shape != before[name].shape:
             return math.inf, name
         one, other = found[name], before[name]
@@ -222,9 +224,10 @@ def holders(name, value):
     return found, compiled
 
 
-def main(places, seconds):
-    before, _ = solved(PROBLEMS)
-    again, base = solved(PROBLEMS)
+def main(places, problems, seconds):
+    chosen = [PROBLEMS[name] for name in problems]
+    before, _ = solved(chosen)
+    again, base = solved(chosen)
     print(f"{base:.1f} s; by itself: {change(again, before)}", flush=True)
     assert not any(":" in name for name in before), [name for name in before if ":" in name]
     begun, of_kernels = time.monotonic(), []
@@ -238,7 +241,7 @@ def main(places, seconds):
         for by in SIZES:
             for one in there:
                 setattr(one, name, scaled(value, by))
-            values, took = solved(PROBLEMS)
+            values, took = solved(chosen)
             for one in there:
                 setattr(one, name, value)
             most, where = change(values, before)
@@ -253,6 +256,7 @@ def main(places, seconds):
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("places", nargs="*")
+    parser.add_argument("--problems", nargs="*", default=[*PROBLEMS], choices=PROBLEMS)
     parser.add_argument("--seconds", type=float, default=600.0)
     given = parser.parse_args()
-    main(given.places, given.seconds)
+    main(given.places, given.problems, given.seconds)

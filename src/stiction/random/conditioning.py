@@ -17,7 +17,7 @@ regression (expectation propagation; Minka, 2001). Where that is not enough, dra
 before the regression (`stiction.random.transport`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -37,7 +37,7 @@ from stiction.problem.profiles.placing import MEASURED
 from stiction.problem.profiles.reading import in_si, unit_of
 from stiction.random.mapping import from_normal
 from stiction.random.synthesis import condition
-from stiction.random.transport import Ratio, make_transport, transport
+from stiction.random.transport import Left, Ratio, Transport, make_transport, transport
 
 DOUBTFUL = 5.0  # standard deviations of chi-square beyond which values do not suit a field
 UNCERTAIN = 0.1  # of a standard deviation of z, by which a posterior may be off
@@ -224,114 +224,59 @@ def _normal_score(below: Array, above: Array) -> Array:
     return np.where(below < 0.5, ndtri(below), -ndtri(above))
 
 
-class Conditioning:
-    """Standard normal draws, given what was measured of properties."""
+class Regression(NamedTuple):
+    """Posterior of the draws given Gaussians for the measured values.
 
-    def __init__(self, measured: Sequence[Measured]) -> None:
-        self.measured = measured
-        self.phi = np.concatenate([one.phi for one in measured])
-        self.data = np.zeros((1, 0))
-        others = np.zeros(len(self.phi)), np.ones(len(self.phi))
-        weighted, precision = self._gaussian(others)
-        for _ in range(TURNS):
-            weighted, precision = self._regress(weighted, precision)
-            before, others = others, self._others(weighted, precision)
-            if np.abs(others[0] - before[0]).max() < SETTLED:
-                break
-            weighted, precision = self._gaussian(others)
-        along, share = self.phi @ self.right, np.sqrt(1.0 + self.power)
-        middle = along @ (self.data[0] / share**2)
-        ratio = self._ratio(weighted, precision, middle)
-        self.found, self.left_over = make_transport(ratio, middle, along / share)
-        self.directions = np.ascontiguousarray(self.found.basis @ self.right.T)
-        self.misfit = self._misfit(middle)
-        self.data = weighted[None, :] @ self.left
+    With the singular values of Psi = U s V^T, turned where precisions have two signs.
+    """
 
-    def _gaussian(self, others: tuple[Array, Array]) -> tuple[Array, Array]:
-        """Gaussians that stand for the measured values, given z from all others."""
-        ends = np.cumsum([len(one.phi) for one in self.measured])[:-1]
-        each = zip(self.measured, *(np.split(part, ends) for part in others), strict=True)
-        found = (one.gaussian(*given) for one, *given in each)
-        weighted, precision = map(np.concatenate, zip(*found, strict=True))
-        return weighted, precision
-
-    def _ratio(self, weighted: Array, precision: Array, middle: Array) -> Ratio:
-        """Logarithm of the likelihood over the Gaussian that stands for it, by place and z."""
-
-        def found(at: NDArray[np.int64], z: Array) -> Array:
-            out, shape, begin = np.empty(z.shape), (-1, *(1 for _ in z.shape[1:])), 0
-            for one in self.measured:
-                here = (at >= begin) & (at < begin + len(one.phi))
-                out[here] = one.logarithm(at[here] - begin, z[here])
-                begin += len(one.phi)
-            off = z - middle[at].reshape(shape)
-            slope = (weighted - precision * middle)[at].reshape(shape)
-            gaussian: Array = off * (slope - 0.5 * precision[at].reshape(shape) * off)
-            return np.maximum(out, LOWEST) - gaussian
-
-        return found
-
-    def _misfit(self, middle: Array) -> float:
-        """Squared misfit of values and of draws at the middle of the posterior."""
-        fit = self._ratio(np.zeros_like(middle), np.zeros_like(middle), middle)
-        lost = -2.0 * float(fit(np.arange(middle.size), middle).sum())
-        draws = self.data[0] / (1.0 + self.power)
-        return lost + float(draws @ draws)
-
-    def _regress(self, weighted: Array, precision: Array) -> tuple[Array, Array]:
-        """Find the posterior of the draws; return what was given, tempered if there is none."""
-        root = np.sqrt(np.maximum(np.abs(precision), FAINT))
-        left, values, right = svd(self.phi * root[:, None], full_matrices=False)
-        kept = values > NEGLIGIBLE
-        left, values, right = left[:, kept] * values[kept], values[kept], right[kept].T
-        power, sign = values**2, precision / root**2
-        if (sign < 1.0).any():
-            power, turn = eigh(left.T * sign @ left)
-            left, right = left @ turn, right @ turn
-            if power.size and power[0] < LEAST:
-                share = 0.5 * LEAST / power[0]
-                return self._regress(share * weighted, share * precision)
-        self.left, self.power = left / root[:, None], power
-        self.right = np.ascontiguousarray(right)
-        self.data = (weighted @ self.left)[None, :]
-        return weighted, precision
-
-    def _others(self, weighted: Array, precision: Array) -> tuple[Array, Array]:
-        """Mean and variance of z at each place from what was measured at all others."""
-        mean, deviation = self.moments(self.phi)
-        least = 0.5 / (self.phi**2).sum(axis=1)
-        rest = np.maximum(deviation**-2 - precision, least)
-        # Over so small an error the map is linear, and the difference would be round-off.
-        sharp = deviation < SHARP
-        found = (mean / deviation**2 - weighted) / rest
-        return np.where(sharp, 0.0, found), np.where(sharp, 1.0, 1.0 / rest)
-
-    def draws(self, draws: Array) -> Array:
-        """Return conditioned draws (samples, dimension)."""
-        out = np.array(draws)
-        if len(self.directions):
-            transport(*self.found._replace(basis=self.directions), out, np.zeros(len(out)))
-        return self._regressed(out)
-
-    def _regressed(self, out: Array) -> Array:
-        share, transposed = 1.0 + self.power, np.ascontiguousarray(self.right.T)
-        condition(self.right, transposed, self.data / share, share**-0.5 - 1.0, out)
-        return out
+    left: Array  # U s over the errors, (points, directions)
+    power: Array  # s^2
+    right: Array  # V, (dimension, directions)
+    data: Array  # s U^T times the values, (1, directions)
 
     def moments(self, phi: Array) -> tuple[Array, Array]:
-        """Return mean and standard deviation of z = phi @ draws by the regression, (points,)."""
+        """Return mean and standard deviation of z = phi @ draws, (points,)."""
         along, share = phi @ self.right, 1.0 + self.power
         free = (phi**2).sum(axis=1) - (along**2).sum(axis=1)
         variance = along**2 @ (1.0 / share) + np.where(free > TINY, free, 0.0)
         return along @ (self.data[0] / share), np.sqrt(variance)
 
+    def apply(self, out: Array) -> Array:
+        """Turn standard normal draws into those of the posterior, in place."""
+        share, transposed = 1.0 + self.power, np.ascontiguousarray(self.right.T)
+        condition(self.right, transposed, self.data / share, share**-0.5 - 1.0, out)
+        return out
+
+
+class Conditioning(NamedTuple):
+    """Standard normal draws, given what was measured of properties: see `conditioned`."""
+
+    regression: Regression
+    mapped: Transport  # of the draws, before the regression
+    left_over: Left
+    misfit: float  # squared, of values and of draws at the middle of the posterior
+    points: int
+
+    @property
+    def moments(self) -> Callable[[Array], tuple[Array, Array]]:
+        """Mean and standard deviation of z = phi @ draws by the regression alone."""
+        return self.regression.moments
+
+    def draws(self, draws: Array) -> Array:
+        """Return conditioned draws (samples, dimension)."""
+        out = np.array(draws)
+        if len(self.mapped.basis):
+            transport(*self.mapped, out, np.zeros(len(out)))
+        return self.regression.apply(out)
+
     def quantile_at(self, phi: Array, probability: float) -> Array:
         """Return the quantile of z = phi @ draws, (points,); beyond the regression, by samples."""
         mean, deviation = self.moments(phi)
         found = mean + float(ndtri(probability)) * deviation
-        if len(self.directions):
+        if len(self.mapped.basis):
             draws = np.random.default_rng(0).standard_normal((PROBES, phi.shape[1]))
-            pair = [self.draws(draws), self._regressed(draws.copy())]
+            pair = [self.draws(draws), self.regression.apply(draws.copy())]
             for i, row in enumerate(phi):  # the difference scatters less than either
                 ends = [np.quantile(one @ row, probability) for one in pair]
                 found[i] += ends[0] - ends[1]
@@ -339,11 +284,10 @@ class Conditioning:
 
     def warn(self) -> None:
         """Warn of measured values that do not suit the field."""
-        points = len(self.phi)
-        if self.misfit > points + DOUBTFUL * np.sqrt(2.0 * points):
+        if self.misfit > self.points + DOUBTFUL * np.sqrt(2.0 * self.points):
             warn_accuracy(
                 f"given: the measured values are unlikely for this field (chi-square"
-                f" {self.misfit:.4g} for {points} values): check its marginal, its correlation"
+                f" {self.misfit:.4g} for {self.points} values): check its marginal, its correlation"
                 " length and the noise"
             )
         if max(self.left_over) > UNCERTAIN:
@@ -354,3 +298,94 @@ class Conditioning:
                 f" {100.0 * deviation:.2g} %; average values at neighbouring places, with their"
                 " smaller noise"
             )
+
+
+def conditioned(measured: Sequence[Measured]) -> Conditioning:
+    """Condition draws on measured values of properties.
+
+    Likelihood and regression take turns until z from all other places stays; what the Gaussians
+    miss is mapped before the regression (`transport`).
+    """
+    phi = np.concatenate([one.phi for one in measured])
+    others = np.zeros(len(phi)), np.ones(len(phi))
+    weighted, precision = _gaussians(measured, others)
+    for _ in range(TURNS):
+        found, weighted, precision = _regressed(phi, weighted, precision)
+        before, others = others, _from_others(phi, found, weighted, precision)
+        if np.abs(others[0] - before[0]).max() < SETTLED:
+            break
+        weighted, precision = _gaussians(measured, others)
+    along, share = phi @ found.right, np.sqrt(1.0 + found.power)
+    middle = along @ (found.data[0] / share**2)
+    ratio = _ratio(measured, weighted, precision, middle)
+    mapped, left_over = make_transport(ratio, middle, along / share)
+    mapped = mapped._replace(basis=np.ascontiguousarray(mapped.basis @ found.right.T))
+    none = np.zeros_like(middle)
+    likelihood = _ratio(measured, none, none, middle)(np.arange(middle.size), middle)
+    draws = found.data[0] / (1.0 + found.power)
+    misfit = -2.0 * float(likelihood.sum()) + float(draws @ draws)
+    found = found._replace(data=weighted[None, :] @ found.left)
+    return Conditioning(found, mapped, left_over, misfit, len(phi))
+
+
+def _gaussians(
+    measured: Sequence[Measured], others: tuple[Array, Array]
+) -> tuple[Array, Array]:
+    """Gaussians that stand for the measured values, given z from all others."""
+    ends = np.cumsum([len(one.phi) for one in measured])[:-1]
+    each = zip(measured, *(np.split(part, ends) for part in others), strict=True)
+    found = (one.gaussian(*given) for one, *given in each)
+    weighted, precision = map(np.concatenate, zip(*found, strict=True))
+    return weighted, precision
+
+
+def _ratio(
+    measured: Sequence[Measured], weighted: Array, precision: Array, middle: Array
+) -> Ratio:
+    """Logarithm of the likelihood over the Gaussian that stands for it, by place and z."""
+
+    def found(at: NDArray[np.int64], z: Array) -> Array:
+        out, shape, begin = np.empty(z.shape), (-1, *(1 for _ in z.shape[1:])), 0
+        for one in measured:
+            here = (at >= begin) & (at < begin + len(one.phi))
+            out[here] = one.logarithm(at[here] - begin, z[here])
+            begin += len(one.phi)
+        off = z - middle[at].reshape(shape)
+        slope = (weighted - precision * middle)[at].reshape(shape)
+        gaussian: Array = off * (slope - 0.5 * precision[at].reshape(shape) * off)
+        return np.maximum(out, LOWEST) - gaussian
+
+    return found
+
+
+def _regressed(
+    phi: Array, weighted: Array, precision: Array
+) -> tuple[Regression, Array, Array]:
+    """Find the posterior of the draws, and its Gaussians: as given, or tempered to have one."""
+    root = np.sqrt(np.maximum(np.abs(precision), FAINT))
+    left, values, right = svd(phi * root[:, None], full_matrices=False)
+    kept = values > NEGLIGIBLE
+    left, values, right = left[:, kept] * values[kept], values[kept], right[kept].T
+    power, sign = values**2, precision / root**2
+    if (sign < 1.0).any():
+        power, turn = eigh(left.T * sign @ left)
+        left, right = left @ turn, right @ turn
+        if power.size and power[0] < LEAST:
+            share = 0.5 * LEAST / power[0]
+            return _regressed(phi, share * weighted, share * precision)
+    left = left / root[:, None]
+    found = Regression(left, power, np.ascontiguousarray(right), (weighted @ left)[None, :])
+    return found, weighted, precision
+
+
+def _from_others(
+    phi: Array, found: Regression, weighted: Array, precision: Array
+) -> tuple[Array, Array]:
+    """Mean and variance of z at each place from what was measured at all others."""
+    mean, deviation = found.moments(phi)
+    least = 0.5 / (phi**2).sum(axis=1)
+    rest = np.maximum(deviation**-2 - precision, least)
+    # Over so small an error the map is linear, and the difference would be round-off.
+    sharp = deviation < SHARP
+    moved = (mean / deviation**2 - weighted) / rest
+    return np.where(sharp, 0.0, moved), np.where(sharp, 1.0, 1.0 / rest)

@@ -33,7 +33,7 @@ from stiction.base.units import is_in
 from stiction.base.variables import PROFILES
 from stiction.problem.friction import SCALES
 from stiction.problem.interface import Interface
-from stiction.random.conditioning import Conditioning, Conditions, Measured
+from stiction.random.conditioning import Conditioning, Conditions, Measured, conditioned
 from stiction.random.dotted_keys import distributions_of, full_key, with_values
 from stiction.random.mapping import correlation_of_mapped, from_normal, hermite_coefficients
 from stiction.random.marginals import AnyMarginal
@@ -582,7 +582,7 @@ def _conditioned(
                 phi[:, columns[j][streams[i].own]] = factor[i, j] * own
             measured.append(Measured(given, fields[i].marginal, phi[:, of_group]))
         if measured:
-            found.append((of_group, Conditioning(measured)))
+            found.append((of_group, conditioned(measured)))
     return found
 
 

@@ -42,10 +42,10 @@ def quantile_of_normal(distribution: Any, z: Array) -> Array:
 def interpolate(z: Array, table: Array, out: Array) -> int:
     """Fill `out` with the tabulated map of `z` (flat arrays); NaN and counted where it has none."""
     pieces = table.shape[0] - 1
-    first = 2048.0 - 0.5 * pieces  # of those of [-8, 8], 256 per unit of z
+    first = REACH * PER_UNIT - 0.5 * pieces  # of those of a whole table
     missing = 0
     for i in range(z.size):
-        position = (z[i] + 8.0) * 256.0 - first
+        position = (z[i] + REACH) * PER_UNIT - first
         piece = int(position) if 0.0 <= position < pieces else -1
         if piece < 0:
             out[i] = np.nan

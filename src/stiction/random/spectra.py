@@ -28,7 +28,7 @@ from stiction.base.kinds import Kinds, OneOf, from_table, register
 from stiction.base.model import Positive, Real, describe, model
 
 Share: TypeAlias = Annotated[Real, Field(gt=0, lt=1)]
-Span: TypeAlias = Annotated[Positive, Field(gt=1e-15, lt=1e15)]
+Magnitude: TypeAlias = Annotated[Positive, Field(gt=1e-15, lt=1e15)]
 """A length or wavenumber, or a ratio of two, of which powers neither underflow nor overflow."""
 Kept: TypeAlias = Annotated[Share, Field(gt=1e-6)]
 ACCURACY, LARGEST_ERROR = 1e-12, 1e-6  # errors of integrals: aimed at, and accepted
@@ -130,8 +130,8 @@ class ScaledSpectrum(SpectralDensity):
     `untruncated_correlation`, by which `stiction.fit_field` finds the correlation length.
     """
 
-    correlation_length: Span
-    truncation: Span | None = dataclasses.field(default=None, kw_only=True)
+    correlation_length: Magnitude
+    truncation: Magnitude | None = dataclasses.field(default=None, kw_only=True)
     power_kept: Kept | None = dataclasses.field(default=None, kw_only=True)
     default_power: ClassVar[float] = 0.9997
     """Share of the power retained by truncation if nothing is given."""
@@ -317,7 +317,7 @@ class CustomSpectrum(SpectralDensity):
     function: Annotated[
         Callable[[Any], Any], PlainSerializer(_refuse_to_write), WithJsonSchema({"not": {}})
     ]
-    max_wavenumber: Span
+    max_wavenumber: Magnitude
     type: Literal["custom"] = "custom"
 
     @model_validator(mode="after")

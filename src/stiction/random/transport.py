@@ -35,7 +35,8 @@ BEYOND = 7.0  # reach of the average over what is not yet known
 LIMIT = 4.0  # of logarithms of ratios where they are compared
 ORDERS = 6  # Hermite polynomials in that comparison
 PROBES = 1024  # samples whose weights measure what is left
-NODES, TINY, FLOOR = 25, 1e-300, 700.0
+POINTS = 25  # of that average
+TINY, FLOOR = 1e-300, 700.0  # least density, and least logarithm, that are floats
 UNMOVED = 0.01  # share of the scatter of a place below which a direction does not move it
 
 Ratio = Callable[[NDArray[np.int64], Array], Array]
@@ -72,7 +73,7 @@ def transport(
     """Map each row of `out` in place; add the log density of e_j to `density`, (rows,)."""
     directions, dimension = basis.shape
     cells, across = fixed.shape[1] - 1, tables.shape[2] - 1
-    step, pace = 16.0 / cells, across / 16.0
+    step, pace = 2.0 * REACH / cells, 0.5 * across / REACH
     height, mass, moved = np.empty(cells + 1), np.empty(cells), np.empty(directions)
     for i in range(out.shape[0]):
         for j in range(directions):
@@ -85,25 +86,25 @@ def transport(
                 begin = 0.0
                 for other in range(j):
                     begin += slopes[j, k, other] * moved[other]
-                begin = (begin + 8.0) * pace
+                begin = (begin + REACH) * pace
                 rise = slopes[j, k, j] * pace
                 for g in range(cells + 1):
-                    place = begin + rise * (g * step - 8.0)
+                    place = begin + rise * (g * step - REACH)
                     cell = int(min(max(place, 0.0), across - 1.0))
                     left = tables[j, k, cell]
                     height[g] += left + (place - cell) * (tables[j, k, cell + 1] - left)
             top = -math.inf
             for g in range(cells + 1):
-                height[g] -= 0.5 * (g * step - 8.0) ** 2
+                height[g] -= 0.5 * (g * step - REACH) ** 2
                 top = max(top, height[g])
             total = 0.0
             for g in range(cells + 1):
-                height[g] = max(height[g], top - 600.0)
+                height[g] = max(height[g], top - 600.0)  # exp is a float there
             right = math.exp(height[0] - top)
             for g in range(cells):  # log-linear between the nodes
                 left, right = right, math.exp(height[g + 1] - top)
                 rate = height[g + 1] - height[g]
-                flat = abs(rate) < 1e-4
+                flat = abs(rate) < 1e-4  # the trapezium is off by its square over twelve
                 mass[g] = 0.5 * (left + right) if flat else (right - left) / rate
                 total += mass[g]
             # From the nearer end, so that tails keep their digits.
@@ -117,9 +118,9 @@ def transport(
             part = min(wanted / mass[cell], 1.0)
             part = part if turn == 1 else 1.0 - part
             rate = height[cell + 1] - height[cell]
-            if abs(rate) > 1e-5:
+            if abs(rate) > 1e-5:  # else linear to half of it
                 part = math.log1p(part * math.expm1(rate)) / rate
-            moved[j] = (cell + part) * step - 8.0
+            moved[j] = (cell + part) * step - REACH
             density[i] += height[cell] + part * rate - top - math.log(total * step)
             for d in range(dimension):
                 out[i, d] += basis[j, d] * (moved[j] - drawn)
@@ -185,7 +186,7 @@ def _directions(coefficients: Array, unit: Array) -> Array:
 
 def _averaged(ratio: Ratio, at: NDArray[np.int64], mean: Array, variance: Array) -> Array:
     """Logarithm of E[r_k(z_k)] with z_k normal, (places, ...); variance (places,)."""
-    y = np.linspace(-BEYOND, BEYOND, NODES)
+    y = np.linspace(-BEYOND, BEYOND, POINTS)
     deviation = np.sqrt(np.maximum(variance, 0.0))[:, None, None]
     value = ratio(at, mean[:, :, None] + deviation * y) - 0.5 * y**2
     top = value.max(axis=2)
