@@ -96,7 +96,7 @@ class Quantity:
         self.magnitude, self.factor = magnitude, factor
 
     def to(self, unit):
-        assert unit == "Pa"
+        assert unit in ("Pa", "Pa*m**-1")
         return Quantity(self.magnitude * self.factor, 1.0)
 
 
@@ -123,7 +123,9 @@ def test_everything_beside_the_strength_is_read_alike():
     np.testing.assert_allclose(rows.residual_strength[0], residual, rtol=1e-14)
     np.testing.assert_allclose(rows.initial_stress, 1e4)
     load = st.Load(profile=labelled(1.0 + X[::-1], X[::-1]), initial_stress=Quantity(0.1, 1e6))
-    problem = make_problem(NODES, weakening_rate=0.2e12, residual_strength=tau_r, load=load)
+    rate = Quantity(np.full(NODES, 0.2), 1e12)
+    problem = make_problem(NODES, weakening_rate=rate, residual_strength=tau_r, load=load)
+    assert problem.friction.weakening_rate == pytest.approx(np.full(NODES, 0.2e12))
     np.testing.assert_allclose(problem.friction.residual_strength, residual, rtol=1e-14)
     np.testing.assert_array_equal(problem.load.profile, 1.0 + X)
     assert problem.load.initial_stress == pytest.approx(1e5)
