@@ -38,7 +38,8 @@ def each_marginal_with_a_spectrum():
         lag = np.linspace(0.0, 0.009, 5)
         found[name] = {
             "sample": field.sample(INTERFACE, samples=2, seed=number),
-            "mean": [field.mean, field.standard_deviation, field.efolding_length()],
+            "mean": [field.mean, field.standard_deviation],
+            "length": field.efolding_length(),
             "quantile": field.quantile(INTERFACE, 0.013),
             "correlation": field.correlation(INTERFACE),
             "untruncated": spectrum.untruncated_correlation(lag),

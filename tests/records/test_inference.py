@@ -28,6 +28,7 @@ def record(nodes, length, seed, trend=0.0, noise=1.5e4):
 
 RECORDS = [record(180, 0.036, 1, 9e4), record(130, 0.026, 2, -7e4)]
 PEAKS = np.array([7.31e5, 7.55e5, 7.02e5, 7.74e5, 7.18e5, 7.43e5])
+LENGTHS = {0.031: PEAKS[:4], 0.062: 0.98 * PEAKS[2:]}
 PROBLEM = make_problem(96, 0.031, weakening_rate=0.42e12, load=st.Load(normal_pressure=2.3e6))
 BOUNDED = st.RandomField(
     st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
@@ -88,10 +89,10 @@ def the_scale_of_a_distribution_of_scipy():
     return {"str": str(found), "at": repr(found.at(7)[1])}
 
 
-def inferred(**more):
+def inferred(peaks=PEAKS, **more):
     prior = {"correlation_length": (1e-3, 6e-3), "marginal.low": (5.6e5, 7.2e5)}
     options = {"prior": prior, "method": LOCAL, "samples": 300, "seed": 3}
-    return st.infer(PROBLEM, BOUNDED, PEAKS, **options | more)
+    return st.infer(PROBLEM, BOUNDED, peaks, **options | more)
 
 
 @calls(RECOVERED, close=1e-5)
@@ -106,9 +107,8 @@ def two_parameters_from_six_peaks():
         "information": found.information,
         "draws": found.draws,
         "members": members,
-        "notes": found.notes if hasattr(found, "notes") else "",
         "at": repr(found.at(7)[1]),
-        "prior": found.prior_transform(np.array([0.21, 0.77])),
+        "prior": found.prior_transform(np.array([0.21, 0.77])) / (1e-3, 1e6),
         "likelihood": found.log_likelihood(np.array([[2.1e-3, 6.3e5], [3.4e-3, 6.6e5]])),
         "groups": sorted(
             str(group) for group in (tree.groups() if callable(tree.groups) else tree.groups)
@@ -144,6 +144,7 @@ def a_list_weighed_by_peaks():
         "str": str(found),
         "draws": found.draws,
         "information": found.information,
+        "notes": found.notes,
         "members": [repr(one.strength) for one in found.interfaces(2, seed=4)],
         "at": repr(found.at(7)[1]),
     }
@@ -157,6 +158,11 @@ def agreement_with_a_prediction_and_a_posterior():
             predicted, PEAKS[1:] * 1e-3, unit="kPa", load_cell_error=4.0, seed=2, replicates=299
         ),
         "posterior": st.statistics.agreement(inferred(), 1.01 * PEAKS, seed=3, replicates=199),
+        "lengths": st.statistics.agreement(
+            inferred(peaks=LENGTHS),
+            {length: 1.02 * peaks for length, peaks in LENGTHS.items()},
+            replicates=199,
+        ),
     }
 
 

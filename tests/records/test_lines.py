@@ -103,7 +103,7 @@ def several_profiles_by_name():
         "initial_stress": -3e4 + 6e4 * uneven(INTERFACE, seed=14),
         "weakening_rate": 2.6e11 + 4e10 * uneven(INTERFACE, seed=15),
         "normal_pressure": np.stack(
-            [2.7e6 + 8e5 * uneven(INTERFACE, seed=s) for s in (16, 17)]
+            [1.6e5 * s + 8e5 * uneven(INTERFACE, seed=s) for s in (16, 17)]
         ),
     }
     return st.onset(LINE, profiles, method=EXACT)

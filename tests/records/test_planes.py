@@ -119,7 +119,8 @@ def a_rupture_with_stations():
         options = {"origin": (0.012, 0.011), "normal_stress": -5e6, "benchmark": "TPV5"}
         files = st.external.write_scec(found, folder, **options)
         written = {path.name: path.read_text().split("\n") for path in files}
-    return {"run": found} | {
+    picture = st.plot.rupture(found, problem=problem)
+    return {"run": found, "picture": picture} | {
         name: {
             "head": "\n".join(line for line in lines if line.startswith("# ")),
             "last": np.array([line.split() for line in lines[-40:-1]], dtype=float),

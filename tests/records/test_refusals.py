@@ -41,6 +41,11 @@ def steep(critical_slip, **more):
     return st.onset(problem, strength, method=EXACT, **more).critical_stress
 
 
+def with_residual(residual):
+    profiles = {"strength": LINE_STRENGTH, "residual_strength": residual}
+    return st.onset(LINE, profiles, method=EXACT).critical_stress
+
+
 PREDICTED = xr.Dataset({"critical_stress": ("sample", 7e5 + 1e4 * np.sin(np.arange(90.0)))})
 ONSET = st.onset(LINE, LINE_STRENGTH, method=LOCAL)
 CALLS = {
@@ -50,6 +55,10 @@ CALLS = {
         lambda: make_problem(weakening_rate=RISING).nodes_in_nucleation_length(2e11),
     ],
     "samples that are steep": [lambda: steep(4e-7), lambda: steep(2.1e-6)],
+    "what is no residual strength": [
+        lambda: with_residual(0.0),
+        lambda: with_residual(-1.0),
+    ],
     "fields that are too fine": [
         lambda: ensemble(st.RandomInterface(strength=field(spectrum=FINE),
                                             residual_strength=field(2e5, FINE))),

@@ -1,5 +1,6 @@
 """Recorded outputs: ruptures on lines with every kind of law, load, start and stop."""
 
+import json
 import tempfile
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from recording import Calls, compared, refusal
 from setups import make_problem
 
 import stiction as st
+from stiction.methods.dynamics.save import open_rupture
 
 calls = Calls()
 WAVES = (
@@ -83,7 +85,8 @@ def a_folder_that_holds_the_run_of_another_load():
             )
             for name, at in ends.items()
         }
-    return {
+        about = open_rupture(Path(folder) / "run").attrs
+    return {"stopped": about["stopped"], "study": sorted(json.loads(about["study"]))} | {
         name: one.replace(folder, "") if isinstance(one, str) else one.critical_stress
         for name, one in found.items()
     }
