@@ -107,6 +107,7 @@ def two_parameters_from_six_peaks():
         "information": found.information,
         "draws": found.draws,
         "members": members,
+        "notes": found.notes,
         "at": repr(found.at(7)[1]),
         "prior": found.prior_transform(np.array([0.21, 0.77])) / (1e-3, 1e6),
         "likelihood": found.log_likelihood(np.array([[2.1e-3, 6.3e5], [3.4e-3, 6.6e5]])),
