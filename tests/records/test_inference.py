@@ -83,9 +83,9 @@ def a_fit_to_a_map_of_known_anisotropy():
 def the_scale_of_a_distribution_of_scipy():
     marginal = scipy.stats.weibull_min(1.9, loc=6.1e5, scale=4.4e5)
     field = dataclasses.replace(BOUNDED, marginal=marginal)
-    found = st.infer(
-        PROBLEM, field, PEAKS, prior={"marginal.scale": (2e5, 8e5)}, method=LOCAL, samples=300
-    )
+    peaks = xr.DataArray(PEAKS * 1e-3, attrs={"units": "kPa"})
+    prior = {"marginal.scale": (2e5, 8e5)}
+    found = st.infer(PROBLEM, field, peaks, prior=prior, method=LOCAL, samples=300)
     return {"str": str(found), "at": repr(found.at(7)[1])}
 
 

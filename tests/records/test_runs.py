@@ -230,7 +230,8 @@ def mistakes_of_commands():
     plain = small_study(nodes=96, length=0.047, ensemble={"samples": 12}, sweep=[twice])
     with inside(plain):
         found = {"twice": command("run study.toml --out run --no-pilot")}
-        other = plain | {"ensemble": {"samples": 12, "seed": 4}}
+        changed = plain["problem"] | {"friction": {"critical_slip": 3e-6}}
+        other = plain | {"ensemble": {"samples": 12, "seed": 4}, "problem": changed}
         Path("other.toml").write_text(tomli_w.dumps(other))
         for line in """run missing.toml --out run
 run study.toml --out run --part 3/2
