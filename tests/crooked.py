@@ -84,6 +84,12 @@ def as_measured(
     return xr.DataArray(rolled, coordinates, interface.dims, attrs={"units": unit})
 
 
+def in_mm(array: Any) -> Any:
+    """Stresses along x, Pa, in kPa over places in mm, the last one first."""
+    there = ("x", 1e3 * array.x.values, {"units": "mm"})
+    return (1e-3 * array).assign_coords(x=there).assign_attrs(units="kPa")[::-1]
+
+
 def write_table(path: Path, measured: Any, name: str = "strength") -> Path:
     """A measured profile as a table with a line of names such as 'x (mm);strength (MPa)'."""
     table = measured.to_dataframe(name).reset_index()

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import scipy.stats
 import xarray as xr
-from crooked import LINE, PLANE, uneven
+from crooked import LINE, PLANE, in_mm, uneven
 from recording import Calls, compared
 
 import stiction as st
@@ -112,7 +112,8 @@ def a_field_that_is_known_in_places():
         "quantile": known.quantile(INTERFACE, 0.1),
     }
     three = three_properties()
-    residual = three.residual_strength.given(1.4e5 + 0.2 * (scan() - 1e6), noise=9e3)
+    measured = in_mm(1.4e5 + 0.2 * (scan() - 1e6))
+    residual = three.residual_strength.given(measured, noise=9e3)
     second = dataclasses.replace(three, residual_strength=residual)
     found |= {"second": second.profiles(INTERFACE, samples=2, seed=6)}
     return found | {"both": both.profiles(INTERFACE, samples=2, seed=6)}

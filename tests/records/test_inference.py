@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import scipy.stats
 import xarray as xr
+from crooked import in_mm
 from recording import Calls, compared
 from setups import LOCAL, make_problem
 from specimens import crooked
@@ -26,7 +27,7 @@ def record(nodes, length, seed, trend=0.0, noise=1.5e4):
     return xr.DataArray(values, {"x": x}, ("x",), attrs={"units": "Pa"})
 
 
-RECORDS = [record(180, 0.036, 1, 9e4), record(130, 0.026, 2, -7e4)]
+RECORDS = [record(180, 0.036, 1, 9e4), in_mm(record(130, 0.026, 2, -7e4))]
 PEAKS = np.array([7.31e5, 7.55e5, 7.02e5, 7.74e5, 7.18e5, 7.43e5])
 LENGTHS = {0.031: PEAKS[:4], 0.062: 0.98 * PEAKS[2:]}
 PROBLEM = make_problem(96, 0.031, weakening_rate=0.42e12, load=st.Load(normal_pressure=2.3e6))

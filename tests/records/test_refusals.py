@@ -41,6 +41,12 @@ def steep(critical_slip, **more):
     return st.onset(problem, strength, method=EXACT, **more).critical_stress
 
 
+def inferred(peaks=(7e5, 7.1e5, 6.9e5), **more):
+    prior = {"marginal.mean": (1e6, 1.3e6)}
+    given = {"method": LOCAL, "samples": 100, "prior": prior} | more
+    return st.infer(make_problem(), field(), peaks, **given).names
+
+
 def with_residual(residual):
     profiles = {"strength": LINE_STRENGTH, "residual_strength": residual}
     return st.onset(LINE, profiles, method=EXACT).critical_stress
@@ -103,6 +109,19 @@ CALLS = {
     "planes": [
         lambda: st.onset(PLANE, np.full((20, 24), 1e6), method=LOCAL),
         lambda: st.onset(PLANE, np.full((24, 20), np.nan), method=LOCAL),
+    ],
+    "peaks and priors": [
+        lambda: inferred(unit="Mstone"),
+        lambda: inferred(peaks=[7e5, np.nan, 7.1e5]),
+        lambda: inferred(peaks=[7e5, -7e5, 7.1e5]),
+        lambda: inferred(peaks=["0.7", "0.8", "0.9"]),
+        lambda: inferred(peaks=[[7e5, 7.1e5], [6.9e5, 7e5]]),
+        lambda: inferred(prior={}),
+        lambda: inferred(prior={"marginal.mean": (1.3e6, 1e6)}),
+        lambda: inferred(prior={"marginal.mean": scipy.stats.uniform}),
+        lambda: inferred(prior={"marginal.mean": scipy.stats.poisson(3)}),
+        lambda: inferred(prior={"marginl.mean": (1e6, 1.3e6), "corelation_length": (1.0, 2.0)}),
+        lambda: inferred(load_cell_error=-1.0, method="local"),
     ],
     "agreement": [
         lambda: st.statistics.agreement(PREDICTED, [1015.0, 998.0, 1031.0]),

@@ -150,6 +150,7 @@ test_fields_that_cannot_be = refusals({
     "draws ... (samples, 250) ... (1, 251)": lambda: of_draws(np.zeros((1, 251))),
     "draws ... finite": lambda: of_draws(np.full((1, 250), np.nan)),
     # More memory than there is
+    "samples: this takes ... GiB of memory": lambda: monte_carlo(keep="strength", samples=10**9),
     "this takes ... GiB of memory": lambda: st.RandomInterface(
         strength=make_strength()
     ).profiles(PLANE, samples=10**6),
