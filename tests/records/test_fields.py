@@ -93,9 +93,9 @@ def three_correlated_properties_with_factors_between_specimens():
 
 
 def scan(dims=("x",), noise=2e4):
-    """Values at six places, off the nodes."""
-    x = np.array([0.0031, 0.0077, 0.0123, 0.0291, 0.0302, 0.0415])
-    values = 1e6 + 2.2e5 * np.sin(300.0 * x)
+    """Values at six places, off the nodes, and a seventh where none was measured."""
+    x = np.array([0.0031, 0.0077, 0.0123, 0.0291, 0.0302, 0.0415, 0.0433])
+    values = np.where(x < 0.042, 1e6 + 2.2e5 * np.sin(300.0 * x), np.nan)
     return xr.DataArray(values, {"x": x}, dims, attrs={"units": "Pa"})
 
 

@@ -178,6 +178,7 @@ def what_tests_would_tell():
             "few": 4,
             "two lengths": {0.031: 3, 0.062: 2},
             "known": {"tests": 6, "known": ["correlation_length"]},
+            "length only": {"tests": 6, "known": ["marginal.low"]},
         },
         method=LOCAL,
         load_cell_error=5e3,
