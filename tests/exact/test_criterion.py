@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.special import jv
 from setups import QUARTER, ROUND_OFF, SOLID, local_onset, make_problem, turns
 
 import stiction as st
@@ -12,7 +11,6 @@ from stiction.methods.criterion.eigenfunction import (
     eigenvalue_and_vector,
     grid_weights,
     multiplier,
-    odd_bessel,
     weight,
 )
 from stiction.methods.criterion.windows import windows_of
@@ -218,10 +216,3 @@ def test_uniform_strength_lets_go_at_its_value_in_units_that_are_named(problem):
     stresses = dict.fromkeys(("critical_load", "critical_stress", "first_instability"), "Pa")
     assert units == stresses | {"critical_position": "m", "sample": "1"}
     assert all(variable.attrs["long_name"] for variable in result.variables.values())
-
-
-def test_odd_bessel_functions_by_recurrence():
-    z = np.concatenate([np.geomspace(1e-9, 2e3, 2000), [1.0, 79.9999, 80.0]])
-    # Absolute, as the sum over orders needs it.
-    expected = jv(np.arange(1, 80, 2)[:, None], z)
-    np.testing.assert_allclose(odd_bessel(z, 40), expected, atol=2e-13)

@@ -284,11 +284,16 @@ def test_fields_and_grids_that_are_doubted(recwarn):
 
 
 def test_errors_of_equilibrium_are_warned_of():
-    no = np.zeros(2, dtype=bool)
+    no, ones = np.zeros(2, dtype=bool), np.ones(2)
+    values = dict.fromkeys(("stopped", "residual_reached"), no) | {
+        "certified": ~no,
+        "certificate_gap": np.array([1e-6, np.nan]),
+        "first_instability": 1e6 * ones,
+        "critical_stress": 1e6 * ones,
+    }
+    rows = PROBLEM.sample(np.full((2, PROBLEM.interface.size), 1e6))
     with pytest.warns(st.AccuracyWarning, match="did not close to 1e-09 of it in 1 of 2"):
-        OnsetSolver(PROBLEM, st.Equilibrium())._warn(
-            np.array([1e-6, np.nan]), np.full(2, 1e6), no, no
-        )
+        OnsetSolver(PROBLEM, st.Equilibrium())._warn(rows, values, no)
 
 
 def test_nothing_is_said_where_nothing_is_in_doubt():

@@ -11,10 +11,11 @@ from stiction.base.arrays import Array
 from stiction.elasticity.protocol import Windows
 
 FINEST = 32
-"""Windows that begin within the length of one, at most."""
+"""Windows that begin within the length of one, at most: weighted means change little between."""
 RUNG = 1.5
-"""Ratio of successive weakening rates whose windows are tried where the rate varies."""
+"""Ratio of successive rates whose windows are tried where the rate varies, as bounds are rough."""
 MOST_RUNGS = 12
+"""Most of them: rates that differ by more than a hundredfold have no window in common."""
 
 
 def _unstable(matrix: Array, rate: float, begin: int, end: int) -> bool:

@@ -15,7 +15,7 @@ with h = (k/(k + C)) C/(2 L). Under dead load h = 0, and for a rigid machine h =
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -57,11 +57,7 @@ class Driven:
     relief: float
     drive_stiffness: float
     error: float
-
-    @property
-    def half_spaces(self) -> HalfSpaces | None:
-        """None: K of blocks has no symbol."""
-        return None
+    half_spaces: ClassVar[HalfSpaces | None] = None
 
     @cached_property
     def entries(self) -> DenseEntries:

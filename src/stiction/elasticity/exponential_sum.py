@@ -26,10 +26,10 @@ Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
 
 T_MAX = 1e5  # the error holds on 0 <= T <= T_MAX; beyond, the sum decays
-MAX_WEIGHT = 10.0
-MAX_PAIRS = 60
-ROUNDS = 14
-_DAMPING = 0.3
+MAX_WEIGHT = 10.0  # larger ones cancel, and lose digits in the recursion
+MAX_PAIRS = 60  # enough for 1e-9 in mode II
+ROUNDS = 14  # of levelling; what is not level by then is tried with one pair more
+_DAMPING = 0.3  # that each pole has over T_MAX at least, so that sums decay beyond
 _FLOOR = _DAMPING / T_MAX  # every pole decays at least as fast
 # Decay over T_MAX for balanced truncation, in the order tried: found to be good starts
 # for polishing at loose and at tight tolerances.

@@ -36,10 +36,6 @@ class HalfSpaces(NamedTuple):
         """Return h_n of a weakening rate (Pa/m) in each direction, m."""
         return tuple(2.0 * SMALLEST_EIGENVALUE * modulus / rate for modulus in self.moduli)
 
-    def mean_relief(self, slip: Array) -> float:
-        """Return 0: slip takes nothing off a load that is far away."""
-        return 0.0
-
 
 @functools.lru_cache(maxsize=16)
 def _symbol(

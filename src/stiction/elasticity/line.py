@@ -20,11 +20,11 @@ from stiction.elasticity.half_spaces import SMALLEST_EIGENVALUE, HalfSpaces
 from stiction.elasticity.protocol import ANYWHERE, CircularEntries, Windows
 
 GROWTH = 1.25
-"""Ratio of successive widths tried where the weakening rate varies."""
+"""Ratio of successive widths tried where the rate varies, as bounds there are rough anyway."""
 DENSE = 300
-"""Widest window whose eigenvector is found with a dense matrix."""
+"""Widest window whose eigenvector a dense matrix gives faster than inverse iteration."""
 WIDEST = 4096
-"""Widest window tried."""
+"""Widest window tried: beyond, its eigenvector takes longer than a solution without its bound."""
 
 
 def stiffness_column(nodes: int, length: float, modulus: float) -> Array:
@@ -51,10 +51,6 @@ class Line:
     entries: CircularEntries
     relief: float = 0.0
     positive: float = 0.0
-
-    def mean_relief(self, slip: Array) -> float:
-        """Return 0: slip takes nothing off a load that is far away."""
-        return 0.0
 
     def windows(self, low: float, high: float) -> Windows:
         """Return the windows for weakening rates from `low` to `high`, Pa/m, narrowest first."""

@@ -86,9 +86,6 @@ class Elasticity(Protocol):
     def positive(self) -> float:
         """Largest positive entry of K off its diagonal, over the diagonal: slip may stop others."""
 
-    def mean_relief(self, slip: Array) -> Any:
-        """Return by how much slip (..., n) lowers the mean stress, Pa."""
-
     def windows(self, low: float, high: float) -> Windows:
         """Return the windows for weakening rates from `low` to `high`, Pa/m.
 

@@ -8,12 +8,12 @@ from functools import lru_cache
 import numpy as np
 import scipy.linalg
 from scipy.optimize import nnls
-from scipy.special import jv
 
 from stiction.base.arrays import Array
 
 TERMS = 40  # of the eigenfunction, whose transform is within 2e-7 of the limit of many
 EDGE = 16  # nodes at either end of a patch that are fitted; samples of g are exact further in
+BATCH = 1 << 20  # cosines at once
 SMOOTH = 2.0  # |k| h_n/2 above which the fit counts less, as the fourth power
 
 
@@ -53,44 +53,14 @@ def weight(s: Array) -> Array:
 def multiplier(z: Array) -> Array:
     """Return the transform of g at z = |k| h_n/2, (m,): what a moving average does to a cosine.
 
-    The integral of sin(m t) cos(z cos t) sin t over [0, pi] is
-    pi m (-1)^((m-1)/2) J_m(z)/z for odd m.
+    The integral of g(cos t) cos(z cos t) sin t over [0, pi], by the midpoint rule, which is exact
+    to round-off with more than (z + TERMS)/2 points.
     """
-    z, sine = np.asarray(z, dtype=np.float64), eigenvalue_and_vector()[1] * (2.0 / np.pi)
-    m = np.arange(1, sine.size + 1, 2)
-    factor = np.pi * sine[m - 1] * m * (-1.0) ** ((m - 1) // 2)
-    safe = np.where(z == 0.0, 1.0, z)
-    value = (factor @ odd_bessel(safe, m.size)) / safe
-    return np.where(z == 0.0, 0.5 * np.pi * sine[0], value)
-
-
-def odd_bessel(z: Array, count: int) -> Array:
-    """Return J_1, J_3, ..., J_(2 count - 1) at positive z (m,), shape (count, m).
-
-    By recurrence: upwards where z is above the highest order, downwards elsewhere (Miller, 1952),
-    and order by order for the few z below 1, where the downward recurrence would overflow.
-    """
-    orders = 2 * count
-    result = np.empty((count, z.size))
-    small, large = z < 1.0, z >= orders
-    result[:, small] = jv(np.arange(1, orders, 2)[:, None], z[small])
-    x = z[large]
-    before, here = jv(0, x), jv(1, x)
-    for m in range(1, orders):
-        if m % 2:
-            result[m // 2, large] = here
-        before, here = here, 2.0 * m / x * here - before
-    middle = ~small & ~large
-    x = z[middle]
-    after, here, norm = np.zeros_like(x), np.full_like(x, 1e-290), np.zeros_like(x)
-    for m in range(120 + 2 * max(0, orders - 80), 0, -1):
-        if m % 2 and m < orders:
-            result[m // 2, middle] = here
-        elif m % 2 == 0:
-            norm += 2.0 * here
-        after, here = here, 2.0 * m / x * here - after
-    result[:, middle] /= norm + here  # J_0 + 2 J_2 + 2 J_4 + ... = 1
-    return result
+    points = int(0.25 * np.max(z)) + TERMS  # the other half is the same
+    t = (np.arange(points) + 0.5) * (0.5 * np.pi / points)
+    share = weight(np.cos(t)) * np.sin(t) * (np.pi / points)
+    parts = np.array_split(z, 1 + np.size(z) * points // BATCH)
+    return np.concatenate([np.cos(np.outer(each, np.cos(t))) @ share for each in parts])
 
 
 def grid_weights(half_width: float) -> Array:

@@ -14,7 +14,7 @@ from stiction.elasticity.driven import Driven
 from stiction.elasticity.protocol import Windows
 from stiction.elasticity.weakest import weakest_window
 from stiction.methods.criterion.average import averages, least_average
-from stiction.methods.criterion.windows import Window, windows_of
+from stiction.methods.criterion.windows import windows_of
 from stiction.problem.friction import ExponentialWeakening
 from stiction.problem.problem import Problem, refusals
 from stiction.problem.results import onset_variables, position
@@ -46,8 +46,8 @@ class LocalCriterion:
     -----
     The weights of the average are never negative, so the result lies between the least and
     the greatest strength also where the strength jumps. On a line the minimum is taken
-    between the nodes. For a nonlinear friction law, the weakening rate at zero slip counts,
-    with an `AccuracyWarning`: if strength falls ever less steeply, the onset comes later. A
+    between the nodes. For a nonlinear friction law, the weakening rate at zero slip
+    counts, with an `AccuracyWarning`: if strength falls ever less steeply, the onset comes later. A
     law that steepens raises an error.
 
     On a plane the average is over critical ellipses of five shapes, each the smallest on which the
@@ -128,7 +128,8 @@ class LocalCriterion:
             excess, profile = excess_of(sample), sample.load_profile
             load, patch = np.empty(len(excess)), np.empty((len(excess), 4))
             place = np.empty((len(excess), 2) if interface.is_plane else len(excess))
-            for windows, same in _by_rate(problem, sample):
+            for rate, same in _rates(sample):
+                windows = windows_of(problem, rate)
                 some = excess if same.size == len(excess) else excess[same]
                 load[same], place[same], chosen = least_average(
                     interface, windows, some, profile
@@ -247,10 +248,11 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     problem.refuse_specimen("nucleation_stress", "st.LocalCriterion() gives its minimum")
     sample, interface = problem.sample(tau_p), problem.interface
     _warn_if_coarse(problem, sample)
-    ((windows, _), *others) = _by_rate(problem, sample)
+    ((rate, _), *others) = _rates(sample)
     if others:
         raise InputError("weakening_rate: differs between samples; pass them one by one")
     excess, profile = excess_of(sample), sample.load_profile
+    windows = windows_of(problem, rate)
     several = averages(interface, windows, excess, profile)
     result = np.array([np.minimum.reduce(list(each)) for each in several])
     # The weights keep to these bounds, the rounding of the transforms does not.
@@ -303,14 +305,6 @@ def excess_of(sample: Sample) -> Array:
             " some of it cannot break, give a large finite strength, or use st.Rupture()"
         )
     return np.ascontiguousarray(sample.strength - sample.initial_stress)
-
-
-def _by_rate(
-    problem: Problem, sample: Sample
-) -> Iterator[tuple[list[Window], NDArray[np.int64]]]:
-    """Yield the windows of each weakening rate, and the samples of this rate."""
-    for rate, same in _rates(sample):
-        yield windows_of(problem, rate), same
 
 
 def _rates(sample: Sample) -> Iterator[tuple[float, NDArray[np.int64]]]:

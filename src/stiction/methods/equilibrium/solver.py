@@ -225,17 +225,11 @@ class OnsetSolver:
             table.append(self._values(rows, row, sample, path))
         values = {name: np.array([each[name] for each in table]) for name in table[0]}
         values["critical_stress"] = rows.mean_stress(values["critical_stress"])
-        first = values["first_instability"] = rows.mean_stress(values["first_instability"])
-        gap, proved = values["certificate_gap"], values.pop("certified")
-        gap *= rows.load_profile.mean()
-        self._warn(gap, first, ~proved, ~np.array(known))
-        _warn_if_stopped(values.pop("stopped") & np.isfinite(first))
-        _warn_if_residual(rows, values["critical_stress"], values["residual_reached"])
-        if self.problem.interface.is_plane:
-            values["certified"] = proved
-        if self.options.sensitivity:
-            _warn_if_lost(values["sensitivity"], np.isfinite(first))
-        return values
+        values["first_instability"] = rows.mean_stress(values["first_instability"])
+        values["certificate_gap"] *= rows.load_profile.mean()
+        self._warn(rows, values, ~np.array(known))
+        unnamed = {"stopped"} if self.problem.interface.is_plane else {"stopped", "certified"}
+        return {name: value for name, value in values.items() if name not in unnamed}
 
     def _values(
         self, rows: Sample, row: int, sample: StaticSample, path: Path
@@ -295,11 +289,10 @@ class OnsetSolver:
             return line_patch(direction, interface)
         return critical_patch(direction.reshape(interface.shape), interface)[1]
 
-    def _warn(
-        self, gap: Array, first: Array, unproved: NDArray[np.bool_], lost: NDArray[np.bool_]
-    ) -> None:
-        """Warn where bounds are wide or absent, or where a path was not followed to its end."""
-        share = gap / np.maximum(np.abs(first), 1e-300)
+    def _warn(self, rows: Sample, values: dict[str, Array], lost: NDArray[np.bool_]) -> None:
+        """Warn of what is not as it mostly is: values are of all samples, stresses in Pa."""
+        first, unproved = values["first_instability"], ~values["certified"]
+        share = values["certificate_gap"] / np.maximum(np.abs(first), 1e-300)
         warn_of_samples(
             f"the bounds of the first instability did not close to {self.program.widest_gap:g} of"
             " it in {samples}: they hold, and are up to {worst:.2g} of it apart; take more nodes",
@@ -324,6 +317,31 @@ class OnsetSolver:
             " a known equilibrium, a lower bound",
             lost,
         )
+        warn_of_samples(
+            "a node that slipped stops before the first instability in {samples}: its equilibria"
+            " are no longer the least ones, so that nothing bounds it from above, and"
+            " certificate_gap is NaN",
+            values["stopped"] & np.isfinite(first),
+        )
+        residual = rows.residual_strength.mean(axis=rows.axes)
+        falls = (rows.strength - rows.residual_strength).reshape(rows.samples, -1)
+        above = values["critical_stress"] - residual
+        above /= np.maximum(np.median(falls, axis=1), 1e-300)
+        warn_of_samples(
+            "all but the last nodes are at their residual strength before the peak in {samples}:"
+            " static friction is then the mean residual strength, to {worst:.2g} of what strength"
+            " falls by, and depends on little else",
+            values["residual_reached"] & (above < SLIDING_ONLY),
+            above,
+        )
+        if self.options.sensitivity:
+            unknown = np.isnan(values["sensitivity"]).reshape(rows.samples, -1).any(axis=1)
+            warn_of_samples(
+                "the first instability has no known derivative in {samples}, so sensitivity is NaN:"
+                " nodes pass a corner from which their law falls more steeply, or the turning point"
+                " was not resolved",
+                np.isfinite(first) & unknown,
+            )
 
 
 def _sensitivity(
@@ -356,36 +374,3 @@ def _quotients(problem: Problem, program: Program, sample: StaticSample, first: 
         state = program.next(rise)
         found[node] = (state.load - relief_of(problem, state.slip) - before) / step
     return found
-
-
-def _warn_if_stopped(stopped: NDArray[np.bool_]) -> None:
-    """Warn where a first instability has no bounds, as a node stopped before."""
-    warn_of_samples(
-        "a node that slipped stops before the first instability in {samples}: its equilibria are no"
-        " longer the least ones, so that nothing bounds it from above, and certificate_gap is NaN",
-        stopped,
-    )
-
-
-def _warn_if_residual(rows: Sample, peak: Array, reached: NDArray[np.bool_]) -> None:
-    """Warn where all but the last nodes are at their residual strength before the peak."""
-    residual = rows.residual_strength.mean(axis=rows.axes)
-    fall = np.median((rows.strength - rows.residual_strength).reshape(rows.samples, -1), axis=1)
-    above = (peak - residual) / np.maximum(fall, 1e-300)
-    warn_of_samples(
-        "all but the last nodes are at their residual strength before the peak in {samples}: static"
-        " friction is then the mean residual strength, to {worst:.2g} of what strength falls by,"
-        " and depends on little else",
-        reached & (above < SLIDING_ONLY),
-        above,
-    )
-
-
-def _warn_if_lost(sensitivity: Array, unstable: NDArray[np.bool_]) -> None:
-    """Warn where a first instability has no derivative."""
-    warn_of_samples(
-        "the first instability has no known derivative in {samples}, so sensitivity is NaN: nodes"
-        " pass a corner from which their law falls more steeply, or the turning point was not"
-        " resolved",
-        unstable & np.isnan(sensitivity).reshape(len(sensitivity), -1).any(axis=1),
-    )

@@ -29,6 +29,9 @@ OVERSTRESS = 1e-12
 CLOSE = 0.02
 """Relative distance of a stable load below the bound at which the bound itself is tried."""
 PASSES = 10_000
+"""Bound of a loop in which each pass adds a node or lowers the load."""
+NEARER = 0.75
+"""Share of the way to the bound by which a stable load is raised until close to it."""
 
 
 @jit_inside
@@ -156,7 +159,9 @@ def solve_program(
             if load >= top:
                 solved = True
                 break
-            load = top if top - load <= CLOSE * abs(top) else 0.25 * load + 0.75 * top
+            load = (
+                top if top - load <= CLOSE * abs(top) else (1.0 - NEARER) * load + NEARER * top
+            )
             solve_forward(workspace, size, load, solution)
             multiply_members(workspace, size, solution, stiff)
             continue

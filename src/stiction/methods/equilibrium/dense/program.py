@@ -20,7 +20,7 @@ from stiction.elasticity.stiffness import apply_circular
 from stiction.elasticity.weakest import window_bound
 from stiction.methods.equilibrium.dense.cholesky import Workspace, make_workspace
 from stiction.methods.equilibrium.dense.jump import jump
-from stiction.methods.equilibrium.dense.linear_program import certificate, solve_program
+from stiction.methods.equilibrium.dense.linear_program import NEARER, certificate, solve_program
 from stiction.methods.equilibrium.dense.runaway import Runs, make_runs, runs_away
 from stiction.methods.equilibrium.dense.stable_path import REACHED, UNSTABLE, advance
 from stiction.methods.equilibrium.patches import main_patch
@@ -42,7 +42,11 @@ from stiction.problem.problem import Problem
 MANY_NODES = 1500
 """Number of nodes weaker than the upper bound of the load above which transforms are faster."""
 GAP_OF_MANY = 3e-10
-"""Relative distance of the bounds by transforms."""
+"""Relative distance of the bounds by transforms, below `widest_gap`."""
+WIDEST_OF_STOPS = 1e-4
+"""`widest_gap` where nodes may stop: positive entries of K leave bounds so far apart."""
+SAME = 1e-12
+"""Relative distance of weakening rates that differ by round-off."""
 
 
 class DenseProgram:
@@ -76,7 +80,7 @@ class DenseProgram:
         self.stops = self.elastic.positive > 0.0  # slip may unload a node that slips
         self._own = threading.local()
         if self.stops:
-            self.widest_gap = max(self.widest_gap, 1e-4)
+            self.widest_gap = max(self.widest_gap, WIDEST_OF_STOPS)
 
     @property
     def _workspaces(self) -> tuple[Workspace, Workspace]:
@@ -123,7 +127,8 @@ class DenseProgram:
         elif (
             low < high
         ):  # the bound is not close, and at too high a load far too many nodes join
-            start = 0.25 * min(top, (sample.excess / sample.profile).min()) + 0.75 * top
+            first = min(top, float((sample.excess / sample.profile).min()))
+            start = (1.0 - NEARER) * first + NEARER * top
         load, solved = solve_program(
             sample, start, bound, cap, multiplier, slip, stiff, self._workspaces[0]
         )
@@ -164,8 +169,10 @@ class DenseProgram:
             for workspace in self._workspaces:  # what is held is of another sample
                 workspace.held[0] = 0
         if target == np.inf and not by_events:
-            piece, strength, rate = present_pieces(sample, state.slip)
-            present = sample._replace(excess=strength, rate=rate)
+            piece, present = None, sample
+            if not rests:
+                piece, strength, rate = present_pieces(sample, state.slip)
+                present = sample._replace(excess=strength, rate=rate)
             found = self.solve(present, state=None if rests else state)
             straight = found is not None and (rests or found.load >= state.load)
             if found is not None and straight and not exceeds(sample, found.slip, piece):
@@ -279,7 +286,7 @@ def _rates(sample: StaticSample) -> tuple[float, float]:
     if rates.size == 0:
         return 0.0, 0.0
     low, high = float(rates.min()), float(rates.max())
-    return low, (high if low < high * (1.0 - 1e-12) else low)
+    return low, (high if low < high * (1.0 - SAME) else low)
 
 
 @lru_cache(maxsize=4)

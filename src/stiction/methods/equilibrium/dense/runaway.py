@@ -78,24 +78,12 @@ def make_runs(column: Array, half_spaces: HalfSpaces) -> Runs:
 
 
 @jit
-def griffith_length(drop: float, energy: float, modulus: float) -> float:
-    """Critical length of a crack (m), infinite without a stress drop.
-
-    A crack of half-length a with stress drop D (Pa) releases pi a D^2/(2 G*) at each tip
-    (Griffith, 1921), and grows where that is more than the fracture energy (J/m²); the
-    modulus is G* (Pa).
-    """
-    if drop <= 0.0:
-        return np.inf
-    return 4.0 * modulus * energy / (np.pi * drop * drop)
-
-
-@jit
 def unstoppable_length(sample: StaticSample, load: float, runs: Runs) -> float:
-    """Nodes in a row at their residual strength that nothing on the interface stops.
+    """Nodes in a row at their residual strength that nothing stops; infinite without a stress drop.
 
-    Griffith's length with the least stress drop and the largest fracture energy, which is
-    (tau_p - tau_r) d_c times the area under the law.
+    Griffith's (1921) length with the least stress drop D and the largest fracture energy, which is
+    (tau_p - tau_r) d_c times the area under the law: with half of it, a, a crack releases
+    pi a D^2/(2 G*) at each tip.
     """
     drop = np.inf
     energy = 0.0
@@ -103,7 +91,9 @@ def unstoppable_length(sample: StaticSample, load: float, runs: Runs) -> float:
         drop = min(drop, load * sample.profile[i] - sample.residual[i])
         fall = sample.excess[i] - sample.residual[i]
         energy = max(energy, sample.pieces.area * fall * sample.critical[i])
-    return griffith_length(drop, energy, runs.modulus) / runs.spacing
+    if drop <= 0.0:
+        return np.inf
+    return 4.0 * runs.modulus * energy / (np.pi * drop * drop) / runs.spacing
 
 
 @jit

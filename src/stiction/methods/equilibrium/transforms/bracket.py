@@ -18,6 +18,13 @@ from stiction.elasticity.linear import NEGATIVE, SOLVED, inner, lowest_eigenvect
 from stiction.elasticity.operator import Operator, filtered, make_operator, product
 from stiction.methods.equilibrium.transforms.held_equilibrium import equilibrate
 
+STEPS = 60
+"""Most halvings: more than a double has digits."""
+NEAR_ZERO = 1e-2
+"""Share of the mean ratio of strength to load below which gaps do not refer to the load itself."""
+LIFTED = 0.4
+"""Share of g in the lifting field, below one half: then A z < 0 for any W."""
+
 
 def _lifting_field(operator: Operator) -> tuple[Array, Array]:
     """A field z > 0 with A z < 0 at every node, and -A z (Pa/m), to make multipliers feasible.
@@ -32,7 +39,7 @@ def _lifting_field(operator: Operator) -> tuple[Array, Array]:
         least = float(operator.rate[~free].min())
         pushed = np.empty_like(lifting)
         filtered(operator, least / (operator.symbol + least), free.astype(np.float64), pushed)
-        lifting -= 0.4 * pushed
+        lifting -= LIFTED * pushed
     image = np.empty_like(lifting)
     product(operator, lifting, image)
     return lifting, -image
@@ -76,7 +83,8 @@ class Bracket:
     def magnitude(self) -> float:
         """Load to which relative gaps refer: the onset, unless it is close to zero."""
         return max(
-            abs(self.upper), 1e-2 * float(np.abs(self.excess).mean() / self.profile.mean())
+            abs(self.upper),
+            NEAR_ZERO * float(np.abs(self.excess).mean() / self.profile.mean()),
         )
 
     def closed(self, gap: float) -> bool:
@@ -124,7 +132,7 @@ def make_bracket(symbol: Array, rate: Array | float, excess: Array, profile: Arr
     return Bracket(operator, excess.flatten(), profile.flatten())
 
 
-def bisect(bracket: Bracket, gap: float, accuracy: float, steps: int = 60) -> Array:
+def bisect(bracket: Bracket, gap: float, accuracy: float) -> Array:
     """Narrow a bracket to a relative gap; return the last unstable direction, of unit norm.
 
     The accuracy is the largest residual stress as a share of the mean strength.
@@ -133,7 +141,7 @@ def bisect(bracket: Bracket, gap: float, accuracy: float, steps: int = 60) -> Ar
     direction = bracket.multiplier / np.sqrt((bracket.multiplier**2).sum())
     low, high = bracket.lower, bracket.upper
     stable = bracket.slip.copy()
-    for _ in range(steps):
+    for _ in range(STEPS):
         if high - low <= gap * bracket.magnitude:
             break
         load = 0.5 * (low + high)

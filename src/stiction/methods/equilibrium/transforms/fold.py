@@ -19,11 +19,13 @@ from stiction.methods.equilibrium.transforms.held_equilibrium import ITERATIONS
 from stiction.methods.equilibrium.transforms.relaxation import residual_tolerance, slip_under
 
 EVENTS = 300
+"""Most events of a path to its turn, which is begun a step of the load before."""
 PRECISE = 1e-11
 """Residual stress of the slip, as a share of the mean strength or load."""
 RESIDUAL = 1e-9
 """Residual of other solutions, as a share of their largest drive."""
 ROUNDS = 20
+"""Most revisions of the pieces of a rough slip."""
 
 
 class Turn(NamedTuple):

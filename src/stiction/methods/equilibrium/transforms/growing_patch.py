@@ -13,30 +13,35 @@ from stiction.methods.equilibrium.patches import span
 from stiction.methods.equilibrium.sample import StaticSample, piece_at, present_pieces, start_of
 from stiction.methods.equilibrium.transforms.held_equilibrium import ITERATIONS
 
-FIRST = 0.02
-"""Growth of a patch that is tried first, as a share of d_c."""
+# No result rests on these: whether a step passes an equilibrium is checked. With one halved or
+# doubled small planes take up to a quarter longer, of MOST and HELD up to six tenths.
+SMALL = 0.02
+"""Growth, as a share of d_c, that is tried first, and counts as none where a jump ends."""
 ENDS = 2e-3
-"""Growth in a step, as a share of d_c, below which a patch is not followed any more."""
+"""Growth in a step, as a share of d_c, below which steps that solve for bounds are faster."""
 QUICK = 0.7
-"""Growth up to which a step is expected to add more than the one before, as a share of d_c."""
-MOST = 0.99
-"""Largest share of the weakening in a step of a growing patch."""
+"""Growth, as a share of d_c, up to which a step adds more than the one before: it speeds up."""
+MOST, LESS = 0.99, 0.7
+"""Largest share of the weakening in a step, and how much less it is after one that failed."""
 SPARED = 0.1
-"""Residual stress of such a step, as a share of the weakening left out."""
+"""Residual stress of a step, as a share of the weakening left out: less would be lost again."""
 HELD = 0.9
-"""Amplitude at which a spring holds a growing patch, as a share of that expected."""
+"""Amplitude at which a spring holds a patch, over that expected: so it pulls, if all is right."""
 FREE = 0.3
-"""Share of the weakening up to which no spring holds the patch."""
-RUNS = -1.0
-"""Force of the spring, over that at rest, below which the patch outruns what was expected."""
+"""Share of the weakening up to which no spring is needed: K less that is positive definite."""
+RUNS, EASY = -1.0, -0.05
+"""Force of the spring, over that at rest, below which the patch outruns what was expected, and
+below which it may soon."""
+SLOWER, FASTER, FASTEST, FREELY = 0.9, 1.5, 2.0, 1.2
+"""Growth over that of the step before: where the spring pulls, pushes, pushes hard; without one."""
 USED, LONGEST = 0.3, 1.5
 """Share of a step that must be possible, or it has failed, and how much of it is made at most."""
 FAILURES = 3
-"""Failures in a row after which a growing patch is not followed any more."""
+"""Failures in a row, each in a window twice as wide, after which bounds are solved for instead."""
 WIDE = 1.5
-"""Least size of a window around a patch, over that of the patch."""
+"""Least size of a window around a patch, over that of the patch: images act as a border does."""
 NARROWEST = 16
-"""Least nodes of a window along x and y."""
+"""Least nodes of a window along x and y: below, transforms cost no less."""
 PART = 0.01
 """Growth from which a node is part of the patch, as a share of the largest."""
 
@@ -198,7 +203,7 @@ def grown(
     weakens = sample.critical > 0.0
     stress, image = np.empty((2, slip.size))
     filtered(operator, operator.symbol, slip, stress)
-    share, failures = 1.0 - FIRST, 0
+    share, failures = 1.0 - SMALL, 0
     while failures < FAILURES:
         rest = load * sample.profile - _strength(sample, slip) - tolerance
         if float(rest.sum()) > 0.0:
@@ -208,7 +213,7 @@ def grown(
         window = window_around(operator, moving, WIDE * 2.0**failures)
         found = _push(window, sample, rest, slip, growth, share, tolerance, image)
         if found is None:
-            share, failures = 0.7 * share, failures + 1
+            share, failures = LESS * share, failures + 1
             continue
         move, force = found
         filtered(operator, operator.symbol, move, image)
@@ -221,13 +226,13 @@ def grown(
             continue
         if step < USED:
             growth, failures = 0.5 * move, failures + 1
-            share *= 1.0 if force > 0.0 else 0.7
+            share *= 1.0 if force > 0.0 else LESS
             continue
         if step * size < ENDS:
             break
         failures = 0
-        faster = 0.9 if force > 0.0 else 1.5 if force > -0.05 else 2.0
-        faster = min(faster if share > FREE else 1.2, max(QUICK / (step * size), 1.0))
+        faster = SLOWER if force > 0.0 else FASTER if force > EASY else FASTEST
+        faster = min(faster if share > FREE else FREELY, max(QUICK / (step * size), 1.0))
         growth = faster * step * move
-        share = min(max(1.0 - 0.7 * step * size, 0.0), MOST)
+        share = min(max(1.0 - LESS * step * size, 0.0), MOST)
     return slip

@@ -28,6 +28,7 @@ from stiction.methods.equilibrium.sample import (
 )
 from stiction.methods.equilibrium.transforms.bracket import Bracket, bisect, make_bracket
 from stiction.methods.equilibrium.transforms.fold import Turn, follow_to_turn
+from stiction.methods.equilibrium.transforms.growing_patch import SMALL
 from stiction.methods.equilibrium.transforms.relaxation import (
     least_equilibrium,
     stable_equilibrium,
@@ -38,25 +39,32 @@ from stiction.problem.problem import Problem
 COARSEST = 8.0
 """Least ratio of the largest K(k) to W on a coarse grid: about six nodes in h_n."""
 FEWEST = 8
-"""Least nodes along x and y on a coarse grid."""
+"""Least nodes along x and y on a coarse grid: below, none is faster than the next one."""
 ROUGH = 1e-4
-"""Relative gap on coarse grids."""
+"""Relative gap on coarse grids, whose own error is larger."""
 RETREATS = (0.0, 1e-5, 1e-4)
-"""Shares of the load below its lower bound from which a path is followed to its turn."""
+"""Shares of the load below its lower bound from which a path is followed to its turn: the slip
+that proves the bound may be beyond it."""
 FIRST_STEP = 1e-4
-"""Step of the load where the path is followed in steps, as a share of the load."""
+"""Step of the load where the path is followed in steps, as a share of the load; it adapts."""
 AHEAD = 0.9
-"""Share of the way to the onset that would be without corners that is tried at once."""
+"""Share of the way to the onset that would be without corners that is tried at once: the rest is
+what corners take off, mostly less than a tenth."""
+SHORTER, LONGER = 0.3, 1.5
+"""Change of a step that failed, and of the next after one that did not."""
+REACH = 3.0
+"""Most steps ahead to which slip is extrapolated as a guess."""
 ROUGHNESS = 0.1
 """Largest residual stress after a step, as a share of the step."""
 ROUGHEST = 1e-5
-"""The same, as a share of the mean strength or load."""
-MOVED = 0.02
-"""Slip, as a share of d_c, below which a jump is a long step of the stable path and no event."""
+"""The same, as a share of the mean strength or load: a rougher slip may miss an event."""
 AT_CORNER = 1.0 - 1e-9
-"""Share of the slip at a corner above which a node counts as beyond it."""
+"""Share of the slip at a corner above which a node counts as beyond it, given `ACCURACY`."""
 ACCURACY = 1e-7
 """Largest residual stress of the slip at a given load, as a share of the mean strength."""
+BISECTED, FINER = 5e-3, 0.2
+"""Relative gap to which a trivial bracket is bisected before Newton's method is tried, and how much
+finer each time that fails."""
 
 
 def halved(fine: Array) -> Array:
@@ -95,14 +103,14 @@ def _narrow(bracket: Bracket, gap: float) -> float:
 
     Returns the curvature found. The bounds of a stiffness that is no Z-matrix may not meet.
     """
-    share, finest = 5e-3, 0.1 * gap
+    share, finest = BISECTED, 0.1 * gap
     bend = 0.0
     while not bracket.closed(gap):
         direction = bisect(bracket, share, 0.05 * min(share, 1e-4))
         _, bend = close(bracket, direction, bracket.lower, bracket.slip, gap)
         if share <= finest:
             break
-        share = max(0.2 * share, finest)
+        share = max(FINER * share, finest)
     return bend
 
 
@@ -231,10 +239,10 @@ class PlaneProgram:
             guess = slip
             if len(passed) > 1:
                 below, less = passed[-2]
-                guess = slip + min(step / (load - below), 3.0) * (slip - less)
+                guess = slip + min(step / (load - below), REACH) * (slip - less)
             there = stable_equilibrium(operator, sample, load + step, slip, accuracy, guess)
             if there is None and step > gap * load:
-                step = max(0.3 * step, 0.7 * gap * load)
+                step = max(SHORTER * step, 0.7 * gap * load)  # the last one is below the gap
                 continue
             beyond = load + step
             if there is None:
@@ -252,7 +260,7 @@ class PlaneProgram:
             work = step * inner(sample.profile, growth)
             if work > 0.0:  # A times the growth is about the step of the load
                 operator = operator._replace(slow=growth / np.sqrt(work))
-            load, slip, step = beyond, there, 1.5 * step
+            load, slip, step = beyond, there, LONGER * step
             passed = [*passed[-3:], (load, slip)]
 
     def gradient(self, sample: StaticSample, state: State) -> Array:
@@ -281,7 +289,7 @@ class PlaneProgram:
         )
         arrested = ahead.status == Outcome.ARRESTED
         weakens = sample.critical > 0.0
-        moved = ahead.slip - found.slip > MOVED * sample.critical
+        moved = ahead.slip - found.slip > SMALL * sample.critical
         after = State(beyond, ahead.slip, found.direction, jumped=True)
         counts = not arrested or bool(moved[weakens].any())
         return Jump(arrested, ahead.status != Outcome.UNDECIDED, after, counts)

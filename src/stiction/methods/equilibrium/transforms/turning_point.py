@@ -26,13 +26,25 @@ from stiction.elasticity.linear import (
 from stiction.methods.equilibrium.transforms.bracket import Bracket
 from stiction.methods.equilibrium.transforms.held_equilibrium import ITERATIONS, equilibrate
 
+# Where Newton's method fails, bisection takes over: no result rests on these.
+STEPS = 40
+"""Most states that are tried."""
 SWITCHES = 4
 """Largest number of patches that are held one after the other."""
-PATIENCE = 8
-PROGRESS = 0.95
-"""Share of the gap that a state should not leave; too many in a row that do end the search."""
+PATIENCE, PROGRESS = 8, 0.95
+"""States in a row that leave more than this share of the gap, after which the search ends."""
 RETREAT = 2e-3
 """Share by which the load is lowered when another patch is held, twice as much each time."""
+LONGEST = 0.3
+"""Longest step, as a share of the amplitude: a patch twice as large is another one."""
+BEYOND = 1.2
+"""Step over Newton's: mu' falls in steps, as nodes join, so that its own falls short."""
+STALLED = 0.7
+"""Share of mu' that must be left for a step to be doubled instead."""
+PRECISE = 0.05
+"""Residual stress over the gap that is asked for: what is left of it must not open the bounds."""
+BELOW = 0.3
+"""Distance of the load from the upper bound, over that gap: a state there closes the bracket."""
 
 
 class Held(NamedTuple):
@@ -42,7 +54,7 @@ class Held(NamedTuple):
     amplitude: float
     force: float
     slope_of_force: float
-    relief: float
+    force_by_load: float
     slip: Array
     slope: Array
 
@@ -111,7 +123,7 @@ def _load_at(state: Held, amplitude: float, curvature: float = 0.0) -> float:
     """Load at which the spring has no force at an amplitude, extrapolated from a state, Pa."""
     step = amplitude - state.amplitude
     force = state.force + (state.slope_of_force + 0.5 * curvature * step) * step
-    return state.load - force / state.relief
+    return state.load - force / state.force_by_load
 
 
 def _amplitude_between(below: Held, above: Held, turn: int) -> float:
@@ -120,8 +132,8 @@ def _amplitude_between(below: Held, above: Held, turn: int) -> float:
         share = below.slope_of_force / (below.slope_of_force - above.slope_of_force)
     else:  # mu' has one step, as where a single node joins: where the two `_load_at` agree
         here, there = _load_at(below, below.amplitude), _load_at(above, below.amplitude)
-        rise = below.slope_of_force / -below.relief
-        fall = above.slope_of_force / -above.relief
+        rise = below.slope_of_force / -below.force_by_load
+        fall = above.slope_of_force / -above.force_by_load
         share = (there - here) / ((rise - fall) * (above.amplitude - below.amplitude))
         share = min(max(share, 0.0), 1.0)
     return below.amplitude + share * (above.amplitude - below.amplitude)
@@ -133,11 +145,11 @@ def _step_across(state: Held, step: float, last: float, curvature: float, moved:
     `step` and `last` are the step before and mu' before it. Since mu' falls in steps, as nodes
     join, it goes a little beyond Newton's, and twice as far as before if mu' hardly changed.
     """
-    longest = 0.3 * state.amplitude
+    longest = LONGEST * state.amplitude
     if curvature >= 0.0:
         return float(np.copysign(longest / 3.0, state.slope_of_force))
-    newton = -1.2 * state.slope_of_force / curvature
-    stalled = moved and state.slope_of_force / last > 0.7
+    newton = -BEYOND * state.slope_of_force / curvature
+    stalled = moved and state.slope_of_force / last > STALLED
     step = 2.0 * step if stalled and abs(newton) < 2.0 * abs(step) else newton
     return min(max(step, -longest), longest)
 
@@ -149,7 +161,6 @@ def close(
     slip: Array,
     gap: float,
     bend: float = 0.0,
-    steps: int = 40,
 ) -> tuple[bool, float]:
     """Close a bracket by Newton's method on the turning point of a patch.
 
@@ -163,14 +174,14 @@ def close(
         not slip.any() and not (bracket.excess < load * bracket.profile).any()
     ):  # nothing to hold
         load = 0.5 * (bracket.lower + bracket.upper)
-    accuracy = 0.05 * gap
+    accuracy = PRECISE * gap
     first: Held | None = None
     below: Held | None = None  # mu' > 0, the one with the largest a
     above: Held | None = None
     guess = _guess(load, inner(held, slip), slip, held)
     step = last = 0.0
     switches = idle = 0
-    for turn in range(steps):
+    for turn in range(STEPS):
         state = _hold(bracket, held, guess, accuracy)
         if state is None:
             switches += 1
@@ -216,7 +227,7 @@ def close(
             step = _step_across(state, step, last, curvature, bool(moved))
             load = _load_at(state, state.amplitude + step, min(curvature, 0.0))
         last = state.slope_of_force
-        load = min(load, bracket.upper - 0.3 * gap * bracket.magnitude)
+        load = min(load, bracket.upper - BELOW * gap * bracket.magnitude)
         slip_there = np.maximum(state.slip + step * state.slope, 0.0)
         guess = _guess(load, state.amplitude + step, slip_there, state.slope)
     return False, bend
