@@ -57,9 +57,15 @@ def weakest_window(
         if not everywhere and threshold != counted:
             _count_fast(rate, threshold, allowed)
             counted = threshold
+        first = windows.starts[c]
+        if first >= 0:
+            if everywhere or allowed[first] >= width:
+                above = dot(excess[first:], mode, width)
+                below = dot(profile[first:], mode, width)
+                if above < best * below:
+                    best, choice, start = above / below, c, first
+            continue
         low, high, stride = 0, n, max(1, width // STRIDES)
-        if windows.starts[c] >= 0:
-            low, high, stride = windows.starts[c], windows.starts[c] + 1, 1
         straight = _window_sum(profile, mode, width, 0) if uniform else 0.0
         while True:
             found = -1
