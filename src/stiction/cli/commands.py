@@ -343,14 +343,13 @@ def _cost(study: Any) -> tuple[dict[str, str], int, list[str]]:
     tried = 0
     with collect_warnings():  # the run itself warns
         for number in chosen.tolist():
-            point, best = points[number], np.inf
+            point = points[number]
             solve_span(point, Span(number, ensemble.first, 1))  # compiles and prepares
-            for most in (1, 8, point.batch):  # few samples at once cost more each
-                count = max(1, int(min(most, ensemble.samples, BUDGET / chosen.size / best)))
-                table = solve_span(point, Span(number, ensemble.first, count))
-                best = min(best, table.seconds / count)
-                failures |= dict.fromkeys(map(str, table.failures))
-            rates.append(best)
+            affordable = BUDGET / chosen.size / point.seconds
+            count = max(1, int(min(point.batch, ensemble.samples, affordable)))
+            table = solve_span(point, Span(number, ensemble.first, count))
+            failures |= dict.fromkeys(map(str, table.failures))
+            rates.append(table.seconds / count)
             tried += count
     seconds = float(np.interp(np.arange(len(points)), chosen, rates).sum()) * ensemble.samples
     each = " to ".join(dict.fromkeys((duration(min(rates)), duration(max(rates)))))

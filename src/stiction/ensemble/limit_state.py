@@ -29,6 +29,8 @@ Event = Literal["critical_stress", "first_instability"]
 RANKED, RANKINGS, LOW = 32, 4_000, 3.0
 """Samples of each of equally likely interfaces that put these in order, at most and of all about,
 and the number of standard deviations below the mean that does."""
+FACTORS = 8
+"""Random factors of the strength at a node, at most, that share what is negligible."""
 SHORTEST = 2e-3
 """Seconds of work that justify a thread."""
 
@@ -165,7 +167,7 @@ class LimitState:
         problem = self.experiment.problem
         if any(field.conditions is not None for field in random.properties.values()):
             negligible = 0.0  # what was measured may be rarer
-        chance = negligible / (8 * problem.interface.size)  # eight random factors, at each node
+        chance = negligible / (FACTORS * problem.interface.size)
         low, high = support_in_stress(problem, random, "strength", chance)
         profile = np.broadcast_to(problem.load_profile, problem.interface.shape)
         least: Any = problem.load.initial_stress

@@ -212,7 +212,7 @@ class Likelihood:
     error: float  # standard deviation of the load cell
     densities: Sequence[Densities]  # for every kind of specimen
     areas: Sequence[Area]  # of every kind, if peaks are forces; else of 1
-    samples: float  # independent ones that these are worth
+    samples: float  # effective number: of independent ones that serve as well
     box: Array  # (2, parameters): corners, as u, between which onsets are simulated
     peaks: Sequence[Array] = ()
 
@@ -334,7 +334,7 @@ def make_likelihood(
     if not local:
         _warn_if_long(experiments_at(prior, coarse[:1], method)[0], total, workers)
     meter.stage("simulated onsets", total)
-    worth, densities = float(count), []
+    effective, densities = float(count), []
     for number, length in enumerate(lengths):
         experiments = experiments_at(prior, thetas, method, length)
         for end in (experiments[0], experiments[-1]):
@@ -357,7 +357,7 @@ def make_likelihood(
             )
             if alike > ALIKE:
                 found = moved(many, found, known, *weights)
-                worth = worth_of(float(alike), many.shape[1], count)
+                effective = effective_samples(float(alike), many.shape[1], count)
             else:
                 _warn_if_long(experiments[0], len(thetas) * count, workers)
                 meter.stage("simulated onsets", len(thetas) * count)
@@ -366,13 +366,15 @@ def make_likelihood(
         densities.append(tabulate(found, np.array(bounds)))
     none = Area(1.0, np.zeros(prior.dimension))
     areas = [area_of(prior, method, length) if forces else none for length in lengths]
-    return Likelihood(prior, method, scaling, axes, error, densities, areas, worth, box)
+    return Likelihood(prior, method, scaling, axes, error, densities, areas, effective, box)
 
 
 def moved(
     many: Array, few: Array, known: Array, index: NDArray[np.int64], weight: Array
 ) -> Array:
     """Move many onsets by the local criterion, (points, many), to those by another method.
+
+    A control variate: as many onsets by the other method would cost more.
 
     At coarse nodes a `few` onsets by it and those of the same samples by the local criterion are
     `known`, (nodes, few). Their quantiles differ little. This difference, both as shares of the
@@ -390,7 +392,7 @@ def moved(
     return result
 
 
-def worth_of(alike: float, many: int, few: int) -> float:
+def effective_samples(alike: float, many: int, few: int) -> float:
     """Return how many independent samples serve as well as onsets that were moved."""
     return 1.0 / (alike**2 / many + (1.0 - alike**2) / few)
 

@@ -251,11 +251,32 @@ def sample_tail(
         draws = state.draws(seed, 0, min(PILOT, budget // 5))
         pilot = draws, state(draws)
     spent = 0 if pilot is None else pilot[1].size
+    label = guide.experiment.method.label if guide else ""
     if auto and guide and pilot:
         share = share_picked(guide(pilot[0]), pilot[1])
-        label = guide.experiment.method.label
         reason += f"; of {spent} plain samples the {label} picks {share:.0%} of the weakest"
         guide = guide if share >= ALIKE else None
+    goal: Any = {"target_cv": target_cv, "stress": stress, "probability": probability}
+    found = _repetitions(state, guide, budget - spent, poor=POOR if auto else 0.0, **goal)
+    spent += sum(one.evaluations for one in found)
+    if auto and guide and _is_poor(found[0], POOR):
+        reason += f"; {found[0].share:.1%} of the failures by the {label} hold: a poor guide"
+        guide, found = None, _repetitions(state, None, budget - spent, **goal)
+        spent += sum(one.evaluations for one in found)
+    return Tail(found, "subset" if guide is None else "two_level", reason, spent)
+
+
+def _repetitions(
+    state: LimitState,
+    guide: LimitState | None,
+    budget: int,
+    *,
+    target_cv: float,
+    stress: float,
+    probability: float,
+    poor: float = 0.0,
+) -> list[Any]:
+    """Return repetitions by one level, or by two with a guide; a single one of a poor guide."""
 
     def make(samples: int, number: int, left: int) -> Any:
         options: dict[str, Any] = {
@@ -264,30 +285,26 @@ def sample_tail(
             "threshold": stress,
             "floor": state.bounds[0],
             "label": state.member,
-            "rng": generator(seed, 1 if guide is None else 3, number),
+            "rng": generator(state.experiment.seed, 1 if guide is None else 3, number),
         }
         if guide is None:
             return descend(state, state.dimension, probability=DEEPER * probability, **options)
         return bridge(guide, state, state.dimension, probability=probability, **options)
 
-    def is_poor(one: Any) -> bool:
-        return auto and guide is not None and one.complete and one.share < POOR
-
     def judge(repetitions: Sequence[Any]) -> float:
-        if is_poor(repetitions[0]):
+        if guide and _is_poor(repetitions[0], poor):
             return 0.0
         tail = Tail(repetitions)
         return tail.cv(tail.quantile(probability) if probability else stress)
 
-    while True:
-        first, largest = SUBSET if guide is None else BRIDGE
-        # Fewer than usual where the budget would not even hold four levels.
-        found = repeat_until_precise(
-            make, judge, target_cv=target_cv, first=min(first, max((budget - spent) // 4, 20)),
-            largest=largest, max_evaluations=budget - spent, meter=state.meter,
-        )  # fmt: skip
-        spent += sum(one.evaluations for one in found)
-        if not is_poor(found[0]):
-            return Tail(found, "subset" if guide is None else "two_level", reason, spent)
-        reason += f"; {found[0].share:.1%} of the failures by the {label} hold: a poor guide"
-        guide = None
+    first, largest = SUBSET if guide is None else BRIDGE
+    # Fewer than usual where the budget would not even hold four levels.
+    return repeat_until_precise(
+        make, judge, target_cv=target_cv, first=min(first, max(budget // 4, 20)),
+        largest=largest, max_evaluations=budget, meter=state.meter,
+    )  # fmt: skip
+
+
+def _is_poor(one: Any, least: float) -> bool:
+    """Return whether too few of the failures by a guide hold."""
+    return bool(one.complete and one.share < least)
