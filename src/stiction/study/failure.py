@@ -135,11 +135,11 @@ def compute(
     missing = ~rows.done
     if part is not None:
         missing &= samples_of_part(part, *missing.shape)
-    smallest = settings["smallest"]
+    smallest, cores = settings["smallest"], workers or usable_cores()
     with merge_warnings():
         if missing.any():
             check_fields(study.experiments)
-            threads = workers or usable_cores() if executor is None else 1
+            threads = cores if executor is None else 1
             states = [replace(weakest_first(state), workers=threads) for state in states]
         complete(
             rows,
@@ -149,7 +149,7 @@ def compute(
             Meter("failure curve", int(missing.sum()), progress, unit="repetitions"),
             store=store,
             executor=executor or Here(),
-            workers=1,
+            workers=cores,
         )
         if store.pilot is None and (part is None or part[0] == 1):
             with merge_warnings() as warned:
