@@ -6,11 +6,10 @@ estimate alone (plug-in), once for the mean over 30 equally likely interfaces (p
 failure probability at these stresses is then known. Its mean over the campaigns should be 1 %.
 Campaigns of profiles, and of profiles and tests, are in families.py.
 
-Run: ``python validation/decisions.py [CAMPAIGNS [FIGURE.png]]``
+Run: ``python validation/decisions.py [CAMPAIGNS]``
 """
 
 import sys
-import time
 import warnings
 
 import numpy as np
@@ -55,7 +54,7 @@ def design(random, seed):
 
 
 def by_tests(tests, seed):
-    """Return the same after some tests of a truth that is drawn from the prior."""
+    """Return true probabilities at both stresses, these, and the right one, by some tests."""
     rng = np.random.default_rng([seed, 9])
     marginal = beta(*(rng.uniform(*PRIOR[key]) for key in ("marginal.low", "marginal.high")))
     truth = strength(marginal, np.exp(rng.uniform(np.log(2e-3), np.log(1.2e-2))))
@@ -70,56 +69,23 @@ def by_tests(tests, seed):
     return np.searchsorted(known, stresses) / known.size, stresses, np.quantile(known, TARGET)
 
 
-def table(name, campaigns, run):
-    """Run the campaigns, print the mean true probabilities, and return stresses over the right."""
-    start = time.perf_counter()
-    rows = [run(seed) for seed in range(campaigns)]
-    chances = np.array([row[0] for row in rows])
-    errors = chances.std(axis=0, ddof=1) / campaigns**0.5
-    shares = np.array([np.array(row[1]) / row[2] for row in rows])
-    pairs = zip(chances.mean(axis=0), errors, strict=True)
-    texts = [f"{100 * mean:5.2f} +- {100 * error:.2f} %" for mean, error in pairs]
-    spread = " and ".join(f"{one.mean():.3f} +- {one.std(ddof=1):.3f}" for one in shares.T)
-    print(
-        f"{name:15s} true P of a design for 1 %: plug-in {texts[0]}, predictive {texts[1]};"
-        f" stress over the right one {spread} ({time.perf_counter() - start:.0f} s)",
-        flush=True,
-    )
-    return shares
-
-
-def figure(path, shares):
-    """Draw design stresses over the right one, plug-in and predictive, by number of tests."""
-    from matplotlib.figure import Figure
-
-    drawn = Figure(figsize=(4.6, 3.0), layout="constrained")
-    axes = drawn.subplots()
-    axes.axhline(1.0, color="0.4", linewidth=0.7, linestyle=":")
-    kinds = (("plug-in", "#b5322a", "^", -0.15), ("predictive", "#14213d", "o", 0.15))
-    for column, (kind, colour, marker, shift) in enumerate(kinds):
-        for place, tests in enumerate(TESTS):
-            own = shares[tests][:, column]
-            x = place + shift + np.linspace(-0.08, 0.08, own.size)
-            axes.plot(x, own, marker, color=colour, markersize=2.5, alpha=0.7,
-                      label=kind if place == 0 else None)  # fmt: skip
-            axes.plot(place + shift + np.array([-0.12, 0.12]), [own.mean()] * 2, color=colour)
-    axes.set_xticks(range(len(TESTS)), [f"{tests} tests" for tests in TESTS])
-    axes.set_ylabel("design stress / right one")
-    axes.legend(frameon=False)
-    drawn.savefig(path, dpi=130)
-
-
-def main(campaigns=20, path=None):
-    """Print the table, and draw the figure if it has a path."""
+def main(campaigns=20):
+    """Print mean true probabilities, and the stresses over the right one."""
     warnings.simplefilter("ignore")
-    shares = {}
     for tests in TESTS:
-        shares[tests] = table(
-            f"{tests} tests", campaigns, lambda seed, n=tests: by_tests(n, seed)
-        )
-    if path:
-        figure(path, shares)
+        rows = [by_tests(tests, seed) for seed in range(campaigns)]
+        chances = np.array([row[0] for row in rows])
+        errors = chances.std(axis=0, ddof=1) / campaigns**0.5
+        ratios = np.array([np.array(row[1]) / row[2] for row in rows])
+        for place, name in enumerate(("plug-in", "predictive")):
+            own = ratios[:, place]
+            print(
+                f"{tests} tests, {name}: true P of a design for 1 %"
+                f" {100 * chances[:, place].mean():.2f} +- {100 * errors[place]:.2f} %, stress over"
+                f" the right one {own.mean():.3f} +- {own.std(ddof=1):.3f}",
+                flush=True,
+            )
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:2]), *sys.argv[2:3])
+    main(*map(int, sys.argv[1:2]))

@@ -111,6 +111,16 @@ def test_missing_values_are_left_out_and_counted(plain):
     assert fitted(filled).parameters == fit.parameters
 
 
+def test_specimens_of_different_strength_are_not_taken_for_one_field(plain):
+    records = [labelled(factor * VALUES) for factor in (1.0, 0.8, 1.2)]
+    with pytest.warns(st.AccuracyWarning, match="p-value of the level .* pass between=True"):
+        fit = fitted(records)
+    assert fit.p_values["level"] < 0.01
+    alike = fitted([labelled(), labelled(VALUES[::-1])])
+    assert alike.p_values["level"] == pytest.approx(1.0)
+    assert "level" not in plain.p_values
+
+
 def test_a_profile_that_is_there_twice_is_no_further_measurement():
     with pytest.warns(st.AccuracyWarning, match="1 of 3 profiles repeat another"):
         records_of([labelled(), labelled(VALUES[::-1]), labelled()], None, "strength")

@@ -43,11 +43,16 @@ def as_of_one(rows: Sequence[Array], within: Array) -> list[Array]:
     return [row * factor for row, factor in zip(rows, factors, strict=True)]
 
 
-def _weighed(logarithms: Array, within: Array, s: float) -> tuple[float, float, float]:
-    """Mean of the logarithms at a variance s between records, its variance, and Q(s)."""
+def _weighed(values: Array, within: Array, s: float) -> tuple[float, float, float]:
+    """Mean of values at a variance s between records, its variance, and Q(s)."""
     weight = 1.0 / (s + within)
-    middle = float(weight @ logarithms / weight.sum())
-    return middle, 1.0 / float(weight.sum()), float(weight @ (logarithms - middle) ** 2)
+    middle = float(weight @ values / weight.sum())
+    return middle, 1.0 / float(weight.sum()), float(weight @ (values - middle) ** 2)
+
+
+def chance_of_scatter(levels: Array, variances: Array) -> float:
+    """Return how likely records of one field scatter at least as much about a common mean."""
+    return float(chi2.sf(_weighed(levels, variances, 0.0)[2], levels.size - 1))
 
 
 def variance_between(logarithms: Array, within: Array, level: float) -> float:

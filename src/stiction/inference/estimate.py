@@ -111,12 +111,18 @@ class Estimate:
         return [row * factor for row, factor in zip(rows, np.exp(scatter), strict=True)]
 
     @property
-    def within(self) -> Array:
-        """Variance of the logarithm of the mean of each record from the field alone."""
-        own = self.parameters["standard_deviation"] / self.parameters["mean"]
+    def of_means(self) -> Array:
+        """Variance of the mean of each record from the field alone."""
         windows, model = self.setting.windows, self.model
         shares = {w: w.variance_of_mean(model.correlation(w)) for w in set(windows)}
-        result: Array = np.log1p(own**2 * np.array([shares[window] for window in windows]))
+        deviation = self.parameters["standard_deviation"]
+        result: Array = deviation**2 * np.array([shares[window] for window in windows])
+        return result
+
+    @property
+    def within(self) -> Array:
+        """Variance of the logarithm of the mean of each record from the field alone."""
+        result: Array = np.log1p(self.of_means / self.parameters["mean"] ** 2)
         return result
 
     @property

@@ -15,7 +15,7 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, unknown_name, warn_accuracy
 from stiction.base.model import Count, Flag, Number, Positive, Progress, at_least, checked
 from stiction.base.variables import QUANTITIES
-from stiction.inference.between import levels_of, likely_between, scatter_between
+from stiction.inference.between import chance_of_scatter, likely_between, scatter_between
 from stiction.inference.bootstrap import FEWEST, Repetitions, bootstrapped, intervals, likely
 from stiction.inference.estimate import Estimate, FitSetting, Goodness, compare, windowed
 from stiction.inference.marginal_fit import Family, family_of, multiplied
@@ -37,6 +37,8 @@ FAR = 0.01
 ADVICE = {
     "marginal": "the values are far from its family; compare families",
     "spectrum": "the periodogram is far from its family; take another spectrum or a higher detrend",
+    "level": "means of records scatter more than those of one field, which designs under the fit"
+    " leave out; pass between=True if records are of different specimens",
 }
 TOLD = 2.0
 """Difference of scores from which data tell two families apart."""
@@ -90,7 +92,8 @@ class FieldFit:
         Number of independent values in the scores of families.
     p_values : dict of str to float
         Probability of records as far from their own marginal, and spectrum, as the data are
-        from the fitted ones, from the repetitions; small if a family does not fit.
+        from the fitted ones, from the repetitions; small if a family does not fit. Of several
+        records without `between` also that of means that scatter as much (``level``).
     missing : (int, int)
         Number of points without a value, which are left out, and of all points.
     doubts : tuple of str
@@ -303,10 +306,11 @@ def fit_field(
     Warns
     -----
     AccuracyWarning
-        If values are outliers, and for each reason in `doubts`: records hold fewer than ten
-        correlation lengths, a p-value is below 1 %, the noise hides the cut-off of the
-        spectrum, a parameter lies at the end of the range that is searched, or fewer than five
-        specimens are to tell the scatter between them.
+        If values are outliers, profiles repeat others, and for each reason in `doubts`: records
+        hold fewer than ten correlation lengths, a p-value is below 1 % (of ``level``: records of
+        different specimens without `between`), the noise hides the cut-off of the spectrum, a
+        parameter lies at the end of the range that is searched, or fewer than five specimens are to
+        tell the scatter between them.
 
     Notes
     -----
@@ -385,12 +389,14 @@ def _judged(
     ends = intervals(repeated, confidence, np.concatenate(found.as_of_one(rows)))
     tests = {"marginal": "distance", "spectrum": "roughness"}
     p_values = {name: _p_value(of, found, fits) for name, of in tests.items()}
+    levels = np.array([row.mean() for row in rows])
+    if levels.size > 1 and not found.setting.between:
+        p_values["level"] = chance_of_scatter(levels, found.of_means)
     doubts = _doubts(found, p_values)
     if failed := len(repeated) * count - sum(len(one.fits) for one in repeated):
         doubts.append(f"the family does not fit {failed} repetitions, which the intervals omit")
     if found.setting.between:
-        logarithms = np.log(levels_of(rows))
-        cv, (low, high), width = scatter_between(logarithms, found.within, confidence)
+        cv, (low, high), width = scatter_between(np.log(levels), found.within, confidence)
         for name in {"mean", "marginal.mean"} & parameters.keys():  # of other specimens, too
             ends[name] = parameters[name] * math.exp(-width), parameters[name] * math.exp(width)
         parameters["between"], ends["between"] = cv, (low, high)
