@@ -114,8 +114,11 @@ def campaign(name, seed):
 
 
 def print_table(rows):
-    """Print means over campaigns, of each truth and of all."""
-    everything = [row for own in rows.values() for row in own]
+    """Print means over campaigns, of each truth and of all; those of one seed share draws."""
+    everything = [
+        tuple(np.mean(part, axis=0) for part in zip(*same, strict=True))
+        for same in zip(*rows.values(), strict=True)
+    ]
     for name, own in (rows | {"all": everything}).items():
         chances, ratios, widths, held = (np.array(part) for part in zip(*own, strict=True))
         errors = chances.std(axis=0, ddof=1) / len(own) ** 0.5
