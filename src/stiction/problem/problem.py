@@ -44,8 +44,6 @@ SLIP = (1e-8, math.inf), (1e-10, math.inf)
 """Slip over which strength falls, m; an atom measures 1e-10 m."""
 SHORT = 4.0
 """Nucleation lengths: on shorter lines free ends change the mean onset by more than about 1 %."""
-SOFTEST = 1e-4
-"""Stiffness of a machine over that of its blocks below which it is probably in another unit."""
 FLATTEST, HIGHEST = 0.025, 10.0
 """Height of blocks over their length between which their response takes seconds and below 1 GB."""
 AT_END = {"II": 0.445 / 1.158, "III": 0.5}
@@ -169,31 +167,21 @@ class Problem:
 
     def _check_drive(self) -> None:
         """Refuse a drive that pulls somewhere in reverse, and blocks that open."""
+        lower = "lower the pusher, push from both sides, or use st.Platen()"
         for what, profile, advice in (
+            ("drive: shears in reverse", self.blocks.shear, lower),
             (
-                "drive",
-                self.blocks.shear,
-                "lower the pusher, push from both sides, or use st.Platen()",
+                "pressing: opens the interface",
+                self.blocks.pressure,
+                "use pressing = 'frictionless'",
             ),
-            ("pressing", self.blocks.pressure, "use pressing = 'frictionless'"),
         ):
             if not profile.min() > 0.0:
                 at = self.interface.describe_node(int(np.argmin(profile)))
-                effect = "shears in reverse" if what == "drive" else "opens the interface"
                 raise InputError(
-                    f"specimen.{what}: {effect} at {at} ({profile.min():.3g} of the mean), which"
-                    f" is not modelled; {advice}"
+                    f"specimen.{what} at {at} ({profile.min():.3g} of the mean),"
+                    f" which is not modelled; {advice}"
                 )
-        assert self.specimen is not None  # else there is no drive
-        machine, depth = self.specimen.drive.stiffness, self.specimen.thickness or 1.0
-        own = 0.5 * depth * self.blocks.drive_stiffness  # of both blocks, in series
-        if 0.0 < machine < SOFTEST * own:
-            warn_user(
-                f"specimen.drive.stiffness: {machine:.3g} N/m is {machine / own:.1g} of that of the"
-                f" blocks, {own:.3g} N/m: as good as dead load, 0; check its unit (N/m) if this is"
-                " not intended",
-                UnitWarning,
-            )
 
     def _place_profiles(self) -> list[str]:
         """Put profiles with coordinates of their own on the nodes; return what does not fit."""
@@ -270,7 +258,8 @@ class Problem:
         pressure = self.given_pressure if pressure is None else pressure
         compared = [("strength", strength, "shear modulus", modulus, RIGIDITY)]
         rate, slip = self.friction.weakening_rate, math.inf
-        if rate is not None and (drop := self._mean_drop(strength)) > 0.0:
+        drop = strength - float(np.mean(self.friction.residual(np.array(strength))))
+        if rate is not None and drop > 0.0:
             slip = drop / float(np.median(rate))
         if pressure is not None:
             mean = float(np.mean(pressure))
@@ -302,10 +291,6 @@ class Problem:
             self._warn_if_short(steep)
             if scales is not None:
                 self._check_resolution(steep)
-
-    def _mean_drop(self, strength: float) -> float:
-        """Return how far a strength falls, Pa."""
-        return strength - float(np.mean(self.friction.residual(np.array(strength))))
 
     def _refuse_force(self, pressure: float, coefficient: float, slip: float) -> None:
         """Refuse a normal pressure that makes sense only if it is a force, N, on a known area."""

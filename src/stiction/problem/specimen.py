@@ -29,24 +29,6 @@ Stiffness = Annotated[
 ]
 
 
-def _height(value: Any) -> float:
-    if isinstance(value, list | tuple) or value == math.inf:
-        raise ValueError(
-            "two unlike blocks, or a block on a rigid base, are not modelled: slip would change"
-            " the pressure; give the one height of two equal blocks"
-        )
-    return as_number(value)
-
-
-def _pressing(value: Any) -> Any:
-    if value == "free":
-        raise ValueError(
-            "a free top would let the block tilt and lift off; use 'frictionless' (rollers) or"
-            " 'glued'"
-        )
-    return value
-
-
 @model(kw_only=True)
 class Platen:
     """The top face is glued to a rigid platen that moves along the interface only.
@@ -116,12 +98,10 @@ class Blocks:
     >>> blocks = st.Blocks(height=0.05, thickness=0.006, drive=st.Platen(stiffness=2e7))
     """
 
-    height: Annotated[Positive, BeforeValidator(_height)]
+    height: Positive
     thickness: Positive | None = None
     drive: Annotated[Platen | Pusher, OneOf(DRIVES, _drive)] = Platen()
-    pressing: Annotated[Literal["frictionless", "glued"], BeforeValidator(_pressing)] = (
-        "frictionless"
-    )
+    pressing: Literal["frictionless", "glued"] = "frictionless"
 
     @model_validator(mode="after")
     def _consistent(self) -> Blocks:
