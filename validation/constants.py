@@ -16,9 +16,12 @@ import ast
 import contextlib
 import importlib
 import math
+import multiprocessing
 import sys
 import time
 import warnings
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import numpy as np
@@ -218,19 +221,25 @@ def holders(name, value):
     found, compiled = [], False
     for module in [m for n, m in list(sys.modules.items()) if n.startswith("stiction")]:
         if vars(module).get(name) is value:
-            found.append(module)
+            found.append(module.__name__)
             kernels = [one for one in vars(module).values() if hasattr(one, "py_func")]
             compiled |= any(name in one.py_func.__code__.co_names for one in kernels)
     return found, compiled
 
 
-def main(places, problems, seconds):
-    chosen = [PROBLEMS[name] for name in problems]
-    before, _ = solved(chosen)
-    again, base = solved(chosen)
+def varied(there, name, value, chosen):
+    """Numbers with another value of a constant, and processor seconds; in a process of its own."""
+    for one in there:
+        setattr(sys.modules[one], name, value)
+    return solved([PROBLEMS[one] for one in chosen])
+
+
+def main(places, chosen, seconds):
+    before, _ = solved([PROBLEMS[name] for name in chosen])
+    again, base = solved([PROBLEMS[name] for name in chosen])
     print(f"{base:.1f} s; by itself: {change(again, before)}", flush=True)
     assert not any(":" in name for name in before), [name for name in before if ":" in name]
-    begun, of_kernels = time.monotonic(), []
+    begun, of_kernels, fork = time.monotonic(), [], multiprocessing.get_context("fork")
     for module, name, value in constants(places):
         there, compiled = holders(name, value)
         label = f"{module.__name__.removeprefix('stiction.')}.{name}"
@@ -239,12 +248,13 @@ def main(places, problems, seconds):
             continue
         found = []
         for by in SIZES:
-            for one in there:
-                setattr(one, name, scaled(value, by))
-            values, took = solved(chosen)
-            for one in there:
-                setattr(one, name, value)
-            most, where = change(values, before)
+            with ProcessPoolExecutor(1, mp_context=fork) as pool:
+                other = pool.submit(varied, there, name, scaled(value, by), chosen)
+                try:
+                    values, took = other.result()
+                    most, where = change(values, before)
+                except BrokenProcessPool:
+                    most, where, took = math.inf, "the process died", 0.0
             found.append(f"{most:8.1e} {where:40.40s} {took / base:5.2f}")
         print(f"{label:48s} {value!s:20.20s} | {' | '.join(found)}", flush=True)
         if time.monotonic() - begun > seconds:
