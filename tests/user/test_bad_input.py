@@ -14,7 +14,7 @@ from setups import LENGTH, LOCAL, RATE, SOLID, beta_strength, local_onset, make_
 import stiction as st
 from stiction.elasticity.exponential_sum import fit_exponentials
 from stiction.methods.criterion.local import excess_of
-from stiction.methods.equilibrium.solver import OnsetSolver, follow
+from stiction.methods.equilibrium.solver import follow
 from stiction.reliability import subset
 from stiction.statistics import density, quantiles
 from stiction.theory import energy_release_rate, griffith_length, nucleation_statistics
@@ -293,7 +293,7 @@ def test_errors_of_equilibrium_are_warned_of():
     }
     rows = PROBLEM.sample(np.full((2, PROBLEM.interface.size), 1e6))
     with pytest.warns(st.AccuracyWarning, match="did not close to 1e-09 of it in 1 of 2"):
-        OnsetSolver(PROBLEM, st.Equilibrium())._warn(rows, values, no)
+        st.Equilibrium().prepare(PROBLEM)._warn(rows, values, no)
 
 
 def test_nothing_is_said_where_nothing_is_in_doubt():

@@ -42,7 +42,6 @@ def same(found, expected):
 
 
 test_wrong_options = refusals({
-    "loading_rate: give either loading_rate or load": {},
     "give either loading_rate or load": {"loading_rate": 1e7, "load": ([0.0, 1.0], [0.0, 1e7])},
     "end_time: needed with stop='time'": {"loading_rate": 1e7, "stop": "time"},
     "times must begin at 0 s and increase": {"load": ([0.0, 1.0, 0.5], [0.0, 1e5, 2e6])},

@@ -69,6 +69,7 @@ FORCES: dict[str, tuple[str, str]] = {
     "event_stress": ("event_force", "shear force at the event"),
     "event_stress_drop": ("event_force_drop", "fall of the shear force in the event"),
     "mean_stress": ("force", "shear force"),
+    "machine_stress": ("machine_force", "force of the machine"),
 }  # fmt: skip
 """Mean stresses that are given as forces, too, where the area is known: their names and texts."""
 

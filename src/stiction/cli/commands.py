@@ -421,7 +421,8 @@ def onset(
     rows: dict[str, dict[str, float]] = {}
     refused: list[str] = []
     for name in method or METHODS.usable():
-        options = {"loading_rate": LOADING_RATE} if name == "rupture" else {}
+        timed = name == "rupture" and problem.specimen is None
+        options = {"loading_rate": LOADING_RATE} if timed else {}
         try:
             one = own if own is not None and own.type == name else METHODS[name](**options)
             with Meter(f"onset by {name}"):
@@ -459,7 +460,8 @@ def rupture(
     The strength is a sample of the study (of a sweep, at its first point) or a profile of your
     own, with or without x. The command writes `rupture.nc` (slip, slip rate and stress over time
     and x) and a figure of the slip rate in space and time (PNG and PDF). The loading rate is that
-    of the study's method `rupture`, else 2e7 Pa/s.
+    of the study's method `rupture`, else 2e7 Pa/s. On a specimen it is the event that slides,
+    with a figure of the blocks.
     """
     from stiction import plot
     from stiction.methods.dynamics.method import Rupture
@@ -480,12 +482,14 @@ def rupture(
         problem, method, save = setup.problem, setup.method, setup.save
         profiles = read_profile(strength, interface=problem.interface)
     if not isinstance(method, Rupture):
-        method = Rupture(loading_rate=LOADING_RATE)
+        method = Rupture(loading_rate=None if problem.specimen else LOADING_RATE)
     result = simulate_rupture(problem, profiles, method=method, save=save)
     write_result(result, out / "rupture.nc")
     echo(_summary(result))
     with Meter("drawing the figures"):
         _save_figure(plot.rupture(result, problem=problem), out / "rupture")
+        if problem.specimen is not None:
+            _save_figure(plot.block(result, problem=problem), out / "block")
     if film:
         echo(f"film: {plot.film(result, out / 'rupture.gif')}")
     echo(f"written to {out}")
@@ -494,7 +498,7 @@ def rupture(
 def _summary(result: Any) -> str:
     """Return the numbers of a rupture, one a line, without those that are NaN."""
     lines = []
-    for name in RUPTURE:
+    for name in (one for one in RUPTURE if one in result):
         numbers = [f"{number:.5g}" for number in result[name].values.reshape(-1)]
         if numbers != ["nan"]:
             about = result[name].attrs

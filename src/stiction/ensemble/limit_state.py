@@ -142,7 +142,7 @@ class LimitState:
         """
         experiment, method = self.experiment, self.experiment.method
         specimen = experiment.problem.specimen
-        if method.type == "equilibrium":
+        if method.type == "equilibrium" or (specimen and method.type == "rupture"):
             return not self.may_survive, not self.may_survive
         if method.type == "local_criterion":
             return specimen is None or specimen.drive.stiffness == 0.0, specimen is None

@@ -1,7 +1,8 @@
 """Plots of results.
 
 A plot of one panel draws on `ax`, or on new axes, and returns the axes. A plot of several panels
-(`fit`, `precursors`, `specimen`) returns a figure. `film` writes a file and returns its path.
+(`block`, `fit`, `precursors`, `specimen`) returns a figure. `film` writes a file and returns its
+path.
 
 Units follow the size of what is drawn: mm and µs, or km and s. Where the problem has a normal
 pressure, friction coefficients are drawn too. `axes` and `style` are what all files share;
@@ -15,11 +16,12 @@ from stiction.plot.fields import field
 from stiction.plot.fits import agreement, fit
 from stiction.plot.onsets import onset
 from stiction.plot.ruptures import film, rupture
-from stiction.plot.specimens import force_travel, precursors, specimen
+from stiction.plot.specimens import block, force_travel, precursors, specimen
 from stiction.plot.style import paper_style
 
 __all__ = [
     "agreement",
+    "block",
     "failure_curve",
     "field",
     "film",

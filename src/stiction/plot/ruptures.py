@@ -163,7 +163,7 @@ def _draw_space_time(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
         since, rate = since[near], rate[near]
     factor, unit = unit_for("s", since)
     length, _ = unit_for("m", interface.lengths)
-    along = (np.arange(interface.size + 1) - 0.5) * interface.spacing
+    along = interface.x[0] + (np.arange(interface.size + 1) - 0.5) * interface.spacing
     edges = np.concatenate([since[:1], 0.5 * (since[1:] + since[:-1]), since[-1:]])
     mesh = axes.pcolormesh(
         along * length, edges * factor, rate, norm=norm, cmap=COLORS, rasterized=True

@@ -13,7 +13,7 @@ from stiction.base.model import check
 from stiction.base.units import unit_for
 from stiction.plot.axes import need, on_axes, problem_of, with_unit
 from stiction.plot.fields import rows_of
-from stiction.plot.style import ACCENT, COLUMN, PALE, QUIET, paper_style, series
+from stiction.plot.style import ACCENT, COLUMN, PAGE, PALE, QUIET, paper_style, series
 from stiction.problem.problem import Problem
 from stiction.problem.specimen import Pusher
 
@@ -160,6 +160,57 @@ def force_travel(result: xr.Dataset, *, ax: Axes | None = None) -> Axes:
         text = "force" if name == "force" else "mean stress"
         axes.set(xlabel=with_unit("travel", length_unit), ylabel=with_unit(text, unit))
     return axes
+
+
+def block(run: xr.Dataset, *, problem: Problem | None = None) -> Figure:
+    """Draw how fast both blocks move while an event runs, at some times.
+
+    Parameters
+    ----------
+    run : Dataset
+        From `stiction.simulate_rupture` on a specimen.
+    problem : Problem, optional
+        Needed only if the run does not hold it.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Velocity along the interface, in one scale of colours whose ends are passed by one value in
+        a hundred. Time counts from the first arrival of the front.
+    """
+    import matplotlib.pyplot as plt
+
+    need(run, "block_velocity", hint="; it is kept of specimens")
+    interface = problem_of(run, problem).interface
+    scale, unit = unit_for("m", interface.lengths)
+    velocity = run["block_velocity"].values
+    largest = max(float(np.quantile(np.abs(velocity), 0.99)), 1e-12)
+    since = run["snapshot"].values - float(run["onset_time"].fillna(0.0))
+    factor, time_unit = unit_for("s", since)
+    x, height = interface.x * scale, run["height"].values * scale
+    both = np.concatenate([-height[:0:-1], height])
+    columns = 4 if 2.0 * height[-1] > 0.6 * x[-1] else 2
+    rows = -(-len(since) // columns)
+    high = PAGE / columns * 2.0 * height[-1] / x[-1]
+    with paper_style():
+        figure = plt.figure(
+            figsize=(PAGE * 1.1, rows * (high + 0.3) + 0.3), layout="constrained"
+        )
+        panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+        for axes, time, upper in zip(panels.flat, since, velocity, strict=False):
+            field = np.concatenate([-upper[:0:-1], upper])
+            mesh = axes.pcolormesh(
+                x, both, field, cmap="RdBu_r", vmin=-largest, vmax=largest,
+                shading="gouraud", rasterized=True,
+            )  # fmt: skip
+            axes.axhline(0.0, color="black", linewidth=0.6)
+            axes.set_title(f"{factor * time:.3g} {time_unit}")
+            axes.set_aspect("equal")
+            axes.label_outer()
+        figure.supxlabel(f"position $x$ ({unit})")
+        figure.supylabel(f"height ({unit})")
+        figure.colorbar(mesh, ax=panels, extend="both", label="velocity along $x$ (m/s)")
+    return figure
 
 
 def _event(name: str) -> str:

@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 
 from stiction.base.errors import InputError
 from stiction.base.kinds import Kinds, OneOf
-from stiction.base.model import Mode, Positive, as_number, model
+from stiction.base.model import Mode, Positive, Real, as_number, model
 from stiction.elasticity.blocks import Pushes
 from stiction.elasticity.driven import Driven, driven
 from stiction.problem.solid import Solid
@@ -27,6 +27,10 @@ def _written(value: float) -> Any:
 Stiffness = Annotated[
     float, BeforeValidator(_stiffness), PlainSerializer(_written), Field(ge=0.0)
 ]
+Quality = Annotated[
+    float, BeforeValidator(_stiffness), PlainSerializer(_written), Field(ge=0.01)
+]
+NotNegative = Annotated[Real, Field(ge=0.0)]
 
 
 @model(kw_only=True)
@@ -38,9 +42,13 @@ class Platen:
     stiffness : float
         Of the machine, N/m between the grips of the two blocks: 0 is dead load (the force is
         controlled), ``float("inf")`` a rigid machine (the travel is controlled).
+    mass : float
+        Of what moves with one block, the platen and its grip, kg. It counts in ruptures with
+        inertia only; 0, the default, leaves it out.
     """
 
     stiffness: Stiffness = 0.0
+    mass: NotNegative = 0.0
     type: Literal["platen"] = "platen"
 
 
@@ -59,12 +67,15 @@ class Pusher:
         lap joint, whose bending and change of pressure are not modelled.
     stiffness : float
         Of the machine, N/m between the grips of the two blocks; see `Platen`.
+    mass : float
+        Of what moves with the pushers of one block, kg; see `Platen`.
     """
 
     height: Positive
     width: Positive
     side: Literal["left", "right", "both"] = "left"
     stiffness: Stiffness = 0.0
+    mass: NotNegative = 0.0
     type: Literal["pusher"] = "pusher"
 
 
@@ -91,6 +102,11 @@ class Blocks:
     pressing : {"frictionless", "glued"}
         How the blocks are pressed: by a uniform pressure, or between plates on which the top faces
         do not slide; then ``Load(normal_pressure=...)`` is the mean.
+    quality_factor : float
+        Q of the slowest shear wave along a block, of the frequency f = c_s/(2 L): momentum is lost
+        at the rate 2 pi f/Q, in ruptures with inertia only. 25 is the inverse of the loss tangent
+        of acrylic at some 10 kHz, 0.04; ``float("inf")`` is no attenuation, so that waves echo for
+        ever and an arrested rupture never rests.
 
     Examples
     --------
@@ -102,6 +118,7 @@ class Blocks:
     thickness: Positive | None = None
     drive: Annotated[Platen | Pusher, OneOf(DRIVES, _drive)] = Platen()
     pressing: Literal["frictionless", "glued"] = "frictionless"
+    quality_factor: Quality = 25.0
 
     @model_validator(mode="after")
     def _consistent(self) -> Blocks:
@@ -118,6 +135,10 @@ class Blocks:
             problems.append(
                 "thickness: is needed with a machine's stiffness in N/m; give it, or"
                 " stiffness = 0 (dead load) or inf (rigid)"
+            )
+        if drive.mass and self.thickness is None:
+            problems.append(
+                "thickness: is needed with drive.mass in kg; give it, or leave the mass out"
             )
         if problems:
             raise InputError(problems)

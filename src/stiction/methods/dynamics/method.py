@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
 
 from stiction.base.errors import InputError
-from stiction.base.model import Count, Flag, Positive, Real, model
+from stiction.base.model import Count, Flag, Number, Positive, Real, model
 from stiction.base.variables import Variable
-from stiction.methods.dynamics import checks
+from stiction.methods.dynamics import checks, specimens
 from stiction.methods.dynamics.diagnostics import stress_scale
 from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.loading import load_history, turning_times
@@ -21,7 +21,7 @@ from stiction.methods.dynamics.medium import Medium, prepare_medium
 from stiction.methods.dynamics.slow_start import slow_start, static_program
 from stiction.methods.dynamics.state import History, Nodes, Setting, State, Thresholds
 from stiction.methods.dynamics.summary import scalars, summary
-from stiction.problem.problem import Problem
+from stiction.problem.problem import Problem, refusals
 from stiction.problem.results import onset_variables
 from stiction.problem.sample import Sample, steepest_rate
 
@@ -61,7 +61,7 @@ class Rupture:
     Parameters
     ----------
     loading_rate : float, optional
-        d tau_0/dt, Pa/s, positive. Either this or `load` must be given.
+        d tau_0/dt, Pa/s, positive. Between half-spaces either this or `load` must be given.
     kernel_tolerance : float
         Allowed error (1) of the memory kernel, a sum of exponentials. The sum is fitted once
         for each solid and stored on disk, in 1 s at 1e-6 (22 pairs) or half a minute at 1e-8
@@ -94,7 +94,9 @@ class Rupture:
     implicit : bool
         False takes explicit steps only (slow loading then costs a million steps).
     max_steps : int
-        Number of steps after which a run is abandoned.
+        Number of steps after which a run, or an event on a specimen, is abandoned.
+    events : int
+        Of specimens, also return this number of arrested events, as `Equilibrium` does.
 
     Raises
     ------
@@ -103,9 +105,15 @@ class Rupture:
 
     Notes
     -----
-    An instability is slip that the load does not drive. It begins at a maximum of the mean
-    shear stress after which waves lower it by 1e-4 of the stress scale, not counting any fall
-    of the load itself; at the start where the stress is above the strength.
+    On specimens loading is slow: the path is that of `Equilibrium` up to each instability, from
+    which waves run through the blocks until they are at rest, and the path goes on from there.
+    Of the options `courant`, `arrival`, `max_steps` and `events` count, and the attenuation and
+    masses of the specimen (`Blocks.quality_factor`, `Platen.mass`, `Pusher.mass`). Results are
+    those of `Equilibrium`, and `rupture_speed` and `median_rupture_speed` of the event that slides.
+
+    Between half-spaces, an instability is slip that the load does not drive. It begins at a
+    maximum of the mean shear stress after which waves lower it by 1e-4 of the stress scale, not
+    counting any fall of the load itself; at the start where the stress is above the strength.
     `first_instability` is the mean stress at which the first one begins. The highest one has
     `onset_time`, `critical_position`, `applied_load` (the load factor then) and, if the
     interface slides, `critical_stress` and `critical_load`, the load factor that carries that
@@ -142,6 +150,7 @@ class Rupture:
     start: Start = "equilibrium"
     stop: Stop = "sliding"
     max_steps: Count = 5_000_000
+    events: Number = 0
     type: Literal["rupture"] = "rupture"
     # Combinations that `Problem.sample` may let through.
     accepts: ClassVar[tuple[str, ...]] = ("barriers", "overstress")
@@ -150,8 +159,8 @@ class Rupture:
     @pydantic.model_validator(mode="after")
     def _consistent(self) -> Rupture:
         problems = []
-        if (self.loading_rate is None) == (self.load is None):
-            problems.append("loading_rate: give either loading_rate or load")
+        if self.loading_rate is not None and self.load is not None:
+            problems.append("loading_rate: give either loading_rate or load, not both")
         if self.stop == "time" and self.end_time is None:
             problems.append("end_time: needed with stop='time', got None")
         if problems:
@@ -161,6 +170,9 @@ class Rupture:
     def seconds_per_sample(self, problem: Problem) -> float:
         """Return the approximate time of a sample on one core, s."""
         shape = problem.interface.shape
+        if problem.specimen is not None:
+            drive = problem.specimen.drive
+            return (0.02 if drive.type == "platen" else 0.3) * (shape[0] / 128) ** 2
         if len(shape) == 1:
             usual = 0.1 if self.start == "rest" else 0.05
             return 8e-3 + usual * (shape[0] / 1024) ** 2
@@ -169,15 +181,19 @@ class Rupture:
 
     def supports(self, problem: Problem) -> list[str]:
         """Return the reasons why the method cannot solve a problem; none if it can."""
-        if problem.specimen is None:
-            return []
-        return [
-            "problem.specimen: ruptures run between half-spaces, and waves that return from the"
-            " faces of blocks are not modelled; use st.Equilibrium(), which arrests without inertia"
-        ]
+        if problem.specimen is not None:
+            return specimens.refusals(self, problem)
+        reasons = []
+        if self.loading_rate is None and self.load is None:
+            reasons.append("loading_rate: give either loading_rate or load")
+        if self.events:
+            reasons.append("events: only those of specimens are known one by one; leave it out")
+        return reasons
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
         """Return the variables that the solver computes for each sample."""
+        if problem.specimen is not None:
+            return specimens.variables(self, problem)
         return onset_variables(problem.interface) | scalars(problem.interface)
 
     def medium(self, problem: Problem) -> Medium:
@@ -186,6 +202,8 @@ class Rupture:
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, NDArray[Any]]]:
         """Return a solver for samples of this problem, with its kernel fitted once."""
+        if problem.specimen is not None:
+            return specimens.RuptureSolver(problem, self.events, self.program(problem))
         medium, rate = self.medium(problem), self.loading_rate
         from_equilibrium = self.start == "equilibrium" and self.implicit and rate is not None
         static = static_program(problem) if from_equilibrium else None
@@ -202,6 +220,12 @@ class Rupture:
             return {name: np.array([one[name] for one in found]) for name in names}
 
         return solve
+
+    def program(self, problem: Problem) -> specimens.RuptureProgram:
+        """Return what finds equilibria of a specimen, with waves between them."""
+        if reasons := refusals(problem, self):
+            raise InputError(reasons)
+        return specimens.RuptureProgram(problem, self)
 
     def _one(self, run: Run, state: State | None) -> dict[str, Any]:
         rest = checks.at_first_slip(run)

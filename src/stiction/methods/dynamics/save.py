@@ -42,7 +42,7 @@ FIELDS = _over(
     shear_stress=("Pa", "shear stress on the interface"),
     strength=("Pa", "current strength"),
 )
-SCALARS = _over(
+SCALARS: dict[str, Variable] = _over(
     "time",
     load=("Pa", "load factor tau_0"),
     mean_stress=("Pa", "mean shear stress on the interface"),

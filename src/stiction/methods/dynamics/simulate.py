@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stiction.base.errors import InputError, warn_accuracy
-from stiction.base.model import Progress, checked
+from stiction.base.model import Number, Progress, checked
 from stiction.base.progress import Meter
 from stiction.base.variables import Variable
 from stiction.methods.dynamics import checks
 from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.method import Rupture, make_run
 from stiction.methods.dynamics.save import SCALARS, Recorder, Save, open_rupture
+from stiction.methods.dynamics.simulate_event import simulate_event
 from stiction.methods.dynamics.state import State
 from stiction.methods.dynamics.summary import summary
 from stiction.problem.problem import Problem, refusals
@@ -37,9 +38,12 @@ def simulate_rupture(
     *,
     method: Rupture,
     save: Save | None = None,
+    event: Number | None = None,
     progress: Progress = True,
 ) -> xr.Dataset:
     """Simulate one interface from its first slip to global sliding, in space and time.
+
+    On a specimen, one of its events: from an unstable equilibrium until all is at rest.
 
     Parameters
     ----------
@@ -54,6 +58,8 @@ def simulate_rupture(
     save : Save, optional
         Results to keep and where to store them: by default slip, slip rate and shear stress
         every ten explicit steps, in memory.
+    event : int, optional
+        On specimens, the number of the event in its order, from 0; by default the one that slides.
     progress : bool or callable
         True shows progress on standard error after two seconds; a callable gets the steps taken
         and 0.
@@ -67,6 +73,11 @@ def simulate_rupture(
         `station_slip_rate` and `station_shear_stress`, and `station_x` (and `station_y`), where
         their nodes are; over 'x' `peak_strength` and `arrival_time`; and the scalars of
         `Rupture` for the run so far. The attribute `stopped` is the reason why it ended.
+
+        On a specimen, over 'time' also `machine_stress` (with a thickness `machine_force`, N),
+        `drive_travel` and energies of their own, from the stress at which the event began; and
+        `block_velocity` over ('snapshot', 'height', 'x'), m/s along x in the upper block at a few
+        times. The lower block is its mirror image and moves the other way. There is no 'step'.
 
     Raises
     ------
@@ -91,6 +102,15 @@ def simulate_rupture(
     rows, measured = problem.placed_sample(profiles, method.accepts)
     if rows.samples != 1:
         raise InputError(f"profiles: one sample at a time, got {rows.samples}")
+    if problem.specimen is not None:
+        problem.doubt(rows)
+        return with_gaps(
+            problem, simulate_event(problem, rows, method, save, event, progress), measured
+        )
+    if event is not None:
+        raise InputError(
+            "event: is of specimens only, whose events are one by one; leave it out"
+        )
     stations = save.nodes(problem.interface)
     problem.doubt(rows)
     checks.warn_if_coarse(problem, rows)

@@ -12,6 +12,10 @@ from stiction.methods.dynamics.state import Floats, State
 from stiction.problem.interface import Interface
 from stiction.problem.results import position
 
+SPEEDS: dict[str, Variable] = {
+    "rupture_speed": Variable("m/s", "largest apparent speed of the front over 2 h_n"),
+    "median_rupture_speed": Variable("m/s", "median apparent speed of the front over h_n/2"),
+}
 _SCALARS: dict[str, Variable] = {
     "applied_load": Variable("Pa", "load factor applied at the onset"),
     "onset_time": Variable("s", "time from zero load to the onset"),
@@ -21,8 +25,7 @@ _SCALARS: dict[str, Variable] = {
     "radiated_energy": Variable("J/m", "energy radiated up to the end of the run"),
     "fracture_energy": Variable("J/m", "energy dissipated above the residual strength"),
     "arrested_events": Variable("1", "instabilities that stopped before global sliding"),
-    "rupture_speed": Variable("m/s", "largest apparent speed of the front over 2 h_n"),
-    "median_rupture_speed": Variable("m/s", "median apparent speed of the front over h_n/2"),
+    **SPEEDS,
     "start_load": Variable("Pa", "load factor at which the simulation began"),
     "start_error": Variable("Pa", "estimated error of the onset due to the start; 0 from rest"),
     "implicit_steps": Variable("1", "implicit steps taken"),

@@ -10,7 +10,7 @@ from pydantic import Field
 from stiction.base.model import Flag, Number, Real, model
 from stiction.base.variables import Variable
 from stiction.methods.equilibrium.sample import pieces_of, refused
-from stiction.methods.equilibrium.solver import OnsetSolver, event_variables
+from stiction.methods.equilibrium.solver import OnsetSolver, event_variables, make_program
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, onset_variables, position
 from stiction.problem.sample import Sample
@@ -145,4 +145,4 @@ class Equilibrium:
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, NDArray[Any]]]:
         """Return a solver for samples of this problem."""
-        return OnsetSolver(problem, self)
+        return OnsetSolver(problem, self, make_program(problem, self.gap))

@@ -55,7 +55,9 @@ def _check_loads(loads: Any) -> Array:
     return given
 
 
-def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
+def equilibrium_path(
+    problem: Problem, profiles: Any, loads: Any, *, method: Any = None
+) -> xr.Dataset:
     """Return slip and stress of one interface at rising loads, and its arrested events.
 
     Patches grow, merge and become unstable; an instability that comes to rest is an event.
@@ -67,6 +69,8 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
         Peak strength (Pa) of one sample, or several profiles by name, as in `onset`.
     loads : (loads,) array
         Load factors tau_0, rising, Pa.
+    method : Rupture, optional
+        On a specimen, lets its events run with inertia.
 
     Returns
     -------
@@ -98,7 +102,8 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
     Notes
     -----
     A patch jumps to the least equilibrium at the same load: an overdamped interface would stop
-    there. Inertia may carry a rupture through; only `Rupture` decides that.
+    there. Inertia may carry a rupture through; only `Rupture` decides that, and on specimens can
+    be given as the method.
 
     Examples
     --------
@@ -111,13 +116,15 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
     """
     given = _check_loads(loads)
     check("problem", problem, Problem)
+    if method is not None and (problem.specimen is None or not hasattr(method, "program")):
+        raise InputError("method: leave it out, or give st.Rupture() for a specimen")
     rows = problem.sample(profiles)
     if rows.samples != 1:
         raise InputError(f"profiles: must be one sample, got {rows.samples}")
     problem.doubt(rows)
     interface = problem.interface
     check_memory("loads", 16.0 * given.size * interface.size)
-    program = make_program(problem, GAP)
+    program = make_program(problem, GAP) if method is None else method.program(problem)
     warn_of_signs(problem)
     sample = sample_of(rows, program.pieces, 0)
     whole = follow(program, sample)
@@ -168,5 +175,5 @@ def equilibrium_path(problem: Problem, profiles: Any, loads: Any) -> xr.Dataset:
         values |= forces(values, problem.area)
         variables |= force_variables(variables)
     coordinates = {"load": (given, LOAD), "event": (np.arange(len(passed)), EVENT)}
-    attributes = study_attributes(problem=problem)
+    attributes = study_attributes(problem=problem, **({"method": method} if method else {}))
     return to_dataset(values, variables, coordinates, attributes, interface)

@@ -203,9 +203,8 @@ def warn_of_signs(problem: Problem) -> None:
 class OnsetSolver:
     """Solves samples of a problem with options of `Equilibrium`; safe in several threads."""
 
-    def __init__(self, problem: Problem, options: Any) -> None:
-        self.problem, self.options = problem, options
-        self.program = make_program(problem, options.gap)
+    def __init__(self, problem: Problem, options: Any, program: Program) -> None:
+        self.problem, self.options, self.program = problem, options, program
 
     def __call__(self, rows: Sample) -> dict[str, NDArray[Any]]:
         """Return the onset of each sample; see `Equilibrium`."""

@@ -1,0 +1,214 @@
+"""simulate_rupture on specimens: one event in space and time, and the block while it runs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from stiction.base.errors import InputError
+from stiction.base.progress import Meter, Show
+from stiction.base.variables import Variable, force_variables, forces
+from stiction.methods.dynamics.event import Event
+from stiction.methods.dynamics.mesh import layer_matrix
+from stiction.methods.dynamics.save import FIELDS, SCALARS, TIME, Save
+from stiction.methods.dynamics.specimens import RuptureProgram, front_speeds, refuse_barriers
+from stiction.methods.dynamics.summary import SPEEDS
+from stiction.methods.dynamics.waves import FORCE, FRICTION, SPEED, TRAVEL
+from stiction.methods.dynamics.waves import TIME as NOW
+from stiction.methods.equilibrium.sample import present_pieces, residual_nodes, sample_of
+from stiction.methods.equilibrium.solver import follow, relief_of
+from stiction.problem.problem import Problem
+from stiction.problem.results import along, study_attributes, to_dataset
+from stiction.problem.sample import Sample
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SNAPSHOTS = 8
+"""Times at which the whole block is kept."""
+MOST = (0.01, 0.99)
+"""Shares of the slip of an event between which they lie."""
+OVER_TIME: dict[str, Variable] = {
+    name: SCALARS[name]
+    for name in ("load", "mean_stress", "mean_slip", "top_slip_rate", "weakened_fraction")
+} | {
+    "machine_stress": Variable("Pa", "force of the machine over the interface", ("time",)),
+    "drive_travel": Variable("m", "travel of both drives since the event began", ("time",)),
+    "work": Variable("J/m", "work of the stress before the event on the slip", ("time",)),
+    "friction_energy": Variable("J/m", "energy lost to friction", ("time",)),
+    "strain_energy": Variable(
+        "J/m", "strain energy of what changed, and the machine's", ("time",)
+    ),
+    "kinetic_energy": Variable("J/m", "kinetic energy of blocks and drives", ("time",)),
+    "attenuated_energy": Variable(
+        "J/m", "work less all of these: lost to attenuation", ("time",)
+    ),
+}
+WHOLE: dict[str, Variable] = {
+    "critical_load": Variable("Pa", "drive of the event", ()),
+    "critical_position": Variable("m", "position at which the front arrives first", ()),
+    "onset_time": Variable("s", "time at which the front arrives first", ()),
+    **{name: Variable(one.units, one.long_name, ()) for name, one in SPEEDS.items()},
+}
+BLOCK = ("snapshot", "height", "x")
+
+
+def simulate_event(
+    problem: Problem, rows: Sample, method: Any, save: Save, number: int | None, progress: Show
+) -> xr.Dataset:
+    """Return one event of a specimen over time, by default the one that slides."""
+    if save.to is not None or save.stations:
+        raise InputError(
+            "save: an event on a specimen is short, and kept in memory with all nodes; leave 'to'"
+            " and 'stations' out, and take every = 1 for each step"
+        )
+    refuse_barriers(rows)
+    program: RuptureProgram = method.program(problem)
+    sample = sample_of(rows, program.pieces, 0)
+    with Meter("rupture", show=progress, unit="events") as meter:
+        path = follow(program, sample)
+        states = [event.before for event in path.events]
+        states += [path.last] if path.last.unstable else []
+        meter.advance(len(states))
+        if not states or (number or 0) >= len(states):
+            raise InputError(
+                f"event: there are {len(states)} here, counted from 0; got {number}"
+            )
+        before = states[-1 if number is None else number]
+        trial = program.event(sample, before)
+        trial.run(method.max_steps)
+        steps = trial.steps + (trial.mesh.window // 2 if trial.slides else 0)
+        record = Record(problem, rows, program.event(sample, before), save)
+        record.add()
+        for _ in range(0, steps, save.every):
+            record.event.advance(save.every, ends=False)
+            record.add()
+        record.blocks = snapshots(program.event(sample, before), record)
+    return record.dataset(method, "sliding" if trial.slides else "rest")
+
+
+def snapshots(event: Event, record: Record) -> list[tuple[float, Any]]:
+    """Return times and how fast the upper block moves along the interface then.
+
+    Evenly while most of the slip happens.
+    """
+    slip = np.array([frame["mean_slip"] for frame in record.frames])
+    done = (slip - slip[0]) / max(slip[-1] - slip[0], 1e-300)
+    first, last = (int(np.argmax(done >= share)) * record.save.every for share in MOST)
+    found = []
+    for stop in np.linspace(first, last + 1, SNAPSHOTS).astype(int):
+        event.advance(int(stop) - event.steps, ends=False)
+        found.append((event.waves.now[NOW], event.waves.u_rate.copy()))
+    return found
+
+
+class Record:
+    """What was kept of an event so far."""
+
+    def __init__(self, problem: Problem, rows: Sample, event: Event, save: Save) -> None:
+        self.problem, self.rows, self.event, self.save = problem, rows, event, save
+        self.frames: list[dict[str, Any]] = []
+        self.blocks: list[tuple[float, Any]] = []
+        nodes = problem.interface.size
+        count = event.mesh.heights.size - 1
+        self._layers = [layer_matrix(event.mesh, row, nodes) for row in range(count)]
+        self._begun = event.waves.slip.copy()
+
+    def add(self) -> None:
+        """Keep the state as it is now."""
+        problem, waves, sample = self.problem, self.event.waves, self.event.sample
+        initial, load = self.rows.initial_stress[0], self.event.before.load
+        pieces = present_pieces(sample, waves.slip)
+        held = initial.mean() + (load - relief_of(problem, self.event.before.slip))
+        fields = {
+            "slip": waves.slip.copy(),
+            "slip_rate": waves.slip_rate.copy(),
+            "shear_stress": (waves.stress if self.frames else self.event.start) + initial,
+            "strength": pieces.strength - pieces.rate * waves.slip + initial,
+        }
+        self.frames.append(
+            {name: fields[name] for name in self.save.fields}
+            | self._energies()
+            | {
+                "time": waves.now[NOW],
+                "load": load,
+                "mean_stress": fields["shear_stress"].mean(),
+                "mean_slip": waves.slip.mean(),
+                "top_slip_rate": waves.slip_rate.max(),
+                "weakened_fraction": residual_nodes(sample, waves.slip).mean(),
+                "machine_stress": held + waves.now[FORCE] / problem.interface.extent,
+                "drive_travel": 2.0 * waves.now[TRAVEL],
+            }
+        )
+
+    def _energies(self) -> dict[str, float]:
+        """Energies of both blocks, J/m, in the middle of the last step, where rates are known."""
+        mesh, waves = self.event.mesh, self.event.waves
+        rates = np.hstack([waves.u_rate, waves.v_rate]).astype(float)
+        lag = mesh.viscous_time + 0.5 * mesh.step
+        w = np.hstack([waves.u, waves.v]).astype(float) - lag * rates
+        strain = 0.0
+        for row, matrix in enumerate(self._layers):
+            both = np.concatenate([w[row], w[row + 1]])
+            strain += float(both @ (matrix @ both))
+        added = waves.slip - self._begun - 0.5 * mesh.step * waves.slip_rate
+        strain += 0.5 * mesh.spacing * float(added @ (mesh.correction @ added))
+        speed = waves.now[SPEED]
+        if np.isfinite(mesh.stiffness):
+            strain += mesh.stiffness * (waves.now[TRAVEL] - 0.5 * mesh.step * speed) ** 2
+        kinetic = (mesh.mass[:, None] * rates**2).sum() + mesh.drive_mass * speed**2
+        work = mesh.spacing * self.event.start @ added
+        friction = 2.0 * waves.now[FRICTION]
+        return {
+            "work": work,
+            "friction_energy": friction,
+            "strain_energy": strain,
+            "kinetic_energy": kinetic,
+            "attenuated_energy": work - friction - strain - kinetic,
+        }
+
+    def dataset(self, method: Any, stopped: str) -> xr.Dataset:
+        """Return what was kept, labelled."""
+        problem, interface = self.problem, self.problem.interface
+        arrival = self.event.waves.arrival
+        reached = bool(np.isfinite(arrival).any())
+        first = (
+            int(np.nanargmin(arrival)) if reached else int(self.event.before.direction.argmax())
+        )
+        values: dict[str, Any] = {
+            name: np.array([frame[name] for frame in self.frames]) for name in self.frames[0]
+        }
+        time = values.pop("time")
+        values |= {
+            "peak_strength": self.rows.strength[0],
+            "arrival_time": arrival,
+            "block_velocity": np.array([rates for _, rates in self.blocks]),
+            "critical_load": self.event.before.load,
+            "critical_position": interface.x[first],
+            "onset_time": arrival[first] if reached else np.nan,
+            **front_speeds(problem, self.rows.steepest_rate, self.event),
+        }
+        variables = {name: along(interface, FIELDS[name]) for name in self.save.fields}
+        variables |= OVER_TIME | WHOLE
+        variables |= {
+            "peak_strength": Variable("Pa", "peak strength tau_p", ("x",)),
+            "arrival_time": Variable("s", "arrival time of the front", ("x",)),
+            "block_velocity": Variable("m/s", "velocity along x in the upper block", BLOCK),
+        }
+        if problem.area is not None:
+            values |= forces(values, problem.area)
+            variables |= force_variables(variables)
+        coordinates = {
+            "time": (time, TIME),
+            "snapshot": (
+                np.array([at for at, _ in self.blocks]),
+                Variable("s", "time of a picture of the block", ("snapshot",)),
+            ),
+            "height": (
+                self.event.mesh.heights,
+                Variable("m", "height above the interface", ("height",)),
+            ),
+        }
+        attributes = study_attributes(problem=problem, method=method) | {"stopped": stopped}
+        return to_dataset(values, variables, coordinates, attributes, interface)

@@ -1,0 +1,143 @@
+"""Ruptures with inertia on specimens, as a user asks for them."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pydantic
+import pytest
+from refusals import refusals
+from specimens import crooked, rough
+
+import stiction as st
+from stiction.base.model import to_plain
+from stiction.methods.dynamics.specimens import RuptureProgram
+from stiction.methods.equilibrium.sample import present_pieces, sample_of
+from stiction.methods.equilibrium.solver import follow, make_program
+
+LOW = st.Pusher(height=0.006, width=0.004, stiffness=3e7)
+SPECIMEN = crooked(nodes=64, drive=LOW)
+STRENGTH = rough(SPECIMEN, 3)
+DRIVES = [
+    LOW,
+    st.Pusher(height=0.012, width=0.005),
+    st.Platen(stiffness=2e7, mass=0.1),
+    st.Pusher(height=0.01, width=0.004, side="both", stiffness=float("inf")),
+]
+
+
+@pytest.fixture(scope="module")
+def run():
+    """An event that comes to rest, at every tenth step."""
+    save = st.Save(["slip", "slip_rate", "shear_stress", "strength"])
+    return st.simulate_rupture(SPECIMEN, STRENGTH, method=st.Rupture(), event=0, save=save)
+
+
+@pytest.mark.parametrize("drive", DRIVES)
+def test_no_event_is_shorter_than_without_inertia_and_each_ends_in_equilibrium(drive):
+    problem = crooked(nodes=64, drive=drive)
+    program, overdamped = RuptureProgram(problem, st.Rupture()), make_program(problem)
+    for strength in rough(problem, 5, samples=4):
+        sample = sample_of(problem.sample(strength), program.pieces, 0)
+        for before, after in follow(program, sample).events:
+            least = overdamped.jump(sample, before)
+            assert least.arrested
+            assert np.all(after.slip >= least.state.slip - 1e-6 * after.slip.max())
+            pieces = present_pieces(sample, after.slip)
+            load = before.load * sample.profile - problem.blocks.stiffness @ after.slip
+            over = load - (pieces.strength - pieces.rate * after.slip)
+            assert over.max() < 1e-9 * sample.excess.max()
+
+
+def test_an_ensemble_a_path_and_a_probability_rest_on_it():
+    method = st.Rupture(events=2)
+    field = st.RandomField(
+        st.Beta(alpha=1.5, beta=3.0, low=0.68e6, high=1.61e6),
+        st.PowerLawSpectrum(correlation_length=4e-3),
+    )
+    found = st.monte_carlo(SPECIMEN, field, method=method, samples=3, progress=False)
+    onset = st.onset(SPECIMEN, rough(SPECIMEN, 0, samples=3), method=method)
+    assert np.array_equal(found["critical_force"], onset["critical_force"])
+    assert found["event_stress_drop"].sizes["event"] == 2
+    assert '"quality_factor": 25.0' in found.attrs["study"]
+    path = st.equilibrium_path(SPECIMEN, STRENGTH, [0.2e6, 3e6], method=method)
+    assert list(path["sliding"].values) == [False, True]
+    assert path.sizes["event"] > 0
+    failure = st.failure_probability(
+        crooked(nodes=64), field, method=st.Rupture(), stress=0.6e6, algorithm="plain",
+        max_evaluations=100, progress=False,
+    )  # fmt: skip
+    assert 0.0 <= failure.probability <= 1.0
+
+
+def test_attenuation_and_mass_are_written_down_with_the_problem():
+    problem = crooked(drive=st.Platen(mass=0.3))
+    problem = dataclasses.replace(
+        problem, specimen=dataclasses.replace(problem.specimen, quality_factor=float("inf"))
+    )
+    written = to_plain(problem)
+    assert written["specimen"]["quality_factor"] == "inf"
+    assert written["specimen"]["drive"]["mass"] == 0.3
+    assert (
+        pydantic.TypeAdapter(st.Problem).validate_python(written).specimen == problem.specimen
+    )
+
+
+def test_one_event_in_space_and_time(run):
+    energies = [
+        "friction_energy", "strain_energy", "kinetic_energy", "attenuated_energy",
+    ]  # fmt: skip
+    assert sum(run[name] for name in energies).values == pytest.approx(run["work"].values)
+    assert run.attrs["stopped"] == "rest"
+    assert run["attenuated_energy"].values[-1] > 0.0
+    assert np.all(np.diff(run["slip"].values, axis=0) >= 0.0)
+    over = run["shear_stress"] - run["strength"]
+    assert over.values[1:].max() < 0.02 * float(run["peak_strength"].mean())
+    assert run["machine_force"].values[0] == pytest.approx(run["force"].values[0], rel=1e-3)
+    assert run["block_velocity"].dims == ("snapshot", "height", "x")
+
+
+def test_its_pictures(run, tmp_path):
+    assert len(st.plot.block(run).axes) == 9
+    assert st.plot.rupture(run).get_ylabel().startswith("time")
+    assert st.plot.film(run, tmp_path / "event.gif", frames=3, progress=False).exists()
+
+
+def simulate(**options):
+    given = {"problem": SPECIMEN, "profiles": STRENGTH, "method": st.Rupture()}
+    return st.simulate_rupture(**given | options)
+
+
+test_what_means_nothing_is_refused_by_name = refusals({
+    "loading_rate: means nothing on a specimen": {"method": st.Rupture(loading_rate=1e8)},
+    "start: means nothing on a specimen": {"method": st.Rupture(start="rest")},
+    "stop: means nothing on a specimen": {"method": st.Rupture(stop="rest")},
+    "friction: equilibria are followed along straight pieces": {
+        "problem": dataclasses.replace(
+            SPECIMEN, friction=st.ExponentialWeakening(weakening_rate=1e11, residual_strength=5e5)
+        )
+    },
+    "save: an event on a specimen is short": {"save": st.Save(to="run")},
+    "event: there are": {"event": 1000},
+    "max_steps: an event has not come to rest": {"method": st.Rupture(max_steps=1)},
+    "strength: barriers that never break": {
+        "profiles": np.where(STRENGTH > 1.2e6, np.inf, STRENGTH)
+    },
+    "initial_stress: is above the strength": {
+        "profiles": {"strength": STRENGTH, "initial_stress": STRENGTH + 1.0}
+    },
+}, simulate)  # fmt: skip
+test_what_specimens_do_not_take = refusals({
+    "thickness: is needed with drive.mass": {"drive": st.Platen(mass=1.0)},
+    "drive.mass": {"drive": {"type": "platen", "mass": -1.0}},
+    "quality_factor": {"quality_factor": 0.0},
+}, lambda **options: st.Blocks(**{"height": 0.05} | options))  # fmt: skip
+
+
+def test_half_spaces_need_a_load_and_have_no_numbered_events():
+    line = st.Problem(SPECIMEN.solid, st.Interface(0.1, 128), SPECIMEN.friction)
+    with pytest.raises(st.InputError, match="give either loading_rate or load"):
+        st.onset(line, np.full(128, 1e6), method=st.Rupture())
+    with pytest.raises(st.InputError, match="events: only those of specimens"):
+        st.onset(line, np.full(128, 1e6), method=st.Rupture(loading_rate=1e8, events=1))

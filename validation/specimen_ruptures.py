@@ -1,0 +1,115 @@
+"""Ruptures with inertia on specimens beside overdamped ones: events, static friction, trends.
+
+    python validation/specimen_ruptures.py [--samples 24] [--nodes 256]
+
+For each drive, random strengths as in the example of docs/specimens.md. Every instability of the
+path with inertia is also let come to rest overdamped, from the same state. Printed are the events,
+how many of them are shorter with inertia, how many run through all of the interface though
+overdamped ones rest, static friction, front speeds, and where the first events end.
+"""
+
+import argparse
+import time
+
+import numpy as np
+
+import stiction as st
+from stiction.methods.dynamics.specimens import RuptureProgram, front_speeds
+from stiction.methods.equilibrium.sample import sample_of
+from stiction.methods.equilibrium.solver import follow, make_program
+
+MACHINE = 2e7
+DRIVES = {
+    "platen, dead load": st.Platen(),
+    "platen, machine": st.Platen(stiffness=MACHINE),
+    "platen of 0.5 kg, machine": st.Platen(stiffness=MACHINE, mass=0.5),
+    "pusher at H/2, machine": st.Pusher(height=0.025, width=0.005, stiffness=MACHINE),
+    "pusher at H/5, machine": st.Pusher(height=0.01, width=0.004, stiffness=MACHINE),
+    "pusher at H/10, machine": st.Pusher(height=0.005, width=0.002, stiffness=MACHINE),
+}
+STRENGTH = st.RandomField(
+    st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
+    st.PowerLawSpectrum(correlation_length=1.75e-3),
+)
+
+
+def problem_with(drive: st.Platen | st.Pusher, nodes: int, quality: float) -> st.Problem:
+    """Return the specimen with a drive."""
+    return st.Problem(
+        solid=st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress"),
+        interface=st.Interface(length=0.1, nodes=nodes),
+        friction=st.LinearWeakening(weakening_rate=0.2e12, residual_strength=0.5e6),
+        specimen=st.Blocks(height=0.05, thickness=0.006, drive=drive, quality_factor=quality),
+    )
+
+
+def compared(problem: st.Problem, samples: int) -> dict[str, list[float]]:
+    """Return what is compared, a number for each event or each sample."""
+    program, overdamped = RuptureProgram(problem, st.Rupture()), make_program(problem)
+    names = ["shorter", "through", "drop", "seconds", "speed", "stress", "end", "count"]
+    found: dict[str, list[float]] = {name: [] for name in names}
+    for strength in STRENGTH.sample(problem.interface, samples=samples, seed=1):
+        rows = problem.sample(strength)
+        sample = sample_of(rows, program.pieces, 0)
+        began = time.process_time()
+        path = follow(program, sample)
+        found["seconds"].append(time.process_time() - began)
+        found["count"].append(len(path.events))
+        found["drop"].append(path.peak / follow(overdamped, sample).peak - 1.0)
+        states = [(event.before, event.after) for event in path.events]
+        for before, after in [*states, (path.last, None)]:
+            if not before.unstable:
+                continue
+            least = overdamped.jump(sample, before)
+            if after is None:
+                found["through"].append(float(least.arrested))
+            else:
+                short = (least.state.slip - after.slip).max() > 1e-6 * after.slip.max()
+                found["shorter"].append(float(short or not least.arrested))
+                found["through"].append(0.0)
+            event = program.event(sample, before)
+            event.run(program.max_steps)
+            speed = front_speeds(problem, rows.steepest_rate, event)["median_rupture_speed"]
+            if np.isfinite(speed):
+                found["speed"].append(speed / problem.solid.rayleigh_wave_speed)
+                found["stress"].append(float(event.start.mean()))
+        if path.events:
+            slid = path.events[0].after.slip > 0.0
+            found["end"].append(float(np.flatnonzero(slid)[-1] + 1) / problem.interface.size)
+    return found
+
+
+def report(name: str, problem: st.Problem, samples: int) -> None:
+    """Print a line of the table."""
+    found = {key: np.array(values) for key, values in compared(problem, samples).items()}
+    speed, drop = found["speed"], 100.0 * found["drop"]
+    low, high = np.quantile(speed, [0.1, 0.9]) if speed.size else (np.nan, np.nan)
+    trend = np.corrcoef(speed, found["stress"])[0, 1] if speed.size > 4 else np.nan
+    end = 100.0 * found["end"].mean() if found["end"].size else np.nan
+    print(
+        f"{name}: {found['through'].size} events, {int(found['shorter'].sum())} shorter with"
+        f" inertia, {int(found['through'].sum())} run through though overdamped ones rest;"
+        f" static friction {drop.mean():+.2f} % ({drop.min():+.2f} to {drop.max():+.2f});"
+        f" {found['count'].mean():.1f} precursors a sample, the first ends at {end:.0f} %;"
+        f" {speed.size} front speeds {low:.2f} to {high:.2f} c_R, correlation with the stress"
+        f" {trend:.2f}; {found['seconds'].mean():.2f} s a sample",
+        flush=True,
+    )
+
+
+def main() -> None:
+    """Print the table, and what attenuation changes."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--samples", type=int, default=24)
+    parser.add_argument("--nodes", type=int, default=256)
+    given = parser.parse_args()
+    for name, drive in DRIVES.items():
+        report(name, problem_with(drive, given.nodes, 25.0), given.samples)
+    for quality in (6.0, 12.5, 50.0, float("inf")):
+        for name in ("platen, machine", "pusher at H/5, machine"):
+            problem = problem_with(DRIVES[name], given.nodes, quality)
+            report(f"Q = {quality:g}, {name}", problem, given.samples)
+
+
+if __name__ == "__main__":
+    main()
