@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 SNAPSHOTS = 8
 """Times at which the whole block is kept."""
-MOST = (0.01, 0.99)
+MOST = (0.01, 0.95)
 """Shares of the slip of an event between which they lie."""
 OVER_TIME: dict[str, Variable] = {
     name: SCALARS[name]
