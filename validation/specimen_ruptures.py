@@ -61,14 +61,13 @@ def compared(problem: st.Problem, samples: int) -> dict[str, list[float]]:
             if not before.unstable:
                 continue
             least = overdamped.jump(sample, before)
-            if after is None:
-                found["through"].append(float(least.arrested))
-            else:
-                short = (least.state.slip - after.slip).max() > 1e-6 * after.slip.max()
-                found["shorter"].append(float(short or not least.arrested))
-                found["through"].append(0.0)
             event = program.event(sample, before)
             event.run(program.max_steps)
+            found["through"].append(float(least.arrested and after is None))
+            if after is not None:  # as the waves leave it, before the rest comes to rest
+                short = least.state.slip - event.waves.slip
+                added = (event.waves.slip - before.slip).max()
+                found["shorter"].append(float(short.max() > 1e-3 * added or not least.arrested))
             speed = front_speeds(problem, rows.steepest_rate, event)["median_rupture_speed"]
             if np.isfinite(speed):
                 found["speed"].append(speed / problem.solid.rayleigh_wave_speed)
