@@ -12,11 +12,11 @@ from stiction.base.progress import SILENT
 from stiction.inference.density import log_likelihoods, tabulate
 from stiction.inference.grid import grid_of
 from stiction.inference.likelihood import (
+    effective_samples,
     experiments_at,
     make_likelihood,
     moved,
     simulate,
-    worth_of,
 )
 from stiction.inference.prior import make_prior
 from stiction.inference.scaling import find_scaling
@@ -246,7 +246,9 @@ def test_onsets_moved_to_another_method_are_worth_what_they_say(alike):
         means.append(moved(many, few, many[:, :100], *ONE).mean())
     assert np.mean(means) == pytest.approx(0.7e6, abs=4.0 * np.std(means) / 20)
     # 400 campaigns know a variance to 7 %; that of quantiles is 2/(1 + alike) of that of a mean.
-    assert worth_of(alike, 1000, 100) == pytest.approx((2e4 / np.std(means)) ** 2, rel=0.3)
+    assert effective_samples(alike, 1000, 100) == pytest.approx(
+        (2e4 / np.std(means)) ** 2, rel=0.3
+    )
 
 
 def test_grid_against_a_sum_by_hand():

@@ -405,7 +405,7 @@ test_refused = refusals(
         "thickness": lambda: st.Blocks(height=0.05, drive=st.Platen(stiffness=2e7)),
         "blocks meet on a line": lambda: of(interface=plane()),
         "width ... area": lambda: plane(width=0.1),
-        "rupture ... half-spaces": lambda: solved(
+        "loading_rate ... leave it out": lambda: solved(
             lambda p, s: st.onset(p, s, method=st.Rupture(loading_rate=1e9))
         ),
         "with another specimen.height ... problem.sample": lambda: solved(

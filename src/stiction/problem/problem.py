@@ -44,6 +44,8 @@ SLIP = (1e-8, math.inf), (1e-10, math.inf)
 """Slip over which strength falls, m; an atom measures 1e-10 m."""
 SHORT = 4.0
 """Nucleation lengths: on shorter lines free ends change the mean onset by more than about 1 %."""
+SOFTEST = 1e-4
+"""Stiffness of a machine over that of its blocks below which it is probably in another unit."""
 FLATTEST, HIGHEST = 0.025, 10.0
 """Height of blocks over their length between which their response takes seconds and below 1 GB."""
 AT_END = {"II": 0.445 / 1.158, "III": 0.5}
@@ -182,6 +184,16 @@ class Problem:
                     f"specimen.{what} at {at} ({profile.min():.3g} of the mean),"
                     f" which is not modelled; {advice}"
                 )
+        assert self.specimen is not None  # else there is no drive
+        machine, depth = self.specimen.drive.stiffness, self.specimen.thickness or 1.0
+        own = 0.5 * depth * self.blocks.drive_stiffness  # of both blocks, in series
+        if 0.0 < machine < SOFTEST * own:
+            warn_user(
+                f"specimen.drive.stiffness: {machine:.3g} N/m is {machine / own:.1g} of that of the"
+                f" blocks, {own:.3g} N/m: as good as dead load, 0; check its unit (N/m) if this is"
+                " not intended",
+                UnitWarning,
+            )
 
     def _place_profiles(self) -> list[str]:
         """Put profiles with coordinates of their own on the nodes; return what does not fit."""
