@@ -7,6 +7,7 @@ from oracles import from_laplace, mode_two_stiffness
 
 from stiction.elasticity.exponential_sum import _Polish, fit_exponentials, kernel_sum
 from stiction.elasticity.memory_kernels import memory_kernel, static_stiffness
+from stiction.methods.dynamics import explicit, implicit, memory
 
 ETA = np.sqrt(2.0 / 0.67)
 """c_d/c_s in plane stress at nu = 0.33."""
@@ -85,3 +86,10 @@ def test_a_real_pole_has_a_weight():
     _, _, weights, residual = fit.project(np.array([-1.0 + 0.0j]), 1.0 + times)
     assert weights == pytest.approx([0.7])
     assert np.abs(residual).max() < 1e-14
+
+
+@pytest.mark.parametrize("module", [explicit, implicit, memory])
+def test_blocks_of_the_memory_have_their_length_from_one_constant(module):
+    kernels = [one.py_func for one in vars(module).values() if hasattr(one, "py_func")]
+    lengths = {64, 128, 192, 256}
+    assert {one.__name__ for one in kernels if lengths & {*one.__code__.co_consts}} == set()

@@ -15,7 +15,7 @@ from stiction.methods.dynamics.diagnostics import (
     finish_step,
 )
 from stiction.methods.dynamics.loading import value_at
-from stiction.methods.dynamics.memory import advance_memory, pack
+from stiction.methods.dynamics.memory import ENTRIES, advance_memory, pack
 from stiction.methods.dynamics.state import (
     ExplicitTables,
     Grid,
@@ -42,7 +42,7 @@ def _transfer(grid: Grid, slip_hat: Array, memory_sum: Array, tables: ExplicitTa
         g, b, c = static[q], response[q], dynamic[q]
         slip = slip_hat[q] + step * rate
         real = c * (memory_sum[o] + b * rate.real) - g * slip.real
-        imaginary = c * (memory_sum[o + 64] + b * rate.imag) - g * slip.imag
+        imaginary = c * (memory_sum[o + ENTRIES] + b * rate.imag) - g * slip.imag
         shared[q] = complex(real, imaginary)
     backward(grid.transform, shared, tables.transfer)
 

@@ -27,6 +27,8 @@ from stiction.methods.dynamics.state import (
 
 ENTRIES = 64
 """Entries of a block of the memory, which a pass takes together."""
+TWO, THREE, FOUR = 2 * ENTRIES, 3 * ENTRIES, 4 * ENTRIES
+"""Numbers in so many rows of a block."""
 LINE = 64
 """Bytes of a cache line."""
 
@@ -119,7 +121,7 @@ def pack(offset: Array, spectrum: Array, packed: Array) -> None:
     for q in range(1, spectrum.size):
         o = offset[q]
         packed[o] = spectrum[q].real
-        packed[o + 64] = spectrum[q].imag
+        packed[o + ENTRIES] = spectrum[q].imag
 
 
 @jit_inside
@@ -127,7 +129,7 @@ def advance_memory(
     memory: Array, table: Array, rate: Array, memory_sum: Array, pairs: int, multiplicity: int
 ) -> None:
     """y <- E y + V and memory_sum = Re sum w E B y, for all modes and pairs: the one pass."""
-    size = pairs * 256
+    size = pairs * FOUR
     for own in range(table.size // size):
         # Views that begin at zero: the compiler can then exclude negative indices. One of each
         # a block and none a pair: making a view costs as much as a few modes.
@@ -135,26 +137,26 @@ def advance_memory(
         for copy in range(multiplicity):
             block = own * multiplicity + copy
             y = memory[block * size :][:size]
-            v, c = rate[block * 128 :][:128], memory_sum[block * 128 :][:128]
-            for j in range(128):
+            v, c = rate[block * TWO :][:TWO], memory_sum[block * TWO :][:TWO]
+            for j in range(TWO):
                 c[j] = 0.0
             for p in range(pairs):
-                o = p * 256
-                for j in range(64):
-                    er, ei = e[o + j], e[o + 64 + j]
-                    cr, ci = e[o + 128 + j], e[o + 192 + j]
-                    yr, yi = y[o + j], y[o + 64 + j]
+                o = p * FOUR
+                for j in range(ENTRIES):
+                    er, ei = e[o + j], e[o + ENTRIES + j]
+                    cr, ci = e[o + TWO + j], e[o + THREE + j]
+                    yr, yi = y[o + j], y[o + ENTRIES + j]
                     ar = er * yr - ei * yi + v[j]
                     ai = er * yi + ei * yr
                     y[o + j] = ar
-                    y[o + 64 + j] = ai
+                    y[o + ENTRIES + j] = ai
                     c[j] += cr * ar - ci * ai
-                    yr, yi = y[o + 128 + j], y[o + 192 + j]
-                    ar = er * yr - ei * yi + v[64 + j]
+                    yr, yi = y[o + TWO + j], y[o + THREE + j]
+                    ar = er * yr - ei * yi + v[ENTRIES + j]
                     ai = er * yi + ei * yr
-                    y[o + 128 + j] = ar
-                    y[o + 192 + j] = ai
-                    c[64 + j] += cr * ar - ci * ai
+                    y[o + TWO + j] = ar
+                    y[o + THREE + j] = ai
+                    c[ENTRIES + j] += cr * ar - ci * ai
 
 
 def sum_memory(grid: Grid, memory: Floats, table: Floats, memory_sum: Floats) -> None:
@@ -210,7 +212,7 @@ def implicit_tables(grid: Grid) -> ImplicitTables:
         *work_arrays(8, nodes, float),
         np.zeros(nodes, dtype=np.int64),
         *np.zeros((2, count * grid.multiplicity * 2 * ENTRIES)),
-        np.empty((2, 2 * ENTRIES)),
+        np.empty((2, TWO)),
     )
     return ImplicitTables(np.array([-1.0, -1.0]), *arrays)
 
@@ -251,11 +253,11 @@ def tabulate(grid: Grid, step: float, tables: ImplicitTables) -> None:
                 ratio = (decay - 1.0) * per_z
                 gain = step * ratio
                 ramp_gain = step * step * ((ratio - 1.0) * per_z - 0.5 * ratio)
-            o = ((j // 64) * pairs + p) * 256 + j % 64
-            table[o], table[o + 64] = decay.real, decay.imag
-            table[o + 128], table[o + 192] = gain.real, gain.imag
-            o = ((j // 64) * pairs + p) * 128 + j % 64
-            ramp[o], ramp[o + 64] = ramp_gain.real, ramp_gain.imag
+            o = ((j // ENTRIES) * pairs + p) * FOUR + j % ENTRIES
+            table[o], table[o + ENTRIES] = decay.real, decay.imag
+            table[o + TWO], table[o + THREE] = gain.real, gain.imag
+            o = ((j // ENTRIES) * pairs + p) * TWO + j % ENTRIES
+            ramp[o], ramp[o + ENTRIES] = ramp_gain.real, ramp_gain.imag
             response[j] += part * (weight * gain).real
             ramp_response[j] += part * (weight * ramp_gain).real
 
@@ -265,28 +267,28 @@ def fading_memory(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
     """Put Re sum w E psi of all modes into `memory_sum`: what the past leaves after the step."""
     pairs, multiplicity, split = grid.poles.size, grid.multiplicity, grid.split
     sums = tables.sums  # of the pairs before `split`, and of those from there on
-    for block in range(memory.size // (256 * pairs)):
-        for j in range(128):
+    for block in range(memory.size // (FOUR * pairs)):
+        for j in range(TWO):
             sums[0, j] = sums[1, j] = 0.0
         for p in range(pairs):
             # Views that begin at zero: the compiler can then exclude negative indices.
-            y = memory[(block * pairs + p) * 256 :][:256]
-            e = tables.table[(block // multiplicity * pairs + p) * 256 :][:256]
+            y = memory[(block * pairs + p) * FOUR :][:FOUR]
+            e = tables.table[(block // multiplicity * pairs + p) * FOUR :][:FOUR]
             out = sums[0 if p < split else 1]
             wr, wi = grid.weights[p].real, grid.weights[p].imag
-            for j in range(64):
-                cr, ci = wr * e[j] - wi * e[64 + j], wr * e[64 + j] + wi * e[j]
-                out[j] += cr * y[j] - ci * y[64 + j]
-                out[64 + j] += cr * y[128 + j] - ci * y[192 + j]
-        for j in range(128):
-            tables.packed[block * 128 + j] = sums[0, j]
-            tables.others[block * 128 + j] = sums[1, j]
+            for j in range(ENTRIES):
+                cr, ci = wr * e[j] - wi * e[ENTRIES + j], wr * e[ENTRIES + j] + wi * e[j]
+                out[j] += cr * y[j] - ci * y[ENTRIES + j]
+                out[ENTRIES + j] += cr * y[TWO + j] - ci * y[THREE + j]
+        for j in range(TWO):
+            tables.packed[block * TWO + j] = sums[0, j]
+            tables.others[block * TWO + j] = sums[1, j]
     for q in range(1, tables.memory_sum.size):
         o, share = grid.offset[q], grid.mode_two[grid.entry[q]]
         rest = 1.0 - share
         tables.memory_sum[q] = complex(
             share * tables.packed[o] + rest * tables.others[o],
-            share * tables.packed[o + 64] + rest * tables.others[o + 64],
+            share * tables.packed[o + ENTRIES] + rest * tables.others[o + ENTRIES],
         )
 
 
@@ -296,21 +298,21 @@ def advance_with_ramp(grid: Grid, memory: Array, tables: ImplicitTables) -> None
     pairs, multiplicity = grid.poles.size, grid.multiplicity
     pack(grid.offset, tables.rate_hat, tables.packed)
     pack(grid.offset, tables.past_hat, tables.others)
-    for block in range(memory.size // (256 * pairs)):
-        v, a = tables.packed[block * 128 :][:128], tables.others[block * 128 :][:128]
+    for block in range(memory.size // (FOUR * pairs)):
+        v, a = tables.packed[block * TWO :][:TWO], tables.others[block * TWO :][:TWO]
         for p in range(pairs):
-            y = memory[(block * pairs + p) * 256 :][:256]
+            y = memory[(block * pairs + p) * FOUR :][:FOUR]
             own = block // multiplicity * pairs + p
-            e, s = tables.table[own * 256 :][:256], tables.ramp[own * 128 :][:128]
-            for j in range(64):
-                er, ei, gr, gi = e[j], e[64 + j], e[128 + j], e[192 + j]
-                lr, li = s[j], s[64 + j]
-                yr, yi = y[j], y[64 + j]
+            e, s = tables.table[own * FOUR :][:FOUR], tables.ramp[own * TWO :][:TWO]
+            for j in range(ENTRIES):
+                er, ei, gr, gi = e[j], e[ENTRIES + j], e[TWO + j], e[THREE + j]
+                lr, li = s[j], s[ENTRIES + j]
+                yr, yi = y[j], y[ENTRIES + j]
                 y[j] = er * yr - ei * yi + gr * v[j] + lr * a[j]
-                y[64 + j] = er * yi + ei * yr + gi * v[j] + li * a[j]
-                yr, yi = y[128 + j], y[192 + j]
-                y[128 + j] = er * yr - ei * yi + gr * v[64 + j] + lr * a[64 + j]
-                y[192 + j] = er * yi + ei * yr + gi * v[64 + j] + li * a[64 + j]
+                y[ENTRIES + j] = er * yi + ei * yr + gi * v[j] + li * a[j]
+                yr, yi = y[TWO + j], y[THREE + j]
+                y[TWO + j] = er * yr - ei * yi + gr * v[ENTRIES + j] + lr * a[ENTRIES + j]
+                y[THREE + j] = er * yi + ei * yr + gi * v[ENTRIES + j] + li * a[ENTRIES + j]
 
 
 def grown_memory(grid: Grid, memory: Floats, rate_hat: Spectrum, growth: float) -> Spectrum:
