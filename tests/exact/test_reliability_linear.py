@@ -409,10 +409,12 @@ def test_small_repetitions_over_members_are_unbiased():
     # The probability of each member is unbiased as well, those that are seen in few runs too.
     shares = []
     for run in runs:
-        each, members, _ = run.below(-3.3)
+        each, members, *_ = run.below(-3.3)
         shares.append(5 * each * np.bincount(members, minlength=5))
     for number in (1, 2, 4):
         assert_mean(np.array(shares)[:, number], true[number], errors=3.5)
     resolved = Tail(runs).of_members(-3.3, 5)
     assert resolved[[1, 2, 4]] == pytest.approx(true[[1, 2, 4]], rel=0.5)
     assert np.isnan(resolved[0])  # of the strongest no sample is so low
+    # Where every plain sample fails, how many were drawn of a member makes no difference.
+    assert Tail(runs).of_members(99.0, 5) == pytest.approx(np.ones(5), rel=1e-12)

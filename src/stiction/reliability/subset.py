@@ -54,6 +54,7 @@ class Below(NamedTuple):
     each: float
     members: NDArray[np.int64]
     ancestors: NDArray[np.int64]
+    drawn: NDArray[np.int64] | None = None  # members of all samples, if they are plain ones
 
 
 class Descent(NamedTuple):
@@ -98,7 +99,8 @@ class Descent(NamedTuple):
         rarest = self._holders(value)[-1]
         each = math.exp(rarest.log_probability) / rarest.values.size
         failed = rarest.values < value
-        return Below(each, rarest.members[failed], rarest.ancestors[failed])
+        drawn = rarest.members if rarest is self.populations[0] else None
+        return Below(each, rarest.members[failed], rarest.ancestors[failed], drawn)
 
     def relative_variance(self, value: float) -> float:
         """Return the squared coefficient of variation of `probability(value)`, from ancestry."""

@@ -102,15 +102,19 @@ class Tail(NamedTuple):
     def of_members(self, stress: float, count: int) -> Array:
         """Return the probability of each of equally likely interfaces, (members,).
 
-        NaN where fewer than `RESOLVED` samples of one are so low.
+        NaN where fewer than `RESOLVED` samples of one are so low. Of plain samples it is a share of
+        those that were drawn of one: their number is chance too, and most of the error near P = 1.
         """
         total = sum(one.samples for one in self.repetitions)
         found, seen = np.zeros(count), np.zeros(count)
         for one in self.repetitions:
-            each, members, _ = one.below(stress)
+            each, members, _, drawn = one.below(stress)
             own = np.bincount(members, minlength=count)
             seen += own
-            found += count * each * one.samples / total * own
+            chances = count * each * own
+            if drawn is not None:
+                chances = own / np.maximum(np.bincount(drawn, minlength=count), 1)
+            found += one.samples / total * chances
         return np.where(seen >= RESOLVED, np.minimum(found, 1.0), np.nan)
 
     def members_cv(self, stress: float, kinds: Array) -> float:
@@ -125,7 +129,7 @@ class Tail(NamedTuple):
         entries = np.bincount(kinds)
         total, pairs, alike = np.zeros(entries.size), 0.0, 0.0
         for one in self.repetitions:
-            each, members, ancestors = one.below(stress)
+            each, members, ancestors, _ = one.below(stress)
             each, own = each * one.samples, kinds[members]
             total += each * np.bincount(own, minlength=entries.size)
             pairs -= each * each * _squares(ancestors)
