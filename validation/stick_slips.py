@@ -4,7 +4,7 @@ The record is `data/stick_slips/events.csv`, measured by Okubo, Yamashita and Fu
 README there). Prints every number of docs/stick-slips.md: first what disagrees whatever the
 parameters, then what the record fixes of them, what holds without a fit, and a prediction.
 
-Run: ``python validation/stick_slips.py [FIGURES] [--quick]``; three minutes on two cores.
+Run: ``python validation/stick_slips.py [FIGURES] [--quick]``; four minutes on two cores.
 """
 
 import itertools
@@ -20,6 +20,10 @@ from scipy.optimize import brentq
 from scipy.special import comb
 
 import stiction as st
+from stiction.methods.dynamics.specimens import RuptureProgram
+from stiction.methods.equilibrium.patches import line_patch
+from stiction.methods.equilibrium.sample import sample_of
+from stiction.methods.equilibrium.solver import follow, make_program, relief_of
 from stiction.plot.style import ACCENT, INK, PAGE, QUIET, panel, paper_style
 
 TABLE = Path(__file__).parent / "data" / "stick_slips" / "events.csv"
@@ -39,6 +43,12 @@ SHARES = (1.0 / 3.0, SHARE, 1.0 / 6.0)
 QUICK = "--quick" in sys.argv
 SAMPLES, NODES = (40, 64) if QUICK else (400, 128)
 EQUILIBRIUM = st.Equilibrium(slip=True)
+INERTIA = (24e3, 35e3, 45e3)
+"""Mean excesses that are computed with inertia, Pa."""
+FRONTS, CROSSED = (0.05, 0.001), 0.25
+"""A front is where this share of the fall of strength is lost; it has a speed over so many m."""
+CYCLES, FINE = (4, 64) if QUICK else (24, 256)
+"""Cycles with inertia for each excess, and nodes."""
 
 
 def read_table():
@@ -334,6 +344,108 @@ def predict(machine, rate, excess, cv=0.5, count=None):
             print(f"    from both ends {np.mean(weaker > SHARE):.2f}")
 
 
+def last_events(problem, strength, method=None):
+    """Return the event that crosses the interface in each cycle, one row each.
+
+    With a `Rupture` as method waves run on until all is at rest; without, until equilibrium.
+    `slope` is that of a line through the times at which a front arrives, s/m.
+    """
+    program = RuptureProgram(problem, method) if method else make_program(problem)
+    x, rows = problem.interface.x, []
+    for one in strength.sample(problem.interface, samples=CYCLES, seed=1):
+        sample = sample_of(problem.sample(one), program.pieces, 0)
+        path = follow(program, sample)
+        before, grows = path.last.slip, path.last.direction
+        slope = crossed = np.nan
+        if method:
+            event, moved = program.event(sample, path.last), np.inf
+            while moved > 1e-4 * (event.waves.slip - before).max():
+                slip = event.waves.slip.copy()
+                event.advance(event.mesh.window, ends=False)
+                moved = (event.waves.slip - slip).max()
+            slip, arrival = event.waves.slip, event.waves.arrival
+            came = arrival > 0.0  # elsewhere the front had come before
+            crossed = came.sum() * problem.interface.spacing
+            if crossed > CROSSED:
+                slope = np.polyfit(x[came], arrival[came], 1)[0]
+        else:  # all of it is at its residual strength
+            slip = np.full_like(before, path.last.load / problem.blocks.relief)
+        row = {
+            "arrests": len(path.events),
+            "critical_position": line_patch(grows, problem.interface).centre[0],
+            "most": x[before.argmax()],
+            "slip": (slip - before).mean(),
+            "drop": relief_of(problem, slip) - relief_of(problem, before),
+            "spread": np.interp(SENSORS, x, slip - before).std(ddof=1),
+            "crossed": crossed,
+            "speed": 1.0 / abs(slope),
+        }
+        rows.append(row)
+    found = pd.DataFrame(rows)
+    found["both"] = share_of_weaker_end(found) > SHARE
+    return found
+
+
+def inertia(machine, events, rows):
+    """Print the event that crosses the interface, measured and with and without inertia."""
+    for end in "EW":
+        speed = events.speed[events.end == end]
+        print(
+            f"speed from {end}: median {speed.median():.0f} +- {error_of_median(speed):.0f} m/s,"
+            f" {speed.min():.0f} to {speed.max():.0f}"
+        )
+    print(f"measured: slip {mean_of(1e6 * events.slip, 1)} um, drop", end=" ")
+    print(f"{mean_of(events['drop'] / 1e3, 1)} kPa")
+    for row in rows[(rows.cv == CVS[1]) & rows.excess.isin(INERTIA)].itertuples():
+        problem = rig(machine, rate=row.rate, nodes=FINE)
+        strength = strength_of(row.excess, row.cv, 0.2)
+        print(f"excess {row.excess / 1e3:.0f} kPa, {CYCLES} cycles on {FINE} nodes:")
+        print("  without inertia: " + described(last_events(problem, strength)))
+        for front in FRONTS:
+            found = last_events(problem, strength, st.Rupture(arrival=front))
+            if front == FRONTS[0]:
+                print("  with inertia: " + described(found))
+            speed = found.speed[~found.both].dropna()
+            print(
+                f"  front at {100 * front:g} % lost: crosses {mean_of(found.crossed)} m, has a"
+                f" speed in {speed.size}",
+                end="",
+            )
+            if speed.size > 1:
+                low, median, high = np.quantile(speed, [0.1, 0.5, 0.9])
+                print(
+                    f", median {median:.0f} +- {error_of_median(speed):.0f} m/s, {low:.0f} to"
+                    f" {high:.0f} (10 and 90 %), least {speed.min():.0f}",
+                    end="",
+                )
+            print(f"; c_R {problem.solid.rayleigh_wave_speed:.0f} m/s")
+
+
+def described(found):
+    """Return the means of some last events, with standard errors, as text."""
+    most = np.abs(found.most / LENGTH - 0.5) > 0.25
+    arrests = found.arrests.sum()
+    return (
+        f"slip {mean_of(1e6 * found.slip, 1)} um, drop {mean_of(found['drop'] / 1e3, 1)} kPa, drop"
+        f" over slip {mean_of(found['drop'] / found.slip / 1e9, 3)} MPa/mm, scatter of slip"
+        f" {mean_of(1e6 * found.spread)} um, from both ends {mean_of(found.both)}, most slip before"
+        f" near an end {most.mean():.2f}, cycles with an arrest {mean_of(found.arrests > 0)}, share"
+        f" of events that arrest {arrests / (arrests + len(found)):.2f}"
+    )
+
+
+def mean_of(values, digits=2):
+    """Return a mean with its standard error, as text."""
+    values = np.asarray(values, dtype=float)
+    return f"{values.mean():.{digits}f} +- {scipy.stats.sem(values):.{digits}f}"
+
+
+def error_of_median(values):
+    """Return the standard error of a median, by the bootstrap."""
+    found = scipy.stats.bootstrap((values,), np.median, n_resamples=1000, rng=1)
+    return found.standard_error
+
+
 def draw_record(table, events, model):
     """Draw the record: stresses in time, and drop on slip beside the model's line."""
     fig, (left, right) = plt.subplots(1, 2, figsize=(PAGE, 2.6), width_ratios=(2, 1))
@@ -414,6 +526,7 @@ def main():
     predict(machine, *CENTRAL)
     for row in rows[rows.excess.isin((30e3, 45e3))].itertuples():
         predict(machine, row.rate, row.excess, row.cv, count=2)
+    inertia(machine, events, rows)
     for folder in folders:
         with paper_style():
             draw_record(table, events, model).savefig(folder / "stick_slips.png", dpi=200)

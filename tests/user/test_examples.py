@@ -132,6 +132,21 @@ def test_stick_slips_of_a_fault(monkeypatch):
     assert 1.5e-6 < spread.mean() < 3e-6
     most = problem.interface.x[found.slip.to_numpy().argmax(axis=1)]
     assert np.all(np.abs(most - 2.0) > 1.0)
+    # With inertia the blocks swing beyond rest: less than twice as far, for friction takes some.
+    monkeypatch.setattr(slips, "CYCLES", 4)
+    strength = slips.strength_of(slips.CENTRAL[1], 0.5, 0.2)
+    still = slips.last_events(problem, strength)
+    waves = slips.last_events(problem, strength, st.Rupture(arrival=0.05))
+    rested = still.arrests == 0
+    first = slips.of_model(problem, found[{"sample": slice(4)}], slid[:4])
+    assert rested.sum() >= 2
+    # The peak, from which `of_model` counts, may be passed just before the instability.
+    assert np.allclose(still["drop"][rested], first[0], rtol=2e-3)
+    assert np.all(still["drop"][rested] <= first[0] * (1.0 + 1e-9))
+    assert np.allclose(still.slip[rested], first[1], rtol=1e-6)
+    assert np.all((waves.slip / still.slip > 1.5) & (waves.slip / still.slip < 2.0))
+    ratio = waves["drop"] / waves.slip
+    assert np.all((ratio > 0.5e9) & (ratio < 0.594e9))
     start = slips.read_table()
     line = np.polyfit(start.time[1:], slips.without_trend(start[1:], "before"), 1)
     assert abs(line[0]) < 1e-6
