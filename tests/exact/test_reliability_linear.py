@@ -418,3 +418,11 @@ def test_small_repetitions_over_members_are_unbiased():
     assert np.isnan(resolved[0])  # of the strongest no sample is so low
     # Where every plain sample fails, how many were drawn of a member makes no difference.
     assert Tail(runs).of_members(99.0, 5) == pytest.approx(np.ones(5), rel=1e-12)
+    # Nor that many runs hold none of a member of a long list.
+    many = EquallyLikely(random.members[:1] * 300)
+    options |= {"label": many.member}
+    long = [
+        descend(lambda draws: draws[:, 1], 26, rng=generator(seed, 8), **options)
+        for seed in range(60)
+    ]
+    assert Tail(long).of_members(99.0, 300) == pytest.approx(np.ones(300), rel=1e-12)

@@ -104,17 +104,22 @@ class Tail(NamedTuple):
 
         NaN where fewer than `RESOLVED` samples of one are so low. Of plain samples it is a share of
         those that were drawn of one: their number is chance too, and most of the error near P = 1.
+        All repetitions share it, since in a single one few or none may be of that member.
         """
         total = sum(one.samples for one in self.repetitions)
-        found, seen = np.zeros(count), np.zeros(count)
+        found, seen, low, plain = np.zeros((4, count))
+        weight = 0.0
         for one in self.repetitions:
             each, members, _, drawn = one.below(stress)
             own = np.bincount(members, minlength=count)
             seen += own
-            chances = count * each * own
-            if drawn is not None:
-                chances = own / np.maximum(np.bincount(drawn, minlength=count), 1)
-            found += one.samples / total * chances
+            if drawn is None:
+                found += one.samples / total * count * each * own
+            else:
+                low += own
+                plain += np.bincount(drawn, minlength=count)
+                weight += one.samples / total
+        found += weight * low / np.maximum(plain, 1.0)
         return np.where(seen >= RESOLVED, np.minimum(found, 1.0), np.nan)
 
     def members_cv(self, stress: float, kinds: Array) -> float:
