@@ -4,7 +4,7 @@ The record is `data/stick_slips/events.csv`, measured by Okubo, Yamashita and Fu
 README there). Prints every number of docs/stick-slips.md: first what disagrees whatever the
 parameters, then what the record fixes of them, what holds without a fit, and a prediction.
 
-Run: ``python validation/stick_slips.py [FIGURES] [--quick]``; four minutes on two cores.
+Run: ``python validation/stick_slips.py [FIGURES] [--quick]``; two to four minutes on two cores.
 """
 
 import itertools
