@@ -1,6 +1,7 @@
 """The stiffness K of a line or of two blocks inside kernels, which resolve it by its type.
 
-`entry`, `mean_relief`, `apply` and `apply_outside` are for kernels only.
+`entry`, `mean_relief`, `apply` and `apply_outside` are for kernels only: numba puts the overload
+for the type of K in their place, so that their Python bodies are never run.
 """
 
 # numba compares the names of arguments with their annotations, so functions by type have none.
