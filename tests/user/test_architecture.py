@@ -3,11 +3,9 @@
 import dataclasses
 import os
 import re
-import shutil
 import tomllib
 from pathlib import Path
 
-import pytest
 from checks import python
 from refusals import refuses
 
@@ -165,39 +163,3 @@ def test_what_no_file_can_name_is_refused_before_anything_is_computed(tmp_path):
     refuses("Another must be positive everywhere", lambda: Another().on(base.interface))
     Another.__abstractmethods__ = frozenset({"values"})
     refuses("Another: lacks values", lambda: register(Another))
-
-
-WITH_A_COLUMN = """
-import numpy as np, sys
-sys.path.insert(0, {tests!r})
-from ruptures import CROOKED, CROOKED_STRENGTH, simulate
-import stiction as st
-save = st.Save(["slip"], every=1)
-run = simulate(CROOKED, CROOKED_STRENGTH, save, loading_rate=1e9, implicit=False)
-friction = CROOKED.friction
-critical = (CROOKED_STRENGTH - friction.residual_strength) / friction.weakening_rate
-slip, found = run.slip.values[1:], run.step_cohesive_length
-expected = ((slip > 0.0) & (slip < critical)).sum(axis=1) * 0.05 / 128
-assert run.sizes["step"] > 100 and expected.max() > 0.01
-assert np.allclose(found, expected, rtol=1e-12) and found.attrs["units"] == "m"
-"""
-
-
-@pytest.mark.slow
-def test_a_quantity_of_each_step_is_added_as_the_page_shows(tmp_path):
-    """In a copy of the package."""
-    shutil.copytree(
-        SOURCES, tmp_path / "stiction", ignore=shutil.ignore_patterns("__pycache__")
-    )
-    (changes,) = worked_examples("diff")
-    for change in changes.split("--- ")[1:]:
-        name, *lines = change.splitlines()
-        path = tmp_path / "stiction" / name
-        before, after = (
-            "".join(f"{line[1:]}\n" for line in lines if line[0] in kept)
-            for kept in (" ", " +")
-        )
-        text = path.read_text(encoding="utf-8")
-        assert text.count(before) == 1, name
-        path.write_text(text.replace(before, after), encoding="utf-8")
-    python("-c", WITH_A_COLUMN.format(tests=str(ROOT / "tests")), PYTHONPATH=tmp_path)
