@@ -11,17 +11,24 @@ import dataclasses
 import json
 import math
 import re
+import tempfile
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
+from unittest import mock
 
 import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from PIL import Image
+
+import stiction as st
+from stiction.plot import ruptures
 
 CLOSE = 1e-6
 """Relative distance of numbers that count as the same: other processors round otherwise."""
@@ -82,6 +89,8 @@ def taken_apart(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
         for name in value.columns:
             yield from taken_apart(value[name].tolist(), f"{path}[{name}]")
     elif isinstance(value, Figure | Axes):
+        if isinstance(value, Figure) and value.texts:
+            yield f"{path}texts", " | ".join(text.get_text() for text in value.texts)
         for number, axes in enumerate(value.axes if isinstance(value, Figure) else [value]):
             yield from _axes(axes, f"{path}axes {number}")
     elif isinstance(value, Mapping):
@@ -253,6 +262,19 @@ def refusal(call: Callable[[], Any]) -> Any:
         return call()
     except ValueError as error:
         return f"{type(error).__name__}: {error}"
+
+
+def filmed(run: xr.Dataset) -> dict[str, Any]:
+    """What a film draws at its end, its frames, size and pace, and whether it moves."""
+    canvas = mock.patch.object(ruptures, "FigureCanvasAgg", wraps=FigureCanvasAgg)
+    with tempfile.TemporaryDirectory() as folder, canvas as opened:
+        path = st.plot.film(run, Path(folder) / "film.gif", frames=4)
+        with Image.open(path) as film:
+            about = [film.n_frames, *film.size, film.info["duration"]]
+            first = np.asarray(film.convert("L")).astype(float)
+            film.seek(3)
+            moved = np.abs(np.asarray(film.convert("L")) - first).max() > 50.0
+    return {"drawn": opened.call_args.args[0], "file": [*about, moved]}
 
 
 def read(path: Path) -> dict[str, dict[str, Any]]:

@@ -1,15 +1,12 @@
 """Recorded outputs: every line, point, label and legend of the figures."""
 
 import dataclasses
-import tempfile
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
 from crooked import LINE, LINE_STRENGTH, PLANE, PLANE_STRENGTH, uneven
-from PIL import Image
-from recording import Calls, compared
+from recording import Calls, compared, filmed
 from setups import EXACT, LOCAL, make_problem
 from small_study import lengths, small_study
 from specimens import crooked, rough
@@ -107,7 +104,9 @@ def specimens_and_their_events():
     strength = rough(JOINT, 6)[0]
     found = st.onset(JOINT, strength, method=st.Equilibrium(events=5))
     path = st.equilibrium_path(JOINT, strength, np.linspace(2e5, 1.5e6, 9))
+    event = st.simulate_rupture(JOINT, strength, method=st.Rupture(), event=0)
     return {
+        "block": st.plot.block(event),
         "specimen": st.plot.specimen(JOINT, strength, found),
         "precursors": st.plot.precursors(path, problem=JOINT),
         "force": st.plot.force_travel(path),
@@ -153,13 +152,6 @@ def a_rupture_and_its_film():
     save = st.Save(["slip", "slip_rate", "shear_stress"], every=30)
     method = st.Rupture(loading_rate=9e8, kernel_tolerance=1e-5)
     run = st.simulate_rupture(LINE, TWO[0], method=method, save=save)
-    with tempfile.TemporaryDirectory() as folder:
-        path = st.plot.film(run, Path(folder) / "film.gif", frames=4)
-        with Image.open(path) as film:
-            film_is = [film.n_frames, *film.size, film.info["duration"]]
-            first = np.asarray(film.convert("L")).astype(float)
-            film.seek(3)
-            moved = np.abs(np.asarray(film.convert("L")) - first).max() > 50.0
     at_once = run.assign(onset_time=run.onset_time * 0.0)  # it begins with the run
     slow = run.assign_coords(time=run.time * 1e6).assign(onset_time=run.onset_time * 1e6)
     large = make_problem(96, 5e4, weakening_rate=0.2e6)
@@ -167,7 +159,7 @@ def a_rupture_and_its_film():
         "rupture": st.plot.rupture(run, problem=LINE),
         "at once": st.plot.rupture(at_once),
         "large": st.plot.rupture(slow.drop_attrs(), problem=large),
-        "film": [*film_is, moved],
+        "film": filmed(run),
     }
 
 

@@ -5,7 +5,7 @@ import tempfile
 
 import numpy as np
 from crooked import PLANE, PLANE_STRENGTH, across_the_seam, uneven
-from recording import Calls, compared
+from recording import Calls, compared, filmed
 from setups import LOCAL, beta_strength, make_problem
 
 import stiction as st
@@ -120,7 +120,7 @@ def a_rupture_with_stations():
         files = st.external.write_scec(found, folder, **options)
         written = {path.name: path.read_text().split("\n") for path in files}
     picture = st.plot.rupture(found, problem=problem)
-    return {"run": found, "picture": picture} | {
+    return {"run": found, "picture": picture, "film": filmed(found)} | {
         name: {
             "head": "\n".join(line for line in lines if line.startswith("# ")),
             "last": np.array([line.split() for line in lines[-40:-1]], dtype=float),

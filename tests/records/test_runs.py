@@ -23,6 +23,7 @@ from stiction.base import progress
 from stiction.cli import commands
 from stiction.cli.report import Page
 from stiction.ensemble.experiment import Experiment
+from stiction.study.study import study_schema
 
 calls = Calls()
 SAME = "the same numbers by st.monte_carlo, tests/user/test_study.py"
@@ -173,7 +174,8 @@ def onset_and_rupture_of_a_profile():
         np.savetxt("gaps.csv", np.column_stack([x, 1e6 * strength]), delimiter=",")
         np.savetxt("three.csv", np.ones((2, 3)), delimiter=",")
         plain = tomllib.loads(Path("study.toml").read_text())
-        plain["problem"]["load"] = {"normal_pressure": 2e6}
+        plain["problem"]["load"] = {"normal_pressure": 2e6, "profile": "load.csv"}
+        np.savetxt("load.csv", np.column_stack([x, table[::-1, 1]]), delimiter=",")
         Path("problem.toml").write_text(tomli_w.dumps({"problem": plain["problem"]}))
         head = "Weg [mm];Reibzahl [-]"
         table = np.column_stack([1e3 * x, table[:, 1] / 2.0])
@@ -311,7 +313,10 @@ def what_a_study_would_do():
         Path("study.toml").write_text(
             Path("study.toml").read_text().replace("poisson_ratio", "poison_ratio")
         )
-        return {"check": check, "wrong": command("check study.toml")}
+        wrong = command("check study.toml")
+    laws = study_schema()["$defs"]["Problem"]["properties"]["friction"]["anyOf"][:3]
+    needed = {one["title"]: str(one.get("required")) for one in laws}
+    return {"check": check, "wrong": wrong, "needed": needed}
 
 
 test_outputs_are_as_recorded = compared(calls, __file__)
