@@ -103,9 +103,7 @@ def heights_of_a_matrix_without_a_unit():
 def gaps_across_the_seam():
     holes = as_measured(LINE.interface, np.where(LINE_GAP, np.nan, LINE_STRENGTH))
     read = st.read_profile(holes, interface=LINE.interface, gaps="fill")
-    local, onset = (
-        st.onset(LINE, holes, method=method, gaps="fill") for method in (LOCAL, EXACT)
-    )
+    local, onset = (st.onset(LINE, read, method=method) for method in (LOCAL, EXACT))
     with tempfile.TemporaryDirectory() as folder:
         export(onset, Path(folder) / "onset.csv")
         table = pd.read_csv(Path(folder) / "onset.csv")

@@ -372,8 +372,9 @@ test_what_is_no_profile_is_refused = refusals({
     "interpolate=True": read(TENT, interface=LINE),
     "values are missing ... the first at x = 0.0265625 m":
         read(TENT.drop_isel(x=[11, 12, 13, 14]), interface=LINE, interpolate=True),
-    "at 1 of 128 nodes, ... are filled on periodic lines only": lambda: onset(
-        without(3), dataclasses.replace(SYSTEM, specimen=st.Blocks(height=0.1)), gaps="fill"
+    "at 1 of 128 nodes, ... are filled on periodic lines only": read(
+        labelled(without(3)), gaps="fill",
+        interface=dataclasses.replace(SYSTEM, specimen=st.Blocks(height=0.1)).interface,
     ),
     "clearly the strength ... 'z'": read(labelled().to_dataset(name="z")),
     "value: unknown '1' ... strength, tau_i":
@@ -420,35 +421,14 @@ def test_gaps_are_named_filled_on_request_and_remembered():
     expected = np.interp(X, X[~np.isnan(holes)], holes[~np.isnan(holes)], period=0.1)
     for given in (holes, labelled(holes), labelled(holes[::-1], X[::-1])):
         refuses(f"strength: values are missing ... {words}", lambda given=given: found(given))
-        result = onset(given, gaps="fill")
-        assert result["critical_stress"][0] == pytest.approx(found(expected)[0], rel=1e-14)
-        np.testing.assert_array_equal(result["measured"], ~np.isnan(holes))
     with pytest.warns(
         st.AccuracyWarning, match=r"65 of 128.*check interface.length and the unit"
     ):
-        onset(labelled(STRENGTH[:63], X[:63]), gaps="fill")
+        st.read_profile(labelled(STRENGTH[:63], X[:63]), interface=LINE, gaps="fill")
     profile = st.read_profile(labelled(holes), interface=LINE, gaps="fill")
     np.testing.assert_allclose(profile, expected, rtol=1e-14)
     np.testing.assert_array_equal(profile["measured"], ~np.isnan(holes))
-    # It is remembered through arithmetic and another order.
-    assert "in_gap" in onset((profile * 2.0)[::-1])
-    assert "in_gap" not in onset(STRENGTH, gaps="fill")
-
-
-def test_an_onset_in_a_gap_is_called_that():
-    holes = without(slice(78, 100))  # beside the weak place: a straight line of low strength
-    holes[100] = 0.9 * holes[77]
-    profile = st.read_profile(labelled(holes[::-1], X[::-1]), interface=LINE, gaps="fill")
-    for given in (profile, without(slice(80, 83))):
-        with pytest.warns(st.AccuracyWarning, match="the critical patch .* reaches into a gap"):
-            assert bool(onset(given, gaps="fill")["in_gap"][0])
-    assert not bool(onset(without(slice(10, 13)), gaps="fill")["in_gap"][0])
-    for gap, reached in ((slice(1, 3), True), (slice(6, 8), False)):  # across x = 0
-        seam = np.roll(STRENGTH, 47)  # weakest at node 124
-        seam[gap] = np.nan
-        assert bool(onset(seam, gaps="fill")["in_gap"][0]) is reached
-    method = st.Rupture(loading_rate=1e8, stop="onset")
-    assert bool(st.simulate_rupture(SYSTEM, profile, method=method, save=st.Save([]))["in_gap"])
+    assert found(profile)[0] == pytest.approx(found(expected)[0], rel=1e-14)
 
 
 def npy(shape, payload=b"", dtype="<f8", version=b"\x01\x00", extra=""):

@@ -2,7 +2,7 @@
 A measured profile with gaps
 ============================
 
-The onset of a record from a file, on a grid of its own; shaded are gaps that were filled.
+The onset of a record from a file, on a grid of its own, with its gaps filled.
 """
 
 from pathlib import Path

@@ -7,7 +7,7 @@ is missing is refused, stays NaN, or is filled on request, on lines that continu
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +16,6 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.problem.interface import Interface
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 Gaps = Literal["refuse", "fill", "skip"]
 Mask = NDArray[np.bool_]
 
@@ -26,8 +23,8 @@ TOLERANCE = 0.02
 """Of the spacing of nodes: what rounding in a file may move a point."""
 WIDE = 4.0
 """Times the median distance of points: what is wider is no interval but a gap."""
-IN_GAP, MEASURED = "in_gap", "measured"
-"""Variable of a result; coordinate of results and profiles with gaps, False where none was."""
+MEASURED = "measured"
+"""Coordinate of profiles with gaps, False where a value was filled in."""
 OF_A_PLANE = (
     "; a map has columns or coordinates x and y, or is an .npy of shape (nx, ny), and needs an"
     " interface of two lengths and two numbers of nodes"
@@ -230,7 +227,7 @@ def close_gaps(
     elif gaps == "refuse":
         raise InputError(
             f"{text}; give them, make interface.length that of the record, or pass gaps='fill'"
-            " to st.onset or st.read_profile, which fills them with straight lines"
+            " to st.read_profile, which fills them with straight lines"
         )
     elif gaps == "fill":
         if holes.all(axis=-1).any():
@@ -242,28 +239,3 @@ def close_gaps(
         doubt = "; check interface.length and the unit of x" if missing.mean() > 0.5 else ""
         warn_accuracy(f"{text}; filled with straight lines{doubt}")
     return values, ~missing & measured
-
-
-def with_gaps(problem: Any, result: xr.Dataset, measured: Any) -> xr.Dataset:
-    """Return a result with the gaps of its profiles, and a mark of patches that reach into one."""
-    interface, position = problem.interface, result["critical_position"]
-    if np.all(measured) or interface.is_plane or interface.is_free:  # nothing was filled
-        return result
-    rate, length, place = problem.uniform_rate, interface.extent, position.values.reshape(-1, 1)
-    patch = interface.spacing if rate is None else problem.nucleation_lengths(rate)[0]
-    apart = np.abs(np.mod(interface.x - place + 0.5 * length, length) - 0.5 * length)
-    near = apart < (1.0 - 1e-9) * max(0.5 * patch, interface.spacing)
-    found = (near & ~measured).any(axis=-1)
-    if found.any():
-        first = float(place[int(np.argmax(found)), 0])
-        warn_accuracy(
-            f"the critical patch at x = {first:.6g} m reaches into a gap of the profile"
-            f" ({found.sum()} of {found.size} samples): the strength there was filled in, not"
-            " measured"
-        )
-    about = {"units": "1", "long_name": "whether the critical patch reaches into a gap"}
-    result[IN_GAP] = (position.dims, found.reshape(position.shape), about)
-    along = ("sample", "x") if len(measured) > 1 else ("x",)
-    known = measured if len(measured) > 1 else measured[0]
-    x = ("x", interface.x, {"units": "m"})
-    return result.assign_coords({"x": x, MEASURED: (along, known)})

@@ -389,13 +389,11 @@ def _directed(array: Any, dims: tuple[str, ...]) -> Any:
 # -- what takes profiles -------------------------------------------------------------------------
 
 
-def at_nodes(
-    name: str, value: Any, interface: Interface, gaps: Gaps = "refuse"
-) -> tuple[Any, Any]:
-    """Return what a caller gave for a quantity, with one value a node, and where it was measured.
+def at_nodes(name: str, value: Any, interface: Interface) -> Any:
+    """Return what a caller gave for a quantity, with one value a node.
 
     `name` may be a dotted key. Numbers, and arrays of another shape, pass as they are, for whoever
-    checks that. The mask is True if nothing is missing.
+    checks that.
     """
     quantity = quantity_of(name)
     with prefixed(name):
@@ -407,13 +405,13 @@ def at_nodes(
             if array.ndim == 1 and not {*array.dims} <= {"x", "row"}:  # one value a sample
                 if quantity == "strength":
                     raise InputError("has no dimension along the interface; call it 'x'")
-                return array.values[:, np.newaxis], True
-            return place(array, interface, gaps=gaps)
+                return array.values[:, np.newaxis]
+            return place(array, interface)[0]
         with suppress(TypeError):  # no numbers: refused with everything else that is wrong
             array = real_array(value)
             if array.shape[-len(interface.shape) :] == interface.shape:
-                return close_gaps(array, True, interface, gaps)
-    return value, True
+                return close_gaps(array, True, interface, "refuse")[0]
+    return value
 
 
 class ProfileFile(NamedTuple):
