@@ -12,6 +12,7 @@ import xarray as xr
 from refusals import refusals, refuses
 
 import stiction as st
+from stiction.ensemble.experiment import Experiment
 
 pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 
@@ -168,6 +169,36 @@ def test_equilibrium_after_the_local_criterion():
     shift = exact.mean("marginal.low") - local.mean("marginal.low")
     # The local criterion is 0.1 % high at xi_0/h_n = 0.6: a fifth of the posterior's width.
     assert 0.0 < shift < 0.4 * local.draws["marginal.low"].std()
+
+
+FIELDS = [st.paper.strength(PROBLEM, correlation_ratio=ratio) for ratio in (0.5, 0.6, 0.8)]
+
+
+@pytest.mark.parametrize(
+    "given",
+    [{"random": FIELDS, "prior": None}, {"prior": {"correlation_length": (H_N, 2.0 * H_N)}}],
+)
+def test_what_an_interrupted_call_has_simulated_is_taken_up(given, monkeypatch):
+    solve, solved = Experiment.results, []
+
+    def results(self, first, count):
+        if len(solved) == last:
+            raise KeyboardInterrupt
+        solved.append(first)
+        return solve(self, first, count)
+
+    monkeypatch.setattr(Experiment, "results", results)
+    last = -1
+    whole = infer(**given, workers=1)
+    total, last = len(solved), len(solved) + 2
+    with pytest.raises(KeyboardInterrupt):
+        infer(**given, workers=1)
+    last = -1
+    found = infer(**given, workers=1)
+    assert len(solved) == 2 * total  # nothing twice
+    np.testing.assert_array_equal(found.u, whole.u)
+    infer(**given, workers=1)
+    assert len(solved) == 3 * total  # what is complete is not kept
 
 
 @pytest.mark.parametrize("factor", [1e-6, 1e3])

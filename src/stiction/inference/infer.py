@@ -42,6 +42,9 @@ NEAR, HELD = 0.05, 1e-3
 EDGE, PILED = 0.02, 4.0
 """Share of a prior at its ends, and its multiple at which the posterior piles up there."""
 
+UNFINISHED: dict[Any, Array] = {}
+"""Onsets of a call that was interrupted; an equal one takes them up."""
+
 
 @checked
 def infer(
@@ -125,7 +128,8 @@ def infer(
     `stiction.inference.scaling` for when the onset follows them exactly. The others are
     simulated on a grid with the same draws everywhere, and interpolated. The posterior is summed
     on a grid, for up to about four parameters; for more, give `log_likelihood` and
-    `prior_transform` of the result to emcee or dynesty.
+    `prior_transform` of the result to emcee or dynesty. After an interruption, or an error in one
+    sample, an equal call in the same session goes on with the onsets that are there.
 
     Of a fit 300 interfaces are drawn, and up to 3000 where the peaks leave few of them weight. The
     parameters of the posterior are then what they differ in: mean, standard deviation and
@@ -165,10 +169,12 @@ def infer(
         )
     if prior is None:
         with Meter("infer", show=progress) as meter:
-            return join(
+            found = join(
                 problem, random, measured, method=method, error=error, samples=samples,
-                seed=seed, workers=workers, meter=meter,
+                seed=seed, workers=workers, meter=meter, done=UNFINISHED,
             )  # fmt: skip
+        UNFINISHED.clear()
+        return found
     parameters = make_prior(problem, random, prior)
     variable = variable_of(parameters, measured.unit)
     (own,) = experiments_at(parameters, parameters.middle, method)
@@ -180,6 +186,7 @@ def infer(
             return make_likelihood(
                 parameters, box, method=method, lengths=measured.lengths, error=error,
                 samples=samples, seed=seed, variable=variable, workers=workers, meter=meter,
+                done=UNFINISHED,
             ).of(measured.values)  # fmt: skip
 
         whole = box = parameters.whole
@@ -192,6 +199,7 @@ def infer(
             if np.array_equal(wider, box):
                 break
             box = wider
+    UNFINISHED.clear()
     if np.all(likelihood.box == whole) and (refused := likelihood.refusals()):
         raise InputError(refused)
     if grid is None:

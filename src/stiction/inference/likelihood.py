@@ -40,7 +40,6 @@ LONG = 60.0
 BEYOND = 2.0
 """Spreads beyond the extremes of these at which a peak is out of reach."""
 
-
 class Axis(NamedTuple):
     """Nodes of one simulated parameter."""
 
@@ -131,11 +130,13 @@ def simulate(
     variable: str,
     workers: int | None = None,
     meter: Meter = SILENT,
+    done: dict[Any, Array] | None = None,
 ) -> Array:
     """Return onsets of samples first, ... of some experiments, (experiments, samples).
 
-    Sample i has the same draws in each of them.
+    Sample i has the same draws in each of them. What is `done` is taken, and added to.
     """
+    done = {} if done is None else done
     peaks = np.empty((len(experiments), samples))
     jobs = [
         (number, start, count)
@@ -145,8 +146,12 @@ def simulate(
 
     def work(job: tuple[int, int, int]) -> None:
         number, start, count = job
-        values = experiments[number].with_seed(seed).results(start, count)
-        peaks[number, start - first : start - first + count] = values[variable]
+        own = experiments[number].with_seed(seed)
+        key = own, start, count, variable
+        values = done.get(key)
+        if values is None:
+            values = done[key] = own.results(start, count)[variable]
+        peaks[number, start - first : start - first + count] = values
         meter.advance(count)
 
     in_threads(work, jobs, workers or usable_cores())
@@ -312,8 +317,9 @@ def make_likelihood(
     variable: str,
     workers: int | None = None,
     meter: Meter = SILENT,
+    done: dict[Any, Array] | None = None,
 ) -> Likelihood:
-    """Simulate the onsets that the likelihood needs.
+    """Simulate the onsets that the likelihood needs, but for those that are `done`.
 
     `lengths` are those of the specimens, m, None for the problem's own; `variable` is the name
     of the peaks among the results, with the standard `error` of the load cell. `box` is the
@@ -340,7 +346,7 @@ def make_likelihood(
         for end in (experiments[0], experiments[-1]):
             end.random.warn_if_inaccurate(end.problem.interface)
         options: Any = {"first": number * SPECIMEN, "seed": seed, "variable": variable}
-        options["workers"] = workers
+        options |= {"workers": workers, "done": done}
         own = experiments_at(prior, coarse, method, length)
         found = simulate(own, samples=count, meter=meter, **options)
         if guided:
