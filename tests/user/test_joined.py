@@ -133,6 +133,24 @@ def test_more_are_drawn_from_a_source_where_few_keep_weight(monkeypatch):
     assert found.prior.cells == source.count
 
 
+class Few(Source):
+    """Has no more than six, such as a fit with few repetitions."""
+
+    def interfaces(self, count, seed=0):
+        self.count = count
+        return [LIST[number % 6] for number in range(count)]
+
+
+def test_interfaces_that_are_drawn_again_and_again_are_worth_one():
+    source = Few()
+    with pytest.warns(st.AccuracyWarning, match="weight of only .* of 6 interfaces; give more"):
+        many = st.infer(PROBLEM, source, PEAKS, samples=100, **LOCAL)
+    assert source.count <= 10 * joining.FIRST
+    assert many.prior.cells == joining.FIRST
+    once = st.infer(PROBLEM, LIST[:6], PEAKS, samples=100, **LOCAL)
+    assert many.notes[0] == once.notes[0]
+
+
 def test_what_cannot_be_weighed():
     field = LIST[0].strength
     values = field.sample(PROBLEM.interface, samples=1, seed=1)[0]

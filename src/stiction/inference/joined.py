@@ -72,6 +72,10 @@ class Members(Prior):
         number = {one: place for place, one in enumerate(self.different)}
         return np.array([number[one] for one in self.likely.members], dtype=np.float64)
 
+    def worth(self, mass: Array) -> float:
+        """Return how many interfaces of equal weight tell as much; equal members are one."""
+        return 1.0 / float(np.sum(np.bincount(self.places.astype(np.int64), mass) ** 2))
+
     @cached_property
     def _differing(self) -> dict[str, Array]:
         rows = [describing(one) for one in self.different]
@@ -153,13 +157,15 @@ def join(
             prior, samples=samples or SAMPLES, lengths=measured.lengths, seed=seed, meter=meter,
             variable=variable_of(prior, measured.unit), **options,
         ).of(measured.values)  # fmt: skip
-        count = len(likely.members)
-        grid = grid_of(likelihood, prior.whole, cells=count)
-        worth = 0.0 if grid is None else 1.0 / float(np.sum(grid.mass**2))
-        if source is None or worth >= ENOUGH or count >= MOST:
+        grid = grid_of(likelihood, prior.whole, cells=prior.cells)
+        worth = 0.0 if grid is None else prior.worth(grid.mass)
+        drawn, count = len(likely.members), len(prior.different)
+        if source is None or worth >= ENOUGH or drawn >= MOST:
             break
-        wanted = min(MOST, int(np.clip(1.5 * ENOUGH / max(worth, 1.0), 2.0, 10.0) * count))
+        wanted = min(MOST, int(np.clip(1.5 * ENOUGH / max(worth, 1.0), 2.0, 10.0) * drawn))
         likely = EquallyLikely(tuple(source.interfaces(wanted, seed)))
+        if len(set(likely.members)) == count:  # the source has no others
+            break
     notes = [f"{count} interfaces, weighed by the peaks, are worth {worth:.0f}"]
     chance, possible = _chance(likelihood, measured, seed)
     if grid is None or not possible:
