@@ -40,6 +40,7 @@ LONG = 60.0
 BEYOND = 2.0
 """Spreads beyond the extremes of these at which a peak is out of reach."""
 
+
 class Axis(NamedTuple):
     """Nodes of one simulated parameter."""
 
