@@ -8,10 +8,8 @@ import threading
 import warnings
 from concurrent.futures import Executor, Future
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
-import pandas as pd
 import pytest
 import scipy.stats
 from crooked import LINE
@@ -21,15 +19,11 @@ from setups import beta_strength, make_problem
 from small_study import lengths, small_study
 
 import stiction as st
-from stiction.base import files, kinds
+from stiction.base import files
 from stiction.base.errors import StoreError, WorkerError
-from stiction.base.kinds import register
-from stiction.base.model import model
-from stiction.cli.report import write_report
 from stiction.ensemble import batches, pilot, store
 from stiction.ensemble.dataset import Gathered
 from stiction.ensemble.experiment import Experiment
-from stiction.problem.load import LoadShape
 from stiction.study.run import samples_of_part
 
 STUDY = small_study(
@@ -162,75 +156,12 @@ def test_a_reader_beside_a_writer_sees_no_damage(tmp_path, often):
 def test_a_damaged_study_is_made_of_the_one_given_and_the_chunks(run, reference):
     """As where another file bears its name; the fuzz damages it otherwise."""
     (run / "study.json").write_bytes((run / "pilot.json").read_bytes())
-    with pytest.warns(UserWarning, match=r"study\.json.* is damaged.*\n?.*run the study again"):
-        lost = st.open_run(run)
-    assert lost.dataset().identical(reference)  # all that the chunks and their labels hold
-    refuses("a report needs the study", lambda: write_report(lost, run / "report.html"))
-    (run / "labels.json").unlink()
     with pytest.raises(StoreError, match="study.json"):
         st.open_run(run)
     other = make_study(ensemble={"samples": 120, "seed": 4})
     refuses("belongs to another study", lambda: other.run(out=run), StoreError)
     assert again(run, "study.json is damaged or missing").identical(reference)
     assert again(run).identical(reference)
-
-
-EDGE = {"type": "edge", "excess": 2.0, "decay": 0.02}
-
-
-def test_numbers_are_read_without_the_plug_in_that_made_them(
-    tmp_path, often, runs, monkeypatch
-):
-    """Also of a run that is damaged, in a sweep, with profiles and events, first sample 4."""
-
-    @register
-    @model
-    class Tilted(LoadShape):
-        type: Literal["tilted"] = "tilted"
-
-        def values(self, interface):
-            return 1.0 + 0.1 * interface.x / interface.lengths[0]
-
-    plain = small_study(
-        64, correlation_length=9e-3, title="tilted",
-        ensemble={"samples": 7, "seed": 3, "first": 4, "keep": ["strength"]},
-        method={"type": "equilibrium", "events": 2},
-        sweep=[
-            {"random.strength.marginal.alpha": [1.5, 2.5, 2.0]},
-            {"problem.load.profile": [{"type": "tilted"}, EDGE]},
-        ],
-    )  # fmt: skip
-    folder = tmp_path / "run"
-    expected = st.Study.from_dict(plain).run(out=folder, progress=False)
-    assert (
-        repr(st.open_run(folder)) == f"StoredRun({str(folder)!r}, 6 x 7 samples by equilibrium)"
-    )
-    monkeypatch.delitem(kinds._registered["loads"], "tilted")
-    with pytest.warns(UserWarning, match="cannot be read by this installation:\n.*'tilted'"):
-        found = st.open_run(folder)
-    assert found.dataset().identical(expected)
-    assert "without its study" in repr(found)
-    export = f"export {folder} {tmp_path / 'out.csv'}"
-    words = "event_stress, .*strength: more than one number"
-    with pytest.warns(st.AccuracyWarning, match=words):
-        found.export(tmp_path / "out.csv")
-    runs(f"status {folder}", "run: tilted", "42 of 42", "'tilted'")
-    table = pd.read_csv(tmp_path / "out.csv")
-    assert len(table) == 42  # one row a sample
-    labels = table["profile (1)"].unique()
-    for (_, row), (at, stress) in zip(
-        table.iterrows(), expected.critical_stress.to_series().items(), strict=True
-    ):
-        assert (row["alpha (1)"], row["profile (1)"], row["sample (1)"]) == at
-        assert row["critical_stress (Pa)"] == stress
-    assert len(labels) == 2
-    chunks(folder)[0].write_bytes(b"")
-    (tmp_path / "out.csv").unlink()
-    runs(f"status {folder}", "damaged", code=1)
-    runs(export, "samples are there", "--partial", code=1)
-    assert not (tmp_path / "out.csv").exists()
-    runs(f"{export} --partial", "the others are missing")
-    assert pd.read_csv(tmp_path / "out.csv")["critical_stress (Pa)"].isna().sum() > 0
 
 
 @pytest.mark.parametrize("number", [errno.EIO, errno.EACCES])

@@ -183,9 +183,9 @@ def status(
     from stiction.study.study import open_run
 
     stored = open_run(run)
-    state, points = stored.status(), stored.points
+    state, points = stored.status(), stored.study.points
     each = state.samples // len(points)
-    echo(f"{run}: {' '.join(stored.title.split())}".removesuffix(": "))
+    echo(f"{run}: {' '.join(stored.study.title.split())}".removesuffix(": "))
     share = 100.0 * state.done / state.samples
     echo(f"  {stored.counted:11s} {state.done} of {state.samples} ({share:.1f} %)")
     echo(f"  chunks      {state.chunks}")

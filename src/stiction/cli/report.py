@@ -88,8 +88,6 @@ def shown(entry: Any) -> str:
 
 def write_report(run: StoredRun, path: Path) -> None:
     """Write a page about a run: figures, tables, failed samples, the study and versions."""
-    if run.study is None:
-        raise InputError(f"{run.path}: a report needs the study, which cannot be read")
     state = run.status()
     if not state.done:
         raise InputError(f"{run.path}: no sample is stored yet")
@@ -98,8 +96,7 @@ def write_report(run: StoredRun, path: Path) -> None:
     if isinstance(run, StoredCurves):
         what, add = "Failure probability", add_curves
     page = Page(run.study.title or what)
-    methods = " and ".join(dict.fromkeys(plan.method.label for plan in run.study.experiments))
-    page.text(f"{state.done:,} of {state.samples:,} {run.counted} by {methods}.")
+    page.text(f"{state.done:,} of {state.samples:,} {run.counted} by {run.methods}.")
     if not state.complete:
         page.text("The run is not complete.", warning=True)
     with paper_style():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -14,7 +14,7 @@ from stiction.base.model import check_memory
 from stiction.base.variables import SAMPLE, Variable
 from stiction.ensemble.batches import NUMBER, POINT, Failure, Table
 from stiction.ensemble.experiment import Ensemble, Experiment
-from stiction.problem.results import as_text, to_dataset
+from stiction.problem.results import to_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,25 +83,6 @@ class Gathered:
         """Samples that failed and are not there, in the order of points and samples."""
         return [self._failures[at] for at in sorted(self._failures) if not self.done[at]]
 
-    @property
-    def lacks(self) -> dict[str, Any]:
-        """Attributes that list failed samples, and count those that are done if others lack."""
-        failed, made = self.failed, int(self.done.sum())
-        found: dict[str, Any] = {"failed_samples": failed} if failed else {}
-        if made + len(failed) < self.done.size:
-            found["cut_short"] = f"{made} of {self.done.size} samples are done"
-        return found
-
-    def arrays(self, shape: tuple[int, ...]) -> dict[str, NDArray[Any]]:
-        """Return the values by name, over axes of the sweep and samples."""
-        found = {}
-        for name, array in self._arrays.items():
-            kind = self._types[name]
-            if kind.kind == "f" or not np.isnan(array).any():
-                array = array.astype(kind, copy=False)
-            found[name] = array.reshape(shape + array.shape[1:])
-        return found
-
     def dataset(
         self, attributes: Mapping[str, Any], axes: GridAxes = MappingProxyType({})
     ) -> xr.Dataset:
@@ -109,48 +90,23 @@ class Gathered:
 
         What is missing is NaN; the attributes 'failed_samples' and 'cut_short' give the cause.
         """
-        dims = tuple(axes)
-        found = self.arrays(tuple(len(axes[dim][dim][0]) for dim in dims))
-        known = variables_in(self.points)
-        variables = {
-            name: replace(one, dims=dims + one.dims)
-            for name, one in known.items()
-            if name in found
-        }
-        values = {name: found[name] for name in variables}
+        dims, shape = tuple(axes), tuple(len(axes[dim][dim][0]) for dim in axes)
+        variables, values = {}, {}
+        for name, one in variables_in(self.points).items():
+            if name in self._arrays:
+                array, kind = self._arrays[name], self._types[name]
+                if kind.kind == "f" or not np.isnan(array).any():
+                    array = array.astype(kind, copy=False)
+                values[name] = array.reshape(shape + array.shape[1:])
+                variables[name] = replace(one, dims=dims + one.dims)
         coordinates: Coordinates = {}
         for own in axes.values():
             coordinates |= own
         coordinates["sample"] = self.first + np.arange(self.done.shape[1]), SAMPLE
-        attributes = {**attributes, **self.lacks}
+        attributes, failed, made = dict(attributes), self.failed, int(self.done.sum())
+        if failed:
+            attributes["failed_samples"] = failed
+        if made + len(failed) < self.done.size:
+            attributes["cut_short"] = f"{made} of {self.done.size} samples are done"
         interface = self.points[0].problem.interface
         return to_dataset(values, variables, coordinates, attributes, interface)
-
-
-def labels_of(
-    result: xr.Dataset, dims: Sequence[str], lacks: Collection[str]
-) -> dict[str, Any]:
-    """Return in plain form what a result over some dimensions holds beside its values.
-
-    Attributes that state what it lacks are left out.
-    """
-    return {
-        "sizes": {dim: result.sizes[dim] for dim in dims},
-        "coords": result.drop_vars(list(result.data_vars)).to_dict()["coords"],
-        "attrs": {name: one for name, one in result.attrs.items() if name not in lacks},
-        "variables": {name: [list(one.dims), one.attrs] for name, one in result.items()},
-    }
-
-
-def with_labels(rows: Gathered, labels: Mapping[str, Any]) -> xr.Dataset:
-    """Return what was gathered as a dataset with stored labels instead of those of a study."""
-    import xarray as xr
-
-    plain = {name: labels[name] for name in ("coords", "attrs")} | {"data_vars": {}}
-    found = rows.arrays(tuple(labels["sizes"].values())[:-1])
-    values = {
-        name: (dims, found[name], attrs)
-        for name, (dims, attrs) in labels["variables"].items()
-        if name in found
-    }
-    return xr.Dataset.from_dict(plain).assign(values).assign_attrs(as_text(rows.lacks))

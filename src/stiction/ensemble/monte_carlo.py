@@ -13,7 +13,7 @@ from stiction.base.errors import merge_warnings, warn_accuracy, warn_user
 from stiction.base.model import Count, Flag, Names, Number, Progress, checked
 from stiction.base.progress import Meter, Show, duration
 from stiction.ensemble.batches import solve_span, spans_of, usable_cores
-from stiction.ensemble.dataset import Gathered, GridAxes, distinct, labels_of
+from stiction.ensemble.dataset import Gathered, GridAxes, distinct
 from stiction.ensemble.experiment import Ensemble, Experiment
 from stiction.ensemble.items import complete
 from stiction.ensemble.pilot import compare, doubt
@@ -98,8 +98,6 @@ def gather(
         if store:
             store.note_pilot(found)
     result = rows.dataset({**attributes, **(found or {})}, axes)
-    if store:
-        store.note_labels(labels_of(result, (*axes, "sample"), rows.lacks))
     if failed := rows.failed:
         some = "; ".join(str(failure) for failure in failed[:SHOWN])
         more = f"; and {len(failed) - SHOWN} more" if len(failed) > SHOWN else ""

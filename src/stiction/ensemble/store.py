@@ -28,7 +28,7 @@ from stiction.ensemble.batches import Failure, Table, versions
 from stiction.ensemble.pilot import LOOKED_AT
 
 FORMAT = 5
-STUDY, PILOT, LABELS, CHUNKS = "study.json", "pilot.json", "labels.json", "chunks"
+STUDY, PILOT, CHUNKS = "study.json", "pilot.json", "chunks"
 NAME = re.compile(r"[0-9a-f]{32}\.npz")
 SAVE_SECONDS = 10.0
 """A chunk holds the samples of this time."""
@@ -40,17 +40,15 @@ class Damaged(StoreError):
 
 
 class Store:
-    """The folder of a run: samples of a study, given in plain form, or of whatever study is there.
+    """The folder of a run: samples of a study, given in plain form.
 
     Of the chunks that were read, `damage` gives the defects of damaged ones, by name; `seconds`
     (of one core, for each) and `versions` are those of the others.
     """
 
-    def __init__(self, path: Path, study: dict[str, Any] | None) -> None:
+    def __init__(self, path: Path, study: Mapping[str, Any]) -> None:
         self.path = path
-        self._mark = None
-        if study is not None:
-            self._mark = digest(json.dumps(_identity(study), sort_keys=True).encode())
+        self._mark = digest(json.dumps(_identity(study), sort_keys=True).encode())
         self.damage: dict[str, str] = {}
         self.seconds: list[float] = []
         self.versions: dict[str, None] = {}
@@ -77,7 +75,6 @@ class Store:
             if list(store.chunks()) or STUDY in others:
                 store.warn(f"{STUDY} is damaged or missing; it is rebuilt from the given study")
         if before != study:
-            (path / LABELS).unlink(missing_ok=True)
             if before and before["ensemble"]["samples"] < LOOKED_AT:  # a pilot of fewer samples
                 (path / PILOT).unlink(missing_ok=True)
             _write_json(path / STUDY, study)
@@ -104,9 +101,8 @@ class Store:
                 continue
             with np.load(io.BytesIO(data), max_header_size=len(data)) as archive:
                 mark, made_by, seconds, failed = json.loads(archive["about"].tobytes())
-                if mark != (self._mark or mark):
+                if mark != self._mark:
                     raise StoreError(f"{folder / name}: belongs to another study")
-                self._mark = mark
                 failures = tuple(Failure(*one) for one in failed)
                 self.seconds.append(seconds)
                 self.versions[made_by] = None
@@ -132,26 +128,13 @@ class Store:
     @property
     def pilot(self) -> dict[str, Any] | None:
         """Result of the pilot; None if there was none."""
-        return self._noted(PILOT)
-
-    @property
-    def labels(self) -> dict[str, Any] | None:
-        """Coordinates and variables of the result without their values; None before its end."""
-        return self._noted(LABELS)
-
-    def _noted(self, name: str) -> dict[str, Any] | None:
         with suppress(Damaged):
-            return read_json(self.path / name)
+            return read_json(self.path / PILOT)
         return None
 
     def note_pilot(self, attributes: Mapping[str, Any]) -> None:
         """Store the result of the pilot."""
         _write_json(self.path / PILOT, attributes)
-
-    def note_labels(self, labels: Mapping[str, Any]) -> None:
-        """Store what names the numbers, for readers without the classes of the study."""
-        if labels != self.labels:
-            _write_json(self.path / LABELS, labels)
 
     def add(self, table: Table) -> None:
         """Take a table, and store all that were taken if it is time or they are large."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,8 +15,7 @@ from pydantic import BeforeValidator
 from stiction.base.errors import RunError
 from stiction.base.model import FilePath, brief, check
 from stiction.ensemble.batches import Failure
-from stiction.ensemble.dataset import Gathered, with_labels
-from stiction.ensemble.experiment import Ensemble
+from stiction.ensemble.dataset import Gathered
 from stiction.ensemble.store import Store
 from stiction.random.synthesis import BLOCK
 from stiction.study.export import export
@@ -79,7 +77,6 @@ class StoredRun:
     ----------
     path : Path
     study : Study
-        None if this installation cannot make it: the numbers can be read all the same.
     counted : str
         What is stored: samples, or repetitions of failure curves.
     """
@@ -90,25 +87,14 @@ class StoredRun:
         self.path, self.study, self._store = store.path, study, store
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({str(self.path)!r}, {self._what})"
-
-    @property
-    def title(self) -> str:
-        """Title of the study."""
-        return str(self.study.title)
-
-    @property
-    def points(self) -> list[str]:
-        """Names of the points of the sweep."""
-        return list(map(str, self.study.points))
-
-    @property
-    def _what(self) -> str:
-        methods = " and ".join(
-            dict.fromkeys(one.method.label for one in self.study.experiments)
-        )
         points, each = len(self.study.experiments), self.study.ensemble.samples
-        return f"{points} x {each} {self.counted} by {methods}"
+        what = f"{points} x {each} {self.counted} by {self.methods}"
+        return f"{type(self).__name__}({str(self.path)!r}, {what})"
+
+    @property
+    def methods(self) -> str:
+        """Labels of the methods of the study."""
+        return " and ".join({one.method.label: None for one in self.study.experiments})
 
     def status(self) -> Status:
         """Return the state of the run, after a comparison of all chunks with their checksums.
@@ -199,37 +185,3 @@ class StoredRun:
                 " partial=True"
             )
         export(self._checked(rows), place)
-
-
-class PlainRun(StoredRun):
-    """A run on disk whose study this installation cannot make: its numbers, for reading."""
-
-    def __init__(self, store: Store, labels: dict[str, Any]) -> None:
-        super().__init__(store, None)
-        self._labels = labels
-
-    @property
-    def title(self) -> str:
-        """Title of the study."""
-        return str(self._labels["attrs"].get("title", ""))
-
-    @property
-    def points(self) -> list[str]:
-        """Names of the points of the sweep."""
-        *axes, _ = self._labels["sizes"].values()
-        return [f"point {number}" for number in range(math.prod(axes))]
-
-    @property
-    def _what(self) -> str:
-        return f"sizes {self._labels['sizes']}, without its study"
-
-    def labelled(self, rows: Any) -> xr.Dataset:
-        """Return what was read as a dataset."""
-        return with_labels(rows, self._labels)
-
-    def _rows(self, only: Sequence[str] | None) -> Any:
-        samples = self._labels["sizes"]["sample"]
-        first = self._labels["coords"]["sample"]["data"][0]
-        points: Any = self.points
-        ensemble = Ensemble(samples=samples, first=first)
-        return Gathered(points, ensemble, self._labels["variables"] if only is None else only)

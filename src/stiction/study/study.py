@@ -33,7 +33,7 @@ from stiction.ensemble.dataset import GridAxes, variables_in
 from stiction.ensemble.experiment import Ensemble, Experiment
 from stiction.ensemble.limit_state import Event
 from stiction.ensemble.monte_carlo import gather
-from stiction.ensemble.store import Damaged, Store, read_study
+from stiction.ensemble.store import Store, read_study
 from stiction.methods.dynamics.save import Save
 from stiction.methods.protocol import METHODS, as_method
 from stiction.problem.problem import Problem
@@ -42,7 +42,7 @@ from stiction.random.dotted_keys import with_values
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 from stiction.reliability.answer import Probability
 from stiction.study.question import Question
-from stiction.study.run import AnyPart, PlainRun, StoredRun, samples_of_part
+from stiction.study.run import AnyPart, StoredRun, samples_of_part
 from stiction.study.sweep import Point, Sweep, Uncertain, grid_axes, with_first_values
 
 if TYPE_CHECKING:
@@ -469,37 +469,24 @@ def open_run(path: Any) -> StoredRun:
     Returns
     -------
     StoredRun
-        With `study`, `status()`, `dataset()` and `export(path)`. If the study cannot be read,
-        because its file is lost or a class of somebody else is not installed, `study` is None: a
-        warning says so, and the samples of a run that came to its end are read all the same.
+        With `study`, `status()`, `dataset()` and `export(path)`.
 
     Raises
     ------
     InputError
         If `path` is not a path.
     StoreError
-        If the folder holds no run, or the run cannot be read.
-
-    Warns
-    -----
-    UserWarning
-        If the study cannot be read.
+        If the folder holds no run, or its study cannot be read, as without a class of somebody
+        else that it names.
     """
     from stiction.study.failure import CURVES, StoredCurves
 
     place = check("path", path, FilePath)
-    store = Store(place, None)
+    plain = read_study(place)
+    store, settings = Store(place, plain), plain.pop(CURVES, None)
     try:
-        plain = read_study(place)
-        store, settings = Store(place, plain), plain.pop(CURVES, None)
         found = Study.from_dict(plain)
-        return StoredCurves(store, found, settings) if settings else StoredRun(store, found)
-    except (InputError, Damaged) as error:
-        texts, labels = getattr(error, "problems", [str(error)]), store.labels
-        if labels is None and isinstance(error, Damaged):
-            raise
-        text = "\n  ".join(["its study cannot be read by this installation:", *texts])
-        if labels is None:
-            raise StoreError(f"{place}: {text}") from None
-        store.warn(f"{text}\nits numbers can be read and exported, but not continued")
-        return PlainRun(store, labels)
+    except InputError as error:
+        texts = [f"{place}: its study cannot be read by this installation:", *error.problems]
+        raise StoreError("\n  ".join(texts)) from None
+    return StoredCurves(store, found, settings) if settings else StoredRun(store, found)
