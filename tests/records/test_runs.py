@@ -192,7 +192,6 @@ onset problem.toml --strength mu.csv
 onset varying.toml --strength scan.csv
 onset wrong.toml --strength scan.csv
 onset study.toml --strength gaps.csv
-onset study.toml --strength gaps.csv --gaps fill
 onset study.toml --strength three.csv
 onset study.toml --strength p.npy --method local
 onset study.toml --strength missing.npy

@@ -372,10 +372,6 @@ test_what_is_no_profile_is_refused = refusals({
     "interpolate=True": read(TENT, interface=LINE),
     "values are missing ... the first at x = 0.0265625 m":
         read(TENT.drop_isel(x=[11, 12, 13, 14]), interface=LINE, interpolate=True),
-    "at 1 of 128 nodes, ... are filled on periodic lines only": read(
-        labelled(without(3)), gaps="fill",
-        interface=dataclasses.replace(SYSTEM, specimen=st.Blocks(height=0.1)).interface,
-    ),
     "clearly the strength ... 'z'": read(labelled().to_dataset(name="z")),
     "value: unknown '1' ... strength, tau_i":
         read(labelled().to_dataset(name="strength").assign(tau_i=labelled()), x=0, value=1),
@@ -415,20 +411,15 @@ def test_other_places_are_said_and_interpolated_only_where_it_is_asked_for():
         assert [*np.flatnonzero(np.isnan(profile))] == [*missing]
 
 
-def test_gaps_are_named_filled_on_request_and_remembered():
-    holes = without(slice(0, 3), slice(-2, None), slice(70, 86))
-    words = "(NaN) at 21 of 128 nodes, the first at x = 0 m"
-    expected = np.interp(X, X[~np.isnan(holes)], holes[~np.isnan(holes)], period=0.1)
+def test_gaps_are_named_or_left_for_xarray_to_fill():
+    holes = without(slice(70, 86))
+    expected = np.interp(X, X[~np.isnan(holes)], holes[~np.isnan(holes)])
+    words = "(NaN) at 16 of 128 nodes, the first at x = 0.0546875 m"
     for given in (holes, labelled(holes), labelled(holes[::-1], X[::-1])):
         refuses(f"strength: values are missing ... {words}", lambda given=given: found(given))
-    with pytest.warns(
-        st.AccuracyWarning, match=r"65 of 128.*check interface.length and the unit"
-    ):
-        st.read_profile(labelled(STRENGTH[:63], X[:63]), interface=LINE, gaps="fill")
-    profile = st.read_profile(labelled(holes), interface=LINE, gaps="fill")
-    np.testing.assert_allclose(profile, expected, rtol=1e-14)
-    np.testing.assert_array_equal(profile["measured"], ~np.isnan(holes))
-    assert found(profile)[0] == pytest.approx(found(expected)[0], rel=1e-14)
+    profile = st.read_profile(labelled(holes), interface=LINE, gaps="skip")
+    np.testing.assert_array_equal(profile, holes)
+    np.testing.assert_allclose(profile.interpolate_na("x"), expected, rtol=1e-14)
 
 
 def npy(shape, payload=b"", dtype="<f8", version=b"\x01\x00", extra=""):
@@ -502,7 +493,7 @@ def test_profiles_in_a_study_file(study, tmp_path):
         ("problem: load.profile: ... load.csv: x does not coincide", {"file": "load.csv"}),
         ("did you mean 'interpolate'", {"file": "tau_r.csv", "interpol": True}),
         ("quantity: is not an option", {"file": "tau_r.csv", "quantity": "height"}),
-        ("gaps: must be 'refuse', 'fill' or", {"file": "load.csv", "gaps": "drop"}),
+        ("gaps: must be 'refuse' or", {"file": "load.csv", "gaps": "drop"}),
         ("tau_r.csv: holds no variable", "tau_r.csv"),
         ("tables with the key 'file'", {"values": [1.0, 2.0]}),
     ],

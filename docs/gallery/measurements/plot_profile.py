@@ -20,6 +20,6 @@ tau_p = st.read_profile(
     root / "examples/data/strength_profile.csv",
     interface=problem.interface,
     interpolate=True,
-    gaps="fill",
-)
+    gaps="skip",
+).interpolate_na("x")
 st.plot.onset(st.onset(problem, tau_p, method=st.Equilibrium()), tau_p)

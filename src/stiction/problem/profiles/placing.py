@@ -2,7 +2,7 @@
 
 The nodes are x_i = i L/n in each direction, periodically: points may come in any order and begin
 anywhere. Those of a specimen are x_i = (i + 1/2) L/n, and nothing continues beyond its ends. What
-is missing is refused, stays NaN, or is filled on request, on lines that continue periodically.
+is missing is refused, or stays NaN on request.
 """
 
 from __future__ import annotations
@@ -16,15 +16,12 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.problem.interface import Interface
 
-Gaps = Literal["refuse", "fill", "skip"]
-Mask = NDArray[np.bool_]
+Gaps = Literal["refuse", "skip"]
 
 TOLERANCE = 0.02
 """Of the spacing of nodes: what rounding in a file may move a point."""
 WIDE = 4.0
 """Times the median distance of points: what is wider is no interval but a gap."""
-MEASURED = "measured"
-"""Coordinate of profiles with gaps, False where a value was filled in."""
 OF_A_PLANE = (
     "; a map has columns or coordinates x and y, or is an .npy of shape (nx, ny), and needs an"
     " interface of two lengths and two numbers of nodes"
@@ -32,31 +29,22 @@ OF_A_PLANE = (
 """What to do with two dimensions where a line was expected."""
 
 
-def points_of(array: Any) -> tuple[Array, dict[str, Array], Any]:
-    """Return values (..., points), their places (m) by direction, and where they were measured.
+def points_of(array: Any) -> tuple[Array, dict[str, Array]]:
+    """Return values (..., points), and their places (m) by direction.
 
-    The mask is True if nothing was filled in. Values without coordinates keep their shape, and the
-    dictionary is empty.
+    Values without coordinates keep their shape, and the dictionary is empty.
     """
     dims = [dim for dim in ("x", "y") if dim in array.coords]
     if len(dims) == 2 and "row" not in array.dims:
         array = array.stack(row=dims, create_index=False)
-    measured: Any = True
-    if MEASURED in array.coords:
-        mask = array[MEASURED].broadcast_like(array).transpose(*array.dims)
-        measured = mask.values.astype(bool)
-    return array.values, {dim: array[dim].values for dim in dims}, measured
+    return array.values, {dim: array[dim].values for dim in dims}
 
 
 def place(
     array: Any, interface: Interface, interpolate: bool = False, gaps: Gaps = "refuse"
-) -> tuple[Array, Any]:
-    """Put values on the nodes of an interface, (..., *shape), with a mask of what was measured.
-
-    The mask is False where there was no value, be it filled in or left out; it is True if nothing
-    is missing.
-    """
-    values, places, measured = points_of(array)
+) -> Array:
+    """Put values on the nodes of an interface, (..., *shape)."""
+    values, places = points_of(array)
     if not places:
         shape = values.shape[-len(interface.shape) :]
         if shape != interface.shape:
@@ -67,7 +55,7 @@ def place(
                     " interpolate=True if points do not lie on the nodes"
                 )
             raise InputError(f"must have shape {interface.shape}, got shape {shape}{hint}")
-        return close_gaps(values, measured, interface, gaps)
+        return checked_gaps(values, interface, gaps)
     if values.size == 0:
         raise InputError("has no values")
     offsets = [_offset(dim, places[dim], interface, interpolate) for dim in interface.dims]
@@ -102,8 +90,7 @@ def place(
             f"{node.size} points are interpolated linearly to {interface.size} nodes, which are"
             f" {interface.spacing:.3g} m apart"
         )
-    whole = np.all(measured) or put(measured * 1.0) > 0.999
-    return close_gaps(put(values), whole, interface, gaps)
+    return checked_gaps(put(values), interface, gaps)
 
 
 def turned(given: tuple[int, ...], shape: tuple[int, ...]) -> str:
@@ -207,35 +194,16 @@ def _interpolated(x: Array, values: Array, interface: Interface) -> Array:
     return np.apply_along_axis(at_nodes, -1, values[..., order])
 
 
-def close_gaps(
-    values: Array, measured: Any, interface: Interface, gaps: Gaps
-) -> tuple[Array, Any]:
-    """Return values (..., *shape) with NaN refused, left or filled, and what was measured."""
-    missing = np.isnan(values)
-    if not missing.any():
-        return values, measured
-    rows, holes = values.reshape(-1, *interface.shape), missing.reshape(-1, *interface.shape)
+def checked_gaps(values: Array, interface: Interface, gaps: Gaps) -> Array:
+    """Return values (..., *shape); refuse NaN among them unless gaps are skipped."""
+    holes = np.isnan(values).reshape(-1, *interface.shape)
+    if gaps == "skip" or not holes.any():
+        return values
     row = int(np.argmax(holes.any(axis=interface.axes)))
-    text = (
+    raise InputError(
         f"values are missing (NaN) at {holes[row].sum()} of {interface.size} nodes"
-        f"{f' of sample {row}' * (len(rows) > 1)}, the first at"
-        f" {interface.describe_node(int(np.argmax(holes[row])))}"
+        f"{f' of sample {row}' * (len(holes) > 1)}, the first at"
+        f" {interface.describe_node(int(np.argmax(holes[row])))}; give them, make interface.length"
+        " that of the record, or fill them, as does"
+        " st.read_profile(..., interface=..., gaps='skip').interpolate_na('x')"
     )
-    if interface.is_plane or interface.is_free:
-        if gaps != "skip":
-            raise InputError(f"{text}; give them: gaps are filled on periodic lines only")
-    elif gaps == "refuse":
-        raise InputError(
-            f"{text}; give them, make interface.length that of the record, or pass gaps='fill'"
-            " to st.read_profile, which fills them with straight lines"
-        )
-    elif gaps == "fill":
-        if holes.all(axis=-1).any():
-            raise InputError("has no value at all")
-        x, length = interface.x, interface.extent
-        for one, hole in zip(rows := rows.copy(), holes, strict=True):
-            one[hole] = np.interp(x[hole], x[~hole], one[~hole], period=length)
-        values = rows.reshape(values.shape)
-        doubt = "; check interface.length and the unit of x" if missing.mean() > 0.5 else ""
-        warn_accuracy(f"{text}; filled with straight lines{doubt}")
-    return values, ~missing & measured
