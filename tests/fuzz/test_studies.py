@@ -29,7 +29,7 @@ PLAIN = small_study(
     ensemble={"samples": 20, "seed": 11, "first": 0},
     sweep=[
         *lengths(0.02, 0.03),
-        {"problem.interface.length": {"start": 0.1, "stop": 0.2, "count": 2}},
+        {"problem.interface.length": [0.1, 0.2]},
     ],
 )
 PLAIN["problem"]["load"] = {"profile": 1.0, "initial_stress": 0.0, "normal_pressure": 5e6}
@@ -42,8 +42,8 @@ VALUES: tuple[Any, ...] = (
     5e-324, 1e-30, 1e-9, 1e3, 1e9, 1e30, 1e308, float("nan"), float("inf"), [], [1], [1.0, 2.0],
     ["x"], [[1.0], [2.0, 3.0]], [True], {}, {"a": 1}, {"type": "x"}, {"type": "norm"},
     {"type": "lognorm", "s": 0.3, "scale": 1e6}, {"type": "equilibrium"}, {"type": 3},
-    {"start": 1, "stop": 2, "count": 3}, {"start": 1.0, "stop": 2.0, "count": 10**9},
-    {"start": 1e-300, "stop": 1e300, "count": 5, "spacing": "log"}, [{"type": "beta"}],
+    [1, 2, 3], [1e-300, 1e300], {"low": 1e-300, "high": 1e300, "spacing": "log"},
+    [{"type": "beta"}],
 )  # fmt: skip
 
 

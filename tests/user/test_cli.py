@@ -21,9 +21,7 @@ import stiction as st
 from stiction.base import files
 from stiction.base.errors import StoreError
 from stiction.base.files import private_folder
-from stiction.cli import commands
 from stiction.cli.commands import app
-from stiction.ensemble import batches
 from stiction.ensemble.store import Store
 from stiction.study import export
 from stiction.study.study import study_schema
@@ -173,17 +171,3 @@ def test_a_disk_without_room_for_a_result_is_left_as_it_was(tmp_path, monkeypatc
     assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
     room["free"] *= 2
     export.write_result(result, tmp_path / "out.nc")
-
-
-def test_the_time_of_a_study_is_that_of_its_points(monkeypatch):
-    """Of 1, 2 and 3 s a sample."""
-    Cost = namedtuple("Cost", "seconds failures")
-
-    def solved(point, span):
-        return Cost((1.0 + span.point) * span.samples, ())
-
-    monkeypatch.setattr(batches, "solve_span", solved)
-    monkeypatch.setattr(batches, "usable_cores", lambda: 4)
-    cost, _, _ = commands._cost(st.Study.from_toml("study.toml"))
-    words = "about 10 min on one core, 2.5 min on the 4 here (1 s to 3 s a sample"
-    assert cost["time"].startswith(words)

@@ -49,6 +49,26 @@ QUANTITIES = PROFILES | {
 }
 """What may be read as a profile."""
 
+UNITS = {name: variable.units for name, variable in PROFILES.items()} | {
+    "length": "m",
+    "correlation_length": "m",
+    "efolding_length": "m",
+    "decay": "m",
+    "height": "m",
+    "thickness": "m",
+    "width": "m",
+    "stiffness": "N m-1",
+    "shear_modulus": "Pa",
+    "youngs_modulus": "Pa",
+    "density": "kg m-3",
+    "loading_rate": "Pa s-1",
+    "pressing_force": "N",
+    "end_time": "s",
+}
+"""Units of parameters by the ends of their keys; others are pure numbers."""
+OF_THE_FIELD = ("mean", "standard_deviation", "low", "high", "loc", "scale", "noise")
+"""Parameters of a marginal, and of what was measured, in the unit of their field."""
+
 DIRECTION = "direction"
 """Dimension of the components along x and y."""
 

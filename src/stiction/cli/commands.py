@@ -19,15 +19,11 @@ from typer import Argument, Option
 from typer.models import OptionInfo
 
 from stiction import __version__
-from stiction.base.errors import InputError, RunError, collect_warnings, unknown_name
+from stiction.base.errors import InputError, RunError, unknown_name
 from stiction.base.progress import Meter, duration, interrupted
 
 SHOWN = 12
 """Points, failures or damaged chunks that are listed."""
-PROBED = 5
-"""Points of a sweep at which samples are timed."""
-BUDGET = 2.0
-"""Seconds that the timing may take, apart from preparation and compilation."""
 RUPTURE = (
     "critical_stress", "stress_drop", "onset_time", "critical_position", "median_rupture_speed"
 )  # fmt: skip
@@ -256,24 +252,13 @@ def report(
 
 
 def check(study: StudyFile) -> None:
-    """Validate a study file and estimate its time and size, or list all errors.
-
-    A few samples are solved to estimate the time. Exit code 1: all of them failed.
-    """
+    """Validate a study file and estimate its time and size, or list all errors."""
     from stiction.study.study import Study
 
     loaded = Study.from_toml(study)
     echo(f"{study}: valid" + (f", {loaded.title!r}" if loaded.title else ""))
-    with Meter("timing a few samples"):
-        cost, tried, failures = _cost(loaded)
-    for name, text in (description(loaded) | cost).items():
+    for name, text in (description(loaded) | _cost(loaded)).items():
         echo(f"  {name:20s} {text}")
-    if failures:
-        echo(
-            f"{len(failures)} of {tried} probed samples failed, such as {failures[0]}", err=True
-        )
-    if len(failures) == tried:
-        raise typer.Exit(1)
 
 
 def description(study: Any) -> dict[str, str]:
@@ -327,39 +312,19 @@ def _numbers(problem: Any, random: Any) -> dict[tuple[str, str], float]:
     return found
 
 
-def _cost(study: Any) -> tuple[dict[str, str], int, list[str]]:
-    """Estimate the time of a study from a few timed samples, and the size of its result.
+def _cost(study: Any) -> dict[str, str]:
+    """Return about how long a study takes, and the size of its result."""
+    from stiction.ensemble.batches import usable_cores
 
-    Return also how many samples were solved or failed, and the failures.
-    """
-    import numpy as np
-
-    from stiction.ensemble.batches import Span, solve_span, usable_cores
-
-    ensemble, points = study.ensemble, study.experiments
-    chosen = np.unique(np.linspace(0, len(points) - 1, PROBED).round().astype(int))
-    rates: list[float] = []
-    failures: dict[str, None] = {}
-    tried = 0
-    with collect_warnings():  # the run itself warns
-        for number in chosen.tolist():
-            point = points[number]
-            solve_span(point, Span(number, ensemble.first, 1))  # compiles and prepares
-            affordable = BUDGET / chosen.size / point.seconds
-            count = max(1, int(min(point.batch, ensemble.samples, affordable)))
-            table = solve_span(point, Span(number, ensemble.first, count))
-            failures |= dict.fromkeys(map(str, table.failures))
-            rates.append(table.seconds / count)
-            tried += count
-    seconds = float(np.interp(np.arange(len(points)), chosen, rates).sum()) * ensemble.samples
-    each = " to ".join(dict.fromkeys((duration(min(rates)), duration(max(rates)))))
-    cores, size = usable_cores(), sum(point.sample_bytes for point in points) * ensemble.samples
-    lines = {
+    points, samples, cores = study.experiments, study.ensemble.samples, usable_cores()
+    each = [point.seconds for point in points]
+    seconds, size = sum(each) * samples, sum(point.sample_bytes for point in points) * samples
+    ends = " to ".join(dict.fromkeys((duration(min(each)), duration(max(each)))))
+    return {
         "time": f"about {duration(seconds)} on one core, {duration(seconds / cores)} on the {cores}"
-        f" here ({each} a sample, probed at {len(chosen)} of {len(points)} points)",
+        f" here ({ends} a sample), to a factor of three",
         "size": f"about {size / 1e6:.3g} MB",
     }
-    return lines, tried, list(failures)
 
 
 def schema() -> None:

@@ -46,7 +46,7 @@ def _warn_if_long(points: Sequence[Experiment], missing: NDArray[Any], workers: 
     if seconds > LONG:
         warn_user(
             f"samples: {int(missing.sum()):,} samples take about {duration(seconds)} on {workers}"
-            f" core{'s' * (workers > 1)}; `stiction check` times some of a study",
+            f" core{'s' * (workers > 1)}",
             UserWarning,
         )
 

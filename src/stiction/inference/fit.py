@@ -14,7 +14,7 @@ from scipy.stats import t as student
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, unknown_name, warn_accuracy
 from stiction.base.model import Count, Flag, Number, Positive, Progress, at_least, checked
-from stiction.base.variables import QUANTITIES
+from stiction.base.variables import OF_THE_FIELD, QUANTITIES, UNITS
 from stiction.inference.between import chance_of_scatter, likely_between, scatter_between
 from stiction.inference.bootstrap import FEWEST, Repetitions, bootstrapped, intervals, likely
 from stiction.inference.estimate import Estimate, FitSetting, Goodness, compare, windowed
@@ -48,8 +48,6 @@ EVENLY = 0.5 * (math.sqrt(5.0) - 1.0)
 """Step of a sequence that fills [0, 1) evenly, however long it is (Niederreiter, 1992)."""
 LEAST_SCATTER = 1e-8
 """Variance of the logarithm of a factor that stands for none."""
-STRESSES = ("mean", "standard_deviation", "noise", "low", "high", "loc", "scale")
-"""Parameters in the unit of the field."""
 
 
 def _families(given: Any) -> list[Family]:
@@ -207,8 +205,8 @@ class FieldFit:
             if name == "mean" and "marginal.mean" in self.parameters:
                 continue  # the same number
             (low, high), last = self.interval[name], name.rpartition(".")[2]
-            own = QUANTITIES[self.quantity].units if last in STRESSES else "1"
-            unit = "m" if last.endswith("length") else own
+            own = QUANTITIES[self.quantity].units
+            unit = own if last in OF_THE_FIELD else UNITS.get(last, "1")
             line = f"  {name:{width}s}  {value:<11.5g} {low:.4g} to {high:.4g}"
             lines.append(line if unit == "1" else f"{line} {unit}")
         p_values = ", ".join(f"{name} {p:.3g}" for name, p in self.p_values.items())

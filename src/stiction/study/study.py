@@ -43,7 +43,7 @@ from stiction.random.fields import RandomField, RandomInterface, as_random_inter
 from stiction.reliability.answer import Probability
 from stiction.study.question import Question
 from stiction.study.run import AnyPart, StoredRun, samples_of_part
-from stiction.study.sweep import Point, Sweep, Uncertain, grid_axes, with_first_values
+from stiction.study.sweep import Point, Sweep, Uncertain, grid_axes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -101,8 +101,7 @@ class Study(_Parts):
     ensemble : Ensemble
     sweep : list of dict
         Axes that are crossed; each maps dotted keys of the study, which vary together, to lists
-        of values or ranges ``{start, stop, count, spacing = "linear" | "log"}``. Every point of
-        the sweep has the same samples.
+        of values. Every point of the sweep has the same samples.
     uncertain : dict, optional
         Distributions of parameters of ``random`` by dotted key, as of `RandomInterface.uncertain`,
         and their ``count``, by default 30: that many interfaces, drawn with the seed, are equally
@@ -372,10 +371,7 @@ class Study(_Parts):
 
     @classmethod
     def from_dict(cls, given: dict[str, Any], *, folder: str | Path | None = None) -> Study:
-        """Make a study of plain dictionaries; paths of profiles are relative to `folder`.
-
-        A key that is swept need not have a value of its own.
-        """
+        """Make a study of plain dictionaries; paths of profiles are relative to `folder`."""
         return _read(cls, given, folder)
 
     @classmethod
@@ -403,15 +399,13 @@ _BOUNDS = {
 
 
 def study_schema() -> dict[str, Any]:
-    """Return the JSON schema of a study file; a sweep may give any key, so none is required."""
+    """Return the JSON schema of a study file."""
 
-    def relaxed(table: dict[str, Any]) -> dict[str, Any]:
-        if "required" in table:
-            table["required"] = [name for name in table["required"] if name == "type"]
+    def renamed(table: dict[str, Any]) -> dict[str, Any]:
         return {_BOUNDS.get(key, key): value for key, value in table.items()}
 
     written = json.dumps(pydantic.TypeAdapter(Study).json_schema())
-    found: dict[str, Any] = json.loads(written, object_hook=relaxed)
+    found: dict[str, Any] = json.loads(written, object_hook=renamed)
     return found
 
 
@@ -422,17 +416,12 @@ class Setup:
     problem: Problem
     method: AnyMethod | None = None
     save: Save | None = None
-    random: Any = None
-    uncertain: Any = None
-    reliability: Any = None
-    ensemble: Any = None
-    sweep: Any = ()
-    title: Any = ""
 
 
 def read_setup(path: Path) -> Setup:
-    """Read one interface from a study file; of a sweep, the first values."""
-    return _read(Setup, _read_toml(path), path.parent)
+    """Read one interface from a study file, which need not have the other tables."""
+    own, given = Setup.__dataclass_fields__, _read_toml(path)
+    return _read(Setup, {key: one for key, one in given.items() if key in own}, path.parent)
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
@@ -451,9 +440,8 @@ def _read(cls: type[T], given: dict[str, Any], folder: str | Path | None) -> T:
     if folder is not None:
         place = check("folder", folder, FilePath)
         context["read"] = lambda profile, name: profile_in_file(profile, name, place)
-    plain = with_first_values(given)
     try:
-        return pydantic.TypeAdapter(cls).validate_python(plain, context=context)
+        return pydantic.TypeAdapter(cls).validate_python(given, context=context)
     except pydantic.ValidationError as error:
         raise InputError(dict.fromkeys(explain(error))) from None
 

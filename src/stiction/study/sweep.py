@@ -5,15 +5,15 @@ import math
 import numbers
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
+from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
+from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
 from stiction.base.errors import InputError, prefixed, unknown_name
-from stiction.base.model import Count, Real, at_least, check, describe, model, to_plain
-from stiction.base.variables import PROFILES, Variable
+from stiction.base.model import Count, check, describe, to_plain
+from stiction.base.variables import OF_THE_FIELD, UNITS, Variable
 from stiction.ensemble.dataset import Coordinates, GridAxes
 from stiction.random.dotted_keys import distributions_of, full_key
 from stiction.random.marginals import Marginal, marginal_of
@@ -23,23 +23,6 @@ INTERFACES = 30
 MOST_POINTS = 100_000
 _FIXED = ("ensemble", "ensemble.samples", "ensemble.first", "ensemble.keep")
 _TABLES = ("problem", "random", "method", "ensemble")
-_UNITS = {name: variable.units for name, variable in PROFILES.items()} | {
-    "length": "m",
-    "correlation_length": "m",
-    "decay": "m",
-    "height": "m",
-    "thickness": "m",
-    "width": "m",
-    "stiffness": "N m-1",
-    "shear_modulus": "Pa",
-    "youngs_modulus": "Pa",
-    "density": "kg m-3",
-    "loading_rate": "Pa s-1",
-    "pressing_force": "N",
-    "end_time": "s",
-}
-_OF_THE_FIELD = ("mean", "low", "high", "loc", "scale", "noise")
-"""Parameters of a marginal, and of what was measured, in the unit of their field."""
 
 Axis: TypeAlias = dict[str, list[Any]]
 """Keys that vary together, each with one value for each step."""
@@ -56,40 +39,11 @@ class Point(NamedTuple):
         return f"point {self.number} ({values})" if values else f"point {self.number}"
 
 
-@model(kw_only=True)
-class Range:
-    """Values from start to stop, both included."""
-
-    start: Real
-    stop: Real
-    count: Annotated[at_least(2), Field(le=MOST_POINTS)]  # type: ignore[valid-type]
-    spacing: Literal["linear", "log"] = "linear"
-
-    def values(self) -> list[float]:
-        """Return the values."""
-        if self.spacing == "log" and min(self.start, self.stop) <= 0.0:
-            raise InputError(
-                f"a log range needs positive ends, got {self.start:g} and {self.stop:g}"
-            )
-        between = np.geomspace if self.spacing == "log" else np.linspace
-        return between(self.start, self.stop, self.count).tolist()
-
-
 def _values(key: str, given: Any) -> list[Any]:
-    if isinstance(given, Mapping):
-        with prefixed(key):
-            values = Range(**given).values()
-        whole = all(isinstance(given[end], numbers.Integral) for end in ("start", "stop"))
-        if whole and all(value.is_integer() for value in values):  # such as numbers of nodes
-            return [int(value) for value in values]
-        return values
     if isinstance(given, np.ndarray):
         given = given.tolist()
     if not isinstance(given, list | tuple) or not given:
-        raise InputError(
-            f"{key}: must be a list of values or a range such as {{start = 1e-3, stop = 4e-3,"
-            f" count = 4}}, got {describe(given)}"
-        )
+        raise InputError(f"{key}: must be a list of values, got {describe(given)}")
     return [one.tolist() if isinstance(one, np.generic | np.ndarray) else one for one in given]
 
 
@@ -109,19 +63,14 @@ def _axis(given: Any) -> Axis:
     return axis
 
 
-def _flat(
-    given: Mapping[str, Any],
-    prefix: str = "",
-    leaf: Collection[str] = ("start", "stop", "count"),
-) -> dict[str, Any]:
+def _flat(given: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """Dotted keys of a table: TOML reads an unquoted ``a.b = 1`` as nested tables."""
     result: dict[str, Any] = {}
     for key, value in given.items():
-        inner = value if isinstance(value, Mapping) else {}
-        nested = any(isinstance(v, Mapping | list | tuple | np.ndarray) for v in inner.values())
-        if nested or (inner and not {*leaf} & set(inner)):
-            result |= _flat(inner, f"{prefix}{key}.", leaf)
-        else:  # values, or a range of them
+        inner = value.values() if isinstance(value, Mapping) else ()
+        if any(isinstance(one, Mapping | list | tuple | np.ndarray) for one in inner):
+            result |= _flat(value, f"{prefix}{key}.")
+        else:  # values, or a distribution
             result[f"{prefix}{key}"] = value
     return result
 
@@ -170,7 +119,7 @@ Sweep: TypeAlias = Annotated[
         {
             "type": "array",
             "description": "axes that are crossed; each a table of dotted keys that vary together,"
-            " with lists of values or {start, stop, count, spacing}",
+            " with lists of values",
             "items": {"type": "object"},
         }
     ),
@@ -188,7 +137,7 @@ def _read_uncertain(given: Any) -> dict[str, Any] | None:
         )
     rest = dict(given)
     found: dict[str, Any] = {"count": check("count", rest.pop("count", INTERFACES), Count)}
-    flat = _flat(rest, leaf=("low", "high", "type"))
+    flat = _flat(rest)
     for key, one in distributions_of(flat).items():
         try:
             given = flat[key]
@@ -218,34 +167,6 @@ Uncertain: TypeAlias = Annotated[
 """Distributions by dotted key, and the number of interfaces."""
 
 
-def with_first_values(given: dict[str, Any]) -> dict[str, Any]:
-    """Return a study in plain form, each swept key without a value with the first of its sweep.
-
-    An uncertain one without a value has its median.
-    """
-    try:
-        axes = read_axes(given.get("sweep", ()))
-        uncertain = _read_uncertain(given.get("uncertain")) or {}
-    except InputError:  # which the validation of the whole explains
-        return given
-    for key, one in uncertain.items():
-        if key != "count":
-            median = float(marginal_of(one).distribution.median())
-            given = _with_default(given, key.split("."), median)
-    for axis in axes:
-        for key, values in axis.items():
-            given = _with_default(given, key.split("."), values[0])
-    return given
-
-
-def _with_default(table: dict[str, Any], steps: list[str], value: Any) -> dict[str, Any]:
-    name, *rest = steps
-    inner = table.get(name, {})
-    if rest and isinstance(inner, dict):
-        return table | {name: _with_default(inner, rest, value)}
-    return table if rest or name in table else table | {name: value}
-
-
 def _text(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:g}"
@@ -255,42 +176,37 @@ def _text(value: Any) -> str:
 
 def _unit(parts: Sequence[str], coefficients: Collection[str]) -> str:
     """Return the unit of the values of a key, given by its parts."""
-    if {"marginal", "given"} & {*parts} and parts[-1] in _OF_THE_FIELD:
-        return "1" if parts[1] in coefficients else _UNITS.get(parts[1], "1")
-    return _UNITS.get(parts[-1], "1")
+    if {"marginal", "given"} & {*parts} and parts[-1] in OF_THE_FIELD:
+        return "1" if parts[1] in coefficients else UNITS.get(parts[1], "1")
+    return "1" if "correlation" in parts else UNITS.get(parts[-1], "1")
 
 
 def grid_axes(
     axes: Sequence[Axis], taken: Collection[str], coefficients: Collection[str]
 ) -> GridAxes:
-    """Return the axes as dimensions of a result, named by the ends of their keys."""
-    names = _short_names([key for axis in axes for key in axis], taken)
+    """Return the axes as dimensions of a result.
+
+    They are named by the last parts of their keys, or by the whole keys where that is not clear.
+    """
+    keys = [key for axis in axes for key in axis]
+    last = {key: key.rpartition(".")[2] for key in keys}
+    count = Counter([*last.values(), *taken])
+    names = {
+        key: key.replace(".", "_") if count[one] > 1 or ".correlation." in key else one
+        for key, one in last.items()
+    }
     result: dict[str, Coordinates] = {}
     for axis in axes:
         dim = names[next(iter(axis))]
         own = result[dim] = {}
         for key, values in axis.items():
-            labels, parts = _labels(values), key.split(".")
-            number = labels.dtype.kind in "if" and "correlation" not in parts
-            unit = _unit(parts, coefficients) if number else "1"
+            labels = _labels(values)
+            number = labels.dtype.kind in "if"
+            unit = _unit(key.split("."), coefficients) if number else "1"
             if unit != "1":  # to be shown in other units
                 labels = labels.astype(float)
             own[names[key]] = (labels, Variable(unit, key, (dim,)))
     return result
-
-
-def _short_names(keys: Sequence[str], taken: Collection[str]) -> dict[str, str]:
-    """Name each key by so many of its last parts that the name is its own."""
-    ends: dict[str, list[str]] = {}
-    for key in keys:
-        parts = key.split(".")
-        fewest = parts[::-1].index("correlation") + 1 if "correlation" in parts else 1
-        ends[key] = ["_".join(parts[-n:]) for n in range(fewest, len(parts) + 1)]
-    count = Counter(name for names in ends.values() for name in names)
-    return {
-        key: next(name for name in names if count[name] == 1 and name not in taken)
-        for key, names in ends.items()
-    }
 
 
 def _labels(values: Sequence[Any]) -> NDArray[Any]:
