@@ -79,13 +79,11 @@ def test_mean_and_deviation_are_those_of_dense_kriging(interface, shift, mean_mo
     weights = np.linalg.solve(inner, across.T).T
     covariance = correlation(field, interface, grid, grid) - weights @ across.T
     known = conditioning(given, interface)
-    mean, deviation = known.regression.moments(field.modes(interface).basis(grid))
+    mean, deviation = known.moments(field.modes(interface).basis(grid))
     np.testing.assert_allclose(mean, weights @ z, atol=1e-10)  # round-off of the dense solution
     np.testing.assert_allclose(deviation**2, np.diag(covariance), atol=1e-10)
     # 20,000 samples: an entry of a covariance scatters by 0.01, the largest of 16,384 by 4.5 of it.
-    draws = known.regression.draws(
-        st.RandomInterface(strength=field).draws(interface, 20_000, seed=1)
-    )
+    draws = known.draws(st.RandomInterface(strength=field).draws(interface, 20_000, seed=1))
     sampled = field.modes(interface).gaussian(draws).reshape(20_000, -1)
     np.testing.assert_allclose(sampled.mean(axis=0), mean, atol=5.0 / 20_000**0.5)
     np.testing.assert_allclose(np.cov(sampled.T), covariance, atol=0.05)
@@ -104,7 +102,7 @@ def test_values_that_contradict_each_other_are_those_of_dense_kriging_with_a_war
     weights = np.linalg.solve(inner, across.T).T
     deviation = np.sqrt(np.maximum(1.0 - (weights * across).sum(axis=1), 0.0))
     known = conditioning(given_on(places[0], values, 2e3, field), LINE)
-    found = known.regression.moments(field.modes(LINE).basis(LINE.x[None]))
+    found = known.moments(field.modes(LINE).basis(LINE.x[None]))
     np.testing.assert_allclose(found[0], weights @ z, rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(found[1], deviation, rtol=1e-6, atol=1e-6)
     with pytest.warns(st.AccuracyWarning, match="unlikely for this field"):
@@ -134,23 +132,30 @@ SKEWED = {  # marginal, places, values, noise, values at each place
 
 @pytest.mark.parametrize("case", SKEWED)
 @pytest.mark.filterwarnings("ignore::stiction.UnitWarning")
-def test_two_moments_of_z_where_values_are_skewed(case):
-    """Those of the field's own draws, weighted."""
+def test_posteriors_of_skewed_values_beyond_two_moments(case):
+    """Mean, scatter and lower tail are those of the field's own draws, weighted."""
     marginal, x, values, noise, times = SKEWED[case]
     field = st.RandomField(marginal, st.PowerLawSpectrum(7e-3), mean_mode=True)
     given = given_on(np.repeat(x, times), np.repeat(values, times), noise, field)
     phi = field.modes(LINE).basis(np.array([x]))
-    known = conditioning(given, LINE)
-    found, deviation = known.regression.moments(phi)
+    known, free = conditioning(given, LINE), field.modes(LINE).dimension
+    draws = np.random.default_rng(1).standard_normal((40_000, free))
+    found = from_normal(marginal, known.draws(draws) @ phi.T)
     z = np.random.default_rng(2).standard_normal((600_000, len(x)))
-    z = z @ np.linalg.cholesky(phi @ phi.T).T
-    prior = from_normal(marginal, z)
+    prior = from_normal(marginal, z @ np.linalg.cholesky(phi @ phi.T).T)
     weight = np.exp(-0.5 * times * (((prior - values) / noise) ** 2).sum(axis=1))
     weight /= weight.sum()
-    mean = weight @ z
-    spread = np.sqrt(weight @ (z - mean) ** 2)
-    np.testing.assert_allclose(found, mean, atol=0.03 * spread.min())
-    np.testing.assert_allclose(deviation, spread, rtol=0.03)
+    mean = weight @ prior
+    spread = np.sqrt(weight @ (prior - mean) ** 2)
+    # 40,000 samples, and 14,000 of the prior that count at least: three standard errors.
+    np.testing.assert_allclose(found.mean(axis=0), mean, atol=0.03 * spread.min())
+    np.testing.assert_allclose(found.std(axis=0), spread, rtol=0.03)
+    for one, other in zip(found.T, prior.T, strict=True):
+        below = weight @ (other < np.quantile(one, 0.01))
+        assert below == pytest.approx(0.01, abs=0.003)
+    everywhere = known.draws(draws[:8000]) @ field.modes(LINE).basis(LINE.x[None]).T
+    level = given.quantile(LINE, 0.05)
+    assert np.mean(from_normal(marginal, everywhere) < level) == pytest.approx(0.05, abs=0.004)
     with warnings.catch_warnings():  # neither unlikely nor approximate
         warnings.simplefilter("error")
         known.warn()

@@ -119,7 +119,7 @@ def a_field_that_is_known_in_places():
     return found | {"both": both.profiles(INTERFACE, samples=2, seed=6)}
 
 
-@calls("dense kriging and weighted draws, tests/exact/test_conditional.py", close=1e-5)
+@calls("dense kriging and Metropolis sampling, tests/exact/test_conditional.py", close=1e-5)
 def a_bounded_field_that_is_known_with_large_errors():
     known = st.RandomField(MARGINALS["weibull"], SPECTRA["cut"]).given(
         scan() * 0.6, noise=1.4e5

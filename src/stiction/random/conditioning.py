@@ -13,15 +13,16 @@ measured.
 
 Values are measured of the marginal and not of z. Their likelihood, a function of z at each
 place, is replaced by the Gaussian of the same mean and variance, in turns with the
-regression (expectation propagation; Minka, 2001). How far that is from the posterior is
-measured by weights of samples.
+regression (expectation propagation; Minka, 2001). Where that is not enough, draws are mapped
+before the regression (`stiction.random.transport`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import pydantic
+from numpy.typing import NDArray
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 from scipy.linalg import eigh, svd
 from scipy.special import ndtri
@@ -35,10 +36,11 @@ from stiction.problem.interface import Interface
 from stiction.problem.profiles.reading import in_si, unit_of
 from stiction.random.mapping import from_normal
 from stiction.random.synthesis import condition
+from stiction.random.transport import Left, Ratio, Transport, make_transport, transport
 
 DOUBTFUL = 5.0  # standard deviations of chi-square beyond which values do not suit a field
 UNCERTAIN = 0.1  # of a standard deviation of z, by which a posterior may be off
-PROBES = 1024  # samples whose weights measure what the Gaussians miss
+PROBES = 1024  # samples by which quantiles beyond the Gaussian are found
 IMPOSSIBLE = 4.0  # errors beyond a bound of the marginal that no measured value has
 FURTHEST = 37.0  # largest z whose tail of the normal distribution is a float
 REACH, NODES = 8.0, 49  # half width of Gaussians, and nodes across them
@@ -159,10 +161,10 @@ class Measured(NamedTuple):
     marginal: Any
     phi: Array
 
-    def logarithm(self, z: Array) -> Array:
-        """Return the log likelihood at z (points, ...); -inf where it has no quantile."""
-        miss = self.conditions.values[:, None] - from_normal(self.marginal, z)
-        miss *= 1.0 / self.conditions.noise
+    def logarithm(self, at: NDArray[np.int64], z: Array) -> Array:
+        """Return the log likelihood of places `at` at z (places, ...); -inf without a quantile."""
+        value = self.conditions.values[at].reshape(-1, *(1 for _ in z.shape[1:]))
+        miss = (value - from_normal(self.marginal, z)) * (1.0 / self.conditions.noise)
         # Far out in the tail scipy may have no quantile.
         return np.where(np.isnan(miss), -np.inf, -0.5 * miss**2)
 
@@ -185,7 +187,7 @@ class Measured(NamedTuple):
             half = np.maximum(0.5 * (high - low), TINY)[:, None]
             z = 0.5 * (low + high)[:, None] + half * np.linspace(-1.0, 1.0, NODES)
             off = (z - mean[:, None]) ** 2 / variance[:, None]
-            return half, z, self.logarithm(z) - 0.5 * off
+            return half, z, self.logarithm(np.arange(len(z)), z) - 0.5 * off
 
         half, z, density = evaluate()
         # Where a value contradicts the others, their product peaks outside or at an end.
@@ -237,10 +239,9 @@ class Regression(NamedTuple):
         variance = along**2 @ (1.0 / share) + np.where(free > TINY, free, 0.0)
         return along @ (self.data[0] / share), np.sqrt(variance)
 
-    def draws(self, draws: Array) -> Array:
-        """Return conditioned draws (samples, dimension)."""
+    def apply(self, out: Array) -> Array:
+        """Turn standard normal draws into those of the posterior, in place."""
         share, transposed = 1.0 + self.power, np.ascontiguousarray(self.right.T)
-        out = np.array(draws)
         condition(self.right, transposed, self.data / share, share**-0.5 - 1.0, out)
         return out
 
@@ -249,9 +250,34 @@ class Conditioning(NamedTuple):
     """Standard normal draws, given what was measured of properties: see `conditioned`."""
 
     regression: Regression
-    missed: tuple[float, float]  # of mean and deviation, at most at any place, in deviations
+    mapped: Transport  # of the draws, before the regression
+    left_over: Left
     misfit: float  # squared, of values and of draws at the middle of the posterior
     points: int
+
+    @property
+    def moments(self) -> Callable[[Array], tuple[Array, Array]]:
+        """Mean and standard deviation of z = phi @ draws by the regression alone."""
+        return self.regression.moments
+
+    def draws(self, draws: Array) -> Array:
+        """Return conditioned draws (samples, dimension)."""
+        out = np.array(draws)
+        if len(self.mapped.basis):
+            transport(*self.mapped, out, np.zeros(len(out)))
+        return self.regression.apply(out)
+
+    def quantile_at(self, phi: Array, probability: float) -> Array:
+        """Return the quantile of z = phi @ draws, (points,); beyond the regression, by samples."""
+        mean, deviation = self.moments(phi)
+        found = mean + float(ndtri(probability)) * deviation
+        if len(self.mapped.basis):
+            draws = np.random.default_rng(0).standard_normal((PROBES, phi.shape[1]))
+            pair = [self.draws(draws), self.regression.apply(draws.copy())]
+            for i, row in enumerate(phi):  # the difference scatters less than either
+                ends = [np.quantile(one @ row, probability) for one in pair]
+                found[i] += ends[0] - ends[1]
+        return found
 
     def warn(self) -> None:
         """Warn of measured values that do not suit the field."""
@@ -261,8 +287,8 @@ class Conditioning(NamedTuple):
                 f" {self.misfit:.4g} for {self.points} values): check its marginal, its correlation"
                 " length and the noise"
             )
-        if max(self.missed) > UNCERTAIN:
-            mean, deviation = self.missed
+        if max(self.left_over) > UNCERTAIN:
+            mean, deviation = self.left_over
             warn_accuracy(
                 f"given: the field is approximate where it was measured: its mean is off by up to"
                 f" about {mean:.2g} of its standard deviation, and that by up to about"
@@ -274,7 +300,8 @@ class Conditioning(NamedTuple):
 def conditioned(measured: Sequence[Measured]) -> Conditioning:
     """Condition draws on measured values of properties.
 
-    Likelihood and regression take turns until z from all other places stays.
+    Likelihood and regression take turns until z from all other places stays; what the Gaussians
+    miss is mapped before the regression (`transport`).
     """
     phi = np.concatenate([one.phi for one in measured])
     others = np.zeros(len(phi)), np.ones(len(phi))
@@ -287,12 +314,15 @@ def conditioned(measured: Sequence[Measured]) -> Conditioning:
         weighted, precision = _gaussians(measured, others)
     along, share = phi @ found.right, np.sqrt(1.0 + found.power)
     middle = along @ (found.data[0] / share**2)
-    missed = _missed(measured, weighted, precision, middle, along / share)
+    ratio = _ratio(measured, weighted, precision, middle)
+    mapped, left_over = make_transport(ratio, middle, along / share)
+    mapped = mapped._replace(basis=np.ascontiguousarray(mapped.basis @ found.right.T))
+    none = np.zeros_like(middle)
+    likelihood = _ratio(measured, none, none, middle)(np.arange(middle.size), middle)
     draws = found.data[0] / (1.0 + found.power)
-    likelihood = _logarithm(measured, middle[:, None])
     misfit = -2.0 * float(likelihood.sum()) + float(draws @ draws)
     found = found._replace(data=weighted[None, :] @ found.left)
-    return Conditioning(found, missed, misfit, len(phi))
+    return Conditioning(found, mapped, left_over, misfit, len(phi))
 
 
 def _gaussians(
@@ -306,40 +336,23 @@ def _gaussians(
     return weighted, precision
 
 
-def _logarithm(measured: Sequence[Measured], z: Array) -> Array:
-    """Logarithm of the likelihood at z (places, samples) of all properties."""
-    ends = np.cumsum([len(one.phi) for one in measured])[:-1]
-    each = zip(measured, np.split(z, ends), strict=True)
-    found = np.concatenate([one.logarithm(rows) for one, rows in each])
-    return np.maximum(found, LOWEST)
+def _ratio(
+    measured: Sequence[Measured], weighted: Array, precision: Array, middle: Array
+) -> Ratio:
+    """Logarithm of the likelihood over the Gaussian that stands for it, by place and z."""
 
+    def found(at: NDArray[np.int64], z: Array) -> Array:
+        out, shape, begin = np.empty(z.shape), (-1, *(1 for _ in z.shape[1:])), 0
+        for one in measured:
+            here = (at >= begin) & (at < begin + len(one.phi))
+            out[here] = one.logarithm(at[here] - begin, z[here])
+            begin += len(one.phi)
+        off = z - middle[at].reshape(shape)
+        slope = (weighted - precision * middle)[at].reshape(shape)
+        gaussian: Array = off * (slope - 0.5 * precision[at].reshape(shape) * off)
+        return np.maximum(out, LOWEST) - gaussian
 
-def _missed(
-    measured: Sequence[Measured],
-    weighted: Array,
-    precision: Array,
-    middle: Array,
-    along: Array,
-) -> tuple[float, float]:
-    """By how much the Gaussians are off in mean and deviation of z = middle + along @ w.
-
-    Samples are compared with the same, weighted by the likelihood over its Gaussians.
-    """
-    w = np.random.default_rng(0).standard_normal((along.shape[1], PROBES))
-    off = along @ w
-    slope = (weighted - precision * middle) @ off
-    weight = _logarithm(measured, middle[:, None] + off).sum(axis=0)
-    weight -= slope - 0.5 * (precision @ off**2)
-    weight = np.exp(weight - weight.max())
-    weight = np.minimum(weight / weight.mean(), np.sqrt(PROBES))
-    weight /= weight.sum()
-    scatter = off.std(axis=1)
-    mean = off @ weight
-    deviation = np.sqrt((off - mean[:, None]) ** 2 @ weight)
-    return (
-        float(np.abs((mean - off.mean(axis=1)) / scatter).max()),
-        float(np.abs(deviation / scatter - 1.0).max()),
-    )
+    return found
 
 
 def _regressed(
