@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from brute_force import BruteForce, along
-from refusals import refusals
 from specimens import crooked, rough
 
 import stiction as st
@@ -88,12 +87,6 @@ def test_a_stiff_machine_on_a_short_specimen_slides_stably():
     assert np.isnan(held.critical_position.item())
     assert held.critical_stress.item() == pytest.approx(free.critical_stress.item(), rel=1e-9)
     assert held.critical_load.item() > free.critical_load.item()
-
-
-def test_a_stiffness_in_another_unit_draws_a_warning():
-    """20 kN/mm given as 20."""
-    with pytest.warns(st.UnitWarning, match="as good as dead load"):
-        crooked(drive=st.Platen(stiffness=20.0))
 
 
 def _compare_sensitivity(problem, strength):
@@ -228,12 +221,6 @@ def test_a_drive_that_dies_away_is_not_reversed(ratio):
     assert problem.load_profile.mean() == pytest.approx(1.0)
 
 
-def test_no_length_of_half_spaces_is_said_to_fill_a_specimen():
-    said = texts(lambda: crooked(height=0.01, rate=0.01e12))
-    assert any("act as strips" in text for text in said)
-    assert not any("fills" in text for text in said)
-
-
 def test_the_peak_is_said_to_be_residual_and_gaps_are_shares_of_the_first_instability(
     monkeypatch,
 ):
@@ -328,12 +315,12 @@ def test_forces_travel_and_pressure():
     )
     for other, gives in ((INF, 0.0), (0.0, np.nan)):
         drive = st.Pusher(height=0.004, width=0.003, stiffness=other)
-        path = st.equilibrium_path(
-            of(specimen=st.Blocks(height=0.031, drive=drive)), strength, [1e5]
-        )
+        path = st.equilibrium_path(crooked(drive=drive, load=st.Load()), strength, [1e5])
         np.testing.assert_array_equal(path.crosshead_travel - path.travel, [gives])
-    glued = st.Blocks(height=0.031, pressing="glued")
-    pressed = of(specimen=glued, load=st.Load(normal_pressure=2e6))
+    pressed = dataclasses.replace(
+        crooked(load=st.Load(normal_pressure=2e6)),
+        specimen=st.Blocks(height=0.031, pressing="glued"),
+    )
     p = pressed.normal_pressure
     assert p.mean() == pytest.approx(2e6)
     assert p[0] < 0.95 * p[48]
@@ -378,41 +365,6 @@ def test_forces_travel_and_pressure():
     }
     placed = pressed.sample(each).normal_pressure
     np.testing.assert_allclose(placed, each["normal_pressure"] * pressed.pressing)
-
-
-def plane(**given):
-    return st.Interface(length=(0.1, 0.1), nodes=(32, 32), **given)
-
-
-def of(**given):
-    return dataclasses.replace(crooked(load=st.Load()), **given)
-
-
-def solved(call):
-    problem = crooked(load=st.Load())
-    return call(problem, rough(problem, 1))
-
-
-PUSHER = st.Pusher(height=0.0295, width=0.001)
-test_refused = refusals(
-    {
-        "load.profile ... drive": lambda: of(
-            load=st.Load(profile=st.GradientLoad(amplitude=0.2))
-        ),
-        "specimen.height ... spacings": lambda: crooked(height=1e-3),
-        "height ... 373 times ... units": lambda: crooked(height=31.0),
-        "reverse ... st.Platen": lambda: crooked(drive=PUSHER),
-        "thickness": lambda: st.Blocks(height=0.05, drive=st.Platen(stiffness=2e7)),
-        "blocks meet on a line": lambda: of(interface=plane()),
-        "width ... area": lambda: plane(width=0.1),
-        "loading_rate ... leave it out": lambda: solved(
-            lambda p, s: st.onset(p, s, method=st.Rupture(loading_rate=1e9))
-        ),
-        "with another specimen.height ... problem.sample": lambda: solved(
-            lambda p, s: p.sample(of(specimen=st.Blocks(height=0.02)).sample(s))
-        ),
-    }
-)
 
 
 def test_a_swept_rigid_machine_is_stored(tmp_path):

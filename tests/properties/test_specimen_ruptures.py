@@ -7,7 +7,6 @@ import dataclasses
 import numpy as np
 import pydantic
 import pytest
-from refusals import refusals
 from specimens import crooked, rough
 
 import stiction as st
@@ -102,42 +101,3 @@ def test_its_pictures(run, tmp_path):
     assert len(st.plot.block(run).axes) == 9
     assert st.plot.rupture(run).get_ylabel().startswith("time")
     assert st.plot.film(run, tmp_path / "event.gif", frames=3, progress=False).exists()
-
-
-def simulate(**options):
-    given = {"problem": SPECIMEN, "profiles": STRENGTH, "method": st.Rupture()}
-    return st.simulate_rupture(**given | options)
-
-
-test_what_means_nothing_is_refused_by_name = refusals({
-    "loading_rate: means nothing on a specimen": {"method": st.Rupture(loading_rate=1e8)},
-    "start: means nothing on a specimen": {"method": st.Rupture(start="rest")},
-    "stop: means nothing on a specimen": {"method": st.Rupture(stop="rest")},
-    "friction: equilibria are followed along straight pieces": {
-        "problem": dataclasses.replace(
-            SPECIMEN, friction=st.ExponentialWeakening(weakening_rate=1e11, residual_strength=5e5)
-        )
-    },
-    "save: an event on a specimen is short": {"save": st.Save(to="run")},
-    "event: there are": {"event": 1000},
-    "max_steps: an event has not come to rest": {"method": st.Rupture(max_steps=1)},
-    "strength: barriers that never break": {
-        "profiles": np.where(STRENGTH > 1.2e6, np.inf, STRENGTH)
-    },
-    "initial_stress: is above the strength": {
-        "profiles": {"strength": STRENGTH, "initial_stress": STRENGTH + 1.0}
-    },
-}, simulate)  # fmt: skip
-test_what_specimens_do_not_take = refusals({
-    "thickness: is needed with drive.mass": {"drive": st.Platen(mass=1.0)},
-    "drive.mass": {"drive": {"type": "platen", "mass": -1.0}},
-    "quality_factor": {"quality_factor": 0.0},
-}, lambda **options: st.Blocks(**{"height": 0.05} | options))  # fmt: skip
-
-
-def test_half_spaces_need_a_load_and_have_no_numbered_events():
-    line = st.Problem(SPECIMEN.solid, st.Interface(0.1, 128), SPECIMEN.friction)
-    with pytest.raises(st.InputError, match="give either loading_rate or load"):
-        st.onset(line, np.full(128, 1e6), method=st.Rupture())
-    with pytest.raises(st.InputError, match="events: only those of specimens"):
-        st.onset(line, np.full(128, 1e6), method=st.Rupture(loading_rate=1e8, events=1))

@@ -225,6 +225,8 @@ LAWS = [
     (lambda law, u: (np.exp(-u), 2.0 * np.exp(-u)), logarithm, exponential_area, 2.0),
 ]
 
+OWN = [own_law(*law) for law in LAWS]
+
 
 @model
 class Sketch(type(PLATEAU)):
@@ -277,10 +279,7 @@ table_of(calls, {
     "gaps": [
         lambda: onset(labelled(np.delete(STRENGTH, 1), np.delete(X, 1))),
         lambda: onset(without(3)),
-        lambda: onset(labelled(STRENGTH[:63], X[:63]), gaps="fill"),
-        lambda: onset(without(*range(80, 83)), gaps="fill"),
-        lambda: onset(without(3), dataclasses.replace(
-            SYSTEM, specimen=st.Blocks(height=0.1)), gaps="fill"),
+        lambda: st.read_profile(labelled(without(3)), interface=LINE, gaps="skip"),
     ],
     "texts": [partial(read, text) for text in (
         "1,5\n2,6\n", "x;tau\n0;1e6\n0.05;strong\n", "0;1\n0.05\n", "x;tau;mu\n0;1\n",
@@ -316,7 +315,6 @@ table_of(calls, {
         lambda: st.read_profile(
             MAP.assign_coords(x=np.where(MAP.x == 0.0, np.nan, MAP.x)), interface=PLANE),
         lambda: st.read_profile(MAP.where(MAP.y > 0.001), interface=PLANE),
-        lambda: st.read_profile(MAP.where(MAP.y > 0.001), interface=PLANE, gaps="fill"),
     ],
     "studies": [
         lambda: studied(problem__solid__densty=1.0),
@@ -336,7 +334,6 @@ table_of(calls, {
     "axes": [
         swept({"random.strength.spectrum.corelation_length": [1]}),
         swept({LENGTH: [4e-3, -1.0]}), swept({LENGTH: 4e-3}), swept({LENGTH: []}),
-        swept({LENGTH: {"start": 1e-3, "stop": 2e-3}}),
         swept({LENGTH: [1, 2], "ensemble.seed": [1, 2, 3]}),
         swept({LENGTH: [1e-3]}, {LENGTH: [2e-3]}),
         swept({"random.strength.spectrum": []}, {LENGTH: [2e-3]}),
@@ -369,10 +366,12 @@ table_of(calls, {
         lambda: fitted(VALUES + 2e6 * (np.median(VALUES) < VALUES), spectrum=GIVEN),
         lambda: fitted(1e7 + VALUES + 3e6 * REST, noise=3e6),
         lambda: fitted(np.r_[2e7, VALUES[1:]]),
+        lambda: st.infer(make_problem(), fitted(quantity="normal_pressure"), [7e5, 7.1e5, 7.3e5],
+                         method=LOCAL),
     ],
     "laws of others": [
-        *(partial(with_law, own_law(*law)) for law in LAWS),
-        *(partial(st.PiecewiseWeakening.from_law, own_law(*law), 32) for law in LAWS),
+        *(partial(with_law, law) for law in OWN),
+        *(partial(st.PiecewiseWeakening.from_law, law, 32) for law in OWN),
         lambda: with_law(Sketch(weakening_rate=0.5e12)),
         lambda: st.onset(with_law(PLATEAU), np.full(512, 1e6), method=LOCAL),
     ],

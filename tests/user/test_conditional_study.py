@@ -1,11 +1,8 @@
 """A field that was measured in part, in study files and tails."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 import xarray as xr
-from refusals import refusals
 from small_study import small_study
 
 import stiction as st
@@ -14,7 +11,6 @@ OWN = st.Study.from_dict(small_study())
 FIELD, LINE = OWN.random.strength, OWN.problem.interface
 SCANNED = FIELD.sample(LINE, seed=9)[0]
 KNOWN = xr.DataArray(SCANNED, {"x": LINE.x}, "x")[:40]
-BETWEEN = {"type": "lognormal", "mean": 1.0, "cv": 0.1}
 
 
 @pytest.fixture
@@ -64,49 +60,6 @@ def test_a_file_holds_the_property_that_was_measured(study, name, heading, unit)
     read = st.Study.from_dict(study, folder=".")
     values = read.random.properties[name].conditions.values
     np.testing.assert_allclose(values, [0.45 * unit, 0.55 * unit], rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("table", "change", "text"),
-    [
-        ("strength", {"noise": -1.0}, "given.noise: must be greater than"),
-        ("strength", {"profile": None}, "random.strength.given.profile: missing"),
-        ("strength", {"nois": 1.0}, "did you mean 'noise'"),
-        ("strength", {"profile": "scam.csv"}, "scam.csv: cannot be read"),
-        ("between", {"strenght": BETWEEN}, "unknown 'strenght'; did you mean 'strength'"),
-        ("between", {"strength": BETWEEN | {"mean": 1.2}}, "must be positive with mean 1"),
-        ("between", {"strength": BETWEEN}, "strength.given was measured on one"),
-    ],
-)
-def test_a_mistake_is_named(study, table, change, text):
-    random = study["random"]
-    given = random["strength"]["given"] if table == "strength" else random.setdefault(table, {})
-    given.update(change)
-    if None in change.values():
-        del given["profile"]
-    with pytest.raises(st.InputError, match=text):
-        st.Study.from_dict(study, folder=".")
-
-
-GIVEN = FIELD.given(KNOWN, noise=20e3)
-test_impossible_values_and_places_are_refused = refusals({
-    "lies outside the marginal": lambda: FIELD.given(3.0 * KNOWN, noise=1e3).sample(LINE),
-    "the interface is 0.1 m long": lambda: FIELD.given(
-        KNOWN.assign_coords(x=KNOWN.x + 0.09), noise=1e3
-    ).sample(LINE),
-    "the field already has one": lambda: GIVEN.given(KNOWN, noise=1e3),
-    "is conditioned on": lambda: st.theory.nucleation_statistics(OWN.problem, GIVEN),
-    "strength is conditioned on one specimen": partial(
-        st.infer, OWN.problem, GIVEN, [7e5, 7.1e5, 7.3e5], method=OWN.method,
-        prior={"marginal.low": (0.5e6, 0.65e6)},
-    ),
-})  # fmt: skip
-
-
-def test_unlikely_values_are_warned_of():
-    rough = KNOWN.copy(data=KNOWN.values[np.random.default_rng(0).permutation(KNOWN.size)])
-    with pytest.warns(st.AccuracyWarning, match="unlikely for this field"):
-        FIELD.given(rough, noise=1e3).sample(LINE)
 
 
 def test_the_tail_of_a_scanned_specimen(study):

@@ -7,9 +7,8 @@ from functools import partial
 import numpy as np
 import pytest
 import xarray as xr
-from refusals import refusals, refuses
+from refusals import refuses
 from ruptures import CROOKED, CROOKED_STRENGTH, STRESS, wavy_line
-from setups import make_problem
 
 import stiction as st
 from stiction import Rupture
@@ -41,42 +40,11 @@ def same(found, expected):
     assert found.attrs["stopped"] == expected.attrs["stopped"]
 
 
-test_wrong_options = refusals({
-    "give either loading_rate or load": {"loading_rate": 1e7, "load": ([0.0, 1.0], [0.0, 1e7])},
-    "end_time: needed with stop='time'": {"loading_rate": 1e7, "stop": "time"},
-    "times must begin at 0 s and increase": {"load": ([0.0, 1.0, 0.5], [0.0, 1e5, 2e6])},
-    "load: must be two arrays of numbers": {"load": 3.0},
-}, Rupture)  # fmt: skip
-test_what_cannot_be_saved = refusals({
-    "to": {"to": 3},
-    "fields": {"fields": None},
-    "did you mean 'slip_rate'": {"fields": ["slip_rat"]},
-}, st.Save)  # fmt: skip
-test_what_cannot_be_simulated = refusals({
-    "progress": {"progress": 3},
-    "one sample at a time": {"profiles": np.stack([PROFILE] * 2)},
-    "does not reach the first slip ... or end_time":
-        {"method": Rupture(loading_rate=1e8, end_time=1e-9)},
-    "first slip, tau_0 = 758853 Pa": {"method": Rupture(load=([0.0, 1.0], [1e5, 1e5]))},
-    "above residual_strength at one node or more":
-        {"problem": make_problem(128, critical_slip=2e-6, residual_strength=2e6)},
-}, simulate)  # fmt: skip
-
-
 def test_the_largest_stable_step_is_known():
     limit = METHOD.medium(PROBLEM).largest_step
     # 0.42 dx/c_s at this solid; the limit is found by bisection to 0.1 %.
     expected = 0.416 * PROBLEM.interface.spacing / STRESS.shear_wave_speed
     assert limit == pytest.approx(expected, rel=5e-3)
-
-
-@pytest.mark.parametrize(
-    ("nodes", "text"), [(48, "7.4 nodes; .*: expect more than 15 %"), (80, "expect up to 6 %")]
-)
-def test_a_coarse_grid_warns_with_the_error_to_expect(nodes, text):
-    problem, profile = wavy_line(nodes)
-    with pytest.warns(st.AccuracyWarning, match=text):
-        METHOD.prepare(problem)(problem.sample(profile))
 
 
 def test_a_run_that_blows_up_stops_and_says_where(monkeypatch):

@@ -6,8 +6,7 @@ import warnings
 import numpy as np
 import pytest
 import ruptures
-from refusals import refusals
-from setups import LOCAL, exact_onset, make_problem
+from setups import exact_onset, make_problem
 
 import stiction as st
 
@@ -123,13 +122,6 @@ def test_slip_that_would_reverse_is_said(initial, options):
         simulate(problem=stressed(initial), **options)
 
 
-@pytest.mark.parametrize("method", [st.LocalCriterion(), st.Equilibrium()])
-def test_an_initial_stress_below_minus_the_strength_is_said(method):
-    problem = stressed(np.where(X > 0.9, -2e6, 0.0))
-    with pytest.warns(st.AccuracyWarning, match="initial_stress is below .* at 9.4 % of the"):
-        critical_stress(method, problem=problem)
-
-
 @pytest.mark.parametrize("stop", ["sliding", "onset", "rest"])
 def test_a_load_that_goes_down_and_up_again_is_no_instability(exact, stop):
     run = simulate(load=DETOUR, stop=stop)
@@ -240,24 +232,6 @@ def test_rates_that_cannot_be_resolved_are_said():
     with warnings.catch_warnings(action="error"):
         fine = critical_stress(st.Rupture(loading_rate=1e12, courant=0.0275))
     assert fast == pytest.approx(fine, rel=1e-2)  # the peak is sampled by 18 steps
-
-
-test_what_a_rupture_cannot_do_is_refused = refusals({
-    "first slip would come after": lambda: critical_stress(st.Rupture(loading_rate=1e-2)),
-    "infinitely much slip":
-        lambda: simulate(problem=make_problem(NODES, weakening_rate=5e-324)),
-    "max_steps: 20 steps": lambda: critical_stress(st.Rupture(loading_rate=1e8, max_steps=20)),
-    "loading_rate: in one explicit step":
-        lambda: critical_stress(st.Rupture(loading_rate=1e15)),
-    "kernel_tolerance: ... waves grow at any time step":
-        lambda: critical_stress(st.Rupture(loading_rate=1e7, kernel_tolerance=1e-2)),
-    "strength: must be finite and above residual": lambda: simulate(strength=np.inf + X),
-    # Methods without waves say what they take.
-    "strength: must be finite; entry":
-        lambda: critical_stress(LOCAL, barred(np.inf)),
-    "above initial_stress ... only st.Rupture()":
-        lambda: critical_stress(LOCAL, problem=OVERSTRESSED),
-})  # fmt: skip
 
 
 def test_the_place_of_a_slow_onset_is_that_of_equilibrium():

@@ -26,7 +26,6 @@ def study(**tables):
     return st.Study.from_dict(small_study(64, **{"sweep": SWEPT, **tables}))
 
 
-POWER, LONGER = {"type": "power_law", "correlation_length": 3e-3}, {"correlation_length": 7e-3}
 UNCERTAIN = {
     "count": 4,
     "random.strength.marginal.low": [0.58e6, 0.7e6],
@@ -143,38 +142,6 @@ def test_uncertain_parameters_are_interfaces_that_are_equally_likely(
     )
     share = (onsets.critical_stress.values < float(found.stress[2])).mean()
     assert share == pytest.approx(float(found.probability[2]), rel=0.2)
-
-
-@pytest.mark.parametrize(
-    ("tables", "words"),
-    [
-        ({"uncertain": 3}, "uncertain: must be a table of keys"),
-        ({"uncertain": {"count": 5}}, "uncertain: names no parameter"),
-        ({"uncertain": {"marginal.low": 3}}, "uncertain: marginal.low: must be a frozen"),
-        (
-            {"uncertain": {"marginal.lw": [1, 2]}},
-            "random.strength.marginal: unknown 'lw'; did you mean 'low'?",
-        ),
-        (
-            {"uncertain": {"correlation_length": [1e-3, 2e-3]}, "sweep": SWEPT},
-            "uncertain: random.strength.spectrum.correlation_length is swept, too",
-        ),
-        (
-            {
-                "uncertain": {"correlation_length": [1e-3, 2e-3]},
-                "sweep": [{"random.strength.spectrum": [POWER, POWER | LONGER]}],
-            },
-            "uncertain: random.strength.spectrum.correlation_length is swept, too",
-        ),
-        (
-            {"uncertain": UNCERTAIN, "random": [small_study()["random"]] * 2},
-            "uncertain: random is a list of equally likely interfaces already",
-        ),
-        ({"random": []}, "random: must hold at least one random interface"),
-    ],
-)
-def test_mistakes_in_what_is_uncertain_are_named(tables, words):
-    refuses(words, lambda: study(**{"sweep": [], **tables}))
 
 
 def test_a_folder_of_other_settings_and_what_cannot_be_sampled_are_refused(tmp_path):

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import xarray as xr
-from refusals import refusals
 
 import stiction as st
 from stiction.inference.bootstrap import bootstrapped
@@ -121,47 +120,6 @@ def test_specimens_of_different_strength_are_not_taken_for_one_field(plain):
 def test_a_profile_that_is_there_twice_is_no_further_measurement():
     with pytest.warns(st.AccuracyWarning, match="1 of 3 profiles repeat another"):
         records_of([labelled(), labelled(VALUES[::-1]), labelled()], None, "strength")
-
-
-INFINITE = np.where(np.arange(COUNT) == 3, np.inf, VALUES)
-REPEATED = xr.DataArray(
-    VALUES.reshape(20, 20), {"x": PIECE.x[[*range(19), 18]], "y": PIECE.x[:20]}, ("x", "y")
-)
-test_what_cannot_be_fitted_is_refused = refusals({
-    "has no point spacing": {"record": VALUES},
-    "x repeats": {"record": labelled(x=np.repeat(PIECE.x[::2], 2))},
-    "not equally spaced": {"record": labelled(x=PIECE.x**1.2)},
-    "40 measured points, too short": {"record": labelled(VALUES[:40], PIECE.x[:40])},
-    "is constant, 1e+06 everywhere": {"record": labelled(np.full(COUNT, 1e6))},
-    "400 of 400 values ... do not lie between the bounds": {"record": labelled(-VALUES)},
-    "detrend ... noise ... bootstrap ... confidence ... seed ... progress": {
-        "record": labelled(), "detrend": 7, "noise": -1.0, "bootstrap": 3, "confidence": 90,
-        "seed": -1, "progress": "x",
-    },
-    "did you mean 'lognormal' ... did you mean 'exponent'": {
-        "record": labelled(), "marginal": "lognormul",
-        "spectrum": {"type": "power_law", "exponnt": 2.0},
-    },
-    "anisotropy: applies to maps only": {"record": labelled(), "anisotropy": True},
-}, fitted)  # fmt: skip
-
-
-NOISE = np.random.default_rng(1).standard_normal(COUNT)
-FEW = {"spectrum": {"type": "exponential", "correlation_length": 1e-3}}
-HIGH = np.median(VALUES) < VALUES
-DOUBTS = {
-    "correlation lengths, too few": (labelled(VALUES[:64], PIECE.x[:64] / 4.0), FEW),
-    "p-value of the marginal is .*e-": (labelled(VALUES + 2e6 * HIGH), FEW),
-    "hides the cut-off": (labelled(1e7 + VALUES + 3e6 * NOISE), {"noise": 3e6}),
-    r"1 of 400 values are outliers.* 2e\+07": (labelled(np.r_[2e7, VALUES[1:]]), {}),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("words", DOUBTS)
-def test_doubtful_records_are_warned_of(words):
-    record, options = DOUBTS[words]
-    with pytest.warns(st.AccuracyWarning, match=words):
-        fitted(record, **options)
 
 
 @pytest.mark.parametrize("records", [2, 3])

@@ -5,8 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from refusals import refusals
-from setups import beta_strength, make_problem
+from setups import make_problem
 
 import stiction as st
 
@@ -20,9 +19,6 @@ def lognormal(mean, cv=0.15, **options):
     return st.RandomField(st.Lognormal(mean=mean, cv=cv), SPECTRUM, **options)
 
 
-COEFFICIENT, STRENGTH = lognormal(0.5, of="friction_coefficient"), lognormal(0.5 * PRESSURE)
-
-
 def joint(pressure=None):
     return make_problem(
         solid=st.Solid(**STEEL), weakening_rate=2e11, residual_ratio=0.3,
@@ -30,6 +26,7 @@ def joint(pressure=None):
     )  # fmt: skip
 
 
+COEFFICIENT = lognormal(0.5, of="friction_coefficient")
 FREE, PRESSED = joint(), joint(PRESSURE)
 UNDER_RANDOM_PRESSURE = st.RandomInterface(
     strength=COEFFICIENT, normal_pressure=lognormal(PRESSURE, cv=0.1)
@@ -47,30 +44,6 @@ def test_youngs_modulus_is_the_shear_modulus_in_other_words():
     solid = st.Solid(**STEEL)
     assert solid == st.Solid(1e9, 0.3, 1200.0)  # G = E/(2 (1 + nu))
     assert st.Problem(STEEL, FREE.interface, FREE.friction).solid == solid
-
-
-test_moduli = refusals({
-    "give either": {"youngs_modulus": 1e9, "shear_modulus": 1e9, "poisson_ratio": 0.3},
-}, partial(st.Solid, density=1200.0))  # fmt: skip
-test_what_is_contradicting_or_missing_is_refused = refusals({
-    "need a normal pressure":
-        lambda: st.monte_carlo(FREE, COEFFICIENT, method=LOCAL, samples=2),
-    "either normal_pressure (Pa) or pressing_force (N)":
-        lambda: st.Load(normal_pressure=5e6, pressing_force=4e3),
-    "load.pressing_force: a force needs the area ... load.normal_pressure":
-        lambda: dataclasses.replace(PRESSED, load=st.Load(pressing_force=4e3)),
-    # kN for N, MPa for Pa, and a force for a stress.
-    "force: 1.2 N is 0.0004 times the mean strength, 3 kN; check the units":
-        lambda: counted(LAP, COEFFICIENT, force=1.2),
-    "stress: 700 Pa": lambda: counted(PRESSED, beta_strength(2e-3), 700.0),  # below its bound
-    "another pressure; give Load(normal_pressure=...)":
-        lambda: st.infer(
-            LAP, COEFFICIENT, {0.2: [0.4, 0.41, 0.42]}, unit="1", method=LOCAL,
-            prior={"marginal.mean": (0.3, 0.6)},
-        ),
-    "critical_slip: of = 'friction_coefficient'":
-        lambda: st.RandomInterface(strength=STRENGTH, critical_slip=COEFFICIENT),
-})  # fmt: skip
 
 
 def test_pressure_that_varies_or_is_random_carries_the_strength_with_it():

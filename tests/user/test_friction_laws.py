@@ -6,7 +6,7 @@ from collections import namedtuple
 
 import numpy as np
 import pytest
-from refusals import refusals, refuses
+from refusals import refuses
 from setups import LENGTH, beta_strength, make_problem
 
 import stiction as st
@@ -34,26 +34,6 @@ ROUGH = 0.1e6 + 3.0 * (TAU_P - TAU_P.min())
 
 def onset(law, strength=TAU_P, method=EXACT):
     return st.onset(with_law(law), strength, method=method)
-
-
-PIECES = "ExponentialWeakening has none ... from_law ... Rupt"
-test_what_a_law_does_not_allow_is_refused = refusals({
-    PIECES: lambda: onset(EXPONENTIAL),
-    f"{PIECES}ure": lambda: st.equilibrium_path(with_law(EXPONENTIAL), TAU_P, [0.6e6]),
-    "2.33 times as steeply": lambda: onset(STEEPENING, method=LOCAL),
-    "up to 2.33 times as steeply":
-        lambda: st.theory.nucleation_stress(with_law(STEEPENING), TAU_P),
-    "strength does not fall linearly": lambda: st.failure_probability(
-        with_law(DUAL), FIELD, 0.7e6, method=EXACT, algorithm="two_level"
-    ),
-    "pieces: must be greater than or equal to 2, got 1":
-        lambda: st.PiecewiseWeakening.from_law(EXPONENTIAL, 1),
-    "law: must be a FrictionLaw, got": lambda: st.PiecewiseWeakening.from_law("exponential", 4),
-    "friction: must be a friction law such as ... got 0.2": lambda: with_law(0.2),
-    "must fall at every corner ... got (0.5, 0.5, 0.0); give a plateau a small fall": lambda: (
-        st.PiecewiseWeakening(slip=[0.5, 0.8, 1.0], strength=[0.5, 0.5, 0.0], critical_slip=1e-6)
-    ),
-})  # fmt: skip
 
 
 @pytest.mark.parametrize("law", [EXPONENTIAL, DUAL])
@@ -124,10 +104,6 @@ def own_law(shape, slip_at, area=np.asarray, slope=1.0, name="initial_slope"):
     return Own(weakening_rate=0.5e12)
 
 
-def logarithm(fraction):
-    return -np.log(fraction) if fraction > 0.0 else np.inf
-
-
 def plateau(law, u):
     """Falls to a half, rests, and falls three times as steeply to zero at u = 1."""
     if u < 0.5:
@@ -145,24 +121,6 @@ def plateau_area(u):
 
 def plateau_slip(fraction):
     return 1.0 - fraction if fraction >= 0.5 else 1.0 - fraction / 3.0
-
-
-def exponential_area(u):
-    return 1.0 - np.exp(-u)
-
-
-EXPONENTIAL_AGAIN = own_law(
-    lambda law, u: (np.exp(-u), np.exp(-u)), logarithm, exponential_area
-)
-
-
-def test_law_without_a_compiled_strength_is_refused():
-    @model
-    class Sketch(type(EXPONENTIAL_AGAIN)):
-        parameters = ()
-
-    words = "Sketch: its parameters must be a NamedTuple with a method f(self, u)"
-    refuses(words, lambda: with_law(Sketch(weakening_rate=0.5e12)))
 
 
 def test_a_plateau_is_followed_and_its_later_slope_counts():
@@ -186,44 +144,3 @@ def test_the_nucleation_length_is_that_of_the_steepest_slope():
     assert late.nucleation_length == pytest.approx(length, rel=1e-12)
     nodes = late.nodes_in_nucleation_length(0.005e12)
     assert nodes == pytest.approx([length / late.interface.spacing], rel=1e-12)
-
-
-def hump(law, u):
-    """Rises by a tenth before it falls: no method of the package can follow it."""
-    return (1.0 - 0.1 * u, 0.1) if u < 0.2 else (1.0 + 0.1 * np.sin(20.0 * u), 0.1)
-
-
-LAWS = {
-    "strength must not rise with slip, as beyond u = 0.2": (
-        hump, lambda f: 1.0 - 0.8 * f / 1.1, np.asarray, 0.1
-    ),
-    "f must fall from zero slip on, got -f'(0) = 0; it sets the weakening rate": (
-        lambda law, u: (0.5 + 0.5 * np.cos(np.pi * u), 0.5 * np.pi * np.sin(np.pi * u)),
-        lambda f: np.arccos(2.0 * f - 1.0) / np.pi, np.asarray, 0.0,
-    ),
-    "the integral of f, area(inf), must be finite, got inf": (
-        lambda law, u: (1.0 / (1.0 + u), (1.0 + u) ** -2),
-        lambda f: 1.0 / f - 1.0 if f else np.inf, np.log1p,
-    ),
-    "numba cannot compile its f ... : Unknown attribute 'nodes' of type": (
-        lambda law, u: (1.0 - min(u, 1.0), TAU_P.nodes), lambda f: 1.0 - f,
-    ),
-    "f and -f' must be finite up to u = 1":
-        (lambda law, u: (1.0 - u, 1.0 / (1.0 - u)), lambda f: 1.0 - f),
-    "its parameters need a field initial_slope": (
-        plateau, plateau_slip, plateau_area, 1.0, "scale",
-    ),
-    "f(0) must be 1, got 0.5": (lambda law, u: (0.5 * np.exp(-u), 0.5 * np.exp(-u)), logarithm),
-    "slip_at(0), or ... must be positive and finite, got 0": (plateau, lambda f: f),
-    "f(slip_at(0)) is 0, but 0.3 by its f":
-        (plateau, lambda f: 0.9 * plateau_slip(f), plateau_area),
-    "the integral of -f' is 1.98, but 0.99 by its f":
-        (lambda law, u: (np.exp(-u), 2.0 * np.exp(-u)), logarithm, exponential_area, 2.0),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("words", LAWS)
-def test_a_law_that_contradicts_itself_is_refused(words):
-    law = own_law(*LAWS[words])
-    refuses(f"friction: ... Own: ... {words}", lambda: with_law(law))
-    refuses(words, lambda: st.PiecewiseWeakening.from_law(law, 32))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.stats
 import xarray as xr
-from refusals import refusals, refuses
+from refusals import refuses
 
 import stiction as st
 from stiction.ensemble.experiment import Experiment
@@ -215,58 +215,6 @@ def test_doubts_are_named_where_the_caller_stands():
     with pytest.warns(st.AccuracyWarning, match="upper end of marginal.low, 640000") as caught:
         infer(prior={"marginal.low": (0.4e6, 0.64e6)})
     assert {one.filename for one in caught} == {__file__}
-
-
-FIVE = [f"marginal.{name}" for name in ("alpha", "beta")] + ["exponent", "truncation"]
-FIVE = {key: (1.0, 2.0) for key in FIVE} | {"problem.friction.weakening_rate": (4e11, 6e11)}
-test_mistakes = refusals({
-    "peaks ... forces ... area": {"unit": "kN"},
-    "30 of 30 ... below all that ... unit": {"peaks": PEAKS / 1e6},
-    "200000, which lies below ... lowest come from marginal.low = 400000":
-        {"peaks": np.append(PEAKS, 0.2e6)},
-    "lies above ... highest come from ... marginal.low = 900000":
-        {"peaks": PEAKS + 1e6, "prior": PRIOR},
-    "at least 3 different ... got 2 in 2 peaks": {"peaks": PEAKS[:2]},
-    "number 1 is nan": {"peaks": [0.7e6, np.nan, 0.71e6]},
-    "each length (m) ... 'short'": {"peaks": {"short": PEAKS}},
-    "0.001": {"peaks": {0.1: PEAKS, 1e-3: PEAKS}},
-    "coefficients of friction ... normal_pressure": {"peaks": PEAKS / 2e6, "unit": "1"},
-    "load_cell_error ... unit of the peaks":
-        {"peaks": PEAKS / 1e6, "unit": "MPa", "load_cell_error": 5e3},
-    "corelation": {"prior": {"corelation_length": (1.0, 2.0)}},
-    "did you mean 'marginal.mean'": {"prior": {"mean": (1.0, 2.0)}},
-    "of a positive range":
-        {"prior": {"marginal.low": {"low": 0.0, "high": 1e6, "spacing": "log"}}},
-    "prior: at marginal.low = 2e+06 ... below high": {"prior": {"marginal.low": (1e6, 2e6)}},
-    "prior: at correlation_length = 0.5005 ... no mode":
-        {"prior": {"correlation_length": (1e-3, 1.0)}},
-    "method": {"method": "local"},
-    "5 parameters would have to be simulated": {"prior": FIVE},
-}, infer)  # fmt: skip
-
-
-def written(tmp_path, text):
-    path = tmp_path / "peaks.csv"
-    path.write_text(text)
-    return path
-
-
-BAD_FILES = {
-    "unit of the peaks is not stated": "peak\n0.71\n0.69\n0.7\n",
-    "Mstone": "peak [Mstone]\n0.71\n0.69\n0.7\n",
-    "no column has a name like": "a [MPa],b [MPa]\n0.7,1\n0.6,2\n0.7,1\n",
-    "may both be the peak": "peak [MPa],stress [MPa]\n0.7,1\n0.6,2\n0.7,1\n",
-    "number 1 is nan": "peak [MPa],n [1]\n0.7,1\n,2\n0.7,1\n",
-    "length ... not stated": "peak [MPa],length\n0.7,1\n0.6,2\n0.7,1\n",
-    "length: missing in row 1 ... mixed": "peak [MPa],length [mm]\n0.7,9\n0.6,\n0.7,9\n",
-    "no numbers": "",
-}
-
-
-@pytest.mark.parametrize("words", BAD_FILES)
-def test_files_that_are_not_taken(words, tmp_path):
-    path = written(tmp_path, BAD_FILES[words])
-    refuses(f"{words} ... peaks.csv", lambda: st.read_peaks(path))
 
 
 simulator = partial(st.external.simulator, PROBLEM, STRENGTH, method=LOCAL, samples=30, seed=99)

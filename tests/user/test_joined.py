@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 import scipy.stats
-import xarray as xr
 from refusals import refuses
 
 import stiction as st
@@ -149,26 +148,3 @@ def test_interfaces_that_are_drawn_again_and_again_are_worth_one():
     assert many.prior.cells == joining.FIRST
     once = st.infer(PROBLEM, LIST[:6], PEAKS, samples=100, **LOCAL)
     assert many.notes[0] == once.notes[0]
-
-
-def test_what_cannot_be_weighed():
-    field = LIST[0].strength
-    values = field.sample(PROBLEM.interface, samples=1, seed=1)[0]
-    profile = xr.DataArray(values, {"x": PROBLEM.interface.x}, "x")
-    known = [field.given(profile[::9], noise=1e4 * k) for k in (1.0, 2.0)]
-    for given, prior, text in [
-        (field, None, "prior: is left out, so `random` must hold several interfaces"),
-        (LIST[:1] * 2, None, "prior: is left out, so `random` must hold several interfaces"),
-        (LIST, {"marginal.mean": (1e6, 2e6)}, "prior: is of one random field or interface"),
-        (known, None, "random: strength is conditioned on one specimen, but the peaks are"),
-    ]:
-        refuses(text, lambda g=given, p=prior: st.infer(PROBLEM, g, PEAKS, prior=p, **LOCAL))
-    records = field.sample(PROBLEM.interface, samples=3, seed=2)
-    pressures = st.fit_field(
-        records, PROBLEM.interface, quantity="normal_pressure", marginal="lognormal",
-        spectrum="exponential", noise=0.0, bootstrap=20, progress=False,
-    )  # fmt: skip
-    refuses(
-        "interfaces: need a strength, and the fit is of normal_pressure",
-        lambda: st.infer(PROBLEM, pressures, PEAKS, **LOCAL),
-    )

@@ -44,26 +44,6 @@ def heights(request, tmp_path):
     return text(path, "x (mm); y (mm); z (um)"), {}
 
 
-OTHERS = {
-    "x reaches from 0 to 19.375 m ... check the unit of x": "metres.csv",
-    "no columns x and y: got 7 columns without names": "matrix.csv",
-    "no columns x and y: got 'x', 'strength' ... of shape (nx, ny)": "line.csv",
-    "x and y are swapped": "turned.npy",
-    "y reaches from 0 to 0.019375 m": MAP.rename(x="y", y="x"),
-    "x must be finite": MAP.assign_coords(x=np.where(MAP.x == 0.0, np.nan, MAP.x)),
-}
-
-
-@pytest.mark.parametrize("words", OTHERS)
-def test_other_maps_are_refused(tmp_path, words):
-    text(tmp_path / "metres.csv", "x (m); y (m); strength (MPa)")
-    np.savetxt(tmp_path / "matrix.csv", VALUES[:, :7], delimiter=",")
-    (tmp_path / "line.csv").write_text("x,strength\n0,1e6\n0.05,2e6\n")
-    np.save(tmp_path / "turned.npy", VALUES.T)
-    source = OTHERS[words]
-    refuses(words, lambda: read(tmp_path / source if isinstance(source, str) else source))
-
-
 @pytest.mark.parametrize("order", ["descending", "shuffled"])
 def test_coordinates_of_a_map_decide_and_not_the_order(tmp_path, order):
     values = VALUES + 1e4 * np.arange(16)

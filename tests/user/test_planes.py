@@ -5,8 +5,6 @@ import warnings
 
 import numpy as np
 import pytest
-import xarray as xr
-from refusals import refusals
 from setups import RATE, make_problem, smooth_noise
 from small_study import lengths, small_study
 
@@ -99,28 +97,8 @@ def test_nodes_of_constant_strength(found):
     assert held["certified"].item()
 
 
-def labelled(scale=1e3):
-    """The strength in MPa over places in mm."""
-    coords = {
-        name: (name, scale * place, {"units": "mm"})
-        for name, place in PLANE.interface.coordinates.items()
-    }
-    return xr.DataArray(STRENGTH.T / 1e6, coords, ("y", "x"), attrs={"units": "MPa"})
-
-
 def rupture(**options):
     return st.onset(PLANE, STRENGTH, method=st.Rupture(loading_rate=1e8, **options))
-
-
-STIFF = st.Solid(shear_modulus=1e9, poisson_ratio=0.495, density=1170.0)
-test_refusals = refusals({
-    "x and y are swapped": lambda: onset(STRENGTH.T),
-    "x does not coincide with the 72 nodes": lambda: onset(labelled(900.0)),
-    "one sample": lambda: st.equilibrium_path(PLANE, SAMPLES, [1e5]),
-    "mode II needs nu <= 0.49": lambda: st.Rupture(loading_rate=1e8).prepare(
-        make_problem((72, 64), (0.0208, 0.0156), solid=STIFF)
-    ),
-})  # fmt: skip
 
 
 def test_the_sample_that_fails_is_named(monkeypatch):

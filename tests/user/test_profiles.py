@@ -1,8 +1,6 @@
 """Profiles of one's own: units, coordinates and gaps decide, wherever one enters."""
 
 import dataclasses
-import os
-import struct
 import sys
 import warnings
 
@@ -10,7 +8,7 @@ import numpy as np
 import openpyxl
 import pytest
 import xarray as xr
-from refusals import refusals, refuses
+from refusals import refuses
 from setups import make_problem
 from small_study import small_study
 
@@ -285,103 +283,8 @@ def test_columns_are_chosen_by_name_heading_number_or_meaning(table):
     np.testing.assert_array_equal(st.read_profile(given, value="tau"), STRENGTH)
 
 
-@pytest.mark.parametrize(
-    ("words", "options"),
-    [
-        ("give x=..., value=", {}),
-        ("unknown 'Local'; did you mean 'Local strength'", {"value": "Local"}),
-        ("strength is in um, which cannot be converted to Pa", {"value": "height", "x": 1}),
-        ("given in kPa, but the source states MPa", {"unit": "kPa", "x": 1}),
-        ("unknown 'stress'", {"quantity": "stress"}),
-        ("interface: needed", {"interpolate": True}),
-        ("x: unknown", {"value": 3, "x": 3}),
-    ],
-)
-def test_columns_that_are_not_taken(table, words, options):
-    refuses(words, lambda: st.read_profile(table, **options))
-
-
-TEXTS = {
-    "1,5\n2,6\n": "may be one number or two",
-    "x;tau\n0;1e6\n0.05;strong\n": "line 3: 'strong' is not a number",
-    "0;1\n0.05\n": "line 2 has 1 columns, line 1 has 2",
-    "x;tau;mu\n0;1\n": "line 1 names 3 columns",
-    "pos;distance;tau\n0;0;1\n": "'pos', 'distance' ... give x=..., value=",
-    "\n# nothing\n": "holds no numbers",
-    "x\0;tau\n": "not a text file",
-    "x;tau\n0;1\n;\n0.05;1\n": "x must be finite; entry 1 (line 3)",
-    "x;tau\nmm;Pa\nmean;1\n0;1\n": "line 3: 'mean' is not a number",
-    "x;tau\n0;1_000\n": "'1_000' is not a number",
-    "x (mm);tau (MPa)\n0;ERR\n50;1\n": "line 2: 'ERR' is not a number",
-    'x,tau\n0,"1,500"\n': "'1,500' is not a number",
-}
-
-
-@pytest.mark.parametrize("text", TEXTS)
-def test_text_that_cannot_be_understood(tmp_path, text):
-    (tmp_path / "p.csv").write_text(text)
-    refuses(TEXTS[text], lambda: st.read_profile(tmp_path / "p.csv", interface=LINE))
-
-
-UNEVEN = np.sort(np.random.default_rng(0).uniform(0.0, 0.1, NODES))
 COARSE = np.linspace(0.0, 0.1, 41)[:-1] + 1e-3
 TENT = labelled(1e6 + 1e7 * np.minimum(COARSE, 0.1 - COARSE), COARSE)
-SQUARE = xr.DataArray(np.ones((NODES, NODES)), dims=("a", "b"))
-STRENGTHS = {
-    # Units
-    "strength is in um, which cannot be converted to Pa": labelled(units="um"),
-    "unknown unit 'mpa'; did you mean MPa?": labelled(units="mpa"),
-    "friction_coefficient: needs a normal pressure ... load.pressing_force": labelled(
-        units="1"
-    ),
-    "unknown unit": labelled(units="m/s/s/"),
-    "unknown unit 'MPa999'": labelled(units="MPa999"),
-    # Names
-    "not clear from (a, b)": SQUARE,
-    # Places
-    "x does not coincide with the 128 nodes": labelled(x=np.linspace(0.0, 0.1, NODES)),
-    "128 points from 0 to 0.0982 ... check the unit of x": labelled(x=X * 0.99),
-    "x reaches from 0 to 99.2 ... check the unit of x": labelled(x=X * 1e3),
-    "x = 0 and 0 m are the same position": labelled(x=np.r_[X[0], X[0], X[2:]]),
-    "x = 0 and 0.1 m are the same position": labelled(np.r_[STRENGTH, 2e6], np.r_[X, 0.1]),
-    "crop the record ... or make interface.length 0.2": labelled(x=2.0 * X),
-    "interpolate=True": labelled(x=UNEVEN),
-    "the column of x (x=...) ... interpolate=True": xr.DataArray(STRENGTH[:60], dims="x"),
-    "64 points from 0 to ... interpolate": labelled(STRENGTH[::2], X[::2]),
-    # Gaps
-    "(NaN) at 1 of 128 nodes, the first at x = 0.00078125 m": labelled(
-        np.delete(STRENGTH, 1), np.delete(X, 1)
-    ),
-    "strength: values are missing (NaN) at 1 of 128": without(3),
-}
-test_what_is_no_strength_here_is_refused = refusals(
-    {words: {"tau_p": given} for words, given in STRENGTHS.items()}, found
-)
-
-
-def read(source, **options):
-    return lambda: st.read_profile(source, **options)
-
-
-def problem_with(**load):
-    return lambda: dataclasses.replace(SYSTEM, load=st.Load(**load))
-
-
-test_what_is_no_profile_is_refused = refusals({
-    "load.profile: x does not coincide": problem_with(profile=labelled(1.0 + X, X * 0.99)),
-    "interpolate=True": read(TENT, interface=LINE),
-    "values are missing ... the first at x = 0.0265625 m":
-        read(TENT.drop_isel(x=[11, 12, 13, 14]), interface=LINE, interpolate=True),
-    "clearly the strength ... 'z'": read(labelled().to_dataset(name="z")),
-    "value: unknown '1' ... strength, tau_i":
-        read(labelled().to_dataset(name="strength").assign(tau_i=labelled()), x=0, value=1),
-    "load.profile: must have one entry for each of the 128 nodes, got an array of shape (2, 128)":
-        problem_with(profile=labelled().expand_dims(sample=2)),
-    "not clear from (time)": lambda: make_problem(
-        (NODES, NODES), (0.1, 0.1),
-        load=st.Load(normal_pressure=xr.DataArray(STRENGTH, dims="time")),
-    ),
-})  # fmt: skip
 
 
 def test_other_places_are_said_and_interpolated_only_where_it_is_asked_for():
@@ -422,43 +325,6 @@ def test_gaps_are_named_or_left_for_xarray_to_fill():
     np.testing.assert_allclose(profile.interpolate_na("x"), expected, rtol=1e-14)
 
 
-def npy(shape, payload=b"", dtype="<f8", version=b"\x01\x00", extra=""):
-    header = f"{{'descr': {dtype!r}, 'fortran_order': False, 'shape': {shape!r}, {extra}}}\n"
-    return b"\x93NUMPY" + version + struct.pack("<H", len(header)) + header.encode() + payload
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        npy((10**15,)),
-        npy((4,), b"x" * 31),
-        npy((2,), b"x" * 16, dtype="|O"),
-        b"\x93NUMPY\x02\x00\xff\xff\xff\xff{",
-        npy((1,), b"x" * 8, extra="'a': " + "(" * 300),
-        b"",
-    ],
-)
-def test_a_hostile_npy_is_refused(tmp_path, content):
-    (tmp_path / "p.npy").write_bytes(content)
-    refuses("not a .npy file", lambda: st.read_profile(tmp_path / "p.npy", interface=LINE))
-
-
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes")
-@pytest.mark.parametrize("ending", ["csv", "npy", "nc"])
-def test_only_regular_files_of_some_size_are_read(tmp_path, ending):
-    names = ("pipe", "zero", "folder", "huge", "none")
-    pipe, zero, folder, huge, none = (tmp_path / f"{name}.{ending}" for name in names)
-    os.mkfifo(pipe)  # opening it in the ordinary way would wait for ever
-    zero.symlink_to("/dev/zero")
-    folder.mkdir()
-    with huge.open("wb") as file:
-        file.truncate(2**40)
-    for path in (pipe, zero, folder):
-        refuses("is not a regular file", lambda path=path: st.read_profile(path))
-    refuses("1099511627776 bytes", lambda: st.read_profile(huge))
-    refuses("cannot be read: No such file", lambda: st.read_profile(none))
-
-
 @pytest.fixture
 def study(tmp_path):
     """A study, and files of profiles beside it."""
@@ -485,22 +351,6 @@ def test_profiles_in_a_study_file(study, tmp_path):
     np.testing.assert_allclose(problem.load.normal_pressure, (5.0 + X) * 1e6, rtol=1e-11)
     np.testing.assert_allclose(problem.load.profile[: NODES - 4], 1.0 + X[:-4], rtol=1e-11)
     assert st.Study.from_dict(loaded.to_dict()) == loaded
-
-
-@pytest.mark.parametrize(
-    ("words", "profile"),
-    [
-        ("problem: load.profile: ... load.csv: x does not coincide", {"file": "load.csv"}),
-        ("did you mean 'interpolate'", {"file": "tau_r.csv", "interpol": True}),
-        ("quantity: is not an option", {"file": "tau_r.csv", "quantity": "height"}),
-        ("gaps: must be 'refuse' or", {"file": "load.csv", "gaps": "drop"}),
-        ("tau_r.csv: holds no variable", "tau_r.csv"),
-        ("tables with the key 'file'", {"values": [1.0, 2.0]}),
-    ],
-)
-def test_profiles_of_a_study_file_that_are_refused(study, tmp_path, words, profile):
-    study["problem"]["load"]["profile"] = profile
-    refuses(words, lambda: st.Study.from_dict(study, folder=tmp_path))
 
 
 def test_a_variable_called_position_holds_the_places(tmp_path):

@@ -10,7 +10,6 @@ from functools import partial
 import numpy as np
 import pytest
 import scipy.stats
-from refusals import refusals, refuses
 from setups import EXACT, LOCAL, exact_onset, local_onset, make_problem, turns
 
 import stiction as st
@@ -63,29 +62,6 @@ class Standing:
 
 VARYING = make_problem(weakening_rate=0.5e12 * (1.0 + 0.1 * np.cos(turns(256))))
 RUPTURES = Standing("rupture"), st.Rupture(loading_rate=1e9)
-test_a_mistake_is_named = refusals({
-    "stress ... method ... target_cv ... max_evaluations":
-        {"stress": "low", "method": st.LocalCriterion, "target_cv": 0.0, "max_evaluations": 3},
-    "event": {"event": "collapse"},
-    "workers": {"workers": 1.5},
-    "stress": {"stress": np.nan},
-    "plain": {"method": RUPTURES[0], "algorithm": "subset"},
-    "method ... plain": {"method": RUPTURES[0], "algorithm": "two_level"},
-    "weakening rate":
-        {"system": (VARYING, FIELD), "method": EXACT, "algorithm": "two_level"},
-    "names no less expensive method": {"algorithm": "two_level"},
-}, failure)  # fmt: skip
-
-
-@pytest.mark.parametrize("method", RUPTURES)
-def test_the_tail_of_ruptures_is_refused(method):
-    refuses("monte_carlo", lambda: design(1e-3, method))
-
-
-@pytest.mark.parametrize("probability", [0.0, 1.0, np.nan, "1e-6", 1e-40])
-def test_probability_must_lie_between_zero_and_one(probability):
-    refuses("probability", lambda: design(probability))
-    refuses("smallest", lambda: st.failure_curve(*SYSTEM, smallest=probability, method=LOCAL))
 
 
 def test_a_slow_method_is_counted_from_two_hundred_samples():
@@ -300,12 +276,6 @@ def above(residual, what, field=FIELD, method=LOCAL):
         st.monte_carlo(problem, field, samples=16, method=method)
     else:
         failure(1e6, method, (problem, field), algorithm="plain", max_evaluations=100)
-
-
-@pytest.mark.parametrize("what", ["monte_carlo", "failure_probability"])
-def test_strength_below_the_residual_strength_is_refused(what):
-    """60 % of the marginal, which reaches from 0.66 MPa, lie below 1 MPa."""
-    refuses("most of the interface would not weaken", lambda: above(1e6, what))
 
 
 @pytest.mark.parametrize("what", ["onset", "monte_carlo", "failure_probability"])

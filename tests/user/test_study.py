@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.stats
 import xarray as xr
-from refusals import refusals, refuses
+from refusals import refuses
 from setups import beta_strength
 from small_study import lengths, small_study
 
@@ -230,30 +230,3 @@ def test_events_are_those_of_the_path():
 
 
 # -- mistakes ------------------------------------------------------------------------------------
-
-test_mistakes_are_named = refusals({
-    "problem.solid ... 'densty' ... did you mean 'density'": {"problem__solid__densty": 1.0},
-    "load.profile ... missing.npy": {"problem__load": {"profile": "missing.npy"}},
-    "strength ... no mode is left": {"random__strength__spectrum__correlation_length": 10.0},
-}, loaded)  # fmt: skip
-
-AXES = {
-    "mean 'correlation_length'": [{"random.strength.spectrum.corelation_length": [1]}],
-    "correlation_length ... greater than 0 ... point 1": [{LENGTH: [4e-3, -1.0]}],
-    f"{LENGTH} ... list of values": [{LENGTH: 4e-3}],
-    f"{LENGTH} ... list": [{LENGTH: []}],
-    "as many values each ... has 2 ... has 3": [{LENGTH: [1, 2], "ensemble.seed": [1, 2, 3]}],
-    "swept twice": [{LENGTH: [1e-3]}, {LENGTH: [2e-3]}],
-    "random.strength.spectrum": [{"random.strength.spectrum": []}, {LENGTH: [2e-3]}],
-    "ensemble.samples: cannot be swept": [{"ensemble.samples": [10, 20]}],
-    "1000000 points": [{"ensemble.seed": list(range(1000))}, {"x": [1] * 1000}],
-    "list of tables": {LENGTH: [1e-3], "ensemble.seed": [1]},
-}
-test_axes_are_refused = refusals({
-    words: {"sweep": axes} for words, axes in AXES.items()
-} | {
-    "an interface that is swept": {
-        "sweep": [{"problem.interface.nodes": [128, 256]}],
-        "ensemble__keep": ["strength"],
-    }
-}, loaded)  # fmt: skip
