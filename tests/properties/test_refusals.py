@@ -37,6 +37,16 @@ FIELDS = {  # an object, where it stands in a study, and what its fields may hol
         "amplitude": "[0, 1)", "centre": "[0, 1)",
     }),
     st.Load(pressing_force=4e3): ("", {"pressing_force": ANY}),
+    st.Load(normal_pressure=2e6): ("", {"normal_pressure": ANY, "profile": ANY}),
+    st.LinearWeakening(weakening_rate=2e11): ("", {
+        "weakening_rate": ANY, "residual_strength": "[0, inf)",
+    }),
+    st.ExponentialWeakening(critical_slip=2e-6, residual_ratio=0.2): ("", {
+        "critical_slip": ANY, "residual_ratio": "[0, 1)",
+    }),
+    st.PiecewiseWeakening(slip=(0.4, 1.0), strength=(0.3, 0.0), fracture_energy=2.0): ("", {
+        "fracture_energy": ANY,
+    }),
     st.Platen(stiffness=1e7): ("", {"stiffness": "[0, inf]"}),
     st.Pusher(height=0.01, width=0.004, stiffness=1e7): ("", {
         "height": ANY, "width": ANY, "side": ("left", "right", "both"), "stiffness": "[0, inf]",
@@ -81,6 +91,9 @@ WHOLE = ("nodes", "events", "samples", "seed", "first", "every", "max_steps", "w
 WHOLE += ("max_evaluations", "bootstrap")
 OPTIONAL = ("width", "thickness", "truncation", "power_kept", "anisotropy", "end_time")
 OPTIONAL += ("loading_rate", "workers", "max_evaluations", "pressing_force")
+PROFILES = ("normal_pressure", "profile", "weakening_rate", "residual_strength")
+PROFILES += ("critical_slip", "residual_ratio", "fracture_energy")
+OPTIONAL += PROFILES
 CALLS = {
     partial(st.monte_carlo, PROBLEM, FIELD, method=LOCAL, samples=1): {
         "samples": "[1, 9]", "seed": "[0, 9]", "first": "[0, 9]", "workers": "[1, 2]",
@@ -116,6 +129,8 @@ def no_value(name, valid):
     """Values that a field does not take."""
     taken = [None] * (name in OPTIONAL) + [math.inf] * (valid[-4:] == "inf]")
     others = [one for one in OTHERS if not any(one is other for other in taken)]
+    if name in PROFILES:  # of a single node
+        others.remove([1.0])
     if valid == FLAG:
         return some.sampled_from([0, 1, 1.0, np.ones(1), *others[:2], *others[5:]])
     if isinstance(valid, tuple):
@@ -163,7 +178,11 @@ CALLED = [(call, name, valid) for call, names in CALLS.items() for name, valid i
 
 
 def named(problems, name):
-    return [text for text in problems if re.match(rf"(\w+\.)*{name}\b", text)]
+    return [
+        text
+        for text in problems
+        if re.match(rf"(\w+\.)*{name}\b|(\w+Weakening|Load): {name} must", text)
+    ]
 
 
 @SEVERAL

@@ -29,9 +29,8 @@ TABLES = {
     + "\n".join(f"{2 * i:d},0;{v:.2f}".replace(".", ",") for i, v in enumerate(EIGHT)),
     "comments and three columns": "# rig 4\n# force in kN\nstation\tx (cm)\tstrength (kPa)\n"
     + "\n".join(f"{i}\t{0.2 * i:.1f}\t{1e3 * v:.0f}" for i, v in enumerate(EIGHT)),
-    "blanks without a heading": "\n".join(
-        f"{2e-3 * i:.4f} {1e6 * v:.0f}" for i, v in enumerate(EIGHT)
-    ),
+    "blanks without a heading": "# rig 4 of May\n"
+    + "\n".join(f"{2e-3 * i:.4f} {1e6 * v:.0f}" for i, v in enumerate(EIGHT)),
     "comments and a first row without a value": "# rig 4, 12 bar\n# x (mm);strength (MPa)\n"
     + "\n".join(f"{2 * i};{'-' if i == 0 else v}" for i, v in enumerate(EIGHT)),
     "rows without values": "strength [MPa];run\n-;3\n-;-\n"
@@ -63,8 +62,11 @@ def other_places_and_units():
     shifted = "x (um);strength (kPa)\n" + "\n".join(
         f"{2e3 * i + 700:.0f};{1e3 * v}" for i, v in enumerate(EIGHT)
     )
+    gap = "\n".join(f"{2 * i} {'-' if i == 3 else 1e3 * v}" for i, v in enumerate(EIGHT))
+    between = {"x_unit": "mm", "unit": "kPa", "interpolate": True, "gaps": "skip"}
     return {
         "interpolated": table(shifted, interface=SMALL, interpolate=True),
+        "beside a gap": table(gap, interface=SMALL, **between),
         "stated": table("\n".join(f"{v}" for v in EIGHT), unit="MPa", interface=SMALL),
         "as read": table(shifted),
         "bare": table(

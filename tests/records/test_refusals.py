@@ -59,6 +59,7 @@ CALLS = {
         lambda: make_problem(weakening_rate=RISING * 60.0),
         lambda: make_problem(weakening_rate=RISING * 5.55).nodes_in_nucleation_length(1.2e12),
         lambda: make_problem(weakening_rate=RISING).nodes_in_nucleation_length(2e11),
+        lambda: st.onset(make_problem(weakening_rate=RISING), np.ones(256), method=LOCAL),
     ],
     "samples that are steep": [lambda: steep(4e-7), lambda: steep(2.1e-6)],
     "what is no residual strength": [
@@ -104,6 +105,9 @@ CALLS = {
     ],
     "fits": [
         lambda: st.fit_field(LINE_STRENGTH, LINE.interface, anisotropy=1.4),
+        lambda: st.fit_field(
+            LINE_STRENGTH - 9e5, LINE.interface, marginal="lognormal", noise=0.0, bootstrap=20
+        ),
         lambda: st.fit_field(LINE_STRENGTH, LINE.interface, quantity="strenght"),
     ],
     "planes": [
