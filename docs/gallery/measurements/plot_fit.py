@@ -2,7 +2,7 @@
 A field fitted to a record
 ==========================
 
-Histogram, quantiles, correlation and spectrum of a record of strength and of the fitted field.
+Histogram and spectrum of a record of strength and of the fitted field.
 """
 
 import xarray as xr
