@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Annotated, Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
+from typing import Annotated, Any, NamedTuple, Protocol, Self, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,8 @@ WHICH = Stream(2000, BLOCK, np.arange(0), mean_mode=True)
 MODES = 1 << 40
 """More than the number of draws of a stream."""
 
-DRAWN = 1_000
-"""Members that are drawn from a source."""
+FIRST, MOST = 1_000, 8_000
+"""Members that are drawn from a source at first, and at most."""
 
 
 @runtime_checkable
@@ -52,6 +52,7 @@ class EquallyLikely:
 
     members: tuple[RandomInterface, ...]
     order: tuple[int, ...] = ()  # of the members along the first draw; empty: as they are
+    source: Source | None = None  # that they were drawn from
 
     def __post_init__(self) -> None:
         if not self.members:
@@ -83,6 +84,11 @@ class EquallyLikely:
         known: dict[Any, int] = {}
         each = [known.setdefault(tuple(o.properties.items()), len(known)) for o in self.members]
         return np.array(each, np.int64)
+
+    def larger(self, count: int, seed: int) -> Self:
+        """Return as many members from the same source."""
+        assert self.source is not None
+        return type(self)(tuple(self.source.interfaces(count, seed)), source=self.source)
 
     def member(self, draws: Array) -> NDArray[np.int64]:
         """Return the number of the member of each sample."""
@@ -153,7 +159,7 @@ def as_random(given: Any, seed: int = 0) -> RandomInterface | EquallyLikely:
     if isinstance(given, EquallyLikely):
         return given
     if isinstance(given, Source):
-        return EquallyLikely(tuple(given.interfaces(DRAWN, seed)))
+        return EquallyLikely(tuple(given.interfaces(FIRST, seed)), source=given)
     if not isinstance(given, list | tuple):
         return as_random_interface(given)
     found = EquallyLikely(tuple(map(as_random_interface, given)))

@@ -20,6 +20,7 @@ from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import Event, LimitState, weakest_first
 from stiction.ensemble.monte_carlo import check_fields
 from stiction.ensemble.pilot import exact_counterpart
+from stiction.random.equally_likely import MOST as MOST_MEMBERS
 from stiction.reliability.tail import Tail, two_levels_refused
 
 TargetCv: TypeAlias = Annotated[Real, Field(ge=1e-6, le=1)]
@@ -35,7 +36,7 @@ seconds on one core that evaluations take at most if `max_evaluations` does not 
 LISTED, SAMPLED = 0.6, 0.8
 """Parts of the target for the error of the list of interfaces and that of sampling, in squares."""
 MORE, CARRIED = 1.2, 0.9
-"""Margin on evaluations wanted; share of the mean whose carriers are counted."""
+"""Margin on the number of members wanted; share of the mean whose carriers are counted."""
 CHECKED = (8, 64)
 """Fewest and most samples that are solved exactly to check those of the local criterion."""
 
@@ -245,6 +246,15 @@ def bounded(lowest: float) -> bool:
     return bool(np.isfinite(lowest) and lowest > 0.0)
 
 
+def wanted_members(random: Any, cv: float, target_cv: float) -> int:
+    """Return how many members to draw from a source instead, 0 for no more."""
+    least = cv / (LISTED * target_cv)
+    count = len(random.members)
+    if getattr(random, "source", None) is None or least <= 1.0 or count >= MOST_MEMBERS:
+        return 0
+    return int(min(max(MORE * count * least * least, 2 * count), MOST_MEMBERS))
+
+
 def few_members(
     random: Any, members: Array, cv: float, members_cv: float, target_cv: float
 ) -> list[str]:
@@ -253,12 +263,19 @@ def few_members(
         return []
     shares = np.cumsum(np.sort(np.bincount(random.kinds, np.nan_to_num(members)))[::-1])
     count = 1 + int(np.searchsorted(shares, CARRIED * shares[-1]))
+    advice = (
+        "give what it was drawn from, a fit or a posterior, in its place: more are then drawn; or"
+        " a longer list (count of [uncertain])"
+    )
+    if random.source is not None:
+        advice = (
+            "no more differ, or no more are drawn: take more repetitions of a fit (bootstrap=)"
+        )
     return [
         f"the list of interfaces is a sample, and {count} of its {shares.size} different ones carry"
         f" {CARRIED:.0%} of the mean: by this alone the coefficient of variation is"
-        f" {members_cv:.2g} (target {target_cv:g}); give a longer list, interfaces(count) of a fit"
-        " with more repetitions (bootstrap=) or of a posterior, or count of [uncertain]; more"
-        " profiles or tests make them more alike"
+        f" {members_cv:.2g} (target {target_cv:g}); {advice}; more profiles or tests make them"
+        " more alike"
     ]
 
 

@@ -34,6 +34,7 @@ from stiction.reliability.answer import (
     imprecise,
     prepare,
     too_slow,
+    wanted_members,
 )
 from stiction.reliability.counting import count_failures
 from stiction.reliability.repetitions import SAMPLES, repetition
@@ -107,7 +108,7 @@ def failure_probability(
         As in `monte_carlo`. The total number of samples is an estimate.
     random : RandomInterface, RandomField, list of them, FieldFit or Posterior
         Of a list, each is equally likely. From a fit or a posterior, or any object with a method
-        ``interfaces(count, seed)``, a thousand are drawn.
+        ``interfaces(count, seed)``, as many are drawn as the target needs, from 1,000 up to 8,000.
         The answer is then the mean over them, the predictive probability, and has its `band`. The
         list is a sample of what may be true: the error by that is in the interval.
     stress : float, optional
@@ -177,9 +178,7 @@ def failure_probability(
     if force is not None:
         stress = problem.stress_of("force", force)
 
-    experiment = Experiment(problem, random, method, seed=seed)
-
-    def solve(meter: Meter) -> Answer:
+    def solve(experiment: Experiment, meter: Meter) -> Answer:
         state, budget = prepare(
             experiment, event, workers, meter, max_evaluations,
             algorithm=algorithm, per_pressure=stress is None,
@@ -193,6 +192,7 @@ def failure_probability(
         )
         return Answer.of(state, stress=float(wanted), quantity=name, **found)
 
+    experiment = Experiment(problem, random, method, seed=seed)
     return _answered(experiment, target_cv, Meter("failure_probability", show=progress), solve)
 
 
@@ -200,16 +200,42 @@ def _answered(
     experiment: Experiment,
     target_cv: float,
     meter: Meter,
-    solve: Callable[[Meter], Answer],
+    solve: Callable[[Experiment, Meter], Answer],
 ) -> Answer:
-    """Return an answer with all that it warned of."""
+    """Return an answer from as many members as the target needs, with all that it warned of."""
     with meter, merge_warnings() as warned:
-        answer = solve(meter)
+
+        def solved(own: Experiment) -> tuple[float, tuple[Experiment, Answer]]:
+            answer = solve(own, meter)
+            return answer.members_cv, (own, answer)
+
+        own, answer = _of_enough_members(experiment, target_cv, meter, warned, solved)
         for text in few_members(
-            experiment.random, answer.members, answer.cv, answer.members_cv, target_cv
+            own.random, answer.members, answer.cv, answer.members_cv, target_cv
         ):
             warn_accuracy(text)
     return replace(answer, warnings=tuple(texts_of(warned)))
+
+
+def _of_enough_members(
+    experiment: Experiment,
+    target_cv: float,
+    meter: Meter,
+    warned: Any,
+    solve: Callable[[Experiment], tuple[float, Any]],
+) -> Any:
+    """Return what `solve` does beside the error by the list, with as many members as that needs."""
+    while True:
+        by_list, found = solve(experiment)
+        known = experiment.random
+        if not (count := wanted_members(known, by_list, target_cv)):
+            return found
+        meter.note = f"{count:,} interfaces, c.o.v. by the list {by_list:.2g}"
+        larger = known.larger(count, experiment.seed)
+        if larger.kinds.max() <= known.kinds.max():  # the source has no others
+            return found
+        experiment = replace(experiment, random=larger)
+        warned.clear()
 
 
 def _check_unit(state: LimitState, name: str, given: float, stress: float) -> None:
@@ -435,12 +461,11 @@ def design_stress(
     True
     """
 
-    experiment = Experiment(problem, random, method, seed=seed)
-
-    def solve(meter: Meter) -> Answer:
+    def solve(experiment: Experiment, meter: Meter) -> Answer:
         state, budget = prepare(experiment, event, workers, meter, max_evaluations)
         return Answer.of(state, **_quantile(state, probability, target_cv, budget))
 
+    experiment = Experiment(problem, random, method, seed=seed)
     return _answered(experiment, target_cv, Meter("design_stress", show=progress), solve)
 
 
@@ -554,9 +579,15 @@ def failure_curve(
     True
     """
     experiment = Experiment(problem, random, method, seed=seed)
-    with Meter("failure_curve", show=progress) as meter, merge_warnings():
-        state, budget = prepare(experiment, event, workers, meter, max_evaluations)
-        tail = _curve_tail(state, smallest, target_cv, budget)
+    with Meter("failure_curve", show=progress) as meter, merge_warnings() as warned:
+
+        def solve(own: Experiment) -> tuple[float, tuple[LimitState, Tail]]:
+            state, budget = prepare(own, event, workers, meter, max_evaluations)
+            tail = _curve_tail(state, smallest, target_cv, budget)
+            reached = tail.quantile(smallest) if tail.complete else tail.reached
+            return _members_cv(state, tail, reached), (state, tail)
+
+        state, tail = _of_enough_members(experiment, target_cv, meter, warned, solve)
         for text in curve_doubts(state, tail, smallest, target_cv):
             warn_accuracy(text)
         if not tail.complete:
