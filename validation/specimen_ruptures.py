@@ -68,7 +68,9 @@ def compared(problem: st.Problem, samples: int) -> dict[str, list[float]]:
                 short = least.state.slip - event.waves.slip
                 added = (event.waves.slip - before.slip).max()
                 found["shorter"].append(float(short.max() > 1e-3 * added or not least.arrested))
-            speed = front_speeds(problem, rows.steepest_rate, event)["median_rupture_speed"]
+            speed = front_speeds(problem, rows.steepest_rate, event.waves.arrival)[
+                "median_rupture_speed"
+            ]
             if np.isfinite(speed):
                 found["speed"].append(speed / problem.solid.rayleigh_wave_speed)
                 found["stress"].append(float(event.start.mean()))

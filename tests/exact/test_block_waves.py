@@ -85,7 +85,7 @@ def test_the_statics_of_the_mesh_are_those_of_the_block(mode: str, drive: Any) -
     for nodes in (48, 96):
         problem = crooked(nodes=nodes, mode=mode, drive=drive, rate=SLOW)
         blocks = problem.blocks
-        static, profile, own = condensed(make_mesh(problem), nodes, mode == "III")
+        static, profile, own = condensed(make_mesh(problem), nodes)
         slip = np.cos(np.pi * (np.arange(nodes) + 0.5) / nodes) ** 3
         exact = blocks.stiffness @ slip
         off = np.abs(static @ slip - exact)[
@@ -96,7 +96,7 @@ def test_the_statics_of_the_mesh_are_those_of_the_block(mode: str, drive: Any) -
         assert np.abs(profile - blocks.shear).mean() < 0.02
     assert errors[1][0] < 0.01
     assert errors[1][0] < 0.6 * errors[0][0]
-    assert errors[1][1] < 0.6 * errors[0][1]
+    assert errors[1][1] < max(0.6 * errors[0][1], 1e-9)  # exact in mode III below a platen
 
 
 def test_shear_waves_of_mode_iii_swing_at_the_frequency_of_their_mode() -> None:

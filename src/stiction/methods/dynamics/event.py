@@ -5,6 +5,7 @@ as it goes on to rise, and slip has grown a little along the unstable direction;
 by waves. A block is at rest when nothing slips any more while shear waves cross it and return.
 """
 
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,8 @@ GROWN = 1e-3
 """Growth of the slip at the start, as a share of d_c where it is largest."""
 STILL = 1e-4
 """Share of the largest slip of an event below which a node counts as resting."""
+LOOKS = 8
+"""How often it is seen whether all is at rest, while shear waves cross the block and return."""
 
 
 @dataclass
@@ -51,16 +54,16 @@ class Event:
         self.slides = bool((self.waves.slip > 0.0).all())
         return not self.slides
 
-    def run(self, most: int) -> None:
+    def run(self, max_steps: int) -> None:
         """Go on until all is at rest or all nodes have slipped."""
-        while True:
-            slip = self.waves.slip.copy()
-            if not self.advance(self.mesh.window):
+        slips = deque([self.waves.slip.copy()], maxlen=LOOKS + 1)
+        while self.advance(-(-self.mesh.window // LOOKS)):
+            slips.append(self.waves.slip.copy())
+            added = float((slips[-1] - slips[0]).max())
+            most = float((slips[-1] - self.before.slip).max())
+            if len(slips) > LOOKS and added <= STILL * most:
                 return
-            added = float((self.waves.slip - slip).max())
-            if added <= STILL * float((self.waves.slip - self.before.slip).max()):
-                return
-            if self.steps > most:
+            if self.steps > max_steps:
                 raise InputError(
                     f"max_steps: an event has not come to rest after {self.steps} steps; raise"
                     " max_steps, or lower specimen.quality_factor"

@@ -2,7 +2,7 @@
 
 Columns lie at the nodes x = (i + 1/2) dx, so that each has a cell of the interface. Beyond the
 outer ones half a cell remains, in which s_xx and s_xy vanish: it is a strip that only resists to
-being stretched along y. Rows are dx apart at the interface and up to four times as much above.
+being stretched along y. Rows are dx apart at the interface and up to five times as much above.
 
 An element with the sides a and b has mean strains and two modes of an hourglass. Exact integration
 gives its energy as a b (s . e)/2 of the means, and (c_11 b/a + G a/b)/24 times the square of
@@ -11,39 +11,24 @@ u_00 - u_10 - u_01 + u_11, likewise for v. In mode III there is only u: c_11 is 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
 from stiction.base.arrays import Array, one_blas_thread
+from stiction.elasticity.driven import Driven
+from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
-from stiction.problem.specimen import Platen
+from stiction.problem.solid import Solid
+from stiction.problem.specimen import Blocks, Platen
 
-GROWTH, WIDEST = 1.08, 4.0
+GROWTH, WIDEST = 1.08, 5.0
 """Ratio of the heights of successive rows, and their largest height over dx."""
 VISCOSITY = 0.05
 """Of the grid: oscillations of the shortest waves lose stress over dx/c_d times this."""
-
-
-class Layers(NamedTuple):
-    """Coefficients of the forces of each row of elements, in N/m² per unit depth, (rows - 1,).
-
-    Means of s_xx from u_x and v_y, of s_yy from v_y, of s_xy from u_y and v_x and their product,
-    each times what it exerts at a node; two hourglasses; the strips at the ends.
-    """
-
-    xx: Array
-    xy: Array
-    yy: Array
-    shear_u: Array
-    shear: Array
-    shear_v: Array
-    hourglass_u: Array
-    hourglass_v: Array
-    strip_u: Array
-    strip_v: Array
 
 
 class Mesh(NamedTuple):
@@ -54,9 +39,13 @@ class Mesh(NamedTuple):
     """y of the rows, m."""
     mass: Array
     """Of a node of each row, kg/m."""
-    layers: Layers
+    elements: Array
+    """Stiffness of the elements above each row but the last, (rows - 1, 2, 2, 2, 2, 2, 2), Pa: from
+    and to the lower and upper row, along x and y, on the left and on the right."""
+    strips: Array
+    """Of the half cells at the ends, along x and y, (rows - 1, 2), Pa."""
     stencils: Array
-    """What differences and sums of neighbours exert at each row, (rows, 4, 6); see `_stencils`."""
+    """What the neighbours of a node exert on it, (rows, 2, 5, 3); see `_stencils`."""
     anti_plane: bool
     push: Array
     """Share of the pusher's force on the left and on the right of each row, (rows, 2)."""
@@ -67,55 +56,67 @@ class Mesh(NamedTuple):
     """Of platen or pusher, kg/m."""
     attenuation: float
     """1/s: momentum is lost at this rate."""
-    viscous_time: float
-    step: float
-    window: int
+    viscous_time: float = 0.0
+    step: float = 0.0
+    window: int = 0
     """Steps in which a shear wave crosses the block and returns."""
-    correction: Array
+    correction: Array = np.zeros((0, 0), np.float32)
     """K of the closed form less that of the mesh, (n, n), Pa/m."""
 
 
 def make_mesh(problem: Problem, courant: float = 0.9) -> Mesh:
     """Return the mesh of a block of a problem, its step being a share of the stability limit."""
-    specimen = problem.specimen
-    assert specimen is not None
-    drive, depth = specimen.drive, specimen.thickness or 1.0
+    assert problem.specimen is not None
     return _mesh(
-        problem, courant, 2.0 * drive.stiffness / depth, drive.mass / depth,
-        np.pi * problem.solid.shear_wave_speed / problem.interface.extent
-        / specimen.quality_factor,
-    )  # fmt: skip
+        problem.specimen,
+        problem.interface,
+        problem.solid,
+        problem.mode,
+        problem.blocks,
+        courant,
+    )
 
 
+@lru_cache(maxsize=4)
 def _mesh(
-    problem: Problem, courant: float, stiffness: float, drive_mass: float, attenuation: float
+    specimen: Blocks,
+    interface: Interface,
+    solid: Solid,
+    mode: str,
+    blocks: Driven,
+    courant: float,
 ) -> Mesh:
-    interface, solid, specimen = problem.interface, problem.solid, problem.specimen
-    assert specimen is not None
-    dx, n = interface.spacing, interface.size
-    shear, anti_plane = solid.shear_modulus, problem.mode == "III"
+    dx, n, drive = interface.spacing, interface.size, specimen.drive
+    depth = specimen.thickness or 1.0
     heights = row_heights(specimen.height, dx)
-    moduli = (shear, 0.0) if anti_plane else _moduli(shear, solid.wave_speed_ratio)
-    layers = _layers(np.diff(heights), dx, *moduli, shear, anti_plane)
+    elements, strips = _elements(np.diff(heights), dx, solid, mode == "III")
     tributary = np.gradient(heights)
     tributary[[0, -1]] = 0.5 * np.diff(heights)[[0, -1]]
-    mass = solid.density * dx * tributary
-    platen = isinstance(drive := specimen.drive, Platen)
     push = np.zeros((heights.size, 2))
     if not isinstance(drive, Platen):
         share = _covered(heights, drive.height, drive.width)
         push[:, 0] = share * {"left": 1.0, "both": 0.5, "right": 0.0}[drive.side]
         push[:, 1] = share * {"left": 0.0, "both": 0.5, "right": 1.0}[drive.side]
     mesh = Mesh(
-        dx, heights, mass, layers, _stencils(layers), anti_plane, push, platen, stiffness,
-        drive_mass, attenuation, 0.0, 0.0, 0, np.zeros((n, n)),
-    )  # fmt: skip
-    static, profile, own = condensed(mesh, n, anti_plane)
-    if stiffness > 0.0:
-        relief = 0.5 * own / (1.0 + own / stiffness) / interface.extent
+        spacing=dx,
+        heights=heights,
+        mass=solid.density * dx * tributary,
+        elements=elements,
+        strips=strips,
+        stencils=_stencils(elements, strips),
+        anti_plane=mode == "III",
+        push=push,
+        platen=isinstance(drive, Platen),
+        stiffness=2.0 * drive.stiffness / depth,
+        drive_mass=drive.mass / depth,
+        attenuation=np.pi * solid.shear_wave_speed / interface.extent / specimen.quality_factor,
+    )
+    static, profile, own = condensed(mesh, n)
+    if mesh.stiffness > 0.0:
+        relief = 0.5 * own / (1.0 + own / mesh.stiffness) / interface.extent
         static = static + relief / n * np.outer(profile, profile)
-    correction = problem.blocks.stiffness - static
-    speed = solid.shear_wave_speed * (1.0 if anti_plane else solid.wave_speed_ratio)
+    correction = blocks.stiffness - static
+    speed = solid.shear_wave_speed * (1.0 if mesh.anti_plane else solid.wave_speed_ratio)
     viscous = VISCOSITY * dx / speed
     step = courant * _limit(speed, solid.shear_wave_speed, mesh, correction, viscous)
     longest = max(interface.extent, specimen.height)
@@ -123,7 +124,7 @@ def _mesh(
         viscous_time=viscous,
         step=step,
         window=int(np.ceil(2.0 * longest / solid.shear_wave_speed / step)),
-        correction=np.ascontiguousarray(correction),
+        correction=correction.astype(np.float32),
     )
 
 
@@ -136,59 +137,51 @@ def row_heights(height: float, spacing: float) -> Array:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def _moduli(shear: float, ratio: float) -> tuple[float, float]:
-    """Return c_11 and c_12 of the plane state, Pa."""
-    along = shear * ratio**2
-    return along, along - 2.0 * shear
+def _elements(b: Array, a: float, solid: Solid, anti: bool) -> tuple[Array, Array]:
+    """Return the stiffness of elements of the heights b, and of the strips at their ends."""
+    shear = solid.shear_modulus
+    c11 = shear * (1.0 if anti else solid.wave_speed_ratio**2)
+    c12, in_plane = (0.0, 0.0) if anti else (c11 - 2.0 * shear, 1.0)
+    sign, axes = np.array([-1.0, 1.0]), np.eye(2)
+    # What the corners (row, axis, column) give of a strain, and of an hourglass.
+    along = [np.multiply.outer([0.5, 0.5], np.outer(axis, sign)) for axis in axes]
+    up = [0.5 * np.multiply.outer(sign, np.outer(axis, [1.0, 1.0])) for axis in axes]
+    twist = [np.multiply.outer(sign, np.outer(axis, sign)) for axis in axes]
+
+    def times(stiffness: Any, one: Array, other: Array) -> Array:
+        return np.multiply.outer(stiffness * np.ones_like(b), np.multiply.outer(one, other))
+
+    elements = times(c11 * b / a, along[0], along[0]) + times(shear * a / b, up[0], up[0])
+    elements += times((c11 * b / a + shear * a / b) / 12.0, twist[0], twist[0])
+    stretched = 0.0
+    if not anti:
+        elements += times(c11 * a / b, up[1], up[1]) + times(shear * b / a, along[1], along[1])
+        elements += times((c11 * a / b + shear * b / a) / 12.0, twist[1], twist[1])
+        for one, other, stiffness in ((along[0], up[1], c12), (up[0], along[1], shear)):
+            elements += times(stiffness, one, other) + times(stiffness, other, one)
+        stretched = c11 - c12**2 / c11
+    strips = 0.5 * a / b[:, None] * np.array([shear if anti else 0.0, stretched])
+    return elements, strips
 
 
-def _layers(b: Array, a: float, c11: float, c12: float, shear: float, anti: bool) -> Layers:
-    cross, c22 = (0.0, 0.0) if anti else (1.0, c11)
-    one = np.ones_like(b)
-    stretched = 0.0 if anti else c22 - c12**2 / c11
-    found = Layers(
-        xx=c11 * b / (4.0 * a),
-        xy=0.25 * c12 * one,
-        yy=c22 * a / (4.0 * b),
-        shear_u=shear * a / (4.0 * b),
-        shear=0.25 * cross * shear * one,
-        shear_v=cross * shear * b / (4.0 * a),
-        hourglass_u=(c11 * b / a + shear * a / b) / 12.0,
-        hourglass_v=(c22 * a / b + cross * shear * b / a) / 12.0,
-        strip_u=(0.5 * a * shear if anti else 0.0) / b,
-        strip_v=0.5 * a * stretched / b,
-    )
-    return Layers(*(column.astype(np.float32) for column in found))
+def _stencils(elements: Array, strips: Array) -> Array:
+    """Return what moves a node: three coefficients each, of the rows below, here and above.
 
-
-def _stencils(layers: Layers) -> Array:
-    """Return the coefficients by which each row adds up the fields of three rows.
-
-    At a node, forces along x are differences of the first sums over x, and sums of the second; so
-    are those along y with the third and fourth. Each adds up two fields of the rows below, here and
-    above: differences over x of u and sums of v, sums of u and differences of v, then with u and v
-    exchanged twice.
+    Of the sum of both neighbours, of the node itself, and of the difference of both neighbours of
+    the other component; then at the left end, where there is one neighbour, of the node itself and
+    of its other component, which at the right end has the other sign.
     """
-    k = Layers(*(np.pad(column.astype(np.float64), 1) for column in layers))
-    low, up = slice(None, -1), slice(1, None)
-
-    def stretched(stiffness: Array, hourglass: Array) -> tuple[Array, ...]:
-        less, more = stiffness - hourglass, stiffness + hourglass
-        return less[low], more[low] + more[up], less[up]
-
-    def sheared(stiffness: Array) -> tuple[Array, ...]:
-        return stiffness[low], -stiffness[low] - stiffness[up], stiffness[up]
-
-    def coupled(stiffness: Array, sign: float) -> tuple[Array, ...]:
-        return -stiffness[low], sign * (stiffness[low] - stiffness[up]), stiffness[up]
-
-    found = [
-        [*stretched(k.xx, k.hourglass_u), *coupled(k.xy, 1.0)],
-        [*sheared(k.shear_u), *coupled(k.shear, -1.0)],
-        [*stretched(k.shear_v, k.hourglass_v), *coupled(k.shear, 1.0)],
-        [*sheared(k.yy), *coupled(k.xy, -1.0)],
-    ]
-    return np.ascontiguousarray(np.moveaxis(np.array(found), -1, 0), dtype=np.float32)
+    found = np.zeros((len(elements) + 1, 2, 5, 3))
+    for row, (element, strip) in enumerate(zip(elements, strips, strict=True)):
+        for up in (0, 1):
+            for axis in (0, 1):
+                own, other = element[up, axis, :, :, axis], element[up, axis, :, :, 1 - axis]
+                end = own[0, :, 0].copy()
+                end += strip[axis] * np.where(np.arange(2) == up, 1.0, -1.0)
+                found[row + up, axis, :, 1 - up : 3 - up] -= [
+                    own[0, :, 1], own[0, :, 0] + own[1, :, 1], other[0, :, 1], end, other[0, :, 0],
+                ]  # fmt: skip
+    return found.astype(np.float32)
 
 
 def _covered(heights: Array, middle: float, width: float) -> Array:
@@ -217,83 +210,71 @@ def _limit(
 
 
 def layer_matrix(mesh: Mesh, layer: int, nodes: int) -> sp.csr_matrix:
-    """Return the stiffness of a row of elements: u and v of its lower nodes, then the upper ones.
-
-    Independently of the kernel: as the sum of the squares of strains.
-    """
-    k = Layers(*(column[layer] for column in mesh.layers))
-    d = sp.diags([-np.ones(nodes - 1), np.ones(nodes - 1)], [0, 1], shape=(nodes - 1, nodes))
-    m = abs(d)
-    zero = sp.csr_matrix(d.shape)
-    along = sp.hstack([d, zero, d, zero])
-    up = sp.hstack([zero, -m, zero, m])
-    over = sp.hstack([-m, zero, m, zero])
-    tilt = sp.hstack([zero, d, zero, d])
-    twist_u, twist_v = sp.hstack([-d, zero, d, zero]), sp.hstack([zero, -d, zero, d])
-    ends = sp.csr_matrix((np.ones(2), ([0, 1], [0, nodes - 1])), shape=(2, nodes))
-    none = sp.csr_matrix(ends.shape)
-    strip_u = sp.hstack([-ends, none, ends, none])
-    strip_v = sp.hstack([none, -ends, none, ends])
-    whole = (
-        k.xx * along.T @ along
-        + k.xy * (along.T @ up + up.T @ along)
-        + k.yy * up.T @ up
-        + k.shear_u * over.T @ over
-        + k.shear * (over.T @ tilt + tilt.T @ over)
-        + k.shear_v * tilt.T @ tilt
-        + k.hourglass_u * twist_u.T @ twist_u
-        + k.hourglass_v * twist_v.T @ twist_v
-        + k.strip_u * strip_u.T @ strip_u
-        + k.strip_v * strip_v.T @ strip_v
-    )
-    return whole.tocsr()
+    """Return the stiffness of a row of elements: u and v of its lower nodes, then the upper ones."""
+    left, right = np.eye(nodes, nodes - 1), np.eye(nodes, nodes - 1, -1)
+    columns = [sp.csr_matrix(left), sp.csr_matrix(right)]
+    whole = sp.csr_matrix((4 * nodes, 4 * nodes))
+    for i, one in enumerate(columns):
+        for j, other in enumerate(columns):
+            corner = mesh.elements[layer][:, :, i, :, :, j].reshape(4, 4)
+            whole += sp.kron(corner, one @ other.T)
+    ends = sp.csr_matrix((np.ones(2), ([0, nodes - 1],) * 2), shape=(nodes, nodes))
+    strips = np.kron([[1.0, -1.0], [-1.0, 1.0]], np.diag(mesh.strips[layer]))
+    return (whole + sp.kron(strips, ends)).tocsr()
 
 
-def condensed(mesh: Mesh, nodes: int, anti_plane: bool) -> tuple[Array, Array, float]:
+def condensed(mesh: Mesh, nodes: int) -> tuple[Array, Array, float]:
     """Return K of the mesh under a given force (Pa/m), q, and C (Pa); see `elasticity.blocks`.
 
-    Rows are eliminated from the top downwards.
+    What is even about the middle of the block and what is odd do not see each other.
     """
+    static, force, compliance = np.zeros((nodes, nodes)), np.zeros(nodes), 0.0
+    half = np.eye(nodes, nodes // 2)
     with one_blas_thread():
-        return _condensed(mesh, nodes, anti_plane)
+        for sign in (1.0, -1.0):
+            folds = [(half + one * half[::-1]) / np.sqrt(2.0) for one in (sign, -sign)]
+            above, below, moved = _condensed(mesh, folds)
+            static += folds[0] @ above @ folds[0].T
+            force += folds[0] @ below
+            compliance += moved
+    static *= 0.5 / mesh.spacing
+    return 0.5 * (static + static.T), force * nodes / force.sum(), 1.0 / compliance
 
 
-def _condensed(mesh: Mesh, nodes: int, anti_plane: bool) -> tuple[Array, Array, float]:
-    rows = mesh.heights.size
-    own = np.arange(nodes if anti_plane else 2 * nodes)  # of a row: u, and v
-    top = own if anti_plane else own[:nodes]  # v = 0 at the top
+def _condensed(mesh: Mesh, folds: list[Array]) -> tuple[Array, Array, float]:
+    """Return stiffness, force and compliance of a half, its rows eliminated from the top downwards.
+
+    `folds` (nodes, half) give u and v of all nodes of a row.
+    """
+    nodes, size = folds[0].shape
+    fold = sp.csr_matrix(scipy.linalg.block_diag(*folds, *folds))
+    own = size if mesh.anti_plane else 2 * size  # of a row: u, and v
+    ends = folds[0][[0, -1]].T
+    kept, above, force = sp.eye(size).tocsr(), np.zeros((size, size)), np.zeros(size)
+    if mesh.platen:  # it does not move where u is odd
+        kept = sp.csr_matrix(folds[0].sum(axis=0)[:, None])
+        above, force = np.eye(1) * (kept.nnz == 0), np.ones(1) * (kept.nnz > 0)
     compliance = 0.0
-    above, force = np.zeros((top.size, top.size)), np.zeros(top.size)
-    if mesh.platen:
-        glue = np.ones((top.size, 1))
-        above, force = np.zeros((1, 1)), np.ones(1)
-    for row in range(rows - 1, 0, -1):
-        layer = layer_matrix(mesh, row - 1, nodes).tocsc()
-        upper = top if row == rows - 1 else own
-        down, up = own, 2 * nodes + upper
-        inner = layer[up][:, up]
-        between = layer[up][:, down]
-        if row == rows - 1 and mesh.platen:
-            inner, between = glue.T @ (inner @ glue), glue.T @ between
-        else:
-            force = force.copy()
-            force[0] += mesh.push[row, 0]
-            force[nodes - 1] += mesh.push[row, 1]
-        inner = above + (inner.toarray() if sp.issparse(inner) else inner)
-        between = sp.csr_matrix(between)
-        inverse = scipy.linalg.lapack.dpotri(
-            scipy.linalg.cholesky(inner, overwrite_a=True, check_finite=False), overwrite_c=True
-        )[0]
+
+    def eliminated(inner: Array, between: Any, force: Array) -> tuple[Array, Array, float]:
+        factor = scipy.linalg.cholesky(inner, overwrite_a=True, check_finite=False)
+        inverse = scipy.linalg.lapack.dpotri(factor, overwrite_c=True)[0]
         inverse = np.triu(inverse) + np.triu(inverse, 1).T
         moved = inverse @ force
-        compliance += float(force @ moved)
-        above = layer[down][:, down].toarray() - between.T @ (between.T @ inverse).T
-        force = -(between.T @ moved)
-    if not anti_plane:
-        inverse = np.linalg.inv(above[nodes:, nodes:])
-        moved = inverse @ force[nodes:]
-        compliance += float(force[nodes:] @ moved)
-        force = force[:nodes] - above[:nodes, nodes:] @ moved
-        above = above[:nodes, :nodes] - above[:nodes, nodes:] @ inverse @ above[nodes:, :nodes]
-    static = 0.5 * (above + above.T) * 0.5 / mesh.spacing
-    return static, force * nodes / force.sum(), 1.0 / compliance
+        less = between.T @ (between.T @ inverse).T
+        return -less, -(between.T @ moved), float(force @ moved)
+
+    for row in range(mesh.heights.size - 1, 0, -1):
+        layer = (fold.T @ layer_matrix(mesh, row - 1, nodes) @ fold).tocsc()
+        up = slice(2 * size, 2 * size + kept.shape[0])
+        force = force + kept[:size].T @ (ends @ mesh.push[row])
+        inner = above + (kept.T @ layer[up, up] @ kept).toarray()
+        above, force, moved = eliminated(inner, kept.T @ layer[up, :own], force)
+        above += layer[:own, :own].toarray()
+        compliance += moved
+        kept = sp.eye(own).tocsr()
+    if not mesh.anti_plane:  # v of the interface
+        less, added, moved = eliminated(above[size:, size:], above[size:, :size], force[size:])
+        above, force = above[:size, :size] + less, force[:size] + added
+        compliance += moved
+    return above, force, compliance

@@ -187,7 +187,7 @@ class Record:
             "critical_load": self.event.before.load,
             "critical_position": interface.x[first],
             "onset_time": arrival[first] if reached else np.nan,
-            **front_speeds(problem, self.rows.steepest_rate, self.event),
+            **front_speeds(problem, self.rows.steepest_rate, arrival),
         }
         variables = {name: along(interface, FIELDS[name]) for name in self.save.fields}
         variables |= OVER_TIME | WHOLE

@@ -80,7 +80,8 @@ class RuptureProgram(DenseProgram):
         state = State(
             found.load, slip, found.direction, stiff, by_events=True, jumped=True, stopped=True
         )
-        return Jump(outcome == Outcome.ARRESTED, outcome != Outcome.UNDECIDED, state)
+        arrested, known = outcome == Outcome.ARRESTED, outcome != Outcome.UNDECIDED
+        return Jump(arrested, known, state, arrival=event.waves.arrival)
 
 
 class RuptureSolver(OnsetSolver):
@@ -100,10 +101,8 @@ class RuptureSolver(OnsetSolver):
         self, rows: Sample, row: int, sample: StaticSample, path: Path
     ) -> dict[str, Any]:
         speeds = dict.fromkeys(SPEEDS, np.nan)
-        if path.last.unstable:  # that event once more: it was not kept
-            event = self.program.event(sample, path.last)
-            event.run(self.program.max_steps)
-            speeds = front_speeds(self.problem, rows.steepest_rate, event)
+        if path.arrival is not None:
+            speeds = front_speeds(self.problem, rows.steepest_rate, path.arrival)
         return super()._values(rows, row, sample, path) | speeds
 
 
@@ -121,7 +120,7 @@ def refuse_barriers(rows: Sample) -> None:
         )
 
 
-def front_speeds(problem: Problem, steepest_rate: float, event: Event) -> dict[str, float]:
+def front_speeds(problem: Problem, steepest_rate: float, arrival: Array) -> dict[str, float]:
     """Return the largest speed of a front over 2 h_n and the median one over h_n/2, m/s."""
     spacing, length = problem.interface.spacing, problem.interface.extent
     nucleation = problem.nucleation_lengths(steepest_rate)[0]
@@ -129,8 +128,7 @@ def front_speeds(problem: Problem, steepest_rate: float, event: Event) -> dict[s
     for lengths, statistic in ((2.0, np.max), (0.5, np.median)):
         window = min(max(lengths * nucleation, 8.0 * spacing), 0.25 * length)
         ends = np.full(round(window / spacing), np.nan)  # fronts do not run round
-        arrival = np.concatenate([event.waves.arrival, ends])
-        speeds = rupture_speed(arrival, spacing, window)
+        speeds = rupture_speed(np.concatenate([arrival, ends]), spacing, window)
         speeds = speeds[np.isfinite(speeds)]
         found.append(float(statistic(speeds)) if speeds.size else np.nan)
     return dict(zip(SPEEDS, found, strict=True))

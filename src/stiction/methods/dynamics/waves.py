@@ -57,46 +57,26 @@ def at_rest(mesh: Mesh, slip: Array) -> Waves:
 
 
 @jit_inside
-def _difference(values: Any, result: Any) -> None:
-    """Write the differences of neighbours, beside a zero at each end."""
-    for i in range(values.shape[0] - 1):
-        result[i + 1] = values[i + 1] - values[i]
-
-
-@jit_inside
-def _sum(values: Any, result: Any) -> None:
-    """Write the sums of neighbours, beside a zero at each end."""
-    for i in range(values.shape[0] - 1):
-        result[i + 1] = values[i + 1] + values[i]
-
-
-@jit_inside
-def _combine(
-    stencil: Any, x0: Any, x1: Any, x2: Any, y0: Any, y1: Any, y2: Any, result: Any
+def _force(
+    stencil: Any, x0: Any, x1: Any, x2: Any, y0: Any, y1: Any, y2: Any, force: Any
 ) -> None:
-    """Add up two fields of the rows below, here and above: one result a loop is fastest."""
-    a, b, c = stencil[0], stencil[1], stencil[2]
-    d, e, f = stencil[3], stencil[4], stencil[5]
-    for i in range(result.shape[0]):
-        result[i] = (a * x0[i] + b * x1[i] + c * x2[i]) + (d * y0[i] + e * y1[i] + f * y2[i])
-
-
-@jit_inside
-def _force(along: Any, across: Any, force: Any) -> None:
-    """Write the forces of the elements on the nodes of a row."""
-    for i in range(force.shape[0]):
-        force[i] = (along[i + 1] - along[i]) + (across[i + 1] + across[i])
-
-
-@jit_inside
-def _add_strips(stiffness: Any, row: int, values: Any, carried: Any, force: Any) -> None:
-    """Add the forces of the half cells beyond the outer columns."""
-    last = force.shape[0] - 1
-    for side, i in ((0, 0), (1, last)):
-        force[i] -= carried[side]
-        if row < stiffness.shape[0]:
-            carried[side] = stiffness[row] * (values[row + 1, i] - values[row, i])
-            force[i] += carried[side]
+    """Write what acts on a row along an axis: by x of the rows around it, and by y across."""
+    n = force.shape[0]
+    a, b, c = stencil[0, 0], stencil[0, 1], stencil[0, 2]
+    d, e, f = stencil[1, 0], stencil[1, 1], stencil[1, 2]
+    g, h, k = stencil[2, 0], stencil[2, 1], stencil[2, 2]
+    for i in range(n - 2):  # a long line, but one loop without branches is what runs in vectors
+        force[i + 1] = (
+            (a * (x0[i] + x0[i + 2]) + b * (x1[i] + x1[i + 2]) + c * (x2[i] + x2[i + 2]))
+            + (d * x0[i + 1] + e * x1[i + 1] + f * x2[i + 1])
+            + (g * (y0[i + 2] - y0[i]) + h * (y1[i + 2] - y1[i]) + k * (y2[i + 2] - y2[i]))
+        )
+    for i, inner, sign in ((0, 1, np.float32(1.0)), (n - 1, n - 2, np.float32(-1.0))):
+        own = a * x0[inner] + b * x1[inner] + c * x2[inner]
+        own += stencil[3, 0] * x0[i] + stencil[3, 1] * x1[i] + stencil[3, 2] * x2[i]
+        other = g * y0[inner] + h * y1[inner] + k * y2[inner]
+        other += stencil[4, 0] * y0[i] + stencil[4, 1] * y1[i] + stencil[4, 2] * y2[i]
+        force[i] = own + sign * other
 
 
 @jit_inside
@@ -105,7 +85,7 @@ def _move(w: Any, rate: Any, force: Any, keep: Any, gain: Any, step: Any, lag: A
     for i in range(w.shape[0]):
         before = rate[i]
         after = keep * before + gain * force[i]
-        w[i] += step * after + lag * (after - before)
+        w[i] += (step + lag) * after - lag * before
         rate[i] = after
 
 
@@ -219,53 +199,30 @@ def follow(
     half = 0.5 * mesh.attenuation * mesh.step
     keep = (1.0 - half) / (1.0 + half)
     gains = mesh.step / ((1.0 + half) * mesh.mass)
-    du, mu, dv, mv = np.zeros((4, 3, n + 1), np.float32)
-    along, across = np.zeros((2, n + 1), np.float32)
-    force, carried = np.zeros(n, np.float32), np.zeros((2, 2), np.float32)
+    along = np.zeros((2, n), np.float32)  # forces on a row, and on the one below it
+    across = np.zeros((2, n), np.float32)
+    last, keep_row = rows - 1, np.float32(keep)
     u, v, u_rate, v_rate = waves.u, waves.v, waves.u_rate, waves.v_rate
     for taken in range(steps):
         never = n
-        carried[:] = np.float32(0.0)
-        _difference(u[0], du[0])
-        _sum(u[0], mu[0])
-        _difference(v[0], dv[0])
-        _sum(v[0], mv[0])
-        for j in range(rows):
-            below, here, above = (j + 2) % 3, j % 3, (j + 1) % 3
-            if j < rows - 1:  # beyond the top and the interface stencils are zero
-                _difference(u[j + 1], du[above])
-                _sum(u[j + 1], mu[above])
-                _difference(v[j + 1], dv[above])
-                _sum(v[j + 1], mv[above])
-            gain = np.float32(gains[j])
-            if not mesh.anti_plane and j < rows - 1:
-                _combine(
-                    mesh.stencils[j, 2], dv[below], dv[here], dv[above],
-                    mu[below], mu[here], mu[above], along,
-                )  # fmt: skip
-                _combine(
-                    mesh.stencils[j, 3], mv[below], mv[here], mv[above],
-                    du[below], du[here], du[above], across,
-                )  # fmt: skip
-                _force(along, across, force)
-                _add_strips(mesh.layers.strip_v, j, v, carried[1], force)
-                _move(v[j], v_rate[j], force, np.float32(keep), gain, step, lag)
-            _combine(
-                mesh.stencils[j, 0], du[below], du[here], du[above],
-                mv[below], mv[here], mv[above], along,
-            )  # fmt: skip
-            _combine(
-                mesh.stencils[j, 1], mu[below], mu[here], mu[above],
-                dv[below], dv[here], dv[above], across,
-            )  # fmt: skip
-            _force(along, across, force)
-            _add_strips(mesh.layers.strip_u, j, u, carried[0], force)
-            if j == 0:
+        for j in range(rows + 1):
+            if j < rows:  # stencils are zero beyond the interface and the top
+                low, up, on = max(j - 1, 0), min(j + 1, last), mesh.stencils[j]
+                _force(on[0], u[low], u[j], u[up], v[low], v[j], v[up], along[j % 2])
+                if not mesh.anti_plane:
+                    _force(on[1], v[low], v[j], v[up], u[low], u[j], u[up], across[j % 2])
+            i = j - 1
+            if i < 0:
+                continue
+            force, gain = along[i % 2], np.float32(gains[i])  # the row above has felt this one
+            if i == 0:
                 never = _slide(sample, start, front, mesh, waves, force, keep, gains[0])
-            elif j == rows - 1 and mesh.platen:
+            elif i == last and mesh.platen:
                 _move_platen(mesh, waves, force)
             else:
-                _move(u[j], u_rate[j], force, np.float32(keep), gain, step, lag)
+                _move(u[i], u_rate[i], force, keep_row, gain, step, lag)
+            if i < last and not mesh.anti_plane:
+                _move(v[i], v_rate[i], across[i % 2], keep_row, gain, step, lag)
         if not mesh.platen:
             _move_pusher(mesh, waves, gains)
         waves.now[TIME] += mesh.step

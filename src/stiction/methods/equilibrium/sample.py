@@ -205,13 +205,15 @@ def multiplier_of(sample: StaticSample, state: State) -> Array:
 class Jump(NamedTuple):
     """End of an instability: whether it is arrested and counts, the state, if that is known.
 
-    `counts` is false for a jump so small that it is a long step of the stable path.
+    `counts` is false for a jump so small that it is a long step of the stable path; `arrival` (s)
+    is when the front of a jump with inertia arrived at each node.
     """
 
     arrested: bool
     known: bool
     state: State
     counts: bool = True
+    arrival: Array | None = None
 
 
 class Program(Protocol):

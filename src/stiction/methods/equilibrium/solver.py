@@ -127,7 +127,8 @@ class Path:
 
     `first` is the first instability, `last` the last equilibrium, `known` is false where a jump
     or a path did not come to its end: `last` is then a lower bound. `peak` is the largest mean
-    stress on the way, over the mean of the load profile.
+    stress on the way, over the mean of the load profile. `arrival` (s) is when the front of the
+    event that slides arrived at each node, with inertia.
     """
 
     first: State
@@ -135,6 +136,7 @@ class Path:
     peak: float
     events: list[Event] = field(default_factory=list)
     known: bool = True
+    arrival: Array | None = None
 
 
 def follow(program: Program, sample: StaticSample) -> Path:
@@ -146,18 +148,18 @@ def follow(program: Program, sample: StaticSample) -> Path:
     found = program.next(sample)
     first: State | None = None
     events: list[Event] = []
-    known, peak = found.known, found.highest
+    known, peak, arrival = found.known, found.highest, None
     while found.unstable:
         jump = program.jump(sample, found)
         if jump.counts:
             first = first or found
             if not jump.arrested:
-                known = jump.known
+                known, arrival = jump.known, jump.arrival
                 break
             events.append(Event(found, jump.state))
         found = program.next(sample, jump.state)
         known, peak = found.known, max(peak, found.highest)
-    return Path(first or found, found, peak, events, known)
+    return Path(first or found, found, peak, events, known, arrival)
 
 
 def relief_of(problem: Problem, slip: Array) -> float:
