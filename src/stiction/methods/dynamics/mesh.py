@@ -141,7 +141,6 @@ def _elements(b: Array, a: float, solid: Solid, anti: bool) -> tuple[Array, Arra
     """Return the stiffness of elements of the heights b, and of the strips at their ends."""
     shear = solid.shear_modulus
     c11 = shear * (1.0 if anti else solid.wave_speed_ratio**2)
-    c12, in_plane = (0.0, 0.0) if anti else (c11 - 2.0 * shear, 1.0)
     sign, axes = np.array([-1.0, 1.0]), np.eye(2)
     # What the corners (row, axis, column) give of a strain, and of an hourglass.
     along = [np.multiply.outer([0.5, 0.5], np.outer(axis, sign)) for axis in axes]
@@ -155,6 +154,7 @@ def _elements(b: Array, a: float, solid: Solid, anti: bool) -> tuple[Array, Arra
     elements += times((c11 * b / a + shear * a / b) / 12.0, twist[0], twist[0])
     stretched = 0.0
     if not anti:
+        c12 = c11 - 2.0 * shear
         elements += times(c11 * a / b, up[1], up[1]) + times(shear * b / a, along[1], along[1])
         elements += times((c11 * a / b + shear * b / a) / 12.0, twist[1], twist[1])
         for one, other, stiffness in ((along[0], up[1], c12), (up[0], along[1], shear)):
@@ -210,7 +210,7 @@ def _limit(
 
 
 def layer_matrix(mesh: Mesh, layer: int, nodes: int) -> sp.csr_matrix:
-    """Return the stiffness of a row of elements: u and v of its lower nodes, then the upper ones."""
+    """Return the stiffness of a row of elements: u and v of the lower nodes, then the upper ones."""
     left, right = np.eye(nodes, nodes - 1), np.eye(nodes, nodes - 1, -1)
     columns = [sp.csr_matrix(left), sp.csr_matrix(right)]
     whole = sp.csr_matrix((4 * nodes, 4 * nodes))
