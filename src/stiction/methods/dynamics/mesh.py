@@ -210,7 +210,7 @@ def _limit(
 
 
 def layer_matrix(mesh: Mesh, layer: int, nodes: int) -> sp.csr_matrix:
-    """Return the stiffness of a row of elements: u and v of the lower nodes, then the upper ones."""
+    """Return the stiffness of a row of elements: u, v of the lower nodes, then the upper ones."""
     left, right = np.eye(nodes, nodes - 1), np.eye(nodes, nodes - 1, -1)
     columns = [sp.csr_matrix(left), sp.csr_matrix(right)]
     whole = sp.csr_matrix((4 * nodes, 4 * nodes))
