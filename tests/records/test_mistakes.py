@@ -176,6 +176,7 @@ table_of(calls, {
         lambda: onset(TAU_P, with_law(STEEPENING)),
         lambda: st.theory.nucleation_stress(with_law(STEEPENING), TAU_P),
         lambda: onset(TAU_P, with_law(EXPONENTIAL)),
+        lambda: st.theory.nucleation_stress(with_law(EXPONENTIAL), TAU_P),
         lambda: onset(TAU_P, with_law(STEEPENING), EXACT),
     ],
     "fields": [

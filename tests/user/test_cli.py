@@ -1,7 +1,6 @@
 """The commands: what they print and write, how they end, and what they make of mistakes."""
 
 import errno
-import json
 import os
 import signal
 import subprocess
@@ -24,7 +23,6 @@ from stiction.base.files import private_folder
 from stiction.cli.commands import app
 from stiction.ensemble.store import Store
 from stiction.study import export
-from stiction.study.study import study_schema
 
 STUDY = small_study(
     title="a small sweep",
@@ -44,10 +42,6 @@ def study(monkeypatch, tmp_path):
     path = Path("study.toml")
     path.write_text(TEXT)
     return path
-
-
-def test_the_schema_is_printed(runs):
-    assert json.loads(runs("schema")) == json.loads(json.dumps(study_schema()))
 
 
 def test_interrupted_from_outside(runs, study):

@@ -2,7 +2,6 @@
 
 import dataclasses
 import errno
-from functools import partial
 
 import numpy as np
 import pytest
@@ -203,23 +202,6 @@ def test_front_speed_is_that_of_a_front_and_not_where_fronts_meet():
     known = speed[np.isfinite(speed)]
     assert known.size == 64 - 2 * 7
     assert known == pytest.approx(3.0)
-
-
-def test_a_folder_with_another_run_is_refused(tmp_path):
-    given = {"problem": CROOKED, "profiles": CROOKED_STRENGTH}
-    given["method"] = Rupture(loading_rate=1e7, stop="onset")
-    save = st.Save(to=tmp_path / "run")
-    simulate(save, **given)
-    load, friction = CROOKED.load, CROOKED.friction
-    for change in (
-        {"load": dataclasses.replace(load, profile=1.2)},
-        {"load": dataclasses.replace(load, initial_stress=5e4)},
-        {"friction": dataclasses.replace(friction, residual_strength=3e5)},
-    ):
-        other = {"problem": dataclasses.replace(CROOKED, **change)}
-        refuses("holds another run", partial(simulate, save, **given | other))
-    for other in ({"profiles": CROOKED_STRENGTH + 1.0}, {"method": Rupture(loading_rate=2e7)}):
-        refuses("holds another run", partial(simulate, save, **given | other))
 
 
 def test_stop_conditions_and_progress(held):

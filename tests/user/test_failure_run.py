@@ -9,7 +9,6 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 import xarray as xr
-from refusals import refuses
 from small_study import lengths, small_study
 
 import stiction as st
@@ -142,21 +141,6 @@ def test_uncertain_parameters_are_interfaces_that_are_equally_likely(
     )
     share = (onsets.critical_stress.values < float(found.stress[2])).mean()
     assert share == pytest.approx(float(found.probability[2]), rel=0.2)
-
-
-def test_a_folder_of_other_settings_and_what_cannot_be_sampled_are_refused(tmp_path):
-    computed(tmp_path / "run", 1, study(sweep=[]))
-    refuses(
-        "failure_curve.smallest: 0.01 here, 0.001 there",
-        lambda: study(sweep=[]).failure_curve(
-            out=tmp_path / "run", smallest=0.01, repetitions=1
-        ),
-    )
-    rupture = study(method={"type": "rupture", "loading_rate": 2e7}, sweep=[])
-    refuses(
-        "method: failures by rupture are counted", lambda: computed(tmp_path / "x", 1, rupture)
-    )
-    assert not (tmp_path / "x").exists()
 
 
 def test_fewer_repetitions_after_the_study_was_lost_are_the_first_ones(tmp_path):

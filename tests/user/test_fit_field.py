@@ -44,18 +44,6 @@ def plain():
     return fitted(VALUES, PIECE)
 
 
-def test_what_it_finds_is_what_was_put_in(plain):
-    assert plain.field.mean == pytest.approx(1e6, rel=0.15)
-    assert plain.parameters["spectrum.correlation_length"] == pytest.approx(1e-3, rel=0.6)
-    assert plain.parameters.keys() == plain.interval.keys()
-    for name, (low, high) in plain.interval.items():
-        assert low < high, name
-    assert "marginal.cv" in repr(plain)
-    assert len(plain.repetitions) == 20
-    assert plain.field.of is None
-    assert plain.field.sample(PIECE, seed=1).shape == (1, COUNT)
-
-
 def test_intervals_are_those_of_three_sets_of_repetitions(plain):
     """By hand: errors in units of root length; the ends from fields of either length."""
     name, truth = "spectrum.correlation_length", plain.parameters

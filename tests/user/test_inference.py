@@ -159,18 +159,6 @@ def test_a_posterior_between_the_points_of_a_grid_counts_in_a_design_of_tests():
     xr.testing.assert_allclose(same, force, rtol=1e-9)
 
 
-def test_equilibrium_after_the_local_criterion():
-    local = infer(samples=None)
-    exact = infer(method=st.Equilibrium(), samples=150)
-    assert exact.method == "equilibrium"
-    assert exact.likelihood.scaling.keys == ()  # every parameter was simulated
-    first = exact.likelihood
-    assert np.all(np.ptp(first.box, axis=0) < 0.5)  # only where the first stage found anything
-    shift = exact.mean("marginal.low") - local.mean("marginal.low")
-    # The local criterion is 0.1 % high at xi_0/h_n = 0.6: a fifth of the posterior's width.
-    assert 0.0 < shift < 0.4 * local.draws["marginal.low"].std()
-
-
 FIELDS = [st.paper.strength(PROBLEM, correlation_ratio=ratio) for ratio in (0.5, 0.6, 0.8)]
 
 
@@ -199,15 +187,6 @@ def test_what_an_interrupted_call_has_simulated_is_taken_up(given, monkeypatch):
     np.testing.assert_array_equal(found.u, whole.u)
     infer(**given, workers=1)
     assert len(solved) == 3 * total  # what is complete is not kept
-
-
-@pytest.mark.parametrize("factor", [1e-6, 1e3])
-def test_peaks_in_another_unit_are_refused_before_anything_is_simulated(factor, monkeypatch):
-    monkeypatch.setattr("stiction.inference.infer.make_likelihood", None)
-    strengths = (STRENGTH, dataclasses.replace(STRENGTH, marginal=st.Weibull(mean=1e6, cv=0.2)))
-    for random, prior in zip(strengths, (LOW, {"marginal.mean": (0.5e6, 2e6)}), strict=True):
-        options = {"random": random, "prior": prior, "method": st.Equilibrium()}
-        refuses("30 of 30 are out of reach ... unit", partial(infer, factor * PEAKS, **options))
 
 
 @pytest.mark.filterwarnings("default::stiction.AccuracyWarning")

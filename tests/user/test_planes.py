@@ -97,10 +97,6 @@ def test_nodes_of_constant_strength(found):
     assert held["certified"].item()
 
 
-def rupture(**options):
-    return st.onset(PLANE, STRENGTH, method=st.Rupture(loading_rate=1e8, **options))
-
-
 def test_the_sample_that_fails_is_named(monkeypatch):
     real, seen = solver.follow, []
 
@@ -124,15 +120,6 @@ STUDY = small_study(
     sweep=lengths(2e-3, 4e-3),
 )
 STUDY["random"]["strength"] |= {"anisotropy": 1.5, "mean_mode": True}
-RUPTURES = small_study(
-    nodes=[40, 36],
-    length=[0.016, 0.012],
-    weakening_rate=RATE,
-    correlation_length=2e-3,
-    method={"type": "rupture", "loading_rate": 1e8},
-    ensemble={"samples": 2, "seed": 4},
-)
-RUPTURES["problem"]["friction"]["residual_strength"] = 1e5
 
 
 def test_failing_profiles_are_kept():

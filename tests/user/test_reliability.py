@@ -2,7 +2,6 @@
 
 import dataclasses
 import re
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -180,40 +179,6 @@ def test_small_runs_whose_states_tie(seed):
     assert found.interval[0] < 1e-12 < found.interval[1]
 
 
-@pytest.mark.parametrize("stress", [1.6e3, 100e3])
-def test_a_stress_in_another_unit_is_answered_without_sampling(stress):
-    """Such as a force: 37,000 evaluations gave P = 0 without a warning."""
-    field = st.RandomField(st.Lognormal(mean=1e6, cv=0.12), FIELD.spectrum)
-    with warnings.catch_warnings(record=True, action="always") as caught:
-        found = failure(stress, system=(PROBLEM, field))
-    doubted = [w for w in caught if "check the units" in str(w.message)]
-    assert len(doubted) == (stress < 2e4)  # a fiftieth of the mean strength
-    assert (found.probability, found.evaluations, found.algorithm) == (0.0, 0, "exact")
-    assert found.interval == (0.0, 1e-15)
-
-
-@pytest.mark.parametrize("stress", [48e3, 1e9])
-@pytest.mark.parametrize("pressed", [False, True], ids=["uniform", "random"])
-def test_a_force_as_a_stress_is_answered_at_once(stress, pressed):
-    """A shear force, and a normal force, on a joint: minutes of subset simulation before."""
-    coefficient = st.RandomField(
-        st.Lognormal(mean=0.2, cv=0.12), FIELD.spectrum, of="friction_coefficient"
-    )
-    pressure = st.RandomField(st.Lognormal(mean=80e6, cv=0.1), FIELD.spectrum)
-    random = st.RandomInterface(
-        strength=coefficient,
-        normal_pressure=pressure if pressed else None,
-        between={"strength": st.Lognormal(mean=1.0, cv=0.08)},
-    )
-    joint = dataclasses.replace(PROBLEM.interface, width=0.03)
-    problem = dataclasses.replace(PROBLEM, interface=joint, load=st.Load(normal_pressure=80e6))
-    for given in ({"stress": stress}, {"friction_coefficient": stress / 80e6}):
-        with pytest.warns(st.UnitWarning, match="check the units"):
-            found = st.failure_probability(problem, random, **given, method=EXACT)
-        assert (found.probability, found.evaluations) == (float(stress > 1e8), 0)
-        assert found.force == pytest.approx(stress * 0.03 * joint.extent)
-
-
 @pytest.fixture(scope="module")
 def joint():
     """Residual strength is reached within the critical patch, so that onsets come later."""
@@ -255,38 +220,6 @@ def test_the_check_after_subset_simulation_sees_both_sides(short, stress):
     local, exact = map(int, counts.groups())
     assert 16 <= local <= 48
     assert exact > local
-
-
-def test_auto_leaves_a_guide_whose_samples_do_not_fail(joint):
-    """Among plain samples it picks the weakest; in the tail hardly one of its samples fails."""
-    # What the local criterion holds for weak is stronger by a twentieth.
-    misled = Standing(change=lambda x: np.where(x < 0.5e6, x + 0.05e6, x))
-    found = failure(0.44e6, misled, joint, target_cv=0.4, max_evaluations=5000)
-    assert found.algorithm == "subset"
-    assert "a poor guide" in found.reason
-
-
-def above(residual, what, field=FIELD, method=LOCAL):
-    """Ask for samples, onsets or a probability where there is a residual strength."""
-    problem = make_problem(weakening_rate=0.5e12, residual_strength=residual)
-    if what == "onset":
-        tau_p = field.sample(problem.interface, samples=8, seed=1)
-        st.onset(problem, tau_p, method=method)
-    elif what == "monte_carlo":
-        st.monte_carlo(problem, field, samples=16, method=method)
-    else:
-        failure(1e6, method, (problem, field), algorithm="plain", max_evaluations=100)
-
-
-@pytest.mark.parametrize("what", ["onset", "monte_carlo", "failure_probability"])
-def test_some_strength_below_the_residual_strength_is_said_once(what):
-    field = st.paper.strength(PROBLEM, 2.0)
-    with warnings.catch_warnings(record=True, action="always") as caught:
-        above(0.73e6, what, field, EXACT)
-    (said,) = [str(w.message) for w in caught if "residual" in str(w.message)]
-    if what != "onset":
-        share = 100.0 * field.marginal.distribution.cdf(0.73e6)
-        assert f"{share:.3g} % of its marginal, which reaches from 660000 to 1.66e+06" in said
 
 
 @pytest.mark.parametrize("rho", [0.9, -0.6, 1.0])

@@ -86,17 +86,6 @@ def test_growing_computes_only_the_new_samples(tmp_path, often, reference):
     refuses(words, lambda: fewer.run(out=tmp_path / "run"))
 
 
-def test_another_study_is_refused_with_the_difference(tmp_path):
-    make_study(samples=20).run(out=tmp_path / "run")
-    problem = copy.deepcopy(STUDY["problem"])
-    problem["solid"]["density"] = 2000.0
-    problem["friction"] = {"critical_slip": 1e-6}
-    other = make_study(samples=20, problem=problem, sweep=STUDY["sweep"][:1])
-    words = "solid.density: 2000.0 here, 1170.0 there ... slip: 1e-06 here, nothing there"
-    refuses(f"sweep ... {words}", lambda: other.run(out=tmp_path / "run"))
-    make_study(samples=20, title="another title").run(out=tmp_path / "run")
-
-
 def test_an_interrupted_run_is_readable_and_goes_on(tmp_path, often, reference):
     def interrupt(done, total):
         if done > 160:
@@ -153,17 +142,6 @@ def test_a_reader_beside_a_writer_sees_no_damage(tmp_path, often):
 # -- damage --------------------------------------------------------------------------------------
 
 
-def test_a_damaged_study_is_made_of_the_one_given_and_the_chunks(run, reference):
-    """As where another file bears its name; the fuzz damages it otherwise."""
-    (run / "study.json").write_bytes((run / "pilot.json").read_bytes())
-    with pytest.raises(StoreError, match="study.json"):
-        st.open_run(run)
-    other = make_study(ensemble={"samples": 120, "seed": 4})
-    refuses("belongs to another study", lambda: other.run(out=run), StoreError)
-    assert again(run, "study.json is damaged or missing").identical(reference)
-    assert again(run).identical(reference)
-
-
 @pytest.mark.parametrize("number", [errno.EIO, errno.EACCES])
 def test_what_cannot_be_read_is_not_damaged(run, monkeypatch, number):
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
@@ -179,13 +157,6 @@ def test_what_cannot_be_read_is_not_damaged(run, monkeypatch, number):
             refuses("cannot be read", lambda: make_study().run(out=run), StoreError)
             refuses("cannot be read", lambda: st.open_run(run).status(), StoreError)
     assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before
-
-
-def test_unusable_folders_are_refused_before_any_work(tmp_path):
-    (tmp_path / "thesis.tex").write_text("text")
-    for place, words in ((tmp_path / "thesis.tex", "File exists"), (tmp_path, "thesis.tex")):
-        with pytest.raises(StoreError, match=words):
-            make_study().run(out=place, executor=Forbidding())
 
 
 # -- failures ------------------------------------------------------------------------------------
