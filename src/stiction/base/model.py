@@ -361,17 +361,6 @@ def _hash(self: Any) -> int:
     return hash(_fields(self))
 
 
-def differing(one: Any, other: Any, name: str = "") -> list[str]:
-    """Return the names of what differs between two objects, such as 'interface.length'."""
-    if _comparable(one) == _comparable(other):
-        return []
-    if not (dataclasses.is_dataclass(one) and type(one) is type(other)):
-        return [name]
-    values, others = vars(one), vars(other)
-    each = (differing(values[key], others[key], _joined(name, key)) for key in values)
-    return [found for names in each for found in names]
-
-
 def brief(self: Any) -> str:
     """Use as `__repr__` of a dataclass: its fields that are not at their default, shortened."""
     parts = []

@@ -12,10 +12,6 @@ from stiction.elasticity.protocol import Windows
 
 FINEST = 32
 """Windows that begin within the length of one, at most: weighted means change little between."""
-RUNG = 1.5
-"""Ratio of successive rates whose windows are tried where the rate varies, as bounds are rough."""
-MOST_RUNGS = 12
-"""Most of them: rates that differ by more than a hundredfold have no window in common."""
 
 
 def _unstable(matrix: Array, rate: float, begin: int, end: int) -> bool:
@@ -57,18 +53,3 @@ def windows_at(matrix: Array, rate: float) -> Windows:
         row /= row.sum()
     starts, ends = np.array(runs, dtype=np.int64).reshape(-1, 2).T
     return Windows(np.full(len(runs), rate), starts.copy(), ends - starts, modes)
-
-
-def rungs_between(low: float, high: float) -> list[float]:
-    """Return the rates of a fixed ladder, falling, whose windows serve rates from low to high."""
-    steps = min(int(np.ceil(np.log(high / low) / np.log(RUNG))), MOST_RUNGS)
-    first = np.floor(np.log(high) / np.log(RUNG))
-    return [float(RUNG ** (first - step)) for step in range(steps + 1)]
-
-
-def joined(several: list[Windows]) -> Windows:
-    """Return windows of falling rates as one record."""
-    widest = max(one.modes.shape[1] for one in several)
-    modes = [np.pad(one.modes, ((0, 0), (0, widest - one.modes.shape[1]))) for one in several]
-    rates, starts, widths, _ = zip(*several, strict=True)
-    return Windows(*map(np.concatenate, (rates, starts, widths, modes)))

@@ -20,7 +20,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from stiction.base.arrays import Array
-from stiction.elasticity.block_windows import joined, rungs_between, windows_at
+from stiction.elasticity.block_windows import windows_at
 from stiction.elasticity.blocks import Pushes, block_response, glued_pressure
 from stiction.elasticity.half_spaces import HalfSpaces
 from stiction.elasticity.protocol import DenseEntries, Windows
@@ -80,10 +80,8 @@ class Driven:
         return mean
 
     def windows(self, low: float, high: float) -> Windows:
-        """Return the windows for weakening rates from `low` to `high`, Pa/m; each has its place."""
-        if high <= low:
-            return _windows_at(self, low)
-        return joined([_windows_at(self, rate) for rate in rungs_between(low, high)])
+        """Return the windows at the lowest of weakening rates, Pa/m; each has its place."""
+        return _windows_at(self, low)
 
     def travel(self, force: Any, slip: Array) -> Any:
         """Return the travel of both drives together, m, at a force per unit depth, N/m."""

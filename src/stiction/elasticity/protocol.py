@@ -89,5 +89,5 @@ class Elasticity(Protocol):
     def windows(self, low: float, high: float) -> Windows:
         """Return the windows for weakening rates from `low` to `high`, Pa/m.
 
-        Exact if these are the same; else those of a fixed ladder, the same for all samples.
+        Exact if these are the same; else for a bound, and the same for all samples.
         """

@@ -112,13 +112,7 @@ class Experiment:
     @property
     def seconds(self) -> float:
         """About how long the method takes for a sample on one core, s."""
-        return seconds_per_sample(self.problem, self.method, self._own_rate)
-
-    @property
-    def _own_rate(self) -> bool:
-        """Whether samples have weakening rates of their own."""
-        friction, names = self.problem.friction, self.random.names
-        return friction.weakening_rate is None or not {*SCALES}.isdisjoint(names)
+        return seconds_per_sample(self.problem, self.method)
 
     @property
     def pressure(self) -> float:
@@ -185,10 +179,7 @@ class Experiment:
     @property
     def batch(self) -> int:
         """Number of samples to solve at once: suited to the method, on planes to the memory."""
-        interface, size = (
-            self.problem.interface,
-            batch_size(self.problem, self.method, self._own_rate),
-        )
+        interface, size = self.problem.interface, batch_size(self.problem, self.method)
         if not interface.is_plane:  # draws come in blocks: a part is as expensive as the whole
             return size
         # A rough field has hundreds of draws for each node.

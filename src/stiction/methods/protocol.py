@@ -54,8 +54,7 @@ class Method(Protocol):
 
     Any frozen dataclass with these members serves `stiction.onset` and `stiction.monte_carlo`, and
     study files too if `stiction.extensions.register` or an entry point makes its `type` known.
-    Three more members are optional: `seconds_per_rate(problem)`, how much longer a sample takes
-    with a weakening rate of its own; `accepts`, of "barriers" and "overstress" (see
+    Two more members are optional: `accepts`, of "barriers" and "overstress" (see
     `Problem.sample`); and `first_stage`, the type of a faster method with similar onsets, by which
     rare failures are found first.
     """
@@ -143,14 +142,9 @@ def _check_values(
             )
 
 
-def seconds_per_sample(problem: Problem, method: Method, own_rate: bool = False) -> float:
-    """Return about how long a sample takes, s, at least a nanosecond; refuse what is no time.
-
-    `own_rate`: if each sample has a weakening rate of its own.
-    """
+def seconds_per_sample(problem: Problem, method: Method) -> float:
+    """Return about how long a sample takes, s, at least a nanosecond; refuse what is no time."""
     seconds = method.seconds_per_sample(problem)
-    if own_rate and hasattr(method, "seconds_per_rate"):
-        seconds += method.seconds_per_rate(problem)
     if not (is_finite(seconds) and seconds >= 0.0):
         raise InputError(
             f"method: seconds_per_sample of {method.label} must return a number of seconds, zero"
@@ -159,9 +153,9 @@ def seconds_per_sample(problem: Problem, method: Method, own_rate: bool = False)
     return max(float(seconds), 1e-9)
 
 
-def batch_size(problem: Problem, method: Method, own_rate: bool = False) -> int:
+def batch_size(problem: Problem, method: Method) -> int:
     """Return how many samples to solve at once: half a second of work, at most 512."""
-    return max(1, min(MOST, int(TICK / seconds_per_sample(problem, method, own_rate))))
+    return max(1, min(MOST, int(TICK / seconds_per_sample(problem, method))))
 
 
 def variables_of(
@@ -275,8 +269,7 @@ def onset(
     attributes = study_attributes(problem=problem, method=method)
     sample = problem.sample(profiles, accept=getattr(method, "accepts", ()))
     problem.doubt(sample)
-    own_rate = bool(np.ptp(sample.weakening_rate[:, *np.zeros(len(sample.shape), int)]))
-    solver, parts, size = prepared(problem, method), [], batch_size(problem, method, own_rate)
+    solver, parts, size = prepared(problem, method), [], batch_size(problem, method)
     meter = Meter(f"onset by {method.label}", sample.samples, progress)
     with meter, merge_warnings() as warned:
         for start in range(0, sample.samples, size):

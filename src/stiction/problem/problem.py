@@ -18,8 +18,8 @@ from stiction.base.errors import (
     warn_accuracy,
     warn_user,
 )
-from stiction.base.model import Mode, describe, differing, is_unplaced, model
-from stiction.base.units import Doubt, doubt_units, in_words
+from stiction.base.model import Mode, describe, is_unplaced, model
+from stiction.base.units import Doubt, doubt_units
 from stiction.base.variables import PROFILES
 from stiction.elasticity.driven import Driven
 from stiction.elasticity.half_spaces import HalfSpaces
@@ -235,13 +235,6 @@ class Problem:
                 f" about {min(3.0, 5.0 * patch / length):.1g} % on average and by up to 17 % in"
                 " single cases"
             )
-        if self.specimen is not None and self.specimen.height < 0.5 * patch:
-            warn_user(
-                f"specimen.height: {self.specimen.height:.3g} m is below half the nucleation"
-                f" length of half-spaces, {patch:.3g} m: the blocks act as strips, and no length of"
-                " half-spaces applies; check the units if this is not intended",
-                UnitWarning,
-            )
 
     def doubt(self, sample: Sample) -> None:
         """Doubt the units of given profiles, as `warn_of_units` does."""
@@ -261,9 +254,8 @@ class Problem:
     ) -> None:
         """Doubt mean peak and residual strengths (Pa) that do not fit the rest of the problem.
 
-        It is an `InputError` if they cannot, if a normal pressure is rather a force, or if scales
-        of slip by name are not resolved at these strengths. The `pressure` is the problem's own
-        if left out.
+        It is an `InputError` if they cannot, or if scales of slip by name are not resolved at these
+        strengths. The `pressure` is the problem's own if left out.
         """
         modulus = self.solid.shear_modulus
         pressure = self.given_pressure if pressure is None else pressure
@@ -274,7 +266,6 @@ class Problem:
             slip = drop / float(np.median(rate))
         if pressure is not None:
             mean = float(np.mean(pressure))
-            self._refuse_force(mean, strength / mean, slip)
             compared.append(("strength", strength, "normal pressure", mean, FRICTION))
         if residual:
             compared.append(("residual_strength", residual, "shear modulus", modulus, RIGIDITY))
@@ -302,22 +293,6 @@ class Problem:
             self._warn_if_short(steep)
             if scales is not None:
                 self._check_resolution(steep)
-
-    def _refuse_force(self, pressure: float, coefficient: float, slip: float) -> None:
-        """Refuse a normal pressure that makes sense only if it is a force, N, on a known area."""
-        if self.area is None or self.load.normal_pressure is None:
-            return
-        meant, (least, most) = pressure / self.area, FRICTION[0]
-        if coefficient > most:  # of a strength in Pa
-            fits = least <= coefficient * self.area <= most
-        else:  # of coefficients, with which the slip grows
-            fits = slip < SLIP[0][0] <= slip / self.area
-        if fits:
-            raise InputError(
-                f"load.normal_pressure: {pressure:.4g} Pa is too low for this strength; if it is a"
-                f" force, {pressure:.4g} N over {self.area:.3g} m2 are {in_words('Pa', meant)}:"
-                f" give load.pressing_force = {pressure:g}"
-            )
 
     @property
     def blocks(self) -> Driven:
@@ -563,13 +538,11 @@ class Problem:
         if sample.shape != self.interface.shape:
             shapes = f"shape {sample.shape}, the interface {self.interface.shape}"
             raise InputError(f"profiles: the sample has {shapes}")
-        others = [] if sample.problem is None else differing(self, sample.problem)
-        if not (others or np.allclose(sample.load_profile, self.load_profile, rtol=1e-6)):
-            others = ["load_profile"]
-        if others:
+        alike = np.allclose(sample.load_profile, self.load_profile, rtol=1e-6)
+        if not alike or sample.problem not in (None, self):
             raise InputError(
-                f"profiles: the sample was made by a problem with another {', '.join(others)};"
-                " make it with problem.sample(strength)"
+                "profiles: the sample was made by another problem; make it with"
+                " problem.sample(strength)"
             )
         given = {name: rows for name, rows in sample._asdict().items() if name in PROFILES}
         if np.isnan(sample.normal_pressure).all():

@@ -79,16 +79,6 @@ class LocalCriterion:
         own, each = (5e-4, 8e-8) if problem.interface.is_plane else (3e-5, 3e-8)
         return own + each * problem.interface.size
 
-    def seconds_per_rate(self, problem: Problem) -> float:
-        """Return the approximate time that each further weakening rate takes, s."""
-        interface, rate = problem.interface, problem.uniform_rate
-        if problem.specimen is not None:
-            return 1.2e-4 * interface.size
-        if not interface.is_plane:
-            return 1.5e-3 + 2e-7 * interface.size
-        nodes = problem.nodes_in_nucleation_length(rate) if rate else (6.0, 6.0)
-        return 8e-4 * nodes[0] * nodes[1]
-
     def supports(self, problem: Problem) -> list[str]:
         """Return the reasons why it cannot solve a problem; none if it can."""
         friction, reasons = problem.friction, []

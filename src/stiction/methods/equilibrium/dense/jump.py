@@ -29,7 +29,7 @@ from stiction.methods.equilibrium.dense.cholesky import (
     substitute_members,
     take_off_resting,
 )
-from stiction.methods.equilibrium.dense.linear_program import sort_by, stress_tolerance
+from stiction.methods.equilibrium.dense.linear_program import overstressed, stress_tolerance
 from stiction.methods.equilibrium.dense.stable_path import AT_STRENGTH, REVERSED, all_slip
 from stiction.methods.equilibrium.sample import (
     Outcome,
@@ -69,30 +69,6 @@ def _residual_runs(sample: StaticSample, slip: Array) -> tuple[int, int]:
 
 
 @jit_inside
-def _overstressed(
-    sample: StaticSample,
-    load: float,
-    slip: Array,
-    stiff: Array,
-    workspace: Workspace,
-    least: float,
-) -> int:
-    """Put the nodes at rest above their strength into `order`, most overstressed first."""
-    count = ZERO
-    keys = workspace.keys
-    for i in range(stiff.shape[0]):
-        if not workspace.inside[i]:
-            present = strength_at(sample, slip, i) if slip[i] > 0.0 else sample.excess[i]
-            margin = present - load * sample.profile[i] + stiff[i]
-            if margin < -least:
-                keys[count] = margin
-                workspace.order[count] = i
-                count += 1
-    sort_by(keys, workspace.order, count)
-    return count
-
-
-@jit_inside
 def _join(
     sample: StaticSample,
     load: float,
@@ -107,7 +83,7 @@ def _join(
     Returns the number of members, ALL if no node remains that never slipped, CROWDED if they do not
     fit.
     """
-    count = _overstressed(sample, load, slip, stiff, workspace, tolerance)
+    count = overstressed(sample, load, slip, stiff, workspace, tolerance)
     if count == 0:
         return size
     if size + count > MOST_MEMBERS:

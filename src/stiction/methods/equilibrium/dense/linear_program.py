@@ -22,7 +22,7 @@ from stiction.methods.equilibrium.dense.cholesky import (
     solve_forward,
     substitute_members,
 )
-from stiction.methods.equilibrium.sample import StaticSample
+from stiction.methods.equilibrium.sample import StaticSample, strength_at
 
 OVERSTRESS = 1e-12
 """Share of the mean strength below which an overstress is round-off."""
@@ -52,17 +52,24 @@ def sort_by(keys: Array, order: Array, count: int) -> None:
 
 @jit_inside
 def overstressed(
-    sample: StaticSample, load: float, stiff: Array, workspace: Workspace, tolerance: float
+    sample: StaticSample,
+    load: float,
+    slip: Array,
+    stiff: Array,
+    workspace: Workspace,
+    least: float,
 ) -> int:
     """Put the nodes at rest above their strength into `order`, most overstressed first."""
     count = ZERO
     keys = workspace.keys
     for i in range(stiff.shape[0]):
-        margin = sample.excess[i] - load * sample.profile[i] + stiff[i]
-        if margin < -tolerance and not workspace.inside[i]:
-            keys[count] = margin
-            workspace.order[count] = i
-            count += 1
+        if not workspace.inside[i]:
+            present = strength_at(sample, slip, i) if slip[i] > 0.0 else sample.excess[i]
+            margin = present - load * sample.profile[i] + stiff[i]
+            if margin < -least:
+                keys[count] = margin
+                workspace.order[count] = i
+                count += 1
     sort_by(keys, workspace.order, count)
     return count
 
@@ -150,9 +157,10 @@ def solve_program(
         if slip[i] > 0.0:
             workspace.order[known] = i
             known += 1
+            slip[i] = 0.0
     solved = False
     for _ in range(PASSES):
-        count = known or overstressed(sample, load, stiff, workspace, tolerance)
+        count = known or overstressed(sample, load, slip, stiff, workspace, tolerance)
         known = ZERO
         if count == 0:
             top = min(bound, cap)
@@ -198,8 +206,6 @@ def solve_program(
             solved = True
             _back_off(sample, load, workspace, size, stiff)
             break
-    for i in range(slip.shape[0]):
-        slip[i] = 0.0
     for t in range(size):
         slip[members[t]] = max(solution[t], 0.0)
     return load, solved
