@@ -78,7 +78,7 @@ def outputs_of(call: Call) -> dict[str, Any]:
 
 
 def _ours(category: type) -> bool:
-    return category.__module__.startswith("stiction")
+    return category is UserWarning or category.__module__.startswith("stiction")
 
 
 def taken_apart(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:

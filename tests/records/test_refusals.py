@@ -1,5 +1,7 @@
 """Recorded refusals of what several keys, or calls, are wrong about, beside what is just taken."""
 
+from unittest import mock
+
 import numpy as np
 import scipy.stats
 import xarray as xr
@@ -9,6 +11,7 @@ from setups import EXACT, LOCAL, make_problem
 from small_study import small_study
 
 import stiction as st
+from stiction.ensemble import monte_carlo
 
 calls = Calls()
 READ = "read beside the rule that refuses"
@@ -28,6 +31,15 @@ def ensemble(random, problem=None, **more):
         **{"method": LOCAL, "samples": 2, "pilot": False} | more,
     )
     return found.critical_stress
+
+
+def announced(samples, workers):
+    """An ensemble of which nothing is computed."""
+    given = {"method": st.Rupture(loading_rate=1e6), "samples": samples, "workers": workers}
+    with mock.patch.object(monte_carlo, "complete"):
+        return dict(
+            st.monte_carlo(make_problem(4096, 0.7), field(), pilot=False, **given).sizes
+        )
 
 
 def studied(**tables):
@@ -61,6 +73,7 @@ CALLS = {
         lambda: make_problem(weakening_rate=RISING).nodes_in_nucleation_length(2e11),
         lambda: st.onset(make_problem(weakening_rate=RISING), np.ones(256), method=LOCAL),
     ],
+    "ensembles that take hours": [lambda: announced(2_100, 1), lambda: announced(47_000, 3)],
     "samples that are steep": [lambda: steep(4e-7), lambda: steep(2.1e-6)],
     "what is no residual strength": [
         lambda: with_residual(0.0),
@@ -104,10 +117,6 @@ CALLS = {
         lambda: studied(sweep=[{"problem.solid.poisson_ratio": [0.2, 0.7]}, {"mehtod": [1, 2]}]),
     ],
     "fits": [
-        lambda: st.fit_field(LINE_STRENGTH, LINE.interface, anisotropy=1.4),
-        lambda: st.fit_field(
-            LINE_STRENGTH - 9e5, LINE.interface, marginal="lognormal", noise=0.0, bootstrap=20
-        ),
         lambda: st.fit_field(LINE_STRENGTH, LINE.interface, quantity="strenght"),
     ],
     "planes": [
@@ -147,7 +156,6 @@ CALLS = {
         lambda: st.plot.film(ONSET, "film.avi"),
     ],
     "densities": [
-        lambda: st.statistics.density(np.linspace(0.1, 1.0, 40), bounds=(0.2, 0.9)),
         lambda: st.statistics.density(np.linspace(0.1, 1.0, 40), bounds=(None, 1.0)).value[:9],
     ],
 }  # fmt: skip
