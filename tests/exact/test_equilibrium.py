@@ -240,21 +240,6 @@ def wide():
     return slow, strength.sample(slow.interface, samples=10, seed=4)
 
 
-@pytest.mark.slow
-def test_initial_stress_adds_to_the_stress_of_an_event_and_not_to_its_load(wide):
-    """A uniform initial stress is a load that is there already."""
-    problem, tau_p = wide
-    count = 0
-    for strength in tau_p:
-        stressed = {"strength": strength, "initial_stress": 5e4}
-        plain, shifted = (st.equilibrium_path(problem, s, [0.0]) for s in (strength, stressed))
-        count += plain.sizes["event"]
-        np.testing.assert_allclose(shifted["event_stress"], plain["event_stress"], rtol=1e-9)
-        np.testing.assert_allclose(shifted["event_load"], plain["event_load"] - 5e4, rtol=1e-9)
-        np.testing.assert_allclose(shifted["event_moment"], plain["event_moment"], rtol=1e-6)
-    assert count > 5
-
-
 def slope(problem, strength, change):
     """Change of the first instability by central differences of the strength, in Pa.
 

@@ -158,19 +158,6 @@ def test_discrete_spectrum_is_the_density_at_the_modes(make_strength):
     assert with_mean[0] ** 2 / with_mean[1] ** 2 == pytest.approx(expected, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("interface", "length"), [(LINE, 1.7e-3), (PLANE, 0.025)], ids=["line", "plane"]
-)
-def test_sample_i_is_the_same_in_every_batch(interface, length):
-    strength = beta_strength(length)
-    whole = strength.sample(interface, samples=600, seed=3)
-    for first, samples in [(0, 1), (255, 2), (300, 300), (599, 1)]:
-        part = strength.sample(interface, samples=samples, seed=3, first=first)
-        np.testing.assert_array_equal(part, whole[first : first + samples])
-    assert not np.array_equal(whole[0], strength.sample(interface, samples=1, seed=4)[0])
-    assert 0.66e6 <= whole.min() < whole.max() <= 1.66e6
-
-
 def test_finer_grids_extend_the_field():
     fine, coarse = (
         beta_strength(0.025).sample(st.Interface(PLANE.length, nodes), samples=3, seed=5)
@@ -340,17 +327,6 @@ def test_correlation_of_a_custom_spectrum_with_a_step():
     lag = np.array([0.0, 1e-3, 1e-2, 10.0])
     found = spectrum.correlation(lag)
     np.testing.assert_allclose(found, np.sinc(3000.0 / np.pi * lag), atol=1e-10)
-
-
-def test_a_coarse_grid_is_told_how_many_nodes_suffice():
-    """Below one per cent there is nothing to say; above, as many nodes as said are enough."""
-    field = field_of(scipy.stats.lognorm(0.2, scale=1e6), 4e-3, mean_mode=True)
-    rough = st.RandomField(field.marginal, st.ExponentialSpectrum(2e-3), mean_mode=True)
-    with pytest.warns(st.AccuracyWarning, match=r"interface.nodes >= 508 it is less than 1 %"):
-        rough.sample(COARSE)
-    shares = [rough.modes(st.Interface(0.1, nodes)).unresolved for nodes in (508, 506)]
-    assert shares[0] <= 0.01 < shares[1]
-    rough.sample(st.Interface(0.1, 508))
 
 
 @pytest.mark.parametrize(

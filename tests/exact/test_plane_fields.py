@@ -140,22 +140,6 @@ def test_a_mode_keeps_its_draws_whatever_the_spectrum():
     assert len(known) > shared
 
 
-def test_properties_are_correlated_mode_by_mode():
-    """Spectra of different lengths: each has the draws of its own modes."""
-    plane = st.Interface(length=(1.0, 1.0), nodes=(32, 32))
-    strength = beta_strength(0.2)
-    marginal = st.Beta(alpha=2.0, beta=2.0, low=0.1e6, high=0.5e6)
-    residual = st.RandomField(marginal, st.PowerLawSpectrum(0.3), anisotropy=2.0)
-    alone = st.RandomInterface(strength=strength, residual_strength=residual)
-    tied = dataclasses.replace(alone, correlation={("strength", "residual_strength"): 1.0})
-    first, second = (r.profiles(plane, samples=2, seed=3) for r in (alone, tied))
-    own, other = (field.sample(plane, samples=2, seed=3) for field in (strength, residual))
-    np.testing.assert_array_equal(first["strength"], second["strength"])
-    np.testing.assert_array_equal(first["strength"], own)
-    np.testing.assert_array_equal(second["residual_strength"], other)
-    assert not np.array_equal(first["residual_strength"], second["residual_strength"])
-
-
 @pytest.mark.parametrize("shape", [(8, 48), (48, 8)])
 def test_waves_that_one_direction_does_not_resolve_are_warned_of(shape):
     """The variance beyond half the nodes along x or y, from the density at all waves."""
@@ -169,12 +153,3 @@ def test_waves_that_one_direction_does_not_resolve_are_warned_of(shape):
     assert field.modes(plane).unresolved == pytest.approx(share, rel=1e-9)
     with pytest.warns(st.AccuracyWarning, match=rf"but {100.0 * share:.2g} % of the variance"):
         field.sample(plane)
-
-
-def test_a_plane_that_is_short_across_against_its_anisotropy_is_warned_of():
-    """z falls to 1/e within 14 mm along y, 0.9 mm along x."""
-    field = beta_strength(1.6e-3, anisotropy=16.0)
-    with pytest.warns(
-        st.AccuracyWarning, match="no mean mode.* would hold 14 % of the variance"
-    ):
-        field.sample(st.Interface(length=(0.01, 0.03), nodes=(128, 32)))

@@ -41,28 +41,6 @@ def test_a_property_keeps_its_draws_whatever_else_is_random(make_strength, resid
     assert np.array_equal(two["residual_strength"], three["residual_strength"])
 
 
-@pytest.mark.parametrize("rho", [0.8, -0.6])
-def test_correlation_of_the_gaussian_fields(make_strength, residual, rho):
-    """Same spectrum: the fields z have this correlation at every node."""
-    random = tied(make_strength(1.0), residual, rho)
-    found = random.profiles(LINE, samples=4000, seed=1)
-    # Ranks of the mapped fields are those of z; of a normal pair, Spearman's rho is known.
-    ranks = [np.argsort(np.argsort(found[name][:, 7])) for name in random.names]
-    spearman = np.corrcoef(ranks)[0, 1]
-    # Sampling error of a correlation of 4,000 pairs is below 1/sqrt(4000) = 0.016.
-    assert spearman == pytest.approx(6.0 / np.pi * np.arcsin(rho / 2.0), abs=0.04)
-
-
-def test_full_correlation_makes_the_residual_proportional(make_strength):
-    """One field is the other, scaled: an affine marginal and correlation 1."""
-    half = st.Beta(alpha=1.5, beta=3.0, low=0.33e6, high=0.83e6)
-    strength = make_strength(1.0)
-    random = tied(strength, dataclasses.replace(strength, marginal=half))
-    found = random.profiles(LINE, samples=20, seed=5)
-    # The map from z to the marginal is tabulated to 1e-9.
-    assert np.allclose(found["residual_strength"], 0.5 * found["strength"], rtol=1e-8)
-
-
 def test_residual_ratio_is_the_same_thing(problem, make_strength):
     tau_p = make_strength(1.0).sample(LINE, samples=3, seed=2)
     own = exact_onset(make_problem(residual_ratio=0.5), tau_p)

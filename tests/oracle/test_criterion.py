@@ -6,30 +6,12 @@ import warnings
 import numpy as np
 import pytest
 from checks import assert_mean
-from oracles import angle_rule
 from scipy.stats import kstest
 from setups import ROUND_OFF, ensemble, exact_onset, local_onset, make_problem
 from specimens import crooked, rough
 
 import stiction as st
 from stiction.methods.criterion import eigenfunction
-
-
-# With the error of the weights on the grid, a tenth of the strength's own variation at most.
-@pytest.mark.parametrize(("nodes", "error"), [(256, 3e-4), (512, 1e-5), (1024, 3e-7)])
-def test_nucleation_stress_is_the_weighted_integral(make_strength, nodes, error):
-    """Direct quadrature of the definition on the trigonometric interpolant of the profile."""
-    problem = make_problem(nodes)
-    tau_p = make_strength(1.0).sample(problem.interface, samples=2, seed=1)
-    s, measure = angle_rule(400)
-    weights = eigenfunction.weight(s) * measure
-    spectrum = np.fft.rfft(tau_p, axis=1) / nodes
-    spectrum[:, 1:-1] *= 2.0
-    found = st.theory.nucleation_stress(problem, tau_p)
-    for node in (0, 100, 201):
-        x = problem.interface.x[node] + problem.nucleation_length / 2.0 * s
-        values = (spectrum @ np.exp(1j * np.outer(problem.interface.wavenumbers, x))).real
-        np.testing.assert_allclose(found[:, node], values @ weights, rtol=error)
 
 
 # Error of a polynomial through ten nodes where the strength varies within a quarter of h_n, in

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-import xarray as xr
 from brute_force import BruteForce
 from checks import assert_mean, standard_error
 from crooked import LINE
@@ -126,20 +125,6 @@ def test_against_openturns_subset_sampling():
     assert abs(np.mean(found) - ours.probability) < 4.0 * error
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("probability", [1e-2, 1e-3])
-def test_failure_probability_of_a_scanned_specimen_is_that_of_counting(probability):
-    field, x = st.paper.strength(PROBLEM, correlation_ratio=1.0), PROBLEM.interface.x[:85]
-    scan = xr.DataArray(field.sample(PROBLEM.interface, seed=4)[0, :85], {"x": x}, "x")
-    given, count = field.given(scan, noise=20e3), 200_000
-    stress = float(
-        ensemble(PROBLEM, given, count, seed=8).critical_stress.quantile(probability)
-    )
-    found = by((PROBLEM, given), stress, "subset", 0.1)
-    error = np.hypot((probability * count) ** -0.5, found.cv)
-    assert abs(np.log(found.probability / probability)) < 3.5 * error
-
-
 def test_two_very_different_interfaces_against_counting_and_each_alone():
     """On a crooked line: short and weak, or long and strong with a random residual strength."""
     problem, residual = LINE, st.Lognormal(mean=0.2e6, cv=0.1)
@@ -171,25 +156,6 @@ def test_two_very_different_interfaces_against_counting_and_each_alone():
     # In the other order they are the same two.
     back = by((problem, pair[::-1]), stress, "plain", 0.07)
     assert back.members[::-1] == pytest.approx(each, rel=0.3, abs=0.05 * each.max())
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("method", [LOCAL, EXACT], ids=["local", "equilibrium"])
-def test_failure_probability_of_blocks_is_that_of_counting(method):
-    """A platen by the local criterion; a pusher with its precursors, behind a machine."""
-    drive = (
-        st.Platen() if method is LOCAL else st.Pusher(height=0.01, width=0.004, stiffness=2e7)
-    )
-    problem = crooked(nodes=64, rate=0.1e12, drive=drive)
-    field = st.RandomField(
-        st.Weibull(mean=1e6, cv=0.2), st.PowerLawSpectrum(correlation_length=4e-3)
-    )
-    count, probability = (50_000, 1e-2) if method is LOCAL else (6000, 3e-2)
-    counted = ensemble(problem, field, count, method=method, seed=8).critical_stress
-    stress = float(counted.quantile(probability))
-    found = by((problem, field), stress, "subset", 0.15, method=method)
-    error = np.hypot((probability * count) ** -0.5, found.cv)
-    assert abs(np.log(found.probability / probability)) < 3.5 * error
 
 
 @pytest.mark.parametrize("event", ["critical_stress", "first_instability"])

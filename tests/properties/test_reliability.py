@@ -9,7 +9,7 @@ import pytest
 from crooked import uneven
 from hypothesis import given, settings
 from hypothesis import strategies as of
-from setups import EXACT, LOCAL, SOLID, ensemble, local_onset
+from setups import EXACT, LOCAL, SOLID, ensemble
 
 import stiction as st
 from stiction.base.errors import collect_warnings
@@ -43,14 +43,6 @@ def test_the_same_seed_gives_the_same_numbers_for_any_workers(algorithm, stress,
     failing, again = (run.failing_profiles["strength"] for run in (one, three))
     np.testing.assert_array_equal(failing, again)
     assert one.probability != other.probability
-
-
-def test_failing_profiles_fail():
-    failing = tail(0.665e6).failing_profiles
-    again = local_onset(PROBLEM, failing["strength"].values)
-    assert failing.sizes["sample"] > 5
-    assert float(again["critical_stress"].max()) < 0.665e6
-    assert failing["strength"].attrs["units"] == "Pa"
 
 
 def test_subset_simulation_visits_disjoint_failure_regions():

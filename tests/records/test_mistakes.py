@@ -203,6 +203,8 @@ table_of(calls, {
         lambda: beta_strength(8e-4).sample(st.Interface(0.1, 330)),
         lambda: beta_strength(0.05).sample(LINE),
         lambda: beta_strength(0.05, mean_mode=True).sample(LINE),
+        lambda: beta_strength(1.6e-3, anisotropy=16.0).sample(
+            st.Interface((0.01, 0.03), (128, 32))),
     ],
     "interfaces": [
         lambda: correlated({("strength", "residual"): 0.5}),

@@ -204,30 +204,6 @@ def test_front_speed_is_that_of_a_front_and_not_where_fronts_meet():
     assert known == pytest.approx(3.0)
 
 
-def test_stop_conditions_and_progress(held):
-    seen = []
-    onset = simulate(
-        st.Save(every=1),
-        method=Rupture(loading_rate=1e8, stop="onset"),
-        progress=lambda done, _: seen.append(done),
-    )
-    end = held.time[-1].item() + 1e-5
-    longer = simulate(method=Rupture(loading_rate=1e8, stop="time", end_time=end))
-    assert onset.attrs["stopped"] == "onset"
-    assert onset.weakened_fraction[-1] < 1.0
-    assert held.attrs["stopped"] == "sliding"
-    assert longer.attrs["stopped"] == "time"
-    assert longer.time[-1].item() >= end
-    assert longer.critical_stress.item() == held.critical_stress.item()
-    assert seen == sorted(seen)
-    assert seen[-1] == onset.sizes["step"]
-    assert set(METHOD.variables(PROBLEM)) <= set(held)
-    pieces = Rupture(stop="onset", load=([0.0, 5e-3, 2e-2], [0.0, 5e5, 2e6]))
-    # The same straight line in pieces: only rounding differs, and it may tip a step size.
-    by_pieces = simulate(method=pieces).critical_stress.item()
-    assert by_pieces == pytest.approx(onset.critical_stress.item(), rel=1e-5)
-
-
 KERNEL = ("III", 1.0, 1e-3)
 
 

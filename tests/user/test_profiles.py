@@ -98,20 +98,6 @@ class Quantity:
         return Quantity(self.magnitude * self.factor, 1.0)
 
 
-@pytest.mark.parametrize(
-    "given",
-    [
-        *(
-            labelled(STRENGTH * 1e-6, X * 1e3, "mm", units=unit)
-            for unit in ("MPa", "N/mm^2", "N mm-2", "megapascal", "MN/m²")
-        ),
-        Quantity(STRENGTH * 1e-6, 1e6),
-    ],
-)
-def test_units_that_are_stated_are_converted(given):
-    assert found(given) == pytest.approx(found(STRENGTH), rel=1e-13)
-
-
 def test_everything_beside_the_strength_is_read_alike():
     residual = 1e5 + 1e6 * X
     tau_r = labelled(residual[::-1] * 1e-3, X[::-1] * 1e3, "mm", units="kPa")

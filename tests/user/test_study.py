@@ -10,7 +10,7 @@ import scipy.stats
 import xarray as xr
 from refusals import refuses
 from setups import beta_strength
-from small_study import lengths, small_study
+from small_study import small_study
 
 import stiction as st
 
@@ -156,36 +156,6 @@ def test_whole_tables_are_values_too():
     stress = swept(scales, random__strength__marginal=LOGNORMAL).run()["critical_stress"].values
     # The onset is linear in the strength: twice the scale, twice the stress, to round-off.
     np.testing.assert_allclose(stress[1], 2.0 * stress[0], rtol=1e-12)
-
-
-def test_values_have_the_type_and_unit_of_their_key():
-    found = swept(
-        {"problem.interface.nodes": [256, 512]}, {"random.strength.marginal.low": [1e5, 2e5]}
-    )
-    axes = found.axes
-    assert axes["nodes"]["nodes"][0].dtype == np.int64
-    assert axes["low"]["low"][1].units == "Pa"
-    # Of a field of coefficients they are coefficients, its lengths still lengths.
-    plain = small_study()["random"]["strength"]
-    beta = plain["marginal"] | {"low": 0.3, "high": 0.6}
-    axes = swept(
-        {"random.strength.marginal.low": [0.2, 0.3]},
-        *lengths(4e-3, 6e-3),
-        problem__load={"normal_pressure": 2e6},
-        random__strength=plain | {"marginal": beta, "of": "friction_coefficient"},
-    ).axes
-    units = [axes[name][name][1].units for name in ("low", "correlation_length")]
-    assert units == ["1", "m"]
-    load = {"profile": {"type": "edge", "excess": 1.0, "decay": 0.01}}
-    held = {"type": "rupture", "loading_rate": 1e8}
-    axes = swept(
-        {"problem.load.profile.decay": [0.01, 0.02]},
-        {"problem.load.profile.excess": [1.0, 2.0]},
-        {"method.end_time": [1e-3, 2e-3]},
-        problem__load=load, method=held,
-    ).axes  # fmt: skip
-    units = [axes[name][name][1].units for name in ("decay", "excess", "end_time")]
-    assert units == ["m", "1", "s"]
 
 
 def test_a_correlation_coefficient_is_swept():
