@@ -15,7 +15,6 @@ import stiction as st
 from stiction.ensemble import batches
 from stiction.reliability import repetitions
 from stiction.reliability.repetitions import SAMPLES
-from stiction.study.study import Setup
 
 SWEPT = lengths(3e-3, 7e-3, 5e-3)
 SMALLEST = 1e-3
@@ -150,31 +149,6 @@ def test_fewer_repetitions_after_the_study_was_lost_are_the_first_ones(tmp_path)
     with pytest.warns(UserWarning, match="study.json is damaged or missing"):
         fewer = one.failure_curve(out=tmp_path / "run", repetitions=2, smallest=0.1)
     assert fewer.equals(one.failure_curve(out=tmp_path / "two", repetitions=2, smallest=0.1))
-
-
-def test_the_local_criterion_is_compared_with_equilibrium_once(tmp_path):
-    """Where residual strengths are high, equilibrium finds other probabilities."""
-    plain = small_study(correlation_length=8e-3)
-    plain["problem"]["friction"]["residual_ratio"] = 0.8
-    plain["random"]["strength"]["marginal"] = {"type": "lognormal", "mean": 1e6, "cv": 0.3}
-    one = st.Study.from_dict(plain)
-    with pytest.warns(st.AccuracyWarning, match="by equilibrium the probability"):
-        computed(tmp_path / "run", 1, one)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", st.AccuracyWarning)
-        computed(tmp_path / "run", 1, one)
-
-
-@pytest.mark.parametrize("line", [
-    "onset study.toml --strength p.npy", "check study.toml",
-    "rupture study.toml --out out --strength p.npy", "run study.toml --out out --no-pilot",
-])  # fmt: skip
-def test_uncertain_parameters_in_every_command(runs, tmp_path, monkeypatch, line):
-    assert {*st.Study.__dataclass_fields__} == {*Setup.__dataclass_fields__}
-    monkeypatch.chdir(tmp_path)
-    study(uncertain=UNCERTAIN, ensemble={"samples": 8, "seed": 3}).to_toml("study.toml")
-    np.save("p.npy", study().random.strength.sample(study().problem.interface, seed=8)[0])
-    runs(line)
 
 
 def test_in_memory_it_is_the_same_curve_with_the_same_doubts(tmp_path):

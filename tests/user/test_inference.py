@@ -46,21 +46,6 @@ def posterior():
     return infer(prior=PRIOR, samples=1000, load_cell_error=5e3)
 
 
-def test_peaks_out_of_reach_of_the_prior():
-    """Below the least strength, but not those that are only rare."""
-    correlation = {"correlation_length": (0.3 * H_N, 3.0 * H_N)}
-    impossible = np.append(PEAKS, 0.64e6)
-    refuses("1 of 31 are out of reach ... 640000", lambda: infer(impossible, prior=correlation))
-    less_exact = partial(infer, impossible, prior=correlation, load_cell_error=2e3)
-    refuses("1 of 31 are out of reach ... 652000 to", less_exact)
-    between = {"strength": st.Lognormal(mean=1.0, cv=0.5)}
-    lots = st.RandomInterface(strength=STRENGTH, between=between)
-    rare = np.append(PEAKS, 4.0 * PEAKS.mean())
-    assert infer(rare, random=lots, prior={"marginal.low": (0.5e6, 0.7e6)}).names == (
-        "marginal.low",
-    )
-
-
 def test_arviz(posterior):
     arviz = pytest.importorskip("arviz")
     found = posterior.to_arviz()
@@ -128,14 +113,6 @@ def test_forces_are_of_the_area_at_each_point_of_the_prior(key):
     )
     for one, own in zip(joint.predicted, areas, strict=True):
         assert 0.5e6 < np.median(one) / own < 1.4e6
-
-
-@pytest.mark.filterwarnings("default::UserWarning")
-def test_how_long_it_takes_is_said_before_it_does(monkeypatch):
-    monkeypatch.setattr("stiction.inference.likelihood.LONG", 1e-9)
-    words = "takes about .* 500 onsets by equilibrium of .* each; fewer samples"
-    with pytest.warns(UserWarning, match=words):  # at 5 points, and not at all 25
-        infer(method=st.Equilibrium(), samples=100)
 
 
 def test_a_posterior_between_the_points_of_a_grid_counts_in_a_design_of_tests():

@@ -236,39 +236,6 @@ def test_coefficients_are_known_by_their_unit(tmp_path, head):
     refuses("either strength (Pa) or friction_coefficient", lambda: onset(both, pressed))
 
 
-@pytest.fixture
-def table(tmp_path):
-    """A file of four columns."""
-    path = tmp_path / "p.csv"
-    head = "time (s);Weg (mm);height (um);Local strength [MPa]"
-    text = text_of([X, X * 1e3, STRENGTH, STRENGTH * 1e-6], comma=True, head=head)
-    # A column of dates that nobody asks for.
-    path.write_text("".join(f"{line};3.4.2024 12:03\n" for line in text.splitlines()))
-    return path
-
-
-def test_columns_are_chosen_by_name_heading_number_or_meaning(table):
-    for options in (
-        {"value": "Local strength", "x": "Weg"},
-        {"value": "Local strength [MPa]", "x": 1},
-        {"value": 3, "x": "Weg (mm)", "unit": "MPa"},
-    ):
-        profile = st.read_profile(table, interface=LINE, **options)
-        np.testing.assert_allclose(profile, STRENGTH, rtol=1e-9)
-    heights = st.read_profile(table, quantity="height", x=1)
-    np.testing.assert_allclose(heights, 1e-6 * STRENGTH, rtol=1e-10)
-    refuses("strength is in m, which cannot be converted to Pa", lambda: onset(heights))
-    table.write_text(table.read_text().replace("height (um)", "quality"))
-    np.testing.assert_allclose(st.read_profile(table, interface=LINE), STRENGTH, rtol=1e-9)
-    table.write_text(text_of([X * 1e3, STRENGTH], head="Weg (mm);value"))
-    heights = st.read_profile(table, quantity="height", unit="um")
-    np.testing.assert_allclose(heights, 1e-6 * STRENGTH, rtol=1e-10)
-    table.write_text(text_of([X, X[::-1], STRENGTH], head="x;y;strength"))
-    assert st.read_profile(table).dims == ("x",)  # one y for each x is no map
-    given = labelled().rename("tau")
-    np.testing.assert_array_equal(st.read_profile(given, value="tau"), STRENGTH)
-
-
 COARSE = np.linspace(0.0, 0.1, 41)[:-1] + 1e-3
 TENT = labelled(1e6 + 1e7 * np.minimum(COARSE, 0.1 - COARSE), COARSE)
 

@@ -4,12 +4,10 @@ import io
 import sys
 import threading
 import time
-import types
 
 import pytest
 from checks import python
 
-import stiction as st
 from stiction.base import progress
 from stiction.base.progress import Meter
 
@@ -68,15 +66,6 @@ def test_a_terminal_gets_a_bar_that_goes_away_with_warnings_above_it(hasty, monk
     assert text.rstrip("\n").endswith("\x1b[2K")  # the line is erased
 
 
-def test_a_notebook_gets_a_line_that_is_rewritten(hasty, monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "ipykernel", types.ModuleType("ipykernel"))
-    work(Meter("in a notebook", 20))
-    *lines, last = capsys.readouterr().err.split("\r")[1::2]
-    assert all(line.startswith("in a notebook [") for line in lines)
-    assert "of 20 samples" in lines[-1]
-    assert not last.strip()
-
-
 def test_one_of_nested_meters_is_shown(hasty, capsys):
     """The outer one if it knows its end, else the inner one; nothing is left behind."""
     before = threading.active_count()
@@ -90,13 +79,3 @@ def test_one_of_nested_meters_is_shown(hasty, capsys):
     assert threading.active_count() == before
     code = "from stiction.base.progress import Meter; Meter('left open').__enter__()"
     python("-c", code)
-
-
-def test_a_function_of_ones_own_gets_the_progress():
-    problem = st.paper.problem(nodes=256)
-    tau_p = st.paper.strength(problem, 0.5).sample(problem.interface, samples=100, seed=0)
-    told = []
-    st.onset(
-        problem, tau_p, method=st.LocalCriterion(), progress=lambda *done: told.append(done)
-    )
-    assert told[-1] == (100, 100)

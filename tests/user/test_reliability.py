@@ -59,37 +59,6 @@ class Standing:
         return solver
 
 
-VARYING = make_problem(weakening_rate=0.5e12 * (1.0 + 0.1 * np.cos(turns(256))))
-RUPTURES = Standing("rupture"), st.Rupture(loading_rate=1e9)
-
-
-def test_a_slow_method_is_counted_from_two_hundred_samples():
-    result = failure(0.72e6, RUPTURES[0], target_cv=0.2)
-    assert result.algorithm == "plain"
-    assert "rupture" in result.reason
-    assert result.evaluations <= 200
-
-
-def test_auto_says_why():
-    often = failure(0.7e6)
-    assert (often.algorithm, often.evaluations >= 1000) == ("plain", True)
-    assert "frequent" in often.reason
-    with pytest.warns(st.AccuracyWarning, match="spans") as caught:
-        rare = failure(0.665e6, target_cv=0.3, workers=2)
-    assert {one.filename for one in caught} == {__file__}  # also those of threads
-    assert rare.algorithm == "subset"
-    assert "rare" in rare.reason
-    assert not any("by equilibrium" in text for text in rare.warnings)  # where it agrees
-    both = failure(0.665e6, EXACT, target_cv=0.4)
-    assert both.algorithm == "two_level"
-    assert both.first_stage_evaluations > both.evaluations
-    assert "c.o.v." in str(both)
-    with pytest.warns(st.AccuracyWarning, match="max_evaluations"):
-        varying = failure(0.675e6, EXACT, (VARYING, FIELD), max_evaluations=1200)
-    assert varying.algorithm == "subset"
-    assert 0.0 < varying.probability < 0.01
-
-
 @pytest.mark.parametrize("algorithm", ["auto", "plain", "subset", "two_level"])
 @pytest.mark.parametrize("allowed", [100, 400])
 def test_the_smallest_budgets_are_kept_to(algorithm, allowed):

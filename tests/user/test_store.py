@@ -21,7 +21,7 @@ from small_study import lengths, small_study
 import stiction as st
 from stiction.base import files
 from stiction.base.errors import StoreError, WorkerError
-from stiction.ensemble import batches, pilot, store
+from stiction.ensemble import batches, store
 from stiction.ensemble.dataset import Gathered
 from stiction.ensemble.experiment import Experiment
 from stiction.study.run import samples_of_part
@@ -259,11 +259,6 @@ def test_versions_that_differ_are_said(tmp_path, often, monkeypatch):
 # -- size and time -------------------------------------------------------------------------------
 
 
-def test_a_run_that_grows_from_few_samples_has_the_whole_pilot(tmp_path):
-    make_study(samples=3).run(out=tmp_path / "run")
-    assert make_study().run(out=tmp_path / "run").identical(make_study().run())
-
-
 def test_a_study_that_another_version_wrote_is_refused_as_such(tmp_path):
     older = make_study().to_dict() | {"method": {"type": "local_criterion", "weights": "exact"}}
     store.Store.open(tmp_path / "run", older)
@@ -299,25 +294,6 @@ def test_the_pilot_says_how_far_the_local_criterion_is_from_the_exact_onset():
         assert found.attrs[f"{name}_samples"] == 32
         assert found.attrs[f"{name}_bias"] == pytest.approx(difference.mean(), rel=1e-9)
         assert found.attrs[f"{name}_scatter"] == pytest.approx(difference.std(ddof=1), rel=1e-9)
-
-
-def test_the_pilot_has_the_workers_of_the_run(monkeypatch):
-    seen, through = set(), pilot.in_threads
-
-    def in_threads(function, jobs, workers):
-        seen.add(workers)
-        return through(function, jobs, workers)
-
-    monkeypatch.setattr(pilot, "in_threads", in_threads)
-    st.Study.from_dict(small_study()).run(workers=3)
-    assert 3 in seen
-    assert seen <= {1, 3}  # 1: samples that failed together
-
-
-def test_the_pilot_of_a_sweep_reports_its_largest_difference_with_its_sign(monkeypatch):
-    own = {0: {"pilot": np.array([-0.06, -0.04])}, 1: {"pilot": np.array([0.01, 0.02])}}
-    monkeypatch.setattr(pilot, "_differences", lambda point, *_: own[point])
-    assert pilot.compare([0, 1])["pilot_bias"] == pytest.approx(-0.05)
 
 
 @pytest.mark.slow
