@@ -25,7 +25,7 @@ from faults import Fault, faults_of
 
 ROOT = Path(__file__).parents[2]
 NEAREST = {
-    "base": "refusals progress cache warnings own_method",
+    "base": "refusals mistakes* progress cache warnings own_method",
     "cli": "runs cli warnings",
     "criterion": "lines planes specimens criterion griffith crooked statistics_*",
     "dynamics": "ruptures dynamics_* rupture_stations plane_rupture",
@@ -34,21 +34,23 @@ NEAREST = {
     "ensemble": "runs fields store ensemble study progress own_method reliability",
     "equilibrium": "lines planes specimens crooked equilibrium plane_equilibrium instability"
     " friction_laws",
-    "friction": "lines ruptures friction_laws friction_coefficients crooked dynamics_properties",
-    "inference": "inference* pictures fit_* agreement joined",
+    "friction": "lines ruptures mistakes* friction_laws friction_coefficients crooked dynamics_properties",
+    "inference": "inference* mistakes* pictures fit_* agreement joined",
     "jit": "cache architecture own_method",
     "plot": "pictures runs",
-    "problem": "refusals specimens bad_input crooked criterion equilibrium profiles"
+    "problem": "refusals mistakes* specimens bad_input crooked criterion equilibrium profiles"
     " friction_coefficients",
-    "profiles": "profiles refusals plane_gaps crooked fit_field",
+    "profiles": "profiles mistakes* refusals plane_gaps crooked fit_field",
     "random": "fields refusals conditional* random_interface marginal_families plane_fields"
     " reliability",
     "reliability": "reliability* failure_run runs pictures",
     "statistics": "fields statistics_* criterion inference",
-    "study": "runs refusals study store planes own_method failure_run",
+    "study": "runs refusals mistakes* study store planes own_method failure_run",
 }
 """Names of test files; the rest of the package is tested by what uses it."""
-REST = "refusals bad_input specimens crooked criterion study dynamics_input own_method"
+REST = (
+    "refusals mistakes* bad_input specimens crooked criterion study dynamics_input own_method"
+)
 
 
 def tests_near(target: str) -> list[str]:

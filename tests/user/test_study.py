@@ -181,10 +181,7 @@ def test_a_correlation_coefficient_is_swept():
     refuses("did you mean 'residual_strength'", lambda: swept(misspelt, **given))
 
 
-# -- what is kept --------------------------------------------------------------------------------
-
-
-# -- load shapes, and events under a load --------------------------------------------------------
+# -- events under a load -------------------------------------------------------------------------
 
 
 def test_events_are_those_of_the_path():
@@ -197,6 +194,3 @@ def test_events_are_those_of_the_path():
         own = st.equilibrium_path(problem, tau_p[sample], [0.0])["event_moment"].values[:4]
         np.testing.assert_allclose(kept[sample, : own.size], own, rtol=1e-12)
         assert np.isnan(kept[sample, own.size :]).all()
-
-
-# -- mistakes ------------------------------------------------------------------------------------
