@@ -34,7 +34,8 @@ NEAREST = {
     "ensemble": "runs fields store ensemble study progress own_method reliability",
     "equilibrium": "lines planes specimens crooked equilibrium plane_equilibrium instability"
     " friction_laws",
-    "friction": "lines ruptures mistakes* friction_laws friction_coefficients crooked dynamics_properties",
+    "friction": "lines ruptures mistakes* friction_laws friction_coefficients crooked"
+    " dynamics_properties",
     "inference": "inference* mistakes* pictures fit_* agreement joined",
     "jit": "cache architecture own_method",
     "plot": "pictures runs",
