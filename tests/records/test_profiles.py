@@ -62,7 +62,8 @@ def other_places_and_units():
     shifted = "x (um);strength (kPa)\n" + "\n".join(
         f"{2e3 * i + 700:.0f};{1e3 * v}" for i, v in enumerate(EIGHT)
     )
-    gap = "\n".join(f"{2 * i} {'-' if i == 3 else 1e3 * v}" for i, v in enumerate(EIGHT))
+    dense = [900.0 + 7.0 * i * i for i in range(16)]
+    gap = "\n".join(f"{i} {'-' if 5 <= i <= 7 else v}" for i, v in enumerate(dense))
     between = {"x_unit": "mm", "unit": "kPa", "interpolate": True, "gaps": "skip"}
     return {
         "interpolated": table(shifted, interface=SMALL, interpolate=True),
