@@ -88,6 +88,18 @@ def a_law_that_rests_and_steepens():
     return st.onset(problem, TWO, method=st.Equilibrium(sensitivity=True))
 
 
+@calls(EVENTS + ", and the same if no patch counts as too long to be stopped")
+def arrests_of_a_law_that_falls_late():
+    friction = st.PiecewiseWeakening(
+        weakening_rate=2.9e10, residual_strength=2e5, slip=(0.8, 1.0), strength=(0.9, 0.0)
+    )
+    problem = make_problem(96, 0.037, friction=friction)
+    away = np.abs(problem.interface.x / 0.037 - 0.4)
+    weak = 6e5 + 2e4 * np.cos(40.0 * away + 0.3)
+    strength = np.where(away < 0.09, weak, np.where(away < 0.18, 1.73e6, 2.4e6))
+    return st.onset(problem, strength, method=st.Equilibrium(events=3))
+
+
 @calls("the same by the whole law in many pieces, tests/oracle/test_friction_laws.py")
 def an_exponential_law_in_pieces():
     exponential = law(st.ExponentialWeakening).friction
