@@ -59,9 +59,9 @@ def inferred(peaks=(7e5, 7.1e5, 6.9e5), **more):
     return st.infer(make_problem(), field(), peaks, **given).names
 
 
-def with_residual(residual):
+def with_residual(residual, method=EXACT):
     profiles = {"strength": LINE_STRENGTH, "residual_strength": residual}
-    return st.onset(LINE, profiles, method=EXACT).critical_stress
+    return st.onset(LINE, profiles, method=method).critical_stress
 
 
 PREDICTED = xr.Dataset({"critical_stress": ("sample", 7e5 + 1e4 * np.sin(np.arange(90.0)))})
@@ -78,6 +78,8 @@ CALLS = {
     "what is no residual strength": [
         lambda: with_residual(0.0),
         lambda: with_residual(-1.0),
+        lambda: with_residual(1.02e6),
+        lambda: with_residual(1.02e6, st.Rupture(loading_rate=9e8)),
     ],
     "fields that are too fine": [
         lambda: ensemble(st.RandomInterface(strength=field(spectrum=FINE),
