@@ -205,8 +205,8 @@ def multiplier_of(sample: StaticSample, state: State) -> Array:
 class Jump(NamedTuple):
     """End of an instability: whether it is arrested and counts, the state, if that is known.
 
-    `counts` is false for a jump so small that it is a long step of the stable path; `arrival` (s)
-    is when the front of a jump with inertia arrived at each node.
+    `counts` is false for one from where the path was not seen to turn: a long step of it. `arrival`
+    (s) is when the front of a jump with inertia arrived at each node.
     """
 
     arrested: bool

@@ -16,7 +16,7 @@ from stiction.methods.equilibrium.transforms.held_equilibrium import ITERATIONS
 # No result rests on these: whether a step passes an equilibrium is checked. With one halved or
 # doubled small planes take up to a quarter longer, of MOST and HELD up to six tenths.
 SMALL = 0.02
-"""Growth, as a share of d_c, that is tried first, and counts as none where a jump ends."""
+"""Growth, as a share of d_c, that is tried first, and is none where steps speed up."""
 ENDS = 2e-3
 """Growth in a step, as a share of d_c, below which steps that solve for bounds are faster."""
 QUICK = 0.7

@@ -28,7 +28,6 @@ from stiction.methods.equilibrium.sample import (
 )
 from stiction.methods.equilibrium.transforms.bracket import Bracket, bisect, make_bracket
 from stiction.methods.equilibrium.transforms.fold import Turn, follow_to_turn
-from stiction.methods.equilibrium.transforms.growing_patch import SMALL
 from stiction.methods.equilibrium.transforms.relaxation import (
     least_equilibrium,
     stable_equilibrium,
@@ -288,10 +287,9 @@ class PlaneProgram:
             self._operator(sample), sample, beyond, found.slip, 0.1 * self.requested, True
         )
         arrested = ahead.status == Outcome.ARRESTED
-        weakens = sample.critical > 0.0
-        moved = ahead.slip - found.slip > SMALL * sample.critical
+        # Where no turn was found, and the rest is in order, a stable path was only hard to follow.
+        counts = not arrested or found.multiplier is not None
         after = State(beyond, ahead.slip, found.direction, jumped=True)
-        counts = not arrested or bool(moved[weakens].any())
         return Jump(arrested, ahead.status != Outcome.UNDECIDED, after, counts)
 
     def at(self, sample: StaticSample, state: State, load: float) -> State | None:
