@@ -483,7 +483,7 @@ def reliability(
         Option(metavar="RUN", help="Compute the curve; repetitions are stored in this folder."),
     ] = None,
     smallest: Annotated[float, Option(help="Smallest probability of the curve.")] = 1e-9,
-    repetitions: Annotated[int, Option(help="Independent repetitions.", min=1)] = 8,
+    repetitions: Annotated[int, Option(help="Independent repetitions.", min=1)] = 4,
     workers: Workers = None,
     scheduler: Scheduler = None,
     part: Part = None,

@@ -41,6 +41,7 @@ from stiction.problem.profiles.reading import profile_in_file
 from stiction.random.dotted_keys import with_values
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 from stiction.reliability.answer import Probability
+from stiction.reliability.failure import REPETITIONS
 from stiction.study.question import Question
 from stiction.study.run import AnyPart, StoredRun, samples_of_part
 from stiction.study.sweep import Point, Sweep, Uncertain, grid_axes
@@ -297,7 +298,7 @@ class Study(_Parts):
         self,
         *,
         out: FilePath,
-        repetitions: Count = 8,
+        repetitions: Count = REPETITIONS,
         smallest: Probability = 1e-9,
         event: Event = "critical_stress",
         workers: Count | None = None,
@@ -315,9 +316,7 @@ class Study(_Parts):
         out : path
             Folder in which repetitions are stored as they are done. The same call resumes an
             interrupted run, and computes more if `repetitions` was raised.
-        repetitions : int
-            Eight give a coefficient of variation of about 0.2 at 1e-9, 32 half of it.
-        smallest, event
+        repetitions, smallest, event
             As in `stiction.failure_curve`.
         workers, executor, progress, part
             As in `run`; parts and executors share repetitions.
