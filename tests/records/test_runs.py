@@ -20,6 +20,7 @@ from small_study import lengths, small_study
 
 import stiction as st
 from stiction.base import progress
+from stiction.base.model import to_plain
 from stiction.cli import commands
 from stiction.cli.report import Page
 from stiction.ensemble.experiment import Experiment
@@ -251,7 +252,9 @@ report study.toml""".splitlines():
 def reliability_of_uncertain_interfaces():
     study = small_study(nodes=96, length=0.047, weakening_rate=0.31e12)
     study["problem"]["interface"]["width"] = 0.013
-    study["uncertain"] = {"count": 3, "strength.marginal.alpha": [1.4, 1.9]}
+    one = st.Study.from_dict(study).random
+    likely = one.uncertain({"strength.marginal.alpha": (1.4, 1.9)}, 3, 3)
+    study["random"] = to_plain(likely)
     study["sweep"] = [{"random.strength.marginal.low": [6.1e5, 7.0e5]}]
     return of_commands(
         study,

@@ -274,9 +274,8 @@ def description(study: Any) -> dict[str, str]:
     some = distinct(points, "problem", "random", "method")
     methods = ", ".join(dict.fromkeys(point.method.label for point in some))
     lines = {"method": methods, "samples": samples}
-    if study.uncertain:
-        keys = ", ".join(key for key in study.uncertain if key != "count")
-        lines["uncertain"] = f"{keys}: {study.uncertain['count']} equally likely interfaces"
+    if isinstance(study.random, list):
+        lines["random"] = f"{len(study.random)} equally likely interfaces"
     for number, (dim, coordinates) in enumerate(study.axes.items(), start=1):
         keys = " with ".join(variable.long_name for _, variable in coordinates.values())
         values, variable = coordinates[dim]
@@ -497,8 +496,8 @@ def reliability(
 
     Problem, strength, method, seed and sweep come from the study file; its number of samples is
     not used. The stress is the mean shear stress on the interface; failure means that the
-    interface as a whole slides below it. With a table [uncertain] the probability is the mean over
-    equally likely interfaces, and the band that holds 90 % of them is beside it. Rerunning the
+    interface as a whole slides below it. Of a list of equally likely interfaces the
+    probability is the mean, and the band that holds 90 % of them is beside it. Rerunning the
     command resumes an interrupted run, and computes more if there are to be more repetitions.
     `stiction export` writes the curve as a table, `stiction report` a page with its figure.
     """

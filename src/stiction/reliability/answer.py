@@ -256,7 +256,7 @@ def few_members(
     count = 1 + int(np.searchsorted(shares, CARRIED * shares[-1]))
     advice = (
         "give what it was drawn from, a fit or a posterior, in its place: more are then drawn; or"
-        " a longer list (count of [uncertain])"
+        " a longer list"
     )
     if random.source is not None:
         advice = (
