@@ -126,7 +126,7 @@ def commands_of_a_sweep():
     return of_commands(
         SWEPT,
         "run study.toml --out run --workers 1",
-        "status run --parts 3",
+        "status run",
         "export run all.csv",
         "export run all.nc",
         "report run",
@@ -209,17 +209,17 @@ def answers_of_commands():
     )
     plain["problem"]["interface"]["width"] = 0.013
     plain["problem"]["load"] = {"normal_pressure": 2.7e6}
-    plain["reliability"] = {"force": 430.0, "target_cv": 0.5}
     lines = """
- --probability 0.02
- --friction-coefficient 0.26
+ --force 430 --target-cv 0.5
+ --probability 0.02 --target-cv 0.5
+ --friction-coefficient 0.26 --target-cv 0.5
  --stress 7e5 --force 7e3
  --probability 2
  --out run --stress 7e5
  --part 1/3 --stress 7e5""".splitlines()
     with inside(plain):
         found = {line: command(f"reliability study.toml{line}") for line in lines}
-        del plain["reliability"], plain["problem"]["interface"]["width"]
+        del plain["problem"]["interface"]["width"]
         Path("other.toml").write_text(tomli_w.dumps(plain))
         asked = ("", " --force 7e3")
         return found | {f"other{one}": command(f"reliability other.toml{one}") for one in asked}
@@ -296,7 +296,7 @@ def a_run_in_parts():
     found = of_commands(
         plain,
         "run study.toml --out run --workers 1 --part 2/3",
-        "status run --parts 3",
+        "status run",
         "export run part.csv",
         "export run all.csv --partial",
         "report run",

@@ -166,12 +166,7 @@ def run(
         raise typer.Exit(1)
 
 
-def status(
-    run: RunPath,
-    parts: Annotated[
-        int | None, Option(metavar="N", help="Name those of N parts that are missing.", min=1)
-    ] = None,
-) -> None:
+def status(run: RunPath) -> None:
     """Show the completed, failed and damaged parts of a run.
 
     Exit code 0: complete; 1: samples are missing, failed or damaged, or the run cannot be read.
@@ -189,10 +184,6 @@ def status(
     counts = zip(points, state.done_by_point, strict=True)
     behind = [f"{one}: {done} of {each}" for one, done in counts if done < each]
     _show_some(behind if len(points) > 1 else [], "  ")
-    if parts is not None:
-        missing = stored.missing_parts(parts)
-        names = ", ".join(f"{k}/{parts}" for k in missing)
-        echo(f"  missing     {f'parts {names}' if names else f'none of {parts} parts'}")
     _show_some(state.damaged, "  damaged     ")
     if state.damaged:
         echo("  run the study again to repair this")
@@ -477,6 +468,7 @@ def reliability(
         float | None, Option(help="Shear stress over normal pressure to carry.")
     ] = None,
     probability: Annotated[float | None, Option(help="Probability of a design.")] = None,
+    target_cv: Annotated[float, Option(help="Coefficient of variation to reach.")] = 0.1,
     out: Annotated[
         Path | None,
         Option(metavar="RUN", help="Compute the curve; repetitions are stored in this folder."),
@@ -490,9 +482,8 @@ def reliability(
     """Compute how likely a study's interface is to slide below a demand, or its design.
 
     One line answers at each point of the sweep: to `--force`, `--stress` or
-    `--friction-coefficient` with a probability, to `--probability` with the design; without an
-    option, to the table [reliability] of the study. With `--out` it is the whole curve, decade by
-    decade.
+    `--friction-coefficient` with a probability, to `--probability` with the design. With `--out` it
+    is the whole curve, decade by decade.
 
     Problem, strength, method, seed and sweep come from the study file; its number of samples is
     not used. The stress is the mean shear stress on the interface; failure means that the
@@ -501,6 +492,7 @@ def reliability(
     command resumes an interrupted run, and computes more if there are to be more repetitions.
     `stiction export` writes the curve as a table, `stiction report` a page with its figure.
     """
+    from stiction.reliability.failure import design_stress, failure_probability
     from stiction.study.export import table_of
     from stiction.study.study import Study, open_run
 
@@ -516,7 +508,18 @@ def reliability(
             raise InputError(
                 [f"--{name}: shares the work of a curve; give --out" for name in needs]
             )
-        _answer(loaded, asked, workers)
+        if not asked:
+            raise InputError(
+                "--out: give the folder of a curve, or ask for one answer with --force, --stress,"
+                " --friction-coefficient or --probability"
+            )
+        ask: Any = failure_probability if probability is None else design_stress
+        for point, one in zip(loaded.points, loaded.experiments, strict=True):
+            answer = ask(
+                one.problem, one.given, method=one.method, seed=one.seed, workers=workers,
+                target_cv=target_cv, **asked,
+            )  # fmt: skip
+            echo(f"{point}: " * bool(point.values) + str(answer))
         return
     if asked:
         raise InputError(
@@ -538,28 +541,6 @@ def reliability(
     echo(
         f"part {part}: " * bool(part) + f"{state.done} of {state.samples} repetitions in {out}"
     )
-
-
-def _answer(study: Any, asked: dict[str, float], workers: int | None) -> None:
-    """Print the answer to what was asked, or else to the question of the study, at each point."""
-    from stiction.study.question import Question
-
-    question = study.reliability
-    if asked:
-        given = {} if question is None else {"target_cv": question.target_cv}
-        try:
-            question = Question(**given, **asked)
-        except InputError as error:
-            texts = (text.partition("Question")[2].lstrip(".: ") for text in error.problems)
-            raise InputError(texts) from None
-    if question is None:
-        raise InputError(
-            "--out: give the folder of a curve, or ask for one answer with --force, --stress,"
-            " --friction-coefficient or --probability, or in the table [reliability] of the study"
-        )
-    for point, experiment in zip(study.points, study.experiments, strict=True):
-        where = f"{point}: " if point.values else ""
-        echo(f"{where}{question.answer(experiment, workers)}")
 
 
 # -- the program ---------------------------------------------------------------------------------

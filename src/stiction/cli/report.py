@@ -2,12 +2,9 @@
 
 import base64
 import io
-import itertools
 import math
-import platform
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +14,7 @@ import tomli_w
 import xarray as xr
 from matplotlib.figure import Figure
 
-from stiction import __version__, plot
+from stiction import plot
 from stiction.base.errors import InputError
 from stiction.base.files import write_whole
 from stiction.base.variables import DIRECTION
@@ -107,17 +104,13 @@ def write_report(run: StoredRun, path: Path) -> None:
     page.listing(
         "The study, to run again to the same numbers", tomli_w.dumps(run.study.to_dict())
     )
-    packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "numba"))
-    page.text(
-        f"Computed with {'; '.join(state.versions)}; page written with stiction"
-        f" {__version__}, Python {platform.python_version()}, {packages}."
-    )
+    page.text(f"Computed with {'; '.join(state.versions)}.")
     write_whole(path, page.html().encode())
 
 
 def add_samples(page: Page, run: StoredRun) -> None:
     """Add the figures and the tables of samples."""
-    names = [*QUANTITIES, "critical_position", "arrested_events"]
+    names = [*QUANTITIES, "critical_position"]
     result, axes = run.dataset(only=names), run.study.axes
     add_figures(page, result, list(axes))
     add_tables(page, result, axes)
@@ -153,24 +146,20 @@ def add_figures(page: Page, result: xr.Dataset, dims: list[str]) -> None:
         page.figure(figure, f"{what.capitalize()} and critical position.")
         return
     along, *others = sorted(dims, key=lambda dim: -result.sizes[dim])
-    within, over = others[:1], others[1:]
-    steps = itertools.product(*(range(result.sizes[dim]) for dim in over))
-    for chosen in itertools.islice(steps, MOST_FIGURES):
-        part = result.isel(dict(zip(over, chosen, strict=True)))
-        fixed = _where(part, over)
-        first = part if not within else part.isel({within[0]: 0})
-        page.figure(
-            densities(first, along),
-            f"Densities of the {what} and of the critical position{_where(first, others)}.",
-        )
-        figure = Figure(figsize=(0.75 * PAGE, 3.2))
-        plot.quantiles(part, along=along, ax=figure.subplots())
-        page.figure(
-            figure,
-            f"Median of the {what} with its 95 % confidence interval{fixed}; band: between"
-            " quartiles"
-            + ("." if within else ", pale band: between the 5 % and 95 % quantiles."),
-        )
+    first = result.isel(dict.fromkeys(others, 0))
+    page.figure(
+        densities(first, along),
+        f"Densities of the {what} and of the critical position{_where(first, others)}.",
+    )
+    part = result.isel(dict.fromkeys(others[1:], 0))
+    figure = Figure(figsize=(0.75 * PAGE, 3.2))
+    plot.quantiles(part, along=along, ax=figure.subplots())
+    bands = "" if others else ", pale band: between the 5 % and 95 % quantiles"
+    page.figure(
+        figure,
+        f"Median of the {what} with its 95 % confidence interval{_where(part, others[1:])}; band:"
+        f" between quartiles{bands}.",
+    )
 
 
 def _where(part: xr.Dataset, dims: list[str]) -> str:
@@ -230,11 +219,6 @@ def add_tables(page: Page, result: xr.Dataset, axes: GridAxes) -> None:
             found = flat[name].transpose("point", ...).values * factor
             rows = [[*at, *_estimates(row)] for at, row in zip(labels, found, strict=False)]
             page.table(flat[name].attrs["long_name"].capitalize(), columns, rows)
-    if "arrested_events" in flat:
-        found = flat["arrested_events"].transpose("point", ...).values
-        counts = [[int(np.isfinite(row).sum()), int(np.sum(row > 0))] for row in found]
-        rows = [[*at, *count] for at, count in zip(labels, counts, strict=False)]
-        page.table("Arrested events", [*swept, "of these with an arrested event"], rows)
 
 
 def _estimates(found: Any) -> list[Any]:

@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import ExitStack, closing
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from stiction.base.errors import merge_warnings, warn_accuracy, warn_user
+from stiction.base.errors import (
+    InputError,
+    RunError,
+    Warned,
+    merge_warnings,
+    warn_accuracy,
+    warn_user,
+)
 from stiction.base.model import Count, Flag, Names, Number, Progress, checked
 from stiction.base.progress import Meter, Show, duration
-from stiction.ensemble.batches import solve_span, spans_of, usable_cores
+from stiction.ensemble.batches import (
+    Span,
+    Table,
+    solve_span,
+    solve_spans,
+    spans_of,
+    usable_cores,
+)
 from stiction.ensemble.dataset import Gathered, GridAxes, distinct
 from stiction.ensemble.experiment import Ensemble, Experiment
-from stiction.ensemble.items import complete
 from stiction.ensemble.pilot import compare, doubt
 from stiction.ensemble.store import Store
 from stiction.methods.protocol import MethodObject
@@ -30,6 +44,8 @@ SHOWN = 3
 """Number of failures that are reported one by one."""
 LONG = 3600.0
 """Estimated seconds from which a run says so before it begins."""
+HOPELESS = 16
+"""Failed items, with none solved, after which the whole run is given up."""
 
 
 def check_fields(points: Sequence[Experiment]) -> None:
@@ -49,6 +65,42 @@ def _warn_if_long(points: Sequence[Experiment], missing: NDArray[Any], workers: 
             f" core{'s' * (workers > 1)}",
             UserWarning,
         )
+
+
+def complete(
+    items: Any,
+    points: Sequence[Any],
+    spans: Sequence[Span],
+    solve: Callable[[Any, Span], Table],
+    meter: Meter,
+    *,
+    store: Store | None,
+    executor: Executor | None,
+    workers: int,
+) -> None:
+    """Compute spans of items; each table goes to memory and to the store as it is done.
+
+    `items` takes tables (`add`), and knows what is `done`, (points, items). `solve` returns the
+    table of a span of a point. One warning stands for those of all tables.
+    """
+    lost, total = 0, sum(span.samples for span in spans)
+    with ExitStack() as stack:
+        if store:  # also on Ctrl-C, and when workers are lost: what is done is kept
+            stack.callback(store.save)
+        warned = stack.enter_context(merge_warnings())
+        stack.enter_context(meter)
+        work = solve_spans(points, spans, solve, executor=executor, workers=workers)
+        for span, table in stack.enter_context(closing(work)):
+            if store:
+                store.add(table)
+            items.add(table)
+            warned += table.warned if len(points) == 1 else map(Warned.unnumbered, table.warned)
+            meter.advance(span.samples)
+            lost += len(table.failures)
+            if lost >= min(HOPELESS, total) and not items.done.any():
+                failure = table.failures[0]
+                texts = [f"{failure.name}: {text}" for text in failure.error.splitlines()]
+                raise InputError(texts) if failure.input else RunError("\n".join(texts))
 
 
 def gather(

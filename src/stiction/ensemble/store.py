@@ -211,9 +211,9 @@ def read_study(folder: Path) -> dict[str, Any]:
 
 
 def _identity(study: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what makes two studies the same run: all but title, question and number of samples."""
+    """Return what makes two studies the same run: all but title and number of samples."""
     ensemble = {key: value for key, value in study["ensemble"].items() if key != "samples"}
-    rest = {key: value for key, value in study.items() if key not in ("title", "reliability")}
+    rest = {key: value for key, value in study.items() if key != "title"}
     return rest | {"ensemble": ensemble}
 
 

@@ -26,8 +26,7 @@ from scipy.special import factorial
 
 from stiction.base.arrays import Array
 from stiction.base.kinds import from_table
-from stiction.inference.marginal_fit import table_of
-from stiction.inference.scoring import climb
+from stiction.inference.marginal_fit import climb, table_of
 from stiction.inference.window import RecordWindow
 from stiction.random.mapping import quantile_of_normal
 from stiction.random.spectra import SPECTRA

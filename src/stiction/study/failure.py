@@ -16,9 +16,8 @@ from stiction.base.errors import InputError, merge_warnings, texts_of, warn_accu
 from stiction.base.progress import Meter, Show
 from stiction.base.variables import Variable
 from stiction.ensemble.batches import Here, Span, Table, usable_cores
-from stiction.ensemble.items import complete
 from stiction.ensemble.limit_state import LimitState, weakest_first
-from stiction.ensemble.monte_carlo import check_fields
+from stiction.ensemble.monte_carlo import check_fields, complete
 from stiction.ensemble.store import Store
 from stiction.problem.results import to_dataset
 from stiction.reliability.failure import (

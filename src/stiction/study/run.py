@@ -144,12 +144,6 @@ class StoredRun:
         found: xr.Dataset = rows.dataset(attributes, self.study.axes)
         return found
 
-    def missing_parts(self, parts: int) -> list[int]:
-        """Return which of so many parts, numbered from 1, are not complete."""
-        done = self._read(only=()).done
-        mine = (samples_of_part((k, parts), *done.shape) for k in range(1, parts + 1))
-        return [k for k, own in enumerate(mine, start=1) if not done[own].all()]
-
     def _rows(self, only: Sequence[str] | None) -> Any:
         return Gathered(self.study.experiments, self.study.ensemble, only)
 

@@ -42,7 +42,6 @@ from stiction.random.dotted_keys import with_values
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 from stiction.reliability.answer import Probability
 from stiction.reliability.failure import REPETITIONS
-from stiction.study.question import Question
 from stiction.study.run import AnyPart, StoredRun, samples_of_part
 from stiction.study.sweep import Point, Sweep, grid_axes
 
@@ -106,9 +105,6 @@ class Study(_Parts):
         of values. Every point of the sweep has the same samples.
     save : Save, optional
         Results that `stiction rupture` keeps, and the places of its stations.
-    reliability : Question, optional
-        What `stiction reliability` answers: a ``force`` (N), ``stress`` (Pa) or
-        ``friction_coefficient`` to carry, or the ``probability`` of a design; and ``target_cv``.
     title : str
         Title of the study, for readers.
 
@@ -137,7 +133,6 @@ class Study(_Parts):
 
     sweep: Sweep = ()
     save: Save | None = None
-    reliability: Question | None = None
     title: Text = ""
 
     @model_validator(mode="after")
