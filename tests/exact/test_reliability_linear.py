@@ -367,6 +367,13 @@ def test_as_many_members_are_drawn_as_the_target_needs(monkeypatch):
     assert "5 % have at most" not in str(found).replace("95 %", "")
     alike = st.failure_probability(LINE, few[:1] * 12, 1.01e6, **options, target_cv=0.3)
     assert alike.members_cv == 0.0  # one interface, twelve times
+    # Entries as a posterior holds them: the weak ones seldom, so that all fail about as often.
+    counts = np.maximum(1, np.round(0.01 / exact)).astype(int).clip(max=40)
+    many = [one for one, count in zip(few, counts, strict=True) for _ in range(count)]
+    weighed = st.failure_probability(LINE, many, stress, **options, target_cv=0.3)
+    shares, held = counts * exact / (counts @ exact), counts / counts.sum()
+    assert math.sqrt(np.sum(shares**2) - np.sum(held**2)) < 0.7 * np.linalg.norm(shares - held)
+    assert weighed.members_cv == pytest.approx(np.linalg.norm(shares - held), rel=0.3)
 
 
 @pytest.mark.parametrize("spread", [0.0, 1.2])

@@ -260,7 +260,8 @@ def few_members(
     )
     if random.source is not None:
         advice = (
-            "no more differ, or no more are drawn: take more repetitions of a fit (bootstrap=)"
+            "no more differ, or no more are drawn: take more repetitions of a fit (bootstrap=), or"
+            " give infer a longer list"
         )
     return [
         f"the list of interfaces is a sample, and {count} of its {shares.size} different ones carry"

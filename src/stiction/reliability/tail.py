@@ -133,11 +133,11 @@ class Tail(NamedTuple):
     def members_cv(self, stress: float, kinds: Array) -> float:
         """Return the coefficient of variation by the list of interfaces being a sample.
 
-        With the shares p of the list's entries in the mean it is the square root of sum p^2 less
-        1/M, as of the bootstrap over entries. The sum is the chance that two failures are of one
-        entry. It is that of two samples of different ancestors, which are independent: the few
-        samples of each entry do not make it too large. `kinds` has a number for each member;
-        those with the same are one entry.
+        Its square is the sum of (p - w)^2 over entries that hold a share w of the list and a share
+        p of the failures, as of importance sampling. The sum of p^2 is the chance that two failures
+        are of one entry. It is that of two samples of different ancestors, which are independent:
+        the few samples of each entry do not make it too large. `kinds` has a number for each
+        member; those with the same are one entry.
         """
         entries = np.bincount(kinds)
         total, pairs, alike = np.zeros(entries.size), 0.0, 0.0
@@ -150,9 +150,11 @@ class Tail(NamedTuple):
         pairs, alike = pairs + float(total.sum()) ** 2, alike + float(total @ total)
         if not pairs > 0.0:
             return 0.0
-        expected = float(np.sum(entries**2)) / kinds.size**2
+        held = entries / kinds.size
+        expected = float(held @ held)
+        spread = alike / pairs - 2.0 * float(held @ total / total.sum()) + expected
         # A spread seen in so many entries is that of one entry less.
-        excess = (alike / pairs - expected) / max(1.0 - expected, 1e-300)
+        excess = spread / max(1.0 - expected, 1e-300)
         return math.sqrt(max(excess, 0.0))
 
     def quantile(self, probability: float) -> float:
