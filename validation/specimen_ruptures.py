@@ -1,11 +1,13 @@
 """Ruptures with inertia on specimens beside overdamped ones: events, static friction, trends.
 
-    python validation/specimen_ruptures.py [--samples 24] [--nodes 256]
+    python validation/specimen_ruptures.py [drives | friction | vary] [--samples 30] [--nodes 128]
 
-For each drive, random strengths as in the example of docs/specimens.md. Every instability of the
-path with inertia is also let come to rest overdamped, from the same state. Printed are the events,
-how many of them are shorter with inertia, how many run through all of the interface though
-overdamped ones rest, static friction, front speeds, and where the first events end.
+`drives`: for each drive, random strengths as in the example of docs/specimens.md. Every instability
+of the path with inertia is also let come to rest overdamped, from the same state. Printed are the
+events, how many of them are shorter with inertia, how many run through all of the interface though
+overdamped ones rest, static friction, front speeds, and where the first events end. `friction`: the
+same below dead load, where the strength is correlated over half of the nucleation length. `vary`:
+behind a machine, with half and twice the attenuation and further, and with heavier platens.
 """
 
 import argparse
@@ -22,15 +24,27 @@ MACHINE = 2e7
 DRIVES = {
     "platen, dead load": st.Platen(),
     "platen, machine": st.Platen(stiffness=MACHINE),
-    "platen of 0.5 kg, machine": st.Platen(stiffness=MACHINE, mass=0.5),
     "pusher at H/2, machine": st.Pusher(height=0.025, width=0.005, stiffness=MACHINE),
     "pusher at H/5, machine": st.Pusher(height=0.01, width=0.004, stiffness=MACHINE),
     "pusher at H/10, machine": st.Pusher(height=0.005, width=0.002, stiffness=MACHINE),
 }
-STRENGTH = st.RandomField(
-    st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
-    st.PowerLawSpectrum(correlation_length=1.75e-3),
-)
+DEAD = {
+    "platen, dead load": st.Platen(),
+    "pusher at H/2, dead load": st.Pusher(height=0.025, width=0.005),
+    "pusher at H/5, dead load": st.Pusher(height=0.01, width=0.004),
+}
+QUALITIES = (6.25, 12.5, 25.0, 50.0, float("inf"))
+MASSES = (0.035, 0.1, 0.5)
+"""Of a platen, kg; the block has 0.035."""
+
+
+def strength_of(length: float) -> st.RandomField:
+    """Return the strength with a correlation length, m."""
+    beta = st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6)
+    return st.RandomField(beta, st.PowerLawSpectrum(correlation_length=length))
+
+
+STRENGTH = strength_of(1.75e-3)
 
 
 def problem_with(drive: st.Platen | st.Pusher, nodes: int, quality: float) -> st.Problem:
@@ -43,12 +57,14 @@ def problem_with(drive: st.Platen | st.Pusher, nodes: int, quality: float) -> st
     )
 
 
-def compared(problem: st.Problem, samples: int) -> dict[str, list[float]]:
+def compared(
+    problem: st.Problem, samples: int, strengths: st.RandomField
+) -> dict[str, list[float]]:
     """Return what is compared, a number for each event or each sample."""
     program, overdamped = RuptureProgram(problem, st.Rupture()), make_program(problem)
     names = ["shorter", "through", "drop", "seconds", "speed", "stress", "end", "count"]
     found: dict[str, list[float]] = {name: [] for name in names}
-    for strength in STRENGTH.sample(problem.interface, samples=samples, seed=1):
+    for strength in strengths.sample(problem.interface, samples=samples, seed=1):
         rows = problem.sample(strength)
         sample = sample_of(rows, program.pieces, 0)
         began = time.process_time()
@@ -80,9 +96,12 @@ def compared(problem: st.Problem, samples: int) -> dict[str, list[float]]:
     return found
 
 
-def report(name: str, problem: st.Problem, samples: int) -> None:
+def report(
+    name: str, problem: st.Problem, samples: int, strengths: st.RandomField = STRENGTH
+) -> None:
     """Print a line of the table."""
-    found = {key: np.array(values) for key, values in compared(problem, samples).items()}
+    result = compared(problem, samples, strengths)
+    found = {key: np.array(values) for key, values in result.items()}
     speed, drop = found["speed"], 100.0 * found["drop"]
     low, high = np.quantile(speed, [0.1, 0.9]) if speed.size else (np.nan, np.nan)
     trend = np.corrcoef(speed, found["stress"])[0, 1] if speed.size > 4 else np.nan
@@ -99,17 +118,27 @@ def report(name: str, problem: st.Problem, samples: int) -> None:
 
 
 def main() -> None:
-    """Print the table, and what attenuation changes."""
+    """Print the asked table."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--samples", type=int, default=24)
-    parser.add_argument("--nodes", type=int, default=256)
+    parser.add_argument("table", nargs="?", choices=("drives", "friction", "vary"))
+    parser.add_argument("--samples", type=int, default=30)
+    parser.add_argument("--nodes", type=int, default=128)
     given = parser.parse_args()
-    for name, drive in DRIVES.items():
-        report(name, problem_with(drive, given.nodes, 25.0), given.samples)
-    for quality in (6.0, 12.5, 50.0, float("inf")):
+    nodes, samples = given.nodes, given.samples
+    if given.table in (None, "drives"):
+        for name, drive in DRIVES.items():
+            report(name, problem_with(drive, nodes, 25.0), samples)
+    if given.table in (None, "friction"):
+        for name, drive in DEAD.items():
+            report(name, problem_with(drive, nodes, 25.0), samples, strength_of(4.35e-3))
+    if given.table in (None, "vary"):
         for name in ("platen, machine", "pusher at H/5, machine"):
-            problem = problem_with(DRIVES[name], given.nodes, quality)
-            report(f"Q = {quality:g}, {name}", problem, given.samples)
+            for quality in QUALITIES:
+                problem = problem_with(DRIVES[name], nodes, quality)
+                report(f"Q = {quality:g}, {name}", problem, samples)
+        for mass in MASSES:
+            heavy = st.Platen(stiffness=MACHINE, mass=mass)
+            report(f"platen of {mass:g} kg", problem_with(heavy, nodes, 25.0), samples)
 
 
 if __name__ == "__main__":

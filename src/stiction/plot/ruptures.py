@@ -52,9 +52,9 @@ def rupture(run: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None 
     -------
     matplotlib.axes.Axes
         A dot marks the onset, where time is zero, if anything became unstable. On a line, time
-        begins shortly before it, and points that slip seven decades slower than the fastest one
-        are white. On a plane, the front is drawn at equal intervals of time on a map of the
-        strength.
+        begins shortly before it and ends shortly after the last slip, and points that slip seven
+        decades slower than the fastest one are white. On a plane, the front is drawn at equal
+        intervals of time on a map of the strength.
 
     Raises
     ------
@@ -158,7 +158,9 @@ def _strength(run: xr.Dataset) -> tuple[Array, float, str]:
 def _draw_space_time(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
     interface = problem.interface
     (since, begin), (rate, norm) = _since_onset(run), _rates(run["slip_rate"].values, DECADES)
-    near = since >= -BEFORE * interface.extent / problem.solid.shear_wave_speed
+    beside = BEFORE * interface.extent / problem.solid.shear_wave_speed
+    slips = since[np.ma.getdata(rate).any(axis=1)]  # and a little before and after
+    near = (since >= -beside) & (since <= slips.max(initial=-np.inf) + beside)
     if near.sum() > 2:
         since, rate = since[near], rate[near]
     factor, unit = unit_for("s", since)
@@ -170,7 +172,10 @@ def _draw_space_time(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
     )
     if begin:
         place = float(run["critical_position"]) * length
-        axes.plot([place], [0.0], "o", color=INK, markersize=3.5, clip_on=False, zorder=5)
+        axes.plot(
+            [place], [0.0], "o", color=INK, markeredgecolor="white", markersize=4.5,
+            clip_on=False, zorder=5,
+        )  # fmt: skip
     name_line(axes, interface, with_unit(f"time{begin}", unit))
     axes.figure.colorbar(mesh, ax=axes, extend="min", label="slip rate (m/s)")
 

@@ -176,7 +176,8 @@ def block(run: xr.Dataset, *, problem: Problem | None = None) -> Figure:
     -------
     matplotlib.figure.Figure
         Velocity along the interface, in one scale of colours whose ends are passed by one value in
-        a hundred. Time counts from the first arrival of the front.
+        a hundred, when 2 to 95 % of the slip have happened. Time counts from the first arrival of
+        the front.
     """
     import matplotlib.pyplot as plt
 
@@ -207,7 +208,7 @@ def block(run: xr.Dataset, *, problem: Problem | None = None) -> Figure:
             axes.set_title(f"{factor * time:.3g} {time_unit}")
             axes.set_aspect("equal")
             axes.label_outer()
-        figure.supxlabel(f"position $x$ ({unit})")
+        figure.supxlabel(f"position $x$ ({unit}); times count from the onset")
         figure.supylabel(f"height ({unit})")
         figure.colorbar(mesh, ax=panels, extend="both", label="velocity along $x$ (m/s)")
     return figure

@@ -25,10 +25,8 @@ from stiction.problem.sample import Sample
 if TYPE_CHECKING:
     import xarray as xr
 
-SNAPSHOTS = 8
-"""Times at which the whole block is kept."""
-MOST = (0.01, 0.95)
-"""Shares of the slip of an event between which they lie."""
+SHARES = (0.02, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95)
+"""Of the slip of an event, at which the whole block is kept."""
 OVER_TIME: dict[str, Variable] = {
     name: SCALARS[name]
     for name in ("load", "mean_stress", "mean_slip", "top_slip_rate", "weakened_fraction")
@@ -79,39 +77,26 @@ def simulate_event(
         trial = program.event(sample, before)
         trial.run(method.max_steps)
         steps = trial.steps + (trial.mesh.window // 2 if trial.slides else 0)
-        record = Record(problem, rows, program.event(sample, before), save)
+        record = Record(problem, rows, program.event(sample, before), save, trial)
         record.add()
         for _ in range(0, steps, save.every):
             record.event.advance(save.every, ends=False)
             record.add()
-        record.blocks = snapshots(program.event(sample, before), record)
     return record.dataset(method, "sliding" if trial.slides else "rest")
 
 
-def snapshots(event: Event, record: Record) -> list[tuple[float, Any]]:
-    """Return times and how fast the upper block moves along the interface then.
-
-    Evenly while most of the slip happens.
-    """
-    slip = np.array([frame["mean_slip"] for frame in record.frames])
-    done = (slip - slip[0]) / max(slip[-1] - slip[0], 1e-300)
-    first, last = (int(np.argmax(done >= share)) * record.save.every for share in MOST)
-    found = []
-    for stop in np.linspace(first, last + 1, SNAPSHOTS).astype(int):
-        event.advance(int(stop) - event.steps, ends=False)
-        found.append((event.waves.now[NOW], event.waves.u_rate.copy()))
-    return found
-
-
 class Record:
-    """What was kept of an event so far."""
+    """What was kept so far of an event, which was tried before: how much slips is known."""
 
-    def __init__(self, problem: Problem, rows: Sample, event: Event, save: Save) -> None:
+    def __init__(
+        self, problem: Problem, rows: Sample, event: Event, save: Save, trial: Event
+    ) -> None:
         self.problem, self.rows, self.event, self.save = problem, rows, event, save
+        first, last = event.waves.slip.mean(), trial.waves.slip.mean()
+        self._due = [first + share * (last - first) for share in SHARES]
         self.frames: list[dict[str, Any]] = []
         self.blocks: list[tuple[float, Any]] = []
-        nodes = problem.interface.size
-        count = event.mesh.heights.size - 1
+        nodes, count = problem.interface.size, event.mesh.heights.size - 1
         self._layers = [layer_matrix(event.mesh, row, nodes) for row in range(count)]
         self._begun = event.waves.slip.copy()
 
@@ -141,6 +126,9 @@ class Record:
                 "drive_travel": 2.0 * waves.now[TRAVEL],
             }
         )
+        while self._due and self._due[0] <= waves.slip.mean():
+            self._due.pop(0)
+            self.blocks.append((waves.now[NOW], waves.u_rate.copy()))
 
     def _energies(self) -> dict[str, float]:
         """Energies of both blocks, J/m, in the middle of the last step, where rates are known."""
