@@ -29,14 +29,6 @@ def rupture(problem, strength, rate=1e5, **options):
 CLOSE = 5e-6
 
 
-@pytest.mark.parametrize("ratio", [0.25, 0.5, 2.0])
-def test_first_instability_at_a_slow_rate_is_the_exact_equilibrium_onset(ratio):
-    strength = fields(ratio, 4)
-    exact = [largest_load(PROBLEM, profile)[0] for profile in strength]
-    found = rupture(PROBLEM, strength)["first_instability"]
-    assert found == pytest.approx(exact, rel=CLOSE)
-
-
 def test_effect_of_the_loading_rate_is_smooth_and_vanishes():
     strength = fields(0.5, 1)
     exact = largest_load(PROBLEM, strength[0])[0]

