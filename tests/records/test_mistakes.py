@@ -51,7 +51,13 @@ def correlated(correlation):
 
 
 def monte_carlo(problem=PROBLEM, random=FIELD, samples=1, **options):
-    given = {"method": LOCAL, "samples": samples, "pilot": False, "progress": False}
+    given = {
+        "method": LOCAL,
+        "samples": samples,
+        "pilot": False,
+        "progress": False,
+        "workers": 1,
+    }
     return st.monte_carlo(problem, random, **given | options)
 
 
