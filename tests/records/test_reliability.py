@@ -37,52 +37,32 @@ PRESSED = st.RandomInterface(
         st.Gamma(mean=2.3e6, cv=0.1), st.SquaredExponentialSpectrum(4e-3)
     ),
 )
-OPTIONS = {"workers": 1}
+
+
+def probability(stress, problem=SMALL, random=BOUNDED, method=EXACT, **more):
+    return st.failure_probability(problem, random, stress, method=method, workers=1, **more)
 
 
 @calls(COUNTED, close=1e-5)
 def rare_by_subset_simulation_with_force():
-    return st.failure_probability(
-        WIDE, BOUNDED, 6.9e5, method=LOCAL, target_cv=0.3, seed=4, **OPTIONS
-    )
+    return probability(6.9e5, WIDE, method=LOCAL, target_cv=0.3, seed=4)
 
 
 @calls(COUNTED, close=1e-5)
 def frequent_by_counting():
-    return st.failure_probability(
-        SMALL,
-        BOUNDED,
-        8.1e5,
-        method=EXACT,
-        target_cv=0.25,
-        seed=5,
-        event="first_instability",
-        max_evaluations=2000,
-        **OPTIONS,
-    )
+    given = {"event": "first_instability", "max_evaluations": 2000}
+    return probability(8.1e5, target_cv=0.25, seed=5, **given)
 
 
 @calls(COUNTED, close=1e-5)
 def two_levels():
-    return st.failure_probability(
-        SMALL,
-        BOUNDED,
-        7.3e5,
-        method=EXACT,
-        algorithm="two_level",
-        target_cv=0.5,
-        seed=6,
-        max_evaluations=30_000,
-        **OPTIONS,
-    )
+    given = {"algorithm": "two_level", "max_evaluations": 30_000}
+    return probability(7.3e5, target_cv=0.5, seed=6, **given)
 
 
 @calls("bounds of the strength, tests/exact/test_reliability_bounds.py")
 def below_and_above_what_any_interface_carries():
-    return [
-        st.failure_probability(SMALL, BOUNDED, stress, method=LOCAL, **OPTIONS)
-        for stress in (4.1e5, 2.1e6)
-    ]
+    return [probability(stress, method=LOCAL) for stress in (4.1e5, 2.1e6)]
 
 
 @calls(COUNTED, close=1e-5)
@@ -92,14 +72,14 @@ def design_stress_of_a_list():
         for mean, cv in ((9.7e5, 0.17), (1.04e6, 0.22), (1.11e6, 0.15))
     ]
     return st.design_stress(
-        WIDE, list_, probability=3e-3, method=LOCAL, target_cv=0.3, seed=8, **OPTIONS
+        WIDE, list_, probability=3e-3, method=LOCAL, target_cv=0.3, seed=8, workers=1
     )
 
 
 @calls(COUNTED, close=1e-5)
 def a_curve_to_a_thousandth():
     return st.failure_curve(
-        WIDE, BOUNDED, method=LOCAL, smallest=1e-3, repetitions=2, seed=9, **OPTIONS
+        WIDE, BOUNDED, method=LOCAL, smallest=1e-3, repetitions=2, seed=9, workers=1
     )
 
 
@@ -107,16 +87,8 @@ def a_curve_to_a_thousandth():
 def a_specimen_in_newtons():
     problem = crooked(nodes=72, drive=st.Pusher(height=0.012, width=0.006))
     field = dataclasses.replace(BOUNDED, spectrum=st.PowerLawSpectrum(4e-3))
-    return st.failure_probability(
-        problem,
-        field,
-        7.1e5,
-        method=EXACT,
-        target_cv=0.4,
-        seed=3,
-        max_evaluations=1500,
-        **OPTIONS,
-    )
+    given = {"target_cv": 0.4, "max_evaluations": 1500}
+    return probability(7.1e5, problem, field, seed=3, **given)
 
 
 @calls("onset of the profiles of the same draws")

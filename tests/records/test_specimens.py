@@ -1,9 +1,10 @@
 """Recorded outputs: finite blocks, each drive, machine, mode and pressing."""
 
 import dataclasses
+from functools import partial
 
 import numpy as np
-from recording import Calls, compared
+from recording import CLOSE, Call, Calls, compared
 from setups import LOCAL
 from specimens import crooked, rough
 
@@ -19,33 +20,33 @@ def solved(problem, seed=5, method=EVENTS, samples=2):
     return st.onset(problem, rough(problem, seed, samples), method=method)
 
 
-@calls(STEPS)
-def platen_under_dead_load():
-    return solved(crooked(nodes=72))
-
-
-@calls(STEPS)
-def platen_behind_a_machine_in_mode_three():
-    drive = st.Platen(stiffness=4.1e7)
-    return solved(crooked(nodes=72, mode="III", drive=drive, height=0.019), seed=7)
-
-
-@calls(STEPS)
-def pusher_on_the_left_behind_a_machine():
-    drive = st.Pusher(height=0.006, width=0.0035, stiffness=8.3e7)
-    return solved(crooked(nodes=72, drive=drive), seed=8)
-
-
-@calls(STEPS)
-def pusher_on_the_right_in_plane_strain():
-    drive = st.Pusher(height=0.013, width=0.007, side="right")
-    return solved(crooked(nodes=72, drive=drive, plane="strain", nu=0.41, height=0.045), seed=9)
-
-
-@calls(STEPS)
-def pushers_on_both_sides_of_a_stiff_machine():
-    drive = st.Pusher(height=0.004, width=0.002, side="both", stiffness=9e8)
-    return solved(crooked(nodes=72, drive=drive, height=0.021, residual=0.31e6), seed=11)
+TWO_PIECES = st.PiecewiseWeakening(
+    weakening_rate=0.26e12, residual_strength=0.45e6, slip=(0.3, 1.0), strength=(0.55, 0.0)
+)
+DRIVEN = {  # and the seed of the strengths
+    "platen_under_dead_load": (crooked(nodes=72), 5),
+    "platen_behind_a_machine_in_mode_three": (
+        crooked(nodes=72, mode="III", drive=st.Platen(stiffness=4.1e7), height=0.019), 7,
+    ),
+    "pusher_on_the_left_behind_a_machine": (
+        crooked(nodes=72, drive=st.Pusher(height=0.006, width=0.0035, stiffness=8.3e7)), 8,
+    ),
+    "pusher_on_the_right_in_plane_strain": (
+        crooked(
+            nodes=72, drive=st.Pusher(height=0.013, width=0.007, side="right"),
+            plane="strain", nu=0.41, height=0.045,
+        ), 9,
+    ),
+    "pushers_on_both_sides_of_a_stiff_machine": (
+        crooked(
+            nodes=72, drive=st.Pusher(height=0.004, width=0.002, side="both", stiffness=9e8),
+            height=0.021, residual=0.31e6,
+        ), 11,
+    ),
+    "a_law_of_two_pieces": (dataclasses.replace(crooked(nodes=72), friction=TWO_PIECES), 13),
+}  # fmt: skip
+for name, given in DRIVEN.items():
+    calls[name] = Call(partial(solved, *given), STEPS, CLOSE)
 
 
 @calls(STEPS)
@@ -63,15 +64,6 @@ def glued_pressing_of_friction_coefficients():
         of="friction_coefficient",
     )
     return st.monte_carlo(problem, field, method=st.Equilibrium(events=2), samples=3, seed=2)
-
-
-@calls(STEPS)
-def a_law_of_two_pieces():
-    friction = st.PiecewiseWeakening(
-        weakening_rate=0.26e12, residual_strength=0.45e6, slip=(0.3, 1.0), strength=(0.55, 0.0)
-    )
-    problem = dataclasses.replace(crooked(nodes=72), friction=friction)
-    return solved(problem, seed=13)
 
 
 @calls("states checked as equilibria, tests/exact/test_specimens.py")
