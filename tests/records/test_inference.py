@@ -37,6 +37,12 @@ BOUNDED = st.RandomField(
 )
 
 
+def inferred(peaks=PEAKS, problem=PROBLEM, field=BOUNDED, **more):
+    prior = {"correlation_length": (1e-3, 6e-3), "marginal.low": (5.6e5, 7.2e5)}
+    options = {"prior": prior, "method": LOCAL, "samples": 300, "seed": 3}
+    return st.infer(problem, field, peaks, **options | more)
+
+
 @calls(RECOVERED, close=2e-2)
 def a_fit_to_records_of_unlike_length():
     found = st.fit_field(
@@ -87,14 +93,8 @@ def the_scale_of_a_distribution_of_scipy():
     field = dataclasses.replace(BOUNDED, marginal=marginal)
     peaks = xr.DataArray(PEAKS * 1e-3, attrs={"units": "kPa"})
     prior = {"marginal.scale": (2e5, 8e5)}
-    found = st.infer(PROBLEM, field, peaks, prior=prior, method=LOCAL, samples=300)
+    found = inferred(peaks, field=field, prior=prior, seed=0)
     return {"str": str(found), "at": repr(found.at(7)[1])}
-
-
-def inferred(peaks=PEAKS, **more):
-    prior = {"correlation_length": (1e-3, 6e-3), "marginal.low": (5.6e5, 7.2e5)}
-    options = {"prior": prior, "method": LOCAL, "samples": 300, "seed": 3}
-    return st.infer(PROBLEM, BOUNDED, peaks, **options | more)
 
 
 @calls(RECOVERED, close=1e-5)
@@ -126,7 +126,7 @@ def parameters_from_peaks_in_newtons_and_two_lengths():
     problem = dataclasses.replace(PROBLEM, interface=st.Interface(0.031, 96, width=0.011))
     forces = {0.031: PEAKS[:4] * 0.031 * 0.011, 0.062: PEAKS[2:] * 0.98 * 0.062 * 0.011}
     prior = {"problem.friction.weakening_rate": (2.5e11, 7.5e11)}
-    found = st.infer(problem, BOUNDED, forces, unit="N", prior=prior, method=LOCAL, samples=300)
+    found = inferred(forces, problem, unit="N", prior=prior, seed=0)
     return {"str": str(found), "at": repr(found.at(7)[0].friction)}
 
 
@@ -136,7 +136,7 @@ def a_list_weighed_by_peaks():
         dataclasses.replace(BOUNDED, marginal=st.Lognormal(mean=mean, cv=cv), mean_mode=True)
         for mean, cv in ((0.96e6, 0.14), (1.03e6, 0.11), (1.01e6, 0.19), (1.12e6, 0.16))
     ]
-    found = st.infer(PROBLEM, likely, PEAKS, method=LOCAL, samples=200, load_cell_error=4e3)
+    found = inferred(field=likely, prior=None, samples=200, seed=0, load_cell_error=4e3)
     return {
         "str": str(found),
         "draws": found.draws,
@@ -189,18 +189,8 @@ def a_specimen_in_newtons():
     problem = crooked(nodes=72, drive=st.Pusher(height=0.012, width=0.006))
     field = dataclasses.replace(BOUNDED, spectrum=st.PowerLawSpectrum(4e-3))
     peaks = np.array([452.0, 471.0, 463.0, 440.0])
-    return str(
-        st.infer(
-            problem,
-            field,
-            peaks,
-            unit="N",
-            prior={"marginal.high": (1.2e6, 2.4e6)},
-            method=LOCAL,
-            samples=200,
-            load_cell_error=4.0,
-        )
-    )
+    given = {"prior": {"marginal.high": (1.2e6, 2.4e6)}, "samples": 200, "seed": 0}
+    return str(inferred(peaks, problem, field, unit="N", load_cell_error=4.0, **given))
 
 
 test_outputs_are_as_recorded = compared(calls, __file__)

@@ -176,21 +176,22 @@ def onset_and_rupture_of_a_profile():
         np.savetxt("three.csv", np.ones((2, 3)), delimiter=",")
         plain = tomllib.loads(Path("study.toml").read_text())
         plain["problem"]["load"] = {"normal_pressure": 2e6, "profile": "load.csv"}
-        np.savetxt("load.csv", np.column_stack([x, table[::-1, 1]]), delimiter=",")
-        Path("problem.toml").write_text(tomli_w.dumps({"problem": plain["problem"]}))
+        Path("joint").mkdir()
+        np.savetxt("joint/load.csv", np.column_stack([x, table[::-1, 1]]), delimiter=",")
+        Path("joint/problem.toml").write_text(tomli_w.dumps({"problem": plain["problem"]}))
         head = "Weg [mm];Reibzahl [-]"
         table = np.column_stack([1e3 * x, table[:, 1] / 2.0])
         np.savetxt("mu.csv", table, delimiter=";", header=head, comments="")
         varying = plain["problem"] | {"friction": {"critical_slip": 3e-6}}
-        Path("varying.toml").write_text(tomli_w.dumps({"problem": varying}))
+        Path("joint/varying.toml").write_text(tomli_w.dumps({"problem": varying}))
         Path("wrong.toml").write_text("title = 'nothing'\n[randon]\na = 1\n")
         for line in """onset study.toml --strength scan.csv
 rupture study.toml --strength scan.csv --out found
 onset study.toml --strength scan.csv --method equilibrium --unit GPa
-onset problem.toml --strength scan.csv
-onset problem.toml --strength mu.csv --quantity friction_coefficient
-onset problem.toml --strength mu.csv
-onset varying.toml --strength scan.csv
+onset joint/problem.toml --strength scan.csv
+onset joint/problem.toml --strength mu.csv --quantity friction_coefficient
+onset joint/problem.toml --strength mu.csv
+onset joint/varying.toml --strength scan.csv
 onset wrong.toml --strength scan.csv
 onset study.toml --strength gaps.csv
 onset study.toml --strength three.csv
