@@ -102,22 +102,6 @@ def test_density_of_even_values_is_uniform():
     np.testing.assert_allclose(found.value, 1.0, atol=2e-3)
 
 
-@pytest.mark.parametrize("shape", [1.5, 2.5])
-def test_a_density_that_vanishes_at_its_bound_is_estimated_so(shape):
-    """With no flux through the bound it was positive there, with zero slope."""
-    truth = scipy.stats.gamma(shape, scale=0.1)
-    sample = truth.rvs(20_000, random_state=np.random.default_rng(5))
-    found = density(sample, bounds=(0.0, None))
-    assert found.value[0] < 0.2 * found.value.max()
-    width = found.x[1] - found.x[0]
-    for share_below in (0.002, 0.01):  # smoothing adds to the 40 and 200 values that lie below
-        end = truth.ppf(share_below)
-        mass = found.value[found.x < end].sum() * width
-        assert mass == pytest.approx((sample < end).mean(), rel=0.2)
-    slopes = np.diff(found.value[found.x < np.quantile(sample, 0.02)])
-    assert np.mean(slopes > 0.0) > 0.95
-
-
 def test_errors_of_a_density_are_its_scatter_also_where_the_kernel_narrows():
     """It vanishes at its bound: at one per cent the kernel is a quarter as wide as amid."""
     truth, rng = scipy.stats.gamma(2.5, loc=3.0), np.random.default_rng(6)

@@ -18,34 +18,30 @@ class Unit(NamedTuple):
 
 _LENGTH, _STRESS = (0, 1, 0), (1, -1, -2)
 _BASE = {
-    "m meter metre meters metres": Unit(1.0, _LENGTH),
-    "s second seconds": Unit(1.0, (0, 0, 1)),
-    "N newton newtons": Unit(1.0, (1, 1, -2)),
-    "J joule joules": Unit(1.0, (1, 2, -2)),
-    "Pa pascal pascals": Unit(1.0, _STRESS),
+    "m": Unit(1.0, _LENGTH),
+    "s": Unit(1.0, (0, 0, 1)),
+    "N": Unit(1.0, (1, 1, -2)),
+    "J": Unit(1.0, (1, 2, -2)),
+    "Pa": Unit(1.0, _STRESS),
     "bar": Unit(1e5, _STRESS),
     "g": Unit(1e-3, (1, 0, 0)),
 }
-_PREFIXES = {  # those of symbols, and of words
-    ("", ""): 1.0, ("T", "tera"): 1e12, ("G", "giga"): 1e9, ("M", "mega"): 1e6,
-    ("k", "kilo"): 1e3, ("c", "centi"): 1e-2, ("m", "milli"): 1e-3, ("u", "micro"): 1e-6,
-    ("\N{MICRO SIGN}", "micro"): 1e-6, ("\N{GREEK SMALL LETTER MU}", "micro"): 1e-6,
-    ("n", "nano"): 1e-9,
+_PREFIXES = {
+    "": 1.0, "T": 1e12, "G": 1e9, "M": 1e6, "k": 1e3, "c": 1e-2, "m": 1e-3, "u": 1e-6,
+    "\N{MICRO SIGN}": 1e-6, "\N{GREEK SMALL LETTER MU}": 1e-6, "n": 1e-9,
 }  # fmt: skip
-_OTHERS = {
-    "1 - dimensionless": Unit(1.0, (0, 0, 0)),
+_UNITS = {
+    prefix + symbol: Unit(scale * unit.factor, unit.powers)
+    for prefix, scale in _PREFIXES.items()
+    for symbol, unit in _BASE.items()
+} | {
+    "1": Unit(1.0, (0, 0, 0)),
+    "-": Unit(1.0, (0, 0, 0)),
     "%": Unit(0.01, (0, 0, 0)),
-    "in inch": Unit(0.0254, _LENGTH),
-    "micron microns": Unit(1e-6, _LENGTH),
+    "in": Unit(0.0254, _LENGTH),
     "psi": Unit(6894.757293168, _STRESS),
     "ksi": Unit(6894757.293168, _STRESS),
 }
-_UNITS = {name: unit for names, unit in _OTHERS.items() for name in names.split()}
-for (_short, _long), _scale in _PREFIXES.items():
-    for _names, _unit in _BASE.items():
-        _symbol, *_words = _names.split()
-        for _name in (_short + _symbol, *(_long + word for word in _words)):
-            _UNITS[_name] = Unit(_scale * _unit.factor, _unit.powers)
 _COMMON = "m, cm, mm, um, nm, km, in, Pa, kPa, MPa, GPa, bar, psi, ksi, N, kN, s, ms"
 _MULTIPLES: dict[str, tuple[float, dict[str, float]]] = {
     "m": (1.0, {"km": 1e-3, "m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}),
@@ -64,9 +60,8 @@ def parse(text: str) -> Unit | None:
     Powers of known units are separated by blanks or dots. After each slash, one is divided by.
     """
     text = text.strip()
-    whole = _UNITS.get(text) or _UNITS.get(text.lower() if len(text) > 4 else text)
-    if whole is not None:
-        return whole
+    if text in _UNITS:
+        return _UNITS[text]
     plain = re.sub("[⁻⁰¹²³⁴]+", lambda m: "^" + m.group().translate(_SUPERSCRIPTS), text)
     plain = re.sub(r"\*(?!\*)|[·⋅]", " ", plain.replace("**", "^"))
     factor = 1.0

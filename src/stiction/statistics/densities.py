@@ -15,7 +15,6 @@ from stiction.statistics.estimates import as_sample
 CELLS = 4096
 REACH = 8.0
 """Of the kernel, in standard deviations."""
-FEW = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +28,7 @@ class Density:
     error : (m,) array
         Standard error of the density from sampling, without the effect of smoothing.
     bandwidth : float
-        Standard deviation of the smoothing kernel at the median, in the unit of the values.
+        Standard deviation of the smoothing kernel, in the unit of the values.
     """
 
     x: Array
@@ -54,13 +53,7 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     Notes
     -----
     A Gaussian kernel on a fine grid, reflected at the bounds, of the bandwidth of Silverman (1986,
-    Eq. 3.31): two peaks are smoothed more than they need.
-
-    This would make a density that vanishes at a bound positive there. So the share of
-    values within a distance d of a bound is first fitted by d^b (Hill, 1975). If b is
-    significantly above 1, the estimate is that of d + c log(1 - exp(-(d + e)/c)), with the
-    median distance c and the distance e of the eighth nearest value: near the bound a
-    logarithm, for which the kernel narrows towards the bound, and far from it d itself.
+    Eq. 3.31): two peaks are smoothed more than they need, and at a bound the slope is zero.
     Without a bound, the grid extends beyond the sample.
 
     Examples
@@ -73,51 +66,20 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     """
     sample = as_sample(values, 16)
     low, high = _ends(sample, bounds)
-    ends = []
-    for end, bound, sign in ((low, bounds[0], 1.0), (high, bounds[1], -1.0)):
-        distances = np.abs(sample - end)
-        if bound == end and _vanishes(distances):
-            ends.append((end, sign, np.median(distances), np.partition(distances, FEW)[FEW]))
-
-    def mapped(x: Any) -> Any:
-        terms = [s * c * np.log(-np.expm1(-(np.abs(x - end) + e) / c)) for end, s, c, e in ends]
-        return x + sum(terms)
-
-    def slope(x: Any) -> Any:
-        return 1.0 + sum(1.0 / np.expm1((np.abs(x - end) + e) / c) for end, _, c, e in ends)
-
-    y = mapped(sample)
-    reach = 0.5 * float(np.ptp(y))
-    first = max(mapped(low), y.min() - reach)
-    width = min(mapped(high), y.max() + reach) - first
+    width = high - low
     counts = np.bincount(
-        np.minimum(((y - first) / width * CELLS).astype(int), CELLS - 1), minlength=CELLS
+        np.minimum(((sample - low) / width * CELLS).astype(int), CELLS - 1), minlength=CELLS
     )
     # Below a cell's width the grid, not the sample, would be resolved.
-    bandwidth = max(_bandwidth(y), 0.5 * width / CELLS)
-    cells = bandwidth / width * CELLS
-    smooth = gaussian_filter1d(1.0 * counts, cells, mode="reflect", truncate=REACH)
-    cumulative = np.append(0.0, np.cumsum(smooth))
-    edges = np.linspace(0.0, 1.0, CELLS + 1)
-    x = low + edges * (high - low)
-    below = np.interp(mapped(x), first + edges * width, cumulative / cumulative[-1])
-    middles = 0.5 * (x[1:] + x[:-1])
-    value = np.diff(below) / np.diff(x)
-    # The integral of the kernel squared is 1/(2 sqrt(pi) bandwidth).
-    error = np.sqrt(
-        value * slope(middles) / (2.0 * math.sqrt(math.pi) * bandwidth * sample.size)
+    bandwidth = max(_bandwidth(sample), 0.5 * width / CELLS)
+    smooth = gaussian_filter1d(
+        1.0 * counts, bandwidth / width * CELLS, mode="reflect", truncate=REACH
     )
-    return Density(middles, value, error, bandwidth / float(slope(np.median(sample))))
-
-
-def _vanishes(distances: Array) -> bool:
-    """Return whether the share d^b of values within a distance d of a bound surely has b > 1."""
-    count = max(FEW, int(distances.size**0.6))
-    nearest = np.sort(distances)[: count + 1]
-    if nearest[FEW] == 0.0:
-        return False
-    inverse = float(np.mean(np.log(nearest[-1] / nearest[nearest > 0.0])))
-    return 0.0 < inverse * (1.0 + 3.0 / math.sqrt(count)) < 1.0
+    x = low + (np.arange(CELLS) + 0.5) / CELLS * width
+    value = smooth / smooth.sum() * CELLS / width
+    # The integral of the kernel squared is 1/(2 sqrt(pi) bandwidth).
+    error = np.sqrt(value / (2.0 * math.sqrt(math.pi) * bandwidth * sample.size))
+    return Density(x, value, error, bandwidth)
 
 
 def _ends(sample: Array, bounds: tuple[float | None, float | None]) -> tuple[float, float]:

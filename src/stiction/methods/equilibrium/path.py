@@ -7,7 +7,7 @@ import xarray as xr
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
-from stiction.base.model import Numbers, check, check_memory
+from stiction.base.model import Numbers, check, check_memory, describe
 from stiction.base.variables import Variable, force_variables, forces
 from stiction.methods.equilibrium.sample import at_rest, sample_of
 from stiction.methods.equilibrium.solver import (
@@ -43,14 +43,10 @@ GAP = 1e-6
 
 def _check_loads(loads: Any) -> Array:
     given = np.atleast_1d(check("loads", loads, Numbers))
-    if given.ndim != 1 or given.size == 0 or not np.all(np.isfinite(given)):
+    rises = given.ndim == 1 and given.size and np.all(np.diff(given, prepend=-1e-300) > 0.0)
+    if not (rises and np.isfinite(given[-1])):
         raise InputError(
-            f"loads: must be a one-dimensional array of finite numbers, got shape {given.shape}"
-        )
-    if np.any(np.diff(given, prepend=-1e-300) <= 0.0):
-        worst = int(np.argmin(np.diff(given, prepend=0.0)))
-        raise InputError(
-            f"loads: must rise, none negative; entry {worst} is {given[worst]:g} Pa"
+            f"loads: must be finite and rise, none negative, got {describe(given.tolist())}"
         )
     return given
 

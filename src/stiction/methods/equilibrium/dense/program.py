@@ -204,7 +204,6 @@ class DenseProgram:
         )
 
     def at(self, sample: StaticSample, state: State, load: float) -> State | None:
-        """Return the equilibrium at a load from a state below, None if it is not found."""
         if load <= state.load:
             return state
         if not (state.jumped or state.by_events or self.driven):
@@ -215,7 +214,6 @@ class DenseProgram:
         return None if there.unstable or not there.known else there
 
     def jump(self, sample: StaticSample, found: State) -> Jump:
-        """Let an unstable state jump to another equilibrium, or to sliding."""
         slip, stiff = found.slip.copy(), found.stiff.copy()
         outcome, longest = self._run(sample, found, slip)
         if outcome == Outcome.UNDECIDED:
@@ -257,9 +255,9 @@ class DenseProgram:
         return result
 
     def gradient(self, sample: StaticSample, state: State) -> Array:
-        """Return the derivative of the mean stress at an instability by the strengths there.
+        """Find the multiplier, whose mean over the load profile is one.
 
-        Its mean over the load profile is one. Behind a machine the multiplier is that of the drive;
+        Behind a machine the multiplier is that of the drive;
         until the instability (K - W) d = D q - s on the nodes that slip, none of which rests.
         """
         y = multiplier_of(sample, state)
@@ -273,7 +271,6 @@ class DenseProgram:
         return y - self.elastic.relief / y.size * ((q @ moved) * y - moved)
 
     def stress_released(self, state: State) -> Array:
-        """Return the stress that the slip takes off the interface, K d, Pa."""
         return state.stiff
 
 

@@ -263,10 +263,7 @@ class PlaneProgram:
             passed = [*passed[-3:], (load, slip)]
 
     def gradient(self, sample: StaticSample, state: State) -> Array:
-        """Return the derivative of the mean stress at an instability by the strengths there.
-
-        It is the direction in which the path turns; NaN if that is not found.
-        """
+        """Find the direction in which the path turns; NaN if that is not found."""
         if state.multiplier is not None or state.gap == 0.0:
             return multiplier_of(sample, state)
         operator, beyond = self._operator(sample), state.load + 2.0 * state.gap
@@ -280,7 +277,6 @@ class PlaneProgram:
         return np.full(slip.size, np.nan)
 
     def jump(self, sample: StaticSample, found: State) -> Jump:
-        """Let an unstable state jump to another equilibrium, or to sliding."""
         beyond = found.load + found.gap
         beyond += self.requested * abs(beyond)
         ahead = least_equilibrium(
@@ -293,7 +289,6 @@ class PlaneProgram:
         return Jump(arrested, ahead.status != Outcome.UNDECIDED, after, counts)
 
     def at(self, sample: StaticSample, state: State, load: float) -> State | None:
-        """Return the equilibrium at a load from a state below, None if it is not found."""
         if load <= state.load:
             return state
         found = least_equilibrium(self._operator(sample), sample, load, state.slip, ACCURACY)
@@ -302,7 +297,6 @@ class PlaneProgram:
         return replace(state, load=load, slip=found.slip, unstable=False)
 
     def stress_released(self, state: State) -> Array:
-        """Return the stress that the slip takes off the interface, K d, Pa."""
         symbol = self.elastic.symbol(self.shape)
         slip = state.slip.reshape(self.shape)
         released: Array = np.fft.irfft2(symbol * np.fft.rfft2(slip), self.shape).reshape(-1)
