@@ -115,7 +115,9 @@ def test_what_survives_counts_as_survived():
         assert found.survived == pytest.approx(lost, abs=error)
         share = np.mean(plain < design.stress)
         assert found.probability == pytest.approx(share, abs=4.0 * found.cv * share + error)
-    pressed = st.failure_probability(problem, likely, 9e6, **options, algorithm="plain")
+    pressed = st.failure_probability(
+        problem, likely, friction_coefficient=9.9, **options, algorithm="plain"
+    )
     # Whatever the stress, no more than those that have an instability.
     assert pressed.probability == pytest.approx(1.0 - lost, abs=error)
     refuses("need not happen", lambda: st.failure_probability(
@@ -124,7 +126,7 @@ def test_what_survives_counts_as_survived():
     never = st.design_stress(problem, likely, probability=0.97, **options)
     assert never.stress == math.inf
     assert any("no stress has that probability" in text for text in never.warnings)
-    curve = st.failure_curve(problem, likely, smallest=0.02, **FIRST)
+    curve = st.failure_curve(problem, likely, smallest=0.02, **options)
     assert curve.survived == pytest.approx(lost, abs=error)
     assert np.isfinite(curve.stress).all()
 

@@ -344,7 +344,7 @@ def test_as_many_members_are_drawn_as_the_target_needs(monkeypatch):
     design = st.design_stress(LINE, source, probability=true, **options, target_cv=0.5)
     slope = norm.pdf(2.9) / true / scale
     assert design.stress == pytest.approx(stress, abs=4.0 * design.cv / slope)
-    curve = st.failure_curve(LINE, source, smallest=0.01, **options)
+    curve = st.failure_curve(LINE, source, smallest=0.01, **options, target_cv=0.3)
     assert curve.sizes["member"] > 100
     assert 0.0 < curve.members_cv[-1] <= 0.6 * 0.3
     assert np.isnan(curve.band_low[-1])

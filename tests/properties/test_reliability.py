@@ -78,7 +78,7 @@ def test_weak_places_are_spread_over_the_interface():
 
 def test_curve_and_design_stress_agree_and_are_monotone():
     options = {"method": LOCAL, "target_cv": 0.3}
-    curve = st.failure_curve(PROBLEM, STRENGTH, smallest=1e-5, method=LOCAL)
+    curve = st.failure_curve(PROBLEM, STRENGTH, smallest=1e-5, **options)
     stress, chance = curve["stress"].values, curve["probability"].values
     for name, values in (("stress", stress), ("probability", chance)):
         assert np.all(np.diff(values) < 0.0)
@@ -166,10 +166,10 @@ SYSTEMS = [
 @given(
     low=of.floats(4e5, 9e5), tail=of.floats(0.7, 6.0),
     initial=of.sampled_from([0.0, 1e5, 3e5]), pressed=of.booleans(), between=of.booleans(),
-    seed=of.integers(0, 99),
+    per_pressure=of.booleans(), seed=of.integers(0, 99),
 )  # fmt: skip
 def test_no_sample_lies_beyond_the_bounds(
-    system, method, low, tail, initial, pressed, between, seed
+    system, method, low, tail, initial, pressed, between, per_pressure, seed
 ):
     """Whatever is driven, random and asked for; what need not happen has no upper bound."""
     blocks, interface = DRIVES.get(system), INTERFACES.get(system, INTERFACES["line"])
@@ -187,7 +187,7 @@ def test_no_sample_lies_beyond_the_bounds(
         problem = st.Problem(SOLID, interface, law, load, mode=mode, specimen=specimen)
         random = random_of(low, tail, initial, pressed, between)
         experiment = Experiment(problem, random, METHODS[method])
-        state = LimitState(experiment, "critical_stress")
+        state = LimitState(experiment, "critical_stress", per_pressure)
         draws = state.draws(seed, 0, 24 if method in ("local", "exact") else 3)
         draws[: len(draws) // 2] *= 2.5  # near the ends of the marginals
         for event in EVENTS:

@@ -14,7 +14,7 @@ import xarray as xr
 from recording import Calls, compared
 from refusals import table_of
 from setups import LOCAL, make_problem
-from small_study import small_study
+from small_study import lengths, small_study
 
 import stiction as st
 from stiction.base.model import model
@@ -130,8 +130,14 @@ def scanned(**given):
     return lambda: studied(random__strength__given={k: v for k, v in known.items() if v})
 
 
+def uncertain(**tables):
+    return lambda: studied(**tables)
+
+
 BETWEEN = {"type": "lognormal", "mean": 1.0, "cv": 0.1}
 LENGTH = "random.strength.spectrum.correlation_length"
+POWER = {"type": "power_law", "correlation_length": 3e-3}
+SOME = {"count": 4, "random.strength.marginal.low": [0.58e6, 0.7e6]}
 COUNT, SPACING = 400, 2e-4
 PIECE = st.Interface(COUNT * SPACING, COUNT)
 FIELD = st.RandomField(st.Lognormal(mean=1e6, cv=0.2), st.ExponentialSpectrum(1e-3), True)
@@ -336,6 +342,14 @@ table_of(calls, {
         swept({"random.correlation.strength.residual_strenght": [0.1]}),
         lambda: studied(sweep={LENGTH: [1e-3], "ensemble.seed": [1]}),
         lambda: studied(sweep=[TWO], ensemble={"samples": 3, "keep": ["strength"]}),
+    ],
+    "uncertain": [
+        uncertain(uncertain=3), uncertain(uncertain={"count": 5}), uncertain(random=[]),
+        uncertain(uncertain={"marginal.low": 3}), uncertain(uncertain={"marginal.lw": [1, 2]}),
+        uncertain(uncertain={"correlation_length": [1e-3, 2e-3]}, sweep=lengths(3e-3, 7e-3)),
+        uncertain(uncertain={"correlation_length": [1e-3, 2e-3]}, sweep=[{
+            "random.strength.spectrum": [POWER, POWER | {"correlation_length": 7e-3}]}]),
+        uncertain(uncertain=SOME, random=[small_study()["random"]] * 2),
     ],
     "fits": [
         lambda: st.fit_field(VALUES),

@@ -115,7 +115,7 @@ def specimens_and_their_events():
 
 @calls(DRAWN, close=1e-4)
 def failure_curves():
-    options = {"method": LOCAL, "smallest": 1e-2, "repetitions": 2, "seed": 3}
+    options = {"method": LOCAL, "smallest": 1e-2, "target_cv": 0.4, "seed": 3}
     curve = st.failure_curve(of_width(plain(LINE)), FIELD, **options)
     without = curve.drop_vars("force")
     return {

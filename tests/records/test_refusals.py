@@ -100,6 +100,17 @@ CALLS = {
     ],
     "studies": [
         lambda: studied(
+            uncertain={"count": 3, "strength.marginal.low": [5e5, 6e5]},
+            sweep=[{"random.strength.marginal": [
+                {"type": "beta", "alpha": a, "beta": 3.0, "low": low, "high": 1.6e6}
+                for a, low in ((1.5, 6e5), (2.5, 6e5))
+            ]}],
+        ),
+        lambda: studied(
+            uncertain={"count": 3, "strength.marginal.low": [5e5, 6e5]},
+            sweep=[{"random.strength.marginal.low": [5e5, 6e5]}],
+        ),
+        lambda: studied(
             ensemble={"samples": 3, "keep": ["strength"]},
             sweep=[{"random.strength": [
                 small_study(correlation_length=one)["random"]["strength"] for one in (4e-3, 6e-3)

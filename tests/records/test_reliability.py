@@ -60,6 +60,12 @@ def two_levels():
     return probability(7.3e5, target_cv=0.5, seed=6, **given)
 
 
+@calls(COUNTED, close=1e-5)
+def a_coefficient_under_a_random_pressure():
+    given = {"algorithm": "subset", "max_evaluations": 20_000, "friction_coefficient": 0.31}
+    return probability(None, random=PRESSED, method=LOCAL, target_cv=0.5, seed=7, **given)
+
+
 @calls("bounds of the strength, tests/exact/test_reliability_bounds.py")
 def below_and_above_what_any_interface_carries():
     return [probability(stress, method=LOCAL) for stress in (4.1e5, 2.1e6)]
@@ -79,7 +85,7 @@ def design_stress_of_a_list():
 @calls(COUNTED, close=1e-5)
 def a_curve_to_a_thousandth():
     return st.failure_curve(
-        WIDE, BOUNDED, method=LOCAL, smallest=1e-3, repetitions=2, seed=9, workers=1
+        WIDE, BOUNDED, method=LOCAL, smallest=1e-3, target_cv=0.3, seed=9, workers=1
     )
 
 

@@ -20,7 +20,6 @@ from small_study import lengths, small_study
 
 import stiction as st
 from stiction.base import progress
-from stiction.base.model import to_plain
 from stiction.cli import commands
 from stiction.cli.report import Page
 from stiction.ensemble.experiment import Experiment
@@ -126,7 +125,7 @@ def commands_of_a_sweep():
     return of_commands(
         SWEPT,
         "run study.toml --out run --workers 1",
-        "status run",
+        "status run --parts 3",
         "export run all.csv",
         "export run all.nc",
         "report run",
@@ -210,17 +209,17 @@ def answers_of_commands():
     )
     plain["problem"]["interface"]["width"] = 0.013
     plain["problem"]["load"] = {"normal_pressure": 2.7e6}
+    plain["reliability"] = {"force": 430.0, "target_cv": 0.5}
     lines = """
- --force 430 --target-cv 0.5
- --probability 0.02 --target-cv 0.5
- --friction-coefficient 0.26 --target-cv 0.5
+ --probability 0.02
+ --friction-coefficient 0.26
  --stress 7e5 --force 7e3
  --probability 2
  --out run --stress 7e5
  --part 1/3 --stress 7e5""".splitlines()
     with inside(plain):
         found = {line: command(f"reliability study.toml{line}") for line in lines}
-        del plain["problem"]["interface"]["width"]
+        del plain["reliability"], plain["problem"]["interface"]["width"]
         Path("other.toml").write_text(tomli_w.dumps(plain))
         asked = ("", " --force 7e3")
         return found | {f"other{one}": command(f"reliability other.toml{one}") for one in asked}
@@ -253,9 +252,7 @@ report study.toml""".splitlines():
 def reliability_of_uncertain_interfaces():
     study = small_study(nodes=96, length=0.047, weakening_rate=0.31e12)
     study["problem"]["interface"]["width"] = 0.013
-    one = st.Study.from_dict(study).random
-    likely = one.uncertain({"strength.marginal.alpha": (1.4, 1.9)}, 3, 3)
-    study["random"] = to_plain(likely)
+    study["uncertain"] = {"count": 3, "strength.marginal.alpha": [1.4, 1.9]}
     study["sweep"] = [{"random.strength.marginal.low": [6.1e5, 7.0e5]}]
     return of_commands(
         study,
@@ -297,7 +294,7 @@ def a_run_in_parts():
     found = of_commands(
         plain,
         "run study.toml --out run --workers 1 --part 2/3",
-        "status run",
+        "status run --parts 3",
         "export run part.csv",
         "export run all.csv --partial",
         "report run",

@@ -23,6 +23,7 @@ def study(**tables):
 
 
 UNCERTAIN = {
+    "count": 4,
     "random.strength.marginal.low": [0.58e6, 0.7e6],
     "random.strength.marginal.high": {"type": "truncated_normal", "mean": 1.6e6, "cv": 0.1},
 }
@@ -73,6 +74,7 @@ def test_interrupted_in_parts_and_grown_it_has_the_same_bits(whole, tmp_path):
         computed(tmp_path / "broken", one=one, progress=stop)
     stored = st.open_run(tmp_path / "broken")
     assert (stored.status().done, stored.status().samples) == (2, 6)
+    assert stored.missing_parts(3) == [1, 2, 3]
     # The first repetitions of two points are there: the third has no number yet.
     assert np.isnan(stored.dataset().stress.values).any(axis=1).tolist() == [False, False, True]
     xr.testing.assert_equal(computed(tmp_path / "broken", one=one), whole)
@@ -81,6 +83,7 @@ def test_interrupted_in_parts_and_grown_it_has_the_same_bits(whole, tmp_path):
         for one_file in (batches, repetitions):
             patch.setattr(one_file, "versions", lambda: "stiction 99.0")
         computed(tmp_path / "parts", 1, one, part="2/2")
+    assert st.open_run(tmp_path / "parts").missing_parts(2) == [1]
     for part in ("1/2", "2/2"):
         with (
             ThreadPoolExecutor(2) as pool,
@@ -88,6 +91,7 @@ def test_interrupted_in_parts_and_grown_it_has_the_same_bits(whole, tmp_path):
         ):
             computed(tmp_path / "parts", one=one, part=part, executor=pool)
     found = st.open_run(tmp_path / "parts")
+    assert found.missing_parts(2) == []
     xr.testing.assert_equal(found.dataset(), whole)
     next((tmp_path / "parts" / "chunks").iterdir()).write_bytes(b"damaged")
     with pytest.warns(UserWarning, match="its repetitions are missing"):
@@ -99,12 +103,15 @@ def test_uncertain_parameters_are_interfaces_that_are_equally_likely(
 ):
     """A study file, the list it stands for, and each interface of that list alone."""
     monkeypatch.chdir(tmp_path)
-    likely = study().random.uncertain(UNCERTAIN, 4, 3)
-    one = dataclasses.replace(study(sweep=[]), random=likely)
+    one = study(uncertain=UNCERTAIN, sweep=[])
     one.to_toml("study.toml")
     assert st.Study.from_toml("study.toml") == one
+    likely = one.experiments[0].given
     lows = sorted(member.strength.marginal.low for member in likely)
     assert np.floor((np.array(lows) - 0.58e6) / 0.03e6).tolist() == [0, 1, 2, 3]
+    again = study(random=st.Study(
+        problem=one.problem, random=likely, method=one.method, ensemble=one.ensemble
+    ).to_dict()["random"], sweep=[])  # fmt: skip
     printed = runs(
         f"reliability study.toml --out RUN --smallest {SMALLEST} --repetitions 2", ""
     )
@@ -114,6 +121,7 @@ def test_uncertain_parameters_are_interfaces_that_are_equally_likely(
     page = (tmp_path / "RUN" / "report.html").read_text(encoding="utf-8")
     assert "mean over 4 equally likely interfaces" in page
     found = st.open_run("RUN").dataset()
+    xr.testing.assert_equal(computed(tmp_path / "list", one=again), found)
     for number, member in enumerate(likely):
         onsets = st.monte_carlo(
             one.problem, member, method=one.method, samples=3000, seed=6
@@ -147,8 +155,9 @@ def test_in_memory_it_is_the_same_curve(tmp_path):
     (point,) = one.experiments
     memory = st.failure_curve(
         point.problem, point.random, method=point.method, seed=point.seed, smallest=SMALLEST,
-        repetitions=3,
+        target_cv=0.13,
     )  # fmt: skip
-    stored = computed(tmp_path / "run", 3, one)
+    stored = computed(tmp_path / "run", memory.repetitions, one)
+    assert memory.repetitions > 1
     assert memory.evaluations == stored.evaluations
     xr.testing.assert_equal(memory, stored)

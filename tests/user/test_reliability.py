@@ -83,6 +83,9 @@ def test_budget_too_small_for_any_failure():
         answer = design(1e-9, max_evaluations=3000)
     assert answer.interval == (0.66e6, answer.stress)
     assert failure(answer.stress, algorithm="subset", target_cv=0.5).probability > 1e-9
+    with pytest.warns(st.AccuracyWarning, match="do not reach"):
+        curve = st.failure_curve(*SYSTEM, method=LOCAL, smallest=1e-9, max_evaluations=3000)
+    assert 1e-5 < float(curve["probability"].min()) < 1e-2
     with pytest.warns(st.AccuracyWarning):
         nothing = failure(0.6605e6, EXACT, algorithm="two_level", max_evaluations=100)
     # A dozen of its samples show next to nothing, and the interval says so.
@@ -153,16 +156,39 @@ def joint():
     return problem, st.RandomField(st.Lognormal(mean=1e6, cv=0.25), spectrum, True)
 
 
+@pytest.fixture(scope="module")
+def short(joint):
+    """Strength that varies within a tenth of h_n, where the criterion is too high."""
+    problem = dataclasses.replace(joint[0], friction=st.LinearWeakening(weakening_rate=0.5e12))
+    spectrum = st.PowerLawSpectrum(0.12 * problem.nucleation_length)
+    return problem, st.RandomField(st.Lognormal(mean=1e6, cv=0.2), spectrum, True)
+
+
 def test_the_local_criterion_is_checked_by_equilibrium(joint):
-    """Counting tells that they differ."""
-    with pytest.warns(st.AccuracyWarning, match="differs from the exact onset by"):
+    """Both probabilities are given where they differ; counting tells that they do."""
+    with pytest.warns(st.AccuracyWarning, match=r"fail by the local criterion and .* by equil"):
         found = failure(0.66e6, system=joint, algorithm="subset", target_cv=0.2)
     local, exact = shares(joint, 0.66e6, samples=2000, seed=3)
     assert exact < 0.7 * local
     assert 0.4 < found.probability / local < 2.5
-    with pytest.warns(st.AccuracyWarning, match="differs from the exact onset by"):
+    with pytest.warns(st.AccuracyWarning, match="by equilibrium the probability"):
         answer = design(1e-3, system=joint, target_cv=0.3)
-    assert any("the exact onset" in text for text in answer.warnings)
+    assert any("by equilibrium" in text for text in answer.warnings)
+
+
+@pytest.mark.parametrize("stress", [0.7505e6, 0.7857e6])
+def test_the_check_after_subset_simulation_sees_both_sides(short, stress):
+    """P of 0.95e-3 and 0.95e-2: nearly all of the last level fails, and equilibrium fails more.
+
+    By 1.45 and 1.36 times (subset simulation by both, 5 % each). A check of the last level alone
+    saw no sample that fails by equilibrium only, and five of six seeds were not warned.
+    """
+    with pytest.warns(st.AccuracyWarning, match="by equilibrium the probability"):
+        found = failure(stress, system=short, algorithm="subset")
+    counts = re.search(r"(\d+) fail by the local criterion and (\d+) by", found.warnings[-1])
+    local, exact = map(int, counts.groups())
+    assert 16 <= local <= 48
+    assert exact > local
 
 
 @pytest.mark.parametrize("rho", [0.9, -0.6, 1.0])

@@ -265,8 +265,9 @@ def description(study: Any) -> dict[str, str]:
     some = distinct(points, "problem", "random", "method")
     methods = ", ".join(dict.fromkeys(point.method.label for point in some))
     lines = {"method": methods, "samples": samples}
-    if isinstance(study.random, list):
-        lines["random"] = f"{len(study.random)} equally likely interfaces"
+    if study.uncertain:
+        keys = ", ".join(key for key in study.uncertain if key != "count")
+        lines["uncertain"] = f"{keys}: {study.uncertain['count']} equally likely interfaces"
     for number, (dim, coordinates) in enumerate(study.axes.items(), start=1):
         keys = " with ".join(variable.long_name for _, variable in coordinates.values())
         values, variable = coordinates[dim]
@@ -468,13 +469,12 @@ def reliability(
         float | None, Option(help="Shear stress over normal pressure to carry.")
     ] = None,
     probability: Annotated[float | None, Option(help="Probability of a design.")] = None,
-    target_cv: Annotated[float, Option(help="Coefficient of variation to reach.")] = 0.1,
     out: Annotated[
         Path | None,
         Option(metavar="RUN", help="Compute the curve; repetitions are stored in this folder."),
     ] = None,
     smallest: Annotated[float, Option(help="Smallest probability of the curve.")] = 1e-9,
-    repetitions: Annotated[int, Option(help="Independent repetitions.", min=1)] = 4,
+    repetitions: Annotated[int, Option(help="Independent repetitions.", min=1)] = 8,
     workers: Workers = None,
     scheduler: Scheduler = None,
     part: Part = None,
@@ -482,17 +482,17 @@ def reliability(
     """Compute how likely a study's interface is to slide below a demand, or its design.
 
     One line answers at each point of the sweep: to `--force`, `--stress` or
-    `--friction-coefficient` with a probability, to `--probability` with the design. With `--out` it
-    is the whole curve, decade by decade.
+    `--friction-coefficient` with a probability, to `--probability` with the design; without an
+    option, to the table [reliability] of the study. With `--out` it is the whole curve, decade by
+    decade.
 
     Problem, strength, method, seed and sweep come from the study file; its number of samples is
     not used. The stress is the mean shear stress on the interface; failure means that the
-    interface as a whole slides below it. Of a list of equally likely interfaces the
-    probability is the mean, and the band that holds 90 % of them is beside it. Rerunning the
+    interface as a whole slides below it. With a table [uncertain] the probability is the mean over
+    equally likely interfaces, and the band that holds 90 % of them is beside it. Rerunning the
     command resumes an interrupted run, and computes more if there are to be more repetitions.
     `stiction export` writes the curve as a table, `stiction report` a page with its figure.
     """
-    from stiction.reliability.failure import design_stress, failure_probability
     from stiction.study.export import table_of
     from stiction.study.study import Study, open_run
 
@@ -508,18 +508,7 @@ def reliability(
             raise InputError(
                 [f"--{name}: shares the work of a curve; give --out" for name in needs]
             )
-        if not asked:
-            raise InputError(
-                "--out: give the folder of a curve, or ask for one answer with --force, --stress,"
-                " --friction-coefficient or --probability"
-            )
-        ask: Any = failure_probability if probability is None else design_stress
-        for point, one in zip(loaded.points, loaded.experiments, strict=True):
-            answer = ask(
-                one.problem, one.given, method=one.method, seed=one.seed, workers=workers,
-                target_cv=target_cv, **asked,
-            )  # fmt: skip
-            echo(f"{point}: " * bool(point.values) + str(answer))
+        _answer(loaded, asked, workers)
         return
     if asked:
         raise InputError(
@@ -541,6 +530,28 @@ def reliability(
     echo(
         f"part {part}: " * bool(part) + f"{state.done} of {state.samples} repetitions in {out}"
     )
+
+
+def _answer(study: Any, asked: dict[str, float], workers: int | None) -> None:
+    """Print the answer to what was asked, or else to the question of the study, at each point."""
+    from stiction.study.question import Question
+
+    question = study.reliability
+    if asked:
+        given = {} if question is None else {"target_cv": question.target_cv}
+        try:
+            question = Question(**given, **asked)
+        except InputError as error:
+            texts = (text.partition("Question")[2].lstrip(".: ") for text in error.problems)
+            raise InputError(texts) from None
+    if question is None:
+        raise InputError(
+            "--out: give the folder of a curve, or ask for one answer with --force, --stress,"
+            " --friction-coefficient or --probability, or in the table [reliability] of the study"
+        )
+    for point, experiment in zip(study.points, study.experiments, strict=True):
+        where = f"{point}: " if point.values else ""
+        echo(f"{where}{question.answer(experiment, workers)}")
 
 
 # -- the program ---------------------------------------------------------------------------------

@@ -37,10 +37,15 @@ SHORTEST = 2e-3
 
 @dataclass(frozen=True, eq=False)
 class LimitState:
-    """Stress at onset of standard normal draws; see `stiction.external.limit_state`."""
+    """Stress at onset as a function of standard normal draws; see `stiction.external.limit_state`.
+
+    Stresses may be taken per normal pressure: where that is random, each is multiplied by the mean
+    pressure over that of its sample, so that one number stands for a coefficient.
+    """
 
     experiment: Experiment
     event: Event = "critical_stress"  # which of the method's stresses
+    per_pressure: bool = False
     workers: int = 1  # threads; the numbers do not depend on this
     meter: Meter = SILENT  # counts the samples
 
@@ -52,6 +57,11 @@ class LimitState:
     def dimension(self) -> int:
         """Number of draws of a sample."""
         return self.experiment.dimension
+
+    @property
+    def _random_pressure(self) -> bool:
+        """Whether stresses are divided by a pressure that differs between samples."""
+        return self.per_pressure and "normal_pressure" in self.experiment.random.names
 
     def by(self, method: Any) -> Self:
         """Return the same limit state by another method."""
@@ -95,7 +105,11 @@ class LimitState:
         return found if given.ndim == 2 else found[0]
 
     def _stress(self, draws: Array) -> Array:
-        found: Array = self.experiment.onset(self.profiles(draws))[self.event]
+        profiles = self.profiles(draws)
+        found: Array = self.experiment.onset(profiles)[self.event]
+        if self._random_pressure:
+            pressure = profiles["normal_pressure"].reshape(draws.shape[0], -1).mean(axis=1)
+            found = found * self.experiment.pressure / pressure
         self.meter.advance(draws.shape[0])
         return found
 
@@ -163,6 +177,11 @@ class LimitState:
         # The mean of the initial stress is itself random where it is a field: take its lowest.
         initial = np.mean(np.broadcast_to(least, profile.shape))
         low = float(initial + np.min((low - most) / profile) * np.mean(profile))
+        if self._random_pressure:
+            ends = support_in_stress(problem, random, "normal_pressure", chance)
+            mean = self.experiment.pressure
+            ratios = mean / ends[1], mean / ends[0] if ends[0] > 0.0 else math.inf
+            low, high = low * ratios[low < 0.0], high * ratios[1]
         below, above = self._bounded
         return low if below else -math.inf, high if above else math.inf
 

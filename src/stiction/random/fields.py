@@ -191,11 +191,12 @@ class RandomField:
         lost = modes.unresolved
         if lost > LOST:
             nodes = " x ".join(map(str, interface.shape))
+            enough = " x ".join(map(str, modes.nodes_for(LOST)))
             warn_accuracy(
                 f"the grid of {nodes} nodes is coarser than the spectrum: values at the nodes"
                 f" are exact, but {100.0 * lost:.2g} % of the variance lies at wavelengths that the"
-                " grid does not resolve; take more nodes, or end the spectrum there with"
-                f" power_kept={1.0 - lost:.3g}"
+                f" grid does not resolve; with interface.nodes >= {enough} it is less than"
+                f" {100.0 * LOST:g} %, or end the spectrum there with power_kept={1.0 - lost:.3g}"
             )
         if self.mean_mode:
             return

@@ -39,6 +39,15 @@ class Modes:
         limit = np.array(self.interface.embedding.shape)[:, None] // 2
         return float(np.sum(self.sigma[(np.abs(self.numbers) > limit).any(axis=0)] ** 2))
 
+    def nodes_for(self, share: float) -> list[int]:
+        """Return how many nodes leave at most this share unresolved, at the proportions given."""
+        shape = np.array(self.interface.shape)
+        halves = np.array(self.interface.embedding.shape) / 2.0
+        finer = (np.abs(self.numbers) / halves[:, None]).max(axis=0)  # than now, to resolve it
+        order = np.argsort(finer)
+        last = np.searchsorted(np.cumsum(self.sigma[order] ** 2), 1.0 - share)
+        return [2 * math.ceil(n / 2 * finer[order][last] - 1e-9) for n in shape.tolist()]
+
     def gaussian(self, draws: Array) -> Array:
         """Compute z(x) = sum_m sigma_m (A_m cos k_m.x + B_m sin k_m.x), (samples, *shape).
 

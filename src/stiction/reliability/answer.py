@@ -2,15 +2,16 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Self, TypeAlias
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 from pydantic import Field
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError, warn_accuracy
+from stiction.base.errors import InputError, collect_warnings, warn_accuracy
 from stiction.base.model import Real, at_least
 from stiction.base.progress import Meter
 from stiction.base.units import in_words
@@ -18,7 +19,7 @@ from stiction.ensemble.batches import usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import Event, LimitState, weakest_first
 from stiction.ensemble.monte_carlo import check_fields
-from stiction.ensemble.pilot import LOOKED_AT, compare, doubt
+from stiction.ensemble.pilot import exact_counterpart
 from stiction.random.equally_likely import MOST as MOST_MEMBERS
 from stiction.reliability.tail import Tail, two_levels_refused
 
@@ -36,6 +37,8 @@ LISTED, SAMPLED = 0.6, 0.8
 """Parts of the target for the error of the list of interfaces and that of sampling, in squares."""
 MORE, CARRIED = 1.2, 0.9
 """Margin on the number of members wanted; share of the mean whose carriers are counted."""
+CHECKED = (8, 64)
+"""Fewest and most samples that are solved exactly to check those of the local criterion."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -202,10 +205,16 @@ def prepare(
     max_evaluations: int | None,
     *,
     algorithm: str = "subset",
+    per_pressure: bool = False,
 ) -> tuple[LimitState, int]:
     """Return the limit state and the evaluations allowed, or refuse what cannot be computed."""
-    state = LimitState(experiment, event, workers or usable_cores(), meter)
+    state = LimitState(experiment, event, per_pressure, workers or usable_cores(), meter)
     problems = []
+    if per_pressure and not experiment.pressure > 0.0:
+        problems.append(
+            "friction_coefficient: needs a normal pressure (load.normal_pressure, Pa, or"
+            " load.pressing_force, N)"
+        )
     if algorithm in ("subset", "two_level") and (slow := too_slow(experiment, max_evaluations)):
         problems.append(f"method: {slow}")
     elif algorithm == "two_level" and (reason := two_levels_refused(state)):
@@ -256,7 +265,7 @@ def few_members(
     count = 1 + int(np.searchsorted(shares, CARRIED * shares[-1]))
     advice = (
         "give what it was drawn from, a fit or a posterior, in its place: more are then drawn; or"
-        " a longer list"
+        " a longer list (count of [uncertain])"
     )
     if random.source is not None:
         advice = (
@@ -283,8 +292,36 @@ def imprecise(cv: float, target_cv: float, evaluations: int) -> list[str]:
     return [text] if cv > target_cv else []
 
 
-def exact_doubts(state: LimitState) -> list[str]:
-    """Return a warning if samples of the local criterion are exactly otherwise; see `compare`."""
+def different(values: Array, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Return up to `count` positions with different values, in random order."""
+    _, first = np.unique(values, return_index=True)  # chains repeat states
+    chosen: NDArray[np.int64] = rng.permutation(first)[:count]
+    return chosen
+
+
+def exact_doubts(
+    state: LimitState, near: tuple[Array, Array], stress: float, probability: float
+) -> list[str]:
+    """Solve some samples of the local criterion exactly; return a warning if they fail otherwise.
+
+    `near` holds draws and stresses of samples on both sides of the stress, the lowest there are.
+    """
+    exact, (draws, values) = exact_counterpart(state.experiment), near
+    if exact is None or not values.size:
+        return []
+    count = int(np.clip(10.0 / exact.seconds, *CHECKED))
+    chosen = different(values, count, np.random.default_rng(0))
     state.meter.note = "checking by equilibrium"
-    text = doubt(compare([state.experiment], most=LOOKED_AT, workers=state.workers))
-    return [text] if text else []
+    with collect_warnings():
+        below = replace(state, experiment=exact)(draws[chosen]) < stress
+    failed = values[chosen] < stress
+    by_one, by_other, differing = (int(np.sum(own)) for own in (failed, below, below != failed))
+    if abs(by_other - by_one) <= 2.0 * math.sqrt(max(differing, 1)):
+        return []
+    there = min(probability * max(by_other, 1) / max(by_one, 1), 1.0)
+    return [
+        f"of {chosen.size} samples in the tail {by_one} fail by the local criterion and {by_other}"
+        " by equilibrium: by equilibrium the probability of failure is"
+        f" {'about' if by_other else 'below'} {there:.2g} instead of {probability:.2g}; use"
+        " method=st.Equilibrium()"
+    ]

@@ -1,7 +1,7 @@
 """Failure probability, design stress and the curve of both: counting, or the tail of the onset."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -14,10 +14,8 @@ from stiction.base.model import Count, Number, Positive, Progress, Real, checked
 from stiction.base.progress import Meter
 from stiction.base.units import Doubt, doubt_units, in_words
 from stiction.base.variables import ONSET_VARIABLES, PROFILES, Variable
-from stiction.ensemble.batches import usable_cores
 from stiction.ensemble.experiment import Experiment
-from stiction.ensemble.limit_state import Event, LimitState, weakest_first
-from stiction.ensemble.monte_carlo import check_fields
+from stiction.ensemble.limit_state import Event, LimitState
 from stiction.methods.protocol import MethodObject, label
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset
@@ -30,6 +28,7 @@ from stiction.reliability.answer import (
     TargetCv,
     band_of,
     chances_of_members,
+    different,
     exact_doubts,
     few_members,
     imprecise,
@@ -38,19 +37,16 @@ from stiction.reliability.answer import (
     wanted_members,
 )
 from stiction.reliability.counting import count_failures
-from stiction.reliability.repetitions import repetition
-from stiction.reliability.subset import Descent
-from stiction.reliability.tail import Goal, Tail, sample_tail
+from stiction.reliability.repetitions import SAMPLES, repetition
+from stiction.reliability.tail import Tail, repeat_until_precise, sample_tail
 from stiction.reliability.uncertainty import binomial_interval, generator, lognormal_interval
 
 PILOT = 1_000
 """Number of plain samples by which the algorithm is chosen."""
 FREQUENT = 0.01
 """Probability above which plain sampling needs no more evaluations than subset simulation."""
-REPETITIONS = 4
-"""Repetitions of a curve by default: a coefficient of variation of about 0.3 at 1e-9."""
 CURVE_CV = 0.3
-"""Part by the list of interfaces above which it is said to be too short."""
+"""Coefficient of variation at the end of a curve by default."""
 COMMONEST, PER_DECADE = 0.5, 3
 """Probability at which a curve begins, and its points for each decade."""
 NEGLIGIBLE = 1e-15
@@ -61,6 +57,8 @@ THOUSAND = 1e3
 """Factor off the mean strength from which on a stress is in another unit: kN for N, MPa for Pa."""
 SHOWN = 20
 """Failing profiles kept."""
+CHECKED = 32
+"""Number of failures among the samples that are also solved by equilibrium."""
 COVERED = 0.8
 """Share of the failures that the first stage must reach to avoid a warning."""
 
@@ -120,7 +118,7 @@ def failure_probability(
         unless `max_evaluations` is 20,000 or more.
     friction_coefficient : float, optional
         Instead of `stress`: ratio of mean shear stress to mean normal pressure that it must
-        carry. The pressure must not be random.
+        carry. If the pressure is random, each sample's own pressure counts.
     force : float, optional
         Instead of `stress`: shear force to carry, N. The area of the interface must be known.
     algorithm : {"auto", "plain", "subset", "two_level"}
@@ -153,7 +151,8 @@ def failure_probability(
     -----
     AccuracyWarning
         If the estimate is unreliable; `warnings` in the result holds the same texts. With
-        the local criterion, some samples are also solved by equilibrium, as by `monte_carlo`.
+        the local criterion, some samples near the stress are also solved by equilibrium,
+        and both probabilities are given if they differ by more than their error.
     UnitWarning
         If the stress is below a fiftieth or above fifty times of the mean strength; a thousand
         times is an `InputError`.
@@ -176,28 +175,25 @@ def failure_probability(
             f" {' and '.join(asked) or 'none'}"
         )
     [name] = asked
-    base = Experiment(problem, random, method, seed=seed)
     if force is not None:
-        wanted = problem.stress_of("force", force)
-    elif friction_coefficient is None:
-        wanted = float(stress or 0.0)
-    elif "normal_pressure" in base.random.names or not base.pressure > 0.0:
-        raise InputError(
-            "friction_coefficient: needs a normal pressure that is not random"
-            " (load.normal_pressure, Pa, or load.pressing_force, N)"
-        )
-    else:
-        wanted = friction_coefficient * base.pressure
+        stress = problem.stress_of("force", force)
 
     def solve(experiment: Experiment, meter: Meter) -> Answer:
         state, budget = prepare(
-            experiment, event, workers, meter, max_evaluations, algorithm=algorithm
+            experiment, event, workers, meter, max_evaluations,
+            algorithm=algorithm, per_pressure=stress is None,
+        )  # fmt: skip
+        wanted = (
+            (friction_coefficient or 0.0) * experiment.pressure if stress is None else stress
         )
         _check_unit(state, name, given[name] or 0.0, wanted)
-        found = _probability(state, wanted, algorithm, target_cv, budget, max_evaluations)
-        return Answer.of(state, stress=wanted, quantity=name, **found)
+        found = _probability(
+            state, float(wanted), algorithm, target_cv, budget, max_evaluations
+        )
+        return Answer.of(state, stress=float(wanted), quantity=name, **found)
 
-    return _answered(base, target_cv, Meter("failure_probability", show=progress), solve)
+    experiment = Experiment(problem, random, method, seed=seed)
+    return _answered(experiment, target_cv, Meter("failure_probability", show=progress), solve)
 
 
 def _answered(
@@ -282,8 +278,8 @@ def _probability(
         found = _by_counting(state, stress, target_cv, budget, least, begun)
         return found | {"reason": reason}
     tail = sample_tail(
-        state, Goal(target_cv, stress), algorithm=algorithm, budget=budget, reason=reason,
-        pilot=pilot,
+        state, algorithm=algorithm, target_cv=target_cv, budget=budget,
+        stress=stress, reason=reason, pilot=pilot,
     )  # fmt: skip
     return _by_tail(state, stress, tail, target_cv)
 
@@ -317,18 +313,25 @@ def _by_counting(
     Samples of a pilot do not enter: counting is chosen where they hold many failures.
     """
     seed = state.experiment.seed
+
+    def drawn(numbers: Any) -> Array:
+        rows = [state.draws(seed, start + int(one), 1) for one in numbers]
+        return np.concatenate([np.empty((0, state.dimension)), *rows])
+
     count, counted = count_failures(
         state, seed, stress, target_cv=target_cv, least=least,
         max_evaluations=budget - start, start=start,
     )  # fmt: skip
     stresses = counted.populations[0].values
-    failed = np.flatnonzero(stresses < stress)[:SHOWN]
+    failed = np.flatnonzero(stresses < stress)
+    # The weakest samples: failures and others in their true shares.
+    some = failed[:CHECKED]
+    near = np.argsort(stresses[: some.max(initial=-1) + 1], kind="stable")[: 2 * some.size]
     tail = Tail([counted])
-    drawn = [state.draws(seed, start + one, 1) for one in failed.tolist()]
     by_list = _members_cv(state, tail, stress)
     cv, interval = math.hypot(count.cv, by_list), count.interval()
     doubts = imprecise(count.cv, target_cv, start + stresses.size)
-    doubts += exact_doubts(state)
+    doubts += exact_doubts(state, (drawn(near), stresses[near]), stress, count.probability)
     return {
         "algorithm": "plain",
         "probability": count.probability,
@@ -338,7 +341,7 @@ def _by_counting(
         "evaluations": start + stresses.size,
         "survived": counted.survived,
         "members": chances_of_members(state, tail, stress),
-        "failing_profiles": _profiles(state, drawn),
+        "failing_profiles": _profiles(state, drawn(failed[:SHOWN])),
         "doubts": doubts,
     }
 
@@ -363,21 +366,20 @@ def _by_tail(state: LimitState, stress: float, tail: Tail, target_cv: float) -> 
                 " be low; compare with algorithm='subset'"
             )
     elif tail.complete:
-        doubts += exact_doubts(state)
+        doubts += exact_doubts(state, tail.repetitions[-1].around(stress), stress, probability)
     else:
         there = tail.probability(tail.reached), tail.cv(tail.reached)
         interval = 0.0, lognormal_interval(*there)[1]
         doubts = [f"{tail.short_of(f'{stress:.7g} Pa')}; the interval ends there"]
     draws, stresses = last.failing(stress)
-    _, first = np.unique(stresses, return_index=True)  # chains repeat states
-    chosen = generator(state.experiment.seed, 2).permutation(first)[:SHOWN]
+    chosen = different(stresses, SHOWN, generator(state.experiment.seed, 2))
     return tail.attributes | {
         "probability": probability,
         "cv": cv,
         "members_cv": by_list,
         "interval": interval,
         "members": chances_of_members(state, tail, stress),
-        "failing_profiles": _profiles(state, [draws[chosen]]),
+        "failing_profiles": _profiles(state, draws[chosen]),
         "doubts": doubts,
     }
 
@@ -387,9 +389,8 @@ def _members_cv(state: LimitState, tail: Tail, stress: float) -> float:
     return tail.members_cv(stress, state.experiment.random.kinds) if state.several else 0.0
 
 
-def _profiles(state: LimitState, parts: list[Array]) -> xr.Dataset:
+def _profiles(state: LimitState, draws: Array) -> xr.Dataset:
     """Return profiles and onset of some draws, labelled."""
-    draws = np.concatenate([np.empty((0, state.dimension)), *parts])
     if not draws.shape[0]:
         return xr.Dataset()
     problem, method = state.experiment.problem, state.experiment.method
@@ -447,7 +448,7 @@ def design_stress(
     -----
     AccuracyWarning
         If the allowed evaluations do not suffice, onsets accumulate at the bound, or
-        equilibrium and the local criterion disagree on samples.
+        equilibrium and the local criterion disagree on samples near the stress.
 
     Examples
     --------
@@ -475,8 +476,8 @@ def _quantile(
     often, lowest, doubts = probability >= FREQUENT, state.bounds[0], []
     target_cv *= SAMPLED if state.several else 1.0
     tail = sample_tail(
-        state, Goal(target_cv, probability=probability), budget=budget,
-        algorithm="subset" if often else "auto", reason="frequent" if often else "rare",
+        state, algorithm="subset" if often else "auto", target_cv=target_cv, budget=budget,
+        probability=probability, reason="frequent" if often else "rare",
     )  # fmt: skip
     by_list = 0.0
     if tail.complete:
@@ -499,7 +500,8 @@ def _quantile(
         interval = tail.stress_interval(probability, cv, lowest)
         doubts += imprecise(sampled, target_cv, tail.spent)
         if tail.algorithm == "subset":
-            doubts += exact_doubts(state)
+            near = tail.repetitions[-1].around(stress)
+            doubts += exact_doubts(state, near, stress, probability)
     else:  # the tail ends at its lowest sample
         cv, stress = math.inf, tail.extent[0] if math.isfinite(tail.extent[0]) else math.nan
         interval = (lowest, stress) if stress > lowest else state.bounds
@@ -524,8 +526,9 @@ def failure_curve(
     *,
     method: MethodObject,
     smallest: Probability = 1e-9,
-    repetitions: Count = REPETITIONS,
+    target_cv: TargetCv = CURVE_CV,
     seed: Number = 0,
+    max_evaluations: Budget | None = None,
     event: Event = "critical_stress",
     workers: Count | None = None,
     progress: Progress = True,
@@ -536,16 +539,14 @@ def failure_curve(
     ----------
     smallest : float
         Smallest probability of the curve.
-    repetitions : int
-        Of subset simulation, with 2,000 samples a level: the same, of the same numbers, as those of
-        `Study.failure_curve`. Four give a coefficient of variation of about 0.3 at 1e-9, 16 half
-        of it; it is lower at larger probabilities.
+    target_cv : float
+        Coefficient of variation to reach at the smallest probability; it is lower elsewhere.
+        Repetitions are added until it is reached: the same, of the same numbers, as those of
+        `Study.failure_curve`.
     problem, seed, workers, progress
         As in `monte_carlo`.
-    random, event
-        As in `failure_probability`.
-    method : LocalCriterion or Equilibrium
-        Failures by `Rupture` can only be counted.
+    random, method, max_evaluations, event
+        As in `design_stress`.
 
     Returns
     -------
@@ -565,8 +566,8 @@ def failure_curve(
     Warns
     -----
     AccuracyWarning
-        If the repetitions are stuck above the smallest probability, or equilibrium and the local
-        criterion disagree on samples.
+        If the allowed evaluations do not suffice, or equilibrium and the local criterion
+        disagree on samples at the end of the curve.
 
     Examples
     --------
@@ -578,51 +579,52 @@ def failure_curve(
     True
     """
     experiment = Experiment(problem, random, method, seed=seed)
-    refuse_counted([experiment])
     with Meter("failure_curve", show=progress) as meter, merge_warnings() as warned:
 
         def solve(own: Experiment) -> tuple[float, tuple[LimitState, Tail]]:
-            check_fields([own])
-            state = weakest_first(LimitState(own, event, workers or usable_cores(), meter))
-            found = [repetition(state, number, smallest) for number in range(repetitions)]
-            tail = tail_of(found)
+            state, budget = prepare(own, event, workers, meter, max_evaluations)
+            tail = _curve_tail(state, smallest, target_cv, budget)
             reached = tail.quantile(smallest) if tail.complete else tail.reached
             return _members_cv(state, tail, reached), (state, tail)
 
-        state, tail = _of_enough_members(experiment, CURVE_CV, meter, warned, solve)
-        for text in curve_doubts(state, tail, smallest):
+        state, tail = _of_enough_members(experiment, target_cv, meter, warned, solve)
+        for text in curve_doubts(state, tail, smallest, target_cv):
             warn_accuracy(text)
+        if not tail.complete:
+            smallest = tail.probability(tail.reached)
     attributes = study_attributes(problem=problem, random=experiment.given, method=method) | {
         "seed": seed,
         "evaluations": tail.spent,
-        "repetitions": repetitions,
+        "repetitions": len(tail.repetitions),
     }
     return curve_of(tail, state, chances(smallest), attributes)
 
 
-def refuse_counted(points: Sequence[Experiment]) -> None:
-    """Refuse methods whose failures can only be counted."""
-    if any(point.method.type == "rupture" for point in points):
-        raise InputError(
-            "method: failures by rupture are counted, not sampled by levels; use st.Equilibrium()"
-            " or st.LocalCriterion(), or failure_probability(..., algorithm='plain')"
-        )
+def _curve_tail(state: LimitState, smallest: float, target_cv: float, budget: int) -> Tail:
+    """Return repetitions down to the end of a curve."""
+    # Fewer than usual where the budget would not even hold four levels.
+    size = min(SAMPLES, max(budget // 4, 20))
+    found = repeat_until_precise(
+        lambda samples, number, left: repetition(state, number, smallest, samples, left),
+        lambda done: Tail(done).cv(Tail(done).quantile(smallest)),
+        target_cv=target_cv * (SAMPLED if state.several else 1.0), first=size, largest=size,
+        max_evaluations=budget, meter=state.meter,
+    )  # fmt: skip
+    return Tail(found, spent=sum(one.evaluations for one in found))
 
 
-def tail_of(repetitions: Sequence[Descent]) -> Tail:
-    """Return the tail of repetitions by number."""
-    return Tail(repetitions, spent=sum(one.evaluations for one in repetitions))
-
-
-def curve_doubts(state: LimitState, tail: Tail, smallest: float) -> list[str]:
+def curve_doubts(
+    state: LimitState, tail: Tail, smallest: float, target_cv: float = CURVE_CV
+) -> list[str]:
     """Return the reasons not to trust the end of a curve."""
     if not tail.complete:
         return [f"{tail.short_of(f'P = {smallest:g}')}; the curve ends there"]
     stress = tail.quantile(smallest)
     by_list = _members_cv(state, tail, stress)
     cv, members = math.hypot(tail.cv(stress), by_list), chances_of_members(state, tail, stress)
-    doubts = few_members(state.experiment.random, members, cv, by_list, CURVE_CV)
-    return doubts + exact_doubts(state)
+    doubts = few_members(state.experiment.random, members, cv, by_list, target_cv)
+    near = tail.repetitions[-1].around(stress)
+    return doubts + exact_doubts(state, near, stress, smallest)
 
 
 def chances(smallest: float) -> Array:

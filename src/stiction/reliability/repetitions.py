@@ -1,5 +1,6 @@
 """Repetitions of subset simulation by number: each depends on (seed, number) only, as a table."""
 
+import math
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -40,14 +41,21 @@ ROW = np.dtype(
 """A sample of a level, with what its level and its repetition share."""
 
 
-def repetition(state: LimitState, number: int, smallest: float) -> Descent:
+def repetition(
+    state: LimitState,
+    number: int,
+    smallest: float,
+    samples: int = SAMPLES,
+    max_evaluations: float = math.inf,
+) -> Descent:
     """Return a repetition that goes down to a probability."""
     with one_blas_thread():  # their number changes last bits
         return descend(
             state,
             state.dimension,
             rng=generator(state.experiment.seed, STREAM, number),
-            samples=SAMPLES,
+            samples=samples,
+            max_evaluations=max_evaluations,
             probability=DEEPER * smallest,
             floor=state.bounds[0],
             label=state.member,

@@ -113,6 +113,21 @@ class Descent(NamedTuple):
         below = last.values < value
         return last.draws[below], last.values[below]
 
+    def around(self, value: float) -> tuple[Array, Array]:
+        """Return draws and values of samples on both sides of a value, in their true shares.
+
+        They are the lowest of a population, twice as many as lie below the value. With more
+        than half of it below, almost none of the other side would be shown.
+        """
+        holders = self._holders(value)
+        while True:
+            holder = holders.pop()
+            below = int(np.sum(holder.values < value))
+            if 2 * below <= holder.values.size or not (holders and holders[-1].draws.size):
+                break
+        lowest = np.argsort(holder.values, kind="stable")[: min(2 * below, len(holder.draws))]
+        return holder.draws[lowest], holder.values[lowest]
+
 
 def grow(
     function: Function,

@@ -18,16 +18,11 @@ from stiction.base.variables import Variable
 from stiction.ensemble.batches import Here, Span, Table, usable_cores
 from stiction.ensemble.limit_state import LimitState, weakest_first
 from stiction.ensemble.monte_carlo import check_fields, complete
+from stiction.ensemble.pilot import exact_counterpart
 from stiction.ensemble.store import Store
 from stiction.problem.results import to_dataset
-from stiction.reliability.failure import (
-    chances,
-    curve_doubts,
-    curve_of,
-    refuse_counted,
-    tail_of,
-)
-from stiction.reliability.repetitions import repetitions_in, solve_repetition
+from stiction.reliability.failure import chances, curve_doubts, curve_of
+from stiction.reliability.repetitions import repetition, repetitions_in, solve_repetition
 from stiction.reliability.subset import Descent
 from stiction.reliability.tail import Tail
 from stiction.study.run import StoredRun, samples_of_part
@@ -58,7 +53,7 @@ class StoredRepetitions:
         """Return the tail of a point from all of its repetitions; None without any."""
         numbers = np.flatnonzero(self.done[point]).tolist()
         found = [self._found[point, number] for number in numbers]
-        return tail_of(found) if found else None
+        return Tail(found, spent=sum(one.evaluations for one in found)) if found else None
 
 
 class StoredCurves(StoredRun):
@@ -126,7 +121,11 @@ def compute(
     part: tuple[int, int] | None,
 ) -> xr.Dataset:
     """Return the curves, after computing what is not stored, or a part of it."""
-    refuse_counted(study.experiments)
+    if any(point.method.type == "rupture" for point in study.experiments):
+        raise InputError(
+            "method: failures by rupture are counted, not sampled by levels; use st.Equilibrium()"
+            " or st.LocalCriterion(), or failure_probability(..., algorithm='plain')"
+        )
     study = replace(study, ensemble=replace(study.ensemble, samples=repetitions))
     store = Store.open(out, study.to_dict() | {CURVES: settings})
     states = [LimitState(point, settings["event"]) for point in study.experiments]
@@ -155,6 +154,8 @@ def compute(
             with merge_warnings() as warned:
                 for point, state in enumerate(states):
                     tail = rows.tail(point)
+                    if exact_counterpart(state.experiment):  # stored repetitions have no draws
+                        tail = Tail([repetition(state, 0, smallest)])
                     for text in curve_doubts(state, tail, smallest) if tail else ():
                         warn_accuracy(text)
             store.note_pilot({"doubts": texts_of(warned)})

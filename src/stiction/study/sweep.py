@@ -12,10 +12,14 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
 from stiction.base.errors import InputError, prefixed, unknown_name
-from stiction.base.model import describe, to_plain
+from stiction.base.model import Count, check, describe, to_plain
 from stiction.base.variables import OF_THE_FIELD, UNITS, Variable
 from stiction.ensemble.dataset import Coordinates, GridAxes
+from stiction.random.dotted_keys import distributions_of, full_key
+from stiction.random.marginals import Marginal, marginal_of
 
+INTERFACES = 30
+"""Number of equally likely interfaces of a study with uncertain parameters."""
 MOST_POINTS = 100_000
 _FIXED = ("ensemble", "ensemble.samples", "ensemble.first", "ensemble.keep")
 _TABLES = ("problem", "random", "method", "ensemble")
@@ -121,6 +125,46 @@ Sweep: TypeAlias = Annotated[
     ),
 ]
 """A list of tables of dotted keys and their values."""
+
+
+def _read_uncertain(given: Any) -> dict[str, Any] | None:
+    """Return ``count`` and, by full dotted key, the distributions as tables of marginals."""
+    if given is None:
+        return None
+    if not isinstance(given, Mapping):
+        raise InputError(
+            f"must be a table of keys and their distributions, got {describe(given)}"
+        )
+    rest = dict(given)
+    found: dict[str, Any] = {"count": check("count", rest.pop("count", INTERFACES), Count)}
+    flat = _flat(rest)
+    for key, one in distributions_of(flat).items():
+        try:
+            given = flat[key]
+            table = isinstance(given, Marginal) or (
+                isinstance(given, Mapping) and "type" in given
+            )
+            plain = marginal_of(given if table else one)
+            found[full_key(key)] = plain.plain() if hasattr(plain, "plain") else to_plain(plain)
+        except ValueError as error:
+            raise InputError(f"{key}: {error}") from None
+    if len(found) == 1:
+        raise InputError("names no parameter; give its dotted key and a distribution")
+    return found
+
+
+Uncertain: TypeAlias = Annotated[
+    Any,
+    BeforeValidator(_read_uncertain),
+    WithJsonSchema(
+        {
+            "type": "object",
+            "description": "distributions of parameters by dotted key, each {low, high, spacing} or"
+            " {type, ...}; and count, the number of equally likely interfaces",
+        }
+    ),
+]
+"""Distributions by dotted key, and the number of interfaces."""
 
 
 def _text(value: Any) -> str:
