@@ -81,7 +81,7 @@ def loaded(**load):
 
 def on_plane(lengths, rate=RATE):
     problem = make_problem((48, 48), lengths, weakening_rate=rate)
-    return monte_carlo(problem, beta_strength(1e-3), samples=2)
+    return monte_carlo(problem, beta_strength(1e-3))
 
 
 def scanned(values, places=(0.01, 0.02), units="Pa", x_units="m"):
