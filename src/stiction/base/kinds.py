@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import pydantic
 from pydantic_core import CoreSchema, core_schema
 
-from stiction.base.errors import InputError, unknown, warn_user
+from stiction.base.errors import InputError, unknown
 from stiction.base.model import Mistakes, keys_of, mistakes, to_plain
 
 T = TypeVar("T", bound=type)
@@ -88,16 +88,6 @@ class Kinds(Mapping[str, Any]):
                 f" used: {text}"
             ) from None
 
-    def usable(self) -> dict[str, Any]:
-        """Return all classes by their `type`; warn of those that cannot be imported."""
-        found = {}
-        for name in self:
-            try:
-                found[name] = self[name]
-            except InputError as error:
-                warn_user(f"left out: {error}", UserWarning)
-        return found
-
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class OneOf:
@@ -105,13 +95,12 @@ class OneOf:
 
     `kinds` are the classes by `type`, `default` is the type of a table that names none. `convert`
     maps what was given to such an object, or returns NotImplemented to leave it: a table to its
-    class, anything else to the annotated type; `also` are JSON schemas of what else the field may
-    hold.
+    class, anything else to the annotated type; `untyped` leaves tables without a type to that.
     """
 
     kinds: Kinds
     convert: Callable[[Any], Any]
-    also: Sequence[Mapping[str, Any]] = ()
+    untyped: bool = False
     default: str | None = None
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
@@ -119,7 +108,7 @@ class OneOf:
             found = self.convert(value)
             if found is not NotImplemented:
                 return found
-            if not isinstance(value, Mapping) or (self.also and "type" not in value):
+            if not isinstance(value, Mapping) or (self.untyped and "type" not in value):
                 return inner(value)
             table = {"type": self.default, **value} if self.default else value
             return self.convert(from_table(self.kinds, table, info.context))
@@ -127,15 +116,6 @@ class OneOf:
         own = handler(source)
         plain = core_schema.wrap_serializer_function_ser_schema(self._written, schema=own)
         return core_schema.with_info_wrap_validator_function(read, own, serialization=plain)
-
-    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: Any) -> dict[str, Any]:
-        found = []
-        for name, kind in self.kinds.usable().items():
-            one = pydantic.TypeAdapter(kind).json_schema()
-            found.append(one)
-            if name != self.default:
-                one["required"] = [*one.get("required", ()), "type"]
-        return {"anyOf": [*found, *self.also]}
 
     def _written(self, value: Any, handler: Any) -> Any:
         if hasattr(value, "plain"):

@@ -25,7 +25,6 @@ from pydantic import (
     Field,
     InstanceOf,
     PlainSerializer,
-    WithJsonSchema,
 )
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
@@ -162,7 +161,12 @@ def _names(value: Any) -> tuple[str, ...]:
 def _path(value: Any) -> Path:
     text = os.fspath(value) if isinstance(value, str | os.PathLike) else ""
     valid = isinstance(text, str) and text == text.encode(errors="ignore").decode()
-    if not valid or not text or "\0" in text or max(map(len, Path(text).parts)) > 255:
+    if (
+        not valid
+        or not text
+        or "\0" in text
+        or max(map(len, Path(text).parts), default=0) > 255
+    ):
         raise ValueError("must be a path in UTF-8, each name at most 255 letters")
     return Path(text)
 
@@ -179,17 +183,10 @@ Real: TypeAlias = Annotated[float, BeforeValidator(as_number), Field(allow_inf_n
 Positive: TypeAlias = Annotated[Real, Field(gt=0)]
 Numbers: TypeAlias = Annotated[Any, BeforeValidator(as_numbers)]
 """Real numbers of any shape, as a float64 array."""
-PROFILE_SCHEMA = [
-    {"type": "number"},
-    {"type": "array", "items": {"type": "number"}},
-    {"type": "string", "description": "path to a .npy, text or NetCDF file"},
-    {"type": "object", "description": "file, and options of read_profile: unit, x_unit, ..."},
-]
 Profile: TypeAlias = Annotated[
     Any,
     BeforeValidator(_profile),
     PlainSerializer(_plain),
-    WithJsonSchema({"anyOf": PROFILE_SCHEMA}),
 ]
 OptionalProfile: Any = Profile | None
 """A number, or a read-only array of shape (nodes,); or None for 'not given'."""

@@ -2,7 +2,6 @@
 
 import functools
 import inspect
-import json
 import logging
 import os
 import re
@@ -29,7 +28,7 @@ RUPTURE = (
 )  # fmt: skip
 """What is printed of a rupture."""
 
-StudyFile = Annotated[Path, Argument(metavar="STUDY.toml", help="See `stiction schema`.")]
+StudyFile = Annotated[Path, Argument(metavar="STUDY.toml", help="See examples/paper.toml.")]
 RunPath = Annotated[Path, Argument(metavar="RUN", help="Folder of a run.")]
 Workers = Annotated[int | None, Option(help="Threads; all cores by default.", min=1)]
 Scheduler = Annotated[
@@ -318,13 +317,6 @@ def _cost(study: Any) -> dict[str, str]:
     }
 
 
-def schema() -> None:
-    """Print the JSON schema of a study file, for editors that complete and check TOML."""
-    from stiction.study.study import study_schema
-
-    echo(json.dumps(study_schema(), indent=2))
-
-
 # -- one interface -------------------------------------------------------------------------------
 
 
@@ -375,7 +367,7 @@ def onset(
     )  # fmt: skip
     rows: dict[str, dict[str, float]] = {}
     refused: list[str] = []
-    for name in method or METHODS.usable():
+    for name in method or METHODS:
         timed = name == "rupture" and problem.specimen is None
         options = {"loading_rate": LOADING_RATE} if timed else {}
         try:
@@ -602,7 +594,7 @@ def _command(function: Callable[..., None]) -> Callable[..., None]:
     return wrapped
 
 
-for _function in (run, check, status, export, report, schema, onset, rupture, reliability):
+for _function in (run, check, status, export, report, onset, rupture, reliability):
     app.command()(_command(_function))
 
 

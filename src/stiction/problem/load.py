@@ -12,7 +12,6 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.kinds import Kinds, OneOf, register
 from stiction.base.model import (
-    PROFILE_SCHEMA,
     OptionalProfile,
     Positive,
     Profile,
@@ -141,7 +140,7 @@ class Load:
     >>> load = st.Load(profile=st.EdgeLoad(excess=2.0, decay=0.01), normal_pressure=5e6)
     """
 
-    profile: Annotated[Profile, OneOf(LOADS, _shape, PROFILE_SCHEMA)] = 1.0
+    profile: Annotated[Profile, OneOf(LOADS, _shape, untyped=True)] = 1.0
     initial_stress: Profile = 0.0
     normal_pressure: OptionalProfile = None
     pressing_force: Positive | None = None

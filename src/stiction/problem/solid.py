@@ -67,14 +67,6 @@ class Solid:
         named["shear_modulus"] = modulus / (2.0 * (1.0 + (ratio if usable else 0.0)))
         return ArgsKwargs((), named) if isinstance(given, ArgsKwargs) else named
 
-    @classmethod
-    def __get_pydantic_json_schema__(cls, core: Any, handler: Any) -> Any:
-        schema = handler.resolve_ref_schema(handler(core))
-        schema["properties"]["youngs_modulus"] = {
-            "type": "number", "exclusiveMinimum": 0, "title": "Youngs Modulus",
-        }  # fmt: skip
-        return schema
-
     @model_validator(mode="after")
     def _plausible(self) -> Solid:
         speed = self.shear_wave_speed

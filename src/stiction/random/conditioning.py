@@ -23,13 +23,13 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import pydantic
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
+from pydantic import BeforeValidator, PlainSerializer
 from scipy.linalg import eigh, svd
 from scipy.special import ndtri
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
-from stiction.base.model import PROFILE_SCHEMA, Positive, model
+from stiction.base.model import Positive, model
 from stiction.base.units import is_in
 from stiction.base.variables import QUANTITIES
 from stiction.problem.interface import Interface
@@ -106,7 +106,6 @@ Points = Annotated[
     Any,
     BeforeValidator(_points),
     PlainSerializer(_table),
-    WithJsonSchema({"anyOf": PROFILE_SCHEMA}),
 ]
 
 

@@ -328,7 +328,5 @@ def _of_scipy(name: str, given: Mapping[str, Any], first: tuple[Any, ...] = ()) 
     return ScipyMarginal(name, tuple(values.items()))
 
 
-_OF_SCIPY = {"type": "string", "description": "name of a continuous scipy.stats distribution"}
-_ALSO = {"type": "object", "properties": {"type": _OF_SCIPY}, "required": ["type"]}
-AnyMarginal: TypeAlias = Annotated[Any, OneOf(MARGINALS, marginal_of, [_ALSO])]
+AnyMarginal: TypeAlias = Annotated[Any, OneOf(MARGINALS, marginal_of)]
 """A `Beta`, `Lognormal`, ..., or any frozen continuous `scipy.stats` distribution."""

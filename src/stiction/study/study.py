@@ -392,23 +392,6 @@ class Study(_Parts):
         return cls.from_dict(given)
 
 
-# pydantic's names of bounds behind a function that reads a value, and those of JSON schema.
-_BOUNDS = {
-    "gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum",
-}  # fmt: skip
-
-
-def study_schema() -> dict[str, Any]:
-    """Return the JSON schema of a study file."""
-
-    def renamed(table: dict[str, Any]) -> dict[str, Any]:
-        return {_BOUNDS.get(key, key): value for key, value in table.items()}
-
-    written = json.dumps(pydantic.TypeAdapter(Study).json_schema())
-    found: dict[str, Any] = json.loads(written, object_hook=renamed)
-    return found
-
-
 @model(kw_only=True)
 class Setup:
     """The interface that a study file describes, without its random properties."""

@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
+from pydantic import BeforeValidator, PlainSerializer
 
 from stiction.base.errors import InputError, prefixed, unknown_name
 from stiction.base.model import Count, check, describe, to_plain
@@ -115,16 +115,8 @@ Sweep: TypeAlias = Annotated[
     Any,
     BeforeValidator(read_axes),
     PlainSerializer(_plain_axes),
-    WithJsonSchema(
-        {
-            "type": "array",
-            "description": "axes that are crossed; each a table of dotted keys that vary together,"
-            " with lists of values",
-            "items": {"type": "object"},
-        }
-    ),
 ]
-"""A list of tables of dotted keys and their values."""
+"""Axes that are crossed: tables of dotted keys that vary together, with lists of values."""
 
 
 def _read_uncertain(given: Any) -> dict[str, Any] | None:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 import pydantic
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
+from pydantic import BeforeValidator, Field, PlainSerializer
 
 from stiction.base.errors import InputError
 from stiction.base.model import Count, Flag, Number, Positive, Real, model
@@ -46,7 +46,6 @@ LoadHistory = Annotated[
     Any,
     BeforeValidator(lambda value: None if value is None else load_history(value)),
     PlainSerializer(lambda value: None if value is None else [one.tolist() for one in value]),
-    WithJsonSchema({"type": "array", "items": {"type": "array", "items": {"type": "number"}}}),
 ]
 
 
