@@ -309,6 +309,8 @@ table_of(calls, {
         lambda: event(profiles=np.where(EVENT_STRENGTH > 1.2e6, np.inf, EVENT_STRENGTH)),
         lambda: event(profiles={"strength": EVENT_STRENGTH,
                                 "initial_stress": EVENT_STRENGTH + 1.0}),
+        lambda: event(problem=crooked(nodes=64, rate=0.01e12, height=0.02,
+                                      drive=st.Platen(stiffness=float("inf")))),
     ],
     "ruptures": [
         lambda: st.Rupture(loading_rate=1e7, load=([0.0, 1.0], [0.0, 1e7])),

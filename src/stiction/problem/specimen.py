@@ -105,8 +105,7 @@ class Blocks:
     quality_factor : float
         Q of the slowest shear wave along a block, of the frequency f = c_s/(2 L): momentum is lost
         at the rate 2 pi f/Q, in ruptures with inertia only. 25 is the inverse of the loss tangent
-        of acrylic at some 10 kHz, 0.04; ``float("inf")`` is no attenuation, so that waves echo for
-        ever and an arrested rupture never rests.
+        of acrylic at some 10 kHz, 0.04; ``float("inf")`` is no attenuation: waves echo for ever.
 
     Examples
     --------

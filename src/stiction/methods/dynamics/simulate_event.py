@@ -69,7 +69,11 @@ def simulate_event(
         states = [event.before for event in path.events]
         states += [path.last] if path.last.unstable else []
         meter.advance(len(states))
-        if not states or (number or 0) >= len(states):
+        if not states:
+            raise InputError(
+                "problem: nothing becomes unstable behind so stiff a machine; it slides stably"
+            )
+        if (number or 0) >= len(states):
             raise InputError(
                 f"event: there are {len(states)} here, counted from 0; got {number}"
             )

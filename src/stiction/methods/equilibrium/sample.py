@@ -56,7 +56,8 @@ def refused(law: FrictionLaw) -> list[str]:
         return []
     return [
         f"friction: equilibria are followed along straight pieces, and {name} has none;"
-        " use st.PiecewiseWeakening.from_law(friction, pieces=32), or st.Rupture(...)"
+        " use st.PiecewiseWeakening.from_law(friction, pieces=32), or, between half-spaces,"
+        " st.Rupture(...)"
     ]
 
 
