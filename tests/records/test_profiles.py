@@ -4,6 +4,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from crooked import (
     LINE,
@@ -16,9 +17,10 @@ from crooked import (
     write_table,
 )
 from recording import Calls, compared, refusal
-from setups import EXACT
+from setups import EXACT, LOCAL
 
 import stiction as st
+from stiction.study.export import export
 
 calls = Calls()
 BACK = "values written out above, tests/oracle/test_crooked.py and tests/user/test_profiles.py"
@@ -53,7 +55,7 @@ def tables_of_a_laboratory():
     found = {}
     for name, text in TABLES.items():
         options = {"x": "x (cm)", "value": "strength (kPa)"} if "three" in name else {}
-        found[name] = table(text, interface=SMALL, gaps="skip", **options)
+        found[name] = table(text, interface=SMALL, gaps="fill", **options)
     return found
 
 
@@ -103,10 +105,17 @@ def heights_of_a_matrix_without_a_unit():
 @calls(BACK)
 def gaps_across_the_seam():
     holes = as_measured(LINE.interface, np.where(LINE_GAP, np.nan, LINE_STRENGTH))
-    read = st.read_profile(holes, interface=LINE.interface, gaps="skip")
+    read = st.read_profile(holes, interface=LINE.interface, gaps="fill")
+    local, onset = (
+        st.onset(LINE, holes, method=method, gaps="fill") for method in (LOCAL, EXACT)
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        export(onset, Path(folder) / "onset.csv")
+        table = pd.read_csv(Path(folder) / "onset.csv")
+    of_line = {"read": read, "local": local, "exact": onset, "table": table}
     of_plane = as_measured(PLANE.interface, np.where(PLANE_GAP, np.nan, PLANE_STRENGTH))
-    of_plane = st.read_profile(of_plane, interface=PLANE.interface, gaps="skip")
-    return {"line": read, "plane": of_plane}
+    read = st.read_profile(of_plane, interface=PLANE.interface, gaps="skip")
+    return {"line": of_line, "plane": {"read": read}}
 
 
 @calls(BACK)

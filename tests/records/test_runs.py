@@ -192,6 +192,7 @@ onset joint/problem.toml --strength mu.csv
 onset joint/varying.toml --strength scan.csv
 onset wrong.toml --strength scan.csv
 onset study.toml --strength gaps.csv
+onset study.toml --strength gaps.csv --gaps fill
 onset study.toml --strength three.csv
 onset study.toml --strength p.npy --method local
 onset study.toml --strength missing.npy

@@ -93,6 +93,9 @@ def test_missing_values_are_left_out_and_counted(plain):
     assert fit.parameters == fitted(labelled(VALUES[there], PIECE.x[there])).parameters
     length = "spectrum.correlation_length"
     assert fit.parameters[length] == pytest.approx(plain.parameters[length], rel=0.15)
+    with pytest.warns(st.AccuracyWarning, match="filled"):  # which is no measurement
+        filled = st.read_profile(labelled(values), interface=PIECE, gaps="fill")
+    assert fitted(filled).parameters == fit.parameters
 
 
 def test_specimens_of_different_strength_are_not_taken_for_one_field(plain):

@@ -28,6 +28,7 @@ def test_gaps_are_refused_or_left(tmp_path):
     path = text(tmp_path / "map.csv", without=3)
     refuses("at 3 of 512 nodes, the first at x = 0 m, y = 0 m", lambda: read(path))
     assert int(np.isnan(read(path, gaps="skip")).sum()) == 3
+    refuses("gaps are filled on periodic lines only", lambda: read(path, gaps="fill"))
 
 
 @pytest.fixture(params=[".csv", ".nc", ".npy"])

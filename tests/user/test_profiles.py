@@ -267,15 +267,41 @@ def test_other_places_are_said_and_interpolated_only_where_it_is_asked_for():
         assert [*np.flatnonzero(np.isnan(profile))] == [*missing]
 
 
-def test_gaps_are_named_or_left_for_xarray_to_fill():
-    holes = without(slice(70, 86))
-    expected = np.interp(X, X[~np.isnan(holes)], holes[~np.isnan(holes)])
-    words = "(NaN) at 16 of 128 nodes, the first at x = 0.0546875 m"
+def test_gaps_are_named_filled_on_request_and_remembered():
+    holes = without(slice(0, 3), slice(-2, None), slice(70, 86))
+    words = "(NaN) at 21 of 128 nodes, the first at x = 0 m"
+    expected = np.interp(X, X[~np.isnan(holes)], holes[~np.isnan(holes)], period=0.1)
     for given in (holes, labelled(holes), labelled(holes[::-1], X[::-1])):
         refuses(f"strength: values are missing ... {words}", lambda given=given: found(given))
-    profile = st.read_profile(labelled(holes), interface=LINE, gaps="skip")
-    np.testing.assert_array_equal(profile, holes)
-    np.testing.assert_allclose(profile.interpolate_na("x"), expected, rtol=1e-14)
+        result = onset(given, gaps="fill")
+        assert result["critical_stress"][0] == pytest.approx(found(expected)[0], rel=1e-14)
+        np.testing.assert_array_equal(result["measured"], ~np.isnan(holes))
+    with pytest.warns(
+        st.AccuracyWarning, match=r"65 of 128.*check interface.length and the unit"
+    ):
+        onset(labelled(STRENGTH[:63], X[:63]), gaps="fill")
+    profile = st.read_profile(labelled(holes), interface=LINE, gaps="fill")
+    np.testing.assert_allclose(profile, expected, rtol=1e-14)
+    np.testing.assert_array_equal(profile["measured"], ~np.isnan(holes))
+    # It is remembered through arithmetic and another order.
+    assert "in_gap" in onset((profile * 2.0)[::-1])
+    assert "in_gap" not in onset(STRENGTH, gaps="fill")
+
+
+def test_an_onset_in_a_gap_is_called_that():
+    holes = without(slice(78, 100))  # beside the weak place: a straight line of low strength
+    holes[100] = 0.9 * holes[77]
+    profile = st.read_profile(labelled(holes[::-1], X[::-1]), interface=LINE, gaps="fill")
+    for given in (profile, without(slice(80, 83))):
+        with pytest.warns(st.AccuracyWarning, match="the critical patch .* reaches into a gap"):
+            assert bool(onset(given, gaps="fill")["in_gap"][0])
+    assert not bool(onset(without(slice(10, 13)), gaps="fill")["in_gap"][0])
+    for gap, reached in ((slice(1, 3), True), (slice(6, 8), False)):  # across x = 0
+        seam = np.roll(STRENGTH, 47)  # weakest at node 124
+        seam[gap] = np.nan
+        assert bool(onset(seam, gaps="fill")["in_gap"][0]) is reached
+    method = st.Rupture(loading_rate=1e8, stop="onset")
+    assert bool(st.simulate_rupture(SYSTEM, profile, method=method, save=st.Save([]))["in_gap"])
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 A measured profile with gaps
 ============================
 
-The onset of a record from a file, on a grid of its own, with its gaps filled.
+The onset of a record from a file, on a grid of its own; shaded are gaps that were filled.
 """
 
 from pathlib import Path
@@ -20,6 +20,6 @@ tau_p = st.read_profile(
     root / "examples/data/strength_profile.csv",
     interface=problem.interface,
     interpolate=True,
-    gaps="skip",
-).interpolate_na("x")
+    gaps="fill",
+)
 st.plot.onset(st.onset(problem, tau_p, method=st.Equilibrium()), tau_p)

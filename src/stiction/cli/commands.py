@@ -54,7 +54,7 @@ def echo(text: Any = "", *, err: bool = False) -> None:
 
 
 def in_options(text: str, command: Callable[..., Any]) -> str:
-    """Return a message in the words of a command: ``--unit mm`` for ``unit="mm"``."""
+    """Return a message in the words of a command: ``--gaps fill`` for ``gaps="fill"``."""
     methods = r"(?:\bmethod=)?st\.(LocalCriterion|Equilibrium|Rupture)\([^)]*\)"
     text = re.sub(methods, _method, text)
     for name, parameter in inspect.signature(command, eval_str=True).parameters.items():
@@ -335,6 +335,7 @@ def onset(
         Option(help="What PROFILE holds; coefficients need a normal pressure."),
     ] = "strength",
     interpolate: Annotated[bool, Option("--interpolate", help="Interpolate to nodes.")] = False,
+    gaps: Annotated[Literal["refuse", "fill"], Option(help="Missing values.")] = "refuse",
 ) -> None:
     """Compute the load and position at which one interface of given strength begins to slide.
 
@@ -358,7 +359,7 @@ def onset(
         raise InputError([unknown_name("--method", name, METHODS) for name in unknown])
     profile = read_profile(
         strength, interface=problem.interface, unit=unit, x_unit=x_unit, interpolate=interpolate,
-        value=_column(value), x=_column(x), quantity=quantity,
+        gaps=gaps, value=_column(value), x=_column(x), quantity=quantity,
     )  # fmt: skip
     # Each method refuses, and warns, for itself.
     problem.sample(profile, accept=("barriers", "overstress", "constant"))

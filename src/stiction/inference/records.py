@@ -59,7 +59,8 @@ def _records(source: Any, interface: Interface | None, quantity: str) -> list[Re
     values = simplified(source, quantity)
     places: dict[str, Array] = {}
     if is_labelled(values):
-        values, places = points_of(labelled(values, quantity))
+        values, places, measured = points_of(labelled(values, quantity))
+        values = np.where(measured, values, np.nan)  # what was filled in is no measurement
     if not places:
         return _of_array(values, interface)
     index, spacings = [], []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from stiction.base.variables import (
     forces,
 )
 from stiction.problem.problem import Problem, refusals
+from stiction.problem.profiles.placing import with_gaps
 from stiction.problem.results import study_attributes, to_dataset
 from stiction.problem.sample import Sample
 
@@ -213,6 +214,7 @@ def onset(
     profiles: Any,
     *,
     method: MethodObject,
+    gaps: Literal["refuse", "fill"] = "refuse",
     progress: Progress = True,
 ) -> xr.Dataset:
     """Compute the load and position at which interfaces of given strength begin to slide.
@@ -231,6 +233,8 @@ def onset(
         normal pressure are the strength.
     method : LocalCriterion, Equilibrium or Rupture
         The method; there is no default.
+    gaps : {"refuse", "fill"}
+        Whether to refuse missing values (NaN) or fill them as `stiction.read_profile` does.
     progress : bool or callable
         True shows progress on standard error after two seconds; a callable gets (done, total).
 
@@ -240,7 +244,8 @@ def onset(
         Over 'sample': `critical_load`, `critical_stress`, `first_instability` (Pa),
         `critical_position` (m), with a normal pressure `friction_coefficient`, with a thickness,
         width or area `critical_force` and `first_instability_force` (N), and what the method
-        adds. Every variable has `units` and `long_name`.
+        adds. Every variable has `units` and `long_name`. If gaps were filled, also
+        `in_gap`, whether the critical patch reaches into one, and the coordinate `measured`.
 
     Raises
     ------
@@ -250,8 +255,8 @@ def onset(
     Warns
     -----
     AccuracyWarning
-        If the local criterion is off by more than 1 % in the first samples, at most 32, that
-        `Equilibrium` solves in two seconds.
+        If gaps are filled, or the onset lies in one; if the local criterion is off by more than
+        1 % in the first samples, at most 32, that `Equilibrium` solves in two seconds.
     UnitWarning
         If a value is so far from what solids have that its unit is in doubt.
 
@@ -267,7 +272,7 @@ def onset(
     if refused := refusals(problem, method):
         raise InputError(refused)
     attributes = study_attributes(problem=problem, method=method)
-    sample = problem.sample(profiles, accept=getattr(method, "accepts", ()))
+    sample, measured = problem.placed_sample(profiles, getattr(method, "accepts", ()), gaps)
     problem.doubt(sample)
     solver, parts, size = prepared(problem, method), [], batch_size(problem, method)
     meter = Meter(f"onset by {method.label}", sample.samples, progress)
@@ -281,4 +286,5 @@ def onset(
     values = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     if text := _doubt(problem, method, sample, values):
         warn_accuracy(text)
-    return label(problem, method, values, np.arange(sample.samples), attributes)
+    result = label(problem, method, values, np.arange(sample.samples), attributes)
+    return with_gaps(problem, result, measured)

@@ -24,9 +24,10 @@ from stiction.plot.axes import (
     with_unit,
 )
 from stiction.plot.fields import draw_map, draw_outline, map_height, name_line, rows_of
-from stiction.plot.style import ACCENT, PAGE, QUIET, color, series
+from stiction.plot.style import ACCENT, PAGE, PALE, QUIET, color, series
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
+from stiction.problem.profiles.placing import IN_GAP, MEASURED
 from stiction.problem.profiles.reading import is_coefficient
 
 Array = NDArray[np.float64]
@@ -108,7 +109,15 @@ def _draw_line(
     interface = problem.interface
     x = interface.x * unit_for("m", interface.lengths)[0]
     factor, unit = unit_for("Pa", tau_p)
+    found = next(iter(results.values()))
     axes.plot(x, tau_p * factor, color=QUIET, linewidth=0.8, label=r"strength $\tau_p$")
+    if MEASURED in found.coords:
+        missing = ~found[MEASURED].values.reshape(-1)
+        beside = np.roll(missing, 1) | np.roll(missing, -1)
+        axes.fill_between(
+            x, 0.0, 1.0, where=missing | beside, transform=axes.get_xaxis_transform(),
+            facecolor=PALE, alpha=0.6, linewidth=0.0, zorder=0.0, label="not measured, filled in",
+        )  # fmt: skip
     with suppress(InputError):  # no single nucleation length: the strength alone is drawn
         averaged = nucleation_stress(problem, tau_p)
         axes.plot(x, averaged * factor, label=r"nucleation stress $\tau_n$", **series(0))
@@ -155,6 +164,7 @@ def _mark(
         if "friction_coefficient" in result:
             text += f" (coefficient {float(result['friction_coefficient'][0]):.4f})"
         text += f" at {', '.join(f'{one:.2f}' for one in place)} {length_unit}"
+        text += " (in a gap)" if IN_GAP in result and bool(result[IN_GAP][0]) else ""
         style: dict[str, Any] = {"linestyle": "none", "color": color(number + 1), "label": text}
         style |= {"marker": "os^DvP"[number % 6], "markersize": max(9.0 - 3.5 * number, 2.0)}
         at = place if interface.is_plane else (*place, load * factor)

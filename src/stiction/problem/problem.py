@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Collection, Mapping
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from stiction.elasticity.half_spaces import HalfSpaces
 from stiction.problem.friction import SCALES, Friction, contradictions
 from stiction.problem.interface import Interface
 from stiction.problem.load import Load, LoadShape
-from stiction.problem.profiles.placing import turned
+from stiction.problem.profiles.placing import Gaps, turned
 from stiction.problem.profiles.reading import at_nodes
 from stiction.problem.sample import FRICTION, Sample, named_profiles, no_coefficients, rows_of
 from stiction.problem.solid import Solid
@@ -203,7 +204,7 @@ class Problem:
             for name, value in vars(owner).items():
                 if is_unplaced(value):
                     try:
-                        at = at_nodes(f"{part}.{name}", value, self.interface)
+                        at, _ = at_nodes(f"{part}.{name}", value, self.interface)
                         value = np.asarray(at)  # of a pandas object too
                     except InputError as error:
                         problems += error.problems
@@ -468,6 +469,12 @@ class Problem:
         constant. An `AccuracyWarning` gives the share of such nodes, and that of nodes where the
         initial stress is below minus the strength.
         """
+        return self.placed_sample(profiles, accept)[0]
+
+    def placed_sample(
+        self, profiles: Any, accept: Collection[str] = (), gaps: Gaps = "refuse"
+    ) -> tuple[Sample, Any]:
+        """Return a sample, and a mask of where all of its profiles were measured, or True."""
         friction, interface = self.friction, self.interface
         if isinstance(profiles, Sample):
             profiles, accept = self._given_sample(profiles), {*accept, "constant"}
@@ -476,13 +483,16 @@ class Problem:
         if of not in given:
             raise InputError("strength: missing among the profiles")
         problems: list[str] = []
+        measured = [np.ones((1, *interface.shape), dtype=bool)]
         scales = [name for name in SCALES if name in given]
         if len(scales) > 1:
             problems.append(f"give one of {', '.join(SCALES)}, got {' and '.join(scales)}")
 
         def read(name: str, own: Any, samples: int | None) -> Any:
             try:
-                value = at_nodes(name, given.get(name, own), interface)
+                value, known = at_nodes(name, given.get(name, own), interface, gaps)
+                if not np.all(known):
+                    measured.append(known.reshape(-1, *interface.shape))
                 with prefixed(name):
                     return rows_of(name, value, interface, samples, "barriers" in accept)
             except InputError as error:
@@ -531,7 +541,7 @@ class Problem:
         sample = Sample(strength, residual, rates, initial, load_shape, pressure, self)
         if "steep" not in accept:
             self._check_resolution(sample.steepest_rate)
-        return sample
+        return sample, reduce(np.logical_and, measured)
 
     def _given_sample(self, sample: Sample) -> dict[str, Array]:
         """Return the profiles of a ready-made sample by name; refuse one of another problem."""

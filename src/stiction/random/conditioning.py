@@ -33,6 +33,7 @@ from stiction.base.model import Positive, model
 from stiction.base.units import is_in
 from stiction.base.variables import QUANTITIES
 from stiction.problem.interface import Interface
+from stiction.problem.profiles.placing import MEASURED
 from stiction.problem.profiles.reading import in_si, unit_of
 from stiction.random.mapping import from_normal
 from stiction.random.synthesis import condition
@@ -74,6 +75,8 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
                 "must be a DataArray over x (m), on a plane over x and y, with coordinates, as"
                 " st.read_profile(path) returns it"
             )
+        if MEASURED in value.coords:  # what was filled in was not measured
+            value = value.where(value[MEASURED].astype(bool))
         each = (in_si(value[name], name, "m") for name in names)
         rows = [*np.meshgrid(*each, indexing="ij"), _values(value.transpose(*names))]
     points = np.array([np.ravel(row) for row in rows], dtype=np.float64)

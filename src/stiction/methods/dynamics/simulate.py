@@ -19,6 +19,7 @@ from stiction.methods.dynamics.simulate_event import simulate_event
 from stiction.methods.dynamics.state import State
 from stiction.methods.dynamics.summary import summary
 from stiction.problem.problem import Problem, refusals
+from stiction.problem.profiles.placing import with_gaps
 from stiction.problem.results import along, study_attributes, to_dataset
 
 if TYPE_CHECKING:
@@ -98,12 +99,14 @@ def simulate_rupture(
     save = Save() if save is None else save
     if refused := refusals(problem, method):
         raise InputError(refused)
-    rows = problem.sample(profiles, accept=method.accepts)
+    rows, measured = problem.placed_sample(profiles, method.accepts)
     if rows.samples != 1:
         raise InputError(f"profiles: one sample at a time, got {rows.samples}")
     if problem.specimen is not None:
         problem.doubt(rows)
-        return simulate_event(problem, rows, method, save, event, progress)
+        return with_gaps(
+            problem, simulate_event(problem, rows, method, save, event, progress), measured
+        )
     if event is not None:
         raise InputError(
             "event: is of specimens only, whose events are one by one; leave it out"
@@ -121,7 +124,7 @@ def simulate_rupture(
     attributes = study_attributes(problem=problem, method=method)
     recorder = Recorder(run, save, attributes | {"stopped": "running"})
     if recorder.begin(state) and save.to is not None:
-        return open_rupture(save.to, fields=())
+        return with_gaps(problem, open_rupture(save.to, fields=()), measured)
     if state.steps == 0:
         recorder.add(state)
     with Meter("rupture", show=progress, unit="steps") as meter:
@@ -135,7 +138,7 @@ def simulate_rupture(
     if stopped in ("rest", "time"):
         checks.warn_of_survival(method.stop, [result])
     recorder.finish(result, stopped)
-    return result
+    return with_gaps(problem, result, measured)
 
 
 def _follow(run: Run, state: State, recorder: Recorder, most: int, meter: Meter) -> str:

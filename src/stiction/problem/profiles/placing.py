@@ -2,12 +2,12 @@
 
 The nodes are x_i = i L/n in each direction, periodically: points may come in any order and begin
 anywhere. Those of a specimen are x_i = (i + 1/2) L/n, and nothing continues beyond its ends. What
-is missing is refused, or stays NaN on request.
+is missing is refused, stays NaN, or is filled on request, on lines that continue periodically.
 """
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +16,18 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.problem.interface import Interface
 
-Gaps = Literal["refuse", "skip"]
+if TYPE_CHECKING:
+    import xarray as xr
+
+Gaps = Literal["refuse", "fill", "skip"]
+Mask = NDArray[np.bool_]
 
 TOLERANCE = 0.02
 """Of the spacing of nodes: what rounding in a file may move a point."""
 WIDE = 4.0
 """Times the median distance of points: what is wider is no interval but a gap."""
+IN_GAP, MEASURED = "in_gap", "measured"
+"""Variable of a result; coordinate of results and profiles with gaps, False where none was."""
 OF_A_PLANE = (
     "; a map has columns or coordinates x and y, or is an .npy of shape (nx, ny), and needs an"
     " interface of two lengths and two numbers of nodes"
@@ -29,22 +35,31 @@ OF_A_PLANE = (
 """What to do with two dimensions where a line was expected."""
 
 
-def points_of(array: Any) -> tuple[Array, dict[str, Array]]:
-    """Return values (..., points), and their places (m) by direction.
+def points_of(array: Any) -> tuple[Array, dict[str, Array], Any]:
+    """Return values (..., points), their places (m) by direction, and where they were measured.
 
-    Values without coordinates keep their shape, and the dictionary is empty.
+    The mask is True if nothing was filled in. Values without coordinates keep their shape, and the
+    dictionary is empty.
     """
     dims = [dim for dim in ("x", "y") if dim in array.coords]
     if len(dims) == 2 and "row" not in array.dims:
         array = array.stack(row=dims, create_index=False)
-    return array.values, {dim: array[dim].values for dim in dims}
+    measured: Any = True
+    if MEASURED in array.coords:
+        mask = array[MEASURED].broadcast_like(array).transpose(*array.dims)
+        measured = mask.values.astype(bool)
+    return array.values, {dim: array[dim].values for dim in dims}, measured
 
 
 def place(
     array: Any, interface: Interface, interpolate: bool = False, gaps: Gaps = "refuse"
-) -> Array:
-    """Put values on the nodes of an interface, (..., *shape)."""
-    values, places = points_of(array)
+) -> tuple[Array, Any]:
+    """Put values on the nodes of an interface, (..., *shape), with a mask of what was measured.
+
+    The mask is False where there was no value, be it filled in or left out; it is True if nothing
+    is missing.
+    """
+    values, places, measured = points_of(array)
     if not places:
         shape = values.shape[-len(interface.shape) :]
         if shape != interface.shape:
@@ -55,7 +70,7 @@ def place(
                     " interpolate=True if points do not lie on the nodes"
                 )
             raise InputError(f"must have shape {interface.shape}, got shape {shape}{hint}")
-        return checked_gaps(values, interface, gaps)
+        return close_gaps(values, measured, interface, gaps)
     if values.size == 0:
         raise InputError("has no values")
     offsets = [_offset(dim, places[dim], interface, interpolate) for dim in interface.dims]
@@ -90,7 +105,8 @@ def place(
             f"{node.size} points are interpolated linearly to {interface.size} nodes, which are"
             f" {interface.spacing:.3g} m apart"
         )
-    return checked_gaps(put(values), interface, gaps)
+    whole = np.all(measured) or put(measured * 1.0) > 0.999
+    return close_gaps(put(values), whole, interface, gaps)
 
 
 def turned(given: tuple[int, ...], shape: tuple[int, ...]) -> str:
@@ -194,16 +210,60 @@ def _interpolated(x: Array, values: Array, interface: Interface) -> Array:
     return np.apply_along_axis(at_nodes, -1, values[..., order])
 
 
-def checked_gaps(values: Array, interface: Interface, gaps: Gaps) -> Array:
-    """Return values (..., *shape); refuse NaN among them unless gaps are skipped."""
-    holes = np.isnan(values).reshape(-1, *interface.shape)
-    if gaps == "skip" or not holes.any():
-        return values
+def close_gaps(
+    values: Array, measured: Any, interface: Interface, gaps: Gaps
+) -> tuple[Array, Any]:
+    """Return values (..., *shape) with NaN refused, left or filled, and what was measured."""
+    missing = np.isnan(values)
+    if not missing.any():
+        return values, measured
+    rows, holes = values.reshape(-1, *interface.shape), missing.reshape(-1, *interface.shape)
     row = int(np.argmax(holes.any(axis=interface.axes)))
-    raise InputError(
+    text = (
         f"values are missing (NaN) at {holes[row].sum()} of {interface.size} nodes"
-        f"{f' of sample {row}' * (len(holes) > 1)}, the first at"
-        f" {interface.describe_node(int(np.argmax(holes[row])))}; give them, make interface.length"
-        " that of the record, or fill them, as does"
-        " st.read_profile(..., interface=..., gaps='skip').interpolate_na('x')"
+        f"{f' of sample {row}' * (len(rows) > 1)}, the first at"
+        f" {interface.describe_node(int(np.argmax(holes[row])))}"
     )
+    if interface.is_plane or interface.is_free:
+        if gaps != "skip":
+            raise InputError(f"{text}; give them: gaps are filled on periodic lines only")
+    elif gaps == "refuse":
+        raise InputError(
+            f"{text}; give them, make interface.length that of the record, or pass gaps='fill'"
+            " to st.onset or st.read_profile, which fills them with straight lines"
+        )
+    elif gaps == "fill":
+        if holes.all(axis=-1).any():
+            raise InputError("has no value at all")
+        x, length = interface.x, interface.extent
+        for one, hole in zip(rows := rows.copy(), holes, strict=True):
+            one[hole] = np.interp(x[hole], x[~hole], one[~hole], period=length)
+        values = rows.reshape(values.shape)
+        doubt = "; check interface.length and the unit of x" if missing.mean() > 0.5 else ""
+        warn_accuracy(f"{text}; filled with straight lines{doubt}")
+    return values, ~missing & measured
+
+
+def with_gaps(problem: Any, result: xr.Dataset, measured: Any) -> xr.Dataset:
+    """Return a result with the gaps of its profiles, and a mark of patches that reach into one."""
+    interface, position = problem.interface, result["critical_position"]
+    if np.all(measured) or interface.is_plane or interface.is_free:  # nothing was filled
+        return result
+    rate, length, place = problem.uniform_rate, interface.extent, position.values.reshape(-1, 1)
+    patch = interface.spacing if rate is None else problem.nucleation_lengths(rate)[0]
+    apart = np.abs(np.mod(interface.x - place + 0.5 * length, length) - 0.5 * length)
+    near = apart < (1.0 - 1e-9) * max(0.5 * patch, interface.spacing)
+    found = (near & ~measured).any(axis=-1)
+    if found.any():
+        first = float(place[int(np.argmax(found)), 0])
+        warn_accuracy(
+            f"the critical patch at x = {first:.6g} m reaches into a gap of the profile"
+            f" ({found.sum()} of {found.size} samples): the strength there was filled in, not"
+            " measured"
+        )
+    about = {"units": "1", "long_name": "whether the critical patch reaches into a gap"}
+    result[IN_GAP] = (position.dims, found.reshape(position.shape), about)
+    along = ("sample", "x") if len(measured) > 1 else ("x",)
+    known = measured if len(measured) > 1 else measured[0]
+    x = ("x", interface.x, {"units": "m"})
+    return result.assign_coords({"x": x, MEASURED: (along, known)})

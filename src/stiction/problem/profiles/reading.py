@@ -20,7 +20,7 @@ from stiction.base.model import FilePath, Flag, as_numbers, check, checked, desc
 from stiction.base.units import factor_to, is_in, parse
 from stiction.base.variables import QUANTITIES
 from stiction.problem.interface import Interface
-from stiction.problem.profiles.placing import OF_A_PLANE, Gaps, checked_gaps, place
+from stiction.problem.profiles.placing import MEASURED, OF_A_PLANE, Gaps, close_gaps, place
 from stiction.problem.profiles.tables import load
 
 if TYPE_CHECKING:
@@ -83,15 +83,16 @@ def read_profile(
         Map the profile to the nodes x_i = i L/n, modulo L, from points in any order.
     interpolate : bool
         Interpolate linearly if the points of a line do not coincide with the nodes.
-    gaps : {"refuse", "skip"}
-        Refuse missing values (NaN, empty cells, missing points), or leave NaN, for
-        `stiction.fit_field`, or for xarray to fill: ``.interpolate_na("x")``. Without an
+    gaps : {"refuse", "fill", "skip"}
+        Refuse missing values (NaN, empty cells, missing points), fill them with straight
+        lines (not on planes and specimens), or leave NaN, for `stiction.fit_field`. Without an
         interface, they always stay.
 
     Returns
     -------
     xarray.DataArray
-        Over 'x' (m), on a plane over 'x' and 'y', with `units`.
+        Over 'x' (m), on a plane over 'x' and 'y', with `units`. With gaps it has the coordinate
+        'measured', False in a gap, which results take over.
 
     Raises
     ------
@@ -102,7 +103,7 @@ def read_profile(
     Warns
     -----
     AccuracyWarning
-        If something is interpolated, or x lies between the nodes.
+        If something is interpolated or filled in, or x lies between the nodes.
     UnitWarning
         If heights without a unit range over more than 1 mm.
 
@@ -124,8 +125,8 @@ def read_profile(
 
     if quantity not in QUANTITIES:
         raise InputError(unknown_name("quantity", quantity, QUANTITIES))
-    if interface is None and interpolate:
-        raise InputError("interface: needed to interpolate")
+    if interface is None and (interpolate or gaps == "fill"):
+        raise InputError("interface: needed to interpolate, or to fill gaps")
     if interpolate and interface is not None and interface.is_plane:
         raise InputError("interpolate: is an option of profiles of a line")
     dims = None if interface is None else interface.dims
@@ -134,12 +135,16 @@ def read_profile(
         if not {*array.dims} <= {"x", "y", "row"}:
             raise InputError(f"must hold one profile, got shape {array.shape}")
         if interface is not None:
-            values = place(array, interface, interpolate, gaps)
+            values, measured = place(array, interface, interpolate, gaps)
             array = xr.DataArray(values, interface.coordinates, interface.dims)
+            if not np.all(measured):
+                array[MEASURED] = (interface.dims, measured)
         else:
             array = _in_order(array)
     for dim in {"x", "y"} & {*array.coords}:
         array[dim].attrs.update(units="m", long_name=f"position along {dim}")
+    if MEASURED in array.coords:
+        array[MEASURED].attrs["long_name"] = "measured, not filled in"
     array.attrs = {"units": QUANTITIES[quantity].units, "long_name": quantity.replace("_", " ")}
     return array.rename(quantity)
 
@@ -246,7 +251,7 @@ def labelled(
     array = data[chosen]
     at = {dim: data[name].variable for dim, name in places.items()}
     at = {dim: one for dim, one in at.items() if {*one.dims} <= {*array.dims}}
-    own = [name for name in array.coords if name not in array.dims]
+    own = [name for name in array.coords if name not in (MEASURED, *array.dims)]
     array = _directed(array.drop_vars(own).assign_coords(at), dims)
     if len({*dims} & {*array.coords}) == 1 < len(dims):
         raise InputError("has the coordinate x or y only; a map has both, or none")
@@ -377,18 +382,20 @@ def _directed(array: Any, dims: tuple[str, ...]) -> Any:
             " it 'x', on a plane 'x' (the direction of load and slip) and 'y', and another one"
             f" 'sample'{OF_A_PLANE * (len(dims) == 1)}"
         )
-    array = array.drop_vars([name for name in array.coords if name not in dims])
+    array = array.drop_vars([name for name in array.coords if name not in (MEASURED, *dims)])
     return array.transpose(*samples, *along)
 
 
 # -- what takes profiles -------------------------------------------------------------------------
 
 
-def at_nodes(name: str, value: Any, interface: Interface) -> Any:
-    """Return what a caller gave for a quantity, with one value a node.
+def at_nodes(
+    name: str, value: Any, interface: Interface, gaps: Gaps = "refuse"
+) -> tuple[Any, Any]:
+    """Return what a caller gave for a quantity, with one value a node, and where it was measured.
 
     `name` may be a dotted key. Numbers, and arrays of another shape, pass as they are, for whoever
-    checks that.
+    checks that. The mask is True if nothing is missing.
     """
     quantity = quantity_of(name)
     with prefixed(name):
@@ -400,13 +407,13 @@ def at_nodes(name: str, value: Any, interface: Interface) -> Any:
             if array.ndim == 1 and not {*array.dims} <= {"x", "row"}:  # one value a sample
                 if quantity == "strength":
                     raise InputError("has no dimension along the interface; call it 'x'")
-                return array.values[:, np.newaxis]
-            return place(array, interface)
+                return array.values[:, np.newaxis], True
+            return place(array, interface, gaps=gaps)
         with suppress(TypeError):  # no numbers: refused with everything else that is wrong
             array = real_array(value)
             if array.shape[-len(interface.shape) :] == interface.shape:
-                return checked_gaps(array, interface, "refuse")
-    return value
+                return close_gaps(array, True, interface, gaps)
+    return value, True
 
 
 class ProfileFile(NamedTuple):
