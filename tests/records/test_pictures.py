@@ -126,6 +126,19 @@ def failure_curves():
     }
 
 
+@calls(DRAWN, close=1e-4)
+def agreement_with_a_posterior():
+    problem = plain(LINE)
+    peaks = np.array([7.1e5, 7.4e5, 6.9e5, 7.7e5, 7.3e5])
+    prior = {
+        "correlation_length": {"low": 8e-4, "high": 6e-3, "spacing": "log"},
+        "marginal.low": (5.2e5, 7.2e5),
+    }
+    found = st.infer(problem, FIELD, peaks, prior=prior, method=LOCAL, samples=200)
+    agreed = st.statistics.agreement(found, 1.01 * peaks, replicates=199)
+    return st.plot.agreement(agreed)
+
+
 @calls(DRAWN, close=1e-3)
 def a_fit_of_two_records():
     grid = st.Interface(0.03, 140)

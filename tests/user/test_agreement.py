@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+import scipy.stats
 import xarray as xr
 from refusals import refuses
 from setups import LOCAL
@@ -34,6 +35,9 @@ def test_p_values_are_those_of_all_permutations():
     here = np.array(distance(np.arange(3)))
     exact = np.mean(all_of_them >= here * (1 - 1e-9), axis=0)
     found = st.statistics.agreement(predicted(others), own, replicates=8000)
+    ((at, share),) = found.predicted
+    assert share[[0, 3, -1]] == pytest.approx([1 / 6, 3 / 6, 1.0])  # up to 1, 4 and 9
+    assert np.interp(6.0, at, share) == pytest.approx(4.5 / 6)  # 4 of 6 up to 5, and 5 up to 7
     assert (found.cramer_von_mises, found.largest_deviation) == pytest.approx(tuple(here))
     error = np.sqrt(exact * (1.0 - exact) / 8000)
     assert np.all(np.abs(np.array(list(found.p_values.values())) - exact) < 4.0 * error + 2e-4)
@@ -57,6 +61,14 @@ def test_further_peaks_are_compared_with_what_the_posterior_leaves_open(posterio
     refuses("was fitted to them", lambda: st.statistics.agreement(posterior, PEAKS[::-1]))
     further = st.statistics.agreement(posterior, PEAKS + 1.0, replicates=300)
     assert 0.2 < further.p_values["cramer_von_mises"] <= 1.0
+    # A thousand draws predict what the posterior's 4,000 do: both are farther from their law than
+    # 0.06 once in a thousand times.
+    at, share = further.predicted[0]
+    drawn = np.searchsorted(np.sort(posterior.predicted[0]), at, side="right") / 4000
+    assert np.abs(drawn - share).max() < 0.06
+    # As uncertain as a posterior of few peaks is, campaigns differ more than peaks of all draws.
+    known = scipy.stats.kstwo(PEAKS.size).ppf(0.9) * PEAKS.size**0.5
+    assert further.band > 1.05 * known
     far = st.statistics.agreement(posterior, 1.08 * PEAKS, replicates=300)
     assert max(far.p_values.values()) < 0.1
 

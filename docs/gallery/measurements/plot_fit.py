@@ -2,7 +2,7 @@
 A field fitted to a record
 ==========================
 
-Histogram and spectrum of a record of strength and of the fitted field.
+Histogram, quantiles, correlation and spectrum of a record of strength and of the fitted field.
 """
 
 import xarray as xr

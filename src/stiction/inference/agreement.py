@@ -7,7 +7,7 @@ posterior leaves open: each simulated campaign is drawn from one point of it.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -23,6 +23,14 @@ POINTS, VALUES = 1000, 400
 """Parameters that stand for a posterior, and values at which the law of a peak is kept."""
 MARGIN = 0.25
 """What is added on either side to the range of the predicted peaks, as a share of it."""
+BAND = 0.9
+
+
+class Predicted(NamedTuple):
+    """Distribution function of the predicted peaks of one kind of specimen."""
+
+    values: Array  # rising, in the unit of the peaks
+    share: Array  # of peaks up to each
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,12 +46,18 @@ class Agreement:
         peaks, and the largest of these differences times the square root of the number of tests.
     p_values : dict of str to float
         By these two names: probability of a distance at least as large if the prediction is right.
+    predicted : tuple of (values, share)
+        Predicted distribution function of each kind of specimen.
+    band : float
+        Largest deviation that 90 % of campaigns do not exceed.
     """
 
     peaks: Peaks
     cramer_von_mises: float
     largest_deviation: float
     p_values: dict[str, float]
+    predicted: tuple[Predicted, ...]
+    band: float
 
     def __str__(self) -> str:
         one, other = self.p_values.values()
@@ -89,6 +103,7 @@ def agreement(
     Returns
     -------
     Agreement
+        `stiction.plot.agreement` draws it.
 
     Raises
     ------
@@ -159,18 +174,19 @@ def _with_sample(values: Array, measured: Peaks, replicates: int, rng: Any) -> A
     """Permutation test: which of all values are the measured ones?"""
     (own,) = measured.values
     measured.refuse_far([values])
-    _, place, counts = np.unique(
+    at, place, counts = np.unique(
         np.concatenate([own, values]), return_inverse=True, return_counts=True
     )
     share = counts / place.size
+    before = np.append(0.0, np.cumsum(np.bincount(place[own.size :], minlength=at.size)))
     found = np.empty((replicates + 1, 2))
     for row in range(replicates + 1):
         chosen = rng.choice(place.size, own.size, replace=False) if row else np.arange(own.size)
-        reached = np.cumsum(np.bincount(place[chosen], minlength=counts.size)) / own.size
+        reached = np.cumsum(np.bincount(place[chosen], minlength=at.size)) / own.size
         # The others' share follows from that of all.
         away = (reached - np.cumsum(share)) * place.size / values.size
         found[row] = own.size * (share @ away**2), np.sqrt(own.size) * np.abs(away).max()
-    return _summary(measured, found)
+    return _summary(measured, found, (Predicted(at, before[1:] / values.size),))
 
 
 def _with_posterior(
@@ -193,16 +209,17 @@ def _with_posterior(
     measured.refuse_far([posterior.predicted[kind] for kind in kinds])
     u = posterior.u[rng.choice(len(posterior.u), POINTS)]
     chosen = rng.integers(POINTS, size=replicates)
-    found = np.zeros((replicates + 1, 2))
+    found, predicted = np.zeros((replicates + 1, 2)), []
     for kind, peaks in zip(kinds, measured.values, strict=True):
         at, shares = _law(posterior, kind, u, peaks)
         uniform = rng.random((replicates, peaks.size))
         drawn = [np.interp(p, shares[i], at) for p, i in zip(uniform, chosen, strict=True)]
-        share = np.interp(np.sort([peaks, *drawn]), at, shares.mean(axis=0))
-        squares, most = _distances(share)
+        law = Predicted(at, shares.mean(axis=0))
+        squares, most = _distances(np.interp(np.sort([peaks, *drawn]), *law))
         found[:, 0] += squares
         found[:, 1] = np.maximum(found[:, 1], most)
-    return _summary(measured, found)
+        predicted.append(law)
+    return _summary(measured, found, tuple(predicted))
 
 
 def _law(posterior: Posterior, kind: int, u: Array, peaks: Array) -> tuple[Array, Array]:
@@ -227,7 +244,7 @@ def _distances(share: Array) -> tuple[Array, Array]:
     return squares, np.sqrt(size) * most
 
 
-def _summary(measured: Peaks, found: Array) -> Agreement:
+def _summary(measured: Peaks, found: Array, predicted: Any) -> Agreement:
     """Summarise distances (1 + replicates, 2), of which the first are the measured ones."""
     own, others = found[0], found[1:]
     as_far = np.sum(others >= own * (1.0 - 1e-9), axis=0)
@@ -238,4 +255,6 @@ def _summary(measured: Peaks, found: Array) -> Agreement:
         cramer_von_mises=float(own[0]),
         largest_deviation=float(own[1]),
         p_values=dict(zip(names, p_values.tolist(), strict=True)),
+        predicted=predicted,
+        band=float(np.quantile(others[:, 1], BAND, method="higher")),
     )

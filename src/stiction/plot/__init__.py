@@ -13,13 +13,14 @@ pressure, friction coefficients are drawn too. `axes` and `style` are what all f
 from stiction.plot.distributions import monte_carlo, quantiles
 from stiction.plot.failure import failure_curve
 from stiction.plot.fields import field
-from stiction.plot.fits import fit
+from stiction.plot.fits import agreement, fit
 from stiction.plot.onsets import onset
 from stiction.plot.ruptures import film, rupture
 from stiction.plot.specimens import block, force_travel, precursors, specimen
 from stiction.plot.style import paper_style
 
 __all__ = [
+    "agreement",
     "block",
     "failure_curve",
     "field",

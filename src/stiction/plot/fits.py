@@ -1,4 +1,4 @@
-"""A field fitted to profiles, beside them."""
+"""Figures for checking fits: a field fitted to profiles, measured and predicted peaks."""
 
 from dataclasses import replace
 from typing import Any
@@ -7,18 +7,21 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from scipy import fft
 
 from stiction.base.units import unit_for
 from stiction.base.variables import QUANTITIES
+from stiction.inference.agreement import Agreement
 from stiction.inference.estimate import bands
 from stiction.inference.fit import FieldFit
 from stiction.inference.whittle import Observed, observe
-from stiction.plot.axes import with_unit
+from stiction.plot.axes import on_axes, with_unit
 from stiction.plot.style import (
     ACCENT,
     INK,
     PAGE,
     PALE,
+    QUIET,
     color,
     panel,
     paper_style,
@@ -28,6 +31,8 @@ Array = NDArray[np.float64]
 
 SHOWN = 100
 """Repetitions, or simulated records, that a band is drawn from: it holds 90 % of them."""
+LAGS = 2.5
+"""Correlation lengths that the panel of the correlation shows."""
 
 
 def fit(found: FieldFit) -> Figure:
@@ -41,9 +46,10 @@ def fit(found: FieldFit) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        (a) Values and the fitted marginal; shaded: 90 % of the fits to records simulated from
-        the fitted field. (b) Spectrum, with the effect of the window; shaded: 90 % of such
-        records.
+        (a) Values and the fitted marginal; (b) quantiles of the data against those of the
+        fit; (c) correlation, with the effect of the window; (d) spectrum. Shaded in (a) and
+        (b): 90 % of the fits to records simulated from the fitted field; in (c) and (d): 90
+        % of such records.
     """
     estimate = found._estimate
     windows = estimate.setting.windows
@@ -55,12 +61,14 @@ def fit(found: FieldFit) -> Figure:
         for _ in range(SHOWN)
     ]
     with paper_style():
-        figure = Figure(figsize=(PAGE, 2.8))
-        left, right = figure.subplots(1, 2)
-        _histogram(left, found)
-        _spectrum(right, found, one, simulated)
-        panel(left, "a")
-        panel(right, "b")
+        figure = Figure(figsize=(PAGE, 5.4))
+        panels = figure.subplots(2, 2).ravel()
+        _histogram(panels[0], found)
+        _quantiles(panels[1], found)
+        _correlation(panels[2], found, one, simulated)
+        _spectrum(panels[3], found, one, simulated)
+        for letter, axes in zip("abcd", panels, strict=True):
+            panel(axes, letter)
     return figure
 
 
@@ -84,15 +92,49 @@ def _histogram(axes: Axes, found: FieldFit) -> None:
     axes.legend()
 
 
+def _quantiles(axes: Axes, found: FieldFit) -> None:
+    estimate = found._estimate
+    values = estimate.setting.marginal.quiet(np.concatenate(found._rows), estimate.model.noise)
+    factor, unit = unit_for(QUANTITIES[found.quantity].units, values)
+    share = (np.arange(200) + 0.5) / 200
+    expected, *spread = (
+        one.marginal.distribution.ppf(share) * factor
+        for one in (found.field, *found.repetitions[:SHOWN])
+    )
+    _compare(axes, expected, np.quantile(values, share) * factor, expected, spread)
+    axes.set_xlabel(with_unit("quantile of the fit", unit))
+    axes.set_ylabel(with_unit("quantile of the data", unit))
+
+
+def _correlation(axes: Axes, found: FieldFit, one: Observed, simulated: list[Array]) -> None:
+    model, spacing = found._estimate.model, one.window.spacings[0]
+    most = LAGS * model.spectrum.correlation_length
+    count = int(np.clip(round(most / spacing), 12, one.window.shape[0] // 2))
+    factor, unit = unit_for("m", count * spacing)
+
+    def correlation(power: Array) -> Array:
+        covariance = fft.irfftn(power, one.window.shape)
+        along: Array = covariance.reshape(covariance.shape[0], -1)[:count, 0]
+        return along / along[0]
+
+    fitted = correlation(model.expectation(one.window))
+    spread = [correlation(power) for power in simulated]
+    lag = np.arange(count) * spacing * factor
+    _compare(axes, lag, correlation(one.average), fitted, spread, "measured", "fitted")
+    axes.axhline(0.0, color=QUIET, linewidth=0.6)
+    axes.set_xlabel(with_unit("lag along x", unit))
+    axes.set_ylabel("correlation in the window")
+    axes.legend()
+
+
 def _spectrum(axes: Axes, found: FieldFit, one: Observed, simulated: list[Array]) -> None:
     scale, unit = unit_for(QUANTITIES[found.quantity].units, np.concatenate(found._rows))
     model = found._estimate.model
     factor = float(np.prod(one.window.spacings)) * scale**2
     k, measured, fitted = bands(one, model.expectation(one.window), 4).T
     spread = [factor * bands(one, power, 4)[:, 2] for power in simulated]
-    _band(axes, k, spread)
-    axes.plot(k, factor * fitted, color=color(1), label="fitted, with the window")
-    axes.plot(k, factor * measured, ".", color=INK, markersize=3, label="measured, averaged")
+    labels = "measured, averaged", "fitted, with the window"
+    _compare(axes, k, factor * measured, factor * fitted, spread, *labels)
     if model.noise**2 > 1e-6 * fitted.max():
         level = factor * model.noise**2
         axes.axhline(level, label="noise", color=ACCENT, linewidth=0.8, linestyle="--")
@@ -104,6 +146,80 @@ def _spectrum(axes: Axes, found: FieldFit, one: Observed, simulated: list[Array]
     axes.legend(loc="lower left")  # spectra fall to the right
 
 
+def _compare(
+    axes: Axes, at: Any, measured: Any, fitted: Any, spread: Any, *labels: str
+) -> None:
+    """Draw data as points, the fit as a line, and 90 % of what repetitions give."""
+    of_data, of_fit = labels or (None, None)
+    _band(axes, at, spread)
+    axes.plot(at, fitted, color=color(1), label=of_fit)
+    axes.plot(at, measured, ".", color=INK, markersize=3, label=of_data)
+
+
 def _band(axes: Axes, at: Any, rows: Any) -> None:
     low, high = np.nanquantile(rows, [0.05, 0.95], axis=0)
     axes.fill_between(at, low, high, color=color(1), alpha=0.25, linewidth=0.0)
+
+
+def agreement(found: Agreement, *, ax: Axes | None = None) -> Axes:
+    """Draw measured peaks as steps on the predicted distribution.
+
+    Parameters
+    ----------
+    found : Agreement
+        From `stiction.statistics.agreement`.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw on; new ones by default.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The shaded band holds all steps of 90 % of campaigns of so many tests, if the
+        prediction is right. Specimens of several lengths have a color each.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=256)
+    >>> strength = st.paper.strength(problem, correlation_ratio=0.5)
+    >>> predicted = st.monte_carlo(
+    ...     problem, strength, method=st.LocalCriterion(), samples=200, seed=0
+    ... )
+    >>> found = st.statistics.agreement(predicted, [0.695, 0.702, 0.731, 0.688], unit="MPa")
+    >>> st.plot.agreement(found).get_xlabel()
+    'peak (MPa)'
+    """
+    peaks = found.peaks
+    factor, unit = unit_for(peaks.unit, np.concatenate(peaks.values))
+    ends: list[float] = []
+    with on_axes(ax) as axes:
+        for number, (length, values, (at, share)) in enumerate(
+            zip(peaks.lengths, peaks.values, found.predicted, strict=True)
+        ):
+            of = "" if length is None else f", {length:g} m"
+            paint = color(number + 1)
+            away = found.band / np.sqrt(values.size)
+            band = (np.clip(share + sign * away, 0.0, 1.0) for sign in (-1.0, 1.0))
+            name = f"90 % of {values.size} tests each{of}"
+            axes.fill_between(
+                at * factor, *band, color=paint, alpha=0.2, linewidth=0.0, label=name
+            )
+            axes.plot(at * factor, share, color=paint, label=f"predicted{of}")
+            seen = at[np.searchsorted(share, [0.001, 0.999]).clip(max=at.size - 1)]
+            low, high = min(seen[0], values.min()), max(seen[1], values.max())
+            margin = 0.05 * (high - low)
+            ends += [(low - margin) * factor, (high + margin) * factor]
+            steps = np.concatenate(([low - margin], np.sort(values), [high + margin])) * factor
+            reached = np.minimum(np.arange(values.size + 2) / values.size, 1.0)
+            style = {"color": INK if number == 0 else paint, "linewidth": 1.2}
+            axes.step(steps, reached, where="post", label=f"{values.size} tests{of}", **style)
+        axes.set_xlim(min(ends), max(ends))
+        axes.set_ylim(0.0, 1.02)
+        axes.set_xlabel(
+            with_unit("coefficient of friction" if peaks.unit == "1" else "peak", unit)
+        )
+        axes.set_ylabel("share of tests up to it")
+        p = found.p_values["cramer_von_mises"]
+        axes.set_title(f"p = {p:.2g}", fontsize=8, loc="left", color=QUIET)
+        axes.legend()
+    return axes
