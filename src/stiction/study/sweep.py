@@ -145,17 +145,7 @@ def _read_uncertain(given: Any) -> dict[str, Any] | None:
     return found
 
 
-Uncertain: TypeAlias = Annotated[
-    Any,
-    BeforeValidator(_read_uncertain),
-    WithJsonSchema(
-        {
-            "type": "object",
-            "description": "distributions of parameters by dotted key, each {low, high, spacing} or"
-            " {type, ...}; and count, the number of equally likely interfaces",
-        }
-    ),
-]
+Uncertain: TypeAlias = Annotated[Any, BeforeValidator(_read_uncertain)]
 """Distributions by dotted key, and the number of interfaces."""
 
 
