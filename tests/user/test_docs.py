@@ -80,8 +80,8 @@ def test_the_tutorial_from_a_profile_to_a_failure_probability(monkeypatch, tmp_p
     shutil.copytree(ROOT / "examples" / "data", tmp_path / "examples" / "data")
     less = {
         "bootstrap=200": "bootstrap=20",
-        r"interfaces\(30\)": "interfaces(4)",
-        r"seed=1\)": "seed=1, target_cv=0.3)",
+        "joint, fit, ": "joint, fit.interfaces(4), ",
+        r"exact, seed=1\)": "exact, seed=1, target_cv=0.3)",
     }
     scope = run_blocks("docs/tutorials/measured-profile.md", {}, **less)
     fit, truth = scope["fit"], {"mean": 1e6, "noise": 0.03e6, "spectrum.exponent": 2.0}
@@ -121,7 +121,7 @@ def test_the_road_from_files_to_a_force(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     less = {
         "between=True": "between=True, bootstrap=20",
-        r"interfaces\(60\)": "interfaces(6)",
+        r"interfaces\(100\)": "interfaces(6)",
         "samples=400": "samples=40",
         "probability=1e-3, method": "probability=0.03, method",
         "nodes=256": "nodes=128",
