@@ -376,6 +376,22 @@ def test_as_many_members_are_drawn_as_the_target_needs(monkeypatch):
     assert weighed.members_cv == pytest.approx(np.linalg.norm(shares - held), rel=0.3)
 
 
+class Again(UnknownMean):
+    """The same hundred again and again, but for one that long lists hold."""
+
+    def interfaces(self, count, seed=0):
+        known = super().interfaces(101, seed)
+        return [known[100 if number == 150 else number % 100] for number in range(count)]
+
+
+def test_a_longer_list_without_others_is_not_computed(monkeypatch):
+    monkeypatch.setattr(equally_likely, "FIRST", 100)
+    options = {"method": AtOnePlace(), "target_cv": 0.3, "progress": False}
+    found = st.failure_probability(LINE, Again(40e3), 0.96e6, **options)
+    assert found.members.size == 100
+    assert "no more differ" in found.warnings[-1]
+
+
 @pytest.mark.parametrize("spread", [0.0, 1.2])
 def test_the_error_of_a_list_is_not_that_of_its_samples(spread):
     """Pairs of runs of 40 and 60 families, pooled; of 25 entries two are equal."""

@@ -121,7 +121,7 @@ def test_the_road_from_files_to_a_force(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     less = {
         "between=True": "between=True, bootstrap=20",
-        r"interfaces\(100\)": "interfaces(6)",
+        r"interfaces\(60\)": "interfaces(6)",
         "samples=400": "samples=40",
         "probability=1e-3, method": "probability=0.03, method",
         "nodes=256": "nodes=128",

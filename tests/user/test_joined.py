@@ -89,6 +89,24 @@ def test_weights_are_those_of_closed_likelihoods(lengths, error):
         np.testing.assert_array_equal(exact_forces.u, again.u)
 
 
+def test_members_are_solved_by_the_method_itself():
+    """Not moved from the local criterion by what others need, which differs by five per cent."""
+    friction = st.LinearWeakening(weakening_rate=0.25e12, residual_ratio=0.7)
+    problem = dataclasses.replace(PROBLEM, friction=friction)
+    many = [
+        st.RandomInterface(
+            strength=st.RandomField(st.Gamma(mean=1e6, cv=cv), st.PowerLawSpectrum(4e-3), True),
+            between={"strength": st.Lognormal(mean=1.0, cv=scatter)},
+        )
+        for cv, scatter in zip((0.1, 0.2, 0.3, 0.1, 0.3, 0.2, 0.1), SCATTER, strict=False)
+    ]
+    exact = st.Equilibrium()
+    found = st.infer(problem, many, 0.8 * PEAKS, method=exact, samples=100, progress=False)
+    for one, onsets in zip(many, found.likelihood.densities[0].onsets, strict=True):
+        own = st.monte_carlo(problem, one, method=exact, samples=100, progress=False)
+        np.testing.assert_allclose(onsets, own.critical_stress, rtol=1e-9)
+
+
 def test_equal_interfaces_keep_equal_weights():
     """Which differ in what the peaks do not see, the length of a variation of 1e-4."""
     field = LIST[0].strength

@@ -53,10 +53,8 @@ def make_axes(
     prior: Prior, scaling: Scaling, box: Array, along: Mapping[int, int] = NODES
 ) -> tuple[Axis, ...]:
     """Place the nodes of the parameters that need simulation in a box of the prior."""
-    if prior.cells is not None:  # numbers 0, 1, ...; few at equal steps
-        last = int(prior.ends[1, 0])
-        few = last + 1 if along is NODES else min(last + 1, along[1])
-        return (Axis(0, np.linspace(0, last, few).round(), np.positive),)
+    if prior.cells is not None:  # numbers 0, 1, ...
+        return (Axis(0, np.arange(prior.ends[1, 0] + 1.0), np.positive),)
     simulated = [i for i in range(prior.dimension) if i not in scaling.keys]
     if len(simulated) not in along:
         names = ", ".join(prior.names[i] for i in simulated)
@@ -334,7 +332,9 @@ def make_likelihood(
     thetas = nodes_of(axes, scaling.reference)
     count = samples or SAMPLES.get(method.type, FEW)
     local = method.type == "local_criterion"
-    guided = not local and not no_single_length(*prior.at(prior.middle))
+    # Members of a list are in no order: what one needs is not between what two others do.
+    ordered = prior.cells is None
+    guided = not local and ordered and not no_single_length(*prior.at(prior.middle))
     few = make_axes(prior, scaling, box, COARSE) if guided else axes
     coarse, weights = nodes_of(few, scaling.reference), corners(few, thetas)
     total = len(coarse) * len(lengths) * count
@@ -354,8 +354,7 @@ def make_likelihood(
             known = simulate(
                 [one.by(LocalCriterion()) for one in own], samples=count, **options
             )
-            most = SAMPLES["local_criterion"] if prior.cells is None else 0
-            options["samples"] = max(count, most)
+            options["samples"] = max(count, SAMPLES["local_criterion"])
             meter.stage("onsets by the local criterion", len(thetas) * options["samples"])
             nearby = [one.by(LocalCriterion()) for one in experiments]
             many = simulate(nearby, meter=meter, **options)

@@ -45,6 +45,8 @@ PILOT = 1_000
 """Number of plain samples by which the algorithm is chosen."""
 FREQUENT = 0.01
 """Probability above which plain sampling needs no more evaluations than subset simulation."""
+FRESH = 1.5
+"""Least ratio of different members for which a longer list is computed."""
 CURVE_CV = 0.3
 """Coefficient of variation at the end of a curve by default."""
 COMMONEST, PER_DECADE = 0.5, 3
@@ -232,7 +234,8 @@ def _of_enough_members(
             return found
         meter.note = f"{count:,} interfaces, c.o.v. by the list {by_list:.2g}"
         larger = known.larger(count, experiment.seed)
-        if larger.kinds.max() <= known.kinds.max():  # the source has no others
+        # A longer list by a posterior of a list holds some more that are rare.
+        if larger.kinds.max() + 1 < FRESH * (known.kinds.max() + 1):
             return found
         experiment = replace(experiment, random=larger)
         warned.clear()
