@@ -280,6 +280,10 @@ table_of(calls, {
         lambda: onset(labelled(np.delete(STRENGTH, 1), np.delete(X, 1))),
         lambda: onset(without(3)),
         lambda: st.read_profile(labelled(without(3)), interface=LINE, gaps="skip"),
+        lambda: onset(labelled(STRENGTH[:63], X[:63]), gaps="fill"),
+        lambda: onset(without(*range(80, 83)), gaps="fill"),
+        lambda: onset(without(3), dataclasses.replace(
+            SYSTEM, specimen=st.Blocks(height=0.1)), gaps="fill"),
     ],
     "texts": [partial(read, text) for text in (
         "1,5\n2,6\n", "x;tau\n0;1e6\n0.05;strong\n", "0;1\n0.05\n", "x;tau;mu\n0;1\n",
@@ -315,6 +319,7 @@ table_of(calls, {
         lambda: st.read_profile(
             MAP.assign_coords(x=np.where(MAP.x == 0.0, np.nan, MAP.x)), interface=PLANE),
         lambda: st.read_profile(MAP.where(MAP.y > 0.001), interface=PLANE),
+        lambda: st.read_profile(MAP.where(MAP.y > 0.001), interface=PLANE, gaps="fill"),
     ],
     "studies": [
         lambda: studied(problem__solid__densty=1.0),
