@@ -2,8 +2,7 @@
 Onset on a plane
 ================
 
-A strength on a plane, the critical ellipse of the local criterion, and what slips at the exact
-onset.
+A strength on a plane, and where its onset is by the local criterion and by exact equilibrium.
 """
 
 import stiction as st
@@ -20,10 +19,5 @@ strength = st.RandomField(
 )
 tau_p = strength.sample(problem.interface, seed=0)
 local = st.onset(problem, tau_p, method=st.LocalCriterion())
-st.plot.onset(local, tau_p)
-
-# %%
-# With the maps of `Equilibrium` the picture shows what slips.
-
-exact = st.onset(problem, tau_p, method=st.Equilibrium(slip=True, sensitivity=True))
+exact = st.onset(problem, tau_p, method=st.Equilibrium())
 st.plot.onset([local, exact], tau_p)

@@ -88,16 +88,19 @@ def write_report(run: StoredRun, path: Path) -> None:
     state = run.status()
     if not state.done:
         raise InputError(f"{run.path}: no sample is stored yet")
-    add: Any
-    what, add = "Onset of sliding: a Monte Carlo study", add_samples
-    if isinstance(run, StoredCurves):
-        what, add = "Failure probability", add_curves
+    curves = isinstance(run, StoredCurves)
+    what = "Failure probability" if curves else "Onset of sliding: a Monte Carlo study"
     page = Page(run.study.title or what)
     page.text(f"{state.done:,} of {state.samples:,} {run.counted} by {run.methods}.")
     if not state.complete:
         page.text("The run is not complete.", warning=True)
     with paper_style():
-        add(page, run)
+        if isinstance(run, StoredCurves):
+            add_curves(page, run)
+        else:
+            result, axes = run.dataset(only=[*QUANTITIES, "critical_position"]), run.study.axes
+            add_figures(page, result, list(axes))
+            add_tables(page, result, axes)
     if state.failures:
         rows = [[str(failure)] for failure in state.failures[:MOST_ROWS]]
         page.table(f"Samples that failed ({len(state.failures):,})", ["sample"], rows)
@@ -106,14 +109,6 @@ def write_report(run: StoredRun, path: Path) -> None:
     )
     page.text(f"Computed with {'; '.join(state.versions)}.")
     write_whole(path, page.html().encode())
-
-
-def add_samples(page: Page, run: StoredRun) -> None:
-    """Add the figures and the tables of samples."""
-    names = [*QUANTITIES, "critical_position"]
-    result, axes = run.dataset(only=names), run.study.axes
-    add_figures(page, result, list(axes))
-    add_tables(page, result, axes)
 
 
 def add_curves(page: Page, run: StoredCurves) -> None:

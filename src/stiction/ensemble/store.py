@@ -231,7 +231,6 @@ def _refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any
 
 
 def _differences(here: Any, there: Any, path: str = "") -> list[str]:
-    """Return the entries in which two plain tables differ, with their paths."""
     if isinstance(here, list) and isinstance(there, list):
         here, there = dict(enumerate(here)), dict(enumerate(there))
     if isinstance(here, Mapping) and isinstance(there, Mapping):

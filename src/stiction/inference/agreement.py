@@ -149,7 +149,6 @@ def agreement(
 
 
 def _values(prediction: xr.Dataset, measured: Peaks) -> Array:
-    """Return the predicted peaks of a dataset."""
     name = measured.variable
     if name not in prediction:
         raise InputError(

@@ -1,7 +1,6 @@
 """Designs of tests: the information expected from each before any test is made."""
 
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -161,7 +160,6 @@ def _expected(
     seed: int,
     meter: Meter,
 ) -> Array:
-    """Return information and its standard error, (2, parameters)."""
     rng, dimension = np.random.default_rng([seed, 2]), simulated.prior.dimension
     gains = np.full((repetitions, dimension), np.nan)
     for row in range(repetitions):
@@ -172,7 +170,12 @@ def _expected(
         ]
         likelihood = simulated.of(peaks)
         box = simulated.box[:, free]
-        given = partial(_given_the_rest, likelihood, truth, free)
+
+        def given(v: Array, known: Array = truth, of: Likelihood = likelihood) -> Array:
+            u = np.tile(known, (v.shape[0], 1))
+            u[:, free] = v
+            return of(u)
+
         while (grid := grid_of(given, box, POINTS)) is None and np.ptp(
             box, axis=0
         ).min() > TINY:
@@ -183,10 +186,3 @@ def _expected(
         meter.advance()
     found = gains[np.isfinite(gains).any(axis=1)]
     return np.stack([found.mean(axis=0), found.std(axis=0) / np.sqrt(len(found))])
-
-
-def _given_the_rest(likelihood: Likelihood, truth: Array, free: list[int], v: Array) -> Array:
-    """Return the likelihood at points `v` of the free parameters, the others being known."""
-    u = np.tile(truth, (v.shape[0], 1))
-    u[:, free] = v
-    return likelihood(u)

@@ -51,7 +51,6 @@ LEAST_SCATTER = 1e-8
 
 
 def _families(given: Any) -> list[Family]:
-    """The families of one name or table, or of several."""
     several = given if isinstance(given, list | tuple) else [given]
     if not several:
         raise InputError("must name a family")
@@ -418,7 +417,6 @@ def _p_value(name: str, truth: Estimate, fits: Sequence[Estimate]) -> float:
 
 
 def _doubts(found: Estimate, p_values: Mapping[str, float]) -> list[str]:
-    """Reasons not to trust a fit."""
     doubts = []
     held, noise = found.lengths_held, found.model.noise
     if held < ENOUGH_LENGTHS:

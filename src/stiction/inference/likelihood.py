@@ -404,7 +404,6 @@ def effective_samples(alike: float, many: int, few: int) -> float:
 
 
 def _warn_if_long(experiment: Experiment, samples: int, workers: int | None) -> None:
-    """Warn of a simulation that takes long."""
     each = experiment.seconds
     seconds = samples * each / (workers or usable_cores())
     if seconds > LONG:

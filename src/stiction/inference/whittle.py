@@ -148,15 +148,6 @@ def origin(name: str) -> float:
     return 0.5 if name.endswith("exponent") else 0.0
 
 
-def _scaled(name: str, value: float) -> float:
-    """A parameter on the scale on which it is searched for."""
-    return value if name == "noise_share" else math.log(value - origin(name))
-
-
-def _unscaled(name: str, value: float) -> float:
-    return value if name == "noise_share" else origin(name) + math.exp(value)
-
-
 def spectrum_of(given: Any) -> tuple[str, dict[str, float]]:
     """Return the name of a family of spectra and the parameters to keep, checked."""
     table = table_of(given)
@@ -192,7 +183,10 @@ class SpectrumFamily:
 
     def model(self, vector: Array, shares: Array) -> Model:
         """Return the model of a vector of parameters."""
-        found = {n: _unscaled(n, float(v)) for n, v in zip(self.free, vector, strict=True)}
+        found = {
+            n: float(v) if n == "noise_share" else origin(n) + math.exp(v)
+            for n, v in zip(self.free, vector, strict=True)
+        }
         variance = found.pop("variance")
         anisotropy = found.pop("anisotropy", self.anisotropy or 1.0)
         known = min((self.noise or 0.0) ** 2 / variance, RANGES["noise_share"][1])
@@ -205,7 +199,10 @@ class SpectrumFamily:
 
     def vector(self, values: Sequence[float]) -> Array:
         """Return free parameters on the scale of the search."""
-        return np.array([_scaled(*one) for one in zip(self.free, values, strict=True)])
+        pairs = zip(self.free, values, strict=True)
+        return np.array(
+            [v if n == "noise_share" else math.log(v - origin(n)) for n, v in pairs]
+        )
 
     def vector_of(self, model: Model) -> Array:
         """Return the vector of a model."""

@@ -226,7 +226,6 @@ def _folded_line(
 def _folded_plane(
     spectrum: Any, axes: list[Array], folds: list[int], sampling: list[float], end: Edge
 ) -> Array:
-    """The same for a plane."""
     few = [np.linspace(axis.min(), axis.max(), FEW[2]) for axis in axes]
     near, far = np.zeros((axes[0].size, axes[1].size)), np.zeros((FEW[2], FEW[2]))
     for p in range(-folds[0], folds[0] + 1):

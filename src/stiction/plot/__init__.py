@@ -6,12 +6,11 @@ path.
 
 Units follow the size of what is drawn: mm and µs, or km and s. Where the problem has a normal
 pressure, friction coefficients are drawn too. `axes` and `style` are what all files share;
-`onsets`, `specimens`, `ruptures`, `distributions`, `failure` and `fits` draw a kind of result each,
+`onsets`, `specimens`, `ruptures`, `distributions` and `fits` draw a kind of result each,
 `fields` profiles and maps.
 """
 
-from stiction.plot.distributions import monte_carlo, quantiles
-from stiction.plot.failure import failure_curve
+from stiction.plot.distributions import failure_curve, monte_carlo, quantiles
 from stiction.plot.fields import field
 from stiction.plot.fits import agreement, fit
 from stiction.plot.onsets import onset

@@ -134,20 +134,6 @@ def draw_map(
     return drawn
 
 
-def draw_outline(
-    axes: Axes, interface: Interface, mask: NDArray[np.bool_], ink: str, width: float
-) -> None:
-    """Draw the border of a set of nodes, closed across the borders of the map."""
-    padded = np.pad(mask.astype(float), 1, mode="wrap")
-    factor, _ = unit_for("m", interface.lengths)
-    x, y = (
-        np.arange(-1, n + 1) * h * factor
-        for h, n in zip(interface.spacings, mask.shape, strict=True)
-    )
-    if 0.0 < padded.mean() < 1.0:
-        axes.contour(x, y, padded.T, levels=[0.5], colors=[ink], linewidths=[width])
-
-
 def map_height(interface: Interface, more: float = 1.0) -> float:
     """Return the height of a figure, inches, with one map and `more` for the rest."""
     x, y = interface.lengths

@@ -1,6 +1,5 @@
 """Figures of the onset by each method on a profile."""
 
-import itertools
 from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
@@ -8,13 +7,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
 from stiction.base.errors import InputError
 from stiction.base.units import unit_for
 from stiction.methods.criterion.local import nucleation_stress
-from stiction.methods.equilibrium.patches import critical_patch
 from stiction.plot.axes import (
     add_friction_scale,
     named,
@@ -23,8 +20,8 @@ from stiction.plot.axes import (
     problem_of,
     with_unit,
 )
-from stiction.plot.fields import draw_map, draw_outline, map_height, name_line, rows_of
-from stiction.plot.style import ACCENT, PAGE, PALE, QUIET, color, series
+from stiction.plot.fields import draw_map, map_height, name_line, rows_of
+from stiction.plot.style import PAGE, PALE, QUIET, color, series
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
 from stiction.problem.profiles.placing import IN_GAP, MEASURED
@@ -46,9 +43,7 @@ def onset(
     Parameters
     ----------
     result : Dataset, or list or mapping of Dataset
-        From `stiction.onset` with this strength. Give several methods as a list, or by name. On
-        a plane, the critical ellipse of the local criterion is drawn and, for `Equilibrium`
-        with ``slip=True`` and ``sensitivity=True``, the slipping patches at the onset.
+        From `stiction.onset` with this strength. Give several methods as a list, or by name.
     strength : array
         tau_p, Pa, of shape (nodes,) or (samples, nodes); on a plane (nx, ny) or (samples, nx, ny).
         A DataArray of friction coefficients (unit 1) is multiplied by the normal pressure.
@@ -130,25 +125,10 @@ def _draw_line(
 def _draw_plane(
     axes: Axes, problem: Problem, tau_p: Array, results: Mapping[str, xr.Dataset]
 ) -> None:
-    exact = next((one for one in results.values() if {"slip", "sensitivity"} <= set(one)), None)
     interface = problem.interface
     factor, unit = unit_for("Pa", tau_p)
-    # Light enough for outlines on it, if there are any.
-    shades: Any = {"cmap": "cividis"} if exact is None else {"cmap": "gray", "alpha": 0.6}
-    draw_map(axes, interface, tau_p * factor, rf"strength $\tau_p$ ({unit})", **shades)
-    if exact is not None:
-        inside, _ = critical_patch(exact["sensitivity"].values[0], interface)
-        sliding = exact["slip"].values[0] > 0.0
-        for mask, ink, width, text in (
-            (sliding, color(1), 0.9, "slips at the first instability"),
-            (inside, ACCENT, 1.6, "critical patch"),
-        ):
-            draw_outline(axes, interface, mask, ink, width)
-            axes.plot([], [], color=ink, linewidth=width, label=text)
+    draw_map(axes, interface, tau_p * factor, rf"strength $\tau_p$ ({unit})", cmap="cividis")
     _mark(axes, interface, results, factor)
-    for result in results.values():
-        if exact is None and "critical_aspect" in result:
-            _ellipse(axes, interface, result)
 
 
 def _mark(
@@ -169,12 +149,3 @@ def _mark(
         style |= {"marker": "os^DvP"[number % 6], "markersize": max(9.0 - 3.5 * number, 2.0)}
         at = place if interface.is_plane else (*place, load * factor)
         axes.plot(*at, markeredgecolor="white", markeredgewidth=0.8, **style)
-
-
-def _ellipse(axes: Axes, interface: Interface, result: xr.Dataset) -> None:
-    factor, _ = unit_for("m", interface.lengths)
-    extent = result["critical_patch_extent"].values[0] * factor
-    for shift in itertools.product((-1, 0, 1), repeat=2):  # it may lie across the edges
-        moved = result["critical_position"].values[0] + np.multiply(shift, interface.lengths)
-        ellipse = Ellipse(moved * factor, *extent, fill=False, edgecolor="white", linewidth=0.9)
-        axes.add_patch(ellipse)

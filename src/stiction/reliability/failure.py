@@ -38,7 +38,7 @@ from stiction.reliability.answer import (
 )
 from stiction.reliability.counting import count_failures
 from stiction.reliability.repetitions import SAMPLES, repetition
-from stiction.reliability.tail import Tail, repeat_until_precise, sample_tail
+from stiction.reliability.tail import Goal, Tail, repeat_until_precise, sample_tail
 from stiction.reliability.uncertainty import binomial_interval, generator, lognormal_interval
 
 PILOT = 1_000
@@ -281,8 +281,8 @@ def _probability(
         found = _by_counting(state, stress, target_cv, budget, least, begun)
         return found | {"reason": reason}
     tail = sample_tail(
-        state, algorithm=algorithm, target_cv=target_cv, budget=budget,
-        stress=stress, reason=reason, pilot=pilot,
+        state, Goal(target_cv, stress), algorithm=algorithm, budget=budget, reason=reason,
+        pilot=pilot,
     )  # fmt: skip
     return _by_tail(state, stress, tail, target_cv)
 
@@ -479,8 +479,8 @@ def _quantile(
     often, lowest, doubts = probability >= FREQUENT, state.bounds[0], []
     target_cv *= SAMPLED if state.several else 1.0
     tail = sample_tail(
-        state, algorithm="subset" if often else "auto", target_cv=target_cv, budget=budget,
-        probability=probability, reason="frequent" if often else "rare",
+        state, Goal(target_cv, probability=probability), budget=budget,
+        algorithm="subset" if often else "auto", reason="frequent" if often else "rare",
     )  # fmt: skip
     by_list = 0.0
     if tail.complete:

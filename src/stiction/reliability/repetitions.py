@@ -103,6 +103,5 @@ def repetitions_in(rows: NDArray[Any]) -> Iterator[tuple[int, int, Descent]]:
 
 
 def _changes(rows: NDArray[Any], *names: str) -> NDArray[np.int64]:
-    """Return the places where one of some columns changes."""
     changed = [np.flatnonzero(np.diff(rows[name])) + 1 for name in names]
     return np.unique(np.concatenate(changed))

@@ -30,6 +30,14 @@ POOR = 0.02
 """Least share of failures among the samples of a guide; below it the method is no guide."""
 
 
+class Goal(NamedTuple):
+    """What a tail is sampled for: the probability of a stress, or the stress of a probability."""
+
+    cv: float  # coefficient of variation to reach
+    stress: float = -math.inf
+    probability: float = 0.0
+
+
 class Tail(NamedTuple):
     """The lower tail of the stress at onset from pooled repetitions."""
 
@@ -240,16 +248,14 @@ def share_picked(guide: Array, exact: Array) -> float:
 
 def sample_tail(
     state: LimitState,
+    goal: Goal,
     *,
     algorithm: str,
-    target_cv: float,
     budget: int,
-    stress: float = -math.inf,
-    probability: float = 0.0,
     reason: str = "as requested",
     pilot: tuple[Array, Array] | None = None,
 ) -> Tail:
-    """Sample the lower tail down to a stress, or down to a probability.
+    """Sample the lower tail down to a goal.
 
     Algorithm 'auto' takes two levels where a less expensive method picks the same weakest ones
     among plain samples, and the first repetition finds failures among the samples that it leads to.
@@ -267,12 +273,11 @@ def sample_tail(
         share = share_picked(guide(pilot[0]), pilot[1])
         reason += f"; of {spent} plain samples the {label} picks {share:.0%} of the weakest"
         guide = guide if share >= ALIKE else None
-    goal: Any = {"target_cv": target_cv, "stress": stress, "probability": probability}
-    found = _repetitions(state, guide, budget - spent, poor=POOR if auto else 0.0, **goal)
+    found = _repetitions(state, guide, goal, budget - spent, POOR if auto else 0.0)
     spent += sum(one.evaluations for one in found)
     if auto and guide and _is_poor(found[0], POOR):
         reason += f"; {found[0].share:.1%} of the failures by the {label} hold: a poor guide"
-        guide, found = None, _repetitions(state, None, budget - spent, **goal)
+        guide, found = None, _repetitions(state, None, goal, budget - spent)
         spent += sum(one.evaluations for one in found)
     return Tail(found, "subset" if guide is None else "two_level", reason, spent)
 
@@ -280,11 +285,8 @@ def sample_tail(
 def _repetitions(
     state: LimitState,
     guide: LimitState | None,
+    goal: Goal,
     budget: int,
-    *,
-    target_cv: float,
-    stress: float,
-    probability: float,
     poor: float = 0.0,
 ) -> list[Any]:
     """Return repetitions by one level, or by two with a guide; a single one of a poor guide."""
@@ -293,29 +295,29 @@ def _repetitions(
         options: dict[str, Any] = {
             "samples": samples,
             "max_evaluations": left,
-            "threshold": stress,
+            "threshold": goal.stress,
             "floor": state.bounds[0],
             "label": state.member,
             "rng": generator(state.experiment.seed, 1 if guide is None else 3, number),
         }
         if guide is None:
-            return descend(state, state.dimension, probability=DEEPER * probability, **options)
-        return bridge(guide, state, state.dimension, probability=probability, **options)
+            chance = DEEPER * goal.probability
+            return descend(state, state.dimension, probability=chance, **options)
+        return bridge(guide, state, state.dimension, probability=goal.probability, **options)
 
     def judge(repetitions: Sequence[Any]) -> float:
         if guide and _is_poor(repetitions[0], poor):
             return 0.0
         tail = Tail(repetitions)
-        return tail.cv(tail.quantile(probability) if probability else stress)
+        return tail.cv(tail.quantile(goal.probability) if goal.probability else goal.stress)
 
     first, largest = SUBSET if guide is None else BRIDGE
     # Fewer than usual where the budget would not even hold four levels.
     return repeat_until_precise(
-        make, judge, target_cv=target_cv, first=min(first, max(budget // 4, 20)),
+        make, judge, target_cv=goal.cv, first=min(first, max(budget // 4, 20)),
         largest=largest, max_evaluations=budget, meter=state.meter,
     )  # fmt: skip
 
 
 def _is_poor(one: Any, least: float) -> bool:
-    """Return whether too few of the failures by a guide hold."""
     return bool(one.complete and one.share < least)

@@ -329,7 +329,6 @@ def _choose(data: Any, names: list[Any], called: tuple[str, ...], si: str = "") 
 
 
 def _column(data: Any, names: list[Any], what: str, wanted: Column) -> Any:
-    """Return the variable of this name, heading or number."""
     columns = list(data.data_vars)
     if isinstance(wanted, int) and "row" in data.dims and 0 <= wanted < len(columns):
         wanted = columns[wanted]

@@ -149,7 +149,6 @@ def _lines(path: Path) -> tuple[list[tuple[int, list[str]]], str, str]:
 
 
 def _sheet(path: Path) -> list[tuple[int, list[str]]]:
-    """Return the rows of the first sheet of a workbook."""
     import pandas as pd
 
     options: Any = {"header": None, "dtype": str, "na_filter": False, "engine": "openpyxl"}
@@ -215,7 +214,6 @@ def _number(cell: str, separator: str) -> float | None:
 def _headings(
     header: list[tuple[int, list[str]]], width: int
 ) -> list[tuple[str, dict[str, str]]]:
-    """Return the name and the attributes of each column."""
     if not header:
         return [(str(number), {}) for number in range(width)]
     number, names = header[-1]
