@@ -527,7 +527,7 @@ def reliability(
 
 def _answer(study: Any, asked: dict[str, float], workers: int | None) -> None:
     """Print the answer to what was asked, or else to the question of the study, at each point."""
-    from stiction.study.question import Question
+    from stiction.study.study import Question
 
     question = study.reliability
     if asked:

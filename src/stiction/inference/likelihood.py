@@ -170,19 +170,19 @@ class Area(NamedTuple):
 
 def area_of(prior: Prior, method: Any, length: float | None) -> Area:
     """Return the area of specimens of a length, m; None stands for the problem's own."""
+
+    def areas(points: Array) -> list[Any]:
+        return [own.problem.area for own in experiments_at(prior, points, method, length)]
+
     powers, middle = np.zeros(prior.dimension), prior.middle
     for i, name in enumerate(prior.names):
         if full_key(name).startswith(("problem.interface.", "problem.specimen.")):
             points = np.tile(middle, (2, 1))
             points[:, i] = ends = prior.ends[:, i]
-            powers[i] = np.log(np.divide(*_areas(prior, points, method, length)))
+            powers[i] = np.log(np.divide(*areas(points)))
             powers[i] = round(powers[i] / np.log(ends[0] / ends[1]), 9) if powers[i] else 0.0
-    (area,) = _areas(prior, middle, method, length)
+    (area,) = areas(middle)
     return Area(float(area / np.prod(middle**powers)), powers)
-
-
-def _areas(prior: Prior, points: Array, method: Any, length: float | None) -> list[Any]:
-    return [own.problem.area for own in experiments_at(prior, points, method, length)]
 
 
 def variable_of(prior: Prior, unit: str) -> str:

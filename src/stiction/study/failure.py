@@ -112,7 +112,6 @@ class StoredCurves(StoredRun):
 def compute(
     study: Any,
     settings: Mapping[str, Any],
-    *,
     out: Path,
     repetitions: int,
     workers: int | None,

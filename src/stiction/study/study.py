@@ -21,7 +21,9 @@ from stiction.base.model import (
     Count,
     FilePath,
     Flag,
+    Positive,
     Progress,
+    Real,
     Text,
     check,
     checked,
@@ -40,8 +42,8 @@ from stiction.problem.problem import Problem
 from stiction.problem.profiles.reading import profile_in_file
 from stiction.random.dotted_keys import with_values
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
-from stiction.reliability.answer import Probability
-from stiction.study.question import Question
+from stiction.reliability.answer import Answer, Probability, TargetCv
+from stiction.reliability.failure import design_stress, failure_probability
 from stiction.study.run import AnyPart, StoredRun, samples_of_part
 from stiction.study.sweep import Point, Sweep, Uncertain, grid_axes
 
@@ -69,6 +71,47 @@ AnyRandom: Any = Annotated[
     Discriminator(lambda given: "several" if isinstance(given, list | tuple) else "one"),
 ]
 """A random interface, or several that are equally likely; a field alone becomes one."""
+
+
+@model(kw_only=True)
+class Question:
+    """A demand, whose failure probability is asked for, or a probability, for a design.
+
+    Parameters
+    ----------
+    stress, force, friction_coefficient : float, optional
+        The demand, Pa, N or 1, as of `stiction.failure_probability`.
+    probability : float, optional
+        Instead: that of sliding below the design, as of `stiction.design_stress`.
+    target_cv : float
+        Coefficient of variation to reach.
+    """
+
+    stress: Real | None = None
+    force: Positive | None = None
+    friction_coefficient: Positive | None = None
+    probability: Probability | None = None
+    target_cv: TargetCv = 0.1
+
+    @model_validator(mode="after")
+    def _one(self) -> Question:
+        given = [name for name, one in vars(self).items() if one is not None]
+        asked = [name for name in given if name != "target_cv"]
+        if len(asked) != 1:
+            raise InputError(
+                "give one of stress (Pa), force (N), friction_coefficient and probability, got"
+                f" {' and '.join(asked) or 'none'}"
+            )
+        return self
+
+    def answer(self, experiment: Experiment, workers: int | None = None) -> Answer:
+        """Answer it for one point of a study."""
+        options: dict[str, Any] = {
+            name: one for name, one in vars(self).items() if one is not None
+        }
+        options |= {"method": experiment.method, "seed": experiment.seed, "workers": workers}
+        ask = failure_probability if self.probability is None else design_stress
+        return ask(experiment.problem, experiment.given, **options)
 
 
 @model(kw_only=True)
@@ -336,16 +379,7 @@ class Study(_Parts):
         from stiction.study.failure import compute
 
         settings = {"smallest": smallest, "event": event}
-        return compute(
-            self,
-            settings,
-            out=out,
-            repetitions=repetitions,
-            workers=workers,
-            executor=executor,
-            progress=progress,
-            part=part,
-        )
+        return compute(self, settings, out, repetitions, workers, executor, progress, part)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain dictionaries, lists and numbers, as in TOML.
