@@ -410,7 +410,7 @@ def test_the_error_of_a_list_is_not_that_of_its_samples(spread):
             runs.append(Descent(1000, [level], 1.0, 1000, True))
         found.append(Tail(runs).members_cv(1.0, kinds) ** 2)
     entries, own = np.bincount(kinds) / 25.0, np.bincount(kinds, shares)
-    expected = (np.sum(own**2) - np.sum(entries**2)) / (1.0 - np.sum(entries**2))
+    expected = np.sum((own - entries) ** 2) / (1.0 - np.sum(entries**2))
     # With the samples of each entry as they are it is 0.01 higher; below zero it is cut off.
     assert np.mean(found) == pytest.approx(expected, abs=4e-3)
 
