@@ -91,7 +91,9 @@ def scrape_figure(block, block_vars, gallery_conf):
 
 
 # The how-tos that README.md lists, with a title each.
-HOW_TOS = re.findall(r"\[([^\]]+)\]\(examples/(\w+)\.py\)", (ROOT / "README.md").read_text("utf-8"))
+HOW_TOS = re.findall(
+    r"\[([^\]]+)\]\(examples/(\w+)\.py\)", (ROOT / "README.md").read_text("utf-8")
+)
 SCRIPTS = ROOT / "build" / "how-to"
 sphinx_gallery_conf = {
     "examples_dirs": [str(SCRIPTS), "gallery"],

@@ -55,7 +55,9 @@ def draw() -> Figure:
         for target in targets:
             (x, y), (to_x, to_y) = at[room], at[target]
             next_to = abs(y - to_y) < 1.5
-            axes.plot((x, to_x), (y, to_y), color="0.55" if next_to else "0.88", lw=0.9, zorder=0)
+            axes.plot(
+                (x, to_x), (y, to_y), color="0.55" if next_to else "0.88", lw=0.9, zorder=0
+            )
     for room, (x, y) in at.items():
         axes.text(
             x, y, room, ha="center", va="center", fontsize=9,

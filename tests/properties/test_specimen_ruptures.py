@@ -59,6 +59,9 @@ def test_an_ensemble_a_path_and_a_probability_rest_on_it():
     onset = st.onset(SPECIMEN, rough(SPECIMEN, 0, samples=3), method=method)
     assert np.array_equal(found["critical_force"], onset["critical_force"])
     assert found["event_stress_drop"].sizes["event"] == 2
+    run = st.simulate_rupture(SPECIMEN, rough(SPECIMEN, 0), method=method, progress=False)
+    for name in ("rupture_speed", "median_rupture_speed"):
+        assert run[name].values == pytest.approx(onset[name].values[0], nan_ok=True)
     assert '"quality_factor": 25.0' in found.attrs["study"]
     path = st.equilibrium_path(SPECIMEN, STRENGTH, [0.2e6, 3e6], method=method)
     assert list(path["sliding"].values) == [False, True]

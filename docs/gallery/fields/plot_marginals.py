@@ -15,6 +15,8 @@ families = (st.Lognormal, st.Weibull, st.Gamma, st.TruncatedNormal)
 with st.plot.paper_style():
     figure, panels = plt.subplots(4, 1, figsize=(6.75, 7), sharex=True, sharey=True)
 for axes, family in zip(panels, families, strict=True):
-    tau_p = st.RandomField(family(mean=1e6, cv=0.35), spectrum).sample(problem.interface, seed=1)
+    tau_p = st.RandomField(family(mean=1e6, cv=0.35), spectrum).sample(
+        problem.interface, seed=1
+    )
     st.plot.field(problem, tau_p, ax=axes)
     axes.set_title(family.__name__)

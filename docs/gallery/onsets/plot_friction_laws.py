@@ -22,8 +22,12 @@ laws = {
 st.plot.monte_carlo(
     {
         name: st.monte_carlo(
-            dataclasses.replace(plain, friction=law), strength, method=st.Equilibrium(),
-            samples=150, seed=0, progress=False,
+            dataclasses.replace(plain, friction=law),
+            strength,
+            method=st.Equilibrium(),
+            samples=150,
+            seed=0,
+            progress=False,
         )
         for name, law in laws.items()
     }

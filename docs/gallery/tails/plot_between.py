@@ -9,7 +9,9 @@ import stiction as st
 
 problem = st.paper.problem(nodes=512)
 strength = st.paper.strength(problem, correlation_ratio=1.0)
-lots = st.RandomInterface(strength=strength, between={"strength": st.Lognormal(mean=1.0, cv=0.1)})
+lots = st.RandomInterface(
+    strength=strength, between={"strength": st.Lognormal(mean=1.0, cv=0.1)}
+)
 ax = None
 for random in (strength, lots):
     curve = st.failure_curve(
