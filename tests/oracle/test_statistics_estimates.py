@@ -5,7 +5,7 @@ import pytest
 import scipy.stats
 
 from stiction.statistics.densities import density
-from stiction.statistics.estimates import WithError, mean, quantiles, standard_deviation
+from stiction.statistics.estimates import mean, quantiles, standard_deviation
 
 RNG = np.random.default_rng(20)
 
@@ -19,11 +19,6 @@ def test_errors_are_the_scatter_of_repetitions(estimator):
     claimed = np.mean([each.error for each in found])
     # 3.5 % from the number of repetitions, three times over; the sixth moments add a little.
     assert claimed / scatter == pytest.approx(1.0, abs=0.15)
-
-
-def test_errors_of_independent_estimates_add_in_squares():
-    difference = WithError(3.0, 0.3) - WithError(1.0, 0.4)
-    assert (difference.value, difference.error) == pytest.approx((2.0, 0.5))
 
 
 def test_quantile_intervals_cover():

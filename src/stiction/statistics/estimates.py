@@ -21,10 +21,6 @@ class WithError:
     value: float
     error: float = 0.0
 
-    def __sub__(self, other: WithError | float) -> WithError:
-        other = other if isinstance(other, WithError) else WithError(other)
-        return WithError(self.value - other.value, math.hypot(self.error, other.error))
-
 
 def as_sample(values: Any, fewest: int = 2) -> Array:
     """Return finite values, at least `fewest`, as a flat array."""

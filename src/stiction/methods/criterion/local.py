@@ -11,7 +11,6 @@ from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import checked, model
 from stiction.base.variables import Variable
 from stiction.elasticity.driven import Driven
-from stiction.elasticity.protocol import Windows
 from stiction.elasticity.weakest import weakest_window
 from stiction.methods.criterion.average import averages, least_average
 from stiction.methods.criterion.windows import windows_of
@@ -148,7 +147,12 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
     load, start, width, relief = np.zeros((4, sample.samples))
     allowed, blocks = np.empty(problem.interface.size), problem.blocks
     for rate, same in _rates(sample):
-        windows = _windows_of_blocks(blocks, rate)
+        windows = blocks.windows(rate, rate)
+        if not windows.starts.size:
+            raise InputError(
+                "interface.length: no part of the specimen becomes unstable by itself, so the local"
+                " criterion does not hold; use st.Equilibrium()"
+            )
         for i in same:
             load[i], c, start[i] = weakest_window(
                 excess[i],
@@ -186,16 +190,6 @@ def _relief_of_patch(blocks: Driven, rate: float, run: slice, drive: Array) -> f
     slip = np.zeros(len(drive))
     slip[run] = np.linalg.solve(matrix, np.append(drive[run], 0.0))[:-1]
     return float(blocks.mean_relief(np.maximum(slip, 0.0)))
-
-
-def _windows_of_blocks(blocks: Driven, rate: float) -> Windows:
-    windows = blocks.windows(rate, rate)
-    if not windows.starts.size:
-        raise InputError(
-            "interface.length: no part of the specimen becomes unstable by itself, so the local"
-            " criterion does not hold; use st.Equilibrium()"
-        )
-    return windows
 
 
 @checked
