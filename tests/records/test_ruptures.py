@@ -36,7 +36,8 @@ def line(nodes=128, **more):
 
 
 def run(problem, strength, save=None, **options):
-    method = st.Rupture(**{"loading_rate": 8e8, "kernel_tolerance": FASTER} | options)
+    given = {"loading_rate": 8e8, "kernel_tolerance": FASTER, "max_steps": 20_000}
+    method = st.Rupture(**given | options)
     save = save or st.Save(
         ["slip", "slip_rate", "strength"], every=60, stations={"a": 0.011, "b": 0.0371}
     )
