@@ -86,7 +86,9 @@ def friction_coefficients_and_pressures():
     text = "x (mm),coefficient (1)\n" + "\n".join(
         f"{2 * i},{v / 2}" for i, v in enumerate(EIGHT)
     )
-    pressure = "x (mm),p (bar)\n" + "\n".join(f"{2 * i},{30 * v}" for i, v in enumerate(EIGHT))
+    pressure = "x (mm),sigma (bar),pressure (bar)\n" + "\n".join(
+        f"{2 * i},{9 + i},{30 * v}" for i, v in enumerate(EIGHT)
+    )
     return {
         "coefficient": table(text, interface=SMALL, quantity="friction_coefficient"),
         "pressure": table(pressure, interface=SMALL, quantity="normal_pressure"),
