@@ -124,7 +124,7 @@ def commands_of_a_sweep():
     return of_commands(
         SWEPT,
         "run study.toml --out run --workers 1",
-        "status run --parts 3",
+        "status run",
         "export run all.csv",
         "export run all.nc",
         "report run",
@@ -294,7 +294,7 @@ def a_run_in_parts():
     found = of_commands(
         plain,
         "run study.toml --out run --workers 1 --part 2/3",
-        "status run --parts 3",
+        "status run",
         "export run part.csv",
         "export run all.csv --partial",
         "report run",
