@@ -198,13 +198,44 @@ def test_arrest_equals_relaxation_node_by_node(wide):
         assert path["event_moment"].item() == pytest.approx(moment, rel=0.1)
 
 
-def test_nodes_that_become_residual_one_by_one_are_events_only_where_the_path_turns(wide):
-    """All of it looks unstable to long steps."""
+def first_loss_of_stability(problem, strength, load, slip):
+    """Follow slip node by node from a state; the load at which K - W is no longer definite."""
+    stiff = dense(symbol_of(problem), problem.interface.shape)
+    rate, residual = problem.friction.weakening_rate, problem.friction.residual_strength
+    critical = (strength - residual) / rate
+    fallen, inside = slip >= critical * (1.0 - 1e-9), slip > 0.0
+    while True:
+        matrix = (stiff - np.diag(np.where(fallen, 0.0, rate)))[np.ix_(inside, inside)]
+        if np.linalg.eigvalsh(matrix)[0] < 0.0:
+            return load
+        carried = np.where(fallen, residual, strength)
+        slip, moves = np.zeros(strength.size), np.zeros(strength.size)
+        slip[inside] = np.linalg.solve(matrix, (load - carried)[inside])
+        moves[inside] = np.linalg.solve(matrix, np.ones(inside.sum()))
+        margin, closing = strength - load + stiff @ slip, 1.0 - stiff @ moves
+        joins, falls = np.full((2, strength.size), np.inf)
+        np.divide(margin, closing, where=~inside & (closing > 0.0), out=joins)
+        np.divide(critical - slip, moves, where=inside & ~fallen & (moves > 0.0), out=falls)
+        load += max(min(joins.min(), falls.min()), 0.0)
+        if joins.min() < falls.min():
+            inside[joins.argmin()] = True
+        else:
+            fallen[falls.argmin()] = True
+
+
+def test_nodes_that_become_residual_one_by_one_are_events_only_where_stability_is_lost(wide):
+    """All of it looks unstable to long steps; the first loss is followed node by node."""
     problem, _ = wide
-    found = exact_onset(problem, 0.4e6 + 4.6e6 * noise(5.0, 5, (32, 32)))
+    strength = 0.4e6 + 4.6e6 * noise(5.0, 5, (32, 32))
+    found = exact_onset(problem, strength)
+    first = found["first_instability"].item()
+    before = st.equilibrium_path(problem, strength, [first * (1.0 - 1e-5)])["slip"].values
+    load = first_loss_of_stability(
+        problem, strength.ravel(), first * (1.0 - 1e-5), before.ravel()
+    )
+    assert first == pytest.approx(load, rel=1e-10)
     assert found["arrested_events"].item() == 2
-    ratio = found["critical_load"].item() / found["first_instability"].item()
-    assert ratio == pytest.approx(1.01224, abs=2e-4)
+    assert found["critical_load"].item() / first == pytest.approx(1.01224, abs=2e-4)
 
 
 def test_path_balances_where_it_slips(wide):
