@@ -190,3 +190,21 @@ def test_a_field_of_coefficients_says_so():
     fit = fitted(VALUES * 3e-7, PIECE, quantity="friction_coefficient")
     assert fit.field.of == "friction_coefficient"
     assert {field.of for field in fit.repetitions} == {"friction_coefficient"}
+
+
+def test_members_keep_their_moments_where_a_bound_of_beta_ends_at_zero():
+    """Of nearly normal values bounds are hardly known; a lower one is no less than zero."""
+    field = st.RandomField(
+        st.Gamma(mean=0.31e6, cv=0.13), st.PowerLawSpectrum(6e-3), mean_mode=True
+    )
+    records = field.sample(st.Interface(length=0.15, nodes=64), samples=4, seed=3)
+    fit = st.fit_field(
+        records, st.Interface(length=0.15, nodes=64), marginal="beta", bootstrap=40
+    )
+    members = [one.strength.marginal for one in fit.interfaces(40)]
+    assert sum(one.low == 0.0 for one in members) > 5
+    means, deviations = np.array(
+        [(one.distribution.mean(), one.distribution.std()) for one in members]
+    ).T
+    assert np.abs(means / fit.field.mean - 1.0).max() < 0.1  # the interval reaches to 0.03
+    assert np.abs(deviations / fit.field.standard_deviation - 1.0).max() < 0.5

@@ -21,6 +21,9 @@ PLACES = ("mean", "marginal.mean", "marginal.loc")
 """Parameters of location."""
 SIDES = {"marginal.low": -1.0, "marginal.high": 1.0}
 """Side of the mean on which a bound lies."""
+SHAPES = ("marginal.alpha", "marginal.beta")
+LEAST_SHAPE = 1e-2
+"""Of a beta distribution that is to scatter more than its bounds allow."""
 SAME = 1e-3
 """Distance within which an interval is uninformative, as a share of an end of a range."""
 
@@ -199,11 +202,28 @@ def limits_of(found: Estimate, values: Array, noise: float) -> dict[str, tuple[f
     return limits
 
 
+def _shapes_within(free: Mapping[str, Array], moved: Mapping[str, Array]) -> dict[str, Array]:
+    """Return shapes of beta distributions whose bounds were moved, at equal mean and variance."""
+    alpha, beta, low, high = (free[name] for name in (*SHAPES, *SIDES))
+    both, extent = alpha + beta, high - low
+    mean, variance = (
+        low + extent * alpha / both,
+        extent**2 * alpha * beta / both**2 / (both + 1.0),
+    )
+    bottom, top = (moved[name] for name in SIDES)
+    share = (mean - bottom) / (top - bottom)
+    both = share * (1.0 - share) * (top - bottom) ** 2 / variance - 1.0
+    as_before = (bottom == low) & (top == high)
+    shapes = np.where(as_before, (alpha, beta), (share * both, (1.0 - share) * both))
+    return dict(zip(SHAPES, np.maximum(shapes, LEAST_SHAPE), strict=True))
+
+
 def likely(repeated: Repetitions, measured: Array) -> list[Estimate]:
     """Return estimates as likely as the one found: it less the error of each repetition."""
     found = repeated.truth
     limits = limits_of(found, measured, found.model.noise)
     moved: dict[str, Array] = {}
+    free: dict[str, Array] = {}  # before the limits
     for name in found.parameters:
         if name == "mean" or name.startswith("marginal.") or name in NAMES.values():
             scale = scale_of(name, [repeated])
@@ -211,7 +231,10 @@ def likely(repeated: Repetitions, measured: Array) -> list[Estimate]:
             places = (at - width * scale.errors(repeated)).tolist()
             means = moved.get("mean", places)  # bounds lie at distances from them
             values = [scale.back(p, {"mean": m}) for p, m in zip(places, means, strict=True)]
+            free[name] = np.array(values)
             moved[name] = np.clip(values, *limits.get(name, (-math.inf, math.inf)))
+    if moved.keys() >= {*SHAPES, *SIDES}:
+        moved |= _shapes_within(free, moved)
     result = []
     for number in range(len(repeated.fits)):
         own = {name: float(value[number]) for name, value in moved.items()}
