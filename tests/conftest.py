@@ -9,6 +9,7 @@ import tempfile
 from pathlib import Path
 from types import SimpleNamespace
 
+import hypothesis
 import pytest
 
 from stiction.cli import commands
@@ -31,6 +32,11 @@ os.environ.setdefault(
 os.environ["STICTION_CACHE_DIR"] = str(
     Path(tempfile.gettempdir()) / f"stiction-tests-{_digest_of_sources()}"
 )
+
+
+# The same examples on every machine; weekly others are drawn (--hypothesis-profile=default).
+hypothesis.settings.register_profile("same", derandomize=True)
+hypothesis.settings.load_profile("same")
 
 
 def pytest_addoption(parser):

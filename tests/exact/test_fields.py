@@ -105,6 +105,13 @@ def test_table_of_the_map_matches_the_quantile(distribution):
     assert np.isnan(quantile_table(marginal)[:, 1]).mean() < 0.02  # where scipy is slow
 
 
+def test_the_far_end_of_a_beta_marginal_is_its_bound():
+    """scipy's quantile of this one is NaN from z = 8.3 on, where 1 - u is below 1e-15."""
+    marginal = st.Beta(alpha=0.6, beta=1.03125, low=4e5, high=1.2e6)
+    z = np.array([8.0, 8.31, 9.0, 12.0])
+    np.testing.assert_allclose(from_normal(marginal, z), 1.2e6, rtol=1e-14)
+
+
 def test_the_map_of_a_lognormal_marginal_is_exact_without_a_table():
     """A long list has as many factors between specimens as members: no table for each."""
     marginal, z = st.Lognormal(mean=1.3, cv=0.37, low=0.21), np.linspace(-9.0, 20.0, 1001)

@@ -35,7 +35,8 @@ def quantile_of_normal(distribution: Any, z: Array) -> Array:
     """
     tail, lower, found = ndtr(-np.abs(z)), z < 0.0, np.empty_like(z)
     found[lower], found[~lower] = distribution.ppf(tail[lower]), distribution.isf(tail[~lower])
-    return found
+    # scipy's beta.isf may be NaN where the value is its upper end to round-off.
+    return np.where(np.isnan(found) & (z > REACH), distribution.support()[1], found)
 
 
 @jit
