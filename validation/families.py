@@ -20,6 +20,7 @@ import warnings
 from itertools import repeat
 
 import numpy as np
+from decisions import LOCAL, PROBLEM, TARGET, strength
 
 import stiction as st
 from stiction.inference import bootstrap
@@ -36,28 +37,17 @@ TRUTHS = {
     "beta": st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
 }
 BOUNDED = {"weibull": {"type": "weibull", "low": 0.5e6}}
-PROBLEM = st.Problem(
-    st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
-    st.Interface(0.05, 128),
-    st.LinearWeakening(weakening_rate=0.25e12),
-)
-TARGET, PROFILES, TESTS, LISTED = 1e-2, 5, 12, 100
+PROFILES, TESTS, LISTED = 5, 12, 100
 SAMPLES, ALONE, KNOWN = 100, 4_000, 30_000  # onsets of a member, a fitted field, a truth
-LOCAL = st.LocalCriterion()
 bootstrap.at_ends = lambda *_: []  # for intervals alone, which nothing here reads
 solve = LOCAL.prepare(PROBLEM)
-
-
-def strength(name, length):
-    """Return the true field, with a mean mode: nothing fixes the mean of a sample."""
-    return st.RandomField(TRUTHS[name], st.PowerLawSpectrum(length), mean_mode=True)
 
 
 def score(name, lengths, seed):
     """Return the score of the true family, from one record."""
     nodes = lengths * POINTS
     whole = st.Interface(3 * lengths * LENGTH, 3 * nodes)
-    values = strength(name, LENGTH).sample(whole, seed=seed)[0, :nodes]
+    values = strength(TRUTHS[name], LENGTH).sample(whole, seed=seed)[0, :nodes]
     interface = st.Interface(lengths * LENGTH, nodes)
     windows, rows = windowed(records_of(values, interface, "strength"), 0)
     families = dict.fromkeys(("lognormal", "weibull", "gamma", "beta")) | {
@@ -99,7 +89,7 @@ def campaign(name, seed, **given):
 
     And 90 % intervals of mean and standard deviation by the two latter, (2, 2, 2).
     """
-    truth = strength(name, 4e-3)
+    truth = strength(TRUTHS[name], 4e-3)
     records = truth.sample(PROBLEM.interface, samples=PROFILES, seed=1000 + seed)
     fit = st.fit_field(
         records,
@@ -161,12 +151,12 @@ def main(records=40, campaigns=40, first=0, family=None):
                 f" {np.mean(own > -2.0):.2f} of {records}",
                 flush=True,
             )
-    known = {name: onsets(strength(name, 4e-3), KNOWN, 7) for name in truths}
+    known = {name: onsets(strength(TRUTHS[name], 4e-3), KNOWN, 7) for name in truths}
     rows = {name: [] for name in truths}
     for seed in range(first, first + campaigns):
         for name, own in known.items():
             stresses, ends = campaign(name, seed, **given)
-            truth = strength(name, 4e-3)
+            truth = strength(TRUTHS[name], 4e-3)
             right = np.array([truth.mean, truth.standard_deviation])
             held = (ends[..., 0] < right) & (right < ends[..., 1])
             ratios = stresses / np.quantile(own, TARGET)

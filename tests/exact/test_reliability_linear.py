@@ -164,7 +164,8 @@ def test_two_levels_correct_for_an_imperfect_first_stage(likeness):
         assert all(run.last == 1.0 for run in runs)
         return
     run = next(run for run in runs if run.last < 1.0)
-    seen = math.exp(run.log_probability) * np.mean(run.values < -4.0)
+    [level] = run.populations
+    seen = math.exp(level.log_probability) * np.mean(level.values < -4.0)
     assert run.probability(-4.0) == pytest.approx(seen / run.last, rel=1e-12)
     assert run.last_variance > 0.0
 

@@ -11,8 +11,8 @@ from small_study import lengths, small_study
 
 import stiction as st
 from stiction.ensemble import batches
-from stiction.reliability import repetitions
-from stiction.reliability.repetitions import SAMPLES
+from stiction.reliability.tail import CURVE
+from stiction.study import failure
 
 SWEPT = lengths(3e-3, 7e-3, 5e-3)
 SMALLEST = 1e-3
@@ -60,7 +60,7 @@ def test_a_curve_is_that_of_samples_of_its_point(whole):
     assert one.lower_bound == 0.66e6
     np.testing.assert_allclose(one.stress_above_bound, one.stress - 0.66e6, atol=1e-6)
     # Errors fall as the square root of the repetitions, here two of a fifth of plain counting.
-    assert one.cv.values[0] == pytest.approx(np.sqrt(0.5 / SAMPLES), rel=0.2)
+    assert one.cv.values[0] == pytest.approx(np.sqrt(0.5 / CURVE[1]), rel=0.2)
 
 
 def test_interrupted_in_parts_and_grown_it_has_the_same_bits(whole, tmp_path):
@@ -79,7 +79,7 @@ def test_interrupted_in_parts_and_grown_it_has_the_same_bits(whole, tmp_path):
     xr.testing.assert_equal(computed(tmp_path / "broken", one=one), whole)
 
     with pytest.MonkeyPatch.context() as patch:
-        for one_file in (batches, repetitions):
+        for one_file in (batches, failure):
             patch.setattr(one_file, "versions", lambda: "stiction 99.0")
         computed(tmp_path / "parts", 1, one, part="2/2")
     for part in ("1/2", "2/2"):

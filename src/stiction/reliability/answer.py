@@ -1,9 +1,11 @@
 """Answers on failure probability, and the checks that all of them share."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, Self, TypeAlias
+from typing import Annotated, Any, NamedTuple, Self, TypeAlias
 
 import numpy as np
 import xarray as xr
@@ -39,6 +41,45 @@ MORE, CARRIED = 1.2, 0.9
 """Margin on the number of members wanted; share of the mean whose carriers are counted."""
 CHECKED = (8, 64)
 """Fewest and most samples that are solved exactly to check those of the local criterion."""
+ESTIMATED = ("stress", "probability", "cv", "members_cv", "members")
+
+
+class Estimate(NamedTuple):
+    """A tail at a stress."""
+
+    state: LimitState
+    tail: Tail
+    stress: float
+
+    @property
+    def probability(self) -> float:
+        """Probability of an onset below the stress."""
+        return self.tail.probability(self.stress)
+
+    @property
+    def sampling_cv(self) -> float:
+        """Coefficient of variation of the probability by sampling."""
+        return self.tail.cv(self.stress)
+
+    @property
+    def members_cv(self) -> float:
+        """That by the list of interfaces, 0 of a single one."""
+        random = self.state.experiment.random
+        return self.tail.members_cv(self.stress, random.kinds) if self.state.several else 0.0
+
+    @property
+    def cv(self) -> float:
+        """That by both."""
+        return math.hypot(self.sampling_cv, self.members_cv)
+
+    @property
+    def members(self) -> Array:
+        """Probability of each of equally likely interfaces; none of a single one."""
+        if not self.state.several:
+            return np.zeros(0)
+        lows, highs = np.array(self.state.bounds_of_members()).T
+        found = self.tail.of_members(self.stress, lows.size)
+        return np.select([self.stress <= lows, self.stress >= highs], [0.0, 1.0], found)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -108,14 +149,24 @@ class Answer:
     quantity: str = "stress"
 
     @classmethod
-    def of(cls, state: LimitState, *, doubts: Sequence[str] = (), **values: Any) -> Self:
-        """Return the answer from a limit state, and issue the doubts as warnings."""
+    def of(cls, estimate: Estimate, doubts: Sequence[str] = (), **more: Any) -> Self:
+        """Return the answer from an estimate, less what is given; issue doubts as warnings."""
         for text in doubts:
             warn_accuracy(text)
-        bound, pressure = state.bounds[0], state.experiment.pressure
-        area = state.experiment.problem.area or math.nan
+        state, tail = estimate.state, estimate.tail
+        known = {name: getattr(estimate, name) for name in ESTIMATED if name not in more}
         return cls(
-            lower_bound=bound, normal_pressure=pressure, area=area, warnings=(), **values
+            lower_bound=state.bounds[0],
+            normal_pressure=state.experiment.pressure,
+            area=state.experiment.problem.area or math.nan,
+            evaluations=tail.spent,
+            first_stage_evaluations=sum(o.first_stage_evaluations for o in tail.repetitions),
+            algorithm=tail.algorithm,
+            reason=tail.reason,
+            survived=tail.survived,
+            warnings=(),
+            **known,
+            **more,
         )
 
     @property
@@ -188,15 +239,6 @@ def band_of(members: Array) -> tuple[float, float]:
     return low, high
 
 
-def chances_of_members(state: LimitState, tail: Tail, stress: float) -> Array:
-    """Return the probability of each of equally likely interfaces; none of a single one."""
-    lows, highs = np.array(state.bounds_of_members()).T
-    if lows.size == 1:
-        return np.zeros(0)
-    found = tail.of_members(stress, lows.size)
-    return np.select([stress <= lows, stress >= highs], [0.0, 1.0], found)
-
-
 def prepare(
     experiment: Experiment,
     event: Event,
@@ -255,13 +297,13 @@ def wanted_members(random: Any, cv: float, target_cv: float) -> int:
     return int(min(max(MORE * count * least * least, 2 * count), MOST_MEMBERS))
 
 
-def few_members(
-    random: Any, members: Array, cv: float, members_cv: float, target_cv: float
-) -> list[str]:
+def few_members(random: Any, found: Answer | Estimate, target_cv: float) -> list[str]:
     """Return a warning if the list makes the estimate less precise than `target_cv`."""
-    if not (cv > target_cv and members_cv > LISTED * target_cv):
+    by_list = found.members_cv
+    if not (found.cv > target_cv and by_list > LISTED * target_cv):
         return []
-    shares = np.cumsum(np.sort(np.bincount(random.kinds, np.nan_to_num(members)))[::-1])
+    members = np.nan_to_num(found.members)
+    shares = np.cumsum(np.sort(np.bincount(random.kinds, members))[::-1])
     count = 1 + int(np.searchsorted(shares, CARRIED * shares[-1]))
     advice = (
         "give what it was drawn from, a fit or a posterior, in its place: more are then drawn; or"
@@ -275,7 +317,7 @@ def few_members(
     return [
         f"the list of interfaces is a sample, and {count} of its {shares.size} different ones carry"
         f" {CARRIED:.0%} of the mean: by this alone the coefficient of variation is"
-        f" {members_cv:.2g} (target {target_cv:g}); {advice}; more profiles or tests make them"
+        f" {by_list:.2g} (target {target_cv:g}); {advice}; more profiles or tests make them"
         " more alike"
     ]
 

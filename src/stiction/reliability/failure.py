@@ -3,15 +3,15 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 import xarray as xr
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError, merge_warnings, texts_of, warn_accuracy
+from stiction.base.errors import InputError, Warned, merge_warnings, texts_of, warn_accuracy
 from stiction.base.model import Count, Number, Positive, Progress, Real, checked
-from stiction.base.progress import Meter
+from stiction.base.progress import Meter, Show
 from stiction.base.units import Doubt, doubt_units, in_words
 from stiction.base.variables import ONSET_VARIABLES, PROFILES, Variable
 from stiction.ensemble.experiment import Experiment
@@ -24,10 +24,10 @@ from stiction.reliability.answer import (
     SAMPLED,
     Answer,
     Budget,
+    Estimate,
     Probability,
     TargetCv,
     band_of,
-    chances_of_members,
     different,
     exact_doubts,
     few_members,
@@ -37,9 +37,10 @@ from stiction.reliability.answer import (
     wanted_members,
 )
 from stiction.reliability.counting import count_failures
-from stiction.reliability.repetitions import SAMPLES, repetition
-from stiction.reliability.tail import Goal, Tail, repeat_until_precise, sample_tail
+from stiction.reliability.tail import Goal, Tail, sample_curve, sample_tail
 from stiction.reliability.uncertainty import binomial_interval, generator, lognormal_interval
+
+F = TypeVar("F", Answer, Estimate)
 
 PILOT = 1_000
 """Number of plain samples by which the algorithm is chosen."""
@@ -83,6 +84,7 @@ CURVE = {
     )
 }
 CURVE["members"] = Variable("1", "probability of each interface", ("point", "member"))
+OF_A_LIST = ("band_low", "band_high", "members_cv", "members")
 
 
 @checked
@@ -192,51 +194,44 @@ def failure_probability(
         found = _probability(
             state, float(wanted), algorithm, target_cv, budget, max_evaluations
         )
-        return Answer.of(state, stress=float(wanted), quantity=name, **found)
+        return replace(found, quantity=name)
 
     experiment = Experiment(problem, random, method, seed=seed)
-    return _answered(experiment, target_cv, Meter("failure_probability", show=progress), solve)
+    return _answered(experiment, target_cv, "failure_probability", progress, solve)
 
 
 def _answered(
     experiment: Experiment,
     target_cv: float,
-    meter: Meter,
+    name: str,
+    progress: Show,
     solve: Callable[[Experiment, Meter], Answer],
 ) -> Answer:
     """Return an answer from as many members as the target needs, with all that it warned of."""
-    with meter, merge_warnings() as warned:
-
-        def solved(own: Experiment) -> tuple[float, tuple[Experiment, Answer]]:
-            answer = solve(own, meter)
-            return answer.members_cv, (own, answer)
-
-        own, answer = _of_enough_members(experiment, target_cv, meter, warned, solved)
-        for text in few_members(
-            own.random, answer.members, answer.cv, answer.members_cv, target_cv
-        ):
+    with Meter(name, show=progress) as meter, merge_warnings() as warned:
+        own, found = _of_enough_members(experiment, target_cv, meter, warned, solve)
+        for text in few_members(own.random, found, target_cv):
             warn_accuracy(text)
-    return replace(answer, warnings=tuple(texts_of(warned)))
+    return replace(found, warnings=tuple(texts_of(warned)))
 
 
 def _of_enough_members(
     experiment: Experiment,
     target_cv: float,
     meter: Meter,
-    warned: Any,
-    solve: Callable[[Experiment], tuple[float, Any]],
-) -> Any:
-    """Return what `solve` does beside the error by the list, with as many members as that needs."""
+    warned: list[Warned],
+    solve: Callable[[Experiment, Meter], F],
+) -> tuple[Experiment, F]:
+    """Return what is solved, with as many members as the error by the list needs."""
     while True:
-        by_list, found = solve(experiment)
-        known = experiment.random
-        if not (count := wanted_members(known, by_list, target_cv)):
-            return found
-        meter.note = f"{count:,} interfaces, c.o.v. by the list {by_list:.2g}"
+        found, known = solve(experiment, meter), experiment.random
+        if not (count := wanted_members(known, found.members_cv, target_cv)):
+            return experiment, found
+        meter.note = f"{count:,} interfaces, c.o.v. by the list {found.members_cv:.2g}"
         larger = known.larger(count, experiment.seed)
         # A longer list by a posterior of a list holds some more that are rare.
         if larger.kinds.max() + 1 < FRESH * (known.kinds.max() + 1):
-            return found
+            return experiment, found
         experiment = replace(experiment, random=larger)
         warned.clear()
 
@@ -259,8 +254,8 @@ def _check_unit(state: LimitState, name: str, given: float, stress: float) -> No
 def _probability(
     state: LimitState, stress: float, algorithm: str, target_cv: float, budget: int,
     allowed: int | None,
-) -> dict[str, Any]:  # fmt: skip
-    """Return the attributes of an answer by the algorithm, or by the one that is chosen."""
+) -> Answer:  # fmt: skip
+    """Return the answer by the algorithm, or by the one that is chosen."""
     likely = state.likely_bounds(NEGLIGIBLE)
     if not likely[0] < stress < likely[1]:
         return _certain(state, stress, likely)
@@ -278,40 +273,47 @@ def _probability(
     target_cv *= SAMPLED if state.several else 1.0
     if algorithm == "plain":
         begun = 0 if pilot is None else least
-        found = _by_counting(state, stress, target_cv, budget, least, begun)
-        return found | {"reason": reason}
+        return _by_counting(state, stress, target_cv, budget, least, begun, reason)
     tail = sample_tail(
         state, Goal(target_cv, stress), algorithm=algorithm, budget=budget, reason=reason,
         pilot=pilot,
     )  # fmt: skip
-    return _by_tail(state, stress, tail, target_cv)
+    return _by_tail(Estimate(state, tail, stress), target_cv)
 
 
-def _certain(state: LimitState, stress: float, likely: tuple[float, float]) -> dict[str, Any]:
-    """Return the attributes of an answer where no sample is needed."""
+def _certain(state: LimitState, stress: float, likely: tuple[float, float]) -> Answer:
+    """Return the answer where no sample is needed."""
     certain = not state.bounds[0] < stress < state.bounds[1]
     low, high = state.bounds if certain else likely
     doubt = 0.0 if certain else NEGLIGIBLE
-    if stress >= high:
-        chance, interval = 1.0, (1.0 - doubt, 1.0)
+    chance = float(stress >= high)
+    reason = f"no interface slides at or below {low:.7g} Pa"
+    if chance:
         reason = f"no interface carries more than {high:.7g} Pa"
-    else:
-        chance, interval = 0.0, (0.0, doubt)
-        reason = f"no interface slides at or below {low:.7g} Pa"
     reason += "" if certain else f", but for a probability below {doubt:g}"
     members = len(state.experiment.random.members)
-    found = {"probability": chance, "interval": interval, "cv": 0.0, "evaluations": 0}
     if state.several:  # another list might hold others
         doubt = max(doubt, binomial_interval(0, members)[1])
-        found["interval"] = (chance - doubt, chance) if chance else (0.0, doubt)
-    found["members"] = np.full(members if members > 1 else 0, chance)
-    return found | {"algorithm": "exact", "reason": reason}
+    return Answer.of(
+        Estimate(state, Tail((), "exact", reason), stress),
+        probability=chance,
+        interval=(chance - doubt, 1.0) if chance else (0.0, doubt),
+        cv=0.0,
+        members_cv=0.0,
+        members=np.full(members if state.several else 0, chance),
+    )
 
 
 def _by_counting(
-    state: LimitState, stress: float, target_cv: float, budget: int, least: int, start: int
-) -> dict[str, Any]:
-    """Return the attributes of an answer by plain Monte Carlo from sample `start` on.
+    state: LimitState,
+    stress: float,
+    target_cv: float,
+    budget: int,
+    least: int,
+    start: int,
+    reason: str,
+) -> Answer:
+    """Return the answer by plain Monte Carlo from sample `start` on.
 
     Samples of a pilot do not enter: counting is chosen where they hold many failures.
     """
@@ -330,34 +332,26 @@ def _by_counting(
     # The weakest samples: failures and others in their true shares.
     some = failed[:CHECKED]
     near = np.argsort(stresses[: some.max(initial=-1) + 1], kind="stable")[: 2 * some.size]
-    tail = Tail([counted])
-    by_list = _members_cv(state, tail, stress)
-    cv, interval = math.hypot(count.cv, by_list), count.interval()
-    doubts = imprecise(count.cv, target_cv, start + stresses.size)
+    found = Estimate(state, Tail([counted], "plain", reason, start + stresses.size), stress)
+    cv, interval = math.hypot(count.cv, found.members_cv), count.interval()
+    if found.members_cv:
+        interval = lognormal_interval(count.probability, cv)
+    doubts = imprecise(count.cv, target_cv, found.tail.spent)
     doubts += exact_doubts(state, (drawn(near), stresses[near]), stress, count.probability)
-    return {
-        "algorithm": "plain",
-        "probability": count.probability,
-        "cv": cv,
-        "members_cv": by_list,
-        "interval": lognormal_interval(count.probability, cv) if by_list else interval,
-        "evaluations": start + stresses.size,
-        "survived": counted.survived,
-        "members": chances_of_members(state, tail, stress),
-        "failing_profiles": _profiles(state, drawn(failed[:SHOWN])),
-        "doubts": doubts,
-    }
+    return Answer.of(
+        found, doubts, probability=count.probability, cv=cv, interval=interval,
+        failing_profiles=_profiles(state, drawn(failed[:SHOWN])),
+    )  # fmt: skip
 
 
-def _by_tail(state: LimitState, stress: float, tail: Tail, target_cv: float) -> dict[str, Any]:
-    """Return the attributes of an answer by subset simulation, by one level or two."""
-    probability, last = tail.probability(stress), tail.repetitions[-1]
-    by_list, sampled = _members_cv(state, tail, stress), tail.cv(stress)
-    cv = math.hypot(sampled, by_list)
-    interval = lognormal_interval(probability, cv)
-    doubts = imprecise(sampled, target_cv, tail.spent)
+def _by_tail(found: Estimate, target_cv: float) -> Answer:
+    """Return the answer by subset simulation, by one level or two."""
+    state, tail, stress = found
+    probability, last = found.probability, tail.repetitions[-1]
+    interval = lognormal_interval(probability, found.cv)
+    doubts = imprecise(found.sampling_cv, target_cv, tail.spent)
     if tail.algorithm == "two_level" and probability == 0.0:
-        interval = 0.0, last.rarest
+        interval = 0.0, math.exp(last.populations[-1].log_probability)
         doubts = [
             f"{tail.short_of('a failure')}; the interval ends at the last level of the first stage"
         ]
@@ -369,27 +363,15 @@ def _by_tail(state: LimitState, stress: float, tail: Tail, target_cv: float) -> 
                 " be low; compare with algorithm='subset'"
             )
     elif tail.complete:
-        doubts += exact_doubts(state, tail.repetitions[-1].around(stress), stress, probability)
+        doubts += exact_doubts(state, last.around(stress), stress, probability)
     else:
         there = tail.probability(tail.reached), tail.cv(tail.reached)
         interval = 0.0, lognormal_interval(*there)[1]
         doubts = [f"{tail.short_of(f'{stress:.7g} Pa')}; the interval ends there"]
     draws, stresses = last.failing(stress)
     chosen = different(stresses, SHOWN, generator(state.experiment.seed, 2))
-    return tail.attributes | {
-        "probability": probability,
-        "cv": cv,
-        "members_cv": by_list,
-        "interval": interval,
-        "members": chances_of_members(state, tail, stress),
-        "failing_profiles": _profiles(state, draws[chosen]),
-        "doubts": doubts,
-    }
-
-
-def _members_cv(state: LimitState, tail: Tail, stress: float) -> float:
-    """Return the coefficient of variation by the list of interfaces, 0 of a single one."""
-    return tail.members_cv(stress, state.experiment.random.kinds) if state.several else 0.0
+    profiles = _profiles(state, draws[chosen])
+    return Answer.of(found, doubts, interval=interval, failing_profiles=profiles)
 
 
 def _profiles(state: LimitState, draws: Array) -> xr.Dataset:
@@ -466,60 +448,47 @@ def design_stress(
 
     def solve(experiment: Experiment, meter: Meter) -> Answer:
         state, budget = prepare(experiment, event, workers, meter, max_evaluations)
-        return Answer.of(state, **_quantile(state, probability, target_cv, budget))
+        found = _quantile(state, probability, target_cv, budget)
+        return replace(found, quantity="stress" if math.isnan(found.area) else "force")
 
     experiment = Experiment(problem, random, method, seed=seed)
-    return _answered(experiment, target_cv, Meter("design_stress", show=progress), solve)
+    return _answered(experiment, target_cv, "design_stress", progress, solve)
 
 
-def _quantile(
-    state: LimitState, probability: float, target_cv: float, budget: int
-) -> dict[str, Any]:
-    """Return the attributes of an answer on the stress of a probability."""
-    often, lowest, doubts = probability >= FREQUENT, state.bounds[0], []
+def _quantile(state: LimitState, probability: float, target_cv: float, budget: int) -> Answer:
+    """Return the answer on the stress of a probability."""
+    often, lowest = probability >= FREQUENT, state.bounds[0]
     target_cv *= SAMPLED if state.several else 1.0
     tail = sample_tail(
         state, Goal(target_cv, probability=probability), budget=budget,
         algorithm="subset" if often else "auto", reason="frequent" if often else "rare",
     )  # fmt: skip
-    by_list = 0.0
-    if tail.complete:
-        stress, least = tail.quantile(probability), math.nextafter(lowest, math.inf)
-        sampled, on_it = tail.cv(stress), tail.probability(least)
-        if math.isinf(stress):
-            doubts.append(
-                f"the event happens in {1.0 - tail.survived:.3g} of all samples, less than"
-                f" P = {probability:g}: no stress has that probability"
-            )
-        if on_it >= probability:
-            stress, sampled = lowest, tail.cv(least)
-            doubts.append(
-                f"{on_it:.2g} of all samples slide at the bound of {lowest:.7g} Pa,"
-                " within the accuracy of the method: the stress at P ="
-                f" {probability:g} is the bound itself"
-            )
-        by_list = _members_cv(state, tail, stress)
-        cv = math.hypot(sampled, by_list)
-        interval = tail.stress_interval(probability, cv, lowest)
-        doubts += imprecise(sampled, target_cv, tail.spent)
-        if tail.algorithm == "subset":
-            near = tail.repetitions[-1].around(stress)
-            doubts += exact_doubts(state, near, stress, probability)
-    else:  # the tail ends at its lowest sample
-        cv, stress = math.inf, tail.extent[0] if math.isfinite(tail.extent[0]) else math.nan
-        interval = (lowest, stress) if stress > lowest else state.bounds
-        doubts.append(tail.short_of(f"P = {probability:g}"))
-    return tail.attributes | {
-        "stress": stress,
-        "probability": probability,
-        "cv": cv,
-        "members_cv": by_list,
-        "interval": interval,
-        "members": chances_of_members(state, tail, stress),
-        "of_stress": True,
-        "quantity": "stress" if state.experiment.problem.area is None else "force",
-        "doubts": doubts,
-    }
+    asked: dict[str, Any] = {"probability": probability, "of_stress": True}
+    if not tail.complete:  # the tail ends at its lowest sample
+        found = Estimate(state, tail, tail.extent[0])
+        interval = (lowest, found.stress) if found.stress > lowest else state.bounds
+        doubts = [tail.short_of(f"P = {probability:g}")]
+        return Answer.of(found, doubts, interval=interval, cv=math.inf, members_cv=0.0, **asked)
+    found, doubts = Estimate(state, tail, tail.quantile(probability)), []
+    if math.isinf(found.stress):
+        doubts.append(
+            f"the event happens in {1.0 - tail.survived:.3g} of all samples, less than"
+            f" P = {probability:g}: no stress has that probability"
+        )
+    bound = Estimate(state, tail, math.nextafter(lowest, math.inf))
+    if bound.probability >= probability:
+        found, asked["stress"] = bound, lowest
+        doubts.append(
+            f"{bound.probability:.2g} of all samples slide at the bound of {lowest:.7g} Pa,"
+            " within the accuracy of the method: the stress at P ="
+            f" {probability:g} is the bound itself"
+        )
+    doubts += imprecise(found.sampling_cv, target_cv, tail.spent)
+    if tail.algorithm == "subset":
+        near = tail.repetitions[-1].around(found.stress)
+        doubts += exact_doubts(state, near, found.stress, probability)
+    interval = tail.stress_interval(probability, found.cv, lowest)
+    return Answer.of(found, doubts, interval=interval, **asked)
 
 
 @checked
@@ -584,50 +553,30 @@ def failure_curve(
     experiment = Experiment(problem, random, method, seed=seed)
     with Meter("failure_curve", show=progress) as meter, merge_warnings() as warned:
 
-        def solve(own: Experiment) -> tuple[float, tuple[LimitState, Tail]]:
+        def solve(own: Experiment, meter: Meter) -> Estimate:
             state, budget = prepare(own, event, workers, meter, max_evaluations)
-            tail = _curve_tail(state, smallest, target_cv, budget)
+            aim = target_cv * (SAMPLED if state.several else 1.0)
+            tail = sample_curve(state, Goal(aim, probability=smallest), budget)
             reached = tail.quantile(smallest) if tail.complete else tail.reached
-            return _members_cv(state, tail, reached), (state, tail)
+            return Estimate(state, tail, reached)
 
-        state, tail = _of_enough_members(experiment, target_cv, meter, warned, solve)
-        for text in curve_doubts(state, tail, smallest, target_cv):
+        _, end = _of_enough_members(experiment, target_cv, meter, warned, solve)
+        state, tail, _ = end
+        for text in curve_doubts(end, smallest, target_cv):
             warn_accuracy(text)
-        if not tail.complete:
-            smallest = tail.probability(tail.reached)
-    attributes = study_attributes(problem=problem, random=experiment.given, method=method) | {
-        "seed": seed,
-        "evaluations": tail.spent,
-        "repetitions": len(tail.repetitions),
-    }
+    attributes = study_attributes(problem=problem, random=experiment.given, method=method)
+    attributes |= {"seed": seed}
+    smallest = smallest if tail.complete else end.probability
     return curve_of(tail, state, chances(smallest), attributes)
 
 
-def _curve_tail(state: LimitState, smallest: float, target_cv: float, budget: int) -> Tail:
-    """Return repetitions down to the end of a curve."""
-    # Fewer than usual where the budget would not even hold four levels.
-    size = min(SAMPLES, max(budget // 4, 20))
-    found = repeat_until_precise(
-        lambda samples, number, left: repetition(state, number, smallest, samples, left),
-        lambda done: Tail(done).cv(Tail(done).quantile(smallest)),
-        target_cv=target_cv * (SAMPLED if state.several else 1.0), first=size, largest=size,
-        max_evaluations=budget, meter=state.meter,
-    )  # fmt: skip
-    return Tail(found, spent=sum(one.evaluations for one in found))
-
-
-def curve_doubts(
-    state: LimitState, tail: Tail, smallest: float, target_cv: float = CURVE_CV
-) -> list[str]:
+def curve_doubts(end: Estimate, smallest: float, target_cv: float = CURVE_CV) -> list[str]:
     """Return the reasons not to trust the end of a curve."""
+    state, tail, stress = end
     if not tail.complete:
         return [f"{tail.short_of(f'P = {smallest:g}')}; the curve ends there"]
-    stress = tail.quantile(smallest)
-    by_list = _members_cv(state, tail, stress)
-    cv, members = math.hypot(tail.cv(stress), by_list), chances_of_members(state, tail, stress)
-    doubts = few_members(state.experiment.random, members, cv, by_list, target_cv)
-    near = tail.repetitions[-1].around(stress)
-    return doubts + exact_doubts(state, near, stress, smallest)
+    doubts = few_members(state.experiment.random, end, target_cv)
+    return doubts + exact_doubts(state, tail.repetitions[-1].around(stress), stress, smallest)
 
 
 def chances(smallest: float) -> Array:
@@ -646,27 +595,26 @@ def curve_of(
     area = state.experiment.problem.area or np.nan
     rows, members = [], []
     for chance in wanted.tolist():
-        stress = tail.quantile(chance)
-        found, by_list = tail.probability(stress), _members_cv(state, tail, stress)
-        cv = math.hypot(tail.cv(stress), by_list)
-        ends = lognormal_interval(found, cv)
-        sides = tail.stress_interval(chance, cv, lowest)
-        values = stress, stress - lowest, stress / pressure, stress * area
-        members.append(chances_of_members(state, tail, stress))
-        rows.append((*values, found, *ends, cv, *sides, *band_of(members[-1]), by_list))
+        one = Estimate(state, tail, stress := tail.quantile(chance))
+        members.append(one.members)
+        values = stress, stress - lowest, stress / pressure, stress * area, one.probability
+        ends = lognormal_interval(one.probability, one.cv)
+        sides = tail.stress_interval(chance, one.cv, lowest)
+        rows.append((*values, *ends, one.cv, *sides, *band_of(members[-1]), one.members_cv))
     table: dict[str, Any] = dict(zip(CURVE, np.array(rows).T, strict=False))
     table["members"] = np.array(members)
     survive = np.isinf(table["stress"])  # so many that no stress has this probability
     for values in table.values():
         values[survive] = np.nan
-    if not table["members"].size:
-        for name in ("band_low", "band_high", "members", "members_cv"):
-            del table[name]
-    if not np.isfinite(pressure):
-        del table["friction_coefficient"]
-    if not np.isfinite(area):
-        del table["force"]
+    known = {
+        "friction_coefficient": np.isfinite(pressure),
+        "force": np.isfinite(area),
+        **dict.fromkeys(OF_A_LIST, state.several),
+    }
+    table = {name: values for name, values in table.items() if known.get(name, True)}
     about = {
+        "evaluations": tail.spent,
+        "repetitions": len(tail.repetitions),
         "lower_bound": lowest,
         "event": state.event,
         "method": state.experiment.method.type,

@@ -60,7 +60,9 @@ class Below(NamedTuple):
 class Descent(NamedTuple):
     """A finished repetition: populations from all samples down to the rarest.
 
-    It is complete if it reached the threshold or the requested probability.
+    It is complete if it reached the threshold or the requested probability. By two levels it has
+    one population, of the samples to which the guide leads, with their exact values; `last` and
+    `walked` are of walks among failures (see `two_level`).
     """
 
     samples: int  # N, of the first level and, within a few, of each other
@@ -69,17 +71,21 @@ class Descent(NamedTuple):
     evaluations: int
     complete: bool
     first_stage_evaluations: int = 0
+    last: float = 1.0  # share of the failures to which the guide leads
+    last_variance: float = 0.0  # squared coefficient of variation of its estimate
+    walked: tuple[Array, Array] | None = None  # draws and values of failures
 
     @property
     def extent(self) -> tuple[float, float]:
         """Lowest and highest finite value of the samples; without any, plus and minus infinity."""
         lowest, plain = self.populations[-1].values, self.populations[0].values
-        return float(lowest.min()), float(plain.max(where=plain < math.inf, initial=-math.inf))
+        low = float(lowest.min(initial=math.inf))
+        return low, float(plain.max(where=plain < math.inf, initial=-math.inf))
 
     @property
     def survived(self) -> float:
         """Share of infinite values among plain samples."""
-        return float(np.isinf(self.populations[0].values).mean())
+        return _share(np.isinf(self.populations[0].values))
 
     def light(self) -> Self:
         """Return the same repetition without draws."""
@@ -92,26 +98,27 @@ class Descent(NamedTuple):
     def probability(self, value: float) -> float:
         """Return the estimate of P(function < value); zero where no sample went so low."""
         rarest = self._holders(value)[-1]
-        return math.exp(rarest.log_probability) * float((rarest.values < value).mean())
+        return math.exp(rarest.log_probability) * _share(rarest.values < value) / self.last
 
     def below(self, value: float) -> Below:
         """Return the samples below a value."""
         rarest = self._holders(value)[-1]
-        each = math.exp(rarest.log_probability) / rarest.values.size
+        each = math.exp(rarest.log_probability) / max(rarest.values.size, 1) / self.last
         failed = rarest.values < value
-        drawn = rarest.members if rarest is self.populations[0] else None
+        drawn = rarest.members if rarest.log_probability == 0.0 else None
         return Below(each, rarest.members[failed], rarest.ancestors[failed], drawn)
 
     def relative_variance(self, value: float) -> float:
         """Return the squared coefficient of variation of `probability(value)`, from ancestry."""
         rarest = self._holders(value)[-1]
-        return ancestral_variance(rarest.ancestors[rarest.values < value], self.samples)
+        family = rarest.ancestors[rarest.values < value]
+        return ancestral_variance(family, self.samples) + self.last_variance
 
     def failing(self, value: float) -> tuple[Array, Array]:
         """Return draws and values of samples of the last population below a value."""
         last = self.populations[-1]
         below = last.values < value
-        return last.draws[below], last.values[below]
+        return self.walked or (last.draws[below], last.values[below])
 
     def around(self, value: float) -> tuple[Array, Array]:
         """Return draws and values of samples on both sides of a value, in their true shares.
@@ -127,6 +134,10 @@ class Descent(NamedTuple):
                 break
         lowest = np.argsort(holder.values, kind="stable")[: min(2 * below, len(holder.draws))]
         return holder.draws[lowest], holder.values[lowest]
+
+
+def _share(which: NDArray[np.bool_]) -> float:
+    return float(which.sum() / max(which.size, 1))
 
 
 def grow(

@@ -6,18 +6,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stiction.base.arrays import Array
+from stiction.base.arrays import Array, one_blas_thread
 from stiction.base.progress import SILENT, Meter
 from stiction.ensemble.limit_state import LimitState, no_single_length
 from stiction.methods.protocol import METHODS
-from stiction.reliability.subset import descend
+from stiction.reliability.subset import Descent, descend
 from stiction.reliability.two_level import bridge
 from stiction.reliability.uncertainty import generator, log_width
 
+MOST = 10**18
+"""Evaluations that no repetition needs."""
 MARGIN = 1.1
 """Factor on the sample size, as the variance so far is itself an estimate."""
-SUBSET, BRIDGE = (1_000, 5_000), (200, 1_000)
-"""Samples per level, or exact samples, of the first and of the largest repetition."""
+SUBSET, BRIDGE, CURVE = (1, 1_000, 5_000), (3, 200, 1_000), (4, 2_000, 2_000)
+"""First key of the generators, and samples per level, or exact samples of two levels, of the first
+and of the largest repetition. Those of curves are stored, so that all are of one size."""
 DEEPER = 0.3
 """Repetitions go on to this share of a probability, to estimate the lower end of the interval."""
 PILOT = 500
@@ -41,7 +44,7 @@ class Goal(NamedTuple):
 class Tail(NamedTuple):
     """The lower tail of the stress at onset from pooled repetitions."""
 
-    repetitions: Sequence[Any]  # all of type Descent, or all of type Bridge
+    repetitions: Sequence[Descent]
     algorithm: str = "subset"  # or 'two_level'
     reason: str = ""
     spent: int = 0  # evaluations of the method, those to choose the algorithm included
@@ -73,26 +76,19 @@ class Tail(NamedTuple):
         return min(lowest), max(highest)
 
     @property
-    def attributes(self) -> dict[str, Any]:
-        """Attributes of an answer."""
-        return {
-            "evaluations": self.spent,
-            "first_stage_evaluations": sum(o.first_stage_evaluations for o in self.repetitions),
-            "algorithm": self.algorithm,
-            "reason": self.reason,
-            "survived": self.survived,
-        }
-
-    @property
     def survived(self) -> float:
         """Share of plain samples in which the event does not happen."""
-        sizes = [one.samples for one in self.repetitions]
-        return float(np.average([one.survived for one in self.repetitions], weights=sizes))
+        return float(self._shares @ [one.survived for one in self.repetitions])
 
-    def _parts(self, stress: float) -> list[float]:
-        """Each repetition's part in the mean, by its size: that does not depend on its outcome."""
-        total = sum(one.samples for one in self.repetitions)
-        return [one.samples / total * one.probability(stress) for one in self.repetitions]
+    @property
+    def _shares(self) -> Array:
+        """Share of each repetition, by its size: that does not depend on its outcome."""
+        sizes = np.array([one.samples for one in self.repetitions])
+        return sizes / sizes.sum()
+
+    def _parts(self, stress: float) -> Array:
+        """Each repetition's part in the probability."""
+        return self._shares * [one.probability(stress) for one in self.repetitions]
 
     def probability(self, stress: float) -> float:
         """Return the estimate of P(onset below `stress`)."""
@@ -101,11 +97,11 @@ class Tail(NamedTuple):
     def cv(self, stress: float) -> float:
         """Return its coefficient of variation; infinite where no sample is so low."""
         parts = self._parts(stress)
-        if not any(parts):
+        if not parts.any():
             return math.inf
         pairs = zip(parts, self.repetitions, strict=True)
         variances = [part * part * one.relative_variance(stress) for part, one in pairs if part]
-        return math.sqrt(sum(variances)) / sum(parts)
+        return float(math.sqrt(sum(variances)) / sum(parts))
 
     def of_members(self, stress: float, count: int) -> Array:
         """Return the probability of each of equally likely interfaces, (members,).
@@ -114,19 +110,18 @@ class Tail(NamedTuple):
         those that were drawn of one: their number is chance too, and most of the error near P = 1.
         All repetitions share it, since in a single one few or none may be of that member.
         """
-        total = sum(one.samples for one in self.repetitions)
         found, seen, low, plain = np.zeros((4, count))
         weight = 0.0
-        for one in self.repetitions:
+        for share, one in zip(self._shares, self.repetitions, strict=True):
             each, members, _, drawn = one.below(stress)
             own = np.bincount(members, minlength=count)
             seen += own
             if drawn is None:
-                found += one.samples / total * count * each * own
+                found += share * count * each * own
             else:
                 low += own
                 plain += np.bincount(drawn, minlength=count)
-                weight += one.samples / total
+                weight += share
         found += weight * low / np.maximum(plain, 1.0)
         return np.where(seen >= RESOLVED, np.minimum(found, 1.0), np.nan)
 
@@ -273,51 +268,73 @@ def sample_tail(
         share = share_picked(guide(pilot[0]), pilot[1])
         reason += f"; of {spent} plain samples the {label} picks {share:.0%} of the weakest"
         guide = guide if share >= ALIKE else None
-    found = _repetitions(state, guide, goal, budget - spent, POOR if auto else 0.0)
+    found = _repetitions(state, goal, budget - spent, guide, POOR if auto else 0.0)
     spent += sum(one.evaluations for one in found)
-    if auto and guide and _is_poor(found[0], POOR):
-        reason += f"; {found[0].share:.1%} of the failures by the {label} hold: a poor guide"
-        guide, found = None, _repetitions(state, None, goal, budget - spent)
+    if auto and guide and _share_failing(found[0]) < POOR:
+        share = _share_failing(found[0])
+        reason += f"; {share:.1%} of the failures by the {label} hold: a poor guide"
+        guide, found = None, _repetitions(state, goal, budget - spent)
         spent += sum(one.evaluations for one in found)
     return Tail(found, "subset" if guide is None else "two_level", reason, spent)
 
 
+def sample_curve(state: LimitState, goal: Goal, budget: int) -> Tail:
+    """Sample the lower tail by the repetitions of curves."""
+    found = _repetitions(state, goal, budget, kind=CURVE)
+    return Tail(found, spent=sum(one.evaluations for one in found))
+
+
 def _repetitions(
     state: LimitState,
-    guide: LimitState | None,
     goal: Goal,
     budget: int,
+    guide: LimitState | None = None,
     poor: float = 0.0,
-) -> list[Any]:
+    kind: tuple[int, int, int] = SUBSET,
+) -> list[Descent]:
     """Return repetitions by one level, or by two with a guide; a single one of a poor guide."""
+    key, first, largest = BRIDGE if guide else kind
 
-    def make(samples: int, number: int, left: int) -> Any:
-        options: dict[str, Any] = {
-            "samples": samples,
-            "max_evaluations": left,
-            "threshold": goal.stress,
-            "floor": state.bounds[0],
-            "label": state.member,
-            "rng": generator(state.experiment.seed, 1 if guide is None else 3, number),
-        }
-        if guide is None:
-            chance = DEEPER * goal.probability
-            return descend(state, state.dimension, probability=chance, **options)
-        return bridge(guide, state, state.dimension, probability=goal.probability, **options)
-
-    def judge(repetitions: Sequence[Any]) -> float:
-        if guide and _is_poor(repetitions[0], poor):
+    def judge(repetitions: Sequence[Descent]) -> float:
+        if guide and _share_failing(repetitions[0]) < poor:
             return 0.0
         tail = Tail(repetitions)
         return tail.cv(tail.quantile(goal.probability) if goal.probability else goal.stress)
 
-    first, largest = SUBSET if guide is None else BRIDGE
     # Fewer than usual where the budget would not even hold four levels.
     return repeat_until_precise(
-        make, judge, target_cv=goal.cv, first=min(first, max(budget // 4, 20)),
-        largest=largest, max_evaluations=budget, meter=state.meter,
+        lambda *size: repetition(state, goal, guide, key, *size), judge,
+        target_cv=goal.cv, first=min(first, max(budget // 4, 20)), largest=largest,
+        max_evaluations=budget, meter=state.meter,
     )  # fmt: skip
 
 
-def _is_poor(one: Any, least: float) -> bool:
-    return bool(one.complete and one.share < least)
+def repetition(
+    state: LimitState,
+    goal: Goal,
+    guide: LimitState | None,
+    key: int,
+    samples: int,
+    number: int,
+    max_evaluations: int = MOST,
+) -> Descent:
+    """Return a repetition by number, down to the goal: it depends on the seed and these only."""
+    options: dict[str, Any] = {
+        "samples": samples,
+        "max_evaluations": max_evaluations,
+        "threshold": goal.stress,
+        "floor": state.bounds[0],
+        "label": state.member,
+        "rng": generator(state.experiment.seed, key, number),
+    }
+    chance = goal.probability
+    with one_blas_thread():  # their number changes last bits
+        if guide is None:
+            return descend(state, state.dimension, probability=DEEPER * chance, **options)
+        return bridge(guide, state, state.dimension, probability=chance, **options)
+
+
+def _share_failing(one: Descent) -> float:
+    """Return the share of failures among the samples to which a guide leads, 1 without any."""
+    values = one.populations[-1].values
+    return float(np.mean(values < one.threshold)) if one.complete else 1.0

@@ -11,14 +11,12 @@ from failures with L < b. Failures that L misses and that no short walk reaches 
 """
 
 import math
-from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
-from stiction.reliability.subset import Below, Function, Label, descend, grow
-from stiction.reliability.uncertainty import ancestral_variance
+from stiction.reliability.subset import Descent, Function, Label, Population, descend, grow
 
 GUIDING = 5
 """Samples of the guide per level for each exact sample of the middle factor."""
@@ -29,62 +27,6 @@ FORGOTTEN = 5
 """Exact steps of each walk in the failure set, and the number of them that are discarded."""
 MARGIN = 2.5
 """Least ratio of the probability of the guide's level to the requested probability."""
-
-
-class Bridge(NamedTuple):
-    """One repetition over both levels, complete if the exact limit state was evaluated.
-
-    Without a failure the estimate is zero: leaving it out would favour those that found one.
-    """
-
-    samples: int  # exact evaluations for the middle factor
-    rarest: float  # probability of the last level of the guide
-    evaluations: int  # of the exact limit state
-    first_stage_evaluations: int  # of the guide
-    complete: bool = False
-    log_probability: float = -math.inf  # logarithm of P(L < b)
-    values: Array = np.zeros(0)  # E of samples with L < b
-    ancestors: NDArray[np.int64] = np.zeros(0, np.int64)  # in the first level of the guide
-    members: NDArray[np.int64] = np.zeros(0, np.int64)  # which of equally likely interfaces
-    share: float = 0.0  # share of them that fail
-    last: float = 1.0  # P(L < b | E < s)
-    last_variance: float = 0.0  # squared coefficient of variation of its estimate
-    draws: Array = np.zeros((0, 0))  # of failing samples
-    stresses: Array = np.zeros(0)  # theirs
-    survived: float = (
-        0.0  # share of plain samples; where samples may survive there is one level
-    )
-
-    def light(self) -> Self:
-        """Return the same; nothing in it is large."""
-        return self
-
-    @property
-    def extent(self) -> tuple[float, float]:
-        """Lowest and highest stress of the samples, Pa; without any, plus and minus infinity."""
-        if not self.values.size:
-            return math.inf, -math.inf
-        return float(self.values.min()), float(self.values.max())
-
-    def probability(self, value: float) -> float:
-        """Return the estimate of P(E < value), for values near its threshold."""
-        share = float(np.mean(self.values < value)) if self.values.size else 0.0
-        return math.exp(self.log_probability) * share / self.last
-
-    def below(self, value: float) -> Below:
-        """Return the samples below a value."""
-        each = math.exp(self.log_probability) / max(self.values.size, 1) / self.last
-        failed = self.values < value
-        return Below(each, self.members[failed], self.ancestors[failed])
-
-    def relative_variance(self, value: float) -> float:
-        """Return the squared coefficient of variation of `probability(value)`."""
-        family = self.ancestors[self.values < value]
-        return ancestral_variance(family, self.values.size) + self.last_variance
-
-    def failing(self, value: float) -> tuple[Array, Array]:
-        """Return draws and stresses of failing samples; `value` is its threshold."""
-        return self.draws, self.stresses
 
 
 def _covered(
@@ -119,19 +61,19 @@ def bridge(
     probability: float = 0.0,
     floor: float = -math.inf,
     label: Label = lambda draws: np.zeros(len(draws), np.int64),
-) -> Bridge:
+) -> Descent:
     """Sample the exact lower tail near a threshold, or near a probability if none is given.
 
     `samples` are exact evaluations for the middle factor, as many again walk in the failure set;
-    `max_evaluations` limits both.
+    `max_evaluations` limits both. Without a failure the estimate is zero: leaving it out would
+    favour repetitions that found one.
     """
     descent = descend(
         guide, dimension, rng=rng, samples=GUIDING * samples, threshold=threshold,
         probability=MARGIN * probability, floor=floor, label=label,
     )  # fmt: skip
     guided, spent, lowest = descent.evaluations, 0, descent.populations[-1]
-    rarest = math.exp(lowest.log_probability)
-    best: Bridge | None = None
+    best: Descent | None = None
     for population in reversed(descent.populations):
         if population.draws.shape[0] == 0 or spent + samples + STEPS > max_evaluations:
             break
@@ -152,13 +94,14 @@ def bridge(
             if probability:  # this level is rarer than the requested probability
                 continue
         last, last_variance = 1.0, 0.0
-        failing, stresses = draws[failed], values[failed]
+        walked = draws[failed], values[failed]
         if failed.any() and math.isfinite(population.ceiling):
             room = (max_evaluations - spent) // STEPS
-            walkers = min(stresses.size, max(16, samples // STEPS), room)
+            walkers = min(int(failed.sum()), max(16, samples // STEPS), room)
+            seeds, theirs = (one[:walkers] for one in walked)
             # The seeds themselves come first, and do not count.
-            states, found, *_ = grow(
-                exact, failing[:walkers], stresses[:walkers], limit, STEPS + 1, lowest.step, rng
+            states, stresses, *_ = grow(
+                exact, seeds, theirs, limit, STEPS + 1, lowest.step, rng
             )
             spent += walkers * STEPS
             later = states[walkers * (1 + FORGOTTEN) :]
@@ -166,12 +109,18 @@ def bridge(
                 later, guide, population.ceiling, families[failed][:walkers], samples
             )
             guided += later.shape[0]
-            failing, stresses = states[-walkers:], found[-walkers:]
-        best = Bridge(
-            samples, rarest, spent, guided, True, population.log_probability, values, families,
-            population.members[looked], float(failed.mean()), last, last_variance, failing,
-            stresses,
+            walked = states[-walkers:], stresses[-walkers:]
+        found = Population(
+            math.inf, population.log_probability, values, families, population.members[looked],
+            np.empty((0, dimension)),
         )  # fmt: skip
+        best = Descent(
+            samples, [found], limit, spent, True, guided, last, last_variance, walked
+        )
         if last >= LAST_FACTOR:
             break
-    return best or Bridge(samples, rarest, spent, guided)
+    if best is not None:
+        return best
+    none, chance = np.zeros(0, np.int64), lowest.log_probability
+    empty = Population(math.inf, chance, np.zeros(0), none, none, np.empty((0, 0)))
+    return Descent(samples, [empty], threshold, spent, False, guided)

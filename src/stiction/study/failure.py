@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
@@ -10,26 +11,96 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
+from numpy.typing import NDArray
 
-from stiction.base.errors import InputError, merge_warnings, texts_of, warn_accuracy
+from stiction.base.errors import (
+    InputError,
+    collect_warnings,
+    merge_warnings,
+    merged,
+    texts_of,
+    warn_accuracy,
+)
 from stiction.base.progress import Meter, Show
 from stiction.base.variables import Variable
-from stiction.ensemble.batches import Here, Span, Table, usable_cores
+from stiction.ensemble.batches import (
+    NUMBER,
+    POINT,
+    Here,
+    Span,
+    Table,
+    usable_cores,
+    versions,
+)
 from stiction.ensemble.limit_state import LimitState, weakest_first
 from stiction.ensemble.monte_carlo import check_fields, complete
 from stiction.ensemble.pilot import exact_counterpart
 from stiction.ensemble.store import Store
 from stiction.problem.results import to_dataset
+from stiction.reliability.answer import Estimate
 from stiction.reliability.failure import chances, curve_doubts, curve_of
-from stiction.reliability.repetitions import repetition, repetitions_in, solve_repetition
-from stiction.reliability.subset import Descent
-from stiction.reliability.tail import Tail
+from stiction.reliability.subset import Descent, Population
+from stiction.reliability.tail import CURVE, Goal, Tail, repetition
 from stiction.study.run import StoredRun, samples_of_part
 
 CURVES = "failure_curve"
 """Key of the settings of a run of failure curves: its smallest probability and its event."""
 BOUND = "stress below which no interface slides"
+
+
+ROW = np.dtype(
+    [(name, np.int64) for name in (POINT, NUMBER, "level", "ancestor", "member")]
+    + [(name, np.float64) for name in ("ceiling", "log_probability", "value", "threshold")]
+    + [("samples", np.int64), ("evaluations", np.int64), ("complete", np.bool_)]
+)
+"""A sample of a level, with what its level and its repetition share."""
+OF_ALL = ("samples", "threshold", "evaluations", "complete")
+OF_LEVEL, OF_SAMPLE = ("ceiling", "log_probability"), ("value", "ancestor", "member")
+
+
+def repetition_of(state: LimitState, smallest: float, number: int) -> Descent:
+    """Return a repetition by number, down to the smallest probability of a curve."""
+    key, samples, _ = CURVE
+    return repetition(state, Goal(0.0, probability=smallest), None, key, samples, number)
+
+
+def solve_repetition(smallest: float, state: LimitState, span: Span) -> Table:
+    """Return the repetition that is the first of a span, as a table of a store."""
+    begin, (point, number, _) = time.perf_counter(), span
+    with collect_warnings() as warned:
+        found = repetition_of(state, smallest, number)
+    parts = []
+    for level, one in enumerate(found.populations):
+        rows = np.empty(one.values.size, ROW)
+        rows[POINT], rows[NUMBER], rows["level"] = point, number, level
+        for name in OF_ALL:
+            rows[name] = getattr(found, name)
+        for name in OF_LEVEL:
+            rows[name] = getattr(one, name)
+        for name, own in zip(OF_SAMPLE, (one.values, one.ancestors, one.members), strict=True):
+            rows[name] = own
+        parts.append(rows)
+    seconds = time.perf_counter() - begin
+    return Table(np.concatenate(parts), (), seconds, versions(), tuple(merged(warned)))
+
+
+def repetitions_in(rows: NDArray[Any]) -> Iterator[tuple[int, int, Descent]]:
+    """Yield point, number and content of the repetitions in a table, without draws."""
+    for (point, number), own in pd.DataFrame(rows).groupby([POINT, NUMBER]):
+        populations = []
+        for _, level in own.groupby("level"):
+            ceiling, chance = (level[name].iloc[0].item() for name in OF_LEVEL)
+            values, ancestors, members = (level[name].to_numpy() for name in OF_SAMPLE)
+            populations.append(
+                Population(ceiling, chance, values, ancestors, members, np.empty((0, 0)))
+            )
+        samples, threshold, evaluations, complete = (
+            own[name].iloc[0].item() for name in OF_ALL
+        )
+        found = Descent(samples, populations, threshold, evaluations, complete)
+        yield point, number, found
 
 
 class StoredRepetitions:
@@ -95,8 +166,7 @@ class StoredCurves(StoredRun):
             if (tail := rows.tail(point)) is None:
                 found.append(None)
                 continue
-            attributes = {"seed": experiment.seed, "evaluations": tail.spent}
-            attributes |= {"repetitions": len(tail.repetitions)} | self.study.attributes
+            attributes = {"seed": experiment.seed} | self.study.attributes
             state = LimitState(experiment, self.settings["event"])
             found.append(curve_of(tail, state, wanted, attributes))
         some = next((one for one in found if one is not None), None)
@@ -154,8 +224,11 @@ def compute(
                 for point, state in enumerate(states):
                     tail = rows.tail(point)
                     if exact_counterpart(state.experiment):  # stored repetitions have no draws
-                        tail = Tail([repetition(state, 0, smallest)])
-                    for text in curve_doubts(state, tail, smallest) if tail else ():
+                        tail = Tail([repetition_of(state, smallest, 0)])
+                    if tail is None:
+                        continue
+                    end = Estimate(state, tail, tail.quantile(smallest))
+                    for text in curve_doubts(end, smallest):
                         warn_accuracy(text)
             store.note_pilot({"doubts": texts_of(warned)})
     return StoredCurves(store, study, settings).labelled(rows)
