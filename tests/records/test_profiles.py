@@ -140,6 +140,8 @@ def peaks_of_tests():
     texts = {
         "forces": "joint;length (mm);peak (kN)\nA;31;0,21\nB;31;0,25\nC;62;0,47\nD;62;0,44\n",
         "stresses": "# rig 2\npeak [MPa]\n0.71\n0.76\n0.69\n",
+        "by unit": "test;Kraft [kN]\n1;0,21\n2;0,25\n3;0,22\n",
+        "two": "Kraft [kN];Reibzahl [-]\n21;0,31\n25;0,29\n22;0,3\n",
         "coefficients": "test,friction coefficient (1)\n1,0.31\n2,0.29\n3,0.335\n",
     }
     found = {}
@@ -147,13 +149,14 @@ def peaks_of_tests():
         for name, text in texts.items():
             path = Path(folder) / f"{name}.csv"
             path.write_text(text)
-            found[name] = st.read_peaks(path)
-        for name, unit in (("stresses", "kPa"), ("forces", "N"), ("stresses", "MPa")):
+        each = {name: (name, None) for name in texts} | {
+            f"{name} in {unit}": (name, unit)
+            for name, unit in (("stresses", "kPa"), ("forces", "N"), ("stresses", "MPa"))
+        }
+        for called, (name, unit) in each.items():
             path = Path(folder) / f"{name}.csv"
             given = refusal(lambda path=path, unit=unit: st.read_peaks(path, unit=unit))
-            found[f"{name} in {unit}"] = (
-                given.replace(folder, "") if isinstance(given, str) else given
-            )
+            found[called] = given.replace(folder, "") if isinstance(given, str) else given
     return found
 
 

@@ -12,8 +12,11 @@ from stiction.base.errors import InputError
 from stiction.base.progress import Meter, Show
 from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.inference.estimate import NAMES, Estimate, estimate
-from stiction.inference.marginal_fit import with_parameters
+from stiction.inference.marginal_fit import beta_of
 from stiction.inference.whittle import RANGES, origin
+from stiction.random.dotted_keys import with_values
+from stiction.random.fields import RandomField
+from stiction.random.marginals import Beta
 
 FEWEST = 20
 """Number of repetitions that determine a tail of errors."""
@@ -21,9 +24,6 @@ PLACES = ("mean", "marginal.mean", "marginal.loc")
 """Parameters of location."""
 SIDES = {"marginal.low": -1.0, "marginal.high": 1.0}
 """Side of the mean on which a bound lies."""
-SHAPES = ("marginal.alpha", "marginal.beta")
-LEAST_SHAPE = 1e-2
-"""Of a beta distribution that is to scatter more than its bounds allow."""
 SAME = 1e-3
 """Distance within which an interval is uninformative, as a share of an end of a range."""
 
@@ -84,9 +84,10 @@ def at_ends(around: Repetitions, confidence: float) -> list[Estimate]:
     place = family.free.index("correlation_length")
     moved = []
     scale, tail = Scale("spectrum.correlation_length"), 0.5 * (1.0 - confidence)
-    for share in (1.0 - tail, tail):
+    for share in (tail, 1.0 - tail):
         vector = family.vector_of(found.model)
-        vector[place] = np.clip(scale.end(found, around, share), *family.limits[place])
+        end = np.quantile(scale.less(found, around), share, method="weibull")
+        vector[place] = np.clip(end, *family.limits[place])
         moved.append(replace(found, model=family.model(vector, found.model.shares)))
     return moved
 
@@ -101,41 +102,43 @@ class Scale(NamedTuple):
     name: str
     linear: bool = False
 
-    def _from(self, values: Mapping[str, float]) -> tuple[float, float]:
-        """Origin of the logarithm, and the side of it on which the parameter lies."""
-        if self.name in SIDES:
-            return values["mean"], SIDES[self.name]
-        return origin(self.name), 1.0
+    def to(self, values: Mapping[str, float]) -> float:
+        """Return a parameter on this scale."""
+        name, value = self.name, values[self.name]
+        if name == "noise":
+            return value**2
+        if self.linear:
+            return value
+        away = SIDES[name] * (value - values["mean"]) if name in SIDES else value - origin(name)
+        return math.log(max(away, 1e-300))
+
+    def back(self, at: float, values: Mapping[str, float]) -> float:
+        """Return a parameter from this scale."""
+        name = self.name
+        if name == "noise":
+            return math.sqrt(max(at, 0.0))
+        if self.linear:
+            return at
+        away = math.exp(at)
+        return values["mean"] + SIDES[name] * away if name in SIDES else origin(name) + away
 
     def of(self, one: Estimate) -> tuple[float, float]:
         """Return an estimate on this scale, and a quantity to which its error is in proportion."""
         if self.name == "noise":
             return one.noise
-        (start, side), value = self._from(one.parameters), one.parameters[self.name]
         width = math.sqrt(one.parameters["efolding_length"])
         if self.name in PLACES:
             width *= one.parameters["standard_deviation"]
-        if self.linear:
-            return value, width
-        return math.log(max(side * (value - start), 1e-300)), width
+        return self.to(one.parameters), width
 
-    def back(self, scaled: float, values: Mapping[str, float]) -> float:
-        """Return a parameter from this scale."""
-        if self.name == "noise":
-            return math.sqrt(max(scaled, 0.0))
-        start, side = self._from(values)
-        return scaled if self.linear else start + side * math.exp(scaled)
-
-    def errors(self, repeated: Repetitions) -> Array:
-        """Return the errors of repetitions in units of their widths."""
-        truth = repeated.truth
-        true = truth.model.noise**2 if self.name == "noise" else self.of(truth)[0]
-        return np.array([(own - true) / wide for own, wide in map(self.of, repeated.fits)])
-
-    def end(self, found: Estimate, repeated: Repetitions, share: float) -> float:
-        """Return an estimate less a quantile of its error in units of its width."""
+    def less(self, found: Estimate, repeated: Repetitions) -> Array:
+        """Return an estimate less the error of each repetition, in proportion to its width."""
         at, width = self.of(found)
-        return at - width * float(np.quantile(self.errors(repeated), share, method="weibull"))
+        true, each = (
+            self.to(repeated.truth.parameters),
+            np.array([*map(self.of, repeated.fits)]),
+        )
+        return at - width * (each[:, 0] - true) / each[:, 1]
 
 
 def scale_of(name: str, repeated: Sequence[Repetitions]) -> Scale:
@@ -164,7 +167,10 @@ def intervals(
         shorter, longer = moved if moved and name != "noise" else (around, around)
         if np.cov([scale.of(one)[0] for one in around.fits], lengths)[0, 1] < 0.0:
             shorter, longer = longer, shorter
-        low, high = scale.end(found, shorter, 1.0 - tail), scale.end(found, longer, tail)
+        low, high = (
+            float(np.quantile(scale.less(found, one), share, method="weibull"))
+            for one, share in ((shorter, tail), (longer, 1.0 - tail))
+        )
         if name == "noise" and high <= 0.0:  # by chance: as wide as of an estimate of zero
             high -= found.noise[0]
         first, last = sorted(scale.back(end, estimated) for end in (low, high))
@@ -202,50 +208,29 @@ def limits_of(found: Estimate, values: Array, noise: float) -> dict[str, tuple[f
     return limits
 
 
-def _shapes_within(free: Mapping[str, Array], moved: Mapping[str, Array]) -> dict[str, Array]:
-    """Return shapes of beta distributions whose bounds were moved, at equal mean and variance."""
-    alpha, beta, low, high = (free[name] for name in (*SHAPES, *SIDES))
-    both, extent = alpha + beta, high - low
-    mean, variance = (
-        low + extent * alpha / both,
-        extent**2 * alpha * beta / both**2 / (both + 1.0),
-    )
-    bottom, top = (moved[name] for name in SIDES)
-    share = (mean - bottom) / (top - bottom)
-    both = share * (1.0 - share) * (top - bottom) ** 2 / variance - 1.0
-    as_before = (bottom == low) & (top == high)
-    shapes = np.where(as_before, (alpha, beta), (share * both, (1.0 - share) * both))
-    return dict(zip(SHAPES, np.maximum(shapes, LEAST_SHAPE), strict=True))
-
-
-def likely(repeated: Repetitions, measured: Array) -> list[Estimate]:
-    """Return estimates as likely as the one found: it less the error of each repetition."""
+def likely(repeated: Repetitions, measured: Array, quantity: str) -> list[RandomField]:
+    """Return fields as likely as the one found: it less the error of each repetition."""
     found = repeated.truth
-    limits = limits_of(found, measured, found.model.noise)
-    moved: dict[str, Array] = {}
-    free: dict[str, Array] = {}  # before the limits
+    field, limits = found.field(quantity), limits_of(found, measured, found.model.noise)
+    free: dict[str, list[float]] = {}
     for name in found.parameters:
         if name == "mean" or name.startswith("marginal.") or name in NAMES.values():
             scale = scale_of(name, [repeated])
-            at, width = scale.of(found)
-            places = (at - width * scale.errors(repeated)).tolist()
-            means = moved.get("mean", places)  # bounds lie at distances from them
-            values = [scale.back(p, {"mean": m}) for p, m in zip(places, means, strict=True)]
-            free[name] = np.array(values)
-            moved[name] = np.clip(values, *limits.get(name, (-math.inf, math.inf)))
-    if moved.keys() >= {*SHAPES, *SIDES}:
-        moved |= _shapes_within(free, moved)
-    result = []
-    for number in range(len(repeated.fits)):
-        own = {name: float(value[number]) for name, value in moved.items()}
-        parts: dict[str, dict[str, float]] = {"marginal": {}, "spectrum": {}}
-        for name, value in own.items():
-            part, _, last = name.rpartition(".")
-            parts.setdefault(part, {})[last] = value
-        model = found.model._replace(
-            spectrum=replace(found.model.spectrum, **parts["spectrum"]),
-            anisotropy=own.get("anisotropy", found.model.anisotropy),
-        )
-        marginal = with_parameters(found.marginal, parts["marginal"])
-        result.append(replace(found, marginal=marginal, model=model))
-    return result
+            places = scale.less(found, repeated).tolist()
+            means = free.get("mean", places)  # bounds lie at distances from them
+            pairs = zip(places, means, strict=True)
+            free[name] = [scale.back(at, {"mean": mean}) for at, mean in pairs]
+    del free["mean"]
+    members = []
+    for row in zip(*free.values(), strict=True):
+        own = dict(zip(free, row, strict=True))
+        within = {n: float(np.clip(own[n], *limits[n])) for n in own.keys() & limits.keys()}
+        one = with_values(field, own | within)
+        if isinstance(one.marginal, Beta):  # of the same mean and scatter between its limits
+            bounds = {n: own[n] for n in own.keys() & SIDES.keys()}
+            before = with_values(field, own | within | bounds)
+            ends = one.marginal.low, one.marginal.high
+            marginal = beta_of(before.mean, before.standard_deviation, *ends)
+            one = replace(one, marginal=marginal)
+        members.append(one)
+    return members

@@ -129,9 +129,7 @@ class FieldFit:
     @cached_property
     def _likely(self) -> list[list[RandomField]]:
         values = np.concatenate(self._rows)
-        return [
-            [one.field(self.quantity) for one in likely(own, values)] for own in self._repeated
-        ]
+        return [likely(own, values, self.quantity) for own in self._repeated]
 
     @checked
     def interfaces(self, count: Count, seed: Number = 0) -> list[RandomInterface]:

@@ -176,11 +176,10 @@ class Family:
             return replace(marginal, cv=factor * marginal.cv)
         if "low" in moved and marginal.low >= 0.0:
             moved["low"] = max(moved["low"], 0.0)
-        wider = replace(marginal, **moved)
-        u = (mean - wider.low) / (wider.high - wider.low)
-        deviation = factor * float(marginal.distribution.std()) / (wider.high - wider.low)
-        total = max(u * (1.0 - u) / deviation**2 - 1.0, LEAST_TOTAL)
-        return replace(wider, alpha=total * u, beta=total * (1.0 - u))
+        deviation = factor * float(marginal.distribution.std())
+        return beta_of(
+            mean, deviation, moved.get("low", marginal.low), moved.get("high", marginal.high)
+        )
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -197,6 +196,13 @@ class Family:
                 f" and {high:.6g}; give others, as in {{'type': {self.name!r}, 'low': ...}}, or"
                 " noise=True if measurement noise carries them there"
             )
+
+
+def beta_of(mean: float, deviation: float, low: float, high: float) -> Beta:
+    """Return the beta distribution of these moments, or of less scatter than its bounds allow."""
+    u, extent = (mean - low) / (high - low), high - low
+    total = max(u * (1.0 - u) / (deviation / extent) ** 2 - 1.0, LEAST_TOTAL)
+    return Beta(alpha=total * u, beta=total * (1.0 - u), low=low, high=high)
 
 
 def _all_parameters(marginal: Any) -> dict[str, float]:
@@ -283,9 +289,7 @@ def _beta(family: Family, values: Array, quiet: Array, noise: float, start: Any)
 
     if start is None:
         ends = ends_at(1.1 * room[name] for name in sides)
-        u = (quiet - ends["low"]) / (ends["high"] - ends["low"])
-        total = max(u.mean() * (1.0 - u.mean()) / u.var() - 1.0, LEAST_TOTAL)
-        start = Beta(alpha=total * u.mean(), beta=total * (1.0 - u.mean()), **ends)
+        start = beta_of(float(quiet.mean()), float(quiet.std()), **ends)
     # Below 1 a shape makes the likelihood grow without bound as its bound nears a value.
     limits = [(math.log(0.05) if end in fixed else 0.0, 12.0) for end in ("low", "high")]
     first = [start.alpha, start.beta]

@@ -130,8 +130,9 @@ def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
     path : path
         A table, separated by commas, semicolons, tabs or blanks, one test a line, with a heading.
         One column is called peak, stress, strength, force or friction, with its unit: ``peak
-        [MPa]``; a coefficient of friction has the unit 1 or -, a force N or kN. Another may be the
-        length of the specimen: ``length [mm]``. Columns of other names are not read.
+        [MPa]``; a coefficient of friction has the unit 1 or -, a force N or kN. Without such a
+        name, it is the only column in a unit of these. Another may be the length of the specimen:
+        ``length [mm]``. Other columns are not read.
     unit : str, optional
         Unit of the peaks if the file states none.
 
@@ -158,7 +159,7 @@ def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
     path = check("path", path, FilePath)
     with prefixed(str(path)):
         table = read_table(Path(path))
-        peak, length = _column(table, PEAK), _column(table, LENGTH)
+        length, peak = _column(table, LENGTH), _column(table, PEAK, ("Pa", "N", "1"))
         if peak is None:
             names = ", ".join(map(str, table.data_vars))
             raise InputError(f"no column has a name like 'peak [MPa]'; found {names}")
@@ -182,10 +183,15 @@ def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
         return make_peaks(groups, stated)
 
 
-def _column(table: Any, kinds: tuple[str, ...]) -> Any:
-    """Return the one column whose name begins with one of some words."""
+def _column(table: Any, kinds: tuple[str, ...], units: tuple[str, ...] = ()) -> Any:
+    """Return the one column whose name begins with one of some words, else that in a unit."""
     firsts = {name: name.lower().partition(" ")[0].strip("_:.") for name in table.data_vars}
     found = [name for name, first in firsts.items() if first in kinds]
+    found = found or [
+        name
+        for name, column in table.items()
+        if any(is_in(column.attrs.get("units"), one) for one in units)
+    ]
     if len(found) > 1:
         both = " and ".join(map(repr, found))
         raise InputError(f"{both} may both be the {kinds[0]}; rename one")

@@ -20,15 +20,13 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.polynomial.hermite_e import hermevander
 from scipy.ndimage import uniform_filter
-from scipy.special import factorial
 
 from stiction.base.arrays import Array
 from stiction.base.kinds import from_table
 from stiction.inference.marginal_fit import climb, table_of
 from stiction.inference.window import RecordWindow
-from stiction.random.mapping import quantile_of_normal
+from stiction.random.mapping import hermite_coefficients
 from stiction.random.spectra import SPECTRA
 
 RANGES = {
@@ -50,9 +48,8 @@ TRIED = {
 FLOOR = 1e-3
 """Floor as a share of the highest power, averaged over records and neighbours."""
 NEIGHBOURS = 5
-ORDERS = 10
-FACTORIALS = factorial(np.arange(ORDERS + 1))
-REACH, POINTS = 6.0, 121
+ORDERS, COARSE = 10, 0.1
+"""Hermite orders of a marginal's map, and steps of z by which they are found to 1e-4."""
 SHOWN = ("correlation_length", "exponent", "anisotropy")
 AT_END = 1e-3
 """Distance from an end of a range, as a share of it, within which an estimate is at it."""
@@ -64,18 +61,9 @@ LONGEST = 1.5
 
 
 def hermite_shares(marginal: Any) -> Array:
-    """Return the shares of the variance in the Hermite orders 0, 1, ..., the last for the rest.
-
-    As `stiction.random.mapping.hermite_coefficients`, at a hundredth of its cost, to 1e-4.
-    """
-    z = np.linspace(-REACH, REACH, POINTS)
-    weight = np.exp(-0.5 * z * z)
-    weight /= weight.sum()
-    value = quantile_of_normal(marginal.distribution, z)
-    value = value - weight @ value
-    shares = (weight * value) @ hermevander(z, ORDERS)
-    shares = shares**2 / (FACTORIALS * (weight @ value**2))
-    shares[ORDERS] = max(1.0 - shares[:-1].sum(), 0.0)
+    """Return the shares of the variance in the Hermite orders 0, 1, ..., the last for the rest."""
+    shares = hermite_coefficients(marginal, COARSE, ORDERS) ** 2
+    shares[0] = 0.0
     result: Array = shares / shares.sum()
     return result
 

@@ -139,25 +139,27 @@ def _standard(marginal: Any) -> tuple[Any, float, float]:
 
 
 @lru_cache(maxsize=64)
-def hermite_coefficients(marginal: Any) -> Array:
+def hermite_coefficients(
+    marginal: Any, step: float = STEP, most_terms: int = MOST_TERMS
+) -> Array:
     """Return c_m = E[F^-1(Phi(Z)) h_m(Z)], h_m the orthonormal Hermite polynomials, m = 0, 1, ...
 
-    c_0 is the mean and the sum of the others' squares the variance (Grigoriu, 1995). By a
-    fine trapezoidal rule on |z| <= 8, which stays accurate where the map has kinks. The last
+    c_0 is the mean and the sum of the others' squares the variance (Grigoriu, 1995). By the
+    trapezoidal rule on |z| <= 8; fine steps are accurate where the map has kinks, too. The last
     coefficient stands for all the rest of the variance, so that the correlation is 1 at zero
     lag. An `InputError` if scipy's quantile and moments disagree.
     """
-    distribution, half = marginal.distribution, round(REACH / STEP)
-    z = np.arange(-half, half + 1) * STEP
+    distribution, half = marginal.distribution, round(REACH / step)
+    z = np.arange(-half, half + 1) * step
     # Without the mean, which would cost a narrow marginal its digits.
     mean, variance = float(distribution.mean()), float(distribution.var())
     if not variance > 0.0:
         raise InputError("marginal: its standard deviation is zero in double precision")
-    root = np.sqrt(STEP / np.sqrt(2.0 * np.pi)) * np.exp(-0.25 * z * z)
+    root = np.sqrt(step / np.sqrt(2.0 * np.pi)) * np.exp(-0.25 * z * z)
     value = (quantile_of_normal(distribution, z) - mean) * root
     found, rest = [mean], variance
     previous, current = np.zeros_like(z), root
-    for m in range(MOST_TERMS):
+    for m in range(most_terms):
         if m > 0:
             found.append(float(np.sum(value * current)))
             rest -= found[-1] ** 2
@@ -165,7 +167,7 @@ def hermite_coefficients(marginal: Any) -> Array:
             break
         following = (z * current - np.sqrt(m) * previous) / np.sqrt(m + 1.0)
         previous, current = current, following
-    if not rest > -SMALL * variance:  # more than round-off
+    if not rest > -max(SMALL, step**2) * variance:  # more than round-off and the rule's error
         raise InputError(
             "marginal: scipy's quantile of this distribution is not accurate enough"
         )
