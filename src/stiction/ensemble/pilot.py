@@ -26,10 +26,10 @@ WORTH_A_WARNING = 0.01
 
 def exact_counterpart(experiment: Experiment) -> Experiment | None:
     """Return an experiment by the local criterion as one by `Equilibrium`, if that can take it."""
-    method, problem = Equilibrium(), experiment.problem
-    if not isinstance(experiment.method, LocalCriterion) or method.supports(problem):
+    method = Equilibrium()
+    if not isinstance(experiment.method, LocalCriterion) or method.supports(experiment.problem):
         return None
-    return Experiment(problem, experiment.random, method, seed=experiment.seed)
+    return experiment.by(method)
 
 
 def compare(

@@ -6,14 +6,12 @@ path.
 
 Units follow the size of what is drawn: mm and µs, or km and s. Where the problem has a normal
 pressure, friction coefficients are drawn too. `axes` and `style` are what all files share;
-`onsets`, `specimens`, `ruptures`, `distributions` and `fits` draw a kind of result each,
-`fields` profiles and maps.
+`fields`, `specimens`, `ruptures`, `distributions` and `fits` draw a kind of result each.
 """
 
 from stiction.plot.distributions import failure_curve, monte_carlo, quantiles
-from stiction.plot.fields import field
+from stiction.plot.fields import field, onset
 from stiction.plot.fits import agreement, fit
-from stiction.plot.onsets import onset
 from stiction.plot.ruptures import film, rupture
 from stiction.plot.specimens import block, force_travel, precursors, specimen
 from stiction.plot.style import paper_style

@@ -9,6 +9,7 @@ import numpy as np
 import pydantic
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from stiction.base.errors import InputError
 from stiction.base.model import check
@@ -23,6 +24,13 @@ def with_unit(name: str, unit: str) -> str:
     return f"{name} ({unit})" if unit else name
 
 
+def new_figure(width: float, height: float) -> Figure:
+    """Return a figure that notebooks and galleries show; sizes in inches."""
+    import matplotlib.pyplot as plt
+
+    return plt.figure(figsize=(width, height), layout="constrained")
+
+
 @contextmanager
 def on_axes(
     ax: Axes | None, width: float = 1.35 * COLUMN, height: float = 2.8
@@ -35,10 +43,8 @@ def on_axes(
             )
         yield ax
         return
-    import matplotlib.pyplot as plt  # notebooks and galleries show the figures that it manages
-
     # Made outside the style: a notebook's backend, loaded by its first figure, sets parameters too.
-    figure = plt.figure(figsize=(width, height), layout="constrained")
+    figure = new_figure(width, height)
     with paper_style():
         yield figure.subplots()
 

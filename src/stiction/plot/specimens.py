@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from stiction.base.model import check
 from stiction.base.units import unit_for
-from stiction.plot.axes import need, on_axes, problem_of, with_unit
+from stiction.plot.axes import need, new_figure, on_axes, problem_of, with_unit
 from stiction.plot.fields import rows_of
 from stiction.plot.style import ACCENT, COLUMN, PAGE, PALE, QUIET, paper_style, series
 from stiction.problem.problem import Problem
@@ -56,11 +56,9 @@ def specimen(
     >>> len(st.plot.specimen(problem).axes)
     2
     """
-    import matplotlib.pyplot as plt
-
     check("problem", problem, Problem)
     blocks, interface = problem.blocks, problem.interface
-    figure = plt.figure(figsize=(1.35 * COLUMN, 1.5 * COLUMN), layout="constrained")
+    figure = new_figure(1.35 * COLUMN, 1.5 * COLUMN)
     with paper_style():
         top, below = figure.subplots(2, sharex=True, height_ratios=(1.0, 1.2))
     scale, unit = unit_for("m", interface.lengths)
@@ -134,21 +132,10 @@ def force_travel(result: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    >>> import numpy as np
-    >>> import stiction as st
-    >>> problem = st.Problem(
-    ...     solid=st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress"),
-    ...     interface=st.Interface(length=0.1, nodes=128),
-    ...     friction=st.LinearWeakening(weakening_rate=0.2e12),
-    ...     specimen=st.Blocks(height=0.05, thickness=0.006),
-    ... )
-    >>> strength = 1e6 + 3e8 * (problem.interface.x - 0.04) ** 2
-    >>> path = st.equilibrium_path(problem, strength, np.linspace(0.0, 1.3e6, 50))
-    >>> st.plot.force_travel(path).get_xlabel()
-    'travel (µm)'
+    As of `precursors`, which draws the events below it.
     """
-    travel, force, name = _curve(result)
-    start, high = result["event_travel"].values, result[_event(name)].values
+    travel, force, name, event = _curve(result)
+    start, high = result["event_travel"].values, result[event].values
     length, length_unit = unit_for("m", travel)
     factor, unit = unit_for(str(result[name].attrs["units"]), force)
     with on_axes(ax) as axes:
@@ -179,8 +166,6 @@ def block(run: xr.Dataset, *, problem: Problem | None = None) -> Figure:
         a hundred, when 2 to 95 % of the slip have happened. Time counts from the first arrival of
         the front.
     """
-    import matplotlib.pyplot as plt
-
     need(run, "block_velocity", hint="; it is kept of specimens")
     interface = problem_of(run, problem).interface
     scale, unit = unit_for("m", interface.lengths)
@@ -194,9 +179,7 @@ def block(run: xr.Dataset, *, problem: Problem | None = None) -> Figure:
     rows = -(-len(since) // columns)
     high = PAGE / columns * 2.0 * height[-1] / x[-1]
     with paper_style():
-        figure = plt.figure(
-            figsize=(PAGE * 1.1, rows * (high + 0.3) + 0.3), layout="constrained"
-        )
+        figure = new_figure(PAGE * 1.1, rows * (high + 0.3) + 0.3)
         panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         for axes, time, upper in zip(panels.flat, since, velocity, strict=False):
             field = np.concatenate([-upper[:0:-1], upper])
@@ -214,25 +197,21 @@ def block(run: xr.Dataset, *, problem: Problem | None = None) -> Figure:
     return figure
 
 
-def _event(name: str) -> str:
-    """Return the name of a force, or of a mean stress, at events."""
-    return "event_force" if name == "force" else "event_stress"
-
-
-def _curve(result: xr.Dataset) -> tuple[Array, Array, str]:
-    """Return travel (m) and force (N) along the curve of a machine, and the force's name.
+def _curve(result: xr.Dataset) -> tuple[Array, Array, str, str]:
+    """Return travel (m) and force (N) along the curve of a machine, its name, and that at events.
 
     The mean stress (Pa) where no thickness is known.
     """
     need(result, "travel", "event_start", hint="; give the path of a specimen")
     name = "force" if "force" in result else "mean_stress"
-    high, drop = result[_event(name)].values, result[f"{_event(name)}_drop"].values
+    event = "event_force" if name == "force" else "event_stress"
+    high, drop = result[event].values, result[f"{event}_drop"].values
     start, step = result["event_travel"].values, result["event_travel_step"].values
     load, before = result["load"].values, result["event_load"].values
     order = np.argsort(np.concatenate([load, before, before]), kind="stable")
     travel = np.concatenate([result["travel"].values, start, start + step])[order]
     force = np.concatenate([result[name].values, high, high - drop])[order]
-    return travel, force, name
+    return travel, force, name, event
 
 
 def precursors(result: xr.Dataset, *, problem: Problem | None = None) -> Figure:
@@ -265,15 +244,13 @@ def precursors(result: xr.Dataset, *, problem: Problem | None = None) -> Figure:
     >>> st.plot.precursors(path).axes[1].get_ylabel()
     'position $x$ (mm)'
     """
-    import matplotlib.pyplot as plt
-
     interface = problem_of(result, problem).interface
     length, _ = unit_for("m", _curve(result)[0])
     scale, unit = unit_for("m", interface.lengths)
     start = result["event_start"].values * scale
     end = start + result["event_length"].values * scale
     with paper_style():
-        figure = plt.figure(figsize=(1.35 * COLUMN, 1.35 * COLUMN), layout="constrained")
+        figure = new_figure(1.35 * COLUMN, 1.35 * COLUMN)
         above, below = figure.subplots(2, sharex=True, height_ratios=(1.3, 1.0))
         force_travel(result, ax=above)
         at = result["event_travel"].values * length

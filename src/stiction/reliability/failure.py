@@ -113,8 +113,7 @@ def failure_probability(
     random : RandomInterface, RandomField, list of them, FieldFit or Posterior
         Of a list, each is equally likely. From a fit or a posterior, or any object with a method
         ``interfaces(count, seed)``, as many are drawn as the target needs, from 1,000 up to 8,000.
-        The answer is then the mean over them, the predictive probability, and has its `band`. The
-        list is a sample of what may be true: the error by that is in the interval.
+        The answer is then the mean over them, the predictive probability, and has its `band`.
     stress : float, optional
         Mean shear stress to carry, Pa. Failure is an onset strictly below it.
     method : LocalCriterion, Equilibrium or Rupture
@@ -127,16 +126,13 @@ def failure_probability(
         Instead of `stress`: shear force to carry, N. The area of the interface must be known.
     algorithm : {"auto", "plain", "subset", "two_level"}
         Plain Monte Carlo, subset simulation, or subset simulation by the local criterion with
-        equilibrium as the last level; page 'Failure probability' of the documentation has their
-        sources. 'auto' counts if 1 % of a thousand plain samples fail. Otherwise it takes two
-        levels for equilibrium if the local criterion picks the same weakest samples, else subset
-        simulation. `reason` in the result gives the cause.
+        equilibrium as the last level; see the page 'Failure probability' of the documentation.
+        `reason` in the result says why 'auto' took one.
     target_cv : float
         Coefficient of variation to reach, that by the list of interfaces included.
     max_evaluations : int, optional
         Largest number of samples to solve: by default as many as take a quarter of an hour on
-        one core, at most 2,000,000; 1,000 by rupture. Fewer are solved where the target is
-        reached before; if they do not suffice, there is a warning.
+        one core, at most 2,000,000; 1,000 by rupture.
     event : {"critical_stress", "first_instability"}
         Whether the interface as a whole has to slide, or the first patch to become unstable,
         arrested or not. By the local criterion they are the same.
@@ -154,9 +150,8 @@ def failure_probability(
     Warns
     -----
     AccuracyWarning
-        If the estimate is unreliable; `warnings` in the result holds the same texts. With
-        the local criterion, some samples near the stress are also solved by equilibrium,
-        and both probabilities are given if they differ by more than their error.
+        If the estimate is unreliable; `warnings` in the result holds the same texts. By the local
+        criterion, some samples near the stress are also solved by equilibrium.
     UnitWarning
         If the stress is below a fiftieth or above fifty times of the mean strength; a thousand
         times is an `InputError`.
@@ -414,9 +409,7 @@ def design_stress(
         is refused unless `max_evaluations` is 20,000 or more.
     target_cv : float
         Coefficient of variation to reach, of the failure probability at the stress.
-    problem, seed, workers, progress
-        As in `monte_carlo`.
-    random, max_evaluations, event
+    problem, random, seed, max_evaluations, event, workers, progress
         As in `failure_probability`.
 
     Returns
@@ -432,8 +425,7 @@ def design_stress(
     Warns
     -----
     AccuracyWarning
-        If the allowed evaluations do not suffice, onsets accumulate at the bound, or
-        equilibrium and the local criterion disagree on samples near the stress.
+        As `failure_probability`, and if onsets accumulate at the bound.
 
     Examples
     --------
@@ -515,9 +507,7 @@ def failure_curve(
         Coefficient of variation to reach at the smallest probability; it is lower elsewhere.
         Repetitions are added until it is reached: the same, of the same numbers, as those of
         `Study.failure_curve`.
-    problem, seed, workers, progress
-        As in `monte_carlo`.
-    random, method, max_evaluations, event
+    problem, random, method, seed, max_evaluations, event, workers, progress
         As in `design_stress`.
 
     Returns
@@ -538,8 +528,7 @@ def failure_curve(
     Warns
     -----
     AccuracyWarning
-        If the allowed evaluations do not suffice, or equilibrium and the local criterion
-        disagree on samples at the end of the curve.
+        As `failure_probability`, at the end of the curve.
 
     Examples
     --------

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -34,6 +33,8 @@ from stiction.ensemble.batches import (
     usable_cores,
     versions,
 )
+from stiction.ensemble.dataset import GridAxes
+from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import LimitState, weakest_first
 from stiction.ensemble.monte_carlo import check_fields, complete
 from stiction.ensemble.pilot import exact_counterpart
@@ -43,10 +44,7 @@ from stiction.reliability.answer import Estimate
 from stiction.reliability.failure import chances, curve_doubts, curve_of
 from stiction.reliability.subset import Descent, Population
 from stiction.reliability.tail import CURVE, Goal, Tail, repetition
-from stiction.study.run import StoredRun, samples_of_part
 
-CURVES = "failure_curve"
-"""Key of the settings of a run of failure curves: its smallest probability and its event."""
 BOUND = "stress below which no interface slides"
 
 
@@ -103,45 +101,58 @@ def repetitions_in(rows: NDArray[Any]) -> Iterator[tuple[int, int, Descent]]:
         yield point, number, found
 
 
-class StoredRepetitions:
-    """The repetitions of all points of a study that are there, in memory."""
+class Repetitions:
+    """The repetitions at all points of a sweep that are there, in memory, and their curves."""
 
     failed = ()  # none does
 
-    def __init__(self, points: int, count: int, only: Sequence[str] | None = None) -> None:
-        self.only = only
-        self.done = np.zeros((points, count), dtype=np.bool_)
-        self._found: dict[tuple[int, int], Descent] = {}
+    def __init__(
+        self,
+        points: Sequence[Experiment],
+        count: int,
+        settings: Mapping[str, Any],
+        only: Sequence[str] | None = None,
+    ) -> None:
+        if any(point.method.type == "rupture" for point in points):
+            raise InputError(
+                "method: failures by rupture are counted, not sampled by levels; use"
+                " st.Equilibrium() or st.LocalCriterion(), or failure_probability(...,"
+                " algorithm='plain')"
+            )
+        self.smallest, self._only = settings["smallest"], only
+        self.states = [LimitState(point, settings["event"]) for point in points]
+        self.done = np.zeros((len(points), count), dtype=np.bool_)
+        self._found: list[dict[int, Descent]] = [{} for _ in points]
 
     def add(self, table: Table) -> None:
         """Take the repetitions of a table; those beyond the number are left out."""
         for point, number, found in repetitions_in(table.rows):
             if number < self.done.shape[1]:
-                self._found[point, number] = found
+                self._found[point][number] = found
                 self.done[point, number] = True
 
     def tail(self, point: int) -> Tail | None:
         """Return the tail of a point from all of its repetitions; None without any."""
-        numbers = np.flatnonzero(self.done[point]).tolist()
-        found = [self._found[point, number] for number in numbers]
+        found = [one for _, one in sorted(self._found[point].items())]
         return Tail(found, spent=sum(one.evaluations for one in found)) if found else None
 
+    def curves(self, attributes: Mapping[str, Any]) -> list[xr.Dataset]:
+        """Return the curve of each point of the sweep, NaN without a repetition."""
+        wanted = chances(self.smallest)
+        tails = [self.tail(point) for point in range(len(self.states))]
+        found = [
+            curve_of(tail, state, wanted, attributes) if tail else None
+            for tail, state in zip(tails, self.states, strict=True)
+        ]
+        some = next((one for one in found if one is not None), None)
+        if some is None:
+            raise InputError("run: no repetition is stored yet")
+        empty = some.where(False).assign_attrs(lower_bound=np.nan)
+        return [empty if one is None else one for one in found]
 
-class StoredCurves(StoredRun):
-    """A run of failure curves on disk, for reading; see `stiction.open_run`."""
-
-    counted = "repetitions"
-
-    def __init__(self, store: Store, study: Any, settings: Mapping[str, Any]) -> None:
-        super().__init__(store, study)
-        self.settings = settings
-
-    def labelled(self, rows: StoredRepetitions) -> xr.Dataset:
-        """Return the curves from repetitions, over the axes of a sweep and 'point'.
-
-        As from `stiction.failure_curve`; NaN at points of the sweep without a repetition.
-        """
-        found, axes = self.curves(rows), self.study.axes
+    def dataset(self, attributes: Mapping[str, Any], axes: GridAxes) -> xr.Dataset:
+        """Return the curves as `stiction.failure_curve` does, over the axes of a sweep too."""
+        found = self.curves(attributes)
         dims, shape = tuple(axes), tuple(len(axes[dim][dim][0]) for dim in axes)
         result = found[0]
         if axes:
@@ -155,80 +166,46 @@ class StoredCurves(StoredRun):
                 variables[str(name)] = Variable(*about, (*dims, *map(str, one.dims[1:])))
             coordinates = {name: one for own in axes.values() for name, one in own.items()}
             result = to_dataset(values, variables, coordinates, result.attrs)
-        return result[list(rows.only)] if rows.only else result
-
-    def curves(self, rows: StoredRepetitions | None = None) -> list[xr.Dataset]:
-        """Return the curve of each point of the sweep, NaN without a repetition."""
-        rows = rows or self._read(None)
-        wanted = chances(self.settings["smallest"])
-        found: list[xr.Dataset | None] = []
-        for point, experiment in enumerate(self.study.experiments):
-            if (tail := rows.tail(point)) is None:
-                found.append(None)
-                continue
-            attributes = {"seed": experiment.seed} | self.study.attributes
-            state = LimitState(experiment, self.settings["event"])
-            found.append(curve_of(tail, state, wanted, attributes))
-        some = next((one for one in found if one is not None), None)
-        if some is None:
-            raise InputError(f"{self.path}: no repetition is stored yet")
-        empty = some.where(False).assign_attrs(lower_bound=np.nan)
-        return [empty if one is None else one for one in found]
-
-    def _rows(self, only: Sequence[str] | None) -> StoredRepetitions:
-        return StoredRepetitions(len(self.study.experiments), self.study.ensemble.samples, only)
+        return result[list(self._only)] if self._only else result
 
 
-def compute(
-    study: Any,
-    settings: Mapping[str, Any],
-    out: Path,
-    repetitions: int,
+def complete_curves(
+    rows: Repetitions,
+    store: Store,
+    *,
+    others: NDArray[Any] | bool,
     workers: int | None,
     executor: Executor | None,
     progress: Show,
-    part: tuple[int, int] | None,
-) -> xr.Dataset:
-    """Return the curves, after computing what is not stored, or a part of it."""
-    if any(point.method.type == "rupture" for point in study.experiments):
-        raise InputError(
-            "method: failures by rupture are counted, not sampled by levels; use st.Equilibrium()"
-            " or st.LocalCriterion(), or failure_probability(..., algorithm='plain')"
-        )
-    study = replace(study, ensemble=replace(study.ensemble, samples=repetitions))
-    store = Store.open(out, study.to_dict() | {CURVES: settings})
-    states = [LimitState(point, settings["event"]) for point in study.experiments]
-    rows = StoredRepetitions(len(states), repetitions)
+    pilot: bool,
+) -> None:
+    """Compute what is not stored; `others`, (points, repetitions), another job computes."""
     store.resume(rows.add)
-    missing = ~rows.done
-    if part is not None:
-        missing &= samples_of_part(part, *missing.shape)
-    smallest, cores = settings["smallest"], workers or usable_cores()
+    missing, states, cores = ~(rows.done | others), rows.states, workers or usable_cores()
     with merge_warnings():
         if missing.any():
-            check_fields(study.experiments)
+            check_fields([state.experiment for state in states])
             threads = cores if executor is None else 1
             states = [replace(weakest_first(state), workers=threads) for state in states]
         complete(
             rows,
             states,
             [Span(point, number, 1) for number, point in np.argwhere(missing.T).tolist()],
-            partial(solve_repetition, smallest),
+            partial(solve_repetition, rows.smallest),
             Meter("failure curve", int(missing.sum()), progress, unit="repetitions"),
             store=store,
             executor=executor or Here(),
             workers=cores,
         )
-        if store.pilot is None and (part is None or part[0] == 1):
+        if store.pilot is None and pilot:
             with merge_warnings() as warned:
                 for point, state in enumerate(states):
                     tail = rows.tail(point)
                     if exact_counterpart(state.experiment):  # stored repetitions have no draws
-                        tail = Tail([repetition_of(state, smallest, 0)])
+                        tail = Tail([repetition_of(state, rows.smallest, 0)])
                     if tail is None:
                         continue
-                    end = Estimate(state, tail, tail.quantile(smallest))
-                    for text in curve_doubts(end, smallest):
+                    end = Estimate(state, tail, tail.quantile(rows.smallest))
+                    for text in curve_doubts(end, rows.smallest):
                         warn_accuracy(text)
             store.note_pilot({"doubts": texts_of(warned)})
-    return StoredCurves(store, study, settings).labelled(rows)

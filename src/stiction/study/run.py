@@ -19,6 +19,7 @@ from stiction.ensemble.dataset import Gathered
 from stiction.ensemble.store import Store
 from stiction.random.synthesis import BLOCK
 from stiction.study.export import export
+from stiction.study.failure import Repetitions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -77,19 +78,22 @@ class StoredRun:
     ----------
     path : Path
     study : Study
-    counted : str
-        What is stored: samples, or repetitions of failure curves.
+    settings : dict
+        Of failure curves, their smallest probability and event; None of samples.
     """
 
-    counted = "samples"
-
-    def __init__(self, store: Store, study: Any) -> None:
-        self.path, self.study, self._store = store.path, study, store
+    def __init__(self, store: Store, study: Any, settings: dict[str, Any] | None) -> None:
+        self.path, self.study, self.settings, self._store = store.path, study, settings, store
 
     def __repr__(self) -> str:
         points, each = len(self.study.experiments), self.study.ensemble.samples
         what = f"{points} x {each} {self.counted} by {self.methods}"
         return f"{type(self).__name__}({str(self.path)!r}, {what})"
+
+    @property
+    def counted(self) -> str:
+        """What is stored."""
+        return "repetitions" if self.settings else "samples"
 
     @property
     def methods(self) -> str:
@@ -136,16 +140,22 @@ class StoredRun:
             self._store.warn(
                 f"{name}: {text}; its {self.counted} are missing; run the study again"
             )
-        return self.labelled(rows)
-
-    def labelled(self, rows: Any) -> xr.Dataset:
-        """Return what was read as a dataset."""
-        attributes = {**self.study.attributes, **(self._store.pilot or {})}
+        attributes = self.study.attributes
+        if not self.settings:
+            attributes |= self._store.pilot or {}
         found: xr.Dataset = rows.dataset(attributes, self.study.axes)
         return found
 
+    def curves(self) -> list[xr.Dataset]:
+        """Return the failure curve of each point of the sweep, NaN without a repetition."""
+        found: list[xr.Dataset] = self._read(None).curves(self.study.attributes)
+        return found
+
     def _rows(self, only: Sequence[str] | None) -> Any:
-        return Gathered(self.study.experiments, self.study.ensemble, only)
+        points, ensemble = self.study.experiments, self.study.ensemble
+        if self.settings:
+            return Repetitions(points, ensemble.samples, self.settings, only)
+        return Gathered(points, ensemble, only)
 
     def _read(self, only: Sequence[str] | None) -> Any:
         rows = self._rows(only)

@@ -7,6 +7,7 @@ import json
 import tomllib
 from collections.abc import Mapping
 from concurrent.futures import Executor
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -44,6 +45,7 @@ from stiction.random.dotted_keys import with_values
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 from stiction.reliability.answer import Answer, Probability, TargetCv
 from stiction.reliability.failure import design_stress, failure_probability
+from stiction.study.failure import Repetitions, complete_curves
 from stiction.study.run import AnyPart, StoredRun, samples_of_part
 from stiction.study.sweep import Point, Sweep, Uncertain, grid_axes
 
@@ -51,7 +53,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 T = TypeVar("T")
-
+CURVES = "failure_curve"
+"""Key of the settings of failure curves beside the study of a run."""
 
 AnyMethod: Any = Annotated[
     Any,
@@ -315,12 +318,8 @@ class Study(_Parts):
         StoreError
             If `out` cannot be used.
         """
-        others: Any = False
-        if part is not None:
-            if out is None:
-                raise InputError("part: needs out=, the folder in which the parts are stored")
-            others = ~samples_of_part(part, len(self.experiments), self.ensemble.samples)
-            pilot = pilot and part[0] == 1
+        if part is not None and out is None:
+            raise InputError("part: needs out=, the folder in which the parts are stored")
         store = None if out is None else Store.open(out, self.to_dict())
         return gather(
             self.experiments,
@@ -328,12 +327,16 @@ class Study(_Parts):
             self.attributes,
             self.axes,
             store=store,
-            others=others,
+            others=self._others(part, self.ensemble.samples),
             workers=workers,
             executor=executor,
             progress=progress,
-            pilot=pilot,
+            pilot=pilot and (part is None or part[0] == 1),
         )
+
+    def _others(self, part: tuple[int, int] | None, samples: int) -> Any:
+        """Return which samples other jobs compute, (points, samples)."""
+        return part is not None and ~samples_of_part(part, len(self.experiments), samples)
 
     @checked
     def failure_curve(
@@ -376,10 +379,19 @@ class Study(_Parts):
         InputError, StoreError, RunError
             As `run`, and if a method is `Rupture`, whose failures can only be counted.
         """
-        from stiction.study.failure import compute
-
         settings = {"smallest": smallest, "event": event}
-        return compute(self, settings, out, repetitions, workers, executor, progress, part)
+        rows = Repetitions(self.experiments, repetitions, settings)
+        study = replace(self, ensemble=replace(self.ensemble, samples=repetitions))
+        complete_curves(
+            rows,
+            Store.open(out, study.to_dict() | {CURVES: settings}),
+            others=self._others(part, repetitions),
+            workers=workers,
+            executor=executor,
+            progress=progress,
+            pilot=part is None or part[0] == 1,
+        )
+        return rows.dataset(study.attributes, self.axes)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain dictionaries, lists and numbers, as in TOML.
@@ -484,8 +496,6 @@ def open_run(path: Any) -> StoredRun:
         If the folder holds no run, or its study cannot be read, as without a class of somebody
         else that it names.
     """
-    from stiction.study.failure import CURVES, StoredCurves
-
     place = check("path", path, FilePath)
     plain = read_study(place)
     store, settings = Store(place, plain), plain.pop(CURVES, None)
@@ -494,4 +504,4 @@ def open_run(path: Any) -> StoredRun:
     except InputError as error:
         texts = [f"{place}: its study cannot be read by this installation:", *error.problems]
         raise StoreError("\n  ".join(texts)) from None
-    return StoredCurves(store, found, settings) if settings else StoredRun(store, found)
+    return StoredRun(store, found, settings)
