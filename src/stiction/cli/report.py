@@ -23,7 +23,6 @@ from stiction.plot.axes import scaled, shown_quantity, with_unit
 from stiction.plot.style import PAGE, panel, paper_style
 from stiction.reliability.answer import bounded
 from stiction.statistics.estimates import mean, quantiles, standard_deviation
-from stiction.study.failure import StoredCurves
 from stiction.study.run import StoredRun
 
 MOST_ROWS = 200
@@ -88,14 +87,13 @@ def write_report(run: StoredRun, path: Path) -> None:
     state = run.status()
     if not state.done:
         raise InputError(f"{run.path}: no sample is stored yet")
-    curves = isinstance(run, StoredCurves)
-    what = "Failure probability" if curves else "Onset of sliding: a Monte Carlo study"
+    what = "Failure probability" if run.settings else "Onset of sliding: a Monte Carlo study"
     page = Page(run.study.title or what)
     page.text(f"{state.done:,} of {state.samples:,} {run.counted} by {run.methods}.")
     if not state.complete:
         page.text("The run is not complete.", warning=True)
     with paper_style():
-        if isinstance(run, StoredCurves):
+        if run.settings:
             add_curves(page, run)
         else:
             result, axes = run.dataset(only=[*QUANTITIES, "critical_position"]), run.study.axes
@@ -111,7 +109,7 @@ def write_report(run: StoredRun, path: Path) -> None:
     write_whole(path, page.html().encode())
 
 
-def add_curves(page: Page, run: StoredCurves) -> None:
+def add_curves(page: Page, run: StoredRun) -> None:
     """Add a figure and a table of the failure curve at each point of a sweep."""
     for point, curve in zip(run.study.points, run.curves(), strict=True):
         where = f" at {point}" if point.values else ""
