@@ -24,21 +24,17 @@ CASES = {  # size in h_n, nodes in h_n, samples; those of one kind and size have
     "plane, 4 h_n": (4, 16, 1000),
     "plane, 8 h_n": (8, 16, 500),
 }
-NEAR, FAR_SAMPLES, OUT_OF_REACH = (
-    1.25 * LENGTH,
-    100,
-    5e6,
-)  # m; samples; Pa, which nothing reaches
+NEAR, FAR_SAMPLES = 1.25 * LENGTH, 100  # m; samples
+OUT_OF_REACH = 5e6  # Pa, which nothing reaches
 
 
 def problem_of(name):
     """Return a line, or a plane as long along y."""
     size, nodes, _ = CASES[name]
-    sides = 2 if name.startswith("plane") else 1
-    length, count = (size * LENGTH,) * sides, (size * nodes,) * sides
-    return st.Problem(
-        SOLID, st.Interface(*((length, count) if sides == 2 else (*length, *count))), FRICTION
-    )
+    length, count = size * LENGTH, size * nodes
+    if name.startswith("plane"):
+        length, count = (length, length), (count, count)
+    return st.Problem(SOLID, st.Interface(length, count), FRICTION)
 
 
 def strength(ratio):

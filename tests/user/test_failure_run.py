@@ -11,7 +11,7 @@ from small_study import lengths, small_study
 
 import stiction as st
 from stiction.ensemble import batches
-from stiction.reliability.tail import CURVE
+from stiction.reliability.tail import OF_CURVES
 from stiction.study import failure
 
 SWEPT = lengths(3e-3, 7e-3, 5e-3)
@@ -60,7 +60,7 @@ def test_a_curve_is_that_of_samples_of_its_point(whole):
     assert one.lower_bound == 0.66e6
     np.testing.assert_allclose(one.stress_above_bound, one.stress - 0.66e6, atol=1e-6)
     # Errors fall as the square root of the repetitions, here two of a fifth of plain counting.
-    assert one.cv.values[0] == pytest.approx(np.sqrt(0.5 / CURVE[1]), rel=0.2)
+    assert one.cv.values[0] == pytest.approx(np.sqrt(0.5 / OF_CURVES[1]), rel=0.2)
 
 
 def test_interrupted_in_parts_and_grown_it_has_the_same_bits(whole, tmp_path):

@@ -13,6 +13,7 @@ from refusals import refuses
 
 import stiction as st
 from stiction.ensemble.experiment import Experiment
+from stiction.inference.infer import UNFINISHED
 
 pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 
@@ -148,12 +149,12 @@ def test_what_an_interrupted_call_has_simulated_is_taken_up(given, monkeypatch):
 
     def results(self, first, count):
         if len(solved) == last:
-            raise KeyboardInterrupt
+            raise stop
         solved.append(first)
         return solve(self, first, count)
 
     monkeypatch.setattr(Experiment, "results", results)
-    last = -1
+    stop, last = KeyboardInterrupt, -1
     whole = infer(**given, workers=1)
     total, last = len(solved), len(solved) + 2
     with pytest.raises(KeyboardInterrupt):
@@ -164,6 +165,10 @@ def test_what_an_interrupted_call_has_simulated_is_taken_up(given, monkeypatch):
     np.testing.assert_array_equal(found.u, whole.u)
     infer(**given, workers=1)
     assert len(solved) == 3 * total  # what is complete is not kept
+    stop, last = MemoryError, len(solved) + 2
+    with pytest.raises(MemoryError):
+        infer(**given, workers=1)
+    assert not UNFINISHED  # nor what ended in an error
 
 
 @pytest.mark.filterwarnings("default::stiction.AccuracyWarning")

@@ -36,7 +36,7 @@ SECONDS = 0.5
 MOST_BYTES = 16 * 2**20
 """Largest size of the values of a piece of work."""
 TICK = 1.0
-"""Seconds after which workers are counted again; Windows lets nothing interrupt a longer wait."""
+"""Seconds between counts of the workers; on Windows nothing interrupts a longer wait."""
 
 
 class Span(NamedTuple):
@@ -69,8 +69,7 @@ class Failure(NamedTuple):
 class Table(NamedTuple):
     """Samples of any points of a sweep, and the failures among them.
 
-    A sample that was solved is a row of a structured array: `POINT`, `NUMBER` and the variables of
-    the method.
+    A sample that was solved is a row of `POINT`, `NUMBER` and the variables of the method.
     """
 
     rows: NDArray[Any]
@@ -81,7 +80,7 @@ class Table(NamedTuple):
 
 
 def _rows(point: int, first: int, values: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
-    """Return the values of consecutive samples of a point, the number of the first given."""
+    """Return the values of consecutive samples of a point as rows."""
     count = len(next(iter(values.values()), ()))
     columns = {POINT: np.full(count, point), NUMBER: first + np.arange(count), **values}
     types = [(name, array.dtype, array.shape[1:]) for name, array in columns.items()]
@@ -99,7 +98,7 @@ def usable_cores() -> int:
 
 
 def in_threads(function: Callable[[Any], Any], jobs: Sequence[Any], workers: int) -> list[Any]:
-    """Return results of a function for all jobs; warnings come once, at the caller's line."""
+    """Return results for all jobs; warnings come once, at the caller's line."""
     with merge_warnings() as caught, ThreadPoolExecutor(workers) as pool:
         contexts = [copy_context() for _ in jobs]
         found = list(pool.map(Context.run, contexts, repeat(function), jobs))
@@ -109,7 +108,7 @@ def in_threads(function: Callable[[Any], Any], jobs: Sequence[Any], workers: int
 
 @cache
 def versions() -> str:
-    """Return the versions on which the last digits of a result depend, as one line of text."""
+    """Return the versions on which the last digits of a result depend."""
     return f"stiction {__version__}, numpy {version('numpy')}, numba {version('numba')}"
 
 
@@ -123,7 +122,7 @@ def solve_span(experiment: Experiment, span: Span) -> Table:
     while waiting:
         first, count = waiting.popleft()
         try:
-            # The number of BLAS threads changes last bits, and the kernels are the parallel part.
+            # The number of BLAS threads changes last bits.
             with one_blas_thread(), collect_warnings() as caught:
                 parts.append(_rows(span.point, first, experiment.results(first, count)))
         except Exception as error:
@@ -146,7 +145,7 @@ def piece_size(
     """Return how many samples go into the next piece of work, at a pace in s a sample."""
     block = block_of(len(experiment.problem.interface.shape))
     size = int(SECONDS / max(pace, 1e-9)) if pace else min(experiment.batch, BLOCK)
-    # A fair share of what is left, but not so small that drawing blocks in parts costs more.
+    # A fair share of what is left, but at least a block, which is drawn as a whole.
     size = min(size, max(-(-left // (2 * workers)), block))
     size = max(1, min(size, int(MOST_BYTES / experiment.sample_bytes), span.samples))
     end = span.first + size
@@ -183,9 +182,9 @@ def solve_spans(
 ) -> Generator[tuple[Span, Table], None, None]:
     """Solve spans of items, and yield pieces of them with their tables as they are done.
 
-    At most two pieces of work a worker are under way, so that memory stays bounded. Closing the
-    generator cancels what has not begun. A worker that is lost, or has other versions, is a
-    `WorkerError`. Only experiments can have spans of more than one item.
+    At most two pieces of work a worker are under way, so that memory stays bounded. Closing
+    the generator cancels what has not begun. A worker that is lost, or has other versions, is
+    a `WorkerError`. Only experiments can have spans of more than one item.
     """
     waiting = deque(spans)
     left = sum(span.samples for span in spans)
@@ -242,7 +241,7 @@ def _result(future: Future[Table], span: Span) -> Table:
 
 
 def spans_of(missing: NDArray[np.bool_], first: int) -> list[Span]:
-    """Return the stretches of samples, from `first` on, that are missing, (points, samples)."""
+    """Return the stretches of samples that are missing, (points, samples)."""
     found = []
     for point, row in enumerate(missing):
         edges = np.flatnonzero(np.diff(row, prepend=False, append=False)).reshape(-1, 2)

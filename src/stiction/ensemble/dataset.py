@@ -1,4 +1,4 @@
-"""Tables of samples, in any order, gathered to one labelled dataset over sweep, sample and x."""
+"""Tables of samples, in any order, gathered to one dataset over sweep, sample and x."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 Coordinates: TypeAlias = dict[str, tuple[NDArray[Any], Variable]]
 """Values and variables of coordinates by name."""
 GridAxes: TypeAlias = Mapping[str, Coordinates]
-"""Axes of a sweep as dimensions of the result; the coordinates of each, that of its name first."""
+"""Coordinates of each dimension of a sweep, that of its name first."""
 
 
 def distinct(points: Sequence[Experiment], *parts: str) -> list[Experiment]:
-    """Return one of the experiments for each combination of these parts, which they share."""
+    """Return one of the experiments for each combination of these parts."""
     found: dict[Any, Experiment] = {}
     for one in points:
         found.setdefault(tuple(id(getattr(one, part)) for part in parts), one)
@@ -34,9 +34,21 @@ def distinct(points: Sequence[Experiment], *parts: str) -> list[Experiment]:
 
 
 def variables_in(points: Sequence[Experiment]) -> dict[str, Variable]:
-    """Return all variables of any point, in the order in which the first method names them."""
+    """Return all variables of any point, in the order of the methods."""
     some = distinct(points, "problem", "random", "method")
     return {name: variable for one in some for name, variable in one.variables.items()}
+
+
+def over_axes(
+    values: Mapping[str, NDArray[Any]], variables: Mapping[str, Variable], axes: GridAxes
+) -> tuple[dict[str, NDArray[Any]], dict[str, Variable], Coordinates]:
+    """Return values of all points, (points, ...), over the axes of a sweep instead."""
+    dims, shape = tuple(axes), tuple(len(axes[dim][dim][0]) for dim in axes)
+    return (
+        {name: array.reshape(shape + array.shape[1:]) for name, array in values.items()},
+        {name: replace(one, dims=dims + one.dims) for name, one in variables.items()},
+        {name: one for own in axes.values() for name, one in own.items()},
+    )
 
 
 class Gathered:
@@ -86,22 +98,18 @@ class Gathered:
     def dataset(
         self, attributes: Mapping[str, Any], axes: GridAxes = MappingProxyType({})
     ) -> xr.Dataset:
-        """Return everything as a dataset over the axes of a sweep, the samples and the nodes.
+        """Return a dataset over the axes of a sweep, the samples and the nodes.
 
-        What is missing is NaN; the attributes 'failed_samples' and 'cut_short' give the cause.
+        What is missing is NaN; attributes 'failed_samples' and 'cut_short' give the cause.
         """
-        dims, shape = tuple(axes), tuple(len(axes[dim][dim][0]) for dim in axes)
-        variables, values = {}, {}
-        for name, one in variables_in(self.points).items():
+        variables, values = variables_in(self.points), {}
+        for name in variables:
             if name in self._arrays:
                 array, kind = self._arrays[name], self._types[name]
                 if kind.kind == "f" or not np.isnan(array).any():
                     array = array.astype(kind, copy=False)
-                values[name] = array.reshape(shape + array.shape[1:])
-                variables[name] = replace(one, dims=dims + one.dims)
-        coordinates: Coordinates = {}
-        for own in axes.values():
-            coordinates |= own
+                values[name] = array
+        values, variables, coordinates = over_axes(values, variables, axes)
         coordinates["sample"] = self.first + np.arange(self.done.shape[1]), SAMPLE
         attributes, failed, made = dict(attributes), self.failed, int(self.done.sum())
         if failed:

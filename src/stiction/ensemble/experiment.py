@@ -37,15 +37,15 @@ from stiction.random.stresses import (
 )
 
 MOST_NUMBERS = 1 << 20
-"""Nodes, and draws, of all samples of planes that are solved at once: 8 MiB for each profile."""
+"""Nodes, and draws, of samples of planes solved at once: 8 MiB for each profile."""
 
 
 @dataclass(frozen=True)
 class Experiment:
     """A problem, what is random in it, and a method, checked together once.
 
-    The numbers of sample i follow from the experiment and i alone, whoever computes them and in
-    whatever batches. An `InputError` lists everything that does not fit.
+    Sample i follows from the experiment and i alone, whatever the batches. An `InputError`
+    lists everything that does not fit.
     """
 
     problem: Problem
@@ -87,7 +87,7 @@ class Experiment:
 
     @property
     def given(self) -> Any:
-        """What is random as a study has it: one interface, or a list of equally likely ones."""
+        """What is random: one interface, or a list of equally likely ones."""
         members = self.random.members
         return list(members) if len(members) > 1 else members[0]
 
@@ -153,17 +153,17 @@ class Experiment:
             )
 
     def draws(self, first: int, count: int) -> Array:
-        """Return standard normal draws (count, dimension) of samples first, first + 1, ..."""
+        """Return standard normal draws (count, dimension) of samples from `first` on."""
         return self.random.draws(self.problem.interface, count, self.seed, first)
 
     def profiles(self, draws: Array) -> dict[str, Array]:
-        """Return the profiles of draws by name, (samples, *shape) each, all of them in SI."""
+        """Return the profiles of draws by name, (samples, *shape) each, in SI."""
         found = self.random.from_draws(self.problem.interface, draws)
         return profiles_in_stress(self.problem, self.random, found)
 
     def onset(self, profiles: Mapping[str, Array]) -> Values:
-        """Solve profiles by name, (samples, *shape) each; no sample depends on the others."""
-        # `check_fields` has looked at both; a refusal of single samples would select the others.
+        """Solve profiles by name, (samples, *shape) each."""
+        # `check_fields` has looked at both; refusing samples would select the others.
         accept = (*getattr(self.method, "accepts", ()), "constant", "steep")
         return dict(self.prepare()(self.problem.sample(profiles, accept=accept)))
 
@@ -172,21 +172,21 @@ class Experiment:
         return _solver(self.problem, self.method)
 
     def results(self, first: int, count: int) -> Values:
-        """Return all `variables` of samples first .. first + count - 1, solved without threads."""
+        """Return all `variables` of samples from `first` on, solved without threads."""
         profiles = self.profiles(self.draws(first, count))
         return self.onset(profiles) | {name: profiles[name] for name in self.keep}
 
     @property
     def batch(self) -> int:
-        """Number of samples to solve at once: suited to the method, on planes to the memory."""
+        """Number of samples to solve at once: by the method, on planes by memory."""
         interface, size = self.problem.interface, batch_size(self.problem, self.method)
-        if not interface.is_plane:  # draws come in blocks: a part is as expensive as the whole
+        if not interface.is_plane:  # a part of a block of draws costs as much as all
             return size
         # A rough field has hundreds of draws for each node.
         return min(size, max(1, MOST_NUMBERS // max(interface.size, self.dimension)))
 
     def batches(self, first: int, count: int, size: int = 0) -> Iterator[tuple[int, int]]:
-        """Cut samples first .. first + count - 1 into (first, count), at multiples of a size."""
+        """Cut samples from `first` on into (first, count), at multiples of a size."""
         size, end = size or self.batch, first + count
         edges = chain((first,), range(first - first % size + size, end, size), (end,))
         return ((start, stop - start) for start, stop in pairwise(edges))

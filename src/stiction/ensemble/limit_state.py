@@ -1,4 +1,4 @@
-"""The limit state: from standard normal draws to the stress at which the interface slides."""
+"""The limit state: the stress at which an interface slides, of standard normal draws."""
 
 import math
 from dataclasses import dataclass, replace
@@ -27,8 +27,8 @@ from stiction.random.stresses import support_in_stress
 Event = Literal["critical_stress", "first_instability"]
 
 RANKED, RANKINGS, LOW = 32, 4_000, 3.0
-"""Samples of each of equally likely interfaces that put these in order, at most and of all about,
-and the number of standard deviations below the mean that does."""
+"""Samples of each of equally likely interfaces, at most, and of all, about, that order them by the
+mean less so many standard deviations."""
 FACTORS = 8
 """Random factors of the strength at a node, at most, that share what is negligible."""
 SHORTEST = 2e-3
@@ -37,10 +37,10 @@ SHORTEST = 2e-3
 
 @dataclass(frozen=True, eq=False)
 class LimitState:
-    """Stress at onset as a function of standard normal draws; see `stiction.external.limit_state`.
+    """Stress at onset as a function of draws; see `stiction.external.limit_state`.
 
-    Stresses may be taken per normal pressure: where that is random, each is multiplied by the mean
-    pressure over that of its sample, so that one number stands for a coefficient.
+    Stresses may be taken per normal pressure: where that is random, each is multiplied by the
+    mean pressure over that of its sample, so that one number stands for a coefficient.
     """
 
     experiment: Experiment
@@ -81,7 +81,7 @@ class LimitState:
         return self.experiment.profiles(draws)
 
     def __call__(self, draws: Array) -> Array:
-        """Return the stress at onset, Pa, of finite draws (samples, dimension) or (dimension,).
+        """Return the stress at onset, Pa, of draws (samples, dimension) or (dimension,).
 
         Infinite where the event does not happen: such a sample survives any stress.
         """
@@ -101,7 +101,7 @@ class LimitState:
         else:
             found = np.concatenate(in_threads(self._stress, parts, self.workers))
         found = np.where(np.isnan(found), np.inf, found)
-        found = np.maximum(found, self.bounds[0])  # rounding may leave a stress slightly below
+        found = np.maximum(found, self.bounds[0])  # rounding may be slightly below
         return found if given.ndim == 2 else found[0]
 
     def _stress(self, draws: Array) -> Array:
@@ -120,7 +120,7 @@ class LimitState:
 
     @property
     def may_survive(self) -> bool:
-        """Whether slip lowers the mean stress before the event, which need not happen at all."""
+        """Whether slip before the event lowers the stress: it need not happen at all."""
         specimen = self.experiment.problem.specimen
         machine = specimen is not None and specimen.drive.stiffness > 0.0
         return machine and self.event == "first_instability"
@@ -129,16 +129,16 @@ class LimitState:
     def _bounded(self) -> tuple[bool, bool]:
         """Whether the strength bounds the stress at onset from below, and from above.
 
-        From below: nothing slips at a load below min (tau_p - tau_i)/p, where the mean stress is
-        <tau_i> + load <p>. Slip lowers it only behind a machine, and then the largest on the way,
-        `critical_stress`, is no lower. A rupture begins at a largest mean stress, however the load
-        goes up and down: none is below that at the first slip. Of other methods nothing is known.
-        The weights of the local criterion are positive, but behind a machine it knows no slip.
+        From below: nothing slips at a load below min (tau_p - tau_i)/p, where the mean stress
+        is <tau_i> + load <p>. Slip lowers it only behind a machine, and then the largest on the
+        way, `critical_stress`, is no lower. A rupture begins at a largest mean stress, however
+        the load moves: none is below that at the first slip. Of other methods nothing is known.
+        The local criterion has positive weights, but behind a machine it knows no slip.
 
-        From above: in equilibrium stress is nowhere above strength, nor is its mean above the mean
-        strength. By the local criterion load <g, p> <= <g, tau_p - tau_i> at each place, and
-        between half-spaces the mean over places makes that load <p> <= <tau_p - tau_i>. What need
-        not happen has no bound.
+        From above: in equilibrium stress is nowhere above strength, nor is its mean above the
+        mean strength. By the local criterion load <g, p> <= <g, tau_p - tau_i> at each place,
+        and between half-spaces the mean over places makes that load <p> <= <tau_p - tau_i>.
+        What need not happen has no bound.
         """
         experiment, method = self.experiment, self.experiment.method
         specimen = experiment.problem.specimen
@@ -150,7 +150,7 @@ class LimitState:
 
     @cached_property
     def bounds(self) -> tuple[float, float]:
-        """Stresses below and above which no sample can slide, Pa; infinite where none is known."""
+        """Stresses below and above which no sample slides, Pa; infinite where unknown."""
         return self.likely_bounds(0.0)
 
     def likely_bounds(self, negligible: float) -> tuple[float, float]:
@@ -174,7 +174,7 @@ class LimitState:
         most: Any = least
         if "initial_stress" in random.names:
             least, most = support_in_stress(problem, random, "initial_stress", chance)
-        # The mean of the initial stress is itself random where it is a field: take its lowest.
+        # The mean of a random initial stress is random itself: take its lowest.
         initial = np.mean(np.broadcast_to(least, profile.shape))
         low = float(initial + np.min((low - most) / profile) * np.mean(profile))
         if self._random_pressure:
@@ -187,10 +187,10 @@ class LimitState:
 
 
 def weakest_first(state: LimitState) -> LimitState:
-    """Return the same limit state with equally likely interfaces in order, the weakest first.
+    """Return the same limit state with equally likely interfaces in order, weakest first.
 
-    Neighbours are then alike, and a chain that goes down moves from one to the next. Their order is
-    that of a low quantile of the same few samples of each, by the method's first stage if it holds.
+    Neighbours are then alike, and a chain that goes down moves from one to the next. Their
+    order is that of a low quantile of the same few samples of each, by the first stage if apt.
     """
     experiment, random = state.experiment, state.experiment.random
     count = len(random.members)

@@ -80,8 +80,8 @@ def complete(
 ) -> None:
     """Compute spans of items; each table goes to memory and to the store as it is done.
 
-    `items` takes tables (`add`), and knows what is `done`, (points, items). `solve` returns the
-    table of a span of a point. One warning stands for those of all tables.
+    `items` takes tables (`add`), and knows what is `done`, (points, items). `solve` returns
+    the table of a span of a point. One warning stands for those of all tables.
     """
     lost, total = 0, sum(span.samples for span in spans)
     with ExitStack() as stack:
@@ -118,8 +118,8 @@ def gather(
 ) -> xr.Dataset:
     """Compute an ensemble at every point of a sweep, or the part of it that is not stored.
 
-    Samples go to the `store` as they are done. `others`, of shape (points, samples), are samples
-    that another job computes. For the rest see `monte_carlo`.
+    Samples go to the `store` as they are done; `others`, (points, samples), are those that
+    another job computes. For the rest see `monte_carlo`.
     """
     rows, cores = Gathered(points, ensemble), workers or usable_cores()
     if store:
@@ -127,7 +127,7 @@ def gather(
     missing = ~(others | rows.done)
     if missing.any():
         check_fields(points)
-        points[0].prepare()  # here and not in a thread, so that it warns at the caller's line
+        points[0].prepare()  # here, not in a thread: it warns at the caller's line
         if executor is None:
             _warn_if_long(points, missing, cores)
     label = " and ".join({one.method.label: None for one in distinct(points, "method")})

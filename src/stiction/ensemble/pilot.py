@@ -16,7 +16,7 @@ from stiction.methods.equilibrium.method import Equilibrium
 ON_A_LINE, ON_A_PLANE = 32, 8
 """Numbers of first samples of a pilot, and of the weakest ones."""
 LOOKED_AT, SECONDS = 1000, 1.0
-"""Number of first samples among which the weakest are, and seconds on one core that these take."""
+"""First samples among which the weakest are, and seconds on one core for these."""
 BATCH = 64
 """Samples that the inexpensive method solves at once."""
 MOST_POINTS = 8
@@ -25,7 +25,7 @@ WORTH_A_WARNING = 0.01
 
 
 def exact_counterpart(experiment: Experiment) -> Experiment | None:
-    """Return an experiment by the local criterion as one by `Equilibrium`, if that can take it."""
+    """Return an experiment by the local criterion as one by `Equilibrium`, if possible."""
     method = Equilibrium()
     if not isinstance(experiment.method, LocalCriterion) or method.supports(experiment.problem):
         return None
@@ -41,9 +41,9 @@ def compare(
 ) -> dict[str, Any]:
     """Solve samples of at most eight points by their method and by its exact counterpart.
 
-    Return mean and scatter of the difference relative to the mean of the exact onset, of the
-    points with the largest, for the first samples and for the weakest among more of them;
-    nothing if there is no exact counterpart.
+    Return mean and scatter of the difference over the mean of the exact onset, of the points
+    with the largest, for the first samples and for the weakest among more of them; nothing
+    if there is no exact counterpart.
     """
     chosen = np.unique(np.linspace(0, len(points) - 1, MOST_POINTS).round().astype(int))
     parts: dict[str, list[Array]] = {}
@@ -66,7 +66,7 @@ def compare(
 def _differences(
     experiment: Experiment, first: int, most: int, workers: int
 ) -> dict[str, Array]:
-    """Return the differences to the exact onset, relative to its mean; none if there is no such."""
+    """Return the differences to the exact onset over its mean; none without one."""
     exact = exact_counterpart(experiment)
     if exact is None:
         return {}

@@ -2,8 +2,8 @@
 
 ``study.json`` identifies the study, and ``chunks/`` holds the samples. A chunk is a table
 of samples with a mark of their study; its name is a digest of its content. Chunks are
-written whole or not at all, they never change, and nothing lists them: so any number of
-processes may write to a folder at once, a run may be killed at any moment, and damage is found.
+written whole or not at all, they never change, and nothing lists them: any number of
+processes may write to a folder, a run may be killed at any moment, and damage is found.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Damaged(StoreError):
 class Store:
     """The folder of a run: samples of a study, given in plain form.
 
-    Of the chunks that were read, `damage` gives the defects of damaged ones, by name; `seconds`
+    Of the chunks that were read, `damage` has the defects of damaged ones, by name; `seconds`
     (of one core, for each) and `versions` are those of the others.
     """
 
@@ -109,7 +109,7 @@ class Store:
                 yield Table(archive["rows"], failures, seconds, made_by)
 
     def resume(self, add: Callable[[Table], None]) -> None:
-        """Hand over what is stored; warn of other versions and of damage, which is deleted."""
+        """Hand over what is stored; warn of other versions, and delete what is damaged."""
         for table in self.chunks():
             add(table)
         for name, text in self.damage.items():
@@ -218,7 +218,7 @@ def _identity(study: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any]) -> None:
-    """Refuse a study that differs from the stored one in more than a growing number of samples."""
+    """Refuse a study that differs from the stored one, but for more samples."""
     now, before = here["ensemble"]["samples"], there["ensemble"]["samples"]
     found = _differences(_identity(here), _identity(there))
     if now < before:

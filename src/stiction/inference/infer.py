@@ -1,6 +1,8 @@
 """Parameters of a random interface from the peaks of repeated tests."""
 
 import itertools
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -44,6 +46,15 @@ EDGE, PILED = 0.02, 4.0
 
 UNFINISHED: dict[Any, Array] = {}
 """Onsets of a call that was interrupted; an equal one takes them up."""
+
+
+@contextmanager
+def _forgetting_errors() -> Iterator[None]:
+    try:
+        yield
+    except Exception:  # Ctrl-C is none: it can be taken up
+        UNFINISHED.clear()
+        raise
 
 
 @checked
@@ -168,7 +179,7 @@ def infer(
             " standard deviation in the unit of the peaks"
         )
     if prior is None:
-        with Meter("infer", show=progress) as meter:
+        with _forgetting_errors(), Meter("infer", show=progress) as meter:
             found = join(
                 problem, random, measured, method=method, error=error, samples=samples,
                 seed=seed, workers=workers, meter=meter, done=UNFINISHED,
@@ -180,7 +191,7 @@ def infer(
     (own,) = experiments_at(parameters, parameters.middle, method)
     own.problem.warn_of_units(mean_in_stress(own.problem, own.random, "strength"))
     _check_reach(parameters, method, measured, error)
-    with Meter("infer", show=progress) as meter:
+    with _forgetting_errors(), Meter("infer", show=progress) as meter:
 
         def likelihood_of(method: Any, samples: int | None, box: Array) -> Likelihood:
             return make_likelihood(

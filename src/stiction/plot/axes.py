@@ -1,4 +1,4 @@
-"""Axes of the caller's or new ones, units of their scales, and the problem behind a result."""
+"""Axes, given or new, units of their scales, and the problem behind a result."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -43,14 +43,14 @@ def on_axes(
             )
         yield ax
         return
-    # Made outside the style: a notebook's backend, loaded by its first figure, sets parameters too.
+    # Made outside the style: a backend that it loads sets parameters too.
     figure = new_figure(width, height)
     with paper_style():
         yield figure.subplots()
 
 
 def problem_of(result: Any, problem: Problem | None = None) -> Problem:
-    """Return the given problem, or the one in the attributes of a result; else an `InputError`."""
+    """Return the given problem, or the one in the attributes of a result."""
     if problem is not None:
         return check("problem", problem, Problem)
     try:
@@ -105,7 +105,7 @@ def shown_quantity(result: xr.Dataset, quantity: str | None = None) -> str:
 
 
 def scaled(variable: xr.DataArray, *others: xr.DataArray) -> tuple[float, str, str]:
-    """Return factor, unit and label, such as 'critical stress (MPa)', for variables of a kind."""
+    """Return factor, unit and label, 'critical stress (MPa)', of variables of a kind."""
     values = np.concatenate([one.values.ravel() for one in (variable, *others)])
     factor, unit = unit_for(str(variable.attrs.get("units", "1")), values)
     name = str(variable.name).replace("_", " ")
@@ -115,7 +115,7 @@ def scaled(variable: xr.DataArray, *others: xr.DataArray) -> tuple[float, str, s
 
 
 def add_friction_scale(axes: Axes, problem: Problem, which: str, factor: float) -> None:
-    """Add a second scale on the other side: the stress over the mean normal pressure, if any.
+    """Add a scale on the other side: stress over the mean normal pressure, if any.
 
     `which` is the scale of stresses, "x" or "y", and `factor` that of its unit.
     """

@@ -1,4 +1,4 @@
-"""Many onsets: their density, their quantiles along a sweep, and their tail over decades."""
+"""Many onsets: density, quantiles along a sweep, and the tail over decades."""
 
 from contextlib import suppress
 from typing import Any

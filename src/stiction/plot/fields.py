@@ -1,4 +1,4 @@
-"""Profiles along a line and maps of a plane (nodes are centres of cells), and onsets on them."""
+"""Profiles along a line, maps of a plane, and onsets on them."""
 
 from collections.abc import Mapping
 from contextlib import suppress

@@ -1,4 +1,4 @@
-"""One rupture: slip rate in space and time, the advance of its front on a plane, and its film."""
+"""One rupture: slip rate in space and time, its front on a plane, its film."""
 
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from stiction.problem.problem import Problem
 
 Array = NDArray[np.float64]
 Moving = list[tuple[Any, str, Any]]
-"""What moves in a figure: an artist, the name of its data, and these for each frame of the run."""
+"""What moves in a figure: an artist, the name of its data, and these by frame."""
 
 COLORS = "inferno_r"
 FRAME_TIME = 50
@@ -135,7 +135,7 @@ def film(
 
 
 def _since_onset(run: xr.Dataset, times: str = "time") -> tuple[Array, str]:
-    """Return times of a run, s, and from when they count: from the onset, if there is one."""
+    """Return times of a run, s, and from when they count: the onset, if any."""
     onset = float(run["onset_time"])
     if np.isfinite(onset):
         return run[times].values - onset, " since the onset"
@@ -143,14 +143,14 @@ def _since_onset(run: xr.Dataset, times: str = "time") -> tuple[Array, str]:
 
 
 def _rates(rate: Array, decades: float) -> tuple[Any, LogNorm]:
-    """Return slip rates, masked some decades below the largest, and the scale of colours."""
+    """Return slip rates, masked some decades below the largest, and their colours."""
     top = max(float(rate.max()), 1e-12)
     low = top * 10.0**-decades
     return np.ma.masked_less(rate, low), LogNorm(low, top)
 
 
 def _strength(run: xr.Dataset) -> tuple[Array, float, str]:
-    """Return the peak strength, Pa, NaN where it is infinite, with factor and unit of a scale."""
+    """Return the peak strength, Pa, NaN where infinite, and factor and unit of a scale."""
     strength = run["peak_strength"].where(np.isfinite(run["peak_strength"])).values
     return strength, *unit_for("Pa", strength)
 

@@ -100,7 +100,7 @@ def _draw_blocks(axes: Axes, problem: Problem, scale: float) -> None:
             sides = ("left", "right") if drive.side == "both" else (drive.side,)
             for side in sides:
                 end = 0.0 if side == "left" else length
-                # Upper block: pushed at the left, or pulled there where it is driven to the left.
+                # Upper block: pushed at the left, or pulled if driven to the left.
                 pushed = up if side == "left" or drive.side == "both" else -up
                 outside = -1.0 if side == "left" else 1.0
                 start = end + outside * reach if pushed * outside < 0.0 else end
@@ -198,7 +198,7 @@ def block(run: xr.Dataset, *, problem: Problem | None = None) -> Figure:
 
 
 def _curve(result: xr.Dataset) -> tuple[Array, Array, str, str]:
-    """Return travel (m) and force (N) along the curve of a machine, its name, and that at events.
+    """Return travel (m) and force (N) of a machine, its name, and that at events.
 
     The mean stress (Pa) where no thickness is known.
     """
@@ -215,7 +215,7 @@ def _curve(result: xr.Dataset) -> tuple[Array, Array, str, str]:
 
 
 def precursors(result: xr.Dataset, *, problem: Problem | None = None) -> Figure:
-    """Draw the curve of a machine, and below it where the interface slips in arrested events.
+    """Draw the curve of a machine, and where the interface slips in arrested events.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ PALE = "#d9d9d9"
 BAND = "#cfe0ea"
 ACCENT = "#b5322a"
 
-# Dark to light, so that the order survives in grey; each also has its own dashes and marker.
+# Dark to light, for print in grey; each also has its own dashes and marker.
 _SERIES: tuple[tuple[str, Any, str], ...] = (
     ("#14213d", "-", "o"),
     ("#2a6f97", (0, (5.0, 1.4)), "s"),

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, NamedTuple, Self, TypeAlias
+from functools import cached_property
+from typing import Annotated, Any, Self, TypeAlias
 
 import numpy as np
 import xarray as xr
@@ -26,17 +27,17 @@ from stiction.random.equally_likely import MOST as MOST_MEMBERS
 from stiction.reliability.tail import Tail, two_levels_refused
 
 TargetCv: TypeAlias = Annotated[Real, Field(ge=1e-6, le=1)]
-"""A smaller coefficient of variation would take more than 1e12 failures; a larger is no answer."""
+"""A smaller one would take more than 1e12 failures; a larger is no answer."""
 Probability: TypeAlias = Annotated[Real, Field(ge=1e-30, lt=1)]
 Budget: TypeAlias = at_least(100)  # type: ignore[valid-type]  # a call makes it
 
 SECONDS, FEWEST, MOST = 100.0, 1_000, 2_000_000
-"""Computing time of counting by a slow method, and fewest and most evaluations, by default."""
+"""Computing time of counting by a slow method, fewest and most evaluations, by default."""
 CHAIN, PATIENCE = 20_000, 900.0
-"""Evaluations of subset simulation for about P = 1e-4 with a coefficient of variation of 0.1, and
-seconds on one core that evaluations take at most if `max_evaluations` does not allow more."""
+"""Evaluations of subset simulation for about P = 1e-4 with a cv of 0.1, and seconds on one core
+that evaluations take at most if `max_evaluations` does not allow more."""
 LISTED, SAMPLED = 0.6, 0.8
-"""Parts of the target for the error of the list of interfaces and that of sampling, in squares."""
+"""Parts of the target for the errors by the list of interfaces and by sampling, in squares."""
 MORE, CARRIED = 1.2, 0.9
 """Margin on the number of members wanted; share of the mean whose carriers are counted."""
 CHECKED = (8, 64)
@@ -44,35 +45,36 @@ CHECKED = (8, 64)
 ESTIMATED = ("stress", "probability", "cv", "members_cv", "members")
 
 
-class Estimate(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Estimate:
     """A tail at a stress."""
 
     state: LimitState
     tail: Tail
     stress: float
 
-    @property
+    @cached_property
     def probability(self) -> float:
         """Probability of an onset below the stress."""
         return self.tail.probability(self.stress)
 
-    @property
+    @cached_property
     def sampling_cv(self) -> float:
         """Coefficient of variation of the probability by sampling."""
         return self.tail.cv(self.stress)
 
-    @property
+    @cached_property
     def members_cv(self) -> float:
         """That by the list of interfaces, 0 of a single one."""
         random = self.state.experiment.random
         return self.tail.members_cv(self.stress, random.kinds) if self.state.several else 0.0
 
-    @property
+    @cached_property
     def cv(self) -> float:
         """That by both."""
         return math.hypot(self.sampling_cv, self.members_cv)
 
-    @property
+    @cached_property
     def members(self) -> Array:
         """Probability of each of equally likely interfaces; none of a single one."""
         if not self.state.several:
@@ -150,7 +152,7 @@ class Answer:
 
     @classmethod
     def of(cls, estimate: Estimate, doubts: Sequence[str] = (), **more: Any) -> Self:
-        """Return the answer from an estimate, less what is given; issue doubts as warnings."""
+        """Return the answer from an estimate and what is given; issue doubts as warnings."""
         for text in doubts:
             warn_accuracy(text)
         state, tail = estimate.state, estimate.tail
@@ -183,10 +185,10 @@ class Answer:
     def band(self) -> tuple[float, float]:
         """90 % band of the probability over equally likely interfaces; NaN of a single one.
 
-        5 % of them have at most the one, 95 % at most the other. More tests make it narrower. It
-        is too wide by the sampling error of each interface, up to a factor of two or three of alike
-        ones: a smaller `target_cv` lowers that. An end is NaN if `members` is so at its rank, as of
-        lists of thousands: take one of tens. The error of the mean is `interval`.
+        5 % of them have at most the one, 95 % at most the other. More tests make it narrower.
+        It is too wide by the sampling error of each interface, which a smaller `target_cv`
+        lowers. An end is NaN if `members` is so at its rank, as of lists of thousands: take one
+        of tens. The error of the mean is `interval`.
         """
         return band_of(self.members)
 
@@ -249,7 +251,7 @@ def prepare(
     algorithm: str = "subset",
     per_pressure: bool = False,
 ) -> tuple[LimitState, int]:
-    """Return the limit state and the evaluations allowed, or refuse what cannot be computed."""
+    """Return the limit state and the evaluations allowed; refuse what takes too long."""
     state = LimitState(experiment, event, per_pressure, workers or usable_cores(), meter)
     problems = []
     if per_pressure and not experiment.pressure > 0.0:
@@ -272,7 +274,7 @@ def prepare(
 
 
 def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
-    """Return the reason why chains of samples take too long by this method; None if allowed."""
+    """Return why chains of samples take too long by this method; None if allowed."""
     seconds, kind = CHAIN * experiment.seconds, experiment.method.type
     if (seconds <= PATIENCE and kind != "rupture") or (max_evaluations or 0) >= CHAIN:
         return None
@@ -344,9 +346,9 @@ def different(values: Array, count: int, rng: np.random.Generator) -> NDArray[np
 def exact_doubts(
     state: LimitState, near: tuple[Array, Array], stress: float, probability: float
 ) -> list[str]:
-    """Solve some samples of the local criterion exactly; return a warning if they fail otherwise.
+    """Solve some samples of the local criterion exactly; return a warning if more or fewer fail.
 
-    `near` holds draws and stresses of samples on both sides of the stress, the lowest there are.
+    `near` holds draws and stresses on both sides of the stress, the lowest there are.
     """
     exact, (draws, values) = exact_counterpart(state.experiment), near
     if exact is None or not values.size:

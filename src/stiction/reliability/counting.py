@@ -15,7 +15,7 @@ BATCH = 1024
 
 
 class Counted(NamedTuple):
-    """Failures among the first samples of an ensemble; a failure that ended it does not count."""
+    """Failures among samples; one that ended the count is not part of the estimate."""
 
     failures: int
     samples: int
@@ -36,12 +36,12 @@ class Counted(NamedTuple):
         last = int(self.until_failure)
         if self.failures <= last:
             return math.inf
-        # If no sample held, count as if one more had been drawn that did: no count is certain.
+        # If no sample held, count as if one more had: no count is certain.
         held = max(1.0 - self.probability, 1.0 / (self.samples + 1.0))
         return math.sqrt(held / (self.failures - last))
 
     def interval(self) -> tuple[float, float]:
-        """Return Clopper and Pearson's, or of a count until a failure the negative binomial one."""
+        """Return Clopper and Pearson's interval, the negative binomial one until a failure."""
         low, high = binomial_interval(self.failures, self.samples)
         if self.until_failure:
             high = binomial_interval(self.failures - 1, self.samples - 1)[1]
@@ -58,10 +58,10 @@ def count_failures(
     max_evaluations: int,
     start: int = 0,
 ) -> tuple[Counted, Descent]:
-    """Counted until there are enough failures, among at least `least` samples from `start` on.
+    """Count until there are enough failures, at least `least` samples from `start` on.
 
-    The number of failures is fixed beforehand: stopping at a precise estimate would favour early
-    failures. Samples beyond the last of them do not count, but are among those returned.
+    The number of failures is fixed beforehand: stopping at a precise estimate would favour
+    early failures. Samples beyond the last of them do not count, but are returned too.
     """
     wanted = 2 + math.ceil(1.0 / (target_cv * target_cv))  # the error falls like 1/sqrt(r - 1)
     least = min(least, max_evaluations)

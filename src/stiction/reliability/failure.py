@@ -1,4 +1,4 @@
-"""Failure probability, design stress and the curve of both: counting, or the tail of the onset."""
+"""Failure probability, design stress and the curve of both: by counting, or by the tail."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -45,7 +45,7 @@ F = TypeVar("F", Answer, Estimate)
 PILOT = 1_000
 """Number of plain samples by which the algorithm is chosen."""
 FREQUENT = 0.01
-"""Probability above which plain sampling needs no more evaluations than subset simulation."""
+"""Probability above which counting needs no more evaluations than subset simulation."""
 FRESH = 1.5
 """Least ratio of different members for which a longer list is computed."""
 CURVE_CV = 0.3
@@ -57,7 +57,7 @@ NEGLIGIBLE = 1e-15
 DOUBTFUL = 0.02
 """Share of the mean strength below which a stress is probably in another unit."""
 THOUSAND = 1e3
-"""Factor off the mean strength from which on a stress is in another unit: kN for N, MPa for Pa."""
+"""Factor off the mean strength that means another unit: kN for N, MPa for Pa."""
 SHOWN = 20
 """Failing profiles kept."""
 CHECKED = 32
@@ -65,7 +65,7 @@ CHECKED = 32
 COVERED = 0.8
 """Share of the failures that the first stage must reach to avoid a warning."""
 
-CURVE = {
+CURVE: dict[str, Variable] = {
     name: Variable(unit, text, ("point",))
     for name, unit, text in (
         ("stress", "Pa", "stress"),
@@ -202,7 +202,7 @@ def _answered(
     progress: Show,
     solve: Callable[[Experiment, Meter], Answer],
 ) -> Answer:
-    """Return an answer from as many members as the target needs, with all that it warned of."""
+    """Return an answer from as many members as the target needs, with its warnings."""
     with Meter(name, show=progress) as meter, merge_warnings() as warned:
         own, found = _of_enough_members(experiment, target_cv, meter, warned, solve)
         for text in few_members(own.random, found, target_cv):
@@ -232,7 +232,7 @@ def _of_enough_members(
 
 
 def _check_unit(state: LimitState, name: str, given: float, stress: float) -> None:
-    """Doubt a demand that is far off the mean strength, and refuse it a thousand times off."""
+    """Doubt a demand far off the mean strength; refuse it a thousand times off."""
     ratio = stress / state.experiment.mean_strength
     unit = f" {CURVE[name].units}".removesuffix(" 1")
     possible = 1.0 / THOUSAND, THOUSAND
@@ -250,7 +250,6 @@ def _probability(
     state: LimitState, stress: float, algorithm: str, target_cv: float, budget: int,
     allowed: int | None,
 ) -> Answer:  # fmt: skip
-    """Return the answer by the algorithm, or by the one that is chosen."""
     likely = state.likely_bounds(NEGLIGIBLE)
     if not likely[0] < stress < likely[1]:
         return _certain(state, stress, likely)
@@ -340,8 +339,7 @@ def _by_counting(
 
 
 def _by_tail(found: Estimate, target_cv: float) -> Answer:
-    """Return the answer by subset simulation, by one level or two."""
-    state, tail, stress = found
+    state, tail, stress = found.state, found.tail, found.stress
     probability, last = found.probability, tail.repetitions[-1]
     interval = lognormal_interval(probability, found.cv)
     doubts = imprecise(found.sampling_cv, target_cv, tail.spent)
@@ -370,7 +368,6 @@ def _by_tail(found: Estimate, target_cv: float) -> Answer:
 
 
 def _profiles(state: LimitState, draws: Array) -> xr.Dataset:
-    """Return profiles and onset of some draws, labelled."""
     if not draws.shape[0]:
         return xr.Dataset()
     problem, method = state.experiment.problem, state.experiment.method
@@ -448,7 +445,6 @@ def design_stress(
 
 
 def _quantile(state: LimitState, probability: float, target_cv: float, budget: int) -> Answer:
-    """Return the answer on the stress of a probability."""
     often, lowest = probability >= FREQUENT, state.bounds[0]
     target_cv *= SAMPLED if state.several else 1.0
     tail = sample_tail(
@@ -550,22 +546,21 @@ def failure_curve(
             return Estimate(state, tail, reached)
 
         _, end = _of_enough_members(experiment, target_cv, meter, warned, solve)
-        state, tail, _ = end
         for text in curve_doubts(end, smallest, target_cv):
             warn_accuracy(text)
     attributes = study_attributes(problem=problem, random=experiment.given, method=method)
     attributes |= {"seed": seed}
-    smallest = smallest if tail.complete else end.probability
-    return curve_of(tail, state, chances(smallest), attributes)
+    smallest = smallest if end.tail.complete else end.probability
+    return curve_of(end.tail, end.state, chances(smallest), attributes)
 
 
 def curve_doubts(end: Estimate, smallest: float, target_cv: float = CURVE_CV) -> list[str]:
     """Return the reasons not to trust the end of a curve."""
-    state, tail, stress = end
-    if not tail.complete:
-        return [f"{tail.short_of(f'P = {smallest:g}')}; the curve ends there"]
-    doubts = few_members(state.experiment.random, end, target_cv)
-    return doubts + exact_doubts(state, tail.repetitions[-1].around(stress), stress, smallest)
+    if not end.tail.complete:
+        return [f"{end.tail.short_of(f'P = {smallest:g}')}; the curve ends there"]
+    doubts = few_members(end.state.experiment.random, end, target_cv)
+    near = end.tail.repetitions[-1].around(end.stress)
+    return doubts + exact_doubts(end.state, near, end.stress, smallest)
 
 
 def chances(smallest: float) -> Array:

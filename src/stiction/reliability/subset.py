@@ -22,7 +22,7 @@ Label = Callable[[Array], NDArray[np.int64]]
 LEVEL_PROBABILITY = 0.1
 """Share of a level's samples that continue to the next."""
 ACCEPTANCE = 0.37
-"""Target share of accepted steps; from 0.25 to 0.44 the efficiency is the same within 10 %."""
+"""Target share of accepted steps; from 0.25 to 0.44 efficiency differs by 10 % at most."""
 FIRST_STEP = 0.7
 MOST_LEVELS = 40
 KEEP = 3
@@ -49,7 +49,7 @@ class Population(NamedTuple):
 
 
 class Below(NamedTuple):
-    """Samples below a value: the probability that each stands for, members and ancestors."""
+    """Samples below a value: the probability of each, their members and ancestors."""
 
     each: float
     members: NDArray[np.int64]
@@ -60,9 +60,9 @@ class Below(NamedTuple):
 class Descent(NamedTuple):
     """A finished repetition: populations from all samples down to the rarest.
 
-    It is complete if it reached the threshold or the requested probability. By two levels it has
-    one population, of the samples to which the guide leads, with their exact values; `last` and
-    `walked` are of walks among failures (see `two_level`).
+    It is complete if it reached the threshold or the requested probability. By two levels it
+    has one population: the samples to which the guide leads, with their exact values; `last`
+    and `walked` are of walks among failures (see `two_level`).
     """
 
     samples: int  # N, of the first level and, within a few, of each other
@@ -77,7 +77,7 @@ class Descent(NamedTuple):
 
     @property
     def extent(self) -> tuple[float, float]:
-        """Lowest and highest finite value of the samples; without any, plus and minus infinity."""
+        """Lowest and highest finite value; without any, plus and minus infinity."""
         lowest, plain = self.populations[-1].values, self.populations[0].values
         low = float(lowest.min(initial=math.inf))
         return low, float(plain.max(where=plain < math.inf, initial=-math.inf))
@@ -109,7 +109,7 @@ class Descent(NamedTuple):
         return Below(each, rarest.members[failed], rarest.ancestors[failed], drawn)
 
     def relative_variance(self, value: float) -> float:
-        """Return the squared coefficient of variation of `probability(value)`, from ancestry."""
+        """Return the squared cv of `probability(value)`, from ancestry."""
         rarest = self._holders(value)[-1]
         family = rarest.ancestors[rarest.values < value]
         return ancestral_variance(family, self.samples) + self.last_variance
@@ -121,7 +121,7 @@ class Descent(NamedTuple):
         return self.walked or (last.draws[below], last.values[below])
 
     def around(self, value: float) -> tuple[Array, Array]:
-        """Return draws and values of samples on both sides of a value, in their true shares.
+        """Return draws and values on both sides of a value, in their true shares.
 
         They are the lowest of a population, twice as many as lie below the value. With more
         than half of it below, almost none of the other side would be shown.

@@ -1,4 +1,4 @@
-"""The lower tail of the stress at onset: independent repetitions, pooled until precise enough."""
+"""The lower tail of the onset: independent repetitions, pooled until precise enough."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -18,17 +18,17 @@ MOST = 10**18
 """Evaluations that no repetition needs."""
 MARGIN = 1.1
 """Factor on the sample size, as the variance so far is itself an estimate."""
-SUBSET, BRIDGE, CURVE = (1, 1_000, 5_000), (3, 200, 1_000), (4, 2_000, 2_000)
-"""First key of the generators, and samples per level, or exact samples of two levels, of the first
-and of the largest repetition. Those of curves are stored, so that all are of one size."""
+SUBSET, BRIDGE, OF_CURVES = (1, 1_000, 5_000), (3, 200, 1_000), (4, 2_000, 2_000)
+"""First key of the generators; samples per level, or exact samples of two levels, of the first
+and of the largest repetition. Those of curves are stored: all are of one size."""
 DEEPER = 0.3
-"""Repetitions go on to this share of a probability, to estimate the lower end of the interval."""
+"""Repetitions go on to this share of a probability, for the lower end of the interval."""
 PILOT = 500
 """Number of plain samples by which a less expensive method is judged as a guide."""
 ALIKE = 0.9
 """Share of the weakest of them that a guide must pick to lead to the rarest."""
 RESOLVED = 3
-"""Samples of one of equally likely interfaces that tell its probability from those of others."""
+"""Samples of one of equally likely interfaces that tell its probability from others."""
 POOR = 0.02
 """Least share of failures among the samples of a guide; below it the method is no guide."""
 
@@ -106,9 +106,9 @@ class Tail(NamedTuple):
     def of_members(self, stress: float, count: int) -> Array:
         """Return the probability of each of equally likely interfaces, (members,).
 
-        NaN where fewer than `RESOLVED` samples of one are so low. Of plain samples it is a share of
-        those that were drawn of one: their number is chance too, and most of the error near P = 1.
-        All repetitions share it, since in a single one few or none may be of that member.
+        NaN where fewer than `RESOLVED` samples of one are so low. Of plain samples it is a share
+        of those of that interface, whose number is chance too, and most of the error near P = 1;
+        all repetitions share it, since a single one may have few or none.
         """
         found, seen, low, plain = np.zeros((4, count))
         weight = 0.0
@@ -128,11 +128,11 @@ class Tail(NamedTuple):
     def members_cv(self, stress: float, kinds: Array) -> float:
         """Return the coefficient of variation by the list of interfaces being a sample.
 
-        Its square is the sum of (p - w)^2 over entries that hold a share w of the list and a share
-        p of the failures, as of importance sampling. The sum of p^2 is the chance that two failures
-        are of one entry. It is that of two samples of different ancestors, which are independent:
-        the few samples of each entry do not make it too large. `kinds` has a number for each
-        member; those with the same are one entry.
+        Its square is the sum of (p - w)^2 over entries with a share w of the list and a share p
+        of the failures, as of importance sampling. The sum of p^2 is the chance that two
+        failures are of one entry: of two samples of different ancestors, which are independent,
+        so that the few samples of each entry do not make it too large. Members with the same
+        number in `kinds` are one entry.
         """
         entries = np.bincount(kinds)
         total, pairs, alike = np.zeros(entries.size), 0.0, 0.0
@@ -200,9 +200,9 @@ def repeat_until_precise(
 ) -> list[Any]:
     """Return repetitions whose pooled coefficient of variation is at most the target.
 
-    All of them are complete, or it is a single incomplete one. `make` takes (samples, number of the
-    repetition, evaluations left), and `judge` returns the coefficient of variation, or zero if no
-    more are wanted. Many repetitions of moderate size, `first` to `largest`, bound the memory.
+    All of them are complete, or it is a single incomplete one. `make` takes (samples, number,
+    evaluations left), and `judge` returns the coefficient of variation, or zero to stop. Many
+    repetitions of moderate size, `first` to `largest`, bound the memory.
     """
     done: list[Any] = []
     spent, size = 0, first
@@ -235,7 +235,7 @@ def two_levels_refused(state: LimitState) -> str | None:
 
 
 def share_picked(guide: Array, exact: Array) -> float:
-    """Return the share of the exactly weakest fiftieth of samples in the guide's weakest tenth."""
+    """Return the share of the weakest fiftieth of samples in the guide's weakest tenth."""
     weakest = np.argsort(exact)[: max(5, exact.size // 50)]
     seen = np.argsort(guide)[: max(10, exact.size // 10)]
     return float(np.isin(weakest, seen).mean())
@@ -252,9 +252,9 @@ def sample_tail(
 ) -> Tail:
     """Sample the lower tail down to a goal.
 
-    Algorithm 'auto' takes two levels where a less expensive method picks the same weakest ones
-    among plain samples, and the first repetition finds failures among the samples that it leads to.
-    `budget` includes the pilot: (draws, stresses) of plain samples that are there already.
+    Algorithm 'auto' takes two levels where a less expensive method, the guide, picks the same
+    weakest ones among plain samples, and the first repetition finds failures by it. `budget`
+    includes the pilot: (draws, stresses) of plain samples that are there already.
     """
     guide, auto, seed = None, algorithm == "auto", state.experiment.seed
     if algorithm == "two_level" or (auto and two_levels_refused(state) is None):
@@ -280,7 +280,7 @@ def sample_tail(
 
 def sample_curve(state: LimitState, goal: Goal, budget: int) -> Tail:
     """Sample the lower tail by the repetitions of curves."""
-    found = _repetitions(state, goal, budget, kind=CURVE)
+    found = _repetitions(state, goal, budget, kind=OF_CURVES)
     return Tail(found, spent=sum(one.evaluations for one in found))
 
 
@@ -292,7 +292,7 @@ def _repetitions(
     poor: float = 0.0,
     kind: tuple[int, int, int] = SUBSET,
 ) -> list[Descent]:
-    """Return repetitions by one level, or by two with a guide; a single one of a poor guide."""
+    """Return repetitions, by two levels with a guide; a single one of a poor guide."""
     key, first, largest = BRIDGE if guide else kind
 
     def judge(repetitions: Sequence[Descent]) -> float:
@@ -318,7 +318,7 @@ def repetition(
     number: int,
     max_evaluations: int = MOST,
 ) -> Descent:
-    """Return a repetition by number, down to the goal: it depends on the seed and these only."""
+    """Return a repetition down to the goal, which depends on seed, key and number only."""
     options: dict[str, Any] = {
         "samples": samples,
         "max_evaluations": max_evaluations,
@@ -335,6 +335,6 @@ def repetition(
 
 
 def _share_failing(one: Descent) -> float:
-    """Return the share of failures among the samples to which a guide leads, 1 without any."""
+    """Return the share of failures among the samples of a guide, 1 without samples."""
     values = one.populations[-1].values
     return float(np.mean(values < one.threshold)) if one.complete else 1.0

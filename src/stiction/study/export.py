@@ -1,4 +1,4 @@
-"""Results as files for other programs: the suffix selects the format, and units are kept."""
+"""Results as files for other programs, with units: the suffix selects the format."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ OVERHEAD = 2**16
 
 
 def export(result: xr.Dataset, path: Path) -> None:
-    """Write a result as NetCDF (.nc) or as a table of samples (.csv), whole or not at all."""
+    """Write a result as NetCDF (.nc) or as a table (.csv), whole or not at all."""
     if path.suffix == ".nc":
         write_result(result, path)
     elif path.suffix == ".csv":
@@ -36,7 +36,7 @@ def write_result(result: xr.Dataset, path: Path) -> None:
     """Write a result as one NetCDF file with checksums, whole or not at all."""
     with suppress(OSError):
         free = shutil.disk_usage(path.parent).free
-        # The NetCDF library does not report a full disk, and keeps its unfinished file open.
+        # NetCDF does not report a full disk, and keeps its unfinished file open.
         if free < 1.05 * result.nbytes + OVERHEAD:
             raise cannot("written", path, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
     encoding = {

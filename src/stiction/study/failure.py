@@ -1,4 +1,4 @@
-"""Failure curves as runs on disk: repetitions of subset simulation in the store of a study."""
+"""Failure curves as runs on disk: repetitions in the store of a study."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from stiction.ensemble.batches import (
     usable_cores,
     versions,
 )
-from stiction.ensemble.dataset import GridAxes
+from stiction.ensemble.dataset import GridAxes, over_axes
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import LimitState, weakest_first
 from stiction.ensemble.monte_carlo import check_fields, complete
@@ -41,11 +41,13 @@ from stiction.ensemble.pilot import exact_counterpart
 from stiction.ensemble.store import Store
 from stiction.problem.results import to_dataset
 from stiction.reliability.answer import Estimate
-from stiction.reliability.failure import chances, curve_doubts, curve_of
+from stiction.reliability.failure import CURVE, chances, curve_doubts, curve_of
 from stiction.reliability.subset import Descent, Population
-from stiction.reliability.tail import CURVE, Goal, Tail, repetition
+from stiction.reliability.tail import OF_CURVES, Goal, Tail, repetition
 
-BOUND = "stress below which no interface slides"
+VARIABLES = CURVE | {
+    "lower_bound": Variable("Pa", "stress below which no interface slides", ())
+}
 
 
 ROW = np.dtype(
@@ -60,7 +62,7 @@ OF_LEVEL, OF_SAMPLE = ("ceiling", "log_probability"), ("value", "ancestor", "mem
 
 def repetition_of(state: LimitState, smallest: float, number: int) -> Descent:
     """Return a repetition by number, down to the smallest probability of a curve."""
-    key, samples, _ = CURVE
+    key, samples, _ = OF_CURVES
     return repetition(state, Goal(0.0, probability=smallest), None, key, samples, number)
 
 
@@ -102,7 +104,7 @@ def repetitions_in(rows: NDArray[Any]) -> Iterator[tuple[int, int, Descent]]:
 
 
 class Repetitions:
-    """The repetitions at all points of a sweep that are there, in memory, and their curves."""
+    """The repetitions that are there at all points of a sweep, and their curves."""
 
     failed = ()  # none does
 
@@ -151,21 +153,18 @@ class Repetitions:
         return [empty if one is None else one for one in found]
 
     def dataset(self, attributes: Mapping[str, Any], axes: GridAxes) -> xr.Dataset:
-        """Return the curves as `stiction.failure_curve` does, over the axes of a sweep too."""
+        """Return curves as `stiction.failure_curve`, over the axes of a sweep too."""
         found = self.curves(attributes)
-        dims, shape = tuple(axes), tuple(len(axes[dim][dim][0]) for dim in axes)
         result = found[0]
         if axes:
-            bounds = xr.DataArray([one.attrs["lower_bound"] for one in found], dims="_")
-            result = xr.concat(found, "_", combine_attrs="drop_conflicts")
-            result["lower_bound"] = bounds.assign_attrs(units="Pa", long_name=BOUND)
-            values, variables = {}, {}
-            for name, one in result.items():
-                values[str(name)] = one.values.reshape(shape + one.shape[1:])
-                about = one.attrs["units"], one.attrs["long_name"]
-                variables[str(name)] = Variable(*about, (*dims, *map(str, one.dims[1:])))
-            coordinates = {name: one for own in axes.values() for name, one in own.items()}
-            result = to_dataset(values, variables, coordinates, result.attrs)
+            shared = {
+                name: one
+                for name, one in result.attrs.items()
+                if all(other.attrs[name] == one for other in found)
+            }
+            values = {str(name): np.stack([one[name] for one in found]) for name in result}
+            values["lower_bound"] = np.array([one.attrs["lower_bound"] for one in found])
+            result = to_dataset(*over_axes(values, VARIABLES, axes), shared)
         return result[list(self._only)] if self._only else result
 
 

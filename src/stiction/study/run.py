@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FEWEST_BLOCKS = 8
-"""Blocks of samples that a part has if there are enough, so that parts take about as long."""
+"""Blocks that a part has if there are enough, so that parts take about as long."""
 
 
 def _part(value: Any) -> tuple[int, int]:
@@ -39,11 +39,11 @@ def _part(value: Any) -> tuple[int, int]:
 
 
 AnyPart: TypeAlias = Annotated[Any, BeforeValidator(_part)]
-"""Number of a part, from 1, and the number of parts: the samples that one of several jobs has."""
+"""Number of a part, from 1, and the number of parts."""
 
 
 def samples_of_part(part: tuple[int, int], points: int, samples: int) -> NDArray[np.bool_]:
-    """Return which samples a part has, (points, samples): blocks in turn, through all points."""
+    """Return which samples a part has, (points, samples): blocks in turn."""
     (number, of), total = part, points * samples
     block = min(BLOCK, max(1, total // (FEWEST_BLOCKS * of)))
     mine: NDArray[np.bool_] = np.arange(total) // block % of == number - 1
@@ -58,7 +58,7 @@ class Status:
     done: int
     done_by_point: NDArray[np.int64]
     failures: tuple[Failure, ...]
-    damaged: tuple[str, ...]  # defect of each damaged chunk; running the study again repairs it
+    damaged: tuple[str, ...]  # defects of chunks, which running the study again repairs
     chunks: int
     seconds: float  # of all workers together
     versions: tuple[str, ...]  # of the packages that computed the samples
@@ -101,7 +101,7 @@ class StoredRun:
         return " and ".join({one.method.label: None for one in self.study.experiments})
 
     def status(self) -> Status:
-        """Return the state of the run, after a comparison of all chunks with their checksums.
+        """Return the state of the run; all chunks are compared with their checksums.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""A study: problem, strength, method and ensemble in one object, from Python or one TOML file."""
+"""A study: problem, strength, method and ensemble in one object, or one TOML file."""
 
 from __future__ import annotations
 
@@ -351,9 +351,9 @@ class Study(_Parts):
         progress: Progress = True,
         part: AnyPart | None = None,
     ) -> xr.Dataset:
-        """Estimate failure probabilities at every point of the sweep, or the part that is missing.
+        """Estimate failure probabilities at every point, or the part that is missing.
 
-        Repetition i of subset simulation, with 2,000 samples a level, depends on (seed, i) only.
+        Repetition i, with 2,000 samples a level, depends on (seed, i) only.
         The number of samples of the study is not used.
 
         Parameters
@@ -417,7 +417,7 @@ class Study(_Parts):
 
     @classmethod
     def from_dict(cls, given: dict[str, Any], *, folder: str | Path | None = None) -> Study:
-        """Make a study of plain dictionaries; paths of profiles are relative to `folder`."""
+        """Make a study of plain dictionaries; files of profiles are in `folder`."""
         return _read(cls, given, folder)
 
     @classmethod
@@ -463,7 +463,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
 
 
 def _read(cls: type[T], given: dict[str, Any], folder: str | Path | None) -> T:
-    """Validate a study in plain form, or its `Setup`; names of files are relative to `folder`."""
+    """Validate a study in plain form, or its `Setup`; its files are in `folder`."""
     check("study", given, dict)
     context = {}
     if folder is not None:

@@ -1,4 +1,4 @@
-"""Sweeps: any key of a study takes several values; axes are crossed, keys of one axis zipped."""
+"""Sweeps: keys of a study take several values; axes are crossed, keys of one zipped."""
 
 import dataclasses
 import math
@@ -120,7 +120,7 @@ Sweep: TypeAlias = Annotated[
 
 
 def _read_uncertain(given: Any) -> dict[str, Any] | None:
-    """Return ``count`` and, by full dotted key, the distributions as tables of marginals."""
+    """Return ``count`` and, by full key, distributions as tables of marginals."""
     if given is None:
         return None
     if not isinstance(given, Mapping):
@@ -168,7 +168,7 @@ def grid_axes(
 ) -> GridAxes:
     """Return the axes as dimensions of a result.
 
-    They are named by the last parts of their keys, or by the whole keys where that is not clear.
+    Their names are the last parts of their keys, or the whole keys if that is not clear.
     """
     keys = [key for axis in axes for key in axis]
     last = {key: key.rpartition(".")[2] for key in keys}
@@ -192,7 +192,7 @@ def grid_axes(
 
 
 def _labels(values: Sequence[Any]) -> NDArray[Any]:
-    """Return numbers as they are, of anything else its name, with a number where names repeat."""
+    """Return numbers as they are, of anything else its name, numbered if it repeats."""
     if all(isinstance(value, numbers.Real) and not isinstance(value, bool) for value in values):
         return np.array(values)
     texts = [value if isinstance(value, str) else _text(value) for value in values]
