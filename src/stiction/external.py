@@ -1,7 +1,102 @@
 """Functions for external programs: samplers, reliability codes, and the SCEC comparison."""
 
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError
+from stiction.base.model import Names, Numbers, at_least, check, checked, describe
+from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import limit_state
-from stiction.inference.simulator import simulator
+from stiction.inference.likelihood import simulate
+from stiction.inference.prior import with_parameters
 from stiction.methods.dynamics.scec import write_scec
+from stiction.methods.protocol import MethodObject
+from stiction.problem.load import NotNegative
+from stiction.problem.problem import Problem
+from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 
 __all__ = ["limit_state", "simulator", "write_scec"]
+
+
+@checked
+def simulator(
+    problem: Problem,
+    random: RandomInterface | RandomField,
+    parameters: Names,
+    *,
+    method: MethodObject,
+    samples: at_least(1),  # type: ignore[valid-type]
+    seed: at_least(0) = 0,  # type: ignore[valid-type]
+    load_cell_error: NotNegative = 0.0,
+) -> Callable[..., Array]:
+    """Return a function that simulates the peaks of repeated tests, for dynesty or sbi.
+
+    Parameters
+    ----------
+    problem, random, method, seed
+        As in `infer`.
+    parameters : sequence of str
+        Keys as in the prior of `infer`: ``("correlation_length", "marginal.low")``.
+    samples : int
+        Number of tests that one call simulates.
+    load_cell_error : float
+        Standard deviation of the error of a peak, Pa.
+
+    Returns
+    -------
+    callable
+        ``simulate(theta)`` returns the peaks, Pa, of shape (samples,); theta has a
+        number for each parameter. ``simulate(theta, first=k)`` returns those of
+        samples k, k + 1, ..., independent of the first call if k >= samples. All theta
+        share the samples, so that peaks are smooth in theta.
+
+    Raises
+    ------
+    InputError
+        If an argument is invalid or a parameter does not exist. The function raises it if the
+        values of the parameters do not make a valid problem.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=256)
+    >>> strength = st.paper.strength(problem, correlation_ratio=1.0)
+    >>> keys = ("correlation_length", "marginal.low")
+    >>> simulate = st.external.simulator(
+    ...     problem, strength, keys, method=st.LocalCriterion(), samples=25
+    ... )
+    >>> simulate([2e-3, 0.66e6]).shape
+    (25,)
+    """
+    interface = as_random_interface(random)
+    unknown: list[str] = []
+    for name in parameters:  # what else may be wrong depends on their values
+        try:
+            with_parameters(problem, interface, (name,), np.ones(1))
+        except InputError as error:
+            unknown += [text for text in error.problems if "unknown" in text]
+    if unknown:
+        raise InputError(unknown)
+
+    def simulated(theta: Any, *, first: int = 0) -> Array:
+        """Peaks of samples first, first + 1, ... at these parameters, Pa, (samples,)."""
+        first = check("first", first, at_least(0))
+        values = check("theta", theta, Numbers)
+        if values.shape != (len(parameters),) or not np.isfinite(values).all():
+            raise InputError(
+                f"theta: must be {len(parameters)} finite numbers, {', '.join(parameters)}, got"
+                f" {describe(theta)}"
+            )
+        experiment = Experiment(
+            *with_parameters(problem, interface, parameters, values), method
+        )
+        (peaks,) = simulate(
+            [experiment], samples=samples, first=first, seed=seed, variable="critical_stress"
+        )
+        errors = np.random.default_rng([seed, first, 1]).standard_normal(samples)
+        return peaks + load_cell_error * errors
+
+    return simulated

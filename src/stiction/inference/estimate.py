@@ -116,14 +116,12 @@ class Estimate:
         windows, model = self.setting.windows, self.model
         shares = {w: w.variance_of_mean(model.correlation(w)) for w in set(windows)}
         deviation = self.parameters["standard_deviation"]
-        result: Array = deviation**2 * np.array([shares[window] for window in windows])
-        return result
+        return deviation**2 * np.array([shares[window] for window in windows])
 
     @property
     def within(self) -> Array:
         """Variance of the logarithm of the mean of each record from the field alone."""
-        result: Array = np.log1p(self.of_means / self.parameters["mean"] ** 2)
-        return result
+        return np.log1p(self.of_means / self.parameters["mean"] ** 2)
 
     @property
     def independent(self) -> float:
@@ -236,8 +234,7 @@ def bands(one: Observed, expected: Array, per_octave: int = 3) -> Array:
     k = k[kept]
     band = np.unique(np.round(per_octave * np.log2(k / k.min())), return_inverse=True)[1]
     sums = [np.bincount(band, weights=w) for w in (k, one.average[kept], expected[kept])]
-    means: Array = np.transpose(sums) / np.bincount(band)[:, None]
-    return means
+    return np.transpose(sums) / np.bincount(band)[:, None]
 
 
 class Goodness(NamedTuple):
@@ -296,19 +293,17 @@ def compare(
     if not fitted:
         raise InputError(problems)
     independent = max(fitted, key=lambda one: one[0])[1].independent
-    scored = []
-    for mean, found in fitted:
-        cost = len(found.setting.marginal.parameters(found.own))
-        scored.append((independent * mean - cost, cost, found))
-    scored.sort(key=lambda one: -one[0])
-    estimates = [found for *_, found in scored]
-    scores = np.array([score for score, *_ in scored]) - scored[0][0]
-    costs = np.array([cost for _, cost, _ in scored])
+    costs = np.array([len(one.setting.marginal.parameters(one.own)) for _, one in fitted])
+    scores = independent * np.array([mean for mean, _ in fitted]) - costs
+    scores -= scores.max()
     weights = np.exp(scores + 0.5 * costs) * (scores > -DRAWN)
     weights /= weights.sum()
-    pairs = zip(estimates, scores.tolist(), weights.tolist(), strict=True)
+    best_first = np.argsort(-scores, kind="stable").tolist()
+    estimates = [fitted[place][1] for place in best_first]
     families = {
-        one.setting.marginal.label: Goodness(one.marginal, one.distance, score, weight)
-        for one, score, weight in pairs
+        one.setting.marginal.label: Goodness(
+            one.marginal, one.distance, float(scores[place]), float(weights[place])
+        )
+        for place, one in zip(best_first, estimates, strict=True)
     }
     return estimates, families, independent

@@ -28,8 +28,7 @@ class PosteriorGrid:
     def marginal(self, axis: int) -> Array:
         """Return the mass of the cells along one parameter."""
         others = tuple(i for i in range(self.mass.ndim) if i != axis)
-        result: Array = self.mass.sum(axis=others)
-        return result
+        return self.mass.sum(axis=others)
 
     def information(self, axis: int) -> float:
         """Return the divergence of the marginal of one parameter from its prior, nats."""
@@ -42,8 +41,7 @@ class PosteriorGrid:
         cells = rng.choice(self.mass.size, size=count, p=self.mass.ravel())
         places = np.stack(np.unravel_index(cells, self.mass.shape), axis=1)
         share = (places + rng.random(places.shape)) / np.array(self.mass.shape)
-        result: Array = self.box[0] + np.ptp(self.box, axis=0) * share
-        return result
+        return self.box[0] + np.ptp(self.box, axis=0) * share
 
 
 def grid_of(

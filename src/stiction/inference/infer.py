@@ -1,6 +1,7 @@
 """Parameters of a random interface from the peaks of repeated tests."""
 
 import itertools
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -24,7 +25,7 @@ from stiction.inference.likelihood import (
     variable_of,
 )
 from stiction.inference.peaks import Peaks, factor_of, make_peaks
-from stiction.inference.posterior import DRAWS, Posterior
+from stiction.inference.posterior import DRAWS, Posterior, posterior_of
 from stiction.inference.prior import Prior, make_prior
 from stiction.methods.criterion.local import LocalCriterion
 from stiction.methods.protocol import MethodObject
@@ -206,32 +207,21 @@ def infer(
         while True:
             likelihood = likelihood_of(method, samples, box)
             grid = grid_of(likelihood, box)
-            wider = _grown(box, None if grid is None else grid.draws(DRAWS, seed))
+            u = None if grid is None else grid.draws(DRAWS, seed)
+            wider = _grown(box, u)
             if np.array_equal(wider, box):
                 break
             box = wider
     UNFINISHED.clear()
     if np.all(likelihood.box == whole) and (refused := likelihood.refusals()):
         raise InputError(refused)
-    if grid is None:
+    if grid is None or u is None:
         raise InputError(
             "peaks: no point of the prior can produce all of them; widen the prior, or give the"
             " load-cell error if they are not exact"
         )
-    u = grid.draws(DRAWS, seed)
-    theta = parameters.theta(u)
-    error = np.sqrt(sum(map(np.size, measured.values)) / likelihood.samples)
-    return Posterior(
-        peaks=measured,
-        draws={name: theta[:, i] for i, name in enumerate(parameters.names)},
-        information={name: grid.information(i) for i, name in enumerate(parameters.names)},
-        log_evidence=grid.log_evidence,
-        monte_carlo_error=float(error),
-        notes=_notes(likelihood, float(error), u),
-        likelihood=likelihood,
-        u=u,
-        seed=seed,
-    )
+    error = math.sqrt(sum(map(np.size, measured.values)) / likelihood.samples)
+    return posterior_of(likelihood, grid, measured, error, _notes(likelihood, error, u), seed)
 
 
 def _check_reach(prior: Prior, method: Any, measured: Peaks, error: float) -> None:
@@ -268,7 +258,7 @@ def _grown(box: Array, u: Array | None) -> Array:
     return np.clip(box + width * touched * np.array([[-1.0], [1.0]]), 0.0, 1.0)
 
 
-def _notes(likelihood: Likelihood, error: float, u: Array) -> tuple[str, ...]:
+def _notes(likelihood: Likelihood, error: float, u: Array) -> list[str]:
     """Return the limitations of the posterior, and issue them as warnings."""
     prior = likelihood.prior
     notes = _piled_up(prior, u)
@@ -283,7 +273,7 @@ def _notes(likelihood: Likelihood, error: float, u: Array) -> tuple[str, ...]:
         )
     for text in notes:
         warn_accuracy(text)
-    return tuple(notes)
+    return notes
 
 
 def _piled_up(prior: Prior, u: Array) -> list[str]:

@@ -19,8 +19,8 @@ from stiction.inference.agreement import agreement
 from stiction.inference.grid import PosteriorGrid, grid_of
 from stiction.inference.likelihood import Likelihood, make_likelihood, variable_of
 from stiction.inference.peaks import Peaks
-from stiction.inference.posterior import DRAWS, MEMBER, Posterior
-from stiction.inference.prior import Prior
+from stiction.inference.posterior import MEMBER, Posterior, posterior_of
+from stiction.inference.prior import Prior, refuse_conditioned
 from stiction.problem.problem import Problem
 from stiction.random.equally_likely import EquallyLikely, Source, as_random
 from stiction.random.fields import RandomInterface
@@ -86,6 +86,17 @@ class Members(Prior):
             if np.ptp(values) > 1e-9 * np.abs(values).max()
         }
 
+    def information(self, grid: PosteriorGrid) -> dict[str, float]:
+        """Return the divergence of each column alone, by its ranks in equal shares, nats."""
+        found, count = {MEMBER: grid.information(0)}, grid.mass.size
+        ends, bins = np.arange(count + 1) / count, np.linspace(0.0, 1.0, min(BINS, count) + 1)
+        every = self.theta((ends[1:] - 0.5 / count)[:, None])
+        for name, values in zip(self.names[1:], every.T[1:], strict=True):
+            ranked = np.append(0.0, np.cumsum(grid.mass[np.argsort(values, kind="stable")]))
+            shares = np.diff(np.interp(bins, ends, ranked))
+            found[name] = float(np.log(shares.size) - entropy(shares))
+        return found
+
     def theta(self, u: Array) -> Array:
         """Return number and description at `u`, of which the first column alone counts."""
         count = self.places.size
@@ -103,8 +114,7 @@ class Members(Prior):
     def quantile(self, share: float) -> Array:
         """Return the quantiles of number and description, each alone."""
         steps = (np.arange(self.places.size) + 0.5) / self.places.size
-        found: Array = np.quantile(self.theta(steps[:, None]), share, axis=0)
-        return found
+        return np.quantile(self.theta(steps[:, None]), share, axis=0)
 
     def at(self, theta: Array) -> tuple[Problem, RandomInterface]:
         """Return the problem and the interface of one number."""
@@ -129,13 +139,7 @@ def describing(random: RandomInterface) -> dict[str, float]:
 
 def members_of(problem: Problem, likely: Any) -> Members:
     """Return the prior of a list, or raise an `InputError` where it cannot be weighed."""
-    for one in likely.members:
-        for name, field in one.properties.items():
-            if field.conditions is not None:
-                raise InputError(
-                    f"random: {name} is conditioned on one specimen, but the peaks are of others;"
-                    " pass interfaces without `given`"
-                )
+    refuse_conditioned(likely.members)
     if len(set(likely.members)) < 2:
         raise InputError(
             "prior: is left out, so `random` must hold several interfaces that differ, such as a"
@@ -194,7 +198,7 @@ def join(
         warn_accuracy(text)
     tests = sum(map(np.size, measured.values))
     error = float(np.sqrt(tests / likelihood.samples + 1.0 / worth))
-    return _posterior(likelihood, grid, measured, error, (*notes, *warnings), seed)
+    return posterior_of(likelihood, grid, measured, error, [*notes, *warnings], seed)
 
 
 def _chance(likelihood: Likelihood, measured: Peaks, seed: int) -> tuple[float, bool]:
@@ -203,27 +207,7 @@ def _chance(likelihood: Likelihood, measured: Peaks, seed: int) -> tuple[float, 
     before = likelihood.of(none.values)
     grid = grid_of(before, likelihood.box, cells=before.prior.cells)
     assert grid is not None
-    found = agreement(_posterior(before, grid, none, 0.0, (), seed), measured, seed=seed)
+    prediction = posterior_of(before, grid, none, 0.0, [], seed)
+    found = agreement(prediction, measured, seed=seed)
     chance = min(found.p_values.values())
     return chance, chance > 1.5e-3
-
-
-def _posterior(
-    likelihood: Likelihood, grid: PosteriorGrid, measured: Peaks, error: float,
-    notes: tuple[str, ...], seed: int,
-) -> Posterior:  # fmt: skip
-    """Return draws from weights of members; information is that of ranks in equal shares."""
-    u, prior = grid.draws(DRAWS, seed), likelihood.prior
-    theta, information = prior.theta(u), {MEMBER: grid.information(0)}
-    count = grid.mass.size
-    ends, bins = np.arange(count + 1) / count, np.linspace(0.0, 1.0, min(BINS, count) + 1)
-    every = prior.theta((ends[1:] - 0.5 / count)[:, None])
-    for name, values in zip(prior.names[1:], every.T[1:], strict=True):
-        ranked = np.append(0.0, np.cumsum(grid.mass[np.argsort(values, kind="stable")]))
-        shares = np.diff(np.interp(bins, ends, ranked))
-        information[name] = float(np.log(shares.size) - entropy(shares))
-    return Posterior(
-        peaks=measured, draws=dict(zip(prior.names, theta.T, strict=True)), u=u, seed=seed,
-        information=information, log_evidence=grid.log_evidence, monte_carlo_error=error,
-        notes=notes, likelihood=likelihood,
-    )  # fmt: skip

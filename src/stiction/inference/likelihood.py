@@ -158,14 +158,14 @@ def simulate(
 
 
 class Area(NamedTuple):
-    """Area of one kind of specimen, m²: a product of powers of parameters."""
+    """Area of one kind of specimen, m², in proportion to some parameters."""
 
     unit: float  # where all of them are 1
-    powers: Array  # (parameters,)
+    sides: list[int]  # their places in the prior
 
     def at(self, theta: Array) -> Array:
         """Return the area at points (points, parameters)."""
-        return self.unit * np.prod(theta**self.powers, axis=1)
+        return self.unit * np.prod(theta[:, self.sides], axis=1)
 
 
 def area_of(prior: Prior, method: Any, length: float | None) -> Area:
@@ -174,15 +174,14 @@ def area_of(prior: Prior, method: Any, length: float | None) -> Area:
     def areas(points: Array) -> list[Any]:
         return [own.problem.area for own in experiments_at(prior, points, method, length)]
 
-    powers, middle = np.zeros(prior.dimension), prior.middle
+    middle, sides = prior.middle, []
+    (area,) = areas(middle)
     for i, name in enumerate(prior.names):
         if full_key(name).startswith(("problem.interface.", "problem.specimen.")):
-            points = np.tile(middle, (2, 1))
-            points[:, i] = ends = prior.ends[:, i]
-            powers[i] = np.log(np.divide(*areas(points)))
-            powers[i] = round(powers[i] / np.log(ends[0] / ends[1]), 9) if powers[i] else 0.0
-    (area,) = areas(middle)
-    return Area(float(area / np.prod(middle**powers)), powers)
+            moved = np.where(np.arange(middle.size) == i, prior.ends[0], middle)
+            if areas(moved) != [area]:
+                sides.append(i)
+    return Area(float(area / np.prod(middle[sides])), sides)
 
 
 def variable_of(prior: Prior, unit: str) -> str:
@@ -370,7 +369,7 @@ def make_likelihood(
                 found = simulate(experiments, **options | {"samples": count, "meter": meter})
         bounds = [bounds_of(own, variable)[0] for own in experiments]
         densities.append(tabulate(found, np.array(bounds)))
-    none = Area(1.0, np.zeros(prior.dimension))
+    none = Area(1.0, [])
     areas = [area_of(prior, method, length) if forces else none for length in lengths]
     return Likelihood(prior, method, scaling, axes, error, densities, areas, effective, box)
 

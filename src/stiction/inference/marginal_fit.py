@@ -19,6 +19,7 @@ from scipy.special import betainc, betaln, gammainc, ndtr
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, unknown_name
 from stiction.base.model import describe, is_finite
+from stiction.random.dotted_keys import with_values
 from stiction.random.marginals import MARGINALS, Beta, ScipyMarginal, marginal_of
 
 BINS = 160
@@ -171,7 +172,7 @@ class Family:
         if isinstance(marginal, ScipyMarginal):
             if "loc" not in free or "scale" not in free:
                 return marginal
-            return with_parameters(marginal, moved | {"scale": factor * free["scale"]})
+            return marginal_of(with_values(marginal, moved | {"scale": factor * free["scale"]}))
         if not isinstance(marginal, Beta):
             return replace(marginal, cv=factor * marginal.cv)
         if "low" in moved and marginal.low >= 0.0:
@@ -214,16 +215,8 @@ def _all_parameters(marginal: Any) -> dict[str, float]:
 def multiplied(marginal: Any, factor: float) -> Any:
     """Return the marginal of values times a factor."""
     own = _all_parameters(marginal)
-    return with_parameters(marginal, {n: factor * own[n] for n in own.keys() & SCALED})
-
-
-def with_parameters(marginal: Any, parameters: Mapping[str, float]) -> Any:
-    """Return a marginal with some of its parameters replaced."""
-    if isinstance(marginal, ScipyMarginal):
-        return marginal_of(
-            {"type": marginal.type} | dict(marginal.parameters) | dict(parameters)
-        )
-    return replace(marginal, **parameters)
+    larger = {name: factor * own[name] for name in own.keys() & SCALED}
+    return marginal_of(with_values(marginal, larger))
 
 
 def table_of(given: Any) -> dict[str, Any]:

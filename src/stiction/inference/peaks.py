@@ -184,15 +184,16 @@ def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
 
 
 def _column(table: Any, kinds: tuple[str, ...], units: tuple[str, ...] = ()) -> Any:
-    """Return the one column whose name begins with one of some words, else that in a unit."""
+    """Return the one column whose name begins with one of some words, else the only in a unit."""
     firsts = {name: name.lower().partition(" ")[0].strip("_:.") for name in table.data_vars}
     found = [name for name, first in firsts.items() if first in kinds]
-    found = found or [
+    if len(found) > 1:
+        both = " and ".join(map(repr, found))
+        raise InputError(f"{both} may both be the {kinds[0]}; rename one")
+    fitting = [
         name
         for name, column in table.items()
         if any(is_in(column.attrs.get("units"), one) for one in units)
     ]
-    if len(found) > 1:
-        both = " and ".join(map(repr, found))
-        raise InputError(f"{both} may both be the {kinds[0]}; rename one")
+    found = found or (fitting if len(fitting) == 1 else [])
     return table[found[0]] if found else None

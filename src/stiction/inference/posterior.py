@@ -1,6 +1,6 @@
 """The posterior: draws, intervals, information gained, and how accurate they are."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -10,6 +10,7 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.model import Count, Number, Numbers, check, checked
+from stiction.inference.grid import PosteriorGrid
 from stiction.inference.likelihood import Likelihood
 from stiction.inference.peaks import Peaks
 from stiction.inference.prior import Prior
@@ -231,6 +232,29 @@ class Posterior:
             )
         lines += [f"  {note}" for note in self.notes]
         return "\n".join(lines)
+
+
+def posterior_of(
+    likelihood: Likelihood,
+    grid: PosteriorGrid,
+    peaks: Peaks,
+    error: float,
+    notes: Sequence[str],
+    seed: int,
+) -> Posterior:
+    """Return draws from a grid; `error` is that by Monte Carlo."""
+    u, prior = grid.draws(DRAWS, seed), likelihood.prior
+    return Posterior(
+        peaks=peaks,
+        draws=dict(zip(prior.names, prior.theta(u).T, strict=True)),
+        information=prior.information(grid),
+        log_evidence=grid.log_evidence,
+        monte_carlo_error=error,
+        notes=tuple(notes),
+        likelihood=likelihood,
+        u=u,
+        seed=seed,
+    )
 
 
 def _in_chains(values: Array) -> Array:

@@ -1,7 +1,7 @@
 """The prior: the unknown parameters, and their distributions before the tests."""
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
@@ -12,6 +12,7 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed
 from stiction.base.model import describe
+from stiction.inference.grid import PosteriorGrid
 from stiction.problem.problem import Problem
 from stiction.random.dotted_keys import distributions_of, full_key, with_values
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
@@ -67,6 +68,10 @@ class Prior:
         """Return a quantile of each parameter, (parameters,)."""
         return self.theta(np.full((1, self.dimension), share))[0]
 
+    def information(self, grid: PosteriorGrid) -> dict[str, float]:
+        """Return the divergence of the posterior of each parameter alone from its prior, nats."""
+        return {name: grid.information(i) for i, name in enumerate(self.names)}
+
     def theta(self, u: Array) -> Array:
         """Return the parameters at `u`, by the inverse distribution functions."""
         result = np.empty_like(u)
@@ -101,12 +106,20 @@ def with_parameters(
     problem: Problem, random: RandomInterface, names: Sequence[str], values: Array
 ) -> tuple[Problem, RandomInterface]:
     """Return both with some parameters replaced, by the keys of a prior."""
-    parts: dict[str, Any] = {"problem": problem, "random": random}
-    for part in parts:
-        pairs = zip(map(full_key, names), values, strict=True)
-        own = {k.partition(".")[2]: float(v) for k, v in pairs if k.startswith(part + ".")}
-        parts[part] = with_values(parts[part], own) if own else parts[part]
-    return parts["problem"], parts["random"]
+    keys = dict(zip(map(full_key, names), values.tolist(), strict=True))
+    both = with_values({"problem": problem, "random": random}, keys)
+    return both["problem"], both["random"]
+
+
+def refuse_conditioned(interfaces: Iterable[RandomInterface]) -> None:
+    """Refuse fields that are conditioned on what was measured of one specimen."""
+    for one in interfaces:
+        for name, field in one.properties.items():
+            if field.conditions is not None:
+                raise InputError(
+                    f"random: {name} is conditioned on one specimen, but the peaks are of others;"
+                    " pass it without `given`"
+                )
 
 
 @lru_cache(maxsize=64)
@@ -133,12 +146,7 @@ def make_prior(problem: Problem, random: Any, given: Any) -> Prior:
             " interfaces holds what is known already"
         )
     random = as_random_interface(random)
-    for name, field in random.properties.items():
-        if field.conditions is not None:
-            raise InputError(
-                f"random: {name} is conditioned on one specimen, but parameters apply to"
-                " all; pass the field without `given`"
-            )
+    refuse_conditioned([random])
     prior = Prior(problem, random, found)
     for corner in itertools.product(*prior.ends.T):
         prior.at(np.array(corner))

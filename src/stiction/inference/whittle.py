@@ -64,8 +64,7 @@ def hermite_shares(marginal: Any) -> Array:
     """Return the shares of the variance in the Hermite orders 0, 1, ..., the last for the rest."""
     shares = hermite_coefficients(marginal, COARSE, ORDERS) ** 2
     shares[0] = 0.0
-    result: Array = shares / shares.sum()
-    return result
+    return shares / shares.sum()
 
 
 class Observed(NamedTuple):
@@ -127,8 +126,7 @@ class Model(NamedTuple):
         """Return the expected periodogram, (*half), from that without noise if it is there."""
         signal = self.signal(window) if signal is None else signal
         share = self.noise_share
-        result: Array = self.variance * ((1.0 - share) * signal + share * window.white)
-        return result
+        return self.variance * ((1.0 - share) * signal + share * window.white)
 
 
 def origin(name: str) -> float:

@@ -92,8 +92,7 @@ class RecordWindow:
         """Sum of w_i w_j over pairs of measured points at each lag, for weights (points,)."""
         field, lags = np.zeros(self.shape), tuple(2 * n for n in self.shape)
         field[self.measured] = weights
-        result: Array = fft.irfftn(np.abs(fft.rfftn(field, lags)) ** 2, lags)
-        return result
+        return fft.irfftn(np.abs(fft.rfftn(field, lags)) ** 2, lags)
 
     def _autocorrelation(self, wave: NDArray[np.int64]) -> Array:
         """a_k at all lags, flat."""
@@ -103,8 +102,7 @@ class RecordWindow:
         field = np.zeros(self.shape, dtype=np.complex128)
         field[self.measured] = carried - self.basis @ (self.basis.T @ carried)
         power = np.abs(fft.fftn(field, self._spread.shape)) ** 2
-        result: Array = fft.ifftn(power).real.ravel()
-        return result
+        return fft.ifftn(power).real.ravel()
 
     @property
     def wave_vectors(self) -> tuple[Array, ...]:
@@ -117,15 +115,13 @@ class RecordWindow:
         """Remove the trend of measured values (points,) but not their mean."""
         if self.basis.shape[1] == 1:
             return values
-        result: Array = values - self.basis @ (self.basis.T @ values) + values.mean()
-        return result
+        return values - self.basis @ (self.basis.T @ values) + values.mean()
 
     def periodogram(self, values: Array) -> Array:
         """Return |sum h (y - trend) exp(-i k x)|^2 of measured values (points,), (*half)."""
         field = np.zeros(self.shape)
         field[self.measured] = values - self.basis @ (self.basis.T @ values)
-        result: Array = np.abs(fft.rfftn(self.taper * field)) ** 2
-        return result
+        return np.abs(fft.rfftn(self.taper * field)) ** 2
 
     def expectation(self, covariance: Array) -> Array:
         """Return the expected periodogram, (*half), from the covariance at all lags."""
@@ -184,8 +180,7 @@ class RecordWindow:
         """Sample z at the points that were measured, (points,): a piece of a period."""
         white = fft.rfftn(rng.standard_normal(self._period))
         whole = fft.irfftn(white * np.sqrt(power * math.prod(self._period)), self._period)
-        result: Array = whole[tuple(slice(n) for n in self.shape)][self.measured]
-        return result
+        return whole[tuple(slice(n) for n in self.shape)][self.measured]
 
 
 def _polynomials(measured: NDArray[np.bool_], degree: int) -> Array:
@@ -196,8 +191,7 @@ def _polynomials(measured: NDArray[np.bool_], degree: int) -> Array:
         for powers in itertools.product(range(degree + 1), repeat=len(axes))
         if sum(powers) <= degree
     ]
-    basis: Array = np.linalg.qr(np.stack([term[measured] for term in terms], axis=1))[0]
-    return basis
+    return np.linalg.qr(np.stack([term[measured] for term in terms], axis=1))[0]
 
 
 def _fade(k: Array, end: Edge) -> Array:
@@ -211,8 +205,7 @@ def _folded_line(
 
     def added(at: Array, multiples: Array) -> Array:
         k = np.abs(at + multiples[:, None] * sampling[0])
-        found: Array = np.sum(spectrum.density(k) * _fade(k, end), axis=0)
-        return found
+        return np.sum(spectrum.density(k) * _fade(k, end), axis=0)
 
     near = min(folds[0], NEAR)
     line = added(axes[0], np.arange(-near, near + 1))
@@ -238,5 +231,4 @@ def _folded_plane(
                 total += spectrum.density(k, 2) * _fade(k, end)
     rows = np.stack([np.interp(axes[1], few[1], row) for row in far])
     columns = [np.interp(axes[0], few[0], column) for column in rows.T]
-    result: Array = near + np.stack(columns, axis=1)
-    return result
+    return near + np.stack(columns, axis=1)

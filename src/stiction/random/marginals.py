@@ -296,8 +296,7 @@ def marginal_of(value: Any) -> Marginal:
         name, rest = value.get("type"), {k: v for k, v in value.items() if k != "type"}
         theirs = name in ("beta", "gamma") and {"a", "b", "loc", "scale"} & rest.keys()
         if not isinstance(name, str) or (name in MARGINALS and not theirs):
-            found: Marginal = from_table(MARGINALS, value)
-            return found
+            return from_table(MARGINALS, value)
         return _of_scipy(name, rest)
     family: Any = getattr(value, "dist", None)
     if not isinstance(family, scipy.stats.rv_continuous):

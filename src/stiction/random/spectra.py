@@ -345,8 +345,7 @@ def spectrum_of(value: Any) -> SpectralDensity:
     if isinstance(value, SpectralDensity):
         return value
     if isinstance(value, dict):
-        found: SpectralDensity = from_table(SPECTRA, value)
-        return found
+        return from_table(SPECTRA, value)
     raise InputError(
         "must be a spectrum such as st.PowerLawSpectrum(...), not its class, or"
         f" st.CustomSpectrum(function=g, max_wavenumber=...), got {describe(value)}"

@@ -75,8 +75,7 @@ def support_in_stress(
 
 
 def _equally_likely(marginal: Any, count: int) -> Array:
-    found: Array = marginal.distribution.ppf((np.arange(count) + 0.5) / count)
-    return found
+    return marginal.distribution.ppf((np.arange(count) + 0.5) / count)
 
 
 def _pressures(problem: Problem, random: RandomInterface) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -87,14 +88,19 @@ def read_table(path: Path) -> xr.Dataset:
         rows.pop()
     width = max((i for _, cells in rows for i, cell in enumerate(cells, 1) if cell), default=0)
     rows = [(number, cells[:width]) for number, cells in rows]
-    last = rows[-1][1] if rows else []
-    numeric = [i for i, cell in enumerate(last) if _number(cell, separator) is not None]
-    start = 0
-    while start < len(rows) and not _holds_values(rows[start][1], numeric, separator):
-        start += 1
-    header, rows = rows[:start], rows[start:]
-    if not rows:
+    values = [[_number(cell, separator) for cell in cells] for _, cells in rows]
+    with_numbers = [row for row in values if any(v == v for v in row if v is not None)]
+    if not with_numbers:
         raise InputError("holds no numbers")
+    numeric = [i for i, v in enumerate(with_numbers[-1]) if v is not None and v == v]
+
+    def is_header(place: int) -> bool:
+        own, cells = values[place], rows[place][1]
+        at = [i for i in numeric if i < len(own)]
+        return not any(cells[i] for i in at) or any(own[i] is None for i in at)
+
+    start = next(place for place in range(len(rows)) if not is_header(place))
+    header, rows, values = rows[:start], rows[start:], values[start:]
     for number, cells in header[-1:]:
         named = [cells[i] for i in numeric if i < len(cells)]
         wrong = [cell for cell in named if _number(cell, separator) is None]
@@ -110,18 +116,16 @@ def read_table(path: Path) -> xr.Dataset:
             " columns with ';', or write decimal points"
         )
     first = len(rows[0][1])
-    columns = np.full((first, len(rows)), np.nan)
-    texts: dict[int, str] = {}  # such as dates: nobody may want a column without a number
-    for place, (number, cells) in enumerate(rows):
+    for number, cells in rows:
         if len(cells) != first:
             raise InputError(
                 f"line {number} has {len(cells)} columns, line {rows[0][0]} has {first}"
             )
-        for column, cell in enumerate(cells):
-            value = _number(cell, separator)
-            if value is not None:
-                columns[column, place] = value
-            elif cell.lower() not in _EMPTY:
+    columns = np.array(values, dtype=np.float64).T
+    texts: dict[int, str] = {}  # such as dates: nobody may want a column without a number
+    for (number, cells), own in zip(rows, values, strict=True):
+        for column, (cell, value) in enumerate(zip(cells, own, strict=True)):
+            if value is None:
                 texts.setdefault(column, f"line {number}: {describe(cell)} is not a number")
     if mixed := [text for column, text in texts.items() if np.isfinite(columns[column]).any()]:
         raise InputError(mixed)
@@ -162,13 +166,6 @@ def _sheet(path: Path) -> list[tuple[int, list[str]]]:
     return [(number, [cell.strip() for cell in row]) for number, row in rows]
 
 
-def _holds_values(cells: list[str], numeric: list[int], separator: str) -> bool:
-    """Whether a row has numbers, or says that they are missing, where the last one has numbers."""
-    found = [cells[i] for i in numeric if i < len(cells)]
-    known = (c.lower() in _EMPTY or _number(c, separator) is not None for c in found)
-    return any(found) and all(known)
-
-
 def _text(path: Path) -> str:
     """Return the text of a file in UTF-8, UTF-16 with a mark, or else Windows' western code."""
     data = content_of(path)
@@ -197,12 +194,15 @@ def _split(line: str, separator: str) -> list[str]:
     if separator != " ":
         return [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
     cells = line.split()
-    if all(_number(cell, " ") is not None or cell.lower() in _EMPTY for cell in cells):
+    if all(_number(cell, " ") is not None for cell in cells):
         return cells
     return [cell.strip() for cell in _WORDS.findall(line)]
 
 
 def _number(cell: str, separator: str) -> float | None:
+    """Return the number in a cell, NaN if it is empty or says so, None for a text."""
+    if cell.lower() in _EMPTY:
+        return math.nan
     if separator != "," and cell.count(",") == 1 and "." not in cell:
         cell = cell.replace(",", ".")
     try:
