@@ -183,8 +183,8 @@ def solve_spans(
     """Solve spans of items, and yield pieces of them with their tables as they are done.
 
     At most two pieces of work a worker are under way, so that memory stays bounded. Closing
-    the generator cancels what has not begun. A worker that is lost, or has other versions, is
-    a `WorkerError`. Only experiments can have spans of more than one item.
+    the generator cancels what has not begun. A worker that is lost, or has other versions,
+    is a `WorkerError`. Only experiments can have spans of more than one item.
     """
     waiting = deque(spans)
     left = sum(span.samples for span in spans)

@@ -39,8 +39,8 @@ SHORTEST = 2e-3
 class LimitState:
     """Stress at onset as a function of draws; see `stiction.external.limit_state`.
 
-    Stresses may be taken per normal pressure: where that is random, each is multiplied by the
-    mean pressure over that of its sample, so that one number stands for a coefficient.
+    Stresses may be taken per normal pressure: where that is random, each is multiplied by
+    the mean pressure over that of its sample, so that one number stands for a coefficient.
     """
 
     experiment: Experiment
@@ -135,9 +135,9 @@ class LimitState:
         the load moves: none is below that at the first slip. Of other methods nothing is known.
         The local criterion has positive weights, but behind a machine it knows no slip.
 
-        From above: in equilibrium stress is nowhere above strength, nor is its mean above the
-        mean strength. By the local criterion load <g, p> <= <g, tau_p - tau_i> at each place,
-        and between half-spaces the mean over places makes that load <p> <= <tau_p - tau_i>.
+        From above: in equilibrium stress is nowhere above strength, nor is its mean above
+        the mean strength. By the local criterion load <g, p> <= <g, tau_p - tau_i> at each
+        place, and between half-spaces, by the mean over places, load <p> <= <tau_p - tau_i>.
         What need not happen has no bound.
         """
         experiment, method = self.experiment, self.experiment.method

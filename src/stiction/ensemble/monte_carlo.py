@@ -183,12 +183,12 @@ def monte_carlo(
     ----------
     problem : Problem
     random : RandomInterface, RandomField or list of them
-        The random properties; a field alone is the peak strength, Pa. Of a list, each is equally
-        likely, and every sample has one of them.
+        The random properties; a field alone is the peak strength, Pa. Of a list, each is
+        equally likely, and every sample has one of them.
     method : LocalCriterion, Equilibrium or Rupture
     samples, seed, first, keep
-        As in `Ensemble`. For profiles of a few samples, repeat these: another call with the same
-        seed and fewer samples gives the same ones.
+        As in `Ensemble`. For profiles of a few samples, repeat these: another call with the
+        same seed and fewer samples gives the same ones.
     workers : int, optional
         Threads; all cores by default. The compiled kernels release the interpreter lock.
     executor : concurrent.futures.Executor, optional
@@ -196,9 +196,9 @@ def monte_carlo(
     progress : bool or callable
         True shows progress on standard error after two seconds; a callable gets (done, total).
     pilot : bool
-        With the local criterion, also solve the first samples (32 on a line, 8 on a plane), and
-        the weakest of the first thousand, by `Equilibrium` and report the difference; the ensemble
-        stays the same.
+        With the local criterion, also solve the first samples (32 on a line, 8 on a plane),
+        and the weakest of the first thousand, by `Equilibrium` and report the difference;
+        the ensemble stays the same.
 
     Returns
     -------
@@ -220,8 +220,8 @@ def monte_carlo(
     Warns
     -----
     AccuracyWarning
-        If samples could not be solved, or the pilot differs from the local criterion by more
-        than 1 %.
+        If samples could not be solved, or the pilot differs from the local criterion by
+        more than 1 %.
 
     Examples
     --------

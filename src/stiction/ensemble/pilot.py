@@ -41,9 +41,9 @@ def compare(
 ) -> dict[str, Any]:
     """Solve samples of at most eight points by their method and by its exact counterpart.
 
-    Return mean and scatter of the difference over the mean of the exact onset, of the points
-    with the largest, for the first samples and for the weakest among more of them; nothing
-    if there is no exact counterpart.
+    Return mean and scatter of the difference over the mean of the exact onset, of the
+    points with the largest, for the first samples and for the weakest among more of them;
+    nothing if there is no exact counterpart.
     """
     chosen = np.unique(np.linspace(0, len(points) - 1, MOST_POINTS).round().astype(int))
     parts: dict[str, list[Array]] = {}

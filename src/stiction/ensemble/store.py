@@ -42,8 +42,8 @@ class Damaged(StoreError):
 class Store:
     """The folder of a run: samples of a study, given in plain form.
 
-    Of the chunks that were read, `damage` has the defects of damaged ones, by name; `seconds`
-    (of one core, for each) and `versions` are those of the others.
+    Of the chunks that were read, `damage` has the defects of damaged ones, by name;
+    `seconds` (of one core, for each) and `versions` are those of the others.
     """
 
     def __init__(self, path: Path, study: Mapping[str, Any]) -> None:

@@ -1,8 +1,8 @@
 """Plots of results.
 
-A plot of one panel draws on `ax`, or on new axes, and returns the axes. A plot of several panels
-(`block`, `fit`, `precursors`, `specimen`) returns a figure. `film` writes a file and returns its
-path.
+A plot of one panel draws on `ax`, or on new axes, and returns the axes. A plot of several
+panels (`block`, `fit`, `precursors`, `specimen`) returns a figure. `film` writes a file and
+returns its path.
 
 Units follow the size of what is drawn: mm and µs, or km and s. Where the problem has a normal
 pressure, friction coefficients are drawn too. `axes` and `style` are what all files share;

@@ -45,9 +45,9 @@ def monte_carlo(result: Any, *, quantity: str | None = None, ax: Axes | None = N
         From `monte_carlo` or `Study.run`. Give several as a list, or by name. For a sweep
         over one parameter, up to six steps are drawn.
     quantity : str, optional
-        A variable of the result; by default `critical_force` of a line or specimen whose area is
-        known, else `friction_coefficient` if there is a pressure, else `critical_stress`.
-        `critical_position` is drawn as a histogram.
+        A variable of the result; by default `critical_force` of a line or specimen whose
+        area is known, else `friction_coefficient` if there is a pressure, else
+        `critical_stress`. `critical_position` is drawn as a histogram.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on; new ones by default.
 
@@ -245,9 +245,9 @@ def failure_curve(
     -------
     matplotlib.axes.Axes
         At the top are forces where the area of the interface is known, else friction
-        coefficients if there is a normal pressure. A dotted line marks the lower bound of the
-        strength. Of a list of equally likely interfaces the line is their mean, and a wider band
-        holds 90 % of them.
+        coefficients if there is a normal pressure. A dotted line marks the lower bound of
+        the strength. Of a list of equally likely interfaces the line is their mean, and a
+        wider band holds 90 % of them.
 
     Raises
     ------

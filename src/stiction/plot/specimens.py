@@ -162,9 +162,9 @@ def block(run: xr.Dataset, *, problem: Problem | None = None) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        Velocity along the interface, in one scale of colours whose ends are passed by one value in
-        a hundred, when 2 to 95 % of the slip have happened. Time counts from the first arrival of
-        the front.
+        Velocity along the interface, in one scale of colours whose ends are passed by one
+        value in a hundred, when 2 to 95 % of the slip have happened. Time counts from the
+        first arrival of the front.
     """
     need(run, "block_velocity", hint="; it is kept of specimens")
     interface = problem_of(run, problem).interface

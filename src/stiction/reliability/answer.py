@@ -95,8 +95,8 @@ class Answer:
     interval : tuple of float
         95 % confidence interval of the one that is estimated.
     cv : float
-        Coefficient of variation of the probability: estimated standard error over the estimate;
-        infinite without a failure, zero if exact.
+        Coefficient of variation of the probability: estimated standard error over the
+        estimate; infinite without a failure, zero if exact.
     members_cv : float
         Part of `cv` that is due to a list of equally likely interfaces being a sample of those
         that may be true; the rest, with which it adds in squares, is that of sampling.
@@ -107,9 +107,9 @@ class Answer:
     algorithm, reason : str
         'plain', 'subset', 'two_level' or 'exact' (nothing had to be sampled), and why.
     members : (members,) array
-        Of a list of equally likely interfaces: the probability of each; NaN where fewer than three
-        samples of an interface slide below the stress. `probability` is the mean over all, the
-        predictive probability: the one to decide with.
+        Of a list of equally likely interfaces: the probability of each; NaN where fewer
+        than three samples of an interface slide below the stress. `probability` is the mean
+        over all, the predictive probability: the one to decide with.
     survived : float
         Share of plain samples in which the event does not happen, at any stress: behind a stiff
         machine nothing need become unstable, and a load that holds need not break anything.
@@ -121,9 +121,9 @@ class Answer:
         Area of the interface, m², and `stress` times it, N; NaN if it is unknown: give
         ``Blocks(thickness=...)``, or ``Interface(width=...)`` of a line.
     failing_profiles : xarray.Dataset
-        From `failure_probability`: some samples of the failure set over ('sample', 'x'), drawn
-        with its distribution: `strength` (and what else is random), `critical_stress`,
-        `critical_position`, ...
+        From `failure_probability`: some samples of the failure set over ('sample', 'x'),
+        drawn with its distribution: `strength` (and what else is random),
+        `critical_stress`, `critical_position`, ...
     of_stress : bool
         Whether the stress is estimated, as by `design_stress`, or the probability.
     quantity : str
@@ -185,10 +185,10 @@ class Answer:
     def band(self) -> tuple[float, float]:
         """90 % band of the probability over equally likely interfaces; NaN of a single one.
 
-        5 % of them have at most the one, 95 % at most the other. More tests make it narrower.
-        It is too wide by the sampling error of each interface, which a smaller `target_cv`
-        lowers. An end is NaN if `members` is so at its rank, as of lists of thousands: take one
-        of tens. The error of the mean is `interval`.
+        5 % of them have at most the one, 95 % at most the other. More tests make it
+        narrower. It is too wide by the sampling error of each interface, which a smaller
+        `target_cv` lowers. An end is NaN if `members` is so at its rank, as of lists of
+        thousands: take one of tens. The error of the mean is `interval`.
         """
         return band_of(self.members)
 

@@ -117,25 +117,25 @@ def failure_probability(
     stress : float, optional
         Mean shear stress to carry, Pa. Failure is an onset strictly below it.
     method : LocalCriterion, Equilibrium or Rupture
-        `Rupture`, and any method too slow for subset simulation, is used with plain Monte Carlo
-        unless `max_evaluations` is 20,000 or more.
+        `Rupture`, and any method too slow for subset simulation, is used with plain Monte
+        Carlo unless `max_evaluations` is 20,000 or more.
     friction_coefficient : float, optional
         Instead of `stress`: ratio of mean shear stress to mean normal pressure that it must
         carry. If the pressure is random, each sample's own pressure counts.
     force : float, optional
         Instead of `stress`: shear force to carry, N. The area of the interface must be known.
     algorithm : {"auto", "plain", "subset", "two_level"}
-        Plain Monte Carlo, subset simulation, or subset simulation by the local criterion with
-        equilibrium as the last level; see the page 'Failure probability' of the documentation.
-        `reason` in the result says why 'auto' took one.
+        Plain Monte Carlo, subset simulation, or subset simulation by the local criterion
+        with equilibrium as the last level; see the page 'Failure probability' of the
+        documentation. `reason` in the result says why 'auto' took one.
     target_cv : float
         Coefficient of variation to reach, that by the list of interfaces included.
     max_evaluations : int, optional
-        Largest number of samples to solve: by default as many as take a quarter of an hour on
-        one core, at most 2,000,000; 1,000 by rupture.
+        Largest number of samples to solve: by default as many as take a quarter of an hour
+        on one core, at most 2,000,000; 1,000 by rupture.
     event : {"critical_stress", "first_instability"}
-        Whether the interface as a whole has to slide, or the first patch to become unstable,
-        arrested or not. By the local criterion they are the same.
+        Whether the interface as a whole has to slide, or the first patch to become
+        unstable, arrested or not. By the local criterion they are the same.
 
     Returns
     -------
@@ -150,11 +150,11 @@ def failure_probability(
     Warns
     -----
     AccuracyWarning
-        If the estimate is unreliable; `warnings` in the result holds the same texts. By the local
-        criterion, some samples near the stress are also solved by equilibrium.
+        If the estimate is unreliable; `warnings` in the result holds the same texts. By the
+        local criterion, some samples near the stress are also solved by equilibrium.
     UnitWarning
-        If the stress is below a fiftieth or above fifty times of the mean strength; a thousand
-        times is an `InputError`.
+        If the stress is below a fiftieth or above fifty times of the mean strength; a
+        thousand times is an `InputError`.
 
     Examples
     --------
@@ -500,9 +500,9 @@ def failure_curve(
     smallest : float
         Smallest probability of the curve.
     target_cv : float
-        Coefficient of variation to reach at the smallest probability; it is lower elsewhere.
-        Repetitions are added until it is reached: the same, of the same numbers, as those of
-        `Study.failure_curve`.
+        Coefficient of variation to reach at the smallest probability; it is lower
+        elsewhere. Repetitions are added until it is reached: the same, of the same numbers,
+        as those of `Study.failure_curve`.
     problem, random, method, seed, max_evaluations, event, workers, progress
         As in `design_stress`.
 

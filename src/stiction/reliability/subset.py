@@ -1,8 +1,8 @@
 """Subset simulation of any function of standard normal draws.
 
-Level after level keeps the lowest tenth of its samples and grows them back to full number by
-Metropolis steps z' = sqrt(1 - b^2) z + b w, which leave the normal distribution as it is and are
-rejected where they leave the level.
+Level after level keeps the lowest tenth of its samples and grows them back to full number
+by Metropolis steps z' = sqrt(1 - b^2) z + b w, which leave the normal distribution as it is
+and are rejected where they leave the level.
 """
 
 import math
@@ -60,9 +60,9 @@ class Below(NamedTuple):
 class Descent(NamedTuple):
     """A finished repetition: populations from all samples down to the rarest.
 
-    It is complete if it reached the threshold or the requested probability. By two levels it
-    has one population: the samples to which the guide leads, with their exact values; `last`
-    and `walked` are of walks among failures (see `two_level`).
+    It is complete if it reached the threshold or the requested probability. By two levels
+    it has one population: the samples to which the guide leads, with their exact values;
+    `last` and `walked` are of walks among failures (see `two_level`).
     """
 
     samples: int  # N, of the first level and, within a few, of each other
@@ -186,9 +186,9 @@ def descend(
 ) -> Descent:
     """Walk down to a threshold or a probability, whichever comes first.
 
-    `function` takes draws (k, dimension) to values (k,); low values are rare, and none is below
-    `floor`. Each level has `samples`; none is begun that would exceed `max_evaluations`. `label`
-    returns which of equally likely interfaces each sample is of.
+    `function` takes draws (k, dimension) to values (k,); low values are rare, and none is
+    below `floor`. Each level has `samples`; none is begun that would exceed
+    `max_evaluations`. `label` returns which of equally likely interfaces each sample is of.
 
     Au and Beck (2001) with the conditional sampling of Papaioannou, Betz, Zwirglmaier and Straub
     (2015), a preconditioned Crank-Nicolson walk whose acceptance does not fall with the dimension.

@@ -106,9 +106,9 @@ class Tail(NamedTuple):
     def of_members(self, stress: float, count: int) -> Array:
         """Return the probability of each of equally likely interfaces, (members,).
 
-        NaN where fewer than `RESOLVED` samples of one are so low. Of plain samples it is a share
-        of those of that interface, whose number is chance too, and most of the error near P = 1;
-        all repetitions share it, since a single one may have few or none.
+        NaN where fewer than `RESOLVED` samples of one are so low. Of plain samples it is a
+        share of those of that interface, whose number is chance too, and most of the error
+        near P = 1; all repetitions share it, since a single one may have few or none.
         """
         found, seen, low, plain = np.zeros((4, count))
         weight = 0.0
@@ -128,11 +128,11 @@ class Tail(NamedTuple):
     def members_cv(self, stress: float, kinds: Array) -> float:
         """Return the coefficient of variation by the list of interfaces being a sample.
 
-        Its square is the sum of (p - w)^2 over entries with a share w of the list and a share p
-        of the failures, as of importance sampling. The sum of p^2 is the chance that two
-        failures are of one entry: of two samples of different ancestors, which are independent,
-        so that the few samples of each entry do not make it too large. Members with the same
-        number in `kinds` are one entry.
+        Its square is the sum of (p - w)^2 over entries with a share w of the list and a
+        share p of the failures, as of importance sampling. The sum of p^2 is the chance
+        that two failures are of one entry: of two samples of different ancestors, which are
+        independent, so that the few samples of each entry do not make it too large. Members
+        with the same number in `kinds` are one entry.
         """
         entries = np.bincount(kinds)
         total, pairs, alike = np.zeros(entries.size), 0.0, 0.0
@@ -200,9 +200,9 @@ def repeat_until_precise(
 ) -> list[Any]:
     """Return repetitions whose pooled coefficient of variation is at most the target.
 
-    All of them are complete, or it is a single incomplete one. `make` takes (samples, number,
-    evaluations left), and `judge` returns the coefficient of variation, or zero to stop. Many
-    repetitions of moderate size, `first` to `largest`, bound the memory.
+    All of them are complete, or it is a single incomplete one. `make` takes (samples,
+    number, evaluations left), and `judge` returns the coefficient of variation, or zero to
+    stop. Many repetitions of moderate size, `first` to `largest`, bound the memory.
     """
     done: list[Any] = []
     spent, size = 0, first
@@ -252,9 +252,9 @@ def sample_tail(
 ) -> Tail:
     """Sample the lower tail down to a goal.
 
-    Algorithm 'auto' takes two levels where a less expensive method, the guide, picks the same
-    weakest ones among plain samples, and the first repetition finds failures by it. `budget`
-    includes the pilot: (draws, stresses) of plain samples that are there already.
+    Algorithm 'auto' takes two levels where a less expensive method, the guide, picks the
+    same weakest ones among plain samples, and the first repetition finds failures by it.
+    `budget` includes the pilot: (draws, stresses) of plain samples that are there already.
     """
     guide, auto, seed = None, algorithm == "auto", state.experiment.seed
     if algorithm == "two_level" or (auto and two_levels_refused(state) is None):

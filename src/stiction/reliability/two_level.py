@@ -4,10 +4,10 @@ With L the guide's stress and E the exact one, for any ceiling b,
 
     P(E < s) = P(L < b) P(E < s | L < b) / P(L < b | E < s).
 
-Where L follows E closely the last factor is near one and the middle one is not small, so that a
-few hundred exact evaluations replace thousands. The last factor is measured by walks that start
-from failures with L < b. Failures that L misses and that no short walk reaches are never found:
-`stiction.reliability.tail` compares beforehand how L and E rank samples.
+Where L follows E closely the last factor is near one and the middle one is not small, so
+that a few hundred exact evaluations replace thousands. The last factor is measured by walks
+that start from failures with L < b. Failures that L misses and that no short walk reaches
+are never found: `stiction.reliability.tail` compares beforehand how L and E rank samples.
 """
 
 import math
@@ -64,9 +64,9 @@ def bridge(
 ) -> Descent:
     """Sample the exact lower tail near a threshold, or near a probability if none is given.
 
-    `samples` are exact evaluations for the middle factor, as many again walk in the failure set;
-    `max_evaluations` limits both. Without a failure the estimate is zero: leaving it out would
-    favour repetitions that found one.
+    `samples` are exact evaluations for the middle factor, as many again walk in the failure
+    set; `max_evaluations` limits both. Without a failure the estimate is zero: leaving it
+    out would favour repetitions that found one.
     """
     descent = descend(
         guide, dimension, rng=rng, samples=GUIDING * samples, threshold=threshold,

@@ -13,8 +13,8 @@ CONFIDENCE = 0.95
 def log_width(cv: float) -> float:
     """Half the width of the interval of the logarithm of an estimate.
 
-    By Student's distribution, as the coefficient of variation is itself estimated, from about
-    1/cv^2 independent families.
+    By Student's distribution, as the coefficient of variation is itself estimated, from
+    about 1/cv^2 independent families.
     """
     if cv == 0.0:
         return 0.0

@@ -134,20 +134,20 @@ _PARTS = tuple(_Parts.__dataclass_fields__)
 class Study(_Parts):
     """Definition of a Monte Carlo study.
 
-    The same names serve Python and TOML; a study read from the attributes of a result runs again
-    to the same numbers.
+    The same names serve Python and TOML; a study read from the attributes of a result runs
+    again to the same numbers.
 
     Parameters
     ----------
     problem : Problem
     random : RandomInterface, RandomField or list of them
-        The random properties; a field alone is the peak strength, Pa. Of a list, each is equally
-        likely.
+        The random properties; a field alone is the peak strength, Pa. Of a list, each is
+        equally likely.
     method : LocalCriterion, Equilibrium or Rupture
     ensemble : Ensemble
     sweep : list of dict
-        Axes that are crossed; each maps dotted keys of the study, which vary together, to lists
-        of values. Every point of the sweep has the same samples.
+        Axes that are crossed; each maps dotted keys of the study, which vary together, to
+        lists of values. Every point of the sweep has the same samples.
     uncertain : dict, optional
         Distributions of parameters of ``random`` by dotted key, as of `RandomInterface.uncertain`,
         and their ``count``, by default 30: that many interfaces, drawn with the seed, are equally
@@ -359,8 +359,8 @@ class Study(_Parts):
         Parameters
         ----------
         out : path
-            Folder in which repetitions are stored as they are done. The same call resumes an
-            interrupted run, and computes more if `repetitions` was raised.
+            Folder in which repetitions are stored as they are done. The same call resumes
+            an interrupted run, and computes more if `repetitions` was raised.
         repetitions : int
             Eight give a coefficient of variation of about 0.2 at 1e-9, 32 half of it.
         smallest, event
@@ -493,8 +493,8 @@ def open_run(path: Any) -> StoredRun:
     InputError
         If `path` is not a path.
     StoreError
-        If the folder holds no run, or its study cannot be read, as without a class of somebody
-        else that it names.
+        If the folder holds no run, or its study cannot be read, as without a class of
+        somebody else that it names.
     """
     place = check("path", path, FilePath)
     plain = read_study(place)
