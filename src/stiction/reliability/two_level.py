@@ -119,8 +119,8 @@ def bridge(
         )
         if last >= LAST_FACTOR:
             break
-    if best is not None:
-        return best
+    if best is not None:  # a last look, in vain, counts as well
+        return best._replace(evaluations=spent, first_stage_evaluations=guided)
     none, chance = np.zeros(0, np.int64), lowest.log_probability
     empty = Population(math.inf, chance, np.zeros(0), none, none, np.empty((0, 0)))
     return Descent(samples, [empty], threshold, spent, False, guided)
