@@ -79,7 +79,7 @@ def test_mean_and_deviation_are_those_of_dense_kriging(interface, shift, mean_mo
     weights = np.linalg.solve(inner, across.T).T
     covariance = correlation(field, interface, grid, grid) - weights @ across.T
     known = conditioning(given, interface)
-    mean, deviation = known.moments(field.modes(interface).basis(grid))
+    mean, deviation = known.regression.moments(field.modes(interface).basis(grid))
     np.testing.assert_allclose(mean, weights @ z, atol=1e-10)  # round-off of the dense solution
     np.testing.assert_allclose(deviation**2, np.diag(covariance), atol=1e-10)
     # 20,000 samples: an entry of a covariance scatters by 0.01, the largest of 16,384 by 4.5 of it.
@@ -102,7 +102,7 @@ def test_values_that_contradict_each_other_are_those_of_dense_kriging_with_a_war
     weights = np.linalg.solve(inner, across.T).T
     deviation = np.sqrt(np.maximum(1.0 - (weights * across).sum(axis=1), 0.0))
     known = conditioning(given_on(places[0], values, 2e3, field), LINE)
-    found = known.moments(field.modes(LINE).basis(LINE.x[None]))
+    found = known.regression.moments(field.modes(LINE).basis(LINE.x[None]))
     np.testing.assert_allclose(found[0], weights @ z, rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(found[1], deviation, rtol=1e-6, atol=1e-6)
     with pytest.warns(st.AccuracyWarning, match="unlikely for this field"):

@@ -108,9 +108,9 @@ def agreement(
     Raises
     ------
     InputError
-        If the prediction lacks the quantity that was measured, is swept, or is of one kind of
-        specimen where several were tested; peaks are fifty times those predicted, or a fiftieth; or
-        the posterior was fitted to them, near which it then lies.
+        If the prediction lacks the quantity that was measured, is swept, or is of one kind
+        of specimen where several were tested; peaks are fifty times those predicted, or a
+        fiftieth; or the posterior was fitted to them, near which it then lies.
 
     Warns
     -----

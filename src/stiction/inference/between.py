@@ -60,8 +60,8 @@ def variance_between(logarithms: Array, within: Array, level: float) -> float:
 
     Q(s) = sum (L - m(s))^2/(s + v) is chi-square distributed with one degree of freedom
     less than records at the true variance s of the logarithms L (Viechtbauer, 2007),
-    whatever their number. `within` are the variances v of the logarithms from the field alone,
-    (records,).
+    whatever their number. `within` are the variances v of the logarithms from the field
+    alone, (records,).
     """
 
     def excess(s: float) -> float:
@@ -79,8 +79,8 @@ def likely_between(
 ) -> tuple[Array, Array]:
     """Draw likely variances between records, and the logarithm of the mean with each, (count,).
 
-    Levels of Q are those of chi-square that `MOST_SCATTER` leaves; given s, the mean logarithm is
-    normal. Factors are log-normal with mean 1.
+    Levels of Q are those of chi-square that `MOST_SCATTER` leaves; given s, the mean
+    logarithm is normal. Factors are log-normal with mean 1.
     """
     freedom = logarithms.size - 1
     least = chi2.cdf(_weighed(logarithms, within, MOST_SCATTER)[2], freedom)

@@ -46,8 +46,8 @@ def bootstrapped(
 ) -> tuple[list[Repetitions], list[Repetitions]]:
     """Fit records simulated from an estimate, and from it `at_ends` of its correlation length.
 
-    Also from `others`, each with its own number of repetitions. Those to which the family cannot
-    be fitted are missing.
+    Also from `others`, each with its own number of repetitions. Those to which the family
+    cannot be fitted are missing.
     """
 
     def repeat(truth: Estimate, count: int = count) -> Repetitions:

@@ -4,11 +4,11 @@ No onset is below the least possible strength, and where the correlation length 
 are just above it. A kernel density of the onsets would leak below, and find any strength
 possible whose bound is not far above the least peak. So the kernels stand on v = log(onset
 - bound) (Wand, Marron and Ruppert, 1991); where there is no bound, on one so far below that
-the logarithm is straight. Their width is Silverman's (1986, section 3.4.2), and what it adds
-to the variance is taken from the sample (section 6.1.2). Densities are tabulated in units in
-which v has mean 0 and variance 1, where they hardly change from node to node. The error of
-the load cell is integrated over v by the midpoint rule, which converges faster than any power
-of the step once that is below the narrower of error and density.
+the logarithm is straight. Their width is Silverman's (1986, section 3.4.2), and what it
+adds to the variance is taken from the sample (section 6.1.2). Densities are tabulated in
+units in which v has mean 0 and variance 1, where they hardly change from node to node. The
+error of the load cell is integrated over v by the midpoint rule, which converges faster
+than any power of the step once that is below the narrower of error and density.
 """
 
 import math

@@ -158,8 +158,8 @@ def estimate(
 ) -> Estimate:
     """Fit measured values (points,) of each record, without trend; from a start if there is one.
 
-    Records of several specimens are scaled by what the fit itself finds of the field's own share
-    in the scatter of their means, in a few rounds.
+    Records of several specimens are scaled by what the fit itself finds of the field's own
+    share in the scatter of their means, in a few rounds.
     """
     if not setting.between:
         return _estimate(rows, setting, start)
@@ -214,8 +214,8 @@ def _estimate(rows: Sequence[Array], setting: FitSetting, start: Estimate | None
 def _left(windows: Sequence[RecordWindow], model: Model) -> float:
     """Return the share of its variance that a field is expected to show about mean and trend.
 
-    Of N values v with correlation R it is tr(M R)/N, with M the projection that takes the trend of
-    each record, and the mean of all, from them.
+    Of N values v with correlation R it is tr(M R)/N, with M the projection that takes the
+    trend of each record, and the mean of all, from them.
     """
     taken, mean, points = 0.0, 0.0, 0.0
     for window, count in Counter(windows).items():
@@ -240,13 +240,13 @@ def bands(one: Observed, expected: Array, per_octave: int = 3) -> Array:
 class Goodness(NamedTuple):
     """Quality of a family of marginals: its best member, and two measures of the fit.
 
-    `distance` is Kolmogorov's. `score` is the log likelihood of so many independent values as tell
-    families apart as well as the correlated ones of the records do, less the number of estimated
-    parameters (Akaike, 1974), less that of the best family: 0 for the best, negative for the
-    others. Differences below 2 do not tell families apart. `weight` is the share of members that
-    `FieldFit.interfaces` draws from the family, in proportion to the likelihood of its members:
-    they scatter about the estimate, and the logarithm of theirs is on average half a unit for
-    each parameter below the greatest.
+    `distance` is Kolmogorov's. `score` is the log likelihood of so many independent values
+    as tell families apart as well as the correlated ones of the records do, less the number
+    of estimated parameters (Akaike, 1974), less that of the best family: 0 for the best,
+    negative for the others. Differences below 2 do not tell families apart. `weight` is the
+    share of members that `FieldFit.interfaces` draws from the family, in proportion to the
+    likelihood of its members: they scatter about the estimate, and the logarithm of theirs
+    is on average half a unit for each parameter below the greatest.
     """
 
     marginal: Any

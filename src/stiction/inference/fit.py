@@ -246,8 +246,8 @@ def fit_field(
         plane (nx, ny) or (samples, nx, ny), in SI, have a value at each node of
         `interface`. Several profiles, also of different lengths, are samples of one field.
     interface : Interface, optional
-        Needed for arrays without coordinates. A warning is issued if it is too short, or its nodes
-        too coarse, for the fitted field.
+        Needed for arrays without coordinates. A warning is issued if it is too short, or
+        its nodes too coarse, for the fitted field.
     marginal : str, dict or sequence of them
         Family: 'beta', 'lognormal', 'weibull', 'gamma', 'normal' or any
         continuous distribution of `scipy.stats`. Of several, the best is chosen, and
@@ -260,8 +260,8 @@ def fit_field(
         ``"truncation"`` or ``"power_kept"`` is given; the field has the usual one otherwise.
     detrend : int
         Degree of the polynomial trend that is removed, 0 to 3. The mean is always kept. The
-        scatter that mean and trend take with them on average is added to the estimate (not to
-        families of `scipy.stats` whose loc or scale is fixed).
+        scatter that mean and trend take with them on average is added to the estimate (not
+        to families of `scipy.stats` whose loc or scale is fixed).
     noise : bool or float
         Whether to estimate white, normal measurement noise along with the field; or its
         standard deviation, if known (SI).
@@ -295,17 +295,17 @@ def fit_field(
     Raises
     ------
     InputError
-        If units are unknown, points repeat or are not equally spaced, records are constant or
-        short, or values lie outside the bounds of the marginal.
+        If units are unknown, points repeat or are not equally spaced, records are constant
+        or short, or values lie outside the bounds of the marginal.
 
     Warns
     -----
     AccuracyWarning
-        If values are outliers, profiles repeat others, and for each reason in `doubts`: records
-        hold fewer than ten correlation lengths, a p-value is below 1 % (of ``level``: records of
-        different specimens without `between`), the noise hides the cut-off of the spectrum, a
-        parameter lies at the end of the range that is searched, or fewer than five specimens are to
-        tell the scatter between them.
+        If values are outliers, profiles repeat others, and for each reason in `doubts`:
+        records hold fewer than ten correlation lengths, a p-value is below 1 % (of
+        ``level``: records of different specimens without `between`), the noise hides the
+        cut-off of the spectrum, a parameter lies at the end of the range that is searched,
+        or fewer than five specimens are to tell the scatter between them.
 
     Notes
     -----
@@ -315,8 +315,8 @@ def fit_field(
     (Sykulski et al., 2019; Guillaumin et al., 2022). Correlations of values follow from
     those of the Gaussian field z by Hermite expansion (Grigoriu, 1995).
 
-    Families are compared by Akaike's criterion for one number of independent values: of N with
-    correlations rho_ij as many as N^2/sum rho_ij^3.
+    Families are compared by Akaike's criterion for one number of independent values: of N
+    with correlations rho_ij as many as N^2/sum rho_ij^3.
 
     Intervals come from a studentised bootstrap (Davison and Hinkley, 1997, section 5.2), their
     upper and lower ends from fields of longer and shorter correlation (Carpenter, 1999).

@@ -54,9 +54,9 @@ def grid_of(
 
     None if it is zero. One parameter that takes so many equally likely values has as many `cells`.
 
-    The first grid covers all of it; each next one the box that holds all but a millionth of the
-    last, until it no longer shrinks by a tenth in any direction. The midpoint rule converges
-    faster than any power of the step once a cell is narrower than the density.
+    The first grid covers all of it; each next one the box that holds all but a millionth of
+    the last, until it no longer shrinks by a tenth in any direction. The midpoint rule
+    converges faster than any power of the step once a cell is narrower than the density.
     """
     dimension = box.shape[1]
     along = cells or int(min(MOST_ALONG, max(8, points ** (1.0 / dimension))))

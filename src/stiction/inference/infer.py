@@ -80,13 +80,14 @@ def infer(
     problem : Problem
         One specimen.
     random : RandomInterface, RandomField, a fit, or a list of interfaces
-        The random properties with known parameters; `prior` replaces their values. Without a
-        `prior`: what is known already, equally likely interfaces, such as a `FieldFit`, a
+        The random properties with known parameters; `prior` replaces their values. Without
+        a `prior`: what is known already, equally likely interfaces, such as a `FieldFit`, a
         `Posterior`, anything with such `interfaces`, or a list. The peaks weigh them.
     peaks : array, mapping of arrays, or Peaks
-        Mean shear stress, or force, at which each specimen slid, in `unit`; for specimens of
-        several lengths a mapping of each length (m) to its peaks, ``{0.1: [...], 0.2: [...]}``,
-        with the node spacing of the problem. Or the result of `read_peaks`.
+        Mean shear stress, or force, at which each specimen slid, in `unit`; for specimens
+        of several lengths a mapping of each length (m) to its peaks,
+        ``{0.1: [...], 0.2: [...]}``, with the node spacing of the problem. Or the result of
+        `read_peaks`.
     prior : mapping, optional
         Parameters and the prior of each: a frozen continuous `scipy.stats` distribution, a
         range ``(low, high)``, or ``{"low": ..., "high": ..., "spacing": "log"}``. Priors
@@ -97,12 +98,12 @@ def infer(
         The method that finds the onset. For all but the local criterion, that one, if applicable,
         first finds the relevant part of the prior, which grows until it contains the posterior.
     load_cell_error : float
-        Standard deviation of the error of a peak, in `unit`; with `Peaks` in Pa, in N, or as a
-        coefficient.
+        Standard deviation of the error of a peak, in `unit`; with `Peaks` in Pa, in N, or
+        as a coefficient.
     unit : str
-        Unit of peaks and load-cell error: a unit of stress; of force, which needs a specimen's
-        ``thickness``, a line's ``width`` or a plane; or "1" for friction coefficients, which need
-        ``Load(normal_pressure=...)``.
+        Unit of peaks and load-cell error: a unit of stress; of force, which needs a
+        specimen's ``thickness``, a line's ``width`` or a plane; or "1" for friction
+        coefficients, which need ``Load(normal_pressure=...)``.
     samples : int, optional
         Simulated specimens at each point: by default 2000 by the local criterion, 500 by
         equilibrium, and 500 for each of a list.
@@ -127,9 +128,9 @@ def infer(
     Warns
     -----
     AccuracyWarning
-        If the posterior piles up at an end of the prior, the method is not accurate there, or
-        few samples are simulated for the number of peaks. If a list and the peaks hardly agree,
-        or few of its interfaces keep weight.
+        If the posterior piles up at an end of the prior, the method is not accurate there,
+        or few samples are simulated for the number of peaks. If a list and the peaks hardly
+        agree, or few of its interfaces keep weight.
     UserWarning
         Beforehand, if the simulation will take more than a minute: how long, and what takes less.
 
@@ -143,9 +144,9 @@ def infer(
     `prior_transform` of the result to emcee or dynesty. After an interruption, or an error in one
     sample, an equal call in the same session goes on with the onsets that are there.
 
-    Of a fit 300 interfaces are drawn, and up to 3000 where the peaks leave few of them weight. The
-    parameters of the posterior are then what they differ in: mean, standard deviation and
-    correlation length of each property, and the scatter between specimens.
+    Of a fit 300 interfaces are drawn, and up to 3000 where the peaks leave few of them
+    weight. The parameters of the posterior are then what they differ in: mean, standard
+    deviation and correlation length of each property, and the scatter between specimens.
 
     Examples
     --------
@@ -239,8 +240,8 @@ def _check_reach(prior: Prior, method: Any, measured: Peaks, error: float) -> No
 def _first_box(likelihood: Likelihood) -> Array:
     """Return the box in which the local criterion finds the posterior.
 
-    All of the prior if it cannot produce the peaks: where nodes reach their residual strength
-    before the onset, the other methods may.
+    All of the prior if it cannot produce the peaks: where nodes reach their residual
+    strength before the onset, the other methods may.
     """
     grid = None if likelihood.refusals() else grid_of(likelihood, likelihood.box)
     if grid is None:

@@ -319,9 +319,9 @@ def make_likelihood(
 ) -> Likelihood:
     """Simulate the onsets that the likelihood needs, but for those that are `done`.
 
-    `lengths` are those of the specimens, m, None for the problem's own; `variable` is the name
-    of the peaks among the results, with the standard `error` of the load cell. `box` is the
-    part of the prior that matters, (2, parameters) as u; all of it if left out.
+    `lengths` are those of the specimens, m, None for the problem's own; `variable` is the
+    name of the peaks among the results, with the standard `error` of the load cell. `box`
+    is the part of the prior that matters, (2, parameters) as u; all of it if left out.
     """
     box = prior.whole if box is None else box
     forces = variable == "critical_force"

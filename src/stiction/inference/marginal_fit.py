@@ -321,8 +321,8 @@ def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], 
 def mean_log_likelihood(marginal: Any, values: Array, noise: float) -> float:
     """Return the mean logarithm of the density of values that carry noise.
 
-    With noise it is the probability of a bin over its width. A family to which a value is all but
-    impossible has a low one, and not none.
+    With noise it is the probability of a bin over its width. A family to which a value is
+    all but impossible has a low one, and not none.
     """
     if noise**2 <= NEGLIGIBLE * values.var():
         least = math.log(LEAST / float(np.ptp(values)))
@@ -348,8 +348,8 @@ def climb(
 ) -> Array:
     """Return the parameters of the greatest likelihood, by damped steps of at most `longest`.
 
-    `value_of` returns the log likelihood and what `derivatives` needs for the score and Fisher's
-    information. A gain below `settled` ends the search.
+    `value_of` returns the log likelihood and what `derivatives` needs for the score and
+    Fisher's information. A gain below `settled` ends the search.
     """
     at = np.clip(at, limits[:, 0], limits[:, 1])
     value, state = value_of(at)

@@ -128,11 +128,11 @@ def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
     Parameters
     ----------
     path : path
-        A table, separated by commas, semicolons, tabs or blanks, one test a line, with a heading.
-        One column is called peak, stress, strength, force or friction, with its unit: ``peak
-        [MPa]``; a coefficient of friction has the unit 1 or -, a force N or kN. Without such a
-        name, it is the only column in a unit of these. Another may be the length of the specimen:
-        ``length [mm]``. Other columns are not read.
+        A table, separated by commas, semicolons, tabs or blanks, one test a line, with a
+        heading. One column is called peak, stress, strength, force or friction, with its
+        unit: ``peak [MPa]``; a coefficient of friction has the unit 1 or -, a force N or
+        kN. Without such a name, it is the only column in a unit of these. Another may be
+        the length of the specimen: ``length [mm]``. Other columns are not read.
     unit : str, optional
         Unit of the peaks if the file states none.
 

@@ -181,8 +181,8 @@ class Posterior:
     def to_arviz(self) -> Any:
         """Return posterior, prior, log-likelihood, prediction and data as ArviZ has them.
 
-        An `arviz.InferenceData`, or a `DataTree` from ArviZ 1 on. The draws are independent; they
-        are cut into four chains only because ArviZ compares chains.
+        An `arviz.InferenceData`, or a `DataTree` from ArviZ 1 on. The draws are
+        independent; they are cut into four chains only because ArviZ compares chains.
 
         Raises
         ------

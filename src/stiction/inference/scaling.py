@@ -6,14 +6,15 @@ load at which the linear problem A d + tau_p - tau_0 >= 0, d >= 0 has no solutio
 
     min {<tau_p, y> : y >= 0, <1, y> = 1, A y <= 0} = a + b min {<s, y> : ...},
 
-because neither A = K - W nor the set of y depends on the strength; the local criterion is the same
-with y restricted to one weight. So onset(a + b s) = a + b onset(s), sample by sample, as long as no
-node has reached its residual strength. The local criterion takes no residual strength into account,
-so there it always holds. Equilibrium does: with slip in units of b, strength is
-a + b max(s - W d, (tau_r - a)/b), the same problem only if (tau_r - a)/b is: if a = 0 and tau_r is
-zero or in proportion to tau_p. A rupture also depends on the loading rate, which would have to
-scale with b. Where W follows from a critical slip or a fracture energy, it changes with b, and the
-nucleation length with it: nothing scales.
+because neither A = K - W nor the set of y depends on the strength; the local criterion is
+the same with y restricted to one weight. So onset(a + b s) = a + b onset(s), sample by
+sample, as long as no node has reached its residual strength. The local criterion takes no
+residual strength into account, so there it always holds. Equilibrium does: with slip in
+units of b, strength is a + b max(s - W d, (tau_r - a)/b), the same problem only if
+(tau_r - a)/b is: if a = 0 and tau_r is zero or in proportion to tau_p. A rupture also
+depends on the loading rate, which would have to scale with b. Where W follows from a
+critical slip or a fracture energy, it changes with b, and the nucleation length with it:
+nothing scales.
 
 Friction coefficients mu = a + b s are a strength sigma_n (a + b s). The shift sigma_n a is the same
 everywhere only if the normal pressure is; where it varies, a must be zero. So it must where the

@@ -92,9 +92,9 @@ def observe(rows: Sequence[Array], windows: Sequence[RecordWindow]) -> list[Obse
 class Model(NamedTuple):
     """Prediction of records from a spectrum, the Hermite shares of a marginal and noise.
 
-    The truncation of a spectrum is a property of the field only if it was given (`end_seen`): at a
-    multiple of 1/xi_0 it would, among the wavenumbers of a record, determine the correlation
-    length.
+    The truncation of a spectrum is a property of the field only if it was given
+    (`end_seen`): at a multiple of 1/xi_0 it would, among the wavenumbers of a record,
+    determine the correlation length.
     """
 
     spectrum: Any

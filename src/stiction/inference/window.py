@@ -134,8 +134,8 @@ class RecordWindow:
         """Return the variance of z in each mode of a period of the grid; it sums to 1 over all.
 
         Power above the sampling wavenumber is folded back, above `FOLDS` times that evenly.
-        The spectrum fades out at its truncation, and has none if `end_seen` is false: what it
-        leaves out of a rough spectrum would be taken for noise.
+        The spectrum fades out at its truncation, and has none if `end_seen` is false: what
+        it leaves out of a rough spectrum would be taken for noise.
         """
         dimensions = len(self.shape)
         stretch = (1.0, anisotropy)[:dimensions]

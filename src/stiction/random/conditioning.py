@@ -1,7 +1,7 @@
 """A field that was measured in places: values with errors, and the field elsewhere.
 
-A Gaussian field is a linear function of its draws, z(x) = phi(x)^T a with a standard normal.
-So measured z_k = phi(x_k)^T a + e_k are a linear regression, whose posterior is
+A Gaussian field is a linear function of its draws, z(x) = phi(x)^T a with a standard
+normal. So measured z_k = phi(x_k)^T a + e_k are a linear regression, whose posterior is
 
     a | z ~ N(mu, P),  P = (1 + Psi^T Psi)^-1,  mu = P Psi^T (z_k/error_k)
 
@@ -13,11 +13,11 @@ measured.
 
 Values are measured of the marginal and not of z. Their likelihood, a function of z at each
 place, is replaced by the Gaussian of the same mean and variance, in turns with the
-regression (expectation propagation; Minka, 2001). Where that is not enough, draws are mapped
-before the regression (`stiction.random.transport`).
+regression (expectation propagation; Minka, 2001). Where that is not enough, draws are
+mapped before the regression (`stiction.random.transport`).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -257,11 +257,6 @@ class Conditioning(NamedTuple):
     misfit: float  # squared, of values and of draws at the middle of the posterior
     points: int
 
-    @property
-    def moments(self) -> Callable[[Array], tuple[Array, Array]]:
-        """Mean and standard deviation of z = phi @ draws by the regression alone."""
-        return self.regression.moments
-
     def draws(self, draws: Array) -> Array:
         """Return conditioned draws (samples, dimension)."""
         out = np.array(draws)
@@ -271,7 +266,7 @@ class Conditioning(NamedTuple):
 
     def quantile_at(self, phi: Array, probability: float) -> Array:
         """Return the quantile of z = phi @ draws, (points,); beyond the regression, by samples."""
-        mean, deviation = self.moments(phi)
+        mean, deviation = self.regression.moments(phi)
         found = mean + float(ndtri(probability)) * deviation
         if len(self.mapped.basis):
             draws = np.random.default_rng(0).standard_normal((PROBES, phi.shape[1]))
@@ -302,8 +297,8 @@ class Conditioning(NamedTuple):
 def conditioned(measured: Sequence[Measured]) -> Conditioning:
     """Condition draws on measured values of properties.
 
-    Likelihood and regression take turns until z from all other places stays; what the Gaussians
-    miss is mapped before the regression (`transport`).
+    Likelihood and regression take turns until z from all other places stays; what the
+    Gaussians miss is mapped before the regression (`transport`).
     """
     phi = np.concatenate([one.phi for one in measured])
     others = np.zeros(len(phi)), np.ones(len(phi))

@@ -22,8 +22,8 @@ MARGINAL = ("mean", "cv", "low", "high", "scale", "alpha", "beta")
 def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
     """Return a copy of a model object, or of each of a list, with dotted keys replaced at once.
 
-    Messages begin with `path`, the dotted key of the object itself. It is an `InputError` if a key
-    does not exist (the nearest valid one is named) or a value does not fit.
+    Messages begin with `path`, the dotted key of the object itself. It is an `InputError`
+    if a key does not exist (the nearest valid one is named) or a value does not fit.
     """
     if isinstance(owner, list):
         return [with_values(one, values, path) for one in owner]

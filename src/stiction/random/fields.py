@@ -488,8 +488,8 @@ class RandomInterface:
         Parameters
         ----------
         parameters : mapping
-            Distributions by dotted key, as priors of `infer`: frozen ones of `scipy.stats`, ranges
-            (low, high), or tables as in a study file.
+            Distributions by dotted key, as priors of `infer`: frozen ones of `scipy.stats`,
+            ranges (low, high), or tables as in a study file.
         count : int
             Their number; 30 show a 90 % band.
         seed : int

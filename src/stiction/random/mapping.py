@@ -145,9 +145,9 @@ def hermite_coefficients(
     """Return c_m = E[F^-1(Phi(Z)) h_m(Z)], h_m the orthonormal Hermite polynomials, m = 0, 1, ...
 
     c_0 is the mean and the sum of the others' squares the variance (Grigoriu, 1995). By the
-    trapezoidal rule on |z| <= 8; fine steps are accurate where the map has kinks, too. The last
-    coefficient stands for all the rest of the variance, so that the correlation is 1 at zero
-    lag. An `InputError` if scipy's quantile and moments disagree.
+    trapezoidal rule on |z| <= 8; fine steps are accurate where the map has kinks, too. The
+    last coefficient stands for all the rest of the variance, so that the correlation is 1
+    at zero lag. An `InputError` if scipy's quantile and moments disagree.
     """
     distribution, half = marginal.distribution, round(REACH / step)
     z = np.arange(-half, half + 1) * step

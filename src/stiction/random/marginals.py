@@ -1,7 +1,7 @@
 """Marginal distributions: how strength is distributed at a point.
 
-To add a family, derive from `Marginal`, with a `distribution`, and `register` it; study files
-take every continuous distribution of `scipy.stats` by its name.
+To add a family, derive from `Marginal`, with a `distribution`, and `register` it; study
+files take every continuous distribution of `scipy.stats` by its name.
 """
 
 import math

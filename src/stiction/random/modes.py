@@ -92,8 +92,8 @@ def make_modes(
 ) -> Modes:
     """Find the modes of a spectrum; `InputError` if there are too many, or none.
 
-    A field on a specimen is one of twice its length, cut: with that period its correlation along
-    the specimen is that of an endless one.
+    A field on a specimen is one of twice its length, cut: with that period its correlation
+    along the specimen is that of an endless one.
     """
     own, interface = interface, interface.embedding
     dimensions = len(interface.shape)
@@ -131,8 +131,8 @@ def make_modes(
 def _numbers(interface: Interface, reach: Array) -> NDArray[np.int64]:
     """Wave vectors over 2 pi/length among which the modes are, in the order of draws.
 
-    On a plane that is the order of growing rectangles of its proportions, so that a mode has
-    the same draws whatever the spectrum and the grid.
+    On a plane that is the order of growing rectangles of its proportions, so that a mode
+    has the same draws whatever the spectrum and the grid.
     """
     if reach.size == 1:
         _refuse_too_many(reach[0])

@@ -1,9 +1,9 @@
 """Power spectral densities of the underlying Gaussian field, on lines and on planes.
 
-On a plane the field is isotropic, and a line cut through it has the correlation of the field
-on a line: to the power of 1 + k^2 is added (D - 1)/2 in D dimensions, and a Gaussian keeps its
-form. Samples have the truncated spectrum, and so correlations and lengths are those of it. To
-add a spectrum, derive from `ScaledSpectrum` and `register` it.
+On a plane the field is isotropic, and a line cut through it has the correlation of the
+field on a line: to the power of 1 + k^2 is added (D - 1)/2 in D dimensions, and a Gaussian
+keeps its form. Samples have the truncated spectrum, and so correlations and lengths are
+those of it. To add a spectrum, derive from `ScaledSpectrum` and `register` it.
 """
 
 from __future__ import annotations
@@ -207,9 +207,9 @@ class PowerLawSpectrum(_PowerOfWavenumber):
     exponent : float
         In [0.6, 64]; 4 in Albertini et al. (2020, Eq. 4).
     truncation : float, optional
-        Truncation in multiples of lambda. If neither this nor `power_kept` is given it is that
-        which retains 0.99969 of the power on a line, at least 2.5: 2.5 at the exponent 4 (as in
-        the paper), 11 at 2 and 2,100 at 1.
+        Truncation in multiples of lambda. If neither this nor `power_kept` is given it is
+        that which retains 0.99969 of the power on a line, at least 2.5: 2.5 at the exponent
+        4 (as in the paper), 11 at 2 and 2,100 at 1.
     power_kept : float, optional
         Share of the power retained by truncation, in (0, 1).
 
@@ -285,8 +285,8 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
 class ExponentialSpectrum(_PowerOfWavenumber):
     """Correlation exp(-|x|/xi_0): g(k) ~ 1/(1 + (k xi_0)^2). A rough field.
 
-    As `SquaredExponentialSpectrum`, but 0.99 of the power is retained by default: every further
-    nine takes ten times as many modes.
+    As `SquaredExponentialSpectrum`, but 0.99 of the power is retained by default: every
+    further nine takes ten times as many modes.
     """
 
     type: Literal["exponential"] = "exponential"

@@ -2,15 +2,15 @@
 
 With draws w of the Gaussian, z at place k is m_k + A_k w, and the posterior has the density
 N(w) prod_k r_k(z_k), r_k being the likelihood over the Gaussian that stands for it. Along
-orthonormal directions u_1, u_2, ... the map to it is triangular (Rosenblatt, 1952): e_j = u_j w
-goes, quantile by quantile, to the distribution of density
+orthonormal directions u_1, u_2, ... the map to it is triangular (Rosenblatt, 1952): e_j =
+u_j w goes, quantile by quantile, to the distribution of density
 
     N(e_j) prod_k E[r_k(z_k) | e_1, ..., e_j],
 
-which takes places as independent given e_1 to e_j (Cseke and Heskes, 2011). That is exact for
-one place, for independent ones, and for many that measure one number. A direction is that of
-the place at which the posterior differs most from the Gaussian, as far as it is not yet
-spanned; the last are left out where there is hardly a difference. What is then left is
+which takes places as independent given e_1 to e_j (Cseke and Heskes, 2011). That is exact
+for one place, for independent ones, and for many that measure one number. A direction is
+that of the place at which the posterior differs most from the Gaussian, as far as it is not
+yet spanned; the last are left out where there is hardly a difference. What is then left is
 measured by the weights of samples.
 """
 

@@ -62,8 +62,8 @@ class Quantiles:
     value : (m,) array
         The sample quantiles, in the unit of the values.
     lower, upper : (m,) arrays
-        Ends of the 95 % confidence interval of each; infinite where the sample is too small to
-        bound that quantile.
+        Ends of the 95 % confidence interval of each; infinite where the sample is too small
+        to bound that quantile.
     """
 
     probability: Array

@@ -38,8 +38,8 @@ OF_A_PLANE = (
 def points_of(array: Any) -> tuple[Array, dict[str, Array], Any]:
     """Return values (..., points), their places (m) by direction, and where they were measured.
 
-    The mask is True if nothing was filled in. Values without coordinates keep their shape, and the
-    dictionary is empty.
+    The mask is True if nothing was filled in. Values without coordinates keep their shape,
+    and the dictionary is empty.
     """
     dims = [dim for dim in ("x", "y") if dim in array.coords]
     if len(dims) == 2 and "row" not in array.dims:
@@ -56,8 +56,8 @@ def place(
 ) -> tuple[Array, Any]:
     """Put values on the nodes of an interface, (..., *shape), with a mask of what was measured.
 
-    The mask is False where there was no value, be it filled in or left out; it is True if nothing
-    is missing.
+    The mask is False where there was no value, be it filled in or left out; it is True if
+    nothing is missing.
     """
     values, places, measured = points_of(array)
     if not places:

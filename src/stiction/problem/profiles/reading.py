@@ -66,10 +66,10 @@ def read_profile(
     Parameters
     ----------
     source : path, xarray.DataArray or xarray.Dataset
-        ``.npy``: shape (nodes,) or (nx, ny). ``.csv``, ``.txt``, ``.dat``, ``.tsv``, ``.xlsx``:
-        columns, with or without a line of names such as ``x (mm); strength (MPa)``. ``.nc``:
-        variables with `units`, and x as a coordinate. A map is over 'x' and 'y'; a table has both
-        as columns.
+        ``.npy``: shape (nodes,) or (nx, ny). ``.csv``, ``.txt``, ``.dat``, ``.tsv``,
+        ``.xlsx``: columns, with or without a line of names such as ``x (mm); strength
+        (MPa)``. ``.nc``: variables with `units`, and x as a coordinate. A map is over 'x'
+        and 'y'; a table has both as columns.
     x, value : str or int, optional
         Name, heading or number (from 0) of the column, coordinate or variable. By default the one
         with such a name (``x``, ``position``; ``strength``, ``tau_p``), the only one in a unit of
@@ -85,20 +85,20 @@ def read_profile(
         Interpolate linearly if the points of a line do not coincide with the nodes.
     gaps : {"refuse", "fill", "skip"}
         Refuse missing values (NaN, empty cells, missing points), fill them with straight
-        lines (not on planes and specimens), or leave NaN, for `stiction.fit_field`. Without an
-        interface, they always stay.
+        lines (not on planes and specimens), or leave NaN, for `stiction.fit_field`. Without
+        an interface, they always stay.
 
     Returns
     -------
     xarray.DataArray
-        Over 'x' (m), on a plane over 'x' and 'y', with `units`. With gaps it has the coordinate
-        'measured', False in a gap, which results take over.
+        Over 'x' (m), on a plane over 'x' and 'y', with `units`. With gaps it has the
+        coordinate 'measured', False in a gap, which results take over.
 
     Raises
     ------
     InputError
-        If the source cannot be read, a unit is unknown or unsuitable, columns are ambiguous,
-        or the profile does not fit the interface.
+        If the source cannot be read, a unit is unknown or unsuitable, columns are
+        ambiguous, or the profile does not fit the interface.
 
     Warns
     -----
@@ -393,8 +393,8 @@ def at_nodes(
 ) -> tuple[Any, Any]:
     """Return what a caller gave for a quantity, with one value a node, and where it was measured.
 
-    `name` may be a dotted key. Numbers, and arrays of another shape, pass as they are, for whoever
-    checks that. The mask is True if nothing is missing.
+    `name` may be a dotted key. Numbers, and arrays of another shape, pass as they are, for
+    whoever checks that. The mask is True if nothing is missing.
     """
     quantity = quantity_of(name)
     with prefixed(name):

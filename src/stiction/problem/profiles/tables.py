@@ -70,13 +70,13 @@ def _read_npy(path: Path) -> Array:
 def read_table(path: Path) -> xr.Dataset:
     """Read a table of numbers from a text file, or from the first sheet of a workbook.
 
-    Columns are separated by semicolons, tabs, commas or blanks, in this order; the decimal sign may
-    be a comma unless commas separate. Lines that begin with ``#`` are comments. The last line above
-    the numbers names the columns, or states their units below a line of names; without one, the
-    last comment may name them. Columns become variables along 'row', NaN where a cell is empty;
-    those without names are called by their numbers, from 0. What is empty at the end is left out.
-    The attribute `lines` has the number of each row's line; `text` of a column without any number
-    says what it holds.
+    Columns are separated by semicolons, tabs, commas or blanks, in this order; the decimal
+    sign may be a comma unless commas separate. Lines that begin with ``#`` are comments.
+    The last line above the numbers names the columns, or states their units below a line of
+    names; without one, the last comment may name them. Columns become variables along
+    'row', NaN where a cell is empty; those without names are called by their numbers, from
+    0. What is empty at the end is left out. The attribute `lines` has the number of each
+    row's line; `text` of a column without any number says what it holds.
     """
     import xarray as xr
 
