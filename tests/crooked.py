@@ -7,6 +7,7 @@ and MPa from an x that is not 0.
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -62,11 +63,20 @@ LINE, LINE_STRENGTH = crooked(96, 0.037)
 """Of 6 nucleation lengths of 16 nodes."""
 PLANE, PLANE_STRENGTH = crooked((24, 20), (0.023, 0.0164))
 """Of cells of .96 by .82 mm."""
+TWO = np.stack(
+    [LINE_STRENGTH, 1.04 * np.roll(LINE_STRENGTH, 31) - 2e4 * uneven(LINE.interface, seed=8)]
+)
 LINE_GAP = np.isin(np.arange(96), (93, 94, 95, 0, 1))
 PLANE_GAP = np.logical_and.outer(
     np.isin(np.arange(24), (22, 23, 0)), np.isin(np.arange(20), (19, 0))
 )
 """Nodes where nothing was measured, across the seam of x and, on the plane, of y."""
+
+
+def of_width(problem: st.Problem, width: float) -> st.Problem:
+    """The problem on an interface of a width, so that forces are known."""
+    wide = dataclasses.replace(problem.interface, width=width)
+    return dataclasses.replace(problem, interface=wide)
 
 
 def as_measured(

@@ -7,6 +7,7 @@ each output. `pytest -n 0 tests/records --record` writes them anew and prints wh
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
 import math
@@ -14,6 +15,7 @@ import re
 import tempfile
 import warnings
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 from unittest import mock
@@ -30,6 +32,7 @@ from PIL import Image
 import stiction as st
 from stiction.plot import ruptures
 
+READ = "read beside the rule that refuses"
 CLOSE = 1e-6
 """Relative distance of numbers that count as the same: other processors round otherwise."""
 FLOOR = 1e-9
@@ -55,11 +58,13 @@ class Call(NamedTuple):
 class Calls(dict[str, Call]):
     """The calls of a file, by name."""
 
-    def __call__(self, verified: str, close: float = CLOSE) -> Callable[[Any], Any]:
+    def __call__(
+        self, verified: str, close: float = CLOSE, name: str = ""
+    ) -> Callable[[Any], Any]:
         """Add a call; `verified` names the oracle, closed form or reading behind its values."""
 
         def add(make: Callable[[], Any]) -> Callable[[], Any]:
-            self[make.__name__] = Call(make, verified, close)
+            self[name or make.__name__] = Call(make, verified, close)
             return make
 
         return add
@@ -71,14 +76,18 @@ def outputs_of(call: Call) -> dict[str, Any]:
         warnings.simplefilter("always")
         result = call.make()
         found = dict(taken_apart(result))
-    ours = {f"{one.category.__name__}: {one.message}" for one in caught if _ours(one.category)}
-    for number, text in enumerate(sorted(ours)):
-        found[f"warning {number}"] = text
+    found |= {f"warning {number}": text for number, text in enumerate(doubts_of(caught))}
     return found
 
 
-def _ours(category: type) -> bool:
-    return category is UserWarning or category.__module__.startswith("stiction")
+def doubts_of(caught: list[warnings.WarningMessage]) -> list[str]:
+    """The texts of our own warnings, each once."""
+    ours = [
+        one
+        for one in caught
+        if one.category is UserWarning or one.category.__module__.startswith("stiction")
+    ]
+    return sorted({f"{one.category.__name__}: {one.message}" for one in ours})
 
 
 def taken_apart(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
@@ -260,15 +269,45 @@ def refusal(call: Callable[[], Any]) -> Any:
     """What a call gives, or the text by which it is refused."""
     try:
         return call()
-    except ValueError as error:
+    except (ValueError, RuntimeError) as error:
         return f"{type(error).__name__}: {error}"
+
+
+def said(call: Callable[[], Any]) -> str | list[str]:
+    """The text by which a call is refused, or those of what it doubts."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found = refusal(call)
+    return found if isinstance(found, str) else doubts_of(caught)
+
+
+def each(door: Callable[..., Any], *given: Any) -> list[Callable[[], Any]]:
+    """Calls of one function, of an argument or of options by name each."""
+    return [
+        partial(door, **one) if isinstance(one, dict) else partial(door, one) for one in given
+    ]
+
+
+def table_of(calls: Calls, rows: dict[str, list[Callable[[], Any]]]) -> None:
+    """Add what each call of a table says to those that are recorded, a record for each list."""
+    for name, some in rows.items():
+        calls(READ, name=name)(
+            lambda some=some: {str(number): said(call) for number, call in enumerate(some)}
+        )
+
+
+@contextlib.contextmanager
+def inside() -> Iterator[Path]:
+    """A folder of its own, in which a call works, so that what it says names none."""
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        yield Path(folder)
 
 
 def filmed(run: xr.Dataset) -> dict[str, Any]:
     """What a film draws at its end, its frames, size and pace, and whether it moves."""
     canvas = mock.patch.object(ruptures, "FigureCanvasAgg", wraps=FigureCanvasAgg)
-    with tempfile.TemporaryDirectory() as folder, canvas as opened:
-        path = st.plot.film(run, Path(folder) / "film.gif", frames=4)
+    with inside() as folder, canvas as opened:
+        path = st.plot.film(run, folder / "film.gif", frames=4)
         with Image.open(path) as film:
             about = [film.n_frames, *film.size, film.info["duration"]]
             first = np.asarray(film.convert("L")).astype(float)

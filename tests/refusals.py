@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import pytest
-from recording import CLOSE, Call, Calls
 
 import stiction as st
 
@@ -32,25 +29,3 @@ def refusals(table: dict[str, Any], call: Callable[..., Any] | None = None) -> A
         refuses(words, given if call is None else lambda: call(**given))
 
     return test
-
-
-def said(call: Callable[[], Any]) -> str | list[str]:
-    """The text by which a call is refused, or those of what it doubts."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        try:
-            call()
-        except (ValueError, RuntimeError) as error:
-            return f"{type(error).__name__}: {error}"
-    doubts = [one for one in caught if one.category.__module__.startswith("stiction")]
-    return sorted({f"{one.category.__name__}: {one.message}" for one in doubts})
-
-
-def table_of(calls: Calls, rows: dict[str, list[Callable[[], Any]]]) -> None:
-    """Add what each call of a table says to those that are recorded, a record for each list."""
-
-    def each(some: list[Callable[[], Any]]) -> dict[str, Any]:
-        return {str(number): said(call) for number, call in enumerate(some)}
-
-    for name, some in rows.items():
-        calls[name] = Call(partial(each, some), "read beside the rule that refuses", CLOSE)

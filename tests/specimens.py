@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from setups import beta_strength
 
 import stiction as st
 
@@ -35,6 +36,5 @@ def crooked(
 
 def rough(problem: st.Problem, seed: int, samples: int = 1, length: float = 4e-3) -> np.ndarray:
     """Strengths of a few patches on the specimen."""
-    marginal = st.Beta(alpha=1.5, beta=3.0, low=0.68e6, high=1.61e6)
-    field = st.RandomField(marginal, st.PowerLawSpectrum(correlation_length=length))
+    field = beta_strength(length, 0.68e6, 1.61e6)
     return field.sample(problem.interface, samples=samples, seed=seed)

@@ -34,14 +34,14 @@ NEAREST = {
     "ensemble": "runs fields store ensemble study progress own_method reliability",
     "equilibrium": "lines planes specimens crooked equilibrium plane_equilibrium instability"
     " friction_laws",
-    "friction": "lines ruptures mistakes* friction_laws friction_coefficients crooked"
+    "friction": "lines ruptures mistakes* friction_laws crooked"
     " dynamics_properties",
-    "inference": "inference* mistakes* pictures fit_* agreement joined",
+    "inference": "inference* mistakes* pictures fit_* joined",
     "jit": "cache architecture own_method",
     "plot": "pictures runs",
     "problem": "refusals mistakes* specimens bad_input crooked criterion equilibrium profiles"
-    " friction_coefficients",
-    "profiles": "profiles mistakes* refusals plane_gaps crooked fit_field",
+    " study",
+    "profiles": "profiles mistakes* refusals crooked fit_field",
     "random": "fields refusals conditional* random_interface marginal_families plane_fields"
     " reliability",
     "reliability": "reliability* failure_run runs pictures",

@@ -26,7 +26,7 @@ METHODS = [{"type": "local_criterion"}, {"type": "equilibrium"}]
 STUDY = st.Study.from_dict(
     small_study(
         nodes=64,
-        ensemble={"samples": 60, "seed": 3, "keep": ["strength"]},
+        ensemble={"samples": 40, "seed": 3, "keep": ["strength"]},
         sweep=[lengths(8e-3, 12e-3)[0] | {"method": METHODS}],
     )
 )
@@ -66,13 +66,12 @@ def begin(folder):
     return writer
 
 
-@pytest.mark.parametrize("writers", [1, 2])
-def test_writers_killed_at_random(tmp_path, fuzz, reference, writers):
-    """Each writer is killed and begins again until one ends by itself; then a new run begins."""
+def test_writers_killed_at_random(tmp_path, fuzz, reference):
+    """One or two are killed and begin again until one ends by itself; then a new run begins."""
     chance, kills, runs = random.Random(fuzz.seed), 0, 0
     while kills < fuzz.count:
         folder, seconds = tmp_path / f"run-{runs}", 0.2
-        running = [begin(folder) for _ in range(writers)]
+        running = [begin(folder) for _ in range(1 + runs % 2)]
         while running:
             seconds *= 1.05  # longer on a machine so busy that nothing is stored meanwhile
             assert seconds < 20.0, "no writer comes to its end"
@@ -145,8 +144,8 @@ def test_damage_anywhere(tmp_path, fuzz, reference):
         if kind == "gone":
             victim.unlink()
         elif victim.name == "study.json" and not same:
-            with pytest.warns(UserWarning, match=r"study\.json.* is damaged"):
-                assert st.open_run(folder).dataset().identical(reference)
+            with pytest.raises(st.RunError, match="damaged"):
+                st.open_run(folder)
         elif not same:
             assert len(st.open_run(folder).status().damaged) == 1
         assert write(folder).identical(reference), (victim.name, kind, at)

@@ -27,10 +27,7 @@ PLAIN = small_study(
     weakening_rate=0.1e12,
     correlation_length=0.02,
     ensemble={"samples": 20, "seed": 11, "first": 0},
-    sweep=[
-        *lengths(0.02, 0.03),
-        {"problem.interface.length": [0.1, 0.2]},
-    ],
+    sweep=[*lengths(0.02, 0.03), {"problem.interface.length": [0.1, 0.2]}],
 )
 PLAIN["problem"]["load"] = {"profile": 1.0, "initial_stress": 0.0, "normal_pressure": 5e6}
 PLAIN["random"]["strength"]["mean_mode"] = True

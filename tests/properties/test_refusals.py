@@ -47,12 +47,13 @@ FIELDS = {  # an object, where it stands in a study, and what its fields may hol
     st.PiecewiseWeakening(slip=(0.4, 1.0), strength=(0.3, 0.0), fracture_energy=2.0): ("", {
         "fracture_energy": ANY,
     }),
-    st.Platen(stiffness=1e7): ("", {"stiffness": "[0, inf]"}),
+    st.Platen(stiffness=1e7): ("", {"stiffness": "[0, inf]", "mass": "[0, inf)"}),
     st.Pusher(height=0.01, width=0.004, stiffness=1e7): ("", {
         "height": ANY, "width": ANY, "side": ("left", "right", "both"), "stiffness": "[0, inf]",
     }),
     st.Blocks(height=0.05, thickness=0.01): ("", {
         "height": ANY, "thickness": ANY, "pressing": ("frictionless", "glued"),
+        "quality_factor": "[0.01, inf]",
     }),
     st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6): ("random.strength.marginal", {
         "alpha": ANY, "beta": ANY, "low": SIZE, "high": SIZE,

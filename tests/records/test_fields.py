@@ -7,6 +7,7 @@ import scipy.stats
 import xarray as xr
 from crooked import LINE, PLANE, in_mm, uneven
 from recording import Calls, compared
+from setups import EXACT, LOCAL, make_problem
 
 import stiction as st
 
@@ -181,6 +182,30 @@ def an_ensemble_by_the_local_criterion_with_its_pilot():
     )
     field = st.RandomField(MARGINALS["beta"], SPECTRA["cut"])
     return st.monte_carlo(problem, field, method=st.LocalCriterion(), samples=700, seed=1)
+
+
+@calls("others are selected: the samples below four nodes, and below the initial stress")
+def ensembles_in_which_samples_are_steep_or_refused():
+    solid, found = st.Solid(1e9, 0.3, 1200.0), {}
+    law = st.LinearWeakening(critical_slip=5.93e-6, residual_strength=1e5)
+    random = st.RandomField(st.Lognormal(mean=1.2e6, cv=0.35), st.PowerLawSpectrum(0.01))
+    for initial in (7e4, 5.2e5):
+        load = st.Load(initial_stress=initial)
+        problem = st.Problem(solid, st.Interface(0.064, 64), law, load)
+        found[str(initial)] = st.monte_carlo(problem, random, method=EXACT, samples=20)
+    return found
+
+
+@calls("strength over pressure is the coefficient that was drawn")
+def an_ensemble_of_coefficients_under_a_random_pressure():
+    coefficient = st.RandomField(
+        st.Lognormal(mean=0.5, cv=0.15), SPECTRA["cut"], of="friction_coefficient"
+    )
+    pressure = st.RandomField(st.Gamma(mean=2.1e6, cv=0.1), SPECTRA["gauss"])
+    random = st.RandomInterface(strength=coefficient, normal_pressure=pressure)
+    problem = make_problem(96, 0.047, weakening_rate=2.3e11, residual_ratio=0.3)
+    kept = {"samples": 3, "seed": 1, "keep": ["strength", "normal_pressure"]}
+    return st.monte_carlo(problem, random, method=LOCAL, **kept)
 
 
 @calls("order statistics and scipy, tests/oracle/test_statistics_estimates.py")

@@ -7,7 +7,7 @@ import scipy.stats
 import xarray as xr
 from crooked import in_mm
 from recording import Calls, compared
-from setups import LOCAL, make_problem
+from setups import LOCAL, beta_strength, make_problem
 from specimens import crooked
 
 import stiction as st
@@ -31,10 +31,7 @@ RECORDS = [record(180, 0.036, 1, 9e4), in_mm(record(130, 0.026, 2, -7e4))]
 PEAKS = np.array([7.31e5, 7.55e5, 7.02e5, 7.74e5, 7.18e5, 7.43e5])
 LENGTHS = {0.031: PEAKS[:4], 0.062: 0.98 * PEAKS[2:]}
 PROBLEM = make_problem(96, 0.031, weakening_rate=0.42e12, load=st.Load(normal_pressure=2.3e6))
-BOUNDED = st.RandomField(
-    st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
-    st.PowerLawSpectrum(2.3e-3, truncation=2.5),
-)
+BOUNDED = beta_strength(2.3e-3, truncation=2.5)
 
 
 def inferred(peaks=PEAKS, problem=PROBLEM, field=BOUNDED, **more):
@@ -77,9 +74,58 @@ def a_fit_to_a_record_with_an_outlier():
     return {name: [one.distance, one.score, one.weight] for name, one in found.families.items()}
 
 
+def labelled(values, spacing=2e-4):
+    x = spacing * np.arange(len(values))
+    return xr.DataArray(values, {"x": x}, ("x",), attrs={"units": "Pa"})
+
+
+def third(marginal, spectrum, seed, noise, count=200):
+    """The first third of a sample, so that it does not repeat itself."""
+    field = st.RandomField(marginal, spectrum, mean_mode=True)
+    values = field.sample(st.Interface(6e-4 * count, 3 * count), seed=seed)[0, :count]
+    return labelled(values + noise * np.random.default_rng(seed).standard_normal(count))
+
+
+@calls("no noise found is not no noise; bounds lie outside of the values", close=2e-2)
+def fits_of_records_with_flaws():
+    """Specimens of different strength, or two, or one twice; noise that is not found; bounds."""
+    wide, narrow = (st.Lognormal(mean=1e6, cv=cv) for cv in (0.3, 0.2))
+    whole = third(narrow, st.ExponentialSpectrum(1e-3), 5, 0.0)
+    fine = st.ExponentialSpectrum(2e-3, power_kept=0.9999)  # the usual end hides such noise
+    cut = st.PowerLawSpectrum(2e-3, exponent=2.0, power_kept=0.99)  # less than its family has
+    beta = st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6)
+    power = st.PowerLawSpectrum(2e-3, exponent=1.0, power_kept=0.99)
+    specimens = [factor * whole for factor in (1.0, 0.8, 1.2)]
+    two = [whole[:100], labelled(1.6 * whole.values[100:])]
+    family = {"type": "power_law", "exponent": 2.0}
+    found = {}
+    for name, records, options in (
+        ("different", [labelled(one.values) for one in specimens], {}),
+        ("twice", [whole, labelled(whole.values[::-1]), whole], {}),
+        ("two", two, {"between": True}),
+        ("none", third(wide, fine, 6, 3e4), {"noise": True}),
+        ("less", third(narrow, cut, 1, 2e4, 300), {"noise": True, "spectrum": family}),
+        ("bounds", third(beta, power, 3, 0.0), {"marginal": "beta", "spectrum": "power_law"}),
+        ("uniform", whole, {"marginal": "uniform"}),
+    ):
+        given = {"marginal": "lognormal", "spectrum": "exponential", "noise": False}
+        fit = st.fit_field(records, **given | {"bootstrap": 20} | options)
+        found[name] = {
+            "interval": fit.interval,
+            "p": fit.p_values,
+            "parameters": fit.parameters,
+        }
+        if name == "two":  # a mean of two scatters as a specimen does
+            members = fit.interfaces(40, seed=4)
+            found["members"] = [
+                [one.strength.mean, one.between["strength"].cv] for one in members
+            ]
+    return found
+
+
 @calls(RECOVERED, close=2e-2)
 def a_fit_to_a_map_of_known_anisotropy():
-    grid = st.Interface((0.014, 0.011), (22, 18))
+    grid = st.Interface((0.011, 0.009), (16, 14))
     rows = dataclasses.replace(FIELD, anisotropy=1.6).sample(grid, samples=1, seed=6)
     found = st.fit_field(
         rows, grid, marginal="weibull", anisotropy=1.4, noise=0.0, bootstrap=20
@@ -128,6 +174,34 @@ def parameters_from_peaks_in_newtons_and_two_lengths():
     prior = {"problem.friction.weakening_rate": (2.5e11, 7.5e11)}
     found = inferred(forces, problem, unit="N", prior=prior, seed=0)
     return {"str": str(found), "at": repr(found.at(7)[0].friction)}
+
+
+@calls("stresses on the one area of a node of the prior, where both are the same", close=1e-5)
+def forces_whose_area_is_unknown():
+    """Of a thickness, a width and two lengths, and a length, beside the marginal's scale."""
+    weibull = dataclasses.replace(BOUNDED, marginal=scipy.stats.weibull_min(4.0, scale=1e6))
+    wide = {"interface": st.Interface(0.031, 96, width=0.011)}
+    plate = {"specimen": st.Blocks(height=0.03, thickness=6e-3)}
+    both, one = {0.031: PEAKS[:4], 0.062: PEAKS[2:]}, {0.031: PEAKS}
+    found = {}
+    for key, changes, (low, high), groups in (
+        ("specimen.thickness", plate, (4e-3, 10e-3), one),
+        ("interface.width", wide, (7e-3, 16e-3), both),
+        ("interface.length", wide, (0.029, 0.036), one),
+    ):
+        problem = dataclasses.replace(PROBLEM, **changes)
+        forces = {length: 0.011 * length * peaks for length, peaks in groups.items()}
+        prior = {f"problem.{key}": (low, high), "marginal.scale": (0.6e6, 1.6e6)}
+        given = {"prior": prior, "samples": 100, "unit": "N", "load_cell_error": 2.0}
+        posterior = inferred(
+            forces if len(forces) > 1 else forces[0.031], problem, weibull, **given
+        )
+        at = np.stack([np.full(3, low + (high - low) * 9 / 24), [0.9e6, 1.05e6, 1.3e6]], axis=1)
+        found[key] = [
+            posterior.log_likelihood(at),
+            *(one.mean() for one in posterior.predicted),
+        ]
+    return found
 
 
 @calls("weights of closed likelihoods, tests/user/test_joined.py", close=1e-5)
@@ -182,6 +256,20 @@ def what_tests_would_tell():
         samples=200,
         seed=2,
     )
+
+
+@calls("log(399 MPa over a third of the scatter) to 1.5; the same in kPa and in kN", close=1e-5)
+def designs_whose_posteriors_lie_between_points():
+    """A prior so wide that one posterior of ten lies below the first point of any fixed grid."""
+    field = dataclasses.replace(BOUNDED, marginal=scipy.stats.weibull_min(4.0, 1e6, 1e5))
+    wide = dataclasses.replace(PROBLEM, interface=st.Interface(0.031, 96, width=0.011))
+    return [
+        st.design_of_tests(
+            wide, field, prior={"marginal.loc": (1e6, high)}, designs={"few": 5},
+            method=LOCAL, samples=100, repetitions=10, seed=141, **given,
+        )
+        for high, given in ((400e6, {}), (2e6, {"unit": "kN", "load_cell_error": 3e-3}))
+    ]  # fmt: skip
 
 
 @calls(RECOVERED, close=1e-5)

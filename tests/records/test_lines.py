@@ -3,7 +3,7 @@
 import dataclasses
 
 import numpy as np
-from crooked import LINE, LINE_STRENGTH, uneven
+from crooked import LINE, TWO, of_width, uneven
 from recording import Calls, compared
 from setups import EXACT, LOCAL, make_problem
 
@@ -11,9 +11,6 @@ import stiction as st
 
 calls = Calls()
 INTERFACE = LINE.interface
-TWO = np.stack(
-    [LINE_STRENGTH, 1.04 * np.roll(LINE_STRENGTH, 31) - 2e4 * uneven(INTERFACE, seed=8)]
-)
 ROUGH = 1.15e6 + 5.2e5 * uneven(INTERFACE, seed=21)
 """A strength of a range so wide that instabilities are arrested."""
 ORACLE = "linear programme and sums over patches, tests/oracle/test_crooked.py"
@@ -30,18 +27,12 @@ def barred(interface, low=4.2e5):
     return np.where(wall, 3.3e6, np.where(np.abs(x - 0.31) <= 0.09, weak, dip))
 
 
-def of_width(problem, width=0.0123):
-    wide = dataclasses.replace(problem.interface, width=width)
-    return dataclasses.replace(problem, interface=wide)
-
-
 def law(kind, **more):
     about = {
         "residual_strength": 1.7e5 + 4e4 * uneven(INTERFACE, seed=4),
         "weakening_rate": 2.3e11,
     }
-    about |= more
-    return dataclasses.replace(LINE, friction=kind(**about))
+    return dataclasses.replace(LINE, friction=kind(**about | more))
 
 
 @calls(ORACLE)
@@ -51,14 +42,14 @@ def local_criterion_of_two_strengths():
 
 @calls("closed form of the mean stress; " + ORACLE)
 def local_criterion_with_forces_in_mode_three():
-    problem = dataclasses.replace(of_width(LINE), mode="III")
+    problem = dataclasses.replace(of_width(LINE, 0.0123), mode="III")
     return st.onset(problem, TWO, method=LOCAL)
 
 
 @calls(ORACLE + "; sensitivity by difference quotients, tests/exact/test_equilibrium.py")
 def exact_onsets_with_slip_sensitivity_and_forces():
     method = st.Equilibrium(slip=True, sensitivity=True)
-    return st.onset(of_width(LINE), TWO, method=method)
+    return st.onset(of_width(LINE, 0.0123), TWO, method=method)
 
 
 @calls(EVENTS)
@@ -70,13 +61,8 @@ def arrested_events_of_two_strengths():
 @calls(EVENTS)
 def a_law_of_two_pieces_with_critical_slip_along_x():
     slip = 2.6e-6 + 7e-7 * uneven(INTERFACE, seed=12)
-    problem = law(
-        st.PiecewiseWeakening,
-        weakening_rate=None,
-        critical_slip=slip,
-        slip=(0.4, 1.0),
-        strength=(0.35, 0.0),
-    )
+    pieces = {"slip": (0.4, 1.0), "strength": (0.35, 0.0)}
+    problem = law(st.PiecewiseWeakening, weakening_rate=None, critical_slip=slip, **pieces)
     return st.onset(problem, TWO, method=st.Equilibrium(events=2, slip=True))
 
 
@@ -86,6 +72,15 @@ def a_law_that_rests_and_steepens():
         st.PiecewiseWeakening, slip=(0.2, 0.5, 0.8, 1.0), strength=(0.7, 0.69, 0.15, 0.0)
     )
     return st.onset(problem, TWO, method=st.Equilibrium(sensitivity=True))
+
+
+@calls("difference quotients of 20 Pa, to 1e-7", close=1e-5)
+def sensitivity_of_a_law_of_two_pieces():
+    """Of so wide a range that weak nodes pass corners before the first instability."""
+    rate = {"weakening_rate": 2.9e11, "slip": (0.05, 1.0), "strength": (0.8, 0.0)}
+    problem = make_problem(96, 0.037, friction=st.PiecewiseWeakening(**rate))
+    rough = 1e5 + 3.0 * (TWO - TWO.min(axis=1, keepdims=True))
+    return st.onset(problem, rough, method=st.Equilibrium(sensitivity=True, slip=True))
 
 
 @calls(EVENTS + ", and the same if no patch counts as too long to be stopped")
@@ -132,7 +127,7 @@ def fracture_energy_along_x_and_residual_ratio():
 @calls("states checked as equilibria, tests/exact/test_equilibrium.py")
 def a_path_through_an_arrested_event():
     loads = [1.1e5, 2.9e5, 3.6e5, 4.1e5, 4.6e5, 5.6e5, 9e5]
-    return st.equilibrium_path(of_width(LINE), barred(INTERFACE), loads)
+    return st.equilibrium_path(of_width(LINE, 0.0123), barred(INTERFACE), loads)
 
 
 @calls("weighted mean over each patch; " + ORACLE)
@@ -157,13 +152,10 @@ def energy_release_rate_and_griffith_length():
 
 @calls("quadrature of the exact correlation, tests/exact/test_statistics_moments.py")
 def nucleation_statistics():
-    field = st.RandomField(
-        st.Weibull(mean=1.05e6, cv=0.17, low=4e5),
-        st.ExponentialSpectrum(2.3e-3, power_kept=0.97),
-    )
-    return st.theory.nucleation_statistics(
-        make_problem(160, 0.043, weakening_rate=3.1e11), field
-    )
+    spectrum = st.ExponentialSpectrum(2.3e-3, power_kept=0.97)
+    field = st.RandomField(st.Weibull(mean=1.05e6, cv=0.17, low=4e5), spectrum)
+    problem = make_problem(160, 0.043, weakening_rate=3.1e11)
+    return st.theory.nucleation_statistics(problem, field)
 
 
 @calls(READ + ": excess * exp(-distance/decay), 1 + amplitude cos")
@@ -182,6 +174,7 @@ def loads_with_an_edge_and_a_gradient():
 @calls(READ + ": pi/4 a_k and Bessel sums; h_n = 2 lambda_0 G*/W")
 def moduli_and_lengths_of_solids():
     found = {}
+    names = [f"{one}_wave_speed" for one in ("shear", "dilatational", "rayleigh")]
     for plane, nu, mode in (
         ("strain", 0.17, "II"),
         ("stress", 0.41, "II"),
@@ -189,20 +182,15 @@ def moduli_and_lengths_of_solids():
     ):
         solid = st.Solid(youngs_modulus=3.1e9, poisson_ratio=nu, density=1190.0, plane=plane)
         problem = make_problem(64, 0.05, solid=solid, mode=mode, weakening_rate=2.1e11)
-        names = (
-            "shear_modulus",
-            "shear_wave_speed",
-            "dilatational_wave_speed",
-            "rayleigh_wave_speed",
-        )
         found[plane, mode] = {
-            name: getattr(solid, name) for name in names if hasattr(solid, name)
-        }
-        found[plane, mode] |= {
-            "modulus": problem.effective_modulus,
-            "length": problem.nucleation_length,
-        }
-    return found
+            name: getattr(solid, name)
+            for name in ("shear_modulus", *names)
+            if hasattr(solid, name)
+        } | {"modulus": problem.effective_modulus, "length": problem.nucleation_length}
+    late = st.PiecewiseWeakening(weakening_rate=5e9, slip=(0.5, 1.0), strength=(0.99, 0.0))
+    problem = make_problem(512, 0.05, friction=late)
+    nodes = problem.nodes_in_nucleation_length(5e9)
+    return found | {"that of the steepest slope": [problem.nucleation_length, *nodes]}
 
 
 test_outputs_are_as_recorded = compared(calls, __file__)

@@ -1,18 +1,15 @@
 """Recorded refusals and doubts of profiles, tables, studies, fits and laws of others."""
 
-import contextlib
 import dataclasses
 import os
 import struct
-import tempfile
 from collections import namedtuple
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
-from recording import Calls, compared
-from refusals import table_of
+from recording import Calls, compared, inside, table_of
 from setups import LOCAL, make_problem
 from small_study import lengths, small_study
 
@@ -43,8 +40,8 @@ def onset(strength, system=SYSTEM, **options):
 
 
 def read(text, name="p.csv", interface=LINE, **options):
-    """What is read from a file of its own, whose messages name no folder."""
-    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+    """What is read from a file of its own."""
+    with inside():
         Path(name).write_bytes(text if isinstance(text, bytes) else text.encode())
         return st.read_profile(name, interface=interface, **options)
 
@@ -58,14 +55,14 @@ def binary(content, name="p.npy"):
 
 
 def peaks(text):
-    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+    with inside():
         Path("peaks.csv").write_text(text)
         return st.read_peaks("peaks.csv")
 
 
 def irregular(name):
     """What is no file of some size: a pipe, a device, a folder, a terabyte, nothing."""
-    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+    with inside():
         if name.startswith("pipe"):  # opening it in the ordinary way would wait for ever
             os.mkfifo(name)
         elif name.startswith("zero"):
@@ -110,7 +107,7 @@ def studied(**changes):
         for name in above:
             table = table.setdefault(name, {})
         table[last] = value
-    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+    with inside():
         rows = [f"{1e3 * x};{1e-3 * (1e5 + 1e6 * x)}" for x in X[:64]]
         Path("tau_r.csv").write_text("\n".join(["x (mm);tau_r (kPa)", *rows]))
         Path("load.csv").write_text("x (m);profile\n0;1\n0.05;1.1\n")
@@ -173,23 +170,8 @@ def logarithm(fraction):
     return -np.log(fraction) if fraction > 0.0 else np.inf
 
 
-def plateau(law, u):
-    """Falls to a half, rests, and falls three times as steeply to zero at u = 1."""
-    if u < 0.5:
-        return 1.0 - u, 1.0
-    if u < 5.0 / 6.0:
-        return 0.5, 0.0
-    return (3.0 * (1.0 - u), 3.0) if u < 1.0 else (0.0, 0.0)
-
-
-def plateau_area(u):
-    u = np.minimum(u, 1.0)
-    first, last = np.minimum(u, 0.5), np.maximum(u - 5.0 / 6.0, 0.0)
-    return first - first**2 / 2 + 0.5 * (u - first) - 1.5 * last**2
-
-
-def plateau_slip(fraction):
-    return 1.0 - fraction if fraction >= 0.5 else 1.0 - fraction / 3.0
+def exponential(law, u):
+    return np.exp(-u), np.exp(-u)
 
 
 def exponential_area(u):
@@ -208,20 +190,15 @@ def endless(law, u):
     return 1.0 / (1.0 + u), (1.0 + u) ** -2
 
 
-def straight(fraction):
-    return 1.0 - fraction
-
-
-PLATEAU = own_law(plateau, plateau_slip, plateau_area)
 LAWS = [
     (hump, lambda f: 1.0 - 0.8 * f / 1.1, np.asarray, 0.1),
     (flat, lambda f: np.arccos(2.0 * f - 1.0) / np.pi, np.asarray, 0.0),
     (endless, lambda f: 1.0 / f - 1.0 if f else np.inf, np.log1p),
-    (lambda law, u: (1.0 - u, 1.0 / (1.0 - u)), straight),
-    (plateau, plateau_slip, plateau_area, 1.0, "scale"),
+    (lambda law, u: (1.0 - u, 1.0 / (1.0 - u)), lambda f: 1.0 - f),
+    (exponential, logarithm, exponential_area, 1.0, "scale"),
     (lambda law, u: (0.5 * np.exp(-u), 0.5 * np.exp(-u)), logarithm),
-    (plateau, lambda f: f),
-    (plateau, lambda f: 0.9 * plateau_slip(f), plateau_area),
+    (exponential, logarithm),
+    (exponential, lambda f: 0.9 * logarithm(f), exponential_area),
     (lambda law, u: (np.exp(-u), 2.0 * np.exp(-u)), logarithm, exponential_area, 2.0),
 ]
 
@@ -229,7 +206,7 @@ OWN = [own_law(*law) for law in LAWS]
 
 
 @model
-class Sketch(type(PLATEAU)):
+class Sketch(type(OWN[-1])):
     """A law without a compiled strength."""
 
     parameters = ()
@@ -239,17 +216,15 @@ def with_law(law):
     return make_problem(512, 0.05, friction=law)
 
 
+SMALL_PLANE = make_problem((24, 20), (0.023, 0.0164), weakening_rate=0.28e12)
 TWO = {"problem.interface.nodes": [128, 256]}
 # fmt: off
 table_of(calls, {
     "units and names": [
-        lambda: onset(labelled(units="um")),
-        lambda: onset(labelled(units="mpa")),
-        lambda: onset(labelled(units="1")),
-        lambda: onset(labelled(units="m/s/s/")),
-        lambda: onset(labelled(units="MPa999")),
+        *(partial(onset, labelled(units=one)) for one in ("um", "mpa", "1", "m/s/s/")),
         lambda: onset(xr.DataArray(np.ones((NODES, NODES)), dims=("a", "b"))),
         lambda: onset({"strength": STRENGTH, "friction_coefficient": 0.1 * STRENGTH}),
+        lambda: st.fit_field(STRENGTH, LINE, quantity="strenght"),
         lambda: st.read_profile(labelled().to_dataset(name="z")),
         lambda: st.read_profile(
             labelled().to_dataset(name="strength").assign(tau_i=labelled()), x=0, value=1),
@@ -259,14 +234,10 @@ table_of(calls, {
             normal_pressure=xr.DataArray(STRENGTH, dims="time"))),
     ],
     "places": [
-        lambda: onset(labelled(x=np.linspace(0.0, 0.1, NODES))),
-        lambda: onset(labelled(x=X * 0.99)),
-        lambda: onset(labelled(x=X * 1e3)),
-        lambda: onset(labelled(x=np.r_[X[0], X[0], X[2:]])),
+        *(partial(onset, labelled(x=one)) for one in (
+            np.linspace(0.0, 0.1, NODES), X * 1e3, np.r_[X[0], X[0], X[2:]],
+            0.1 * (X / 0.1) ** 1.1, X + 0.05 / NODES, X - 0.03 / NODES)),
         lambda: onset(labelled(np.r_[STRENGTH, 2e6], np.r_[X, 0.1])),
-        lambda: onset(labelled(x=2.0 * X)),
-        lambda: onset(labelled(x=0.1 * (X / 0.1) ** 1.1)),
-        lambda: onset(labelled(x=X + 0.05 / NODES)),
         lambda: onset(xr.DataArray(STRENGTH[:60], dims="x")),
         lambda: onset(labelled(STRENGTH[::2], X[::2])),
         lambda: dataclasses.replace(SYSTEM, load=st.Load(profile=labelled(1.0 + X, X * 0.99))),
@@ -278,7 +249,6 @@ table_of(calls, {
     ],
     "gaps": [
         lambda: onset(labelled(np.delete(STRENGTH, 1), np.delete(X, 1))),
-        lambda: onset(without(3)),
         lambda: st.read_profile(labelled(without(3)), interface=LINE, gaps="skip"),
         lambda: onset(labelled(STRENGTH[:63], X[:63]), gaps="fill"),
         lambda: onset(without(*range(80, 83)), gaps="fill"),
@@ -318,8 +288,10 @@ table_of(calls, {
         lambda: st.read_profile(MAP.values.T, interface=PLANE),
         lambda: st.read_profile(
             MAP.assign_coords(x=np.where(MAP.x == 0.0, np.nan, MAP.x)), interface=PLANE),
-        lambda: st.read_profile(MAP.where(MAP.y > 0.001), interface=PLANE),
-        lambda: st.read_profile(MAP.where(MAP.y > 0.001), interface=PLANE, gaps="fill"),
+        *(partial(st.read_profile, MAP.where(MAP.y > 0.001), interface=PLANE, **one)
+          for one in ({}, {"gaps": "fill"})),
+        *(partial(st.onset, SMALL_PLANE, one, method=LOCAL)
+          for one in (np.full((20, 24), 1e6), np.full((24, 20), np.nan))),
     ],
     "studies": [
         lambda: studied(problem__solid__densty=1.0),
@@ -333,6 +305,8 @@ table_of(calls, {
         lambda: studied(random__between={"strength": BETWEEN | {"mean": 1.2}}),
         lambda: studied(random__strength__given={"profile": "tau_r.csv", "noise": 1e3},
                         random__between={"strength": BETWEEN}),
+        lambda: studied(problem__specimen={"height": 0.04},
+                        method={"type": "rupture", "loading_rate": 3e8}),
         lambda: studied(problem__load={"normal_pressure": 2e6},
                         random__strength__of="friction_coeficient"),
     ],
@@ -345,6 +319,7 @@ table_of(calls, {
         swept({"ensemble.samples": [10, 20]}),
         swept({"ensemble.seed": list(range(1000))}, {"x": [1] * 1000}),
         swept({"random.correlation.strength.residual_strenght": [0.1]}),
+        swept({"problem.solid.poisson_ratio": [0.2, 0.7]}, {"mehtod": [1, 2]}),
         lambda: studied(sweep={LENGTH: [1e-3], "ensemble.seed": [1]}),
         lambda: studied(sweep=[TWO], ensemble={"samples": 3, "keep": ["strength"]}),
     ],
@@ -355,6 +330,10 @@ table_of(calls, {
         uncertain(uncertain={"correlation_length": [1e-3, 2e-3]}, sweep=[{
             "random.strength.spectrum": [POWER, POWER | {"correlation_length": 7e-3}]}]),
         uncertain(uncertain=SOME, random=[small_study()["random"]] * 2),
+        uncertain(uncertain=SOME, sweep=[{"random.strength.marginal.low": [5e5, 6e5]}]),
+        uncertain(uncertain=SOME, sweep=[{"random.strength.marginal": [
+            {"type": "beta", "alpha": 1.5, "beta": 3.0, "low": 6e5, "high": one}
+            for one in (1.6e6, 1.7e6)]}]),
     ],
     "fits": [
         lambda: st.fit_field(VALUES),
@@ -378,7 +357,7 @@ table_of(calls, {
         *(partial(with_law, law) for law in OWN),
         *(partial(st.PiecewiseWeakening.from_law, law, 32) for law in OWN),
         lambda: with_law(Sketch(weakening_rate=0.5e12)),
-        lambda: st.onset(with_law(PLATEAU), np.full(512, 1e6), method=LOCAL),
+        lambda: with_law(own_law(exponential, logarithm, exponential_area)),
     ],
 })
 if hasattr(os, "mkfifo"):

@@ -5,9 +5,9 @@ import dataclasses
 import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
-from crooked import LINE, LINE_STRENGTH, PLANE, PLANE_STRENGTH, uneven
+from crooked import LINE, PLANE, PLANE_STRENGTH, TWO, of_width
 from recording import Calls, compared, filmed
-from setups import EXACT, LOCAL, make_problem
+from setups import EXACT, LOCAL, beta_strength, make_problem
 from small_study import lengths, small_study
 from specimens import crooked, rough
 
@@ -15,13 +15,7 @@ import stiction as st
 
 calls = Calls()
 DRAWN = "the same numbers in the records of what is drawn; looked at"
-TWO = np.stack(
-    [LINE_STRENGTH, 1.04 * np.roll(LINE_STRENGTH, 31) - 2e4 * uneven(LINE.interface, seed=8)]
-)
-FIELD = st.RandomField(
-    st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
-    st.PowerLawSpectrum(2.3e-3, truncation=2.5),
-)
+FIELD = beta_strength(2.3e-3, truncation=2.5)
 EXACTLY = st.Equilibrium(slip=True, sensitivity=True)
 JOINT = crooked(nodes=64, drive=st.Pusher(height=0.008, width=0.004))
 
@@ -30,12 +24,6 @@ def plain(problem):
     """The problem without profiles of its own."""
     friction = st.LinearWeakening(weakening_rate=0.28e12, residual_strength=1.9e5)
     return dataclasses.replace(problem, friction=friction, load=st.Load(normal_pressure=2.9e6))
-
-
-def of_width(problem):
-    return dataclasses.replace(
-        problem, interface=dataclasses.replace(problem.interface, width=0.012)
-    )
 
 
 @calls(DRAWN)
@@ -83,7 +71,9 @@ def densities_and_quantiles():
     swept = st.Study.from_dict(study).run(progress=False)
     many = {"method": LOCAL, "samples": 60, "seed": 2, "pilot": False}
     one = st.monte_carlo(plain(LINE), FIELD, **many)
-    wide = st.monte_carlo(of_width(dataclasses.replace(LINE, load=st.Load())), FIELD, **many)
+    wide = st.monte_carlo(
+        of_width(dataclasses.replace(LINE, load=st.Load()), 0.012), FIELD, **many
+    )
     weak = one.map(lambda values: 0.01 * values, keep_attrs=True)
     return {
         "one": st.plot.monte_carlo(one),
@@ -116,7 +106,7 @@ def specimens_and_their_events():
 @calls(DRAWN, close=1e-4)
 def failure_curves():
     options = {"method": LOCAL, "smallest": 1e-2, "target_cv": 0.4, "seed": 3}
-    curve = st.failure_curve(of_width(plain(LINE)), FIELD, **options)
+    curve = st.failure_curve(of_width(plain(LINE), 0.012), FIELD, **options)
     without = curve.drop_vars("force")
     return {
         "curve": st.plot.failure_curve(curve),

@@ -1,11 +1,10 @@
 """Recorded outputs: planes where nothing is symmetric."""
 
 import dataclasses
-import tempfile
 
 import numpy as np
 from crooked import PLANE, PLANE_STRENGTH, across_the_seam, uneven
-from recording import Calls, compared, filmed
+from recording import Calls, compared, filmed, inside
 from setups import LOCAL, beta_strength, make_problem
 
 import stiction as st
@@ -62,6 +61,20 @@ def a_law_of_two_pieces():
     return st.onset(problem, TWO[1], method=st.Equilibrium())
 
 
+@calls("more than what weakens, and no sensitivity where the residual is reached", close=1e-4)
+def strength_that_hardly_weakens():
+    near = dataclasses.replace(PLANE.friction, residual_strength=0.97 * PLANE_STRENGTH)
+    method = st.Equilibrium(slip=True, sensitivity=True)
+    held = np.where(uneven(INTERFACE, seed=9) > 0.8, 2e6, 1e5)
+    profiles = {"strength": PLANE_STRENGTH, "residual_strength": held}
+    return {
+        "near": st.onset(
+            dataclasses.replace(PLANE, friction=near), PLANE_STRENGTH, method=method
+        ),
+        "constant": st.onset(PLANE, profiles, method=st.Equilibrium()),
+    }
+
+
 @calls("states checked as equilibria, tests/properties/test_plane_equilibrium.py", close=1e-4)
 def a_path():
     return st.equilibrium_path(PLANE, TWO[0], [2e5, 4.3e5, 5.1e5, 2e6])
@@ -115,7 +128,7 @@ def a_rupture_with_stations():
     )
     method = st.Rupture(loading_rate=6e8, kernel_tolerance=1e-5)
     found = st.simulate_rupture(problem, strength, method=method, save=save)
-    with tempfile.TemporaryDirectory() as folder:
+    with inside() as folder:
         options = {"origin": (0.012, 0.011), "normal_stress": -5e6, "benchmark": "TPV5"}
         files = st.external.write_scec(found, folder, **options)
         written = {path.name: path.read_text().split("\n") for path in files}

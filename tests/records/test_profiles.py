@@ -1,6 +1,7 @@
 """Recorded outputs: what is read from a laboratory's tables, files and arrays."""
 
-import tempfile
+import dataclasses
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +17,11 @@ from crooked import (
     as_measured,
     write_table,
 )
-from recording import Calls, compared, refusal
+from recording import Calls, compared, inside, refusal
 from setups import EXACT, LOCAL
 
 import stiction as st
+from stiction.base.units import parse
 from stiction.study.export import export
 
 calls = Calls()
@@ -44,10 +46,9 @@ TABLES = {
 
 
 def table(text, **options):
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "scan.csv"
-        path.write_text(text, encoding="utf-8")
-        return st.read_profile(path, **options)
+    with inside():
+        Path("scan.csv").write_text(text, encoding="utf-8")
+        return st.read_profile("scan.csv", **options)
 
 
 @calls(BACK)
@@ -99,9 +100,9 @@ def friction_coefficients_and_pressures():
 def heights_of_a_matrix_without_a_unit():
     heights = 1e-3 * np.cos(np.arange(96.0)).reshape(12, 8)
     heights[5, 3] = np.nan
-    with tempfile.TemporaryDirectory() as folder:
-        np.save(Path(folder) / "h.npy", heights)
-        return st.read_profile(Path(folder) / "h.npy", quantity="height")
+    with inside():
+        np.save("h.npy", heights)
+        return st.read_profile("h.npy", quantity="height")
 
 
 @calls(BACK)
@@ -111,9 +112,9 @@ def gaps_across_the_seam():
     local, onset = (
         st.onset(LINE, holes, method=method, gaps="fill") for method in (LOCAL, EXACT)
     )
-    with tempfile.TemporaryDirectory() as folder:
-        export(onset, Path(folder) / "onset.csv")
-        table = pd.read_csv(Path(folder) / "onset.csv")
+    with inside():
+        export(onset, Path("onset.csv"))
+        table = pd.read_csv("onset.csv")
     of_line = {"read": read, "local": local, "exact": onset, "table": table}
     of_plane = as_measured(PLANE.interface, np.where(PLANE_GAP, np.nan, PLANE_STRENGTH))
     read = st.read_profile(of_plane, interface=PLANE.interface, gaps="skip")
@@ -122,16 +123,15 @@ def gaps_across_the_seam():
 
 @calls(BACK)
 def arrays_and_files_of_a_plane():
-    with tempfile.TemporaryDirectory() as folder:
-        measured = as_measured(PLANE.interface, PLANE_STRENGTH, unit="kPa", scale=1e3)
-        measured.rename("strength").to_netcdf(Path(folder) / "scan.nc")
-        np.save(Path(folder) / "scan.npy", PLANE_STRENGTH)
-        path = write_table(Path(folder) / "scan.csv", measured)
+    measured = as_measured(PLANE.interface, PLANE_STRENGTH, unit="kPa", scale=1e3)
+    with inside():
+        measured.rename("strength").to_netcdf("scan.nc")
+        np.save("scan.npy", PLANE_STRENGTH)
+        write_table(Path("scan.csv"), measured)
+        sources = {one: f"scan.{one}" for one in ("nc", "npy", "csv")}
         return {
-            "nc": st.read_profile(Path(folder) / "scan.nc", interface=PLANE.interface),
-            "npy": st.read_profile(Path(folder) / "scan.npy", interface=PLANE.interface),
-            "csv": st.read_profile(path, interface=PLANE.interface),
-            "transposed": st.read_profile(measured.transpose(), interface=PLANE.interface),
+            name: st.read_profile(source, interface=PLANE.interface)
+            for name, source in (sources | {"transposed": measured.transpose()}).items()
         }
 
 
@@ -145,19 +145,44 @@ def peaks_of_tests():
         "coefficients": "test,friction coefficient (1)\n1,0.31\n2,0.29\n3,0.335\n",
     }
     found = {}
-    with tempfile.TemporaryDirectory() as folder:
+    with inside():
         for name, text in texts.items():
-            path = Path(folder) / f"{name}.csv"
-            path.write_text(text)
-        each = {name: (name, None) for name in texts} | {
-            f"{name} in {unit}": (name, unit)
-            for name, unit in (("stresses", "kPa"), ("forces", "N"), ("stresses", "MPa"))
-        }
-        for called, (name, unit) in each.items():
-            path = Path(folder) / f"{name}.csv"
-            given = refusal(lambda path=path, unit=unit: st.read_peaks(path, unit=unit))
-            found[called] = given.replace(folder, "") if isinstance(given, str) else given
+            Path(f"{name}.csv").write_text(text)
+            found[name] = refusal(partial(st.read_peaks, f"{name}.csv"))
+        for name, unit in (("stresses", "kPa"), ("forces", "N"), ("stresses", "MPa")):
+            read = partial(st.read_peaks, f"{name}.csv", unit=unit)
+            found[f"{name} in {unit}"] = refusal(read)
     return found
+
+
+@calls("read: only what follows a slash at once is divided by")
+def powers_and_slashes_of_units():
+    texts = ["kPa/mm/s", "N/mm s", "kN m/cm^2", "1/s", "mJ mm⁻²", "%", "MPa·um", "N**2/m**3"]
+    return {text: [parse(text).factor, parse(text).powers] for text in texts}
+
+
+@calls("coefficients times the pressure, a straight line through each gap")
+def onsets_of_coefficients_and_beside_gaps():
+    """In per cent, in another order, with the unit kept by a product; gaps that are remembered."""
+    law = st.LinearWeakening(weakening_rate=0.28e12, residual_ratio=0.1)
+    ratio = dataclasses.replace(LINE, friction=law)
+    pressure = LINE.load.normal_pressure
+    percent = as_measured(LINE.interface, LINE_STRENGTH / pressure, "%", 0.01)
+    mu = st.read_profile(percent, interface=LINE.interface, quantity="friction_coefficient")
+    product = (mu * pressure).assign_attrs(units="1")
+    weak = int(np.argmin(LINE_STRENGTH))
+    found = {
+        "reversed": st.onset(LINE, mu[::-1], method=LOCAL),
+        "product": refusal(lambda: st.onset(ratio, product, method=LOCAL)),
+    }
+    for after in (1, 9):  # in the critical patch, and beyond it
+        gap = np.isin(np.arange(96), (weak + after + np.arange(3)) % 96)
+        holes = as_measured(LINE.interface, np.where(gap, np.nan, LINE_STRENGTH))
+        filled = st.read_profile(holes, interface=LINE.interface, gaps="fill")
+        found[str(after)] = st.onset(LINE, 1.1 * filled[::-1], method=LOCAL)
+    method, save = st.Rupture(loading_rate=6e8, stop="onset"), st.Save([])
+    run = st.simulate_rupture(LINE, filled, method=method, save=save)
+    return found | {"rupture": run.in_gap}
 
 
 @calls("the same profile as an array, to the bit")

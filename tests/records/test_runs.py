@@ -5,9 +5,9 @@ import io
 import math
 import re
 import sys
-import tempfile
 import tomllib
 import warnings
+from functools import partial
 from pathlib import Path
 from unittest import mock
 
@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 import tomli_w
 import xarray as xr
-from recording import Calls, compared
+from recording import Calls, compared, inside
 from small_study import lengths, small_study
 
 import stiction as st
@@ -25,11 +25,11 @@ from stiction.cli.report import Page
 from stiction.ensemble.experiment import Experiment
 
 calls = Calls()
+RUN = "run study.toml --out run --workers 1"
 SAME = "the same numbers by st.monte_carlo, tests/user/test_study.py"
-SWEPT = small_study(
-    nodes=96,
-    length=0.047,
-    weakening_rate=0.31e12,
+small = partial(small_study, 96, 0.047)
+SWEPT = small(
+    0.31e12,
     ensemble={"samples": 9, "seed": 11},
     sweep=[
         *lengths(2.2e-3, 5.1e-3),
@@ -42,23 +42,7 @@ SWEPT = small_study(
     title="three axes",
 )
 SWEPT["problem"]["interface"]["width"] = 0.013
-SPECIMEN = small_study(
-    nodes=64,
-    length=0.083,
-    weakening_rate=0.19e12,
-    correlation_length=6e-3,
-    method={"type": "equilibrium", "events": 1},
-    ensemble={"samples": 6, "seed": 2},
-)
-SPECIMEN["problem"] |= {
-    "specimen": {
-        "height": 0.031,
-        "thickness": 0.0071,
-        "drive": {"type": "pusher", "height": 0.012, "width": 0.006},
-    },
-    "load": {"normal_pressure": 2.1e6},
-}
-SPECIMEN["problem"]["friction"]["residual_strength"] = 3.1e5
+PUSHER = {"type": "pusher", "height": 0.012, "width": 0.006}
 PLAIN = re.compile(
     r"<script.*?</script>|<style.*?</style>|<[^>]+>|data:image/[^\"')]*", re.DOTALL
 )
@@ -69,11 +53,11 @@ CHANGES = re.compile(
 
 
 @contextlib.contextmanager
-def inside(study):
+def beside(study):
     """A folder with a study file, in which commands run."""
-    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+    with inside() as folder:
         st.Study.from_dict(study).to_toml(Path("study.toml"))
-        yield Path(folder)
+        yield folder
 
 
 def command(line):
@@ -110,7 +94,7 @@ def of_commands(study, *lines):
         original(page, drawn, caption)
 
     original = Page.figure
-    with inside(study) as folder, mock.patch.object(Page, "figure", figure):
+    with beside(study) as folder, mock.patch.object(Page, "figure", figure):
         found |= {line: command(line) for line in lines}
         found["table"] = pd.read_csv(folder / "all.csv")
         if (folder / "all.nc").exists():
@@ -121,50 +105,38 @@ def of_commands(study, *lines):
 
 @calls(SAME)
 def commands_of_a_sweep():
-    return of_commands(
-        SWEPT,
-        "run study.toml --out run --workers 1",
-        "status run",
-        "export run all.csv",
-        "export run all.nc",
-        "report run",
-    )
+    lines = ("status run", "export run all.csv", "export run all.nc", "report run")
+    return of_commands(SWEPT, RUN, *lines)
 
 
 @calls("events by st.onset of the same samples")
 def commands_of_a_specimen():
-    return of_commands(
-        SPECIMEN, "run study.toml --out run --workers 1", "export run all.csv", "report run"
-    )
+    method, some = {"type": "equilibrium", "events": 1}, {"samples": 6, "seed": 2}
+    plain = small_study(64, 0.083, 0.19e12, 6e-3, method=method, ensemble=some)
+    plain["problem"]["specimen"] = {"height": 0.031, "thickness": 0.0071, "drive": PUSHER}
+    plain["problem"]["load"] = {"normal_pressure": 2.1e6}
+    plain["problem"]["friction"]["residual_strength"] = 3.1e5
+    return of_commands(plain, RUN, "export run all.csv", "report run")
 
 
-@calls("each sample by st.onset, tests/user/test_warnings.py")
+@calls("each sample by st.onset")
 def commands_of_a_plane():
-    plain = small_study(
-        nodes=[24, 20],
-        length=[0.023, 0.0164],
-        weakening_rate=0.28e12,
-        method={"type": "equilibrium", "slip": True},
-        ensemble={"samples": 3, "seed": 2, "keep": ["strength"]},
-    )
+    method = {"type": "equilibrium", "slip": True}
+    some = {"samples": 3, "seed": 2, "keep": ["strength"]}
+    plain = small_study([24, 20], [0.023, 0.0164], 0.28e12, method=method, ensemble=some)
     plain["random"]["strength"]["anisotropy"] = 1.4
     plain["problem"]["load"] = {"normal_pressure": 2.7e6}
-    lines = ("run study.toml --out run", "status run", "export run all.csv", "report run")
-    return of_commands(plain, "check study.toml", *lines)
+    lines = ("check study.toml", RUN, "status run", "export run all.csv", "report run")
+    return of_commands(plain, *lines)
 
 
 @calls("st.onset and st.simulate_rupture of the same profile", close=1e-5)
 def onset_and_rupture_of_a_profile():
-    study = small_study(
-        nodes=96,
-        length=0.047,
-        weakening_rate=0.31e12,
-        method={"type": "rupture", "loading_rate": 6e8},
-    )
+    study = small(0.31e12, method={"type": "rupture", "loading_rate": 6e8})
     x = np.arange(96) * 0.047 / 96
     strength = 0.95 + 0.2 * np.sin(400.0 * x) + 0.1 * np.cos(933.0 * x)
     found = {}
-    with inside(study):
+    with beside(study):
         table = np.column_stack([1e3 * x, strength])
         np.savetxt(
             "scan.csv", table, delimiter=";", header="x (mm);strength (MPa)", comments=""
@@ -202,11 +174,9 @@ rupture study.toml --out study.toml""".splitlines():
     return found
 
 
-@calls("the same answers by st.failure_probability, tests/user/test_warnings.py", close=1e-4)
+@calls("the same answers by st.failure_probability", close=1e-4)
 def answers_of_commands():
-    plain = small_study(
-        nodes=96, length=0.047, weakening_rate=0.31e12, sweep=lengths(4e-3, 6e-3)
-    )
+    plain = small(0.31e12, sweep=lengths(4e-3, 6e-3))
     plain["problem"]["interface"]["width"] = 0.013
     plain["problem"]["load"] = {"normal_pressure": 2.7e6}
     plain["reliability"] = {"force": 430.0, "target_cv": 0.5}
@@ -217,7 +187,7 @@ def answers_of_commands():
  --probability 2
  --out run --stress 7e5
  --part 1/3 --stress 7e5""".splitlines()
-    with inside(plain):
+    with beside(plain):
         found = {line: command(f"reliability study.toml{line}") for line in lines}
         del plain["reliability"], plain["problem"]["interface"]["width"]
         Path("other.toml").write_text(tomli_w.dumps(plain))
@@ -229,8 +199,8 @@ def answers_of_commands():
 def mistakes_of_commands():
     """And two points of a sweep that have one label."""
     twice = {"problem.interface.nodes": [96, 96], "random.strength.marginal.alpha": [1.5, 3.0]}
-    plain = small_study(nodes=96, length=0.047, ensemble={"samples": 12}, sweep=[twice])
-    with inside(plain):
+    plain = small(ensemble={"samples": 12}, sweep=[twice])
+    with beside(plain):
         found = {"twice": command("run study.toml --out run --no-pilot")}
         changed = plain["problem"] | {"friction": {"critical_slip": 3e-6}}
         other = plain | {"ensemble": {"samples": 12, "seed": 4}, "problem": changed}
@@ -248,9 +218,12 @@ report study.toml""".splitlines():
     return found
 
 
-@calls("st.failure_curve and counting, tests/user/test_failure_run.py", close=1e-4)
+@calls(
+    "st.failure_curve in memory, tests/user/test_failure_run.py; counting, tests/oracle",
+    close=1e-4,
+)
 def reliability_of_uncertain_interfaces():
-    study = small_study(nodes=96, length=0.047, weakening_rate=0.31e12)
+    study = small(0.31e12)
     study["problem"]["interface"]["width"] = 0.013
     study["uncertain"] = {"count": 3, "strength.marginal.alpha": [1.4, 1.9]}
     study["sweep"] = [{"random.strength.marginal.low": [6.1e5, 7.0e5]}]
@@ -273,11 +246,8 @@ def a_run_with_failures():
             raise FloatingPointError("not finite")
         return original(self, first, count)
 
-    sweep = lengths(2.2e-3, 5.1e-3)
-    plain = small_study(
-        nodes=96, length=0.047, ensemble={"samples": 12, "seed": 4}, sweep=sweep
-    )
-    lines = ["run study.toml --out run --workers 1", "status run", "check study.toml"]
+    plain = small(ensemble={"samples": 12, "seed": 4}, sweep=lengths(2.2e-3, 5.1e-3))
+    lines = [RUN, "status run", "check study.toml"]
     with mock.patch.object(Experiment, "results", results):
         lines += ["report run", "export run all.csv --partial"]
         return of_commands(plain, *lines)
@@ -285,30 +255,24 @@ def a_run_with_failures():
 
 @calls("counted: a third of the samples, and what is left of them")
 def a_run_in_parts():
-    plain = small_study(nodes=96, length=0.047, ensemble={"samples": 31, "seed": 5, "first": 2})
+    plain = small(ensemble={"samples": 31, "seed": 5, "first": 2})
     seen = []
 
     def show(done, total):
         seen.append([done, total])
 
-    found = of_commands(
-        plain,
-        "run study.toml --out run --workers 1 --part 2/3",
-        "status run",
-        "export run part.csv",
-        "export run all.csv --partial",
-        "report run",
-    )
-    with tempfile.TemporaryDirectory() as folder:
+    exports = ("export run part.csv", "export run all.csv --partial")
+    found = of_commands(plain, f"{RUN} --part 2/3", "status run", *exports, "report run")
+    with inside():
         for part in ("1/3", "3/3"):
             one = st.Study.from_dict(plain)
-            one.run(out=Path(folder) / "run", part=part, progress=show, workers=1)
+            one.run(out="run", part=part, progress=show, workers=1)
     return found | {"progress": [seen[0], seen[-1]]}
 
 
 @calls("read beside the study")
 def what_a_study_would_do():
-    with inside(SWEPT):
+    with beside(SWEPT):
         check = command("check study.toml")
         Path("study.toml").write_text(
             Path("study.toml").read_text().replace("poisson_ratio", "poison_ratio")

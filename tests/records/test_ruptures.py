@@ -2,13 +2,12 @@
 
 import dataclasses
 import json
-import tempfile
-from pathlib import Path
 
 import numpy as np
 from crooked import across_the_seam, uneven
-from recording import Calls, compared, refusal
-from setups import make_problem
+from recording import Calls, compared, inside, refusal
+from ruptures import wavy_line
+from setups import beta_strength, make_problem
 
 import stiction as st
 from stiction.methods.dynamics.save import open_rupture
@@ -42,6 +41,12 @@ def run(problem, strength, save=None, **options):
         ["slip", "slip_rate", "strength"], every=60, stations={"a": 0.011, "b": 0.0371}
     )
     return st.simulate_rupture(problem, strength, method=method, save=save)
+
+
+def summary(problem, strength, **options):
+    """The numbers of a run without its fields."""
+    found = run(problem, strength, st.Save([], every=500), **options)
+    return found.drop_dims(["step", "time"])
 
 
 @calls(WAVES, close=CLOSE)
@@ -79,8 +84,8 @@ def a_load_history_that_is_held_and_lowered():
 @calls("every number of the setting enters the digest, read", close=CLOSE)
 def a_folder_that_holds_the_run_of_another_load():
     problem, strength = line(nodes=96)
-    with tempfile.TemporaryDirectory() as folder:
-        save = st.Save(["slip"], every=40, stations={"a": 0.013}, to=Path(folder) / "run")
+    with inside():
+        save = st.Save(["slip"], every=40, stations={"a": 0.013}, to="run")
         given, times = {"loading_rate": None, "stop": "onset", "save": save}, [0.0, 1e-3, 2e-3]
         ends = {"same": 9e5, "again": 9e5, "other": 8e5}
         found = {
@@ -89,11 +94,17 @@ def a_folder_that_holds_the_run_of_another_load():
             )
             for name, at in ends.items()
         }
-        about = open_rupture(Path(folder) / "run").attrs
+        about = open_rupture("run").attrs
     return {"stopped": about["stopped"], "study": sorted(json.loads(about["study"]))} | {
-        name: one.replace(folder, "") if isinstance(one, str) else one.critical_stress
+        name: one if isinstance(one, str) else one.critical_stress
         for name, one in found.items()
     }
+
+
+def placed(problem, low, high):
+    """Nodes within a range of x/L."""
+    x = problem.interface.x / problem.interface.length
+    return (x > low) & (x < high)
 
 
 @calls(WAVES, close=CLOSE)
@@ -104,14 +115,109 @@ def barriers_that_arrest():
     return run(problem, walled, stop="rest")
 
 
+@calls("the onset as by equilibrium, .4 % later at so fast a load", close=CLOSE)
+def barriers_that_never_slip():
+    """And a uniform critical slip, by which a barrier weakens the more steeply."""
+    problem, strength = line(nodes=96)
+    by_slip = dataclasses.replace(problem, friction=st.LinearWeakening(critical_slip=3e-6))
+    inside = placed(problem, 0.6, 0.8)
+    return {
+        "to the end": summary(problem, np.where(inside, np.inf, strength)),
+        "onset": summary(by_slip, np.where(inside, np.inf, strength), stop="onset"),
+        "too steep": summary(by_slip, np.where(placed(problem, 0.31, 0.35), 2e7, strength)),
+    }
+
+
+@calls("a patch that breaks at once is no onset, read", close=CLOSE)
+def a_patch_that_is_overstressed():
+    """At once, by explicit steps alone; and under no load at all."""
+    problem, strength = line(nodes=96)
+    patch = np.where(placed(problem, 0.2, 0.33), 1.1 * strength, 5e5)
+    problem = dataclasses.replace(problem, load=st.Load(initial_stress=patch))
+    held = {"loading_rate": None, "load": ([0.0, 1.0], [0.0, 0.0]), "stop": "time"}
+    return {
+        "loaded": summary(problem, strength),
+        "explicit": summary(problem, strength, implicit=False).arrival_time,
+        "held": summary(problem, strength, end_time=3e-5, **held),
+    }
+
+
+@calls("read beside the rule: slip may not reverse", close=CLOSE)
+def slip_that_would_reverse():
+    problem, strength = line(nodes=96)
+    pulled = st.Load(initial_stress=np.where(placed(problem, 0.9, 1.1), -2e6, 0.0))
+    pulled = dataclasses.replace(problem, load=pulled)
+    load = ([0.0, 9e-4, 1.1e-3], [0.0, 6.9e5, -2e6])
+    return {
+        "unloaded": summary(problem, strength, loading_rate=None, load=load),
+        "pulled": summary(pulled, strength, stop="onset"),
+    }
+
+
+@calls("the first global sliding only counts, read", close=CLOSE)
+def loads_after_global_sliding():
+    """Unloaded to rest; and a sudden load on a barrier, whose mean stress rises above the onset."""
+    problem, strength = line(nodes=96)
+    slow, given = 1.2e-3, {"loading_rate": None, "stop": "time"}
+    falls = ([0.0, slow, 1.25e-3, 1.35e-3, 1.6e-3], [0.0, 1.1e6, 1.1e6, 1e5, 1e5])
+    sudden = ([0.0, slow, 1.21e-3, 2e-3], [0.0, 1e6, 2.2e6, 2.2e6])
+    walled = np.where(placed(problem, 0.6, 0.8), np.inf, strength)
+    return {
+        "falls": summary(problem, strength, load=falls, end_time=1.55e-3, **given),
+        "sudden": summary(problem, walled, load=sudden, end_time=1.4e-3, **given),
+    }
+
+
+@calls("the onset as by equilibrium, .4 % later at so fast a load", close=CLOSE)
+def nodes_that_hardly_weaken():
+    problem, strength = line(nodes=96)
+    residual = np.broadcast_to(problem.friction.residual_strength, 96)
+    weak = np.where(np.arange(96) == 70, residual * (1.0 + 1e-5), strength)
+    high = dataclasses.replace(
+        problem, friction=st.LinearWeakening(critical_slip=2e-6, residual_strength=9.5e5)
+    )
+    return {
+        "one": summary(problem, weak),
+        "many": summary(high, strength, implicit=False),
+        "at once": summary(high, strength, loading_rate=8e9, stop="onset"),
+    }
+
+
+@calls("the onset of equilibrium to 4e-4, and the mean slip of explicit steps", close=CLOSE)
+def onsets_and_waves_of_slow_loads():
+    """Under a negative mean stress; waves of an arrested rupture; patches about equally slow."""
+    problem, strength = wavy_line()
+    x = np.arange(128) / 128
+    pushed = np.abs(x - 0.5) < 0.3
+    load = st.Load(initial_stress=np.where(pushed, -3e6, 0.0))
+    method = st.Rupture(loading_rate=1e7, stop="onset")
+    found = {
+        "pushed": st.onset(
+            dataclasses.replace(problem, load=load),
+            np.where(pushed, 5e6, strength),
+            method=method,
+        )
+    }
+    arrested = np.where(np.abs(np.arange(1024) / 1024 - 0.4) < 0.25, 0.8e6, 6e6)
+    end = {"stop": "time", "end_time": 0.8e6 / 1e8 + 2.2e-4}  # four times the period over c_s
+    method, save = st.Rupture(loading_rate=1e8, **end), st.Save([], every=500)
+    line, _ = wavy_line(1024, rate=0.5e12)
+    found["waves"] = st.simulate_rupture(line, arrested, method=method, save=save).mean_slip
+    problem = st.paper.problem(nodes=512)
+    field = st.paper.strength(problem, correlation_ratio=0.5)
+    strength = field.sample(problem.interface, samples=1, seed=3, first=18)
+    method = st.Rupture(loading_rate=1e3)
+    found["place"] = st.onset(problem, strength, method=method).critical_position
+    return found
+
+
 @calls("onset of each as by simulate_rupture, to the bit", close=CLOSE)
 def an_ensemble():
     problem, _ = line(nodes=96)
-    field = st.RandomField(
-        st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6), st.PowerLawSpectrum(2.1e-3)
-    )
     method = st.Rupture(loading_rate=9e8, kernel_tolerance=FASTER, stop="onset")
-    return st.monte_carlo(problem, field, method=method, samples=3, seed=7, workers=1)
+    return st.monte_carlo(
+        problem, beta_strength(2.1e-3), method=method, samples=3, seed=7, workers=1
+    )
 
 
 test_outputs_are_as_recorded = compared(calls, __file__)

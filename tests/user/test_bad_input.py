@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from refusals import refusals
-from setups import EXACT, LENGTH, LOCAL, beta_strength, make_problem
+from setups import EXACT, LOCAL, beta_strength, make_problem
 
 import stiction as st
 from stiction.elasticity.exponential_sum import fit_exponentials
@@ -55,28 +55,6 @@ def test_errors_of_equilibrium_are_warned_of():
         EXACT.prepare(PROBLEM)._warn(rows, values, no)
 
 
-def test_nothing_is_said_where_nothing_is_in_doubt():
-    """Eighteen nodes in h_n, a spectrum that the grid resolves, a mean mode, stresses in Pa."""
-    load = st.Load(initial_stress=1e4, normal_pressure=2e6)
-    problem, field = make_problem(512, load=load), beta_strength(2.0 * LENGTH, mean_mode=True)
-    line = problem.interface
-    place = ("x", 1e3 * line.x, {"units": "mm"})
-    profile = field.sample(line, seed=3)[0]
-    measured = xr.DataArray(profile, {"x": place}, "x", attrs={"units": "Pa"})
-    with warnings.catch_warnings(action="error"):
-        for method in (
-            LOCAL,
-            st.Equilibrium(sensitivity=True),
-            st.Rupture(loading_rate=1e7, stop="onset"),
-        ):
-            st.onset(problem, measured, method=method)
-        st.equilibrium_path(problem, profile, [0.5e6, 2e6])
-        for random in (field, field.given(measured[::16], noise=2e4)):
-            st.monte_carlo(problem, random, method=LOCAL, samples=8)
-        st.failure_probability(problem, field, 0.8e6, method=LOCAL, target_cv=0.3)
-        st.failure_curve(problem, field, method=LOCAL, smallest=1e-2)
-
-
 def test_a_path_whose_end_is_not_known_is_said(monkeypatch):
     ends = "stiction.methods.equilibrium.path.follow"
     monkeypatch.setattr(ends, lambda *given: dataclasses.replace(follow(*given), known=False))
@@ -105,23 +83,20 @@ def test_a_warning_stands_where_the_caller_is_and_once():
     assert [one.filename for one in caught] == [__file__]
 
 
-@pytest.mark.parametrize(
-    ("solid", "friction", "length", "strength"),
-    [
+def test_what_people_study_raises_no_doubt():
+    for solid, friction, length, strength in (
         ((1e9, 0.33, 1170.0), 0.5e12, 0.1, 1e6),  # the paper's polymer
         ((3e10, 0.25, 2700.0), 1e6 / 1e-4, 100.0, 5e6),  # a laboratory fault in granite
         ((3e10, 0.25, 2700.0), 5e6 / 0.5, 5e4, 5e7),  # a natural fault, d_c of half a metre
         ((8e10, 0.3, 7850.0), 3e5 / 1e-6, 1.0, 3e5),  # steel, lightly clamped
         ((2e3, 0.49, 1000.0), 5e2 / 1e-3, 0.1, 5e2),  # a gel
         ((4.8e11, 0.1, 3500.0), 1e7 / 1e-8, 1e-3, 1e7),  # diamond
-    ],
-)
-def test_what_people_study_raises_no_doubt(solid, friction, length, strength):
-    with warnings.catch_warnings(action="error", category=st.UnitWarning):
+    ):
         h_n = 2 * 0.5789 * solid[0] / (1 - solid[1]) / friction
         interface = st.Interface(length, max(64, 2 * int(4 * length / h_n)))
-        system = st.Problem(st.Solid(*solid), interface, st.LinearWeakening(friction))
-        system.warn_of_units(strength)
+        with warnings.catch_warnings(action="error", category=st.UnitWarning):
+            system = st.Problem(st.Solid(*solid), interface, st.LinearWeakening(friction))
+            system.warn_of_units(strength)
 
 
 def test_a_ready_made_sample_gives_what_its_profiles_give():

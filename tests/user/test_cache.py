@@ -16,19 +16,6 @@ WITHOUT = 'import sys\nsys.modules["stiction.base.jit.internals"] = None\n'
 """As if the file with numba's private parts had been deleted."""
 
 
-@pytest.fixture(params=["", WITHOUT], ids=["internals", "plain"])
-def run(tmp_path, monkeypatch, request):
-    """Run a module in a process of its own, with a folder for compiled kernels."""
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-
-    def run(code, cache):
-        (tmp_path / "own_module.py").write_text(request.param + code)
-        places = {"PYTHONPATH": SOURCES, "STICTION_CACHE_DIR": cache}
-        return python("-B", "-c", "import own_module", cwd=tmp_path, **places).splitlines()
-
-    return run
-
-
 def test_an_edited_kernel_is_another_folder_for_those_who_call_it(tmp_path, monkeypatch):
     """numba looks at the kernel's own file only; the kernels here call those of other files."""
     copy = tmp_path / "stiction"
@@ -63,11 +50,6 @@ def test_an_edited_kernel_is_another_folder_for_those_who_call_it(tmp_path, monk
     assert not set(law) & set(own)
 
 
-def test_kernels_need_no_folder(run):
-    code = "from stiction.base.jit import jit\n\n@jit\ndef twice(x):\n    return 2 * x\n\n"
-    assert run(code + "print(twice(4))", Path(os.devnull) / "cache") == ["8"]
-
-
 LAWS = """
 from typing import NamedTuple
 import numpy as np, stiction as st
@@ -87,12 +69,17 @@ for law in (OwnParameters(2.0), linear):
 """
 
 
-def test_a_law_from_elsewhere_leaves_nothing_in_the_cache(tmp_path, run):
+@pytest.mark.parametrize("start", ["", WITHOUT], ids=["internals", "plain"])
+def test_a_law_from_elsewhere_leaves_nothing_in_the_cache(tmp_path, monkeypatch, start):
     """Its module may be missing in the next process, or changed; numba would notice neither."""
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     cache = tmp_path / "cache"
-    assert run(LAWS, cache) == ["[2. 2. 2.]", "[0.5 0.5 0.5]"]
-    edited = LAWS.replace("law.scale * 1.0", "law.scale * 3.0")
-    assert run(edited, cache) == ["[6. 6. 6.]", "[0.5 0.5 0.5]"]
+    places = {"cwd": tmp_path, "PYTHONPATH": SOURCES, "STICTION_CACHE_DIR": cache}
+    for factor, found in ((1.0, "[2. 2. 2.]"), (3.0, "[6. 6. 6.]")):
+        edited = LAWS.replace("law.scale * 1.0", f"law.scale * {factor}")
+        (tmp_path / "own_module.py").write_text(start + edited)
+        said = python("-B", "-c", "import own_module", **places)
+        assert said.splitlines() == [found, "[0.5 0.5 0.5]"]
     assert list(cache.rglob("*.nbc"))
     assert b"own_module" not in b"".join(path.read_bytes() for path in cache.rglob("*.nbi"))
 
@@ -123,9 +110,13 @@ assert numba.config.CACHE_DIR == before
 """
 
 
-def test_plain_numba_gives_the_same_bits_and_user_code_is_left_alone(tmp_path):
-    """A numba that lacks a private part is plain numba to us; so is one that was not tried."""
-    places = {"PYTHONPATH": SOURCES, "NUMBA_CACHE_DIR": tmp_path}
+def test_plain_numba_gives_the_same_bits_and_user_code_is_left_alone(monkeypatch):
+    """A numba that lacks a private part is plain numba to us; so is one that was not tried.
+
+    Neither needs a folder for what it compiles.
+    """
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    places = {"PYTHONPATH": SOURCES, "STICTION_CACHE_DIR": Path(os.devnull) / "cache"}
     own, plain = (python("-c", start + BITS, **places) for start in ("", WITHOUT))
     assert own == plain
     assert "[True, True]" in own  # garbage collection, during compilations that are not ours

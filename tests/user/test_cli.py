@@ -104,18 +104,14 @@ MISTAKES = {
 """Those that tests/records does not hold: what they print depends on the terminal or the system."""
 
 
-@pytest.mark.parametrize("line", MISTAKES)
-def test_mistakes_end_with_a_message(runs, line):
-    runs(line, MISTAKES[line], code=2)
+def test_mistakes_end_with_a_message_and_every_command_has_help(runs):
+    for line, words in MISTAKES.items():
+        runs(line, words, code=2)
+    for name in (run.callback.__name__ for run in app.registered_commands):
+        assert len(runs(f"{name} --help").splitlines()) > 5
 
 
-@pytest.mark.parametrize("name", [run.callback.__name__ for run in app.registered_commands])
-def test_help_of_every_command(runs, name):
-    assert len(runs(f"{name} --help").splitlines()) > 5
-
-
-@pytest.mark.parametrize("line", ["report run --out page.html", "export run out.nc"])
-def test_a_full_disk_is_called_so_and_leaves_nothing_half(runs, monkeypatch, line):
+def test_a_full_disk_is_called_so_and_leaves_nothing_half(runs, monkeypatch):
     runs("run study.toml --out run")
     before = sorted(os.listdir())
 
@@ -123,18 +119,13 @@ def test_a_full_disk_is_called_so_and_leaves_nothing_half(runs, monkeypatch, lin
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(files.os, "fsync", fail)  # as of a file system that allocates late
-    runs(line, "cannot be written: No space left on device", code=1)
-    assert sorted(os.listdir()) == before
-
-
-def test_an_empty_run(runs):
-    runs("run study.toml --out run")
-    for chunk in Path("run/chunks").iterdir():
-        chunk.unlink()
-    runs("report run", "no sample is stored yet", code=2)
+    for line in ("report run --out page.html", "export run out.nc"):
+        runs(line, "cannot be written: No space left on device", code=1)
+        assert sorted(os.listdir()) == before
 
 
 def test_escape_sequences_of_a_run_are_not_printed_raw(runs):
+    """And a run of which nothing is left has no report."""
     title = "\x1b[2Jnice\x07\nsamples 9 of 9 <script>"
     st.Study.from_dict(STUDY | {"title": title}).to_toml("hostile.toml")
     runs("run hostile.toml --out run")
@@ -143,6 +134,9 @@ def test_escape_sequences_of_a_run_are_not_printed_raw(runs):
         assert not any(raw in said for raw in ("\x1b", "\x07", "\nsamples 9"))
     runs("report run")
     assert "9 <script>" not in Path("run/report.html").read_text()
+    for chunk in Path("run/chunks").iterdir():
+        chunk.unlink()
+    runs("report run", "no sample is stored yet", code=2)
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="Windows has other means")

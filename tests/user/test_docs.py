@@ -16,7 +16,7 @@ import stiction as st
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text("utf-8")
 PAGES = sorted((ROOT / "docs").glob("*.md"))
-MORE = [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
+DATA = ROOT / "examples" / "data"
 COMMANDS = (
     "python3 -m venv .venv && .venv/bin/python -m pip install . && .venv/bin/python reproduction",
     'python3 -m venv .venv && .venv/bin/python -m pip install -e ".[test]"'
@@ -33,15 +33,6 @@ def blocks(page, language):
     return [re.sub(rf"^{indent}", "", block, flags=re.MULTILINE) for indent, block in found]
 
 
-def run_blocks(page, scope, **less):
-    """Run the python of a page, some of its words replaced."""
-    for block in blocks(page, "python"):
-        for words, other in less.items():
-            block = re.sub(words, other, block)
-        exec(compile(block, page, "exec"), scope)
-    return scope
-
-
 def test_the_two_commands_stand_there_each_on_its_own_line():
     for command in COMMANDS:
         assert README.splitlines().count(command) == 1
@@ -49,89 +40,92 @@ def test_the_two_commands_stand_there_each_on_its_own_line():
     assert (ROOT / ".ci" / "run").read_text().count("README.md") >= 2
 
 
-def test_python_of_the_readme(monkeypatch, tmp_path):
-    """On a coarser grid, and less far out in the tail."""
-    monkeypatch.chdir(tmp_path)
-    less = {
+# -- python of pages, some of its words replaced so that it takes less, and what it must find ------
+
+
+def of_readme(found):
+    assert found["result"].sizes["sample"] == 10_000
+
+
+def of_studies(found):
+    stress = found["result"]["critical_stress"]
+    assert stress.dims == ("correlation_length", "length", "sample")
+
+
+def of_profile(found):
+    truth = {"mean": 1e6, "noise": 0.03e6, "spectrum.exponent": 2.0}
+    for name, value in truth.items():
+        assert found["fit"].parameters[name] == pytest.approx(value, rel=0.2)
+    assert 0.0 < found["found"].probability < 0.5
+    assert 0.2e6 < found["design"].stress < 1e6
+    assert 0.2e6 < found["decision"].stress < 1e6
+    assert found["decision"].members.size == 4
+    joint = tomllib.loads((DATA / "joint.toml").read_text())["problem"]
+    assert st.Problem(**joint) == found["joint"]
+
+
+def of_reliability(found):
+    assert 1e-6 < found["found"].probability < 1e-3
+    low, high = found["decision"].band
+    assert low < found["decision"].probability < high
+
+
+def of_peaks(found):
+    assert found["first"].size == 13
+    assert found["found"].p_values["cramer_von_mises"] > 0.05
+
+
+def of_decisions(found):
+    assert found["fit"].parameters["marginal.mean"] == pytest.approx(0.2, rel=0.1)
+    assert 30e3 < found["design"].force < 50e3
+    assert found["demand"].force == pytest.approx(40e3)
+    assert 0.0 < found["demand"].probability < 0.3
+    assert str(found["design"]).startswith("force ")
+
+
+SHOWN = {
+    "README.md": (of_readme, {
         "nodes=(1024|512)": "nodes=256",
         "probability=1e-3, method": "probability=0.1, method",
-    }
-    scope = run_blocks("README.md", {}, **less)
-    assert scope["result"].sizes["sample"] == 10_000
-
-
-@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
-def test_python_of_the_page_on_studies(monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    problem = st.paper.problem()
-    strength = st.paper.strength(problem)
-    table = np.column_stack([problem.interface.x, strength.sample(problem.interface)[0]])
-    np.savetxt("profile.csv", table, delimiter=",", header="x (m),strength (Pa)", comments="")
-    scope = {"st": st, "problem": problem, "strength": strength}
-    run_blocks("docs/studies.md", scope, **{r"\bsamples=[\d_]+": "samples=4"})
-    assert scope["result"]["critical_stress"].dims == ("correlation_length", "length", "sample")
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
-def test_the_tutorial_from_a_profile_to_a_failure_probability(monkeypatch, tmp_path):
-    """Every block and command, with fewer repetitions."""
-    monkeypatch.chdir(tmp_path)
-    shutil.copytree(ROOT / "examples" / "data", tmp_path / "examples" / "data")
-    less = {
+    }),
+    "docs/studies.md": (of_studies, {r"\bsamples=[\d_]+": "samples=4"}),
+    "docs/tutorials/measured-profile.md": (of_profile, {
         "bootstrap=200": "bootstrap=20",
         "joint, fit, ": "joint, fit.interfaces(4), ",
         r"exact, seed=1\)": "exact, seed=1, target_cv=0.3)",
-    }
-    scope = run_blocks("docs/tutorials/measured-profile.md", {}, **less)
-    fit, truth = scope["fit"], {"mean": 1e6, "noise": 0.03e6, "spectrum.exponent": 2.0}
-    for name, value in truth.items():
-        assert fit.parameters[name] == pytest.approx(value, rel=0.2)
-    assert 0.0 < scope["found"].probability < 0.5
-    assert 0.2e6 < scope["design"].stress < 1e6
-    assert 0.2e6 < scope["decision"].stress < 1e6
-    assert scope["decision"].members.size == 4
-    joint = tomllib.loads((ROOT / "examples/data/joint.toml").read_text())["problem"]
-    assert st.Problem(**joint) == scope["joint"]
-
-
-@pytest.mark.slow
-def test_python_of_the_page_on_reliability():
-    """With a failure curve by equilibrium: about a minute."""
-    scope = run_blocks("docs/reliability.md", {})
-    assert 1e-6 < scope["found"].probability < 1e-3
-    low, high = scope["decision"].band
-    assert low < scope["decision"].probability < high
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
-def test_python_of_the_page_on_peaks(monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    shutil.copy(ROOT / "examples" / "data" / "peaks.csv", tmp_path)
-    scope = run_blocks("docs/what-do-twenty-five-tests-tell-me.md", {})
-    assert scope["first"].size == 13
-    assert scope["found"].p_values["cramer_von_mises"] > 0.05
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
-def test_the_road_from_files_to_a_force(monkeypatch, tmp_path):
-    """Every block of the page on decisions, with fewer repetitions and interfaces."""
-    monkeypatch.chdir(tmp_path)
-    less = {
+    }),
+    "docs/reliability.md": (of_reliability, {}),
+    "docs/what-do-twenty-five-tests-tell-me.md": (of_peaks, {}),
+    "docs/decisions.md": (of_decisions, {
         "between=True": "between=True, bootstrap=20",
         r"interfaces\(60\)": "interfaces(6)",
         "samples=400": "samples=40",
         "probability=1e-3, method": "probability=0.03, method",
         "nodes=256": "nodes=128",
-    }
-    scope = run_blocks("docs/decisions.md", {}, **less)
-    assert scope["fit"].parameters["marginal.mean"] == pytest.approx(0.2, rel=0.1)
-    assert 30e3 < scope["design"].force < 50e3
-    assert scope["demand"].force == pytest.approx(40e3)
-    assert 0.0 < scope["demand"].probability < 0.3
-    assert str(scope["design"]).startswith("force ")
+    }),
+}  # fmt: skip
+QUICK = ("README.md", "docs/studies.md")
+
+
+@pytest.mark.parametrize(
+    "page",
+    [pytest.param(page, marks=() if page in QUICK else pytest.mark.slow) for page in SHOWN],
+)
+def test_python_of_a_page(page, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(DATA, tmp_path / "examples" / "data")
+    shutil.copy(DATA / "peaks.csv", tmp_path)
+    problem = st.paper.problem()
+    strength = st.paper.strength(problem)
+    table = np.column_stack([problem.interface.x, strength.sample(problem.interface)[0]])
+    np.savetxt("profile.csv", table, delimiter=",", header="x (m),strength (Pa)", comments="")
+    scope = {"st": st, "problem": problem, "strength": strength}
+    check, less = SHOWN[page]
+    for block in blocks(page, "python"):
+        for words, other in less.items():
+            block = re.sub(words, other, block)
+        exec(compile(block, page, "exec"), scope)
+    check(scope)
 
 
 WITH_EXAMPLES = [
@@ -149,19 +143,22 @@ def test_examples_in_docstrings(module):
 
 
 def test_the_tutorials_data_are_what_the_script_makes_and_say_so():
-    data = ROOT / "examples" / "data"
-    script = runpy.run_path(str(data / "make_strength_profile.py"))
-    assert "synthetic" in (data / "strength_profile.csv").read_text("utf-8").splitlines()[0]
-    profile = st.read_profile(data / "strength_profile.csv")
+    script = runpy.run_path(str(DATA / "make_strength_profile.py"))
+    assert "synthetic" in (DATA / "strength_profile.csv").read_text("utf-8").splitlines()[0]
+    profile = st.read_profile(DATA / "strength_profile.csv")
     x, strength = script["record"]()
     np.testing.assert_allclose(profile["x"], 1e-3 * x, atol=1e-9)  # to the digits of the file
     np.testing.assert_allclose(profile, 1e6 * strength, atol=51.0)
-    assert (data / "peaks.csv").read_text().startswith("# synthetic")
-    assert "Nothing here was measured" in (data / "make_peaks.py").read_text()
+    assert (DATA / "peaks.csv").read_text().startswith("# synthetic")
+    assert "Nothing here was measured" in (DATA / "make_peaks.py").read_text()
 
 
-def test_tables_of_study_files():
-    """Each is valid TOML; what the page on studies shows of a study makes a valid one."""
+def test_study_files_and_tables_of_them():
+    """Each is valid TOML; what the pages show of a study makes a valid one."""
+    examples = sorted((ROOT / "examples").glob("*.toml"))
+    for path in examples:
+        study = st.Study.from_toml(path)
+        assert st.Study.from_dict(study.to_dict()) == study, path
     pages = [page for page in PAGES if page.stem != "architecture"]  # names a reader's package
     parsed = [tomllib.loads(block) for page in pages for block in blocks(page, "toml")]
     assert len(parsed) >= 5
@@ -172,27 +169,18 @@ def test_tables_of_study_files():
             st.Study.from_dict(whole | table)
 
 
-@pytest.mark.parametrize(
-    "path", sorted((ROOT / "examples").glob("*.toml")), ids=lambda path: path.name
-)
-def test_every_study_file_is_valid(path):
-    study = st.Study.from_toml(path)
-    assert st.Study.from_dict(study.to_dict()) == study
-
-
 def test_links_and_paths():
     pattern = r"`((?:examples|validation|benchmarks|tests|docs)/[\w./]+\.\w+)`"
     known = [path.as_posix() for path in (ROOT / "src").rglob("*.py")]
     page = (ROOT / "docs" / "architecture.md").read_text("utf-8")
     for name in re.findall(r"`([\w/]+\.py)`", page):
         assert any(path.endswith(f"/{name}") for path in [*known, f"{ROOT}/{name}"]), name
-    for page in [*PAGES, *MORE]:
+    for page in [*PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md"]:
         text = page.read_text("utf-8")
         # The entry of the site links pages that are made when it is built, and is checked there.
         links = [] if page.name == "index.md" else re.findall(r"\]\((?!http)([^)#]+)", text)
-        for place in [page.parent / link for link in links] + [
-            ROOT / path for path in re.findall(pattern, text)
-        ]:
+        places = [page.parent / link for link in links]
+        for place in places + [ROOT / path for path in re.findall(pattern, text)]:
             assert place.exists(), f"{page.name}: {place}"
 
 

@@ -1,40 +1,30 @@
-"""Inference as a user meets it: results, mistakes, libraries of others, the page and its data."""
+"""Inference as a user meets it: what is handed to libraries of others, forces, interruptions."""
 
-import dataclasses
+import itertools
 import runpy
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.stats
 import xarray as xr
-from refusals import refuses
+from setups import LOCAL
 
 import stiction as st
 from stiction.ensemble.experiment import Experiment
 from stiction.inference.infer import UNFINISHED
 
-pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
-
 PROBLEM = st.paper.problem(nodes=256)
 H_N = PROBLEM.nucleation_length
 STRENGTH = st.paper.strength(PROBLEM, correlation_ratio=0.6)
-LOCAL = st.LocalCriterion()
 PRIOR = {
     "correlation_length": {"low": 0.25 * H_N, "high": 4.0 * H_N, "spacing": "log"},
     "marginal.low": (0.4e6, 0.9e6),
     "marginal.high": (1.2e6, 2.2e6),
 }
 LOW = {"marginal.low": (0.4e6, 0.9e6)}
-
-
-def peaks_of(problem, seed):
-    options = {"method": LOCAL, "samples": 30, "seed": seed, "pilot": False}
-    return st.monte_carlo(problem, STRENGTH, **options).critical_stress.values
-
-
-PEAKS = peaks_of(PROBLEM, 99)
+THIRTY = {"method": LOCAL, "samples": 30, "seed": 99}
+PEAKS = st.monte_carlo(PROBLEM, STRENGTH, **THIRTY, pilot=False).critical_stress.values
 
 
 def infer(peaks=PEAKS, problem=PROBLEM, random=STRENGTH, prior=LOW, **options):
@@ -42,13 +32,9 @@ def infer(peaks=PEAKS, problem=PROBLEM, random=STRENGTH, prior=LOW, **options):
     return st.infer(problem, random, peaks, prior=prior, **options)
 
 
-@pytest.fixture(scope="module")
-def posterior():
-    return infer(prior=PRIOR, samples=1000, load_cell_error=5e3)
-
-
-def test_arviz(posterior):
+def test_arviz():
     arviz = pytest.importorskip("arviz")
+    posterior = infer(prior=PRIOR, samples=400, load_cell_error=5e3)
     found = posterior.to_arviz()
     groups = {"posterior", "prior", "log_likelihood", "posterior_predictive", "observed_data"}
     assert all(group in found for group in groups)
@@ -74,67 +60,6 @@ def test_predicted_campaigns_have_as_many_independent_tests_as_the_measured_one(
         assert own.mean() == pytest.approx(one.mean(), abs=0.1 * one.std())
         within = np.sqrt(own.var(axis=1, ddof=1).mean())
         assert within == pytest.approx(one.std(), rel=0.1)
-
-
-CELL = {"load_cell_error": 30.0, "unit": "N"}
-PLATE = st.Blocks(height=0.05, thickness=6e-3)
-WIDE = st.Interface(length=0.1, nodes=160, width=0.02)
-BY_AREA = {  # key: problem, its range, area at the tenth of 25 nodes (m2), lengths of specimens
-    "specimen.thickness": ({"specimen": PLATE}, (4e-3, 10e-3), 6.25e-3 * 0.1, (None,)),
-    "interface.width": ({"interface": WIDE}, (9e-3, 33e-3), 18e-3 * 0.1, (0.05, 0.1)),
-    "interface.length": ({"interface": WIDE}, (0.09, 0.114), 0.02 * 0.099, (None,)),
-}
-
-
-@pytest.mark.parametrize("key", BY_AREA)
-def test_forces_are_of_the_area_at_each_point_of_the_prior(key):
-    """Against stresses on the one area of a node of the prior, where the two are the same."""
-    changes, (low, high), area, lengths = BY_AREA[key]
-    problem, at = dataclasses.replace(PROBLEM, **changes), low + (high - low) * 9 / 24
-    areas = [area * (length or 0.1) / 0.1 for length in lengths]
-    kinds = [0.66e6 + 3e5 * np.linspace(0.1, 0.3, 4 + i) for i in range(len(lengths))]
-    forces = {n: one * own for n, one, own in zip(lengths, kinds, areas, strict=True)}
-    field = dataclasses.replace(STRENGTH, marginal=scipy.stats.weibull_min(4.0, scale=1e6))
-    scaled, options = {"marginal.scale": (0.8e6, 1.4e6)}, {"samples": 100, "random": field}
-    joint = infer(
-        forces, problem, prior={f"problem.{key}": (low, high)} | scaled, **CELL, **options
-    )
-    part, _, name = key.partition(".")
-    fixed = dataclasses.replace(getattr(problem, part), **{name: at})
-    problem, jacobian = dataclasses.replace(problem, **{part: fixed}), 0.0
-    if len(kinds) == 1:  # the error of the load cell is one stress
-        error, jacobian = 30.0 / area, np.log(area) * kinds[0].size
-        alone = infer(kinds[0], problem, prior=scaled, load_cell_error=error, **options)
-    else:
-        alone = infer(forces, problem, prior=scaled, **CELL, **options)
-    scales = np.array([0.9e6, 1.05e6, 1.3e6])
-    found = joint.log_likelihood(np.stack([np.full(3, at), scales], axis=1))
-    np.testing.assert_allclose(
-        found, alone.log_likelihood(scales[:, None]) - jacobian, atol=1e-6
-    )
-    for one, own in zip(joint.predicted, areas, strict=True):
-        assert 0.5e6 < np.median(one) / own < 1.4e6
-
-
-def test_a_posterior_between_the_points_of_a_grid_counts_in_a_design_of_tests():
-    """A prior so wide that one posterior of ten lies below the first point of any fixed grid."""
-    field = dataclasses.replace(STRENGTH, marginal=scipy.stats.weibull_min(4.0, 1e6, 1e5))
-    options = {"method": LOCAL, "samples": 100, "repetitions": 10, "seed": 141}
-    wide, problem = {"marginal.loc": (1e6, 400e6)}, dataclasses.replace(PROBLEM, interface=WIDE)
-    found = st.design_of_tests(problem, field, prior=wide, designs={"nine": 9}, **options)
-    # Onsets scatter by some 20 kPa, and nine tests know their location to a third of that.
-    assert found.information.item() == pytest.approx(np.log(399e6 / 2e4), abs=1.5)
-    assert 0.0 < found.standard_error.item() < 0.2
-    area = problem.area
-    same = st.design_of_tests(
-        problem, field, prior={"marginal.loc": (1e6, 2e6)}, designs={"few": 5},
-        load_cell_error=1e4, **options,
-    )  # fmt: skip
-    force = st.design_of_tests(
-        problem, field, prior={"marginal.loc": (1e6, 2e6)}, designs={"few": 5}, unit="kN",
-        load_cell_error=10.0 * area, workers=1, **options,
-    )  # fmt: skip
-    xr.testing.assert_allclose(same, force, rtol=1e-9)
 
 
 FIELDS = [st.paper.strength(PROBLEM, correlation_ratio=ratio) for ratio in (0.5, 0.6, 0.8)]
@@ -171,28 +96,36 @@ def test_what_an_interrupted_call_has_simulated_is_taken_up(given, monkeypatch):
     assert not UNFINISHED  # nor what ended in an error
 
 
-@pytest.mark.filterwarnings("default::stiction.AccuracyWarning")
 def test_doubts_are_named_where_the_caller_stands():
     with pytest.warns(st.AccuracyWarning, match="upper end of marginal.low, 640000") as caught:
         infer(prior={"marginal.low": (0.4e6, 0.64e6)})
     assert {one.filename for one in caught} == {__file__}
 
 
-simulator = partial(st.external.simulator, PROBLEM, STRENGTH, method=LOCAL, samples=30, seed=99)
+def test_p_values_of_agreement_are_those_of_all_permutations():
+    """Of three peaks and six predicted ones, by hand: Cramer-von Mises over all 84 choices."""
+    own, others = np.array([3.0, 8.0, 9.0]), np.array([1.0, 2.0, 4.0, 5.0, 8.0, 7.0])
+    every = np.concatenate([own, others])
 
+    def distance(chosen):
+        rest = np.setdiff1d(np.arange(9), chosen)
+        steps = [
+            np.mean(every[list(some)][:, None] <= every, axis=0) for some in (chosen, rest)
+        ]
+        away = steps[0] - steps[1]
+        return np.mean(away**2) * 3, np.abs(away).max() * np.sqrt(3)
 
-def test_limit_states_and_simulators_are_those_of_monte_carlo():
-    state = st.external.limit_state(PROBLEM, STRENGTH, LOCAL)
-    draws = state.draws(seed=99, first=0, samples=30)
-    np.testing.assert_array_equal(state(draws), PEAKS)
-    assert state(draws[3]) == PEAKS[3]
-    refuses("draws ... shape", lambda: state(np.zeros((2, 3))))
-    simulate = simulator(("marginal.low",))
-    np.testing.assert_array_equal(simulate([0.66e6]), PEAKS)
-    np.testing.assert_array_equal(simulate([0.66e6], first=10)[:20], PEAKS[10:])
-    refuses("theta ... 1 finite", lambda: simulate([]))
-    refuses("'lo' ... 'low'", lambda: simulator("marginal.lo"))
-    refuses("'mean' ... 'marginal.mean' ... 'corr'", lambda: simulator(("mean", "corr")))
+    all_of_them = np.array([distance(np.array(c)) for c in itertools.combinations(range(9), 3)])
+    here = np.array(distance(np.arange(3)))
+    exact = np.mean(all_of_them >= here * (1 - 1e-9), axis=0)
+    predicted = xr.Dataset({"critical_stress": ("sample", others)})
+    found = st.statistics.agreement(predicted, own, replicates=8000)
+    ((at, share),) = found.predicted
+    assert share[[0, 3, -1]] == pytest.approx([1 / 6, 3 / 6, 1.0])  # up to 1, 4 and 9
+    assert np.interp(6.0, at, share) == pytest.approx(4.5 / 6)  # 4 of 6 up to 5, and 5 up to 7
+    assert (found.cramer_von_mises, found.largest_deviation) == pytest.approx(tuple(here))
+    error = np.sqrt(exact * (1.0 - exact) / 8000)
+    assert np.all(np.abs(np.array(list(found.p_values.values())) - exact) < 4.0 * error + 2e-4)
 
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

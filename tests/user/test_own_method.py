@@ -1,7 +1,5 @@
 """A method of somebody else that does not do as its members promise."""
 
-import warnings
-
 import numpy as np
 import pytest
 from refusals import refuses
@@ -55,15 +53,3 @@ def test_a_time_that_is_none_is_refused(seconds):
     words = "method: seconds_per_sample of broken must return a number of seconds"
     refuses(words, lambda: st.onset(problem, np.full((3, 256), 1e6), method=method))
     refuses(words, lambda: st.failure_probability(problem, strength, 0.7e6, method=method))
-
-
-def test_hours_are_announced_before_they_begin():
-    problem, seen = st.paper.problem(nodes=256), []
-    strength = st.paper.strength(problem, correlation_ratio=2.0)
-    given = {"samples": 500, "progress": lambda *done: seen.append(done), "workers": 2}
-    with pytest.warns(UserWarning, match=r"500 samples take about 2.08 h on 2 cores") as caught:
-        st.monte_carlo(problem, strength, method=Broken({}, seconds=30.0), **given)
-    assert seen
-    assert caught[0].filename == __file__
-    with warnings.catch_warnings(action="error", category=UserWarning):
-        st.monte_carlo(problem, strength, method=Broken({}, seconds=12.0), **given)

@@ -2,7 +2,6 @@
 
 import copy
 import errno
-import json
 import os
 import threading
 import warnings
@@ -11,11 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import scipy.stats
 from crooked import LINE
 from executors import Counting, Forbidding
 from refusals import refuses
-from setups import beta_strength, make_problem
+from setups import beta_strength
 from small_study import lengths, small_study
 
 import stiction as st
@@ -51,23 +49,12 @@ def reference():
     return make_study().run(workers=1)
 
 
-@pytest.fixture
-def run(tmp_path, often):
-    make_study().run(out=tmp_path / "run", workers=1)
-    return tmp_path / "run"
-
-
-def chunks(folder):
-    return sorted((folder / "chunks").glob("*.npz"))
-
-
-def again(folder, words=None, executor=None):
-    """Run the study again, with a warning if words are given and none if not."""
+def again(folder, executor=None):
+    """Run the study again, which says nothing about the store."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         result = make_study().run(out=folder, workers=1, executor=executor)
-    texts = "\n".join(str(w.message) for w in caught if w.category is UserWarning)
-    assert words in texts if words else not texts, texts
+    assert not [one for one in caught if one.category is UserWarning]
     return result
 
 
@@ -84,24 +71,6 @@ def test_growing_computes_only_the_new_samples(tmp_path, often, reference):
     fewer = make_study(samples=80)
     words = "ensemble.samples: 80 here, 120 there"
     refuses(words, lambda: fewer.run(out=tmp_path / "run"))
-
-
-def test_an_interrupted_run_is_readable_and_goes_on(tmp_path, often, reference):
-    def interrupt(done, total):
-        if done > 160:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        make_study().run(out=tmp_path / "run", progress=interrupt, workers=2)
-    state = st.open_run(tmp_path / "run").status()
-    assert 160 < state.done < ALL
-    part = st.open_run(tmp_path / "run").dataset()
-    assert "samples are done" in part.attrs["cut_short"]
-    stress = part["critical_stress"].values
-    found = np.isfinite(stress)
-    assert found.sum() == state.done
-    np.testing.assert_array_equal(stress[found], reference["critical_stress"].values[found])
-    assert again(tmp_path / "run").identical(reference)
 
 
 # -- parts and several writers -------------------------------------------------------------------
@@ -143,9 +112,11 @@ def test_a_reader_beside_a_writer_sees_no_damage(tmp_path, often):
 
 
 @pytest.mark.parametrize("number", [errno.EIO, errno.EACCES])
-def test_what_cannot_be_read_is_not_damaged(run, monkeypatch, number):
+def test_what_cannot_be_read_is_not_damaged(tmp_path, often, monkeypatch, number):
+    run = tmp_path / "run"
+    make_study().run(out=run, workers=1)
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
-    for victim in (run / "study.json", chunks(run)[0]):
+    for victim in (run / "study.json", next((run / "chunks").glob("*.npz"))):
 
         def fail(path, read=Path.read_bytes, victim=victim):
             if path.name == victim.name:
@@ -160,43 +131,6 @@ def test_what_cannot_be_read_is_not_damaged(run, monkeypatch, number):
 
 
 # -- failures ------------------------------------------------------------------------------------
-
-
-def failing(samples):
-    original = Experiment.results
-
-    def results(self, first, count):
-        if any(first <= sample < first + count for sample in samples):
-            raise FloatingPointError("the slip rate became non-finite")
-        return original(self, first, count)
-
-    return results
-
-
-def test_failed_samples_are_nan_listed_and_retried(tmp_path, often, reference, monkeypatch):
-    words = (
-        r"8 of 480 samples could not be solved.* 17 \(seed 3\): FloatingPointError.*and 5 more"
-    )
-    with monkeypatch.context() as patch:
-        patch.setattr(Experiment, "results", failing({17, 105}))
-        with pytest.warns(st.AccuracyWarning, match=words):
-            memory = make_study().run(workers=1, pilot=False)
-        with pytest.warns(st.AccuracyWarning, match=words):
-            stored = make_study().run(out=tmp_path / "run", workers=2, pilot=False)
-    assert stored.identical(memory)
-    assert memory["critical_stress"].isnull().sum() == 8
-    rest = [sample for sample in range(120) if sample not in (17, 105)]
-    for name in ("critical_stress", "critical_position"):
-        np.testing.assert_array_equal(
-            stored[name].sel(sample=rest), reference[name].sel(sample=rest)
-        )
-    state = st.open_run(tmp_path / "run").status()
-    assert {(f.point, f.sample, f.seed) for f in state.failures} == {
-        (point, sample, 3) for point in range(4) for sample in (17, 105)
-    }
-    assert len(json.loads(stored.attrs["failed_samples"])) == 8
-    assert make_study().run(out=tmp_path / "run").identical(reference)
-    assert st.open_run(tmp_path / "run").status().failures == ()
 
 
 def test_counts_are_whole_numbers_and_samples_beyond_the_last_are_left_out():
@@ -216,7 +150,10 @@ def test_counts_are_whole_numbers_and_samples_beyond_the_last_are_left_out():
 
 
 def test_a_study_that_fails_from_the_start_is_given_up(tmp_path, often, monkeypatch):
-    monkeypatch.setattr(Experiment, "results", failing(set(range(1000))))
+    def results(self, first, count):
+        raise FloatingPointError("the slip rate became non-finite")
+
+    monkeypatch.setattr(Experiment, "results", results)
     for out in (None, tmp_path / "run"):
         with pytest.raises(RuntimeError, match=r"sample 0 \(seed 3\): FloatingPointError"):
             make_study().run(out=out, workers=1)
@@ -256,9 +193,6 @@ def test_versions_that_differ_are_said(tmp_path, often, monkeypatch):
         make_study(samples=40).run(executor=Counting(versions="stiction 99.0"))
 
 
-# -- size and time -------------------------------------------------------------------------------
-
-
 def test_a_study_that_another_version_wrote_is_refused_as_such(tmp_path):
     older = make_study().to_dict() | {"method": {"type": "local_criterion", "weights": "exact"}}
     store.Store.open(tmp_path / "run", older)
@@ -267,71 +201,23 @@ def test_a_study_that_another_version_wrote_is_refused_as_such(tmp_path):
         st.open_run(tmp_path / "run")
 
 
-# -- samples of any ensemble, the pilot by the exact method, Dask --------------------------
-
-SMALL = st.Study.from_dict(small_study(sweep=lengths(4e-3, 6e-3)))
-
-
-def test_the_pilot_says_how_far_the_local_criterion_is_from_the_exact_onset():
-    """Of strengths so scattered that nodes reach their residual strength before the onset."""
-    problem = make_problem(128, weakening_rate=0.69e11)
-    marginal = scipy.stats.lognorm(0.5, scale=1e6)
-    strength = st.RandomField(marginal, st.PowerLawSpectrum(0.0075), mean_mode=True)
-    given = {"method": st.LocalCriterion(), "samples": 200, "seed": 11}
-    words = (
-        r"differs from the exact onset by .*in the 32 first samples.*in the 32 weakest of more"
-    )
-    with pytest.warns(st.AccuracyWarning, match=words):
-        found = st.monte_carlo(problem, strength, **given)
-    alone = st.monte_carlo(problem, strength, **given, pilot=False)
-    np.testing.assert_array_equal(found.critical_stress, alone.critical_stress)
-    assert "pilot_bias" not in alone.attrs
-    options = {"method": st.Equilibrium(), "samples": 200, "seed": 11}
-    exact = st.monte_carlo(problem, strength, **options).critical_stress.values
-    near = found.critical_stress.values
-    for name, some in {"pilot": range(32), "pilot_weakest": np.argsort(near)[:32]}.items():
-        difference = (near[some] - exact[some]) / exact[some].mean()
-        assert found.attrs[f"{name}_samples"] == 32
-        assert found.attrs[f"{name}_bias"] == pytest.approx(difference.mean(), rel=1e-9)
-        assert found.attrs[f"{name}_scatter"] == pytest.approx(difference.std(ddof=1), rel=1e-9)
+# -- samples of any ensemble, Dask -----------------------------------------------------------------
 
 
 @pytest.mark.slow
 def test_a_dask_scheduler(tmp_path, command):
     """By the executor of a client, and by the address on the command line."""
     distributed = pytest.importorskip("distributed")
-    SMALL.to_toml(tmp_path / "study.toml")
-    reference = SMALL.run(workers=1)
+    small = st.Study.from_dict(small_study(sweep=lengths(4e-3, 6e-3)))
+    small.to_toml(tmp_path / "study.toml")
+    reference = small.run(workers=1)
     options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
     with distributed.LocalCluster(**options) as cluster, distributed.Client(cluster) as client:
-        assert SMALL.run(executor=client.get_executor(pure=False)).identical(reference)
+        assert small.run(executor=client.get_executor(pure=False)).identical(reference)
         given = tmp_path / "study.toml", "--out", tmp_path / "run"
         code, _, errors = command("run", *given, "--scheduler", cluster.scheduler_address)
     assert code == 0, errors
     assert st.open_run(tmp_path / "run").dataset().identical(reference)
-
-
-@pytest.mark.parametrize("refused", [False, True])
-def test_samples_solved_one_by_one_warn_once(refused):
-    """Steep samples, below four nodes in a nucleation length, are solved: others are selected."""
-    law = st.LinearWeakening(critical_slip=5.93e-6, residual_strength=0.1e6)
-    load = st.Load(initial_stress=0.52e6 if refused else 0.07e6)
-    problem = st.Problem(st.Solid(1e9, 0.3, 1200.0), st.Interface(0.064, 64), law, load)
-    random = st.RandomField(st.Lognormal(mean=1.2e6, cv=0.35), st.PowerLawSpectrum(0.01))
-    with pytest.warns(st.AccuracyWarning) as caught:
-        found = st.monte_carlo(
-            problem, random, method=st.Equilibrium(), samples=20, progress=False
-        )
-    texts = [str(warning.message) for warning in caught]
-    assert sum("are recommended" in text for text in texts) == 1, texts
-    assert sum("could not be solved" in text for text in texts) == refused, texts
-    lost = np.isnan(found.critical_stress.values)
-    strength = random.sample(problem.interface, samples=20, seed=0)
-    np.testing.assert_array_equal(lost, strength.min(axis=1) <= 0.52e6 if refused else False)
-    assert lost.any() == refused
-    steepest = (strength.max(axis=1) - 0.1e6) / 5.93e-6
-    nodes = np.array([problem.nodes_in_nucleation_length(one)[0] for one in steepest])
-    assert 0 < np.count_nonzero(nodes < 4.0) < 20
 
 
 def test_a_file_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch):

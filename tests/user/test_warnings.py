@@ -6,31 +6,22 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 import pytest
 import tomli_w
-from refusals import refuses
+from setups import beta_strength
 from small_study import small_study
+from specimens import crooked
 
 import stiction as st
 from stiction.base.errors import collect_warnings, merge_warnings, warn_of_samples, warn_user
 from stiction.cli import commands
 
-STIFF = float("inf")
-
 
 def joint(samples, **options):
     """Samples of a lap joint behind a stiff machine, in many of which a node that slipped stops."""
-    solid = st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress")
-    drive = st.Pusher(height=0.01, width=0.004, side="both", stiffness=STIFF)
-    problem = st.Problem(
-        solid,
-        st.Interface(length=0.1, nodes=48),
-        st.LinearWeakening(weakening_rate=0.06e12, residual_strength=0.2e6),
-        specimen=st.Blocks(height=0.05, thickness=0.006, drive=drive),
-    )
-    marginal = st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6)
-    strength = st.RandomField(marginal, st.PowerLawSpectrum(1.75e-3))
+    drive = st.Pusher(height=0.01, width=0.004, side="both", stiffness=float("inf"))
+    problem = crooked(nodes=48, height=0.05, drive=drive, rate=0.06e12, residual=0.2e6)
     given = {"method": st.Equilibrium(), "samples": samples, "progress": False} | options
     with pytest.warns(st.AccuracyWarning) as caught:
-        st.monte_carlo(problem, strength, **given)
+        st.monte_carlo(problem, beta_strength(1.75e-3), **given)
     return [str(one.message) for one in caught if "stops before" in str(one.message)]
 
 
@@ -162,59 +153,3 @@ def test_the_same_doubts_in_python_in_a_study_and_in_a_command(
     assert found[0] == found[1]
     assert {commands.in_options(text, command) for text in found[0]} == printed
     assert found[0]
-
-
-METHODS = {
-    "local": ({"type": "local_criterion"}, st.LocalCriterion()),
-    "events": ({"type": "equilibrium", "events": 2}, st.Equilibrium(events=2)),
-    "rupture": (
-        {"type": "rupture", "loading_rate": 3e8, "stop": "onset"},
-        st.Rupture(loading_rate=3e8, stop="onset"),
-    ),
-}
-QUESTION = {"stress": 0.8e6, "target_cv": 0.5}
-JOINT = changed(
-    problem__specimen={
-        "height": 0.04,
-        "thickness": 0.006,
-        "drive": {"type": "pusher", "height": 0.01, "width": 0.004},
-    },
-    problem__friction__weakening_rate=0.06e12,
-    problem__friction__residual_strength=0.2e6,
-)
-
-
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("plain", [changed(), JOINT], ids=["half-spaces", "joint"])
-def test_the_same_numbers_in_python_in_a_study_and_in_a_command(
-    plain, method, tmp_path, monkeypatch, runs
-):
-    """Of every variable of samples, and of one answer between half-spaces."""
-    monkeypatch.chdir(tmp_path)
-    table, own = METHODS[method]
-    if plain is JOINT and method == "rupture":  # options of time mean nothing there
-        words = "method: the rupture cannot take this: loading_rate"
-        (tmp_path / "study.toml").write_text(tomli_w.dumps(plain | {"method": table}))
-        refuses(words, lambda: st.Study.from_toml("study.toml"))
-        runs("run study.toml --out A", words, code=2)
-        table, own = {"type": "rupture", "events": 2}, st.Rupture(events=2)
-    (tmp_path / "study.toml").write_text(
-        tomli_w.dumps(plain | {"method": table, "reliability": QUESTION})
-    )
-    given = {
-        "problem": st.Problem(**plain["problem"]),
-        "random": st.RandomInterface(**plain["random"]),
-        "method": own,
-        "seed": 3,
-    }
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        study = st.Study.from_toml("study.toml")
-        expected = st.monte_carlo(**given, samples=6)
-        runs("run study.toml --out B")
-        for found in (study.run(), st.open_run("B").dataset()):
-            assert found[list(expected.data_vars)].drop_attrs().equals(expected.drop_attrs())
-        if method != "rupture" and plain is not JOINT:
-            answer = str(st.failure_probability(**given, **QUESTION))
-            assert str(study.reliability.answer(study.experiments[0])) == answer
-            assert answer in runs("reliability study.toml").splitlines()
