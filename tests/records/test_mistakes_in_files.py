@@ -197,7 +197,7 @@ LAWS = [
     (lambda law, u: (1.0 - u, 1.0 / (1.0 - u)), lambda f: 1.0 - f),
     (exponential, logarithm, exponential_area, 1.0, "scale"),
     (lambda law, u: (0.5 * np.exp(-u), 0.5 * np.exp(-u)), logarithm),
-    (exponential, logarithm),
+    (exponential, lambda f: f, exponential_area),
     (exponential, lambda f: 0.9 * logarithm(f), exponential_area),
     (lambda law, u: (np.exp(-u), 2.0 * np.exp(-u)), logarithm, exponential_area, 2.0),
 ]
