@@ -34,8 +34,7 @@ NEAREST = {
     "ensemble": "runs fields store ensemble study progress own_method reliability",
     "equilibrium": "lines planes specimens crooked equilibrium plane_equilibrium instability"
     " friction_laws",
-    "friction": "lines ruptures mistakes* friction_laws crooked"
-    " dynamics_properties",
+    "friction": "lines ruptures mistakes* friction_laws crooked dynamics_properties",
     "inference": "inference* mistakes* pictures fit_* joined",
     "jit": "cache architecture own_method",
     "plot": "pictures runs",
