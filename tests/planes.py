@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stiction.elasticity.half_spaces import HalfSpaces
+from stiction.elasticity.protocol import HalfSpaces
 from stiction.methods.equilibrium.sample import LINEAR, make_sample
 from stiction.methods.equilibrium.transforms.plane import AT_CORNER
 

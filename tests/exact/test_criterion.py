@@ -5,7 +5,7 @@ import pytest
 from setups import QUARTER, ROUND_OFF, SOLID, local_onset, make_problem, turns
 
 import stiction as st
-from stiction.elasticity.half_spaces import SMALLEST_EIGENVALUE
+from stiction.elasticity.protocol import SMALLEST_EIGENVALUE
 from stiction.methods.criterion.eigenfunction import (
     around,
     eigenvalue_and_vector,

@@ -5,8 +5,13 @@ import numpy as np
 import pytest
 from oracles import from_laplace, mode_two_stiffness
 
-from stiction.elasticity.exponential_sum import _Polish, fit_exponentials, kernel_sum
-from stiction.elasticity.memory_kernels import memory_kernel, static_stiffness
+from stiction.elasticity.memory_kernels import (
+    _Polish,
+    fit_exponentials,
+    kernel_sum,
+    memory_kernel,
+    static_stiffness,
+)
 from stiction.methods.dynamics import explicit, implicit, memory
 
 ETA = np.sqrt(2.0 / 0.67)

@@ -9,8 +9,7 @@ from scipy.special import j0, j1
 from setups import make_problem
 
 import stiction as st
-from stiction.elasticity.exponential_sum import kernel_sum
-from stiction.elasticity.memory_kernels import memory_kernel, static_stiffness
+from stiction.elasticity.memory_kernels import kernel_sum, memory_kernel, static_stiffness
 
 SOLID = st.paper.problem().solid
 ETA = np.sqrt(2.0 / 0.67)

@@ -9,8 +9,8 @@ from setups import beta_strength, exact_onset, make_problem, turns
 import stiction as st
 from stiction.elasticity.line import (
     circular_entries,
-    smallest_window,
     stiffness_column,
+    widths_between,
     window_mode,
 )
 from stiction.elasticity.stiffness import apply_circular
@@ -128,7 +128,7 @@ def test_factor_of_a_crack_that_grows_keeps_rows_that_stand():
 def test_factor_stops_at_the_node_that_makes_the_matrix_singular():
     nodes = 256
     rate = 12.0  # in units of (G*/2)(2 pi/L)
-    width = smallest_window(nodes, rate)
+    (width,) = widths_between(nodes, rate, rate)
     assert window_mode(nodes, width)[0] <= rate < window_mode(nodes, width - 1)[0]
     column = stiffness_column(nodes, np.pi, 1.0)
     _, size = growing_factor(np.arange(nodes), column, column[0] - rate, [nodes])

@@ -6,8 +6,8 @@ from planes import Lattice, moduli
 from setups import RATE, exact_onset, make_problem, repeated, turns
 
 import stiction as st
-from stiction.elasticity.half_spaces import HalfSpaces
 from stiction.elasticity.operator import make_operator, product
+from stiction.elasticity.protocol import HalfSpaces
 from stiction.methods.criterion.windows import ellipse_window
 from stiction.methods.equilibrium.patches import labelled_patches, patch_of
 from stiction.methods.equilibrium.transforms.growing_patch import window_around

@@ -11,8 +11,7 @@ from ruptures import stepped, with_step
 from setups import QUARTER, RATE, make_problem
 
 import stiction as st
-from stiction.elasticity.exponential_sum import ExponentialSum
-from stiction.elasticity.memory_kernels import memory_kernel, static_stiffness
+from stiction.elasticity.memory_kernels import ExponentialSum, memory_kernel, static_stiffness
 from stiction.methods.dynamics.medium import amplification
 from stiction.methods.dynamics.simulate import simulate_rupture
 

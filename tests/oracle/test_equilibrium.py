@@ -9,7 +9,7 @@ from setups import RATE, exact_onset, make_problem, turns
 
 import stiction as st
 import stiction.methods.equilibrium.dense.program
-from stiction.elasticity.half_spaces import HalfSpaces
+from stiction.elasticity.protocol import HalfSpaces
 from stiction.methods.equilibrium.dense.program import DenseProgram
 from stiction.methods.equilibrium.sample import at_rest, sample_of
 from stiction.methods.equilibrium.solver import follow

@@ -18,9 +18,13 @@ from setups import (
 )
 
 import stiction as st
-from stiction.elasticity.half_spaces import HalfSpaces
-from stiction.elasticity.linear import SOLVED, lowest_eigenvector, no_spring, solve_inside
-from stiction.elasticity.operator import make_operator
+from stiction.elasticity.operator import (
+    SOLVED,
+    lowest_eigenvector,
+    make_operator,
+    solve_inside,
+)
+from stiction.elasticity.protocol import HalfSpaces
 from stiction.methods.equilibrium.sample import Outcome, present_pieces, sample_of
 from stiction.methods.equilibrium.solver import follow
 from stiction.methods.equilibrium.transforms.bracket import make_bracket
@@ -140,11 +144,11 @@ def test_a_slow_direction_saves_iterations():
     slow = np.zeros(inside.size)
     slow[nodes] = rough / np.sqrt(rough @ block @ rough - rate * rough @ rough)
     for each in (np.empty(0), slow):
-        x, residual, workspace = np.zeros(inside.size), right.copy(), np.empty((3, inside.size))
-        given = operator._replace(slow=each), no_spring(inside.size), inside, x, residual
-        _, iterations = solve_inside(*given, workspace, 0.02, 200)
+        x, residual = np.zeros(inside.size), right.copy()
+        given = operator._replace(slow=each), inside, x, residual
+        _, iterations = solve_inside(*given, 0.02, 200)
         taken.append(iterations)
-        status, _ = solve_inside(*given, workspace, 1e-10, 200)
+        status, _ = solve_inside(*given, 1e-10, 200)
         assert status == SOLVED
         # The residual over the lowest eigenvalue.
         np.testing.assert_allclose(x[nodes], exact, rtol=1e-6)

@@ -6,8 +6,8 @@ from planes import WAVENUMBERS, Lattice, moduli, plane_sample
 from setups import LENGTH, RATE, exact_onset, make_problem, smooth_noise
 
 import stiction as st
-from stiction.elasticity.half_spaces import HalfSpaces
 from stiction.elasticity.operator import make_operator
+from stiction.elasticity.protocol import HalfSpaces
 from stiction.methods.criterion.average import _between_nodes, least_average
 from stiction.methods.criterion.windows import ellipse_window
 from stiction.methods.equilibrium.sample import Outcome

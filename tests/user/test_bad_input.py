@@ -11,7 +11,7 @@ from refusals import refusals
 from setups import EXACT, LOCAL, beta_strength, make_problem
 
 import stiction as st
-from stiction.elasticity.exponential_sum import fit_exponentials
+from stiction.elasticity.memory_kernels import fit_exponentials
 from stiction.methods.equilibrium.solver import follow
 from stiction.reliability import subset
 

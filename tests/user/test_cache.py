@@ -90,7 +90,7 @@ import numba, numpy as np
 from numba.core import event
 before = numba.config.CACHE_DIR
 import stiction as st
-from stiction.elasticity.linear import inner
+from stiction.elasticity.operator import inner
 from stiction.problem.friction import kernels
 
 x = np.random.default_rng(7).lognormal(sigma=2.0, size=203)

@@ -12,7 +12,7 @@ from ruptures import wavy_line
 import stiction as st
 from stiction.base.errors import StoreError
 from stiction.base.files import read_arrays
-from stiction.elasticity.exponential_sum import kernel_sum
+from stiction.elasticity.memory_kernels import kernel_sum
 from stiction.methods.dynamics import save as save_module
 from stiction.methods.dynamics.save import open_rupture
 

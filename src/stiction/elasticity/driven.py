@@ -22,8 +22,7 @@ import scipy.linalg
 
 from stiction.base.arrays import Array
 from stiction.elasticity.blocks import Pushes, block_response, glued_pressure
-from stiction.elasticity.half_spaces import HalfSpaces
-from stiction.elasticity.protocol import DenseEntries, Windows
+from stiction.elasticity.protocol import DenseEntries, HalfSpaces, Windows
 
 FINEST = 32
 """Windows that begin within the length of one, at most: weighted means change little between."""

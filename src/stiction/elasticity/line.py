@@ -16,8 +16,13 @@ import numpy as np
 import scipy.linalg
 
 from stiction.base.arrays import Array
-from stiction.elasticity.half_spaces import SMALLEST_EIGENVALUE, HalfSpaces
-from stiction.elasticity.protocol import ANYWHERE, CircularEntries, Windows
+from stiction.elasticity.protocol import (
+    ANYWHERE,
+    SMALLEST_EIGENVALUE,
+    CircularEntries,
+    HalfSpaces,
+    Windows,
+)
 
 GROWTH = 1.25
 """Ratio of successive widths tried where the rate varies, as bounds there are rough anyway."""
@@ -56,7 +61,7 @@ class Line:
         """Return the windows for weakening rates from `low` to `high`, Pa/m, narrowest first."""
         (length,), (modulus,) = self.half_spaces
         unit = np.pi * modulus / length
-        return _windows(self.nodes, _widths_between(self.nodes, low / unit, high / unit), unit)
+        return _windows(self.nodes, widths_between(self.nodes, low / unit, high / unit), unit)
 
 
 @functools.lru_cache(maxsize=4)
@@ -92,17 +97,10 @@ def window_mode(nodes: int, width: int) -> tuple[float, Array]:
     return value, mode
 
 
-def _estimated_width(nodes: int, rate: float) -> int:
-    """Width of an unstable window by h_n = 2 lambda_0 G*/W of the continuum.
-
-    The rate is W in units of (G*/2)(2 pi/L), so that h_n/L = 2 lambda_0/(pi rate).
-    """
-    return int(np.clip(2.0 * SMALLEST_EIGENVALUE / (np.pi * rate) * nodes, 1, nodes))
-
-
-def _narrowest(nodes: int, widths: Sequence[int], guess: int, rate: float) -> int:
+def _narrowest(nodes: int, widths: Sequence[int], rate: float) -> int:
     """Index of the first of rising widths that is unstable, their number if none is."""
-    i = min(guess, len(widths) - 1)
+    # That of the continuum, h_n, is a node or so off, more if it is a fair part of the circle.
+    i = min(bisect.bisect_left(widths, _continuous_width(nodes, rate)), len(widths) - 1)
     while i < len(widths) and window_mode(nodes, widths[i])[0] > rate:
         i += 1
     while i > 0 and window_mode(nodes, widths[i - 1])[0] <= rate:
@@ -110,38 +108,28 @@ def _narrowest(nodes: int, widths: Sequence[int], guess: int, rate: float) -> in
     return i
 
 
-@functools.lru_cache(maxsize=64)
-def smallest_window(nodes: int, rate: float) -> int | None:
-    """Fewest nodes that are unstable by themselves at a weakening rate; None beyond `WIDEST`."""
+def _continuous_width(nodes: int, rate: float) -> int:
+    """Nodes in h_n = 2 lambda_0 G*/W, the rate W in units of (G*/2)(2 pi/L)."""
+    return int(min(2.0 * SMALLEST_EIGENVALUE / (np.pi * rate), 1.0) * nodes)
+
+
+def widths_between(nodes: int, lowest: float, highest: float) -> tuple[int, ...]:
+    """Widths for weakening rates from `lowest` to `highest`, the widest unstable at `lowest`.
+
+    At one rate it is the narrowest of all, if that is not beyond `WIDEST`; else they are from a
+    ladder, the same for all samples.
+    """
     widest = min(nodes - 1, WIDEST)
-    width = _estimated_width(nodes, rate)
-    if width > 1.2 * widest:
-        return None
-    # The estimate is a node or so off, more where the window is a fair part of the circle.
-    width = _narrowest(nodes, range(1, widest + 1), width - 1, rate) + 1
-    return width if width <= widest else None
-
-
-def _ladder(nodes: int) -> list[int]:
-    """Widths tried where the weakening rate varies: the same for all samples."""
-    widths = [1]
-    while widths[-1] < min(nodes // 2, WIDEST):
-        widths.append(max(widths[-1] + 1, int(widths[-1] * GROWTH)))
-    return widths[:-1]
-
-
-def _widths_between(nodes: int, lowest: float, highest: float) -> tuple[int, ...]:
-    """Widths for weakening rates from `lowest` to `highest`, the widest unstable at `lowest`."""
-    if lowest >= highest:
-        width = smallest_window(nodes, highest)
-        return () if width is None else (width,)
-    rungs = _ladder(nodes)
-
-    def rung(rate: float) -> int:
-        guess = bisect.bisect_left(rungs, _estimated_width(nodes, rate))
-        return _narrowest(nodes, rungs, guess, rate)
-
-    return tuple(rungs[rung(highest) : rung(lowest) + 1])
+    widths: Sequence[int] = range(1, widest + 1)
+    if lowest < highest:
+        ladder = [1]
+        while ladder[-1] < min(nodes // 2, WIDEST):
+            ladder.append(max(ladder[-1] + 1, int(ladder[-1] * GROWTH)))
+        widths = ladder[:-1]
+    elif _continuous_width(nodes, highest) > 1.2 * widest:
+        return ()
+    first, last = (_narrowest(nodes, widths, rate) for rate in (highest, lowest))
+    return tuple(widths[first : last + 1])
 
 
 @functools.lru_cache(maxsize=64)

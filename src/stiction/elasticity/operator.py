@@ -1,9 +1,17 @@
-"""K - W of an interface by fast Fourier transform, inside compiled kernels and without allocating.
+"""K - W of an interface by fast Fourier transform: products, conjugate gradients, eigenvectors.
 
-K is given by its symbol (`half_spaces`). Kernels take flat arrays, so that the same code serves
-lines and planes.
+K is given by its symbol (`protocol`). Kernels take flat arrays, so that the same code serves lines
+and planes.
+
+The slip of given nodes solves A d = drive with A = K - W cut to them. A spring may hold a
+patch: A + spring phi phi^T is positive definite also where A has one direction phi of
+negative curvature, so that states on and beyond the turning point of the load can be solved
+for. The preconditioner is 1/(K(k) + W/2), cut too. Close to a turning point A has one eigenvalue
+that is much smaller than all others; a direction y close to its eigenvector, with y^T A y = 1, adds
+y y^T to the preconditioner, so that it costs no iterations.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +19,14 @@ from numpy.typing import NDArray
 from rocket_fft import c2c, c2r, r2c
 
 from stiction.base.arrays import Array
-from stiction.base.jit import jit, jit_inside
+from stiction.base.jit import jit, jit_allocating, jit_inside
+from stiction.base.lanes import LANES, add, load, multiply_add, total, zeros
+
+SOLVED = 0
+NEGATIVE = 1
+EXHAUSTED = 2
+
+Mask = NDArray[np.bool_]
 
 
 class Transform(NamedTuple):
@@ -64,14 +79,29 @@ def convolve(
 
 
 class Operator(NamedTuple):
-    """K - W of an interface, an approximate inverse and a workspace; for one thread at a time."""
+    """K - W of an interface with what solving takes; for one thread at a time."""
 
     transform: Transform
     symbol: Array  # (modes,): K(k), Pa/m
     inverse: Array  # (modes,): 1/(K(k) + W/2) with the mean W
     rate: Array  # (nodes,): W, Pa/m, zero where the residual strength is reached
     spectrum: NDArray[np.complex128]  # (modes,): overwritten by each transform
+    preconditioned: Array  # (nodes,): overwritten by conjugate gradients, as are the next two
+    direction: Array  # in which curvature is negative, if they meet one
+    image: Array
     slow: Array  # (nodes,): y with y^T (K - W) y about 1 that the inverse lacks, or empty
+    spring: float  # stiffness of a spring that holds a patch, Pa/m; 0 for none
+    held: Array  # (nodes,): phi, the patch that it holds, of unit norm
+
+
+def operator_of(shape: tuple[int, ...], symbol: Array, inverse: Array, rate: Array) -> Operator:
+    """Return the operator of a symbol, an inverse (modes,) and a weakening rate (nodes,)."""
+    spectrum, none = np.empty(symbol.size, dtype=np.complex128), np.empty(0)
+    z, direction, image = np.empty((3, rate.size))
+    return Operator(
+        make_transform(shape), symbol, inverse, rate, spectrum, z, direction, image,
+        slow=none, spring=0.0, held=none,
+    )  # fmt: skip
 
 
 def make_operator(symbol: Array, rate: Array | float, shape: tuple[int, ...]) -> Operator:
@@ -79,14 +109,7 @@ def make_operator(symbol: Array, rate: Array | float, shape: tuple[int, ...]) ->
     rates = np.broadcast_to(np.asarray(rate, dtype=np.float64), shape).flatten()
     typical = float(rates[rates > 0.0].mean()) if (rates > 0.0).any() else float(symbol.max())
     flat = symbol.flatten()
-    return Operator(
-        make_transform(shape),
-        flat,
-        1.0 / (flat + 0.5 * typical),
-        rates,
-        np.empty(flat.shape, dtype=np.complex128),
-        np.empty(0),
-    )
+    return operator_of(shape, flat, 1.0 / (flat + 0.5 * typical), rates)
 
 
 @jit
@@ -97,8 +120,211 @@ def filtered(operator: Operator, multiplier: Array, field: Array, out: Array) ->
 
 @jit
 def product(operator: Operator, field: Array, out: Array) -> None:
-    """`out` = (K - W) field at every node."""
+    """`out` = (K - W) field at every node; without a spring."""
     filtered(operator, operator.symbol, field, out)
     rate = operator.rate
     for i in range(out.size):
         out[i] -= rate[i] * field[i]
+
+
+@jit
+def dot(first: Array, second: Array, count: int) -> float:
+    """Sum of products in one thread; numpy's own depends on the number of its threads."""
+    a = zeros()
+    b = zeros()
+    c = zeros()
+    d = zeros()
+    t = 0
+    while t + 4 * LANES <= count:
+        a = multiply_add(load(first, t), load(second, t), a)
+        b = multiply_add(load(first, t + LANES), load(second, t + LANES), b)
+        c = multiply_add(load(first, t + 2 * LANES), load(second, t + 2 * LANES), c)
+        d = multiply_add(load(first, t + 3 * LANES), load(second, t + 3 * LANES), d)
+        t += 4 * LANES
+    if t + 2 * LANES <= count:
+        a = multiply_add(load(first, t), load(second, t), a)
+        b = multiply_add(load(first, t + LANES), load(second, t + LANES), b)
+        t += 2 * LANES
+    if t + LANES <= count:
+        c = multiply_add(load(first, t), load(second, t), c)
+        t += LANES
+    rest = 0.0
+    while t < count:
+        rest = multiply_add(first[t], second[t], rest)
+        t += 1
+    return total(add(add(a, b), add(c, d))) + rest
+
+
+@jit
+def inner(a: Array, b: Array) -> float:
+    """Sum of products over all nodes of two fields."""
+    return dot(a, b, a.size)
+
+
+@jit
+def add_scaled(target: Array, factor: float, source: Array) -> None:
+    """`target` += factor * source."""
+    for i in range(target.size):
+        target[i] += factor * source[i]
+
+
+@jit
+def set_scaled(target: Array, factor: float, source: Array) -> None:
+    """`target` = factor * source; a slice on the left takes numba seconds to compile."""
+    for i in range(target.size):
+        target[i] = factor * source[i]
+
+
+@jit
+def restrict(field: Array, inside: Mask) -> None:
+    """Set a field to zero outside a set of nodes."""
+    for i in range(field.size):
+        if not inside[i]:
+            field[i] = 0.0
+
+
+@jit
+def largest_inside(field: Array, inside: Mask) -> float:
+    """Largest absolute value of a field on a set of nodes."""
+    most = 0.0
+    for i in range(field.size):
+        if inside[i]:
+            most = max(most, abs(field[i]))
+    return most
+
+
+@jit
+def residual_of(operator: Operator, right: Array, x: Array, out: Array) -> None:
+    """`out` = right - (A + spring phi phi^T) x at every node."""
+    product(operator, x, out)
+    for i in range(out.size):
+        out[i] = right[i] - out[i]
+    if operator.spring > 0.0:
+        add_scaled(out, -operator.spring * inner(operator.held, x), operator.held)
+
+
+@jit
+def solve_inside(
+    operator: Operator,
+    inside: Mask,
+    x: Array,
+    residual: Array,
+    tolerance: float,
+    iterations: int,
+) -> tuple[int, int]:
+    """Conjugate gradients for (A + spring phi phi^T) x = right on the nodes `inside`.
+
+    x is a guess, then the solution, with its residual, as from `residual_of`; both are zero
+    outside. Returns SOLVED (no residual above the tolerance, Pa), NEGATIVE (curvature, along
+    `operator.direction`) or EXHAUSTED, and the number of iterations.
+    """
+    z, direction, image = operator.preconditioned, operator.direction, operator.image
+    restrict(residual, inside)
+    slow = operator.slow
+    largest = largest_inside(residual, inside)
+    previous = 0.0
+    for iteration in range(iterations):
+        if largest <= tolerance:
+            return SOLVED, iteration
+        filtered(operator, operator.inverse, residual, z)
+        if slow.size > 0:
+            add_scaled(z, inner(slow, residual), slow)
+        now = inner(residual, z)
+        ratio = now / previous if previous > 0.0 else 0.0
+        previous = now
+        for i in range(direction.size):
+            kept = ratio * direction[i] if ratio > 0.0 else 0.0
+            direction[i] = z[i] + kept if inside[i] else 0.0
+        product(operator, direction, image)
+        if operator.spring > 0.0:
+            add_scaled(image, operator.spring * inner(operator.held, direction), operator.held)
+        curvature = inner(direction, image)
+        if curvature <= 0.0:
+            return NEGATIVE, iteration + 1
+        step = now / curvature
+        largest = 0.0
+        for i in range(direction.size):
+            if inside[i]:
+                x[i] += step * direction[i]
+                residual[i] -= step * image[i]
+                largest = max(largest, abs(residual[i]))
+    return EXHAUSTED, iterations
+
+
+@jit
+def _combine(basis: Array, weights: Array, count: int, out: Array) -> None:
+    """`out` = the second to last vectors of a basis with these weights; the first is scaled."""
+    for i in range(out.size):
+        total = 0.0
+        for k in range(1, count):
+            total += weights[k] * basis[k, i]
+        out[i] = basis[2, i] = total
+        basis[0, i] = basis[0, i] * weights[0] + total
+
+
+@jit_allocating
+def lowest_eigenvector(
+    operator: Operator, inside: Mask, vector: Array, tolerance: float, iterations: int
+) -> tuple[float, int]:
+    """Smallest eigenvalue of A on the nodes `inside`, by single-vector LOBPCG (Knyazev 2001).
+
+    The vector is a guess, then the eigenvector: unit norm, positive sum, zero outside. It
+    stops where the norm of A y - lambda y is below the tolerance. Returns lambda (Pa/m) and
+    iterations.
+    """
+    nodes = vector.size
+    basis = np.empty((3, nodes))  # the vector, the preconditioned residual, the last direction
+    images = np.empty((3, nodes))
+    moved = np.empty(nodes)
+    # A guess may be so small that its norm underflows: a power of two changes no digit.
+    exponent = math.frexp(largest_inside(vector, inside))[1]
+    set_scaled(basis[0], math.ldexp(1.0, min(-exponent, 1000)), vector)
+    restrict(basis[0], inside)
+    set_scaled(basis[0], 1.0 / np.sqrt(inner(basis[0], basis[0])), basis[0])
+    product(operator, basis[0], images[0])
+    restrict(images[0], inside)
+    value = inner(basis[0], images[0])
+    count = 2
+    taken = 0
+    while taken < iterations:
+        set_scaled(moved, 1.0, images[0])
+        add_scaled(moved, -value, basis[0])
+        if np.sqrt(inner(moved, moved)) <= tolerance:
+            break
+        taken += 1
+        filtered(operator, operator.inverse, moved, basis[1])
+        restrict(basis[1], inside)
+        product(operator, basis[1], images[1])
+        restrict(images[1], inside)
+        for k in range(1, count):  # orthonormal, so that the small problem is a plain one
+            for _ in range(2):
+                for m in range(k):
+                    overlap = inner(basis[k], basis[m])
+                    add_scaled(basis[k], -overlap, basis[m])
+                    add_scaled(images[k], -overlap, images[m])
+            norm = np.sqrt(inner(basis[k], basis[k]))
+            if norm < 1e-14:
+                count = k
+                break
+            set_scaled(basis[k], 1.0 / norm, basis[k])
+            set_scaled(images[k], 1.0 / norm, images[k])
+        if count < 2:
+            break
+        small = np.empty((count, count))
+        for k in range(count):
+            for m in range(k + 1):
+                both = inner(basis[k], images[m]) + inner(basis[m], images[k])
+                small[k, m] = small[m, k] = 0.5 * both
+        values, vectors = np.linalg.eigh(small)
+        value, weights = values[0], vectors[:, 0]
+        _combine(basis, weights, count, moved)
+        _combine(images, weights, count, moved)
+        scale = 1.0 / np.sqrt(inner(basis[2], basis[2]))
+        set_scaled(basis[2], scale, basis[2])
+        set_scaled(images[2], scale, images[2])
+        count = 3
+    total = 0.0
+    for i in range(nodes):
+        total += basis[0, i]
+    set_scaled(vector, -1.0 if total < 0.0 else 1.0, basis[0])
+    return value, taken

@@ -2,7 +2,7 @@
 
 from stiction.base.arrays import Array
 from stiction.base.jit import jit, jit_inside
-from stiction.elasticity.linear import dot
+from stiction.elasticity.operator import dot
 from stiction.elasticity.protocol import Windows
 
 STRIDES = 16

@@ -23,7 +23,7 @@ from stiction.base.model import Mode, describe, is_unplaced, model
 from stiction.base.units import Doubt, doubt_units
 from stiction.base.variables import PROFILES
 from stiction.elasticity.driven import Driven
-from stiction.elasticity.half_spaces import HalfSpaces
+from stiction.elasticity.protocol import HalfSpaces
 from stiction.problem.friction import SCALES, Friction, contradictions
 from stiction.problem.interface import Interface
 from stiction.problem.load import Load, LoadShape

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
-from stiction.elasticity.half_spaces import HalfSpaces
-from stiction.elasticity.linear import lowest_eigenvector
-from stiction.elasticity.operator import make_operator
+from stiction.elasticity.operator import lowest_eigenvector, make_operator
+from stiction.elasticity.protocol import HalfSpaces
 from stiction.methods.criterion.eigenfunction import around, grid_weights
 from stiction.problem.problem import Problem
 

@@ -7,8 +7,7 @@ import numpy as np
 
 from stiction.base.errors import InputError
 from stiction.base.model import check_memory
-from stiction.elasticity.exponential_sum import ExponentialSum, kernel_sum
-from stiction.elasticity.memory_kernels import static_stiffness
+from stiction.elasticity.memory_kernels import ExponentialSum, kernel_sum, static_stiffness
 from stiction.elasticity.operator import make_transform
 from stiction.methods.dynamics.memory import offsets, phi, step_table
 from stiction.methods.dynamics.state import Floats, Grid

@@ -76,7 +76,8 @@ class RuptureProgram(DenseProgram):
         stiff: Array = self.problem.blocks.stiffness @ slip
         outcome: int = Outcome.SLIDING
         if not event.slides:  # what still moves once the waves have died away comes to rest
-            outcome = jump(sample, found.load, slip, stiff, np.inf, *self._workspaces, True)
+            course = self._course(sample, slip, stiff)
+            outcome = jump(course, found.load, np.inf, self._workspaces[1])
         state = State(
             found.load, slip, found.direction, stiff, by_events=True, jumped=True, stopped=True
         )

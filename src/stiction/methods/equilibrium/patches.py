@@ -152,16 +152,20 @@ def largest_patch(weight: Array, interface: Any, share: float) -> tuple[Mask, Pa
     return inside, patch_of(inside, weight, interface.spacings)
 
 
-def critical_patch(multiplier: Array, interface: Any) -> tuple[Mask, Patch]:
+def critical_patch(multiplier: Array, interface: Any) -> Patch:
     """Return the patch that becomes unstable, from its multiplier y >= 0, not all zero.
 
     On a line it is the run with the largest y. On a plane it is where y is above a tenth of its
     largest value, around that value. It is not all slipping nodes connected with it: on rough
     strengths these reach across the plane, with a y close to zero.
     """
-    return largest_patch(multiplier, interface, 0.0 if multiplier.ndim == 1 else CORE)
+    if interface.is_plane:
+        return largest_patch(multiplier.reshape(interface.shape), interface, CORE)[1]
+    return line_patch(multiplier, interface)
 
 
-def patches_of(slip: Array) -> int:
-    """Return the number of slipping patches on a line (n,) or a plane (nx, ny)."""
-    return count_patches(slip) if slip.ndim == 1 else labelled_patches(slip > 0.0)[1]
+def patches_of(slip: Array, interface: Any) -> int:
+    """Return the number of slipping patches."""
+    if interface.is_plane:
+        return labelled_patches(slip.reshape(interface.shape) > 0.0)[1]
+    return count_patches(with_ends(slip, interface))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
 from stiction.base.jit import jit, jit_inside
-from stiction.elasticity.linear import inner
+from stiction.elasticity.operator import inner
 from stiction.problem.friction import FrictionLaw
 from stiction.problem.friction.parameters import Linear, Polygon
 from stiction.problem.sample import Sample
@@ -36,8 +36,8 @@ class Pieces(NamedTuple):
     ends: Array
     starts: Array
     slopes: Array
-    first: float = 1.0
-    area: float = 0.5
+    first: float
+    area: float
     at_corner: float = 1.0 - 1e-12
 
     @property
@@ -46,7 +46,7 @@ class Pieces(NamedTuple):
         return bool(np.any(np.diff(self.slopes) > 0.0))
 
 
-LINEAR = Pieces(np.array([1.0]), np.array([1.0, 0.0]), np.array([1.0, 0.0]))
+LINEAR = Pieces(np.array([1.0]), np.array([1.0, 0.0]), np.array([1.0, 0.0]), 1.0, 0.5)
 
 
 def refused(law: FrictionLaw) -> list[str]:
@@ -100,37 +100,27 @@ class StaticSample(NamedTuple):
 def make_sample(
     excess: Array, residual: Array, profile: Array, rate: Array, pieces: Pieces
 ) -> StaticSample:
-    """Return one sample, or many over the first axis.
-
-    Nodes whose strength is residual, but for round-off, do not weaken.
-    """
+    """Return one sample; nodes whose strength is residual, but for round-off, do not weaken."""
     fall = excess - residual
     largest = max(excess.max(), residual.max(), -excess.min(), -residual.min())
     if not fall.min() > FLAT * largest:
-        scale = np.maximum(np.abs(excess), np.abs(residual)).mean(axis=-1, keepdims=True)
+        scale = np.maximum(np.abs(excess), np.abs(residual)).mean()
         constant = ~(fall > FLAT * scale)
         residual = np.where(constant, excess, residual)
         fall, rate = np.where(constant, 0.0, (fall, rate))
     with np.errstate(invalid="ignore", divide="ignore"):
         critical = np.where(rate > 0.0, pieces.first * fall / rate, 0.0)
-    # A copy: of a read-only array, as of a law, each kernel would be compiled a second time.
-    return StaticSample(excess, residual, profile, rate.copy(), critical, pieces)
+    return StaticSample(excess, residual, profile, rate, critical, pieces)
 
 
-def sample_of(rows: Sample, pieces: Pieces, row: int | slice = slice(None)) -> StaticSample:
-    """Return one sample of a batch, or all of them, as the kernels take them."""
+def sample_of(rows: Sample, pieces: Pieces, row: int) -> StaticSample:
+    """Return one sample of a batch as the kernels take it."""
     initial = rows.initial_stress[row]
-    shape = (*initial.shape[: initial.ndim - rows.load_profile.ndim], -1)
-    excess = (rows.strength[row] - initial).reshape(shape)
-    residual = (rows.residual_strength[row] - initial).reshape(shape)
-    rate = rows.weakening_rate[row].reshape(shape)
-    return make_sample(excess, residual, rows.load_profile.flatten(), rate, pieces)
-
-
-def row_of(samples: StaticSample, row: int) -> StaticSample:
-    """Return one sample of a batch."""
-    excess, residual, profile, rate, critical, pieces = samples
-    return StaticSample(excess[row], residual[row], profile, rate[row], critical[row], pieces)
+    excess = (rows.strength[row] - initial).reshape(-1)
+    residual = (rows.residual_strength[row] - initial).reshape(-1)
+    # Copies: of read-only arrays, as of a law, each kernel would be compiled a second time.
+    profile, rate = rows.load_profile.flatten(), rows.weakening_rate[row].flatten()
+    return make_sample(excess, residual, profile, rate, pieces)
 
 
 class Present(NamedTuple):
@@ -153,8 +143,6 @@ class State:
         d (m) and the direction in which it is unstable.
     stiff : (n,) array
         K d, Pa; empty on planes.
-    stiff_direction : (n,) array, optional
-        K times the direction, if it is known.
     multiplier : (n,) array, optional
         The exact y with <p, y> = 1, if the direction is that; else the direction stands for it.
     gap : float
@@ -182,7 +170,6 @@ class State:
     stopped: bool = False
     peak: float | None = None
     multiplier: Array | None = None
-    stiff_direction: Array | None = None
 
     @property
     def highest(self) -> float:

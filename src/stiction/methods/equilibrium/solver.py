@@ -11,12 +11,9 @@ from stiction.base.errors import InputError, warn_accuracy, warn_of_samples
 from stiction.base.variables import Variable
 from stiction.methods.equilibrium.dense.program import DenseProgram
 from stiction.methods.equilibrium.patches import (
-    Patch,
     critical_patch,
     largest_patch,
-    line_patch,
     patches_of,
-    with_ends,
 )
 from stiction.methods.equilibrium.sample import (
     Program,
@@ -27,7 +24,6 @@ from stiction.methods.equilibrium.sample import (
     present_pieces,
     refused,
     residual_nodes,
-    row_of,
     sample_of,
 )
 from stiction.methods.equilibrium.transforms.plane import PlaneProgram
@@ -94,31 +90,44 @@ def event_table(
     problem: Problem, rows: Sample, row: int, events: list[Event]
 ) -> dict[str, Array]:
     """Return the variables of the arrested events of one sample, (events, ...) arrays."""
-    interface, plane = problem.interface, problem.interface.is_plane
     initial, profile = rows.initial_stress[row].mean(), rows.load_profile.mean()
-    table = []
-    for before, after in events:
-        added = (after.slip - before.slip).reshape(interface.shape)
-        inside, patch = largest_patch(np.maximum(added, 0.0), interface, EVENT_CORE)
-        held = before.load - relief_of(problem, before.slip)
-        stress = initial + held * profile
-        moment = problem.solid.shear_modulus * float(added.sum()) * interface.cell
-        measures = (
-            (patch.centre, patch.extents, patch.area) if plane else (*patch.centre, patch.area)
+    measured = [_measures(problem, initial, profile, *event) for event in events]
+    return {
+        name: np.array([each[name] for each in measured]).reshape(
+            len(events), *(2 for _ in variable.dims[1:])
         )
-        values: tuple[Any, ...] = (*measures, added[inside].mean(), moment)
-        if problem.specimen is not None:
-            left = after.load - relief_of(problem, after.slip)
-            moved, on = (travel_of(problem, one.load, one.slip) for one in (before, after))
-            start = float(np.argmax(inside)) * interface.spacing
-            far = moved + elongation_of(problem, stress)
-            values += ((held - left) * profile, moved, far, on - moved, start)
-        table.append((before.load, stress, *values))
-    names = event_variables(interface)
-    if not table:
-        return {name: np.empty((0, 2)[: len(names[name].dims)]) for name in names}
-    columns = zip(*table, strict=True)
-    return {name: np.array(column) for name, column in zip(names, columns, strict=True)}
+        for name, variable in event_variables(problem.interface).items()
+    }
+
+
+def _measures(
+    problem: Problem, initial: float, profile: float, before: State, after: State
+) -> dict[str, Any]:
+    """Return the variables of one event; initial stress and load profile are means."""
+    interface = problem.interface
+    added = (after.slip - before.slip).reshape(interface.shape)
+    inside, patch = largest_patch(np.maximum(added, 0.0), interface, EVENT_CORE)
+    held, left = (one.load - relief_of(problem, one.slip) for one in (before, after))
+    values = {
+        "event_load": before.load,
+        "event_stress": initial + held * profile,
+        "event_position": patch.centre,
+        "event_length": patch.area,
+        "event_extent": patch.extents,
+        "event_area": patch.area,
+        "event_mean_slip": added[inside].mean(),
+        "event_moment": problem.solid.shear_modulus * float(added.sum()) * interface.cell,
+    }
+    if problem.specimen is not None:
+        moved, on = (travel_of(problem, one.load, one.slip) for one in (before, after))
+        values |= {
+            "event_stress_drop": (held - left) * profile,
+            "event_travel": moved,
+            "event_crosshead_travel": moved + elongation_of(problem, values["event_stress"]),
+            "event_travel_step": on - moved,
+            "event_start": float(np.argmax(inside)) * interface.spacing,
+        }
+    return values
 
 
 @dataclass
@@ -212,9 +221,9 @@ class OnsetSolver:
         """Return the onset of each sample; see `Equilibrium`."""
         warn_of_signs(self.problem)
         self.problem.warn_if_coarse(rows, FINE, ROUGHLY[len(self.problem.interface.shape)])
-        samples, table, known = sample_of(rows, self.program.pieces), [], []
+        table, known = [], []
         for row in range(rows.samples):
-            sample = row_of(samples, row)
+            sample = sample_of(rows, self.program.pieces, row)
             try:
                 path = follow(self.program, sample)
             except Exception as error:
@@ -238,21 +247,19 @@ class OnsetSolver:
         """Return the variables of one sample, the first instability as a load."""
         interface, shape = self.problem.interface, rows.strength[row].shape
         first, last = path.first, path.last
-        slides = patch = self._patch(multiplier_of(sample, first))
+        slides = patch = critical_patch(multiplier_of(sample, first), interface)
         # On lines the multiplier is known of a programme, which passes no corner.
         straight = last is first and first.multiplier is not None and not interface.is_plane
         if last is not first and last.direction.any():
-            slides = self._patch(last.direction)
+            slides = critical_patch(last.direction, interface)
         values: dict[str, Any] = {
             "critical_load": last.load,
             "critical_stress": path.peak,
             "first_instability": first.load - relief_of(self.problem, first.slip),
             "certificate_gap": first.gap,
-            "critical_position": patch.centre,
-            "sliding_position": slides.centre,
-            "slip_patches": patches_of(
-                with_ends(first.slip.reshape(interface.shape), interface)
-            ),
+            "critical_position": np.squeeze(patch.centre),
+            "sliding_position": np.squeeze(slides.centre),
+            "slip_patches": patches_of(first.slip, interface),
             "arrested_events": len(path.events),
             "residual_reached": not straight and bool(residual_nodes(sample, last.slip).any()),
             "certified": first.certified,
@@ -263,9 +270,6 @@ class OnsetSolver:
             values["critical_patch_area"] = patch.area
         else:
             values["critical_patch_length"] = patch.area
-            values["critical_position"], values["sliding_position"] = (
-                *patch.centre, *slides.centre,
-            )  # fmt: skip
         stable = path.known and not first.unstable  # behind a stiff machine
         if stable:
             of_patch = ("first_instability", "critical_position", "critical_patch_length")
@@ -283,12 +287,6 @@ class OnsetSolver:
                 values[name] = np.full((most, *column.shape[1:]), np.nan)
                 values[name][: len(column)] = column
         return values
-
-    def _patch(self, direction: Array) -> Patch:
-        interface = self.problem.interface
-        if not interface.is_plane:
-            return line_patch(direction, interface)
-        return critical_patch(direction.reshape(interface.shape), interface)[1]
 
     def _warn(self, rows: Sample, values: dict[str, Array], lost: NDArray[np.bool_]) -> None:
         """Warn of what is not as it mostly is: values are of all samples, stresses in Pa."""

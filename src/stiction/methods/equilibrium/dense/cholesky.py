@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from stiction.base.arrays import Array
 from stiction.base.jit import ZERO, jit, jit_inside
 from stiction.base.lanes import LANES, load, multiply_add, totals, zeros
-from stiction.elasticity.linear import dot
+from stiction.elasticity.operator import dot
 from stiction.elasticity.stiffness import apply, apply_outside, entry
+from stiction.methods.equilibrium.sample import StaticSample
 
 GROUP = 4
 """Rows that are appended together: each row of the factor is then read once for four new ones."""
@@ -179,8 +180,9 @@ class Workspace(NamedTuple):
     """The factor of A on the slipping nodes of one sample, with the arrays that extend it.
 
     `members[:size]` are the slipping nodes in the order of the rows of `factor`, `inside` marks
-    them, `diagonal` is that of A; `forward` holds the forward substitutions of the load profile
-    and of the strength. `order` is a list of nodes to append, `keys` that by which it is sorted.
+    them, `diagonal` is that of A; `forward_load` and `forward_strength` are the forward
+    substitutions of the load profile and of the strength, `forward_drive` in a jump that of the
+    drive `known_drive`. `order` is a list of nodes to append, `keys` that by which it is sorted.
     Rows of the factor up to `held` are valid for these members and their diagonal entries of A,
     `held_diagonal`. The others are fields: a `right` side and `resting`, the stress that nodes take
     off the interface which slipped and rest, at nodes; a `solution` and slip `rates` of members;
@@ -193,11 +195,14 @@ class Workspace(NamedTuple):
     order: NDArray[np.int64]
     inside: NDArray[np.bool_]
     diagonal: Array
-    forward: Array
     turns: Array
     halves: Array
     held: NDArray[np.int64]
     held_diagonal: Array
+    forward_load: Array
+    forward_strength: Array
+    forward_drive: Array
+    known_drive: Array
     keys: Array
     right: Array
     resting: Array
@@ -218,11 +223,23 @@ def make_workspace(stiffness: Any, n: int) -> Workspace:
         np.empty(n, dtype=np.bool_),
         np.empty(n),
         np.empty((2, n + 4)),
-        np.empty((2, n + 4)),
         np.empty((2, n // 2)),
         np.zeros(1, dtype=np.int64),
-        *np.zeros((8, n + 4)),
+        *np.zeros((12, n + 4)),
     )
+
+
+class Course(NamedTuple):
+    """One sample on its way: the slip d (m) and K d (Pa) of all nodes go with it.
+
+    `stops` says whether a node that slips may stop.
+    """
+
+    sample: StaticSample
+    slip: Array
+    stiff: Array
+    workspace: Workspace
+    stops: bool
 
 
 @jit
@@ -369,8 +386,9 @@ def multiply_outside(workspace: Workspace, size: int, values: Array, result: Arr
 
 
 @jit_inside
-def take_off_resting(workspace: Workspace, slip: Array) -> None:
+def take_off_resting(course: Course) -> None:
     """Multiply K by the slip of the nodes that rest, into `resting`."""
+    slip, workspace = course.slip, course.workspace
     values, count = workspace.right, ZERO
     for i in range(slip.shape[0]):
         if slip[i] > 0.0 and not workspace.inside[i]:
@@ -386,7 +404,7 @@ def take_off_resting(workspace: Workspace, slip: Array) -> None:
 def solve_forward(workspace: Workspace, size: int, load: float, solution: Array) -> None:
     """Slip of the members at a load, A_SS d = load p - s, from the forward substitutions."""
     for t in range(size):
-        solution[t] = load * workspace.forward[0, t] - workspace.forward[1, t]
+        solution[t] = load * workspace.forward_load[t] - workspace.forward_strength[t]
     back_substitute(workspace.factor, size, solution)
 
 

@@ -19,6 +19,7 @@ from stiction.elasticity.stiffness import entry, mean_relief
 from stiction.methods.equilibrium.dense.cholesky import (
     CROWDED,
     MOST_MEMBERS,
+    Course,
     Workspace,
     append,
     back_substitute,
@@ -69,21 +70,14 @@ def _residual_runs(sample: StaticSample, slip: Array) -> tuple[int, int]:
 
 
 @jit_inside
-def _join(
-    sample: StaticSample,
-    load: float,
-    slip: Array,
-    stiff: Array,
-    workspace: Workspace,
-    size: int,
-    tolerance: float,
-) -> int:
+def _join(course: Course, load: float, size: int, tolerance: float) -> int:
     """Append the overstressed nodes to the elastic factor.
 
     Returns the number of members, ALL if no node remains that never slipped, CROWDED if they do not
     fit.
     """
-    count = overstressed(sample, load, slip, stiff, workspace, tolerance)
+    workspace = course.workspace
+    count = overstressed(course, load, tolerance)
     if count == 0:
         return size
     if size + count > MOST_MEMBERS:
@@ -93,37 +87,29 @@ def _join(
         return ALL
     for t in range(size, now):
         workspace.inside[workspace.members[t]] = True
-    return ALL if all_slip(workspace, slip) else now
+    return ALL if all_slip(course) else now
 
 
 @jit_inside
 def _forget(workspace: Workspace) -> None:
     """Let no row of the factor have a forward substitution."""
-    for t in range(workspace.forward.shape[1]):
-        workspace.forward[1, t] = np.nan
+    for t in range(workspace.known_drive.shape[0]):
+        workspace.known_drive[t] = np.nan
 
 
 @jit_inside
-def _relax(
-    sample: StaticSample,
-    load: float,
-    slip: Array,
-    stiff: Array,
-    workspace: Workspace,
-    size: int,
-    tolerance: float,
-    stops: bool,
-) -> int:
+def _relax(course: Course, load: float, size: int, tolerance: float) -> int:
     """Take one elastic step with frozen strengths; the nodes that it overstresses then join.
 
     Returns what `_join` returns. Of rows whose drive is that of the step before, as it is at
     residual strength, the forward substitution stays; `_forget` them with the factor.
     """
+    sample, slip, stiff, workspace = course.sample, course.slip, course.stiff, course.workspace
     solution, drive = workspace.solution, workspace.right
     resting, members = workspace.resting, workspace.members
-    forward, before = workspace.forward[0], workspace.forward[1]
-    if stops:
-        take_off_resting(workspace, slip)
+    forward, before = workspace.forward_drive, workspace.known_drive
+    if course.stops:
+        take_off_resting(course)
     while True:
         for t in range(size):
             i = members[t]
@@ -137,7 +123,7 @@ def _relax(
             solution[t] = forward[t]
         back_substitute(workspace.factor, size, solution)
         stay = size
-        for t in range(size if stops else ZERO):
+        for t in range(size if course.stops else ZERO):
             i = members[t]
             if (slip[i] - solution[t]) * workspace.diagonal[i] > AT_STRENGTH * tolerance:
                 workspace.inside[i] = False
@@ -146,7 +132,7 @@ def _relax(
             break
         size = factor_inside(workspace)
         _forget(workspace)
-        take_off_resting(workspace, slip)
+        take_off_resting(course)
     for t in range(size):
         i = members[t]
         slip[i] = max(slip[i], solution[t])
@@ -155,7 +141,7 @@ def _relax(
     multiply_outside(workspace, size, solution, stiff)
     for i in range(slip.shape[0]):
         stiff[i] += resting[i]
-    return _join(sample, load, slip, stiff, workspace, size, tolerance)
+    return _join(course, load, size, tolerance)
 
 
 @jit_inside
@@ -179,21 +165,14 @@ def _leave_reversed(other: Workspace, size: int, least: float, share: float) -> 
 
 @jit_inside
 def _settle(
-    sample: StaticSample,
-    load: float,
-    slip: Array,
-    stiff: Array,
-    workspace: Workspace,
-    other: Workspace,
-    size: int,
-    tolerance: float,
-    stops: bool,
+    course: Course, load: float, other: Workspace, size: int, tolerance: float
 ) -> Outcome:
     """Take one step with the true states: along the unstable direction or towards equilibrium.
 
     Returns ARRESTED if the step ends in the equilibrium of the members, SLIDING if nothing bounds
     it, else UNDECIDED.
     """
+    sample, slip, stiff, workspace = course.sample, course.slip, course.stiff, course.workspace
     drive = workspace.right
     for i in range(slip.shape[0]):
         own = entry(workspace.stiffness, i, i)
@@ -209,7 +188,7 @@ def _settle(
         if now < count:
             singular_direction(other, now, direction)
             longest = np.inf
-            gone = _leave_reversed(other, now, 0.0, REVERSED) if stops else ZERO
+            gone = _leave_reversed(other, now, 0.0, REVERSED) if course.stops else ZERO
         else:
             longest = 1.0
             substitute_members(other, ZERO, count, drive, solution)
@@ -218,7 +197,7 @@ def _settle(
                 direction[i] = 0.0
             for t in range(count):
                 direction[other.members[t]] = max(solution[t], 0.0)
-            gone = _leave_reversed(other, count, near, 0.0) if stops else ZERO
+            gone = _leave_reversed(other, count, near, 0.0) if course.stops else ZERO
         if gone == 0:
             break
         count -= gone
@@ -229,8 +208,8 @@ def _settle(
     for t in range(size):
         solution[t] = slip[workspace.members[t]]
     multiply_members(workspace, size, solution, stiff)
-    if stops:
-        take_off_resting(workspace, slip)
+    if course.stops:
+        take_off_resting(course)
     rests = step == 1.0 and longest == 1.0
     for i in range(slip.shape[0]):
         stiff[i] += resting[i]
@@ -241,23 +220,14 @@ def _settle(
 
 
 @jit
-def jump(
-    sample: StaticSample,
-    load: float,
-    slip: Array,
-    stiff: Array,
-    griffith: float,
-    workspace: Workspace,
-    other: Workspace,
-    stops: bool,
-) -> Outcome:
+def jump(course: Course, load: float, griffith: float, other: Workspace) -> Outcome:
     """Follow an instability at a fixed load to the next least equilibrium, or to sliding.
 
     Slip d and K d are those of the state that became unstable, moved along the unstable direction
     as far as `step_to_corner` goes; on return, of the next equilibrium or a lower bound of it.
-    `stops` says whether a node may stop. A run of residual nodes as long as Griffith's length
-    counts as global sliding.
+    A run of residual nodes as long as Griffith's length counts as global sliding.
     """
+    sample, slip, workspace = course.sample, course.slip, course.workspace
     tolerance = stress_tolerance(sample, load)
     count = ZERO
     for i in range(slip.shape[0]):
@@ -275,7 +245,7 @@ def jump(
     passed = 0
     for _ in range(STEPS):
         before = size
-        size = _relax(sample, load, slip, stiff, workspace, size, tolerance, stops)
+        size = _relax(course, load, size, tolerance)
         if size == CROWDED:
             return Outcome.UNDECIDED
         fixed = mean_relief(workspace.stiffness, sample.profile, slip) == 0.0
@@ -292,10 +262,10 @@ def jump(
         waited = 0
         passed = corners
         before = size
-        status = _settle(sample, load, slip, stiff, workspace, other, size, tolerance, stops)
+        status = _settle(course, load, other, size, tolerance)
         if status == Outcome.SLIDING:
             return Outcome.SLIDING
-        size = _join(sample, load, slip, stiff, workspace, size, tolerance)
+        size = _join(course, load, size, tolerance)
         if size < 0:
             return Outcome.UNDECIDED if size == CROWDED else Outcome.SLIDING
         if status == Outcome.ARRESTED and size == before:

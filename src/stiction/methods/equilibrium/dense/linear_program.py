@@ -14,6 +14,7 @@ from stiction.base.jit import ZERO, jit, jit_inside
 from stiction.elasticity.stiffness import apply, entry
 from stiction.methods.equilibrium.dense.cholesky import (
     MOST_MEMBERS,
+    Course,
     Workspace,
     append,
     back_substitute,
@@ -51,15 +52,9 @@ def sort_by(keys: Array, order: Array, count: int) -> None:
 
 
 @jit_inside
-def overstressed(
-    sample: StaticSample,
-    load: float,
-    slip: Array,
-    stiff: Array,
-    workspace: Workspace,
-    least: float,
-) -> int:
+def overstressed(course: Course, load: float, least: float) -> int:
     """Put the nodes at rest above their strength into `order`, most overstressed first."""
+    sample, slip, stiff, workspace = course.sample, course.slip, course.stiff, course.workspace
     count = ZERO
     keys = workspace.keys
     for i in range(stiff.shape[0]):
@@ -85,18 +80,16 @@ def stress_tolerance(sample: StaticSample, load: float) -> float:
 
 
 @jit_inside
-def _back_off(
-    sample: StaticSample, load: float, workspace: Workspace, size: int, stiff: Array
-) -> None:
+def _back_off(course: Course, load: float, size: int) -> None:
     """Lower the load of the slip by so little that no node at rest is overstressed.
 
     Close to the onset slip grows so fast with the load that round-off in the load alone may leave
     a node overstressed. One step along the tangent d d/d load mends it.
     """
-    solution = workspace.solution
-    stiff_rate = workspace.product
+    sample, stiff, workspace = course.sample, course.stiff, course.workspace
+    solution, stiff_rate = workspace.solution, workspace.product
     for t in range(size):
-        solution[t] = workspace.forward[0, t]
+        solution[t] = workspace.forward_load[t]
     back_substitute(workspace.factor, size, solution)
     multiply_members(workspace, size, solution, stiff_rate)
     step = 0.0
@@ -127,14 +120,7 @@ def _without_reversed(workspace: Workspace, size: int, load: float) -> int:
 
 @jit
 def solve_program(
-    sample: StaticSample,
-    start: float,
-    bound: float,
-    cap: float,
-    multiplier: Array,
-    slip: Array,
-    stiff: Array,
-    workspace: Workspace,
+    course: Course, start: float, bound: float, cap: float, multiplier: Array
 ) -> tuple[float, bool]:
     """Critical load with slip d, K d and multiplier, from an upper bound and its multiplier.
 
@@ -143,6 +129,7 @@ def solve_program(
     first. If `cap` is below the critical load, the result is the least equilibrium there. It is not
     solved after too many passes, or if the workspace cannot hold the members.
     """
+    sample, slip, stiff, workspace = course.sample, course.slip, course.stiff, course.workspace
     top = min(bound, cap)
     load = min(start, top)
     tolerance = stress_tolerance(sample, top)
@@ -160,7 +147,7 @@ def solve_program(
             slip[i] = 0.0
     solved = False
     for _ in range(PASSES):
-        count = known or overstressed(sample, load, slip, stiff, workspace, tolerance)
+        count = known or overstressed(course, load, tolerance)
         known = ZERO
         if count == 0:
             top = min(bound, cap)
@@ -177,8 +164,8 @@ def solve_program(
             break
         before = size
         size = append(workspace, size, count)
-        substitute_members(workspace, before, size, sample.profile, workspace.forward[0])
-        substitute_members(workspace, before, size, sample.excess, workspace.forward[1])
+        substitute_members(workspace, before, size, sample.profile, workspace.forward_load)
+        substitute_members(workspace, before, size, sample.excess, workspace.forward_strength)
         for t in range(before, size):
             inside[members[t]] = True
         failed = size < before + count
@@ -204,7 +191,7 @@ def solve_program(
         multiply_members(workspace, size, solution, stiff)
         if settled:  # a cut that lowers the load by round-off only: this is the optimum
             solved = True
-            _back_off(sample, load, workspace, size, stiff)
+            _back_off(course, load, size)
             break
     for t in range(size):
         slip[members[t]] = max(solution[t], 0.0)
@@ -215,10 +202,7 @@ def solve_program(
 def certificate(
     sample: StaticSample, slip: Array, stiff: Array, multiplier: Array, workspace: Workspace
 ) -> float:
-    """Distance of the rigorous bounds from below (by the slip) and from above (by y), Pa.
-
-    K y is left in ``workspace.product``.
-    """
+    """Distance of the rigorous bounds from below (by the slip) and from above (by y), Pa."""
     n = slip.shape[0]
     lower = np.inf
     count = ZERO

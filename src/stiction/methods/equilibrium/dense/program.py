@@ -13,12 +13,11 @@ from functools import lru_cache
 import numpy as np
 
 from stiction.base.arrays import Array
-from stiction.elasticity.half_spaces import HalfSpaces
 from stiction.elasticity.line import line_of
-from stiction.elasticity.protocol import NONE, Elasticity
+from stiction.elasticity.protocol import NONE, Elasticity, HalfSpaces
 from stiction.elasticity.stiffness import apply_circular
 from stiction.elasticity.weakest import window_bound
-from stiction.methods.equilibrium.dense.cholesky import Workspace, make_workspace
+from stiction.methods.equilibrium.dense.cholesky import Course, Workspace, make_workspace
 from stiction.methods.equilibrium.dense.jump import jump
 from stiction.methods.equilibrium.dense.linear_program import NEARER, certificate, solve_program
 from stiction.methods.equilibrium.dense.runaway import Runs, make_runs, runs_away
@@ -92,6 +91,11 @@ class DenseProgram:
         pair: tuple[Workspace, Workspace] = self._own.workspaces
         return pair
 
+    def _course(
+        self, sample: StaticSample, slip: Array, stiff: Array, place: int = 0
+    ) -> Course:
+        return Course(sample, slip, stiff, self._workspaces[place], self.stops)
+
     def bound(self, sample: StaticSample) -> tuple[float, Array]:
         """Return the bound of the weakest window of one sample (Pa), and its multiplier."""
         low, high = _rates(sample)
@@ -129,9 +133,8 @@ class DenseProgram:
         ):  # the bound is not close, and at too high a load far too many nodes join
             first = min(top, float((sample.excess / sample.profile).min()))
             start = (1.0 - NEARER) * first + NEARER * top
-        load, solved = solve_program(
-            sample, start, bound, cap, multiplier, slip, stiff, self._workspaces[0]
-        )
+        course = self._course(sample, slip, stiff)
+        load, solved = solve_program(course, start, bound, cap, multiplier)
         if not solved:
             return None
         return State(load, slip, multiplier, stiff, multiplier=multiplier)
@@ -177,13 +180,11 @@ class DenseProgram:
             straight = found is not None and (rests or found.load >= state.load)
             if found is not None and straight and not exceeds(sample, found.slip, piece):
                 self._certify(present, found, found.direction)
-                found.stiff_direction = self._workspaces[0].product[: self.nodes].copy()
                 return found
             by_events = not rests
         slip, stiff, direction = state.slip.copy(), state.stiff.copy(), state.direction.copy()
-        load, peak, stopped, status = advance(
-            sample, state.load, target, slip, stiff, direction, self._workspaces[1], self.stops
-        )
+        course = self._course(sample, slip, stiff, 1)
+        load, peak, stopped, status = advance(course, state.load, target, direction)
         found = State(
             load, slip, direction, stiff,
             unstable=status == UNSTABLE, known=status in (UNSTABLE, REACHED), peak=peak,
@@ -198,7 +199,7 @@ class DenseProgram:
         return found
 
     def _certify(self, present: StaticSample, found: State, multiplier: Array) -> None:
-        """Write the distance of the bounds of an instability; K y is left in the workspace."""
+        """Write the distance of the bounds of an instability."""
         found.gap = certificate(
             present, found.slip, found.stiff, multiplier, self._workspaces[0]
         )
@@ -217,9 +218,8 @@ class DenseProgram:
         slip, stiff = found.slip.copy(), found.stiff.copy()
         outcome, longest = self._run(sample, found, slip)
         if outcome == Outcome.UNDECIDED:
-            outcome = jump(
-                sample, found.load, slip, stiff, longest, *self._workspaces, self.stops
-            )
+            course = self._course(sample, slip, stiff)
+            outcome = jump(course, found.load, longest, self._workspaces[1])
         if outcome == Outcome.ARRESTED:
             before, after = (present_pieces(sample, each).piece for each in (found.slip, slip))
             if not np.any(after > before):
@@ -238,21 +238,15 @@ class DenseProgram:
             step = step_to_corner(sample, slip, found.direction, np.inf)
             return (Outcome.SLIDING if step == np.inf else Outcome.UNDECIDED), np.inf
         start, length, _ = main_patch(found.direction)
-        return runs_away(
-            sample, self.runs, found.load, slip, found.stiff, found.direction,
-            self._pushed(found), start, length, np.empty((4, self.nodes)),
-        )  # fmt: skip
-
-    def _pushed(self, found: State) -> Array:
-        """Return K times the direction of an instability, Pa."""
-        if found.stiff_direction is not None:
-            return found.stiff_direction
-        members, result = np.flatnonzero(found.direction), np.empty(self.nodes)
+        members, stiff_direction = np.flatnonzero(found.direction), np.empty(self.nodes)
         apply_circular(
             self.elastic.entries, members, members.size, found.direction[members],
-            np.empty((2, self.nodes // 2)), result,
+            np.empty((2, self.nodes // 2)), stiff_direction,
         )  # fmt: skip
-        return result
+        return runs_away(
+            sample, self.runs, found.load, slip, found.stiff, found.direction,
+            stiff_direction, start, length, np.empty((4, self.nodes)),
+        )  # fmt: skip
 
     def gradient(self, sample: StaticSample, state: State) -> Array:
         """Find the multiplier, whose mean over the load profile is one.

@@ -13,7 +13,7 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.jit import ZERO, jit
 from stiction.base.lanes import multiply_add
-from stiction.elasticity.half_spaces import HalfSpaces
+from stiction.elasticity.protocol import HalfSpaces
 from stiction.methods.equilibrium.dense.cholesky import back_substitute, row_start, substitute
 from stiction.methods.equilibrium.sample import (
     Outcome,

@@ -26,6 +26,7 @@ from stiction.elasticity.stiffness import entry, mean_relief
 from stiction.methods.equilibrium.dense.cholesky import (
     CROWDED,
     MOST_MEMBERS,
+    Course,
     Workspace,
     append,
     back_substitute,
@@ -40,7 +41,7 @@ from stiction.methods.equilibrium.dense.cholesky import (
     take_off_resting,
 )
 from stiction.methods.equilibrium.dense.linear_program import stress_tolerance
-from stiction.methods.equilibrium.sample import StaticSample, piece_at, start_of, strength_at
+from stiction.methods.equilibrium.sample import piece_at, start_of, strength_at
 
 REACHED = 0
 UNSTABLE = 1
@@ -59,19 +60,13 @@ REVERSED = 1e-10
 
 @jit_inside
 def _begin(
-    sample: StaticSample,
-    load: float,
-    slip: Array,
-    stiff: Array,
-    piece: NDArray[np.int64],
-    strength: Array,
-    workspace: Workspace,
-    stops: bool,
+    course: Course, load: float, piece: NDArray[np.int64], strength: Array
 ) -> tuple[int, bool]:
     """Strength and diagonal of A for the present pieces.
 
     Returns how many nodes slip, and whether others rest that slipped before.
     """
+    sample, slip, workspace = course.sample, course.slip, course.workspace
     count = ZERO
     rests = False
     near = AT_STRENGTH * stress_tolerance(sample, load)
@@ -81,8 +76,8 @@ def _begin(
         strength[i] = start_of(sample, i, piece[i])
         own = entry(workspace.stiffness, i, i)
         workspace.diagonal[i] = own - sample.pieces.slopes[piece[i]] * sample.rate[i]
-        if stops and slips:
-            margin = strength_at(sample, slip, i) - load * sample.profile[i] + stiff[i]
+        if course.stops and slips:
+            margin = strength_at(sample, slip, i) - load * sample.profile[i] + course.stiff[i]
             slips = margin <= near
             rests = rests or not slips
         workspace.inside[i] = slips
@@ -121,13 +116,14 @@ def _first_to_stop(
 
 
 @jit_inside
-def _fails(workspace: Workspace, size: int, speed: Array, direction: Array, stops: bool) -> int:
+def _fails(course: Course, size: int, speed: Array, direction: Array) -> int:
     """Write the direction after a pivot failed; the member whose rate bounds it, -1 for none.
 
     Rates then move along it until that of the member is zero.
     """
+    workspace = course.workspace
     singular_direction(workspace, size, direction)
-    if not stops:
+    if not course.stops:
         return -1
     solution = workspace.solution
     solution[size] = 1.0
@@ -135,73 +131,67 @@ def _fails(workspace: Workspace, size: int, speed: Array, direction: Array, stop
 
 
 @jit_inside
-def _stop(workspace: Workspace, size: int, member: int, slip: Array, speed: Array) -> int:
+def _stop(course: Course, size: int, member: int, speed: Array) -> int:
     """Let a member rest; returns how many slip on."""
+    workspace = course.workspace
     node = workspace.members[member]
     workspace.inside[node] = False
     speed[node] = 0.0
     size = remove(workspace, size, member)
-    take_off_resting(workspace, slip)
+    take_off_resting(course)
     return size
 
 
 @jit_inside
-def _keep_members(workspace: Workspace, size: int, slip: Array, speed: Array) -> None:
+def _keep_members(course: Course, size: int, speed: Array) -> None:
     """Let all others rest; those at their strength slip on in the next events."""
-    for i in range(slip.shape[0]):
-        workspace.inside[i] = False
+    members, inside = course.workspace.members, course.workspace.inside
+    for i in range(speed.shape[0]):
+        inside[i] = False
     for t in range(size):
-        workspace.inside[workspace.members[t]] = True
-    for i in range(slip.shape[0]):
-        if not workspace.inside[i]:
+        inside[members[t]] = True
+    for i in range(speed.shape[0]):
+        if not inside[i]:
             speed[i] = 0.0
-    take_off_resting(workspace, slip)
+    take_off_resting(course)
 
 
 @jit_inside
-def _substitute(
-    sample: StaticSample, strength: Array, workspace: Workspace, first: int, size: int
-) -> None:
+def _substitute(course: Course, strength: Array, first: int, size: int) -> None:
     """Extend both forward substitutions by the members first..size-1."""
+    workspace, profile = course.workspace, course.sample.profile
     right, resting = workspace.right, workspace.resting
     for t in range(first, size):
         i = workspace.members[t]
         right[i] = strength[i] + resting[i]
-    substitute_members(workspace, first, size, sample.profile, workspace.forward[0])
-    substitute_members(workspace, first, size, right, workspace.forward[1])
+    substitute_members(workspace, first, size, profile, workspace.forward_load)
+    substitute_members(workspace, first, size, right, workspace.forward_strength)
 
 
 @jit_inside
-def all_slip(workspace: Workspace, slip: Array) -> bool:
+def all_slip(course: Course) -> bool:
     """Whether every node slips or has slipped."""
-    count = ZERO
+    slip, count = course.slip, ZERO
     for i in range(slip.shape[0]):
-        count += workspace.inside[i] or slip[i] > 0.0
+        count += course.workspace.inside[i] or slip[i] > 0.0
     return bool(count == slip.shape[0])
 
 
 @jit_inside
 def _next_event(
-    sample: StaticSample,
-    load: float,
-    target: float,
-    slip: Array,
-    stiff: Array,
-    piece: NDArray[np.int64],
-    workspace: Workspace,
-    size: int,
+    course: Course, load: float, target: float, piece: NDArray[np.int64], size: int
 ) -> tuple[float, int, int]:
     """Step of the load to the next event, the node that begins to slip and the member that reaches
     a corner, -1 for none."""
-    rate, stiff_rate = workspace.rates, workspace.product
-    pieces = sample.pieces
+    sample, slip, workspace = course.sample, course.slip, course.workspace
+    rate, stiff_rate, pieces = workspace.rates, workspace.product, sample.pieces
     step = target - load
     starts = -1
     ends = -1
     for i in range(slip.shape[0]):
         if not workspace.inside[i]:
             present = strength_at(sample, slip, i) if slip[i] > 0.0 else sample.excess[i]
-            margin = max(present - load * sample.profile[i] + stiff[i], 0.0)
+            margin = max(present - load * sample.profile[i] + course.stiff[i], 0.0)
             closing = sample.profile[i] - stiff_rate[i]
             if closing > 0.0 and margin < step * closing:
                 step = margin / closing
@@ -236,24 +226,17 @@ def _change_slope(
 
 @jit_allocating
 def advance(
-    sample: StaticSample,
-    load: float,
-    target: float,
-    slip: Array,
-    stiff: Array,
-    direction: Array,
-    workspace: Workspace,
-    stops: bool,
+    course: Course, load: float, target: float, direction: Array
 ) -> tuple[float, float, bool, int]:
-    """Follow the stable path from a load towards another one; slip d and K d go with it.
+    """Follow the stable path from a load towards another one.
 
-    It ends where all nodes have slipped, too. `stops` says whether a node may stop. Returned are
-    the load at the end, the largest mean stress on the way (over the mean of the load profile; the
-    load, unless a machine drives), whether a node stopped or rests after slip, and the status:
-    REACHED; UNSTABLE, in the direction z >= 0, A z <= 0, that is then written; or CROWDED: more
-    members than the workspace holds.
+    It ends where all nodes have slipped, too. Returned are the load at the end, the largest mean
+    stress on the way (over the mean of the load profile; the load, unless a machine drives),
+    whether a node stopped or rests after slip, and the status: REACHED; UNSTABLE, in the direction
+    z >= 0, A z <= 0, that is then written; or CROWDED: more members than the workspace holds.
     """
-    n = slip.shape[0]
+    sample, slip, stiff, workspace = course.sample, course.slip, course.stiff, course.workspace
+    n, stops = slip.shape[0], course.stops
     solution, stiff_rate, rate = workspace.solution, workspace.product, workspace.rates
     resting = workspace.resting
     pieces = sample.pieces
@@ -261,33 +244,33 @@ def advance(
     strength = np.empty(n)
     speed = np.zeros(n)
     members, order = workspace.members, workspace.order
-    count, stopped = _begin(sample, load, slip, stiff, piece, strength, workspace, stops)
+    count, stopped = _begin(course, load, piece, strength)
     peak = load - mean_relief(workspace.stiffness, sample.profile, slip)
     if count > MOST_MEMBERS:
         return load, load, stopped, CROWDED
     size = factor_inside(workspace)
     if size < count:
         # Stability was lost exactly as the residual strength was reached.
-        if _fails(workspace, size, speed, direction, stops) < 0:
+        if _fails(course, size, speed, direction) < 0:
             return load, peak, stopped, UNSTABLE
-        _keep_members(workspace, size, slip, speed)
+        _keep_members(course, size, speed)
     for i in range(n):
         resting[i] = 0.0
     if stopped or size < count:
-        take_off_resting(workspace, slip)
-    _substitute(sample, strength, workspace, ZERO, size)
+        take_off_resting(course)
+    _substitute(course, strength, ZERO, size)
     # Unless it stops, a node begins to slip, and passes each corner, once.
     for event in range((1 + STARTS * stops + pieces.ends.shape[0]) * n + 1):
         while True:
             for t in range(size):
-                rate[t] = workspace.forward[0, t]
+                rate[t] = workspace.forward_load[t]
             back_substitute(workspace.factor, size, rate)
             first = _first_to_stop(workspace, size, rate, speed, False) if stops else -1
             if first < 0:
                 break
             stopped = True
-            size = _stop(workspace, size, first, slip, speed)
-            _substitute(sample, strength, workspace, ZERO, size)
+            size = _stop(course, size, first, speed)
+            _substitute(course, strength, ZERO, size)
         for t in range(size):
             i = members[t]
             speed[i] = max(rate[t], 0.0)
@@ -301,9 +284,7 @@ def advance(
                 slip[members[t]] = max(solution[t], 0.0)
             for i in range(n):
                 stiff[i] += resting[i]
-        step, starts, ends = _next_event(
-            sample, load, target, slip, stiff, piece, workspace, size
-        )
+        step, starts, ends = _next_event(course, load, target, piece, size)
         load = target if starts < 0 and ends < 0 else load + step
         for t in range(size):
             slip[members[t]] += step * rate[t]
@@ -321,10 +302,10 @@ def advance(
             now = _change_slope(workspace, size, ends, before, after)
             changed = ends
             if now < size:
-                if _fails(workspace, now, speed, direction, stops) < 0:
+                if _fails(course, now, speed, direction) < 0:
                     return load, peak, stopped, UNSTABLE
                 size = now
-                _keep_members(workspace, size, slip, speed)
+                _keep_members(course, size, speed)
                 changed = ZERO
         elif starts >= 0:
             if size == MOST_MEMBERS:
@@ -333,20 +314,20 @@ def advance(
                 order[0] = starts
                 if append(workspace, size, ONE) > size:
                     break
-                first = _fails(workspace, size, speed, direction, stops)
+                first = _fails(course, size, speed, direction)
                 if first < 0:
                     return load, peak, stopped, UNSTABLE
                 stopped = True
-                size = _stop(workspace, size, first, slip, speed)
+                size = _stop(course, size, first, speed)
                 changed = ZERO
             workspace.inside[starts] = True
             size += 1
             if slip[starts] > 0.0:  # it had stopped
-                take_off_resting(workspace, slip)
+                take_off_resting(course)
                 changed = ZERO
-            if all_slip(workspace, slip):
+            if all_slip(course):
                 return load, peak, stopped, REACHED
         else:
             return load, peak, stopped, REACHED
-        _substitute(sample, strength, workspace, changed, size)
+        _substitute(course, strength, changed, size)
     return load, peak, stopped, CROWDED

@@ -14,8 +14,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stiction.base.arrays import Array
-from stiction.elasticity.linear import NEGATIVE, SOLVED, inner, lowest_eigenvector, no_spring
-from stiction.elasticity.operator import Operator, filtered, make_operator, product
+from stiction.elasticity.operator import (
+    NEGATIVE,
+    SOLVED,
+    Operator,
+    filtered,
+    inner,
+    lowest_eigenvector,
+    make_operator,
+    product,
+)
 from stiction.methods.equilibrium.transforms.held_equilibrium import equilibrate
 
 STEPS = 60
@@ -63,10 +71,8 @@ class Bracket:
 
     def __post_init__(self) -> None:
         nodes = self.excess.size
-        self.workspace = np.empty((3, nodes))
         self.residual = np.empty(nodes)
         self.inside = np.zeros(nodes, dtype=np.bool_)
-        self.free = no_spring(nodes)
         self.slip = np.zeros(nodes)
         self.lower = float((self.excess / self.profile).min())
         self.upper = np.inf
@@ -149,8 +155,8 @@ def bisect(bracket: Bracket, gap: float, accuracy: float) -> Array:
         inside = bracket.inside
         inside[:] = (slip > 0.0) | (excess < load * profile)
         status, _ = equilibrate(
-            operator, bracket.free, load * profile - excess, inside, slip, bracket.residual,
-            bracket.workspace, accuracy * bracket.scale,
+            operator, load * profile - excess, inside, slip, bracket.residual,
+            accuracy * bracket.scale,
         )  # fmt: skip
         if status == SOLVED:
             low, stable = load, slip
@@ -159,7 +165,7 @@ def bisect(bracket: Bracket, gap: float, accuracy: float) -> Array:
         high = load
         if status != NEGATIVE:
             continue
-        vector = np.abs(bracket.workspace[1])
+        vector = np.abs(operator.direction)
         value, _ = lowest_eigenvector(
             operator, inside, vector, 1e-4 * float(operator.rate.max()), 200
         )

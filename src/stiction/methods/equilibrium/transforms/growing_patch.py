@@ -7,8 +7,15 @@ from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
 from stiction.base.jit import jit
-from stiction.elasticity.linear import SOLVED, Spring, inner, residual_of, solve_inside
-from stiction.elasticity.operator import Operator, filtered, make_transform
+from stiction.elasticity.operator import (
+    SOLVED,
+    Operator,
+    filtered,
+    inner,
+    operator_of,
+    residual_of,
+    solve_inside,
+)
 from stiction.methods.equilibrium.patches import span
 from stiction.methods.equilibrium.sample import StaticSample, piece_at, present_pieces, start_of
 from stiction.methods.equilibrium.transforms.held_equilibrium import ITERATIONS
@@ -138,15 +145,13 @@ def window_around(operator: Operator, growth: Array, wide: float) -> Window:
         field.reshape(half)[::by_x, ::by_y].flatten()
         for field in (operator.symbol, operator.inverse)
     )
-    transform = make_transform((rows.size, columns.size))
-    spectrum = np.empty(symbol.size, dtype=np.complex128)
-    rate, none = operator.rate[nodes], np.empty(0)
-    return Window(nodes, Operator(transform, symbol, inverse, rate, spectrum, none))
+    shape = rows.size, columns.size
+    return Window(nodes, operator_of(shape, symbol, inverse, operator.rate[nodes]))
 
 
 def _push(
     window: Window, sample: StaticSample, rest: Array, slip: Array, growth: Array, share: float,
-    tolerance: float, workspace: Array,
+    tolerance: float,
 ) -> tuple[Array, float] | None:  # fmt: skip
     """Slip that a growing patch adds where it is overloaded by `rest`; None if it has no bound.
 
@@ -159,7 +164,7 @@ def _push(
     excess, strength, profile, slope, critical = (field[nodes] for field in fields)
     sample = StaticSample(excess, strength, profile, slope, critical, pieces)
     rest, slip, growth = rest[nodes], slip[nodes], growth[nodes]
-    inside, residual = rest >= 0.0, workspace[: slip.size]
+    inside, residual = rest >= 0.0, np.empty_like(slip)
     move = np.where(inside, growth, 0.0)
     size = np.sqrt(inner(move, move))
     if size == 0.0:
@@ -167,20 +172,18 @@ def _push(
     rate = np.empty_like(slip)
     fall = secants(sample, slip, move, rate)
     stiffness = float(sample.rate.max()) if share > FREE else 0.0
-    spring = Spring(stiffness, move / size)
     spared = max(SPARED * (1.0 - share) * fall, tolerance)
-    drive = rest - spared + (HELD * stiffness * size) * spring.shape
+    held = move / size
+    drive = rest - spared + (HELD * stiffness * size) * held
     rate *= share
-    held = operator._replace(rate=rate)
-    residual_of(held, spring, drive, move, residual)
-    status, _ = solve_inside(
-        held, spring, inside, move, residual, np.empty((3, slip.size)), spared, ITERATIONS
-    )
+    operator = operator._replace(rate=rate, spring=stiffness, held=held)
+    residual_of(operator, drive, move, residual)
+    status, _ = solve_inside(operator, inside, move, residual, spared, ITERATIONS)
     if status != SOLVED:
         return None
     pushed = np.zeros(every)
     pushed[nodes] = np.maximum(move, 0.0)
-    return pushed, HELD - inner(spring.shape, move) / size
+    return pushed, HELD - inner(held, move) / size
 
 
 def grown(
@@ -211,7 +214,7 @@ def grown(
         rest -= stress
         moving = np.where(rest >= 0.0, growth, 0.0)
         window = window_around(operator, moving, WIDE * 2.0**failures)
-        found = _push(window, sample, rest, slip, growth, share, tolerance, image)
+        found = _push(window, sample, rest, slip, growth, share, tolerance)
         if found is None:
             share, failures = LESS * share, failures + 1
             continue

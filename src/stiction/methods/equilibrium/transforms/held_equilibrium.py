@@ -9,18 +9,17 @@ both sides of the turning point, and mu gives the load to which each belongs.
 
 from stiction.base.arrays import Array
 from stiction.base.jit import jit, jit_inside
-from stiction.elasticity.linear import (
+from stiction.elasticity.operator import (
     EXHAUSTED,
     NEGATIVE,
     SOLVED,
     Mask,
-    Spring,
+    Operator,
     largest_inside,
     residual_of,
     restrict,
     solve_inside,
 )
-from stiction.elasticity.operator import Operator
 
 LOOSE = 0.05
 """Factor by which a residual is reduced before the set of slipping nodes is revised."""
@@ -47,12 +46,10 @@ def _revise(inside: Mask, slip: Array, residual: Array, tolerance: float) -> tup
 @jit
 def equilibrate(
     operator: Operator,
-    spring: Spring,
     right: Array,
     inside: Mask,
     slip: Array,
     residual: Array,
-    workspace: Array,
     tolerance: float,
 ) -> tuple[int, int]:
     """Slip under the drive `right` = tau_0 p - s + spring alpha phi; status and iterations.
@@ -61,21 +58,19 @@ def equilibrate(
     right - A d - spring phi <phi, d> is nowhere above `tolerance` (Pa) if it is solved.
     """
     restrict(slip, inside)
-    residual_of(operator, spring, right, slip, residual)
+    residual_of(operator, right, slip, residual)
     _revise(inside, slip, residual, tolerance)
     used = 0
     while used < ITERATIONS:
         goal = max(LOOSE * largest_inside(residual, inside), tolerance)
-        status, taken = solve_inside(
-            operator, spring, inside, slip, residual, workspace, goal, ITERATIONS - used
-        )
+        status, taken = solve_inside(operator, inside, slip, residual, goal, ITERATIONS - used)
         used += taken + 1
         if status == NEGATIVE:
             return status, used
-        residual_of(operator, spring, right, slip, residual)
+        residual_of(operator, right, slip, residual)
         joined, left = _revise(inside, slip, residual, tolerance)
         if joined == 0 and left == 0 and largest_inside(residual, inside) <= 2.0 * tolerance:
             return SOLVED, used
         if left > 0:
-            residual_of(operator, spring, right, slip, residual)
+            residual_of(operator, right, slip, residual)
     return EXHAUSTED, used

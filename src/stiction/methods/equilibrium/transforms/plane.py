@@ -13,9 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from stiction.base.arrays import Array
-from stiction.elasticity.half_spaces import HalfSpaces
-from stiction.elasticity.linear import inner
-from stiction.elasticity.operator import Operator, make_operator
+from stiction.elasticity.operator import Operator, inner, make_operator
+from stiction.elasticity.protocol import HalfSpaces
 from stiction.methods.equilibrium.sample import (
     Jump,
     Outcome,

@@ -10,17 +10,17 @@ from typing import NamedTuple
 import numpy as np
 
 from stiction.base.arrays import Array
-from stiction.elasticity.linear import (
+from stiction.elasticity.operator import (
     EXHAUSTED,
     NEGATIVE,
     SOLVED,
+    Operator,
     inner,
     lowest_eigenvector,
-    no_spring,
+    product,
     residual_of,
     solve_inside,
 )
-from stiction.elasticity.operator import Operator, product
 from stiction.methods.equilibrium.sample import (
     Outcome,
     Present,
@@ -67,10 +67,8 @@ def slip_under(
     """Equilibrium for given strengths at zero slip and rates; status and slip."""
     new = slip.copy()
     inside = (slip > 0.0) | (drive > 0.0)
-    status, _ = equilibrate(
-        operator._replace(rate=rate), no_spring(slip.size), drive, inside, new,
-        np.empty_like(slip), np.empty((3, slip.size)), tolerance,
-    )  # fmt: skip
+    operator = operator._replace(rate=rate)
+    status, _ = equilibrate(operator, drive, inside, new, np.empty_like(slip), tolerance)
     return status, new
 
 
@@ -86,10 +84,8 @@ def _definite(operator: Operator, rate: Array, growth: Array, slip: Array) -> bo
     curvature = inner(growth, image)
     if not curvature > 0.0:
         return False
-    status, _ = solve_inside(
-        operator._replace(slow=growth / np.sqrt(curvature)), no_spring(slip.size), inside,
-        x, np.where(inside, 1.0, 0.0), np.empty((3, slip.size)), CHECKED, ITERATIONS,
-    )  # fmt: skip
+    operator, residual = operator._replace(slow=growth / np.sqrt(curvature)), 1.0 * inside
+    status, _ = solve_inside(operator, inside, x, residual, CHECKED, ITERATIONS)
     return status == SOLVED
 
 
@@ -119,7 +115,7 @@ def stable_equilibrium(
         drive, before = load * sample.profile - now.strength, now.piece
         if rough > tolerance:
             present = operator._replace(rate=now.rate)
-            residual_of(present, no_spring(slip.size), drive, new, residual)
+            residual_of(present, drive, new, residual)
             largest = np.where(new > 0.0, np.abs(residual), residual).max()
             rough = max(tolerance, LOOSE * float(largest))
         status, found = slip_under(operator, drive, now.rate, new, rough)
@@ -186,17 +182,13 @@ def _weakening_step(
     operator = operator._replace(rate=now.rate)
     drive = load * sample.profile - now.strength
     rest, new = np.empty_like(slip), slip.copy()
-    workspace = np.empty((3, slip.size))
-    free = no_spring(slip.size)
-    residual_of(operator, free, drive, slip, rest)
+    residual_of(operator, drive, slip, rest)
     inside = (slip > 0.0) | (rest > 0.0)
-    status, _ = solve_inside(
-        operator, free, inside, new, rest, workspace, tolerance, ITERATIONS
-    )
+    status, _ = solve_inside(operator, inside, new, rest, tolerance, ITERATIONS)
     direction = np.where(inside, np.maximum(new - slip, 0.0), 0.0)
     longest = 1.0
     if status == NEGATIVE:
-        direction = np.abs(workspace[1])
+        direction = np.abs(operator.direction)
         largest = float(sample.rate.max())
         lowest_eigenvector(operator, inside, direction, 1e-6 * largest, ITERATIONS)
         direction = np.where(direction > RELEVANT * direction.max(), direction, 0.0)

@@ -15,9 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from stiction.base.arrays import Array
-from stiction.elasticity.linear import (
+from stiction.elasticity.operator import (
     SOLVED,
-    Spring,
     inner,
     lowest_eigenvector,
     residual_of,
@@ -69,18 +68,21 @@ def _hold(bracket: Bracket, held: Array, guess: Held, accuracy: float) -> Held |
     The guess gives the amplitude at which the spring has no force; the accuracy is the largest
     residual stress as a share of the mean strength.
     """
-    operator, excess, profile = bracket.operator, bracket.excess, bracket.profile
-    workspace, load, amplitude = bracket.workspace, guess.load, guess.amplitude
-    stiffness = 2.0 * float(operator.rate.max())  # no direction has a curvature below -W
-    spring = Spring(stiffness, held)
+    excess, profile, load, amplitude = (
+        bracket.excess,
+        bracket.profile,
+        guess.load,
+        guess.amplitude,
+    )
+    stiffness = 2.0 * float(bracket.operator.rate.max())  # no curvature is below -W
+    operator = bracket.operator._replace(spring=stiffness, held=held)
     slip = guess.slip.copy()
     inside = bracket.inside
     inside[:] = (slip > 0.0) | (excess < load * profile)
     right = load * profile - excess + (stiffness * amplitude) * held
     status, _ = equilibrate(
-        operator, spring, right, inside, slip, bracket.residual, workspace,
-        accuracy * bracket.scale,
-    )  # fmt: skip
+        operator, right, inside, slip, bracket.residual, accuracy * bracket.scale
+    )
     if status != SOLVED:
         return None
     slope = np.where(inside, guess.slope, 0.0)
@@ -88,13 +90,11 @@ def _hold(bracket: Bracket, held: Array, guess: Held, accuracy: float) -> Held |
     if not share > 0.0:  # none of the patch slips any more
         return None
     slope *= 1.0 / (stiffness * share)
-    residual_of(operator, spring, held, slope, bracket.residual)
+    residual_of(operator, held, slope, bracket.residual)
     # A lift of y by epsilon costs epsilon <s - tau_0 p, 1>/<p, y>.
     cost = float(np.abs(excess - load * profile).sum())
     tolerance = accuracy * stiffness * bracket.magnitude * inner(profile, slope) / cost
-    status, _ = solve_inside(
-        operator, spring, inside, slope, bracket.residual, workspace, tolerance, ITERATIONS
-    )
+    status, _ = solve_inside(operator, inside, slope, bracket.residual, tolerance, ITERATIONS)
     if status != SOLVED:
         return None
     share = inner(held, slope)
@@ -107,7 +107,7 @@ def _hold(bracket: Bracket, held: Array, guess: Held, accuracy: float) -> Held |
 
 def _other_patch(bracket: Bracket) -> Array | None:
     """The patch that became unstable beside the one that was held, unit norm; None if none did."""
-    vector = np.where(bracket.inside, np.abs(bracket.workspace[1]), 0.0)
+    vector = np.where(bracket.inside, np.abs(bracket.operator.direction), 0.0)
     if not vector.any():
         return None
     value, _ = lowest_eigenvector(
