@@ -3,8 +3,13 @@
 import numpy as np
 import pytest
 
-from stiction.elasticity.blocks import Pushes, block_response, glued_pressure
-from stiction.elasticity.free_end import lattice_entries, lattice_symbol
+from stiction.elasticity.blocks import (
+    Pushes,
+    block_response,
+    glued_pressure,
+    lattice_entries,
+    lattice_symbol,
+)
 
 KAPPA = (3.0 - 0.35) / (1.0 + 0.35)  # plane stress, nu = 0.35
 MODULUS = 1.3e9  # Pa

@@ -27,7 +27,7 @@ from stiction.elasticity.operator import (
 from stiction.elasticity.protocol import HalfSpaces
 from stiction.methods.equilibrium.sample import Outcome, present_pieces, sample_of
 from stiction.methods.equilibrium.solver import follow
-from stiction.methods.equilibrium.transforms.bracket import make_bracket
+from stiction.methods.equilibrium.transforms.bracket import Bracket
 from stiction.methods.equilibrium.transforms.plane import PlaneProgram, plane_onset
 from stiction.methods.equilibrium.transforms.relaxation import (
     least_equilibrium,
@@ -95,7 +95,7 @@ def test_any_multiplier_bounds_the_onset_where_some_nodes_do_not_weaken():
     matrix = dense(symbol, shape) - np.diag(rate.ravel())
     given = (field.ravel() for field in (rate, strength, profile))
     exact, _, multiplier = by_linear_programme(dense(symbol, shape), *given)
-    bracket = make_bracket(symbol, rate, strength, profile)
+    bracket = Bracket(symbol, rate, strength, profile)
     lifting, lifted = bracket.lifting
     assert lifting.min() > 0.0
     assert lifted.min() > 1e-3 * RATE
@@ -146,9 +146,9 @@ def test_a_slow_direction_saves_iterations():
     for each in (np.empty(0), slow):
         x, residual = np.zeros(inside.size), right.copy()
         given = operator._replace(slow=each), inside, x, residual
-        _, iterations = solve_inside(*given, 0.02, 200)
+        _, iterations = solve_inside(*given, 0.02)
         taken.append(iterations)
-        status, _ = solve_inside(*given, 1e-10, 200)
+        status, _ = solve_inside(*given, 1e-10)
         assert status == SOLVED
         # The residual over the lowest eigenvalue.
         np.testing.assert_allclose(x[nodes], exact, rtol=1e-6)

@@ -26,6 +26,9 @@ SOLVED = 0
 NEGATIVE = 1
 EXHAUSTED = 2
 
+ITERATIONS = 3000
+"""Largest number of iterations of conjugate gradients, or for one equilibrium."""
+
 Mask = NDArray[np.bool_]
 
 
@@ -210,7 +213,6 @@ def solve_inside(
     x: Array,
     residual: Array,
     tolerance: float,
-    iterations: int,
 ) -> tuple[int, int]:
     """Conjugate gradients for (A + spring phi phi^T) x = right on the nodes `inside`.
 
@@ -223,7 +225,7 @@ def solve_inside(
     slow = operator.slow
     largest = largest_inside(residual, inside)
     previous = 0.0
-    for iteration in range(iterations):
+    for iteration in range(ITERATIONS):
         if largest <= tolerance:
             return SOLVED, iteration
         filtered(operator, operator.inverse, residual, z)
@@ -248,7 +250,7 @@ def solve_inside(
                 x[i] += step * direction[i]
                 residual[i] -= step * image[i]
                 largest = max(largest, abs(residual[i]))
-    return EXHAUSTED, iterations
+    return EXHAUSTED, ITERATIONS
 
 
 @jit

@@ -4,10 +4,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from rocket_fft import c2r, r2c
 
 from stiction.base.arrays import Array
 from stiction.base.jit import ZERO, jit, jit_allocating
+from stiction.elasticity.operator import Transform, convolve, make_transform
 from stiction.methods.criterion.windows import Window
 from stiction.problem.interface import Interface
 
@@ -43,11 +43,9 @@ def least_average(
     count = len(excess)
     load, place, chosen = np.full(count, np.inf), np.zeros(count), np.zeros(count, np.int64)
     if not interface.is_plane:
-        multiplier, axis = np.array(windows[0].spectrum), np.arange(1)
-        scale, spectrum = np.empty(excess.shape[1]), np.empty(multiplier.size, dtype=complex)
-        _filter(profile, multiplier / multiplier[0], axis, spectrum, scale)
+        transform, multiplier = make_transform(interface.shape), np.array(windows[0].spectrum)
         reach = int(np.ceil(0.5 * windows[0].extents[0] / interface.spacing)) + 2
-        _minimum_of_rows(excess, profile, scale, multiplier, reach, axis, spectrum, load, place)
+        _minimum_of_rows(transform, excess, profile, multiplier, reach, load, place)
         return load, place, chosen
     place = np.zeros((count, 2))
     for i, each in enumerate(averages(interface, windows, excess, profile)):
@@ -73,15 +71,6 @@ def _between_nodes(average: Array) -> Array:
         if bend > 0.0:
             place[axis] += 0.5 * (before - after) / bend
     return np.mod(place, average.shape)
-
-
-@jit
-def _filter(field: Array, multiplier: Array, axis: Array, spectrum: Array, out: Array) -> None:
-    """Write a line with its Fourier modes multiplied to `out`."""
-    r2c(field, spectrum, axis, True, 1.0, 1)
-    for i in range(spectrum.size):
-        spectrum[i] *= multiplier[i]
-    c2r(spectrum, out, axis, False, 1.0 / out.size, 1)
 
 
 @jit
@@ -168,20 +157,22 @@ def _minimum_near(
 
 @jit_allocating
 def _minimum_of_rows(
-    excess: Array, profile: Array, scale: Array, multiplier: Array, reach: int,
-    axis: Array, spectrum: Array, minimum: Array, place: Array,
+    transform: Transform, excess: Array, profile: Array, multiplier: Array, reach: int,
+    minimum: Array, place: Array,
 ) -> None:  # fmt: skip
     """Minimum over a line of <s, y>/<p, y> for every row, and its place in units of nodes.
 
-    `scale` is <p, y>. A parabola through each local minimum of the nodes estimates how low the
+    A parabola through each local minimum of the nodes estimates how low the
     function falls there; polynomials through ten nodes take the lowest, and any other that might be
     lower.
     """
     nodes = profile.size
     values, power = np.empty(nodes), np.empty(STENCIL)
+    scale, spectrum = np.empty(nodes), np.empty(multiplier.size, np.complex128)
+    convolve(transform, multiplier / multiplier[0], profile, spectrum, scale)
     for row in range(excess.shape[0]):
         strength = excess[row]
-        _filter(strength, multiplier, axis, spectrum, values)
+        convolve(transform, multiplier, strength, spectrum, values)
         # The weights keep to the least ratio; only the rounding of the transforms may not.
         least = np.inf
         for i in range(nodes):

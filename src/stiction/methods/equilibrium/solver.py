@@ -221,7 +221,7 @@ class OnsetSolver:
         """Return the onset of each sample; see `Equilibrium`."""
         warn_of_signs(self.problem)
         self.problem.warn_if_coarse(rows, FINE, ROUGHLY[len(self.problem.interface.shape)])
-        table, known = [], []
+        table, paths = [], []
         for row in range(rows.samples):
             sample = sample_of(rows, self.program.pieces, row)
             try:
@@ -231,15 +231,14 @@ class OnsetSolver:
                     f"in sample {row} of the {rows.samples} that were solved together"
                 )
                 raise
-            known.append(path.known)
+            paths.append(path)
             table.append(self._values(rows, row, sample, path))
         values = {name: np.array([each[name] for each in table]) for name in table[0]}
         values["critical_stress"] = rows.mean_stress(values["critical_stress"])
         values["first_instability"] = rows.mean_stress(values["first_instability"])
         values["certificate_gap"] *= rows.load_profile.mean()
-        self._warn(rows, values, ~np.array(known))
-        unnamed = {"stopped"} if self.problem.interface.is_plane else {"stopped", "certified"}
-        return {name: value for name, value in values.items() if name not in unnamed}
+        self._warn(rows, values, paths)
+        return values
 
     def _values(
         self, rows: Sample, row: int, sample: StaticSample, path: Path
@@ -262,12 +261,11 @@ class OnsetSolver:
             "slip_patches": patches_of(first.slip, interface),
             "arrested_events": len(path.events),
             "residual_reached": not straight and bool(residual_nodes(sample, last.slip).any()),
-            "certified": first.certified,
-            "stopped": first.stopped,
         }
         if interface.is_plane:
             values["critical_patch_extent"] = patch.extents
             values["critical_patch_area"] = patch.area
+            values["certified"] = first.certified
         else:
             values["critical_patch_length"] = patch.area
         stable = path.known and not first.unstable  # behind a stiff machine
@@ -288,9 +286,12 @@ class OnsetSolver:
                 values[name][: len(column)] = column
         return values
 
-    def _warn(self, rows: Sample, values: dict[str, Array], lost: NDArray[np.bool_]) -> None:
+    def _warn(self, rows: Sample, values: dict[str, Array], paths: list[Path]) -> None:
         """Warn of what is not as it mostly is: values are of all samples, stresses in Pa."""
-        first, unproved = values["first_instability"], ~values["certified"]
+        first = values["first_instability"]
+        unproved = np.array([not path.first.certified for path in paths])
+        lost = np.array([not path.known for path in paths])
+        stopped = np.array([path.first.stopped for path in paths])
         share = values["certificate_gap"] / np.maximum(np.abs(first), 1e-300)
         warn_of_samples(
             f"the bounds of the first instability did not close to {self.program.widest_gap:g} of"
@@ -320,7 +321,7 @@ class OnsetSolver:
             "a node that slipped stops before the first instability in {samples}: its equilibria"
             " are no longer the least ones, so that nothing bounds it from above, and"
             " certificate_gap is NaN",
-            values["stopped"] & np.isfinite(first),
+            stopped & np.isfinite(first),
         )
         residual = rows.residual_strength.mean(axis=rows.axes)
         falls = (rows.strength - rows.residual_strength).reshape(rows.samples, -1)

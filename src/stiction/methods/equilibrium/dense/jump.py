@@ -104,11 +104,11 @@ def _relax(course: Course, load: float, size: int, tolerance: float) -> int:
     Returns what `_join` returns. Of rows whose drive is that of the step before, as it is at
     residual strength, the forward substitution stays; `_forget` them with the factor.
     """
-    sample, slip, stiff, workspace = course.sample, course.slip, course.stiff, course.workspace
+    sample, slip, stiff, workspace, stops = course
     solution, drive = workspace.solution, workspace.right
     resting, members = workspace.resting, workspace.members
     forward, before = workspace.forward_drive, workspace.known_drive
-    if course.stops:
+    if stops:
         take_off_resting(course)
     while True:
         for t in range(size):
@@ -123,7 +123,7 @@ def _relax(course: Course, load: float, size: int, tolerance: float) -> int:
             solution[t] = forward[t]
         back_substitute(workspace.factor, size, solution)
         stay = size
-        for t in range(size if course.stops else ZERO):
+        for t in range(size if stops else ZERO):
             i = members[t]
             if (slip[i] - solution[t]) * workspace.diagonal[i] > AT_STRENGTH * tolerance:
                 workspace.inside[i] = False
@@ -172,7 +172,7 @@ def _settle(
     Returns ARRESTED if the step ends in the equilibrium of the members, SLIDING if nothing bounds
     it, else UNDECIDED.
     """
-    sample, slip, stiff, workspace = course.sample, course.slip, course.stiff, course.workspace
+    sample, slip, stiff, workspace, stops = course
     drive = workspace.right
     for i in range(slip.shape[0]):
         own = entry(workspace.stiffness, i, i)
@@ -188,7 +188,7 @@ def _settle(
         if now < count:
             singular_direction(other, now, direction)
             longest = np.inf
-            gone = _leave_reversed(other, now, 0.0, REVERSED) if course.stops else ZERO
+            gone = _leave_reversed(other, now, 0.0, REVERSED) if stops else ZERO
         else:
             longest = 1.0
             substitute_members(other, ZERO, count, drive, solution)
@@ -197,7 +197,7 @@ def _settle(
                 direction[i] = 0.0
             for t in range(count):
                 direction[other.members[t]] = max(solution[t], 0.0)
-            gone = _leave_reversed(other, count, near, 0.0) if course.stops else ZERO
+            gone = _leave_reversed(other, count, near, 0.0) if stops else ZERO
         if gone == 0:
             break
         count -= gone
@@ -208,7 +208,7 @@ def _settle(
     for t in range(size):
         solution[t] = slip[workspace.members[t]]
     multiply_members(workspace, size, solution, stiff)
-    if course.stops:
+    if stops:
         take_off_resting(course)
     rests = step == 1.0 and longest == 1.0
     for i in range(slip.shape[0]):
@@ -227,7 +227,7 @@ def jump(course: Course, load: float, griffith: float, other: Workspace) -> Outc
     as far as `step_to_corner` goes; on return, of the next equilibrium or a lower bound of it.
     A run of residual nodes as long as Griffith's length counts as global sliding.
     """
-    sample, slip, workspace = course.sample, course.slip, course.workspace
+    sample, slip, _, workspace, _ = course
     tolerance = stress_tolerance(sample, load)
     count = ZERO
     for i in range(slip.shape[0]):

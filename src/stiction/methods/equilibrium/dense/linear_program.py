@@ -54,7 +54,7 @@ def sort_by(keys: Array, order: Array, count: int) -> None:
 @jit_inside
 def overstressed(course: Course, load: float, least: float) -> int:
     """Put the nodes at rest above their strength into `order`, most overstressed first."""
-    sample, slip, stiff, workspace = course.sample, course.slip, course.stiff, course.workspace
+    sample, slip, stiff, workspace, _ = course
     count = ZERO
     keys = workspace.keys
     for i in range(stiff.shape[0]):
@@ -86,7 +86,7 @@ def _back_off(course: Course, load: float, size: int) -> None:
     Close to the onset slip grows so fast with the load that round-off in the load alone may leave
     a node overstressed. One step along the tangent d d/d load mends it.
     """
-    sample, stiff, workspace = course.sample, course.stiff, course.workspace
+    sample, _, stiff, workspace, _ = course
     solution, stiff_rate = workspace.solution, workspace.product
     for t in range(size):
         solution[t] = workspace.forward_load[t]
@@ -129,7 +129,7 @@ def solve_program(
     first. If `cap` is below the critical load, the result is the least equilibrium there. It is not
     solved after too many passes, or if the workspace cannot hold the members.
     """
-    sample, slip, stiff, workspace = course.sample, course.slip, course.stiff, course.workspace
+    sample, slip, stiff, workspace, _ = course
     top = min(bound, cap)
     load = min(start, top)
     tolerance = stress_tolerance(sample, top)

@@ -8,21 +8,19 @@ a specimen is always decided by following the jump.
 
 import threading
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.elasticity.line import line_of
-from stiction.elasticity.protocol import NONE, Elasticity, HalfSpaces
+from stiction.elasticity.protocol import NONE, Elasticity
 from stiction.elasticity.stiffness import apply_circular
 from stiction.elasticity.weakest import window_bound
 from stiction.methods.equilibrium.dense.cholesky import Course, Workspace, make_workspace
 from stiction.methods.equilibrium.dense.jump import jump
 from stiction.methods.equilibrium.dense.linear_program import NEARER, certificate, solve_program
-from stiction.methods.equilibrium.dense.runaway import Runs, make_runs, runs_away
+from stiction.methods.equilibrium.dense.runaway import Runs, runs_away, runs_of
 from stiction.methods.equilibrium.dense.stable_path import REACHED, UNSTABLE, advance
-from stiction.methods.equilibrium.patches import main_patch
 from stiction.methods.equilibrium.sample import (
     Jump,
     Outcome,
@@ -72,7 +70,7 @@ class DenseProgram:
         self.runs: Runs | None = None
         if problem.specimen is None:
             self.elastic = line_of(problem.half_spaces, self.nodes)
-            self.runs = _runs(problem.half_spaces, self.nodes)
+            self.runs = runs_of(problem.half_spaces, self.nodes)
         else:
             self.elastic = problem.blocks
         self.driven = self.elastic.relief > 0.0
@@ -237,7 +235,6 @@ class DenseProgram:
         if self.runs is None:
             step = step_to_corner(sample, slip, found.direction, np.inf)
             return (Outcome.SLIDING if step == np.inf else Outcome.UNDECIDED), np.inf
-        start, length, _ = main_patch(found.direction)
         members, stiff_direction = np.flatnonzero(found.direction), np.empty(self.nodes)
         apply_circular(
             self.elastic.entries, members, members.size, found.direction[members],
@@ -245,7 +242,7 @@ class DenseProgram:
         )  # fmt: skip
         return runs_away(
             sample, self.runs, found.load, slip, found.stiff, found.direction,
-            stiff_direction, start, length, np.empty((4, self.nodes)),
+            stiff_direction,
         )  # fmt: skip
 
     def gradient(self, sample: StaticSample, state: State) -> Array:
@@ -278,8 +275,3 @@ def _rates(sample: StaticSample) -> tuple[float, float]:
         return 0.0, 0.0
     low, high = float(rates.min()), float(rates.max())
     return low, (high if low < high * (1.0 - SAME) else low)
-
-
-@lru_cache(maxsize=4)
-def _runs(half_spaces: HalfSpaces, nodes: int) -> Runs:
-    return make_runs(line_of(half_spaces, nodes).entries.column, half_spaces)

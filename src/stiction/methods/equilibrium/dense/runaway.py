@@ -6,15 +6,18 @@ problem of the run with frozen strengths; the blocks of K being Toeplitz, one Ch
 the runs of every sample.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from stiction.base.arrays import Array
-from stiction.base.jit import ZERO, jit
+from stiction.base.jit import ZERO, jit, jit_allocating
 from stiction.base.lanes import multiply_add
+from stiction.elasticity.line import line_of
 from stiction.elasticity.protocol import HalfSpaces
 from stiction.methods.equilibrium.dense.cholesky import back_substitute, row_start, substitute
+from stiction.methods.equilibrium.patches import main_patch
 from stiction.methods.equilibrium.sample import (
     Outcome,
     StaticSample,
@@ -69,12 +72,14 @@ class Runs(NamedTuple):
     modulus: float
 
 
-def make_runs(column: Array, half_spaces: HalfSpaces) -> Runs:
-    """Return what the test needs of a line, of the first column of its K."""
+@lru_cache(maxsize=4)
+def runs_of(half_spaces: HalfSpaces, nodes: int) -> Runs:
+    """Return what the test needs of a line."""
     (length,), (modulus,) = half_spaces
-    longest = min(LONGEST_RUN, column.size - 1)
+    column = line_of(half_spaces, nodes).entries.column
+    longest = min(LONGEST_RUN, nodes - 1)
     factor = block_factor(column, longest)
-    return Runs(np.tile(column, 3), factor, longest, length / column.size, modulus)
+    return Runs(np.tile(column, 3), factor, longest, length / nodes, modulus)
 
 
 @jit
@@ -96,7 +101,7 @@ def unstoppable_length(sample: StaticSample, load: float, runs: Runs) -> float:
     return 4.0 * runs.modulus * energy / (np.pi * drop * drop) / runs.spacing
 
 
-@jit
+@jit_allocating
 def runs_away(
     sample: StaticSample,
     runs: Runs,
@@ -105,24 +110,22 @@ def runs_away(
     stiff: Array,
     direction: Array,
     stiff_direction: Array,
-    first: int,
-    length: int,
-    work: Array,
 ) -> tuple[Outcome, float]:
     """Whether the patch of an instability certainly becomes global sliding: SLIDING or UNDECIDED.
 
     Returned is, too, the number of residual nodes in a row that would show it in a jump. Slip d and
     K d are those of the state that became unstable; afterwards slip is a lower bound of the next
-    equilibrium. K times the unstable direction is given beside it, and the first node and the
-    length of its patch; `work` (4, n) is work space.
+    equilibrium. K times the unstable direction is given beside it.
     """
     n = slip.shape[0]
     griffith = unstoppable_length(sample, load, runs)
+    safe = MARGIN * griffith
     step = step_to_corner(sample, slip, direction, np.inf)
     if step == np.inf:
-        return Outcome.SLIDING, MARGIN * griffith
+        return Outcome.SLIDING, safe
+    first, length, _ = main_patch(direction)
     if (griffith > runs.longest and griffith < np.inf) or length > runs.longest:
-        return Outcome.UNDECIDED, MARGIN * griffith
+        return Outcome.UNDECIDED, safe
     # Everything below is numbered from `origin`, so that the patch lies in the middle.
     begin = (n - length) // 2
     end = begin + length
@@ -131,12 +134,11 @@ def runs_away(
     origin = first - begin
     if origin < 0:
         origin += n
-    grown, extra, push, solution = work[0], work[1], work[2], work[3]
+    grown, extra = np.zeros(n), np.zeros(n)
+    push, solution = np.empty(n), np.empty(n)
     for q in range(n):
         i = (origin + q) % n
         push[q] = load * sample.profile[i] - stiff[i] - step * stiff_direction[i]
-        grown[q] = 0.0
-        extra[q] = 0.0
     for _ in range(STEPS):
         # Neighbours that are driven forward join, as far as the stress was computed.
         while begin > low:
@@ -151,7 +153,7 @@ def runs_away(
             end += 1
         length = end - begin
         if length > runs.longest:
-            return Outcome.UNDECIDED, MARGIN * griffith
+            return Outcome.UNDECIDED, safe
         for t in range(length):
             q = begin + t
             i = (origin + q) % n
@@ -171,9 +173,9 @@ def runs_away(
             run = run + 1 if slip[i] >= sample.pieces.at_corner * sample.critical[i] else 0
             longest = max(longest, run)
         if longest >= griffith or unsupported(sample, load, slip):
-            return Outcome.SLIDING, MARGIN * griffith
+            return Outcome.SLIDING, safe
         if fastest < SHARE * largest:
-            return Outcome.UNDECIDED, MARGIN * griffith
+            return Outcome.UNDECIDED, safe
         low = max(begin - length // 2, 0)
         high = min(end + length // 2, n)
         near = extra[low:high]
@@ -184,4 +186,4 @@ def runs_away(
             factor = grown[q]
             for t in range(near.shape[0]):
                 near[t] = multiply_add(factor, source[t], near[t])
-    return Outcome.UNDECIDED, MARGIN * griffith
+    return Outcome.UNDECIDED, safe

@@ -66,7 +66,7 @@ def _begin(
 
     Returns how many nodes slip, and whether others rest that slipped before.
     """
-    sample, slip, workspace = course.sample, course.slip, course.workspace
+    sample, slip, stiff, workspace, stops = course
     count = ZERO
     rests = False
     near = AT_STRENGTH * stress_tolerance(sample, load)
@@ -76,8 +76,8 @@ def _begin(
         strength[i] = start_of(sample, i, piece[i])
         own = entry(workspace.stiffness, i, i)
         workspace.diagonal[i] = own - sample.pieces.slopes[piece[i]] * sample.rate[i]
-        if course.stops and slips:
-            margin = strength_at(sample, slip, i) - load * sample.profile[i] + course.stiff[i]
+        if stops and slips:
+            margin = strength_at(sample, slip, i) - load * sample.profile[i] + stiff[i]
             slips = margin <= near
             rests = rests or not slips
         workspace.inside[i] = slips
@@ -183,7 +183,7 @@ def _next_event(
 ) -> tuple[float, int, int]:
     """Step of the load to the next event, the node that begins to slip and the member that reaches
     a corner, -1 for none."""
-    sample, slip, workspace = course.sample, course.slip, course.workspace
+    sample, slip, stiff, workspace, _ = course
     rate, stiff_rate, pieces = workspace.rates, workspace.product, sample.pieces
     step = target - load
     starts = -1
@@ -191,7 +191,7 @@ def _next_event(
     for i in range(slip.shape[0]):
         if not workspace.inside[i]:
             present = strength_at(sample, slip, i) if slip[i] > 0.0 else sample.excess[i]
-            margin = max(present - load * sample.profile[i] + course.stiff[i], 0.0)
+            margin = max(present - load * sample.profile[i] + stiff[i], 0.0)
             closing = sample.profile[i] - stiff_rate[i]
             if closing > 0.0 and margin < step * closing:
                 step = margin / closing
@@ -235,8 +235,8 @@ def advance(
     whether a node stopped or rests after slip, and the status: REACHED; UNSTABLE, in the direction
     z >= 0, A z <= 0, that is then written; or CROWDED: more members than the workspace holds.
     """
-    sample, slip, stiff, workspace = course.sample, course.slip, course.stiff, course.workspace
-    n, stops = slip.shape[0], course.stops
+    sample, slip, stiff, workspace, stops = course
+    n = slip.shape[0]
     solution, stiff_rate, rate = workspace.solution, workspace.product, workspace.rates
     resting = workspace.resting
     pieces = sample.pieces

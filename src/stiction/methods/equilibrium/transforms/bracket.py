@@ -9,8 +9,6 @@ be a Z-matrix. Bisection is robust, and its steps are proportional to the number
 starts `turning_point`, which closes the bracket, and takes over where that fails.
 """
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
 from stiction.base.arrays import Array
@@ -53,30 +51,23 @@ def _lifting_field(operator: Operator) -> tuple[Array, Array]:
     return lifting, -image
 
 
-@dataclass
 class Bracket:
     """Programme of one sample on a grid, with the bounds of its solution found so far.
 
-    It holds the strength less initial stress (Pa) and load profile, flat, and rigorous bounds
-    of the onset load (Pa) with the slip (m) and the multiplier, <p, y> = 1, that prove them.
+    They are rigorous bounds of the onset load (Pa), `lower` and `upper`, with the slip (m) and the
+    multiplier, <p, y> = 1, that prove them: at first no node slips, or all slide at once. All of
+    K(k), W (Pa/m), strength less initial stress (Pa) and load profile are given as fields (*shape).
     """
 
-    operator: Operator
-    excess: Array
-    profile: Array
-    lower: float = field(init=False)
-    upper: float = field(init=False)
-    slip: Array = field(init=False)
-    multiplier: Array = field(init=False)
-
-    def __post_init__(self) -> None:
-        nodes = self.excess.size
-        self.residual = np.empty(nodes)
-        self.inside = np.zeros(nodes, dtype=np.bool_)
-        self.slip = np.zeros(nodes)
+    def __init__(
+        self, symbol: Array, rate: Array | float, excess: Array, profile: Array
+    ) -> None:
+        self.operator = make_operator(symbol, rate, excess.shape)
+        self.excess, self.profile = excess.flatten(), profile.flatten()
+        self.residual, self.slip, self.multiplier = np.zeros((3, excess.size))
+        self.inside = np.zeros(excess.size, dtype=np.bool_)
         self.lower = float((self.excess / self.profile).min())
         self.upper = np.inf
-        self.multiplier = np.zeros(nodes)
         self.lifting = _lifting_field(self.operator)
         self.raise_multiplier(self.lifting[0])
 
@@ -130,12 +121,6 @@ class Bracket:
         if load < self.upper:
             self.upper, self.multiplier = load, trial / weight
         return load
-
-
-def make_bracket(symbol: Array, rate: Array | float, excess: Array, profile: Array) -> Bracket:
-    """Return the trivial bracket of fields (*shape): no node slips, or all slide at once."""
-    operator = make_operator(symbol, rate, excess.shape)
-    return Bracket(operator, excess.flatten(), profile.flatten())
 
 
 def bisect(bracket: Bracket, gap: float, accuracy: float) -> Array:

@@ -14,7 +14,6 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.elasticity.operator import SOLVED, Mask, Operator, inner, product, solve_inside
 from stiction.methods.equilibrium.sample import StaticSample, present_pieces
-from stiction.methods.equilibrium.transforms.held_equilibrium import ITERATIONS
 from stiction.methods.equilibrium.transforms.relaxation import residual_tolerance, slip_under
 
 EVENTS = 300
@@ -42,7 +41,7 @@ def _solution(operator: Operator, inside: Mask, right: Array) -> Array | None:
     """Solution of A x = right on the nodes inside, None if A is not positive definite there."""
     x, residual = np.zeros(right.size), np.where(inside, right, 0.0)
     tolerance = RESIDUAL * float(np.abs(residual).max())
-    status, _ = solve_inside(operator, inside, x, residual, tolerance, ITERATIONS)
+    status, _ = solve_inside(operator, inside, x, residual, tolerance)
     return x if status == SOLVED else None
 
 

@@ -18,7 +18,6 @@ from stiction.elasticity.operator import (
 )
 from stiction.methods.equilibrium.patches import span
 from stiction.methods.equilibrium.sample import StaticSample, piece_at, present_pieces, start_of
-from stiction.methods.equilibrium.transforms.held_equilibrium import ITERATIONS
 
 # No result rests on these: whether a step passes an equilibrium is checked. With one halved or
 # doubled small planes take up to a quarter longer, of MOST and HELD up to six tenths.
@@ -84,12 +83,6 @@ def longest_step(
             here = corner
             piece += 1
     return longest
-
-
-def _strength(sample: StaticSample, slip: Array) -> Array:
-    """Strength less initial stress after a slip, Pa."""
-    now = present_pieces(sample, slip)
-    return now.strength - now.rate * slip
 
 
 @jit
@@ -178,7 +171,7 @@ def _push(
     rate *= share
     operator = operator._replace(rate=rate, spring=stiffness, held=held)
     residual_of(operator, drive, move, residual)
-    status, _ = solve_inside(operator, inside, move, residual, spared, ITERATIONS)
+    status, _ = solve_inside(operator, inside, move, residual, spared)
     if status != SOLVED:
         return None
     pushed = np.zeros(every)
@@ -208,7 +201,8 @@ def grown(
     filtered(operator, operator.symbol, slip, stress)
     share, failures = 1.0 - SMALL, 0
     while failures < FAILURES:
-        rest = load * sample.profile - _strength(sample, slip) - tolerance
+        _, start, rate = present_pieces(sample, slip)
+        rest = load * sample.profile - (start - rate * slip) - tolerance
         if float(rest.sum()) > 0.0:
             break
         rest -= stress

@@ -11,6 +11,7 @@ from stiction.base.arrays import Array
 from stiction.base.jit import jit, jit_inside
 from stiction.elasticity.operator import (
     EXHAUSTED,
+    ITERATIONS,
     NEGATIVE,
     SOLVED,
     Mask,
@@ -23,8 +24,6 @@ from stiction.elasticity.operator import (
 
 LOOSE = 0.05
 """Factor by which a residual is reduced before the set of slipping nodes is revised."""
-ITERATIONS = 3000
-"""Largest number of iterations of conjugate gradients for one equilibrium."""
 
 
 @jit_inside
@@ -63,7 +62,7 @@ def equilibrate(
     used = 0
     while used < ITERATIONS:
         goal = max(LOOSE * largest_inside(residual, inside), tolerance)
-        status, taken = solve_inside(operator, inside, slip, residual, goal, ITERATIONS - used)
+        status, taken = solve_inside(operator, inside, slip, residual, goal)
         used += taken + 1
         if status == NEGATIVE:
             return status, used

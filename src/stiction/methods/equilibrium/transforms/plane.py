@@ -25,8 +25,8 @@ from stiction.methods.equilibrium.sample import (
     multiplier_of,
     pieces_of,
 )
-from stiction.methods.equilibrium.transforms.bracket import Bracket, bisect, make_bracket
-from stiction.methods.equilibrium.transforms.fold import Turn, follow_to_turn
+from stiction.methods.equilibrium.transforms.bracket import Bracket, bisect
+from stiction.methods.equilibrium.transforms.fold import follow_to_turn
 from stiction.methods.equilibrium.transforms.relaxation import (
     least_equilibrium,
     stable_equilibrium,
@@ -142,9 +142,8 @@ def plane_onset(
     for number in range(len(levels) - 1, -1, -1):
         goal = gap if number == 0 else max(ROUGH, gap)
         strength, load_profile, weakening, end = levels.pop()
-        bracket = make_bracket(
-            half_spaces.symbol(strength.shape), weakening, strength, load_profile
-        )
+        symbol = half_spaces.symbol(strength.shape)
+        bracket = Bracket(symbol, weakening, strength, load_profile)
         if slip is not None:
             bracket.raise_slip(slip.flatten())
         closed = False
@@ -252,7 +251,10 @@ class PlaneProgram:
                     direction = slip - passed[0][1]
                     return State(load, slip, direction, gap=step, certified=False)
                 if turn.direction.any():
-                    return _turned(turn, beyond)
+                    return State(
+                        turn.load, turn.slip, turn.direction, gap=beyond - turn.load,
+                        certified=False, multiplier=turn.direction,
+                    )  # fmt: skip
                 there = turn.slip
             growth = there - slip
             work = step * inner(sample.profile, growth)
@@ -300,11 +302,3 @@ class PlaneProgram:
         slip = state.slip.reshape(self.shape)
         released: Array = np.fft.irfft2(symbol * np.fft.rfft2(slip), self.shape).reshape(-1)
         return released
-
-
-def _turned(turn: Turn, beyond: float) -> State:
-    """Return the instability at a turn; the path does not reach the load `beyond`."""
-    return State(
-        turn.load, turn.slip, turn.direction,
-        gap=beyond - turn.load, certified=False, multiplier=turn.direction,
-    )  # fmt: skip

@@ -12,6 +12,7 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.elasticity.operator import (
     EXHAUSTED,
+    ITERATIONS,
     NEGATIVE,
     SOLVED,
     Operator,
@@ -30,7 +31,7 @@ from stiction.methods.equilibrium.sample import (
     step_to_corner,
 )
 from stiction.methods.equilibrium.transforms.growing_patch import ENDS, SMALL, grown
-from stiction.methods.equilibrium.transforms.held_equilibrium import ITERATIONS, equilibrate
+from stiction.methods.equilibrium.transforms.held_equilibrium import equilibrate
 
 # Halved or doubled none of these changes a result by more than the gap, or the time by much more
 # than a tenth (planes of 64 and 96 squared, with and without arrests).
@@ -85,7 +86,7 @@ def _definite(operator: Operator, rate: Array, growth: Array, slip: Array) -> bo
     if not curvature > 0.0:
         return False
     operator, residual = operator._replace(slow=growth / np.sqrt(curvature)), 1.0 * inside
-    status, _ = solve_inside(operator, inside, x, residual, CHECKED, ITERATIONS)
+    status, _ = solve_inside(operator, inside, x, residual, CHECKED)
     return status == SOLVED
 
 
@@ -184,7 +185,7 @@ def _weakening_step(
     rest, new = np.empty_like(slip), slip.copy()
     residual_of(operator, drive, slip, rest)
     inside = (slip > 0.0) | (rest > 0.0)
-    status, _ = solve_inside(operator, inside, new, rest, tolerance, ITERATIONS)
+    status, _ = solve_inside(operator, inside, new, rest, tolerance)
     direction = np.where(inside, np.maximum(new - slip, 0.0), 0.0)
     longest = 1.0
     if status == NEGATIVE:

@@ -23,7 +23,7 @@ from stiction.elasticity.operator import (
     solve_inside,
 )
 from stiction.methods.equilibrium.transforms.bracket import Bracket
-from stiction.methods.equilibrium.transforms.held_equilibrium import ITERATIONS, equilibrate
+from stiction.methods.equilibrium.transforms.held_equilibrium import equilibrate
 
 # Where Newton's method fails, bisection takes over: no result rests on these.
 STEPS = 40
@@ -47,19 +47,16 @@ BELOW = 0.3
 
 
 class Held(NamedTuple):
-    """A held equilibrium: load, a, mu, mu', d mu/d tau_0 at fixed a, d, d' (<phi, d'> = 1)."""
+    """A held equilibrium, or a guess of one: load, a, d, d' (<phi, d'> = 1), mu, mu' and d mu/d
+    tau_0 at fixed a."""
 
     load: float
     amplitude: float
-    force: float
-    slope_of_force: float
-    force_by_load: float
     slip: Array
     slope: Array
-
-
-def _guess(load: float, amplitude: float, slip: Array, slope: Array) -> Held:
-    return Held(load, amplitude, 0.0, 0.0, 0.0, slip, slope)
+    force: float = 0.0
+    slope_of_force: float = 0.0
+    force_by_load: float = 0.0
 
 
 def _hold(bracket: Bracket, held: Array, guess: Held, accuracy: float) -> Held | None:
@@ -94,14 +91,14 @@ def _hold(bracket: Bracket, held: Array, guess: Held, accuracy: float) -> Held |
     # A lift of y by epsilon costs epsilon <s - tau_0 p, 1>/<p, y>.
     cost = float(np.abs(excess - load * profile).sum())
     tolerance = accuracy * stiffness * bracket.magnitude * inner(profile, slope) / cost
-    status, _ = solve_inside(operator, inside, slope, bracket.residual, tolerance, ITERATIONS)
+    status, _ = solve_inside(operator, inside, slope, bracket.residual, tolerance)
     if status != SOLVED:
         return None
     share = inner(held, slope)
     reached = inner(held, slip)
     return Held(
-        load, reached, stiffness * (amplitude - reached), 1.0 / share - stiffness,
-        -inner(profile, slope) / share, slip, slope / share,
+        load, reached, slip, slope / share, stiffness * (amplitude - reached),
+        1.0 / share - stiffness, -inner(profile, slope) / share,
     )  # fmt: skip
 
 
@@ -178,7 +175,7 @@ def close(
     first: Held | None = None
     below: Held | None = None  # mu' > 0, the one with the largest a
     above: Held | None = None
-    guess = _guess(load, inner(held, slip), slip, held)
+    guess = Held(load, inner(held, slip), slip, held)
     step = last = 0.0
     switches = idle = 0
     for turn in range(STEPS):
@@ -192,7 +189,7 @@ def close(
             load = min(guess.load, bracket.upper)
             load -= RETREAT * 2.0 ** (switches - 1) * bracket.magnitude
             slip = slip if first is None else first.slip
-            guess = _guess(load, inner(held, slip), slip, held)
+            guess = Held(load, inner(held, slip), slip, held)
             first = below = above = None
             step = bend = 0.0
             continue
@@ -229,5 +226,5 @@ def close(
         last = state.slope_of_force
         load = min(load, bracket.upper - BELOW * gap * bracket.magnitude)
         slip_there = np.maximum(state.slip + step * state.slope, 0.0)
-        guess = _guess(load, state.amplitude + step, slip_there, state.slope)
+        guess = Held(load, state.amplitude + step, slip_there, state.slope)
     return False, bend
