@@ -21,9 +21,10 @@ from scipy.special import comb
 
 import stiction as st
 from stiction.methods.dynamics.specimens import RuptureProgram
+from stiction.methods.equilibrium.events import relief_of
 from stiction.methods.equilibrium.patches import line_patch
 from stiction.methods.equilibrium.sample import sample_of
-from stiction.methods.equilibrium.solver import follow, make_program, relief_of
+from stiction.methods.equilibrium.solver import follow, make_program
 from stiction.plot.style import ACCENT, INK, PAGE, QUIET, panel, paper_style
 
 TABLE = Path(__file__).parent / "data" / "stick_slips" / "events.csv"

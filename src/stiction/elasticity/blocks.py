@@ -54,24 +54,12 @@ class Pushes(NamedTuple):
 
 
 class BlockResponse(NamedTuple):
-    """What a method needs of two blocks; nodes at (i + 1/2) dx.
+    """What a method needs of two blocks; nodes at (i + 1/2) dx."""
 
-    Attributes
-    ----------
-    stiffness : (n, n) array
-        K under a given force of the drive, Pa/m; symmetric, its rows sum to zero.
-    shear : (n,) array
-        q, shear stress of the drive over its mean.
-    drive_stiffness : float
-        C, force of the drive per unit depth over the travel of one block without slip, Pa.
-    error : float
-        By how much K as computed violates reciprocity at most, Pa/m; 0 for closed forms.
-    """
-
-    stiffness: Array
-    shear: Array
-    drive_stiffness: float
-    error: float = 0.0
+    stiffness: Array  # (n, n): K at a given force, Pa/m; symmetric, its rows sum to zero
+    shear: Array  # (n,): q, shear stress of the drive over its mean
+    drive_stiffness: float  # C, force per unit depth over travel of a block without slip, Pa
+    error: float = 0.0  # by how much K violates reciprocity at most, Pa/m
 
 
 @lru_cache(maxsize=8)
@@ -85,18 +73,9 @@ def block_response(
 ) -> BlockResponse:
     """Return the response of two blocks to slip and to their drive.
 
-    Parameters
-    ----------
-    length, nodes, height : float, int, float
-        L (m), number of nodes, H (m).
-    modulus : float
-        Shear modulus G, Pa.
-    kappa : float or None
-        Kolosov's constant, 3 - 4 nu in plane strain and (3 - nu)/(1 + nu) in plane stress; None
-        for mode III.
-    pushes : Pushes or None
-        The drive; None for a platen that is glued to the top and moves along the interface. The
-        top of a block that is pushed lies on rollers (in mode III it is free).
+    Length L and height H are in m, the modulus is G (Pa), and kappa Kolosov's constant
+    (`rectangle`), None for mode III. A platen (no `pushes`) is glued to the top and moves along the
+    interface; the top of a block that is pushed lies on rollers (in mode III it is free).
     """
     with one_blas_thread():
         if kappa is None:

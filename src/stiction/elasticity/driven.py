@@ -36,28 +36,14 @@ LEAST = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Driven:
-    """Two blocks behind their machine, an `Elasticity`; arrays are not to be written to.
+    """Two blocks behind their machine, an `Elasticity`; arrays are not to be written to."""
 
-    Attributes
-    ----------
-    stiffness : (n, n) array
-        K, Pa/m.
-    shear, pressure : (n,) arrays
-        q and p, each of mean one.
-    relief : float
-        h, Pa/m: how much stress the mean of q d takes off the drive.
-    drive_stiffness : float
-        C, Pa.
-    error : float
-        To which the entries of K are known, Pa/m.
-    """
-
-    stiffness: Array
-    shear: Array
-    pressure: Array
-    relief: float
-    drive_stiffness: float
-    error: float
+    stiffness: Array  # (n, n): K, Pa/m
+    shear: Array  # (n,): q, of mean one
+    pressure: Array  # (n,): that of the normal load over its mean
+    relief: float  # h, Pa/m: how much stress the mean of q d takes off the drive
+    drive_stiffness: float  # C, Pa
+    error: float  # to which the entries of K are known, Pa/m
     half_spaces: ClassVar[HalfSpaces | None] = None
 
     @cached_property

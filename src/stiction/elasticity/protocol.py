@@ -68,21 +68,14 @@ class Windows(NamedTuple):
     <s, y>/<p, y> bounds the load of the first instability from above, s being the strength less
     initial stress and p the load profile. This is the criterion of Uenishi and Rice (2003) in the
     form that is strict on the grid.
-
-    Attributes
-    ----------
-    rates : (count,) array
-        Weakening rate from which each is unstable, Pa/m, never rising.
-    starts, widths : (count,) int arrays
-        First node, or `ANYWHERE`, and number of nodes.
-    modes : (count or 1, largest width) array
-        Eigenvectors of unit sum, zero beyond their width.
     """
 
-    rates: Array
-    starts: NDArray[np.int64]
-    widths: NDArray[np.int64]
-    modes: Array
+    rates: Array  # (count,): weakening rate from which each is unstable, Pa/m, never rising
+    starts: NDArray[np.int64]  # (count,): first node, or `ANYWHERE`
+    widths: NDArray[np.int64]  # (count,): number of nodes
+    modes: (
+        Array  # (count or 1, largest width): eigenvectors of unit sum, zero beyond their width
+    )
 
 
 _NO_NODES = np.empty(0, dtype=np.int64)

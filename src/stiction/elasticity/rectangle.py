@@ -59,23 +59,10 @@ def total(*parts: Goursat) -> Goursat:
 
 
 class Rectangle:
-    """Fields of a block from the values on its sides and its top.
+    """Fields of a block from the values at places `left`, `right` and `top` of its border, m.
 
-    Parameters
-    ----------
-    length, height : float
-        L and H, m.
-    kappa : float
-        Kolosov's constant.
-    glued : bool
-        The top is given by u and v, otherwise by v and s_xy (rollers).
-    pressed : bool
-        The interface has no v and no s_xy, otherwise no u and no s_yy.
-
-    Attributes
-    ----------
-    left, right, top : (points,) arrays
-        Places z at which the values are given, m.
+    The top is given by u and v if it is `glued`, otherwise by v and s_xy (rollers). The interface
+    has no v and no s_xy if the block is `pressed`, otherwise no u and no s_yy.
     """
 
     def __init__(

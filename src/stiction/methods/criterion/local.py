@@ -118,9 +118,8 @@ class LocalCriterion:
             place = np.empty((len(excess), 2) if interface.is_plane else len(excess))
             for rate, same in _rates(sample):
                 windows = windows_of(problem, rate)
-                some = excess if same.size == len(excess) else excess[same]
                 load[same], place[same], chosen = least_average(
-                    interface, windows, some, profile
+                    interface, windows, excess[same], profile
                 )
                 if interface.is_plane:
                     patches = [(one.aspect, *one.extents, one.area) for one in windows]

@@ -16,8 +16,9 @@ from stiction.methods.dynamics.specimens import RuptureProgram, front_speeds, re
 from stiction.methods.dynamics.summary import SPEEDS
 from stiction.methods.dynamics.waves import FORCE, FRICTION, SPEED, TRAVEL
 from stiction.methods.dynamics.waves import TIME as NOW
+from stiction.methods.equilibrium.events import relief_of
 from stiction.methods.equilibrium.sample import present_pieces, residual_nodes, sample_of
-from stiction.methods.equilibrium.solver import follow, relief_of
+from stiction.methods.equilibrium.solver import follow
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset
 from stiction.problem.sample import Sample

@@ -9,8 +9,9 @@ from pydantic import Field
 
 from stiction.base.model import Flag, Number, Real, model
 from stiction.base.variables import Variable
+from stiction.methods.equilibrium.events import event_variables
 from stiction.methods.equilibrium.sample import pieces_of, refused
-from stiction.methods.equilibrium.solver import OnsetSolver, event_variables, make_program
+from stiction.methods.equilibrium.solver import OnsetSolver, make_program
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, onset_variables, position
 from stiction.problem.sample import Sample

@@ -9,16 +9,14 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Numbers, check, check_memory, describe
 from stiction.base.variables import Variable, force_variables, forces
-from stiction.methods.equilibrium.sample import at_rest, sample_of
-from stiction.methods.equilibrium.solver import (
+from stiction.methods.equilibrium.events import (
     elongation_of,
     event_table,
     event_variables,
-    follow,
-    make_program,
     travel_of,
-    warn_of_signs,
 )
+from stiction.methods.equilibrium.sample import at_rest, sample_of
+from stiction.methods.equilibrium.solver import follow, make_program, warn_of_signs
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset
 
@@ -37,8 +35,6 @@ TRAVEL = {
 EVENT = Variable("1", "event number", ("event",))
 CLOSE = 1e-9
 """Relative distance of loads that count as the same."""
-GAP = 1e-6
-"""Relative distance of the bounds of instabilities on planes."""
 
 
 def _check_loads(loads: Any) -> Array:
@@ -120,7 +116,7 @@ def equilibrium_path(
     problem.doubt(rows)
     interface = problem.interface
     check_memory("loads", 16.0 * given.size * interface.size)
-    program = make_program(problem, GAP) if method is None else method.program(problem)
+    program = make_program(problem) if method is None else method.program(problem)
     warn_of_signs(problem)
     sample = sample_of(rows, program.pieces, 0)
     whole = follow(program, sample)

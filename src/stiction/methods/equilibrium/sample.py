@@ -25,20 +25,14 @@ is within the round-off of K d; an instability of such nodes adds no slip and ne
 
 
 class Pieces(NamedTuple):
-    """A falling piecewise linear function f of u = slip/d_c, the same at every node.
+    """A falling piecewise linear function f of u = slip/d_c, the same at every node."""
 
-    `ends` are the u at the end of each piece, the last 1. For each piece and the residual
-    strength, `starts` are f continued back to zero slip (1, ..., 0) and `slopes` are -f' over
-    the first (1, ..., 0); `first` is -f' on the first piece, `area` the integral of f. From
-    the share `at_corner` of the slip at a corner on a node counts as beyond it.
-    """
-
-    ends: Array
-    starts: Array
-    slopes: Array
-    first: float
-    area: float
-    at_corner: float = 1.0 - 1e-12
+    ends: Array  # u at the end of each piece, the last 1
+    starts: Array  # of each piece and the residual strength: f continued to u = 0 (1, ..., 0)
+    slopes: Array  # of these: -f' over the first (1, ..., 0)
+    first: float  # -f' on the first piece
+    area: float  # integral of f
+    at_corner: float = 1.0 - 1e-12  # share of a corner's slip from which a node is beyond it
 
     @property
     def steepens(self) -> bool:
@@ -81,19 +75,13 @@ class Outcome(IntEnum):
 
 
 class StaticSample(NamedTuple):
-    """One strength profile; all arrays of shape (nodes,).
+    """One strength profile; arrays (nodes,). Rate and d_c are 0 where strength is constant."""
 
-    Stress is counted from the initial one: `excess` is the strength excess tau_p - tau_i and
-    `residual` is tau_r - tau_i (Pa). `profile` is the load profile, `rate` the weakening rate W at
-    zero slip (Pa/m), and `critical` the slip d_c (m) at which the strength is residual. Nodes of
-    constant strength have both 0. `pieces` are those of the friction law.
-    """
-
-    excess: Array
-    residual: Array
-    profile: Array
-    rate: Array
-    critical: Array
+    excess: Array  # tau_p - tau_i, Pa
+    residual: Array  # tau_r - tau_i, Pa
+    profile: Array  # of the load
+    rate: Array  # W at zero slip, Pa/m
+    critical: Array  # d_c, the slip at which the strength is residual, m
     pieces: Pieces
 
 
@@ -133,42 +121,23 @@ class Present(NamedTuple):
 
 @dataclass
 class State:
-    """An equilibrium on the path of one sample, by default one at which it is unstable.
+    """An equilibrium on the path of one sample, by default one at which it is unstable."""
 
-    Attributes
-    ----------
-    load : float
-        tau_0, Pa.
-    slip, direction : (n,) arrays
-        d (m) and the direction in which it is unstable.
-    stiff : (n,) array
-        K d, Pa; empty on planes.
-    multiplier : (n,) array, optional
-        The exact y with <p, y> = 1, if the direction is that; else the direction stands for it.
-    gap : float
-        Distance to a load without equilibrium, Pa; NaN where none is known.
-    peak : float, optional
-        Largest mean stress on the way here over the mean of the load profile, Pa: the load itself
-        (None), unless a machine drives.
-    certified, unstable, known : bool
-        Whether the gap is proved, the path is unstable here, and it could be followed so far.
-    by_events, jumped, stopped : bool
-        Whether a programme failed to find the next instability before, an instability came to rest
-        on the way, or a node that slipped stopped.
-    """
-
-    load: float
-    slip: Array
-    direction: Array
-    stiff: Array = field(default_factory=lambda: np.empty(0))
-    gap: float = np.nan
-    certified: bool = True
-    unstable: bool = True
-    known: bool = True
-    by_events: bool = False
-    jumped: bool = False
-    stopped: bool = False
+    load: float  # tau_0, Pa
+    slip: Array  # (n,): d, m
+    direction: Array  # (n,): in which it is unstable
+    stiff: Array = field(default_factory=lambda: np.empty(0))  # (n,): K d, Pa; empty on planes
+    gap: float = np.nan  # distance to a load without equilibrium, Pa; NaN where none is known
+    certified: bool = True  # the gap is proved
+    unstable: bool = True  # the path is unstable here
+    known: bool = True  # the path could be followed so far
+    by_events: bool = False  # a programme failed to find the next instability before
+    jumped: bool = False  # an instability came to rest on the way
+    stopped: bool = False  # a node that slipped stopped
+    # Largest mean stress on the way here over the mean of the load profile, Pa: the load itself
+    # (None), unless a machine drives.
     peak: float | None = None
+    # The exact y with <p, y> = 1, if the direction is that; else the direction stands for it.
     multiplier: Array | None = None
 
     @property
@@ -191,17 +160,13 @@ def multiplier_of(sample: StaticSample, state: State) -> Array:
 
 
 class Jump(NamedTuple):
-    """End of an instability: whether it is arrested and counts, the state, if that is known.
-
-    `counts` is false for one from where the path was not seen to turn: a long step of it. `arrival`
-    (s) is when the front of a jump with inertia arrived at each node.
-    """
+    """End of an instability."""
 
     arrested: bool
     known: bool
     state: State
-    counts: bool = True
-    arrival: Array | None = None
+    counts: bool = True  # false where the path was not seen to turn: a long step of it
+    arrival: Array | None = None  # when the front arrived at each node, with inertia, s
 
 
 class Program(Protocol):

@@ -1,6 +1,5 @@
 """The solver of the equilibrium method: samples in, onsets out, on lines and planes."""
 
-from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -8,13 +7,9 @@ from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy, warn_of_samples
-from stiction.base.variables import Variable
 from stiction.methods.equilibrium.dense.program import DenseProgram
-from stiction.methods.equilibrium.patches import (
-    critical_patch,
-    largest_patch,
-    patches_of,
-)
+from stiction.methods.equilibrium.events import Event, event_table, relief_of
+from stiction.methods.equilibrium.patches import Mask, critical_patch, patches_of
 from stiction.methods.equilibrium.sample import (
     Program,
     State,
@@ -27,9 +22,7 @@ from stiction.methods.equilibrium.sample import (
     sample_of,
 )
 from stiction.methods.equilibrium.transforms.plane import PlaneProgram
-from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
-from stiction.problem.results import position
 from stiction.problem.sample import Sample
 
 FINE = 8.0
@@ -39,99 +32,14 @@ ROUGHLY = {
     " quarter of it, by 3 and 9 % if it is a tenth",
     2: "single onsets are off by 0.15 % at 9 nodes along x and 6 along y, by 0.5 % at 6 and 4",
 }
-OF_SPECIMENS = {
-    "event_stress_drop": Variable("Pa", "fall of the mean interface stress", ("event",)),
-    "event_travel": Variable("m", "travel of the drives before the event", ("event",)),
-    "event_crosshead_travel": Variable(
-        "m", "travel of the machine's far ends before the event", ("event",)
-    ),
-    "event_travel_step": Variable("m", "travel of the drives in the event", ("event",)),
-    "event_start": Variable("m", "left end of the patch that slipped", ("event",)),
-}
 SLIDING_ONLY = 0.02
 """Height of the peak above the mean residual strength, as a share of the fall of strength, below
 which nothing but sliding is left of it."""
 QUOTIENT = 1e-7
 """Rise of the strength of a node for a difference quotient, as a share of the mean."""
-EVENT_CORE = 1e-3
-"""Share of the largest added slip above which a node belongs to the patch of an event."""
 
 
-def event_variables(interface: Interface) -> dict[str, Variable]:
-    """Return the variables of each arrested event on a line or a plane."""
-
-    def variable(units: str, text: str) -> Variable:
-        return Variable(units, text, ("event",))
-
-    plane = interface.is_plane
-    centre = variable("m", "centre of the slip added by the event")
-    extent = variable("m", f"{'extent' if plane else 'length'} of the patch that slipped")
-    moment = "shear modulus times slip added" + ("" if plane else ", per unit depth")
-    return {
-        "event_load": variable("Pa", "load factor of the event"),
-        "event_stress": variable("Pa", "mean interface stress at the event"),
-        "event_position": position(interface, centre),
-        "event_extent" if plane else "event_length": position(interface, extent),
-        **({"event_area": variable("m2", "area of the patch that slipped")} if plane else {}),
-        "event_mean_slip": variable("m", "mean slip added to that patch"),
-        "event_moment": variable("N m" if plane else "N", moment),
-        **(OF_SPECIMENS if interface.is_free else {}),
-    }
-
-
-class Event(NamedTuple):
-    """An instability that came to rest: the states before and after it."""
-
-    before: State
-    after: State
-
-
-def event_table(
-    problem: Problem, rows: Sample, row: int, events: list[Event]
-) -> dict[str, Array]:
-    """Return the variables of the arrested events of one sample, (events, ...) arrays."""
-    initial, profile = rows.initial_stress[row].mean(), rows.load_profile.mean()
-    measured = [_measures(problem, initial, profile, *event) for event in events]
-    return {
-        name: np.array([each[name] for each in measured]).reshape(
-            len(events), *(2 for _ in variable.dims[1:])
-        )
-        for name, variable in event_variables(problem.interface).items()
-    }
-
-
-def _measures(
-    problem: Problem, initial: float, profile: float, before: State, after: State
-) -> dict[str, Any]:
-    """Return the variables of one event; initial stress and load profile are means."""
-    interface = problem.interface
-    added = (after.slip - before.slip).reshape(interface.shape)
-    inside, patch = largest_patch(np.maximum(added, 0.0), interface, EVENT_CORE)
-    held, left = (one.load - relief_of(problem, one.slip) for one in (before, after))
-    values = {
-        "event_load": before.load,
-        "event_stress": initial + held * profile,
-        "event_position": patch.centre,
-        "event_length": patch.area,
-        "event_extent": patch.extents,
-        "event_area": patch.area,
-        "event_mean_slip": added[inside].mean(),
-        "event_moment": problem.solid.shear_modulus * float(added.sum()) * interface.cell,
-    }
-    if problem.specimen is not None:
-        moved, on = (travel_of(problem, one.load, one.slip) for one in (before, after))
-        values |= {
-            "event_stress_drop": (held - left) * profile,
-            "event_travel": moved,
-            "event_crosshead_travel": moved + elongation_of(problem, values["event_stress"]),
-            "event_travel_step": on - moved,
-            "event_start": float(np.argmax(inside)) * interface.spacing,
-        }
-    return values
-
-
-@dataclass
-class Path:
+class Path(NamedTuple):
     """Course of one sample until it slides.
 
     `first` is the first instability, `last` the last equilibrium, `known` is false where a jump
@@ -143,9 +51,9 @@ class Path:
     first: State
     last: State
     peak: float
-    events: list[Event] = field(default_factory=list)
-    known: bool = True
-    arrival: Array | None = None
+    events: list[Event]
+    known: bool
+    arrival: Array | None
 
 
 def follow(program: Program, sample: StaticSample) -> Path:
@@ -169,29 +77,6 @@ def follow(program: Program, sample: StaticSample) -> Path:
         found = program.next(sample, jump.state)
         known, peak = found.known, max(peak, found.highest)
     return Path(first or found, found, peak, events, known, arrival)
-
-
-def relief_of(problem: Problem, slip: Array) -> float:
-    """Return by how much slip lowers the mean stress below the load, Pa: behind a machine."""
-    return 0.0 if problem.specimen is None else float(problem.blocks.mean_relief(slip))
-
-
-def travel_of(problem: Problem, load: float, slip: Array) -> float:
-    """Return the travel of both drives of a specimen together from the unloaded state, m."""
-    force = (load - relief_of(problem, slip)) * problem.interface.extent
-    return float(problem.blocks.travel(force, slip))
-
-
-def elongation_of(problem: Problem, stress: float) -> float:
-    """Return by how much the machine gives at a mean stress of the interface (Pa), m.
-
-    NaN under dead load, whose far end is not defined.
-    """
-    assert problem.specimen is not None
-    machine, area = problem.specimen.drive.stiffness, problem.area
-    if machine == 0.0:
-        return np.nan
-    return 0.0 if area is None else stress * area / machine  # without an area it is rigid
 
 
 def make_program(problem: Problem, gap: float = 1e-6) -> Program:
@@ -221,7 +106,7 @@ class OnsetSolver:
         """Return the onset of each sample; see `Equilibrium`."""
         warn_of_signs(self.problem)
         self.problem.warn_if_coarse(rows, FINE, ROUGHLY[len(self.problem.interface.shape)])
-        table, paths = [], []
+        table, flags = [], []
         for row in range(rows.samples):
             sample = sample_of(rows, self.program.pieces, row)
             try:
@@ -231,13 +116,13 @@ class OnsetSolver:
                     f"in sample {row} of the {rows.samples} that were solved together"
                 )
                 raise
-            paths.append(path)
+            flags.append((path.known, path.first.certified, path.first.stopped))
             table.append(self._values(rows, row, sample, path))
         values = {name: np.array([each[name] for each in table]) for name in table[0]}
         values["critical_stress"] = rows.mean_stress(values["critical_stress"])
         values["first_instability"] = rows.mean_stress(values["first_instability"])
         values["certificate_gap"] *= rows.load_profile.mean()
-        self._warn(rows, values, paths)
+        self._warn(rows, values, *np.array(flags).T)
         return values
 
     def _values(
@@ -247,8 +132,6 @@ class OnsetSolver:
         interface, shape = self.problem.interface, rows.strength[row].shape
         first, last = path.first, path.last
         slides = patch = critical_patch(multiplier_of(sample, first), interface)
-        # On lines the multiplier is known of a programme, which passes no corner.
-        straight = last is first and first.multiplier is not None and not interface.is_plane
         if last is not first and last.direction.any():
             slides = critical_patch(last.direction, interface)
         values: dict[str, Any] = {
@@ -260,7 +143,7 @@ class OnsetSolver:
             "sliding_position": np.squeeze(slides.centre),
             "slip_patches": patches_of(first.slip, interface),
             "arrested_events": len(path.events),
-            "residual_reached": not straight and bool(residual_nodes(sample, last.slip).any()),
+            "residual_reached": bool(residual_nodes(sample, last.slip).any()),
         }
         if interface.is_plane:
             values["critical_patch_extent"] = patch.extents
@@ -286,12 +169,16 @@ class OnsetSolver:
                 values[name][: len(column)] = column
         return values
 
-    def _warn(self, rows: Sample, values: dict[str, Array], paths: list[Path]) -> None:
+    def _warn(
+        self,
+        rows: Sample,
+        values: dict[str, Array],
+        known: Mask,
+        certified: Mask,
+        stopped: Mask,
+    ) -> None:
         """Warn of what is not as it mostly is: values are of all samples, stresses in Pa."""
-        first = values["first_instability"]
-        unproved = np.array([not path.first.certified for path in paths])
-        lost = np.array([not path.known for path in paths])
-        stopped = np.array([path.first.stopped for path in paths])
+        first, unproved = values["first_instability"], ~certified
         share = values["certificate_gap"] / np.maximum(np.abs(first), 1e-300)
         warn_of_samples(
             f"the bounds of the first instability did not close to {self.program.widest_gap:g} of"
@@ -315,7 +202,7 @@ class OnsetSolver:
         warn_of_samples(
             "a jump was not followed to its end in {samples}: their critical load is the last with"
             " a known equilibrium, a lower bound",
-            lost,
+            ~known,
         )
         warn_of_samples(
             "a node that slipped stops before the first instability in {samples}: its equilibria"

@@ -1,6 +1,6 @@
 """Onsets by factors of the stiffness: lines and blocks.
 
-Read `line`, which puts the parts together: `windows` bound the load, `linear_program` finds it by
+Read `program`, which puts the parts together: windows bound the load, `linear_program` finds it by
 an active set over `cholesky`, `runaway` is its shortcut, `stable_path` goes from event to event
-and `jump` beyond an instability. `blocks` is the same for a specimen.
+and `jump` beyond an instability.
 """

@@ -179,37 +179,30 @@ def back_substitute(factor: Array, size: int, values: Array) -> None:
 class Workspace(NamedTuple):
     """The factor of A on the slipping nodes of one sample, with the arrays that extend it.
 
-    `members[:size]` are the slipping nodes in the order of the rows of `factor`, `inside` marks
-    them, `diagonal` is that of A; `forward_load` and `forward_strength` are the forward
-    substitutions of the load profile and of the strength, `forward_drive` in a jump that of the
-    drive `known_drive`. `order` is a list of nodes to append, `keys` that by which it is sorted.
-    Rows of the factor up to `held` are valid for these members and their diagonal entries of A,
-    `held_diagonal`. The others are fields: a `right` side and `resting`, the stress that nodes take
-    off the interface which slipped and rest, at nodes; a `solution` and slip `rates` of members;
-    a `direction`, and a `product` of K. `turns` are the cosines and sines of rotations.
+    Arrays are at nodes (n,), or of members: the slipping nodes in the order of the factor's rows.
     """
 
     stiffness: Any
     factor: Array
     members: NDArray[np.int64]
-    order: NDArray[np.int64]
-    inside: NDArray[np.bool_]
-    diagonal: Array
-    turns: Array
-    halves: Array
-    held: NDArray[np.int64]
-    held_diagonal: Array
-    forward_load: Array
-    forward_strength: Array
-    forward_drive: Array
-    known_drive: Array
-    keys: Array
-    right: Array
-    resting: Array
-    solution: Array
-    rates: Array
-    direction: Array
-    product: Array
+    order: NDArray[np.int64]  # nodes to append
+    inside: NDArray[np.bool_]  # marks the members
+    diagonal: Array  # of A, at nodes
+    turns: Array  # cosines and sines of rotations
+    halves: Array  # workspace of products
+    held: NDArray[np.int64]  # (1,): rows that are valid for members and `held_diagonal`
+    held_diagonal: Array  # of A as factored, of members
+    forward_load: Array  # forward substitution of the load profile
+    forward_strength: Array  # that of the strength
+    forward_drive: Array  # that of the drive in a jump
+    known_drive: Array  # the drive of which that is
+    keys: Array  # by which `order` is sorted
+    right: Array  # a right side, at nodes
+    resting: Array  # stress that nodes take off the interface which slipped and rest, at nodes
+    solution: Array  # of members
+    rates: Array  # of slip, of members
+    direction: Array  # at nodes
+    product: Array  # of K, at nodes
 
 
 def make_workspace(stiffness: Any, n: int) -> Workspace:
@@ -230,16 +223,13 @@ def make_workspace(stiffness: Any, n: int) -> Workspace:
 
 
 class Course(NamedTuple):
-    """One sample on its way: the slip d (m) and K d (Pa) of all nodes go with it.
-
-    `stops` says whether a node that slips may stop.
-    """
+    """One sample on its way."""
 
     sample: StaticSample
-    slip: Array
-    stiff: Array
+    slip: Array  # d at nodes, m; it goes with it, as does the next
+    stiff: Array  # K d, Pa
     workspace: Workspace
-    stops: bool
+    stops: bool  # a node that slips may stop
 
 
 @jit

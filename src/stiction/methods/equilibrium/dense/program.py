@@ -47,17 +47,7 @@ SAME = 1e-12
 
 
 class DenseProgram:
-    """Equilibria of a line or a specimen; safe to use from several threads.
-
-    Parameters
-    ----------
-    problem : Problem
-
-    Raises
-    ------
-    InputError
-        If the law has no straight pieces.
-    """
+    """Equilibria of a line or a specimen; safe to use from several threads."""
 
     widest_gap = 1e-9
     """Certificate gap, as a share of the load, above which there is a warning."""

@@ -59,17 +59,13 @@ def block_factor(column: Array, width: int) -> Array:
 
 
 class Runs(NamedTuple):
-    """Properties of a line that the test needs.
+    """Properties of a line that the test needs."""
 
-    The first column of K three times over (Pa/m), the factor for runs of up to `longest` nodes,
-    the distance of the nodes (m), and G* (Pa).
-    """
-
-    wide_column: Array
-    factor: Array
+    wide_column: Array  # the first column of K three times over, Pa/m
+    factor: Array  # for runs of up to `longest` nodes
     longest: int
-    spacing: float
-    modulus: float
+    spacing: float  # m
+    modulus: float  # G*, Pa
 
 
 @lru_cache(maxsize=4)

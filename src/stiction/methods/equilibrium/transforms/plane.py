@@ -166,14 +166,7 @@ def plane_onset(
 
 
 class PlaneProgram:
-    """Equilibria of a plane; safe to use from several threads.
-
-    Parameters
-    ----------
-    problem : Problem
-    gap : float
-        Relative distance of the bounds at which to stop.
-    """
+    """Equilibria of a plane, to a relative distance of bounds; safe to use from several threads."""
 
     def __init__(self, problem: Problem, gap: float = 1e-6) -> None:
         self.elastic = problem.half_spaces
@@ -202,10 +195,7 @@ class PlaneProgram:
         """
         if state is not None:
             return self._step_on(sample, state, FIRST_STEP * state.load)
-        first = float(self.pieces.ends[0])
-        found = self._onset(
-            sample, sample.critical if first == 1.0 else first * sample.critical
-        )
+        found = self._onset(sample, self.pieces.ends[0] * sample.critical)
         if found.slip.size < sample.excess.size:
             reached = self._from_rest(sample, found)
             if exceeds(sample, reached.slip):

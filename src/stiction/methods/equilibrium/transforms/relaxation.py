@@ -227,39 +227,36 @@ def least_equilibrium(
     `accuracy`. On planes K has small positive entries there.
     """
     tolerance = residual_tolerance(sample, load, accuracy)
-    slip = np.maximum(slip, 0.0)
-    weakens = sample.critical > 0.0
-    left = kept = dropped = 0.0
+    slip, weakens = np.maximum(slip, 0.0), sample.critical > 0.0
+    spared = resumed = fall = 0.0  # share of the weakening left out; that after a true step; Pa
     for _ in range(STEPS):
         now = present_pieces(sample, slip)
         drive = load * sample.profile - now.strength
         if float((drive + now.rate * slip).sum()) > tolerance * slip.size:
             return Relaxed(Outcome.SLIDING, slip)
-        allowed = max(tolerance, ROUGH * left * dropped)
-        status, new, true = NEGATIVE, slip, False
+        status = NEGATIVE
         if not unstable:
-            status, new, true = _bound(operator, sample, load, slip, now, 1.0 - left, allowed)
+            allowed = max(tolerance, ROUGH * spared * fall)
+            share = 1.0 - spared
+            status, new, true = _bound(operator, sample, load, slip, now, share, allowed)
         unstable = False
-        if status == NEGATIVE and left < 1.0:
-            if left == 0.0:
-                before = slip
-                slip = _weakening_step(operator, sample, load, slip, tolerance)
-                growth = slip - before
+        if status == SOLVED:
+            if true:
+                return Relaxed(Outcome.ARRESTED, new)
+            growth = np.where(~residual_nodes(sample, new) & weakens, new - slip, 0.0)
+            fall, slip = float((now.rate * growth).max()), new
+            if not (growth > SMALL * sample.critical).any():  # it creeps along
+                spared, resumed = 0.0, spared
+        elif status == NEGATIVE and spared < 1.0:
+            if spared == 0.0:
+                moved = _weakening_step(operator, sample, load, slip, tolerance)
+                growth, slip = moved - slip, moved
                 largest = float((growth[weakens] / sample.critical[weakens]).max(initial=0.0))
                 if largest > ENDS and not sample.pieces.steepens:
                     growth *= min(1.0, SMALL / largest)
                     slip = grown(operator, sample, load, slip, growth, tolerance)
                     continue
-            left, kept = min(max(2.0 * left, kept, SMALL), 1.0), 0.0
-            continue
-        if status != SOLVED:
+            spared, resumed = min(max(2.0 * spared, resumed, SMALL), 1.0), 0.0
+        else:
             break
-        if true:
-            return Relaxed(Outcome.ARRESTED, new)
-        weakening = ~residual_nodes(sample, new) & weakens
-        growth = np.where(weakening, new - slip, 0.0)
-        dropped = float((now.rate * growth).max())
-        slip = new
-        if not (growth > SMALL * sample.critical).any():
-            left, kept = 0.0, left
     return Relaxed(Outcome.UNDECIDED, slip)

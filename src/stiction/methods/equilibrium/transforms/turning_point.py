@@ -47,16 +47,15 @@ BELOW = 0.3
 
 
 class Held(NamedTuple):
-    """A held equilibrium, or a guess of one: load, a, d, d' (<phi, d'> = 1), mu, mu' and d mu/d
-    tau_0 at fixed a."""
+    """A held equilibrium, or a guess of one."""
 
     load: float
-    amplitude: float
-    slip: Array
-    slope: Array
-    force: float = 0.0
-    slope_of_force: float = 0.0
-    force_by_load: float = 0.0
+    amplitude: float  # a
+    slip: Array  # d
+    slope: Array  # d', <phi, d'> = 1
+    force: float = 0.0  # mu
+    slope_of_force: float = 0.0  # mu'
+    force_by_load: float = 0.0  # d mu/d tau_0 at fixed a
 
 
 def _hold(bracket: Bracket, held: Array, guess: Held, accuracy: float) -> Held | None:

@@ -1,0 +1,125 @@
+"""Arrested events: what is measured of each, and the travel of a machine on the way.
+
+Behind a machine the load is its drive, from which slip takes off some.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stiction.base.arrays import Array
+from stiction.base.variables import Variable
+from stiction.methods.equilibrium.patches import largest_patch
+from stiction.methods.equilibrium.sample import State
+from stiction.problem.interface import Interface
+from stiction.problem.problem import Problem
+from stiction.problem.results import position
+from stiction.problem.sample import Sample
+
+OF_SPECIMENS = {
+    "event_stress_drop": Variable("Pa", "fall of the mean interface stress", ("event",)),
+    "event_travel": Variable("m", "travel of the drives before the event", ("event",)),
+    "event_crosshead_travel": Variable(
+        "m", "travel of the machine's far ends before the event", ("event",)
+    ),
+    "event_travel_step": Variable("m", "travel of the drives in the event", ("event",)),
+    "event_start": Variable("m", "left end of the patch that slipped", ("event",)),
+}
+EVENT_CORE = 1e-3
+"""Share of the largest added slip above which a node belongs to the patch of an event."""
+
+
+def event_variables(interface: Interface) -> dict[str, Variable]:
+    """Return the variables of each arrested event on a line or a plane."""
+
+    def variable(units: str, text: str) -> Variable:
+        return Variable(units, text, ("event",))
+
+    plane = interface.is_plane
+    centre = variable("m", "centre of the slip added by the event")
+    extent = variable("m", f"{'extent' if plane else 'length'} of the patch that slipped")
+    moment = "shear modulus times slip added" + ("" if plane else ", per unit depth")
+    return {
+        "event_load": variable("Pa", "load factor of the event"),
+        "event_stress": variable("Pa", "mean interface stress at the event"),
+        "event_position": position(interface, centre),
+        "event_extent" if plane else "event_length": position(interface, extent),
+        **({"event_area": variable("m2", "area of the patch that slipped")} if plane else {}),
+        "event_mean_slip": variable("m", "mean slip added to that patch"),
+        "event_moment": variable("N m" if plane else "N", moment),
+        **(OF_SPECIMENS if interface.is_free else {}),
+    }
+
+
+class Event(NamedTuple):
+    """An instability that came to rest: the states before and after it."""
+
+    before: State
+    after: State
+
+
+def event_table(
+    problem: Problem, rows: Sample, row: int, events: list[Event]
+) -> dict[str, Array]:
+    """Return the variables of the arrested events of one sample, (events, ...) arrays."""
+    initial, profile = rows.initial_stress[row].mean(), rows.load_profile.mean()
+    measured = [_measures(problem, initial, profile, *event) for event in events]
+    return {
+        name: np.array([each[name] for each in measured]).reshape(
+            len(events), *(2 for _ in variable.dims[1:])
+        )
+        for name, variable in event_variables(problem.interface).items()
+    }
+
+
+def _measures(
+    problem: Problem, initial: float, profile: float, before: State, after: State
+) -> dict[str, Any]:
+    """Return the variables of one event; initial stress and load profile are means."""
+    interface = problem.interface
+    added = (after.slip - before.slip).reshape(interface.shape)
+    inside, patch = largest_patch(np.maximum(added, 0.0), interface, EVENT_CORE)
+    held, left = (one.load - relief_of(problem, one.slip) for one in (before, after))
+    values = {
+        "event_load": before.load,
+        "event_stress": initial + held * profile,
+        "event_position": patch.centre,
+        "event_length": patch.area,
+        "event_extent": patch.extents,
+        "event_area": patch.area,
+        "event_mean_slip": added[inside].mean(),
+        "event_moment": problem.solid.shear_modulus * float(added.sum()) * interface.cell,
+    }
+    if problem.specimen is not None:
+        moved, on = (travel_of(problem, one.load, one.slip) for one in (before, after))
+        values |= {
+            "event_stress_drop": (held - left) * profile,
+            "event_travel": moved,
+            "event_crosshead_travel": moved + elongation_of(problem, values["event_stress"]),
+            "event_travel_step": on - moved,
+            "event_start": float(np.argmax(inside)) * interface.spacing,
+        }
+    return values
+
+
+def relief_of(problem: Problem, slip: Array) -> float:
+    """Return by how much slip lowers the mean stress below the load, Pa: behind a machine."""
+    return 0.0 if problem.specimen is None else float(problem.blocks.mean_relief(slip))
+
+
+def travel_of(problem: Problem, load: float, slip: Array) -> float:
+    """Return the travel of both drives of a specimen together from the unloaded state, m."""
+    force = (load - relief_of(problem, slip)) * problem.interface.extent
+    return float(problem.blocks.travel(force, slip))
+
+
+def elongation_of(problem: Problem, stress: float) -> float:
+    """Return by how much the machine gives at a mean stress of the interface (Pa), m.
+
+    NaN under dead load, whose far end is not defined.
+    """
+    assert problem.specimen is not None
+    machine, area = problem.specimen.drive.stiffness, problem.area
+    if machine == 0.0:
+        return np.nan
+    return 0.0 if area is None else stress * area / machine  # without an area it is rigid
