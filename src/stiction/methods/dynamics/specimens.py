@@ -13,6 +13,7 @@ from stiction.base.variables import Variable
 from stiction.methods.dynamics.event import Event, begin
 from stiction.methods.dynamics.mesh import make_mesh
 from stiction.methods.dynamics.summary import SPEEDS, rupture_speed
+from stiction.methods.equilibrium.dense.cholesky import Course
 from stiction.methods.equilibrium.dense.jump import jump
 from stiction.methods.equilibrium.dense.program import DenseProgram
 from stiction.methods.equilibrium.method import Equilibrium
@@ -76,8 +77,9 @@ class RuptureProgram(DenseProgram):
         stiff: Array = self.problem.blocks.stiffness @ slip
         outcome: int = Outcome.SLIDING
         if not event.slides:  # what still moves once the waves have died away comes to rest
-            course = self._course(sample, slip, stiff)
-            outcome = jump(course, found.load, np.inf, self._workspaces[1])
+            elastic, true = self._workspaces
+            course = Course(sample, slip, stiff, elastic, self.stops)
+            outcome = jump(course, found.load, np.inf, true)
         state = State(
             found.load, slip, found.direction, stiff, by_events=True, jumped=True, stopped=True
         )

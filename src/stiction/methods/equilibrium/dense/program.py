@@ -71,18 +71,13 @@ class DenseProgram:
 
     @property
     def _workspaces(self) -> tuple[Workspace, Workspace]:
-        """The workspaces of the thread: one for the path, another one for jumps."""
+        """The workspaces of the thread: for programmes and elastic steps, and for true states."""
         if not hasattr(self._own, "workspaces"):
             self._own.workspaces = tuple(
                 make_workspace(self.elastic.entries, self.nodes) for _ in range(2)
             )
         pair: tuple[Workspace, Workspace] = self._own.workspaces
         return pair
-
-    def _course(
-        self, sample: StaticSample, slip: Array, stiff: Array, place: int = 0
-    ) -> Course:
-        return Course(sample, slip, stiff, self._workspaces[place], self.stops)
 
     def bound(self, sample: StaticSample) -> tuple[float, Array]:
         """Return the bound of the weakest window of one sample (Pa), and its multiplier."""
@@ -116,12 +111,10 @@ class DenseProgram:
         low, high = _rates(sample)
         if state is not None:
             start, slip = state.load, state.slip.copy()
-        elif (
-            low < high
-        ):  # the bound is not close, and at too high a load far too many nodes join
+        elif low < high:  # the bound is not close: at too high a load far too many nodes join
             first = min(top, float((sample.excess / sample.profile).min()))
             start = (1.0 - NEARER) * first + NEARER * top
-        course = self._course(sample, slip, stiff)
+        course = Course(sample, slip, stiff, self._workspaces[0], self.stops)
         load, solved = solve_program(course, start, bound, cap, multiplier)
         if not solved:
             return None
@@ -171,7 +164,7 @@ class DenseProgram:
                 return found
             by_events = not rests
         slip, stiff, direction = state.slip.copy(), state.stiff.copy(), state.direction.copy()
-        course = self._course(sample, slip, stiff, 1)
+        course = Course(sample, slip, stiff, self._workspaces[1], self.stops)
         load, peak, stopped, status = advance(course, state.load, target, direction)
         found = State(
             load, slip, direction, stiff,
@@ -206,8 +199,9 @@ class DenseProgram:
         slip, stiff = found.slip.copy(), found.stiff.copy()
         outcome, longest = self._run(sample, found, slip)
         if outcome == Outcome.UNDECIDED:
-            course = self._course(sample, slip, stiff)
-            outcome = jump(course, found.load, longest, self._workspaces[1])
+            elastic, true = self._workspaces
+            course = Course(sample, slip, stiff, elastic, self.stops)
+            outcome = jump(course, found.load, longest, true)
         if outcome == Outcome.ARRESTED:
             before, after = (present_pieces(sample, each).piece for each in (found.slip, slip))
             if not np.any(after > before):
