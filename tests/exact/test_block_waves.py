@@ -12,9 +12,8 @@ from setups import make_problem
 from specimens import crooked, rough
 
 import stiction as st
-from stiction.methods.dynamics.event import Event, begin
 from stiction.methods.dynamics.mesh import Mesh, condensed, layer_matrix, make_mesh
-from stiction.methods.dynamics.specimens import RuptureProgram
+from stiction.methods.dynamics.specimens import Event, RuptureProgram, begin
 from stiction.methods.dynamics.waves import FRICTION, SPEED, TRAVEL, Waves, at_rest, follow
 from stiction.methods.equilibrium.sample import LINEAR, State, StaticSample, sample_of
 from stiction.methods.equilibrium.solver import follow as path_of

@@ -6,8 +6,7 @@ import numpy as np
 
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.methods.dynamics.integrator import Run
-from stiction.methods.dynamics.loading import value_at
-from stiction.methods.dynamics.state import Reason, State
+from stiction.methods.dynamics.state import Reason, State, value_at
 from stiction.problem.problem import FEWEST_NODES, Problem
 from stiction.problem.sample import Sample
 

@@ -6,7 +6,6 @@ import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.base.jit import jit_inside
-from stiction.methods.dynamics.loading import value_at
 from stiction.methods.dynamics.state import (
     Grid,
     History,
@@ -15,6 +14,7 @@ from stiction.methods.dynamics.state import (
     Setting,
     State,
     Thresholds,
+    value_at,
 )
 
 REACH = 3.0  # a node counts with at most so many times the stress drop that the load provides

@@ -14,7 +14,6 @@ from stiction.methods.dynamics.diagnostics import (
     end_event,
     finish_step,
 )
-from stiction.methods.dynamics.loading import value_at
 from stiction.methods.dynamics.memory import ENTRIES, advance_memory, pack
 from stiction.methods.dynamics.state import (
     ExplicitTables,
@@ -24,6 +23,7 @@ from stiction.methods.dynamics.state import (
     Setting,
     State,
     Thresholds,
+    value_at,
 )
 from stiction.problem.friction.kernels import strength_at
 

@@ -9,7 +9,6 @@ from stiction.base.jit import ZERO, jit, jit_inside
 from stiction.elasticity.operator import backward, forward
 from stiction.methods.dynamics.complementarity import solve_increment
 from stiction.methods.dynamics.diagnostics import EVENT_DROP, STEADY_STRESS, Step, finish_step
-from stiction.methods.dynamics.loading import value_at
 from stiction.methods.dynamics.memory import advance_with_ramp, fading_memory, tabulate
 from stiction.methods.dynamics.state import (
     Grid,
@@ -19,6 +18,7 @@ from stiction.methods.dynamics.state import (
     Setting,
     State,
     Thresholds,
+    value_at,
 )
 from stiction.problem.friction.kernels import strength_at
 

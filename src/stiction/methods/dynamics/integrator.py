@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from stiction.methods.dynamics.explicit import explicit_steps
 from stiction.methods.dynamics.implicit import LARGEST_STEP, implicit_steps
-from stiction.methods.dynamics.loading import first_reach, value_at
 from stiction.methods.dynamics.medium import Medium
 from stiction.methods.dynamics.memory import (
     empty_memory,
@@ -27,6 +26,7 @@ from stiction.methods.dynamics.state import (
     Record,
     Setting,
     State,
+    value_at,
 )
 from stiction.problem.friction.kernels import strengths
 
@@ -81,8 +81,14 @@ class Run:
         return float(np.min((nodes.strength - nodes.initial) / nodes.profile))
 
     def first_slip(self) -> float:
-        """Return when the first node reaches its strength, s."""
-        return first_reach(self.setting.load, self.first_load)
+        """Return when the first node reaches its strength, s; inf if it never does."""
+        (times, values), target = self.setting.load, self.first_load
+        if values[0] >= target:
+            return 0.0
+        last = int(np.argmax(values >= target)) or values.size - 1
+        slope = (values[last] - values[last - 1]) / (times[last] - times[last - 1])
+        left = target - values[last - 1]
+        return float(times[last - 1] + left / slope) if slope > 0.0 else np.inf
 
     def slope(self, time: float) -> float:
         """Return the size of the loading rate just after a time, Pa/s."""

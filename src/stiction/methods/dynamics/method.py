@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, PlainSerializer
 
 from stiction.base.errors import InputError
-from stiction.base.model import Count, Flag, Number, Positive, Real, model
+from stiction.base.model import Count, Flag, Number, Positive, Real, model, real_array
 from stiction.base.variables import Variable
 from stiction.methods.dynamics import checks, specimens
 from stiction.methods.dynamics.diagnostics import stress_scale
 from stiction.methods.dynamics.integrator import Run
-from stiction.methods.dynamics.loading import load_history, turning_times
 from stiction.methods.dynamics.medium import Medium, prepare_medium
 from stiction.methods.dynamics.slow_start import slow_start, static_program
 from stiction.methods.dynamics.state import History, Nodes, Setting, State, Thresholds
@@ -42,11 +41,29 @@ _LATER = (
 )  # fmt: skip
 
 
-LoadHistory = Annotated[
-    Any,
-    BeforeValidator(lambda value: None if value is None else load_history(value)),
-    PlainSerializer(lambda value: None if value is None else [one.tolist() for one in value]),
-]
+def _load_history(load: Any) -> History | None:
+    """Return times (s) and values (Pa) of tau_0 from samples (times, values), checked."""
+    if load is None:
+        return None
+    try:
+        times, values = (real_array(part) for part in load)
+    except (TypeError, ValueError):
+        raise InputError("must be two arrays of numbers, (times, values)") from None
+    if times.ndim != 1 or times.shape != values.shape or times.size < 2:
+        shapes = f"{times.shape} and {values.shape}"
+        raise InputError(f"needs two 1-d arrays, equally long, of two or more; got {shapes}")
+    if not (np.all(np.isfinite(times)) and np.all(np.isfinite(values))):
+        raise InputError("times and values must be finite")
+    if times[0] != 0.0 or np.any(np.diff(times) <= 0.0):
+        raise InputError("times must begin at 0 s and increase")
+    return History(times, values)
+
+
+def _written(load: History | None) -> Any:
+    return None if load is None else [one.tolist() for one in load]
+
+
+LoadHistory = Annotated[Any, BeforeValidator(_load_history), PlainSerializer(_written)]
 
 
 @model(kw_only=True)
@@ -276,13 +293,14 @@ def make_run(
     history = method.load
     if history is None:
         history = History(np.array([0.0, 1.0]), np.array([0.0, method.loading_rate]))
+    rising = np.sign(np.diff(history.values))
     setting = Setting(
         law=friction.parameters,
         nodes=nodes,
         mean_profile=float(nodes.profile.mean()),
         mean_initial=float(nodes.initial.mean()),
         load=history,
-        turning_times=turning_times(history),
+        turning_times=history.at[1:-1][rising[1:] != rising[:-1]],
         scale=stress_scale(nodes),
         thresholds=_thresholds(method, medium, nodes),
         stations=np.empty(0, dtype=np.int64) if stations is None else stations,

@@ -9,10 +9,14 @@ import numpy as np
 from stiction.base.errors import InputError
 from stiction.base.progress import Meter, Show
 from stiction.base.variables import Variable, force_variables, forces
-from stiction.methods.dynamics.event import Event
 from stiction.methods.dynamics.mesh import layer_matrix
 from stiction.methods.dynamics.save import FIELDS, SCALARS, TIME, Save
-from stiction.methods.dynamics.specimens import RuptureProgram, front_speeds, refuse_barriers
+from stiction.methods.dynamics.specimens import (
+    Event,
+    RuptureProgram,
+    front_speeds,
+    refuse_barriers,
+)
 from stiction.methods.dynamics.summary import SPEEDS
 from stiction.methods.dynamics.waves import FORCE, FRICTION, SPEED, TRAVEL
 from stiction.methods.dynamics.waves import TIME as NOW

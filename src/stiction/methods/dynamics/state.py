@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
+from stiction.base.jit import jit
 from stiction.elasticity.operator import Transform
 
 Ints = NDArray[np.int64]
@@ -23,6 +24,21 @@ class History(NamedTuple):
 
     at: Floats  # times, s, or loads, Pa; rising
     values: Floats
+
+
+@jit
+def value_at(history: History, t: float) -> Any:
+    """Value of a piecewise linear function."""
+    times, values = history
+    low, high = 0, times.size - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if times[middle] <= t:
+            low = middle
+        else:
+            high = middle
+    slope = (values[high] - values[low]) / (times[high] - times[low])
+    return values[low] + slope * (t - times[low])
 
 
 Reason = IntEnum(

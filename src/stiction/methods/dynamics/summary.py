@@ -1,6 +1,5 @@
 """The scalars of a run: loads, moment, energies, rupture speeds."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -16,6 +15,11 @@ SPEEDS: dict[str, Variable] = {
     "rupture_speed": Variable("m/s", "largest apparent speed of the front over 2 h_n"),
     "median_rupture_speed": Variable("m/s", "median apparent speed of the front over h_n/2"),
 }
+SPANS: dict[str, Any] = {
+    "rupture_speed": (2.0, np.max),
+    "median_rupture_speed": (0.5, np.median),
+}
+"""Lengths h_n over which speeds are means, and which of them counts."""
 _SCALARS: dict[str, Variable] = {
     "applied_load": Variable("Pa", "load factor applied at the onset"),
     "onset_time": Variable("s", "time from zero load to the onset"),
@@ -82,25 +86,16 @@ def energy_balance(run: Run, state: State) -> dict[str, float]:
     }
 
 
-def _axis_speeds(
-    run: Run, state: State, lengths: float, statistic: Callable[[Floats], Any]
-) -> list[float]:
-    """A statistic of the front's speed along each axis, on the lines through its origin.
-
-    Speeds are means over `lengths` times the shortest h_n along the axis.
-    """
+def _axis_speeds(run: Run, state: State, name: str) -> list[float]:
+    """Return a speed of the front along each axis, on the lines through its origin, m/s."""
     interface = run.medium.interface
     nucleation = run.medium.problem.nucleation_lengths(run.steepest_rate)
     arrival = state.arrival.reshape(interface.shape)
     began = np.unravel_index(int(state.now["onset_node"]), interface.shape)
     found = []
-    for axis, spacing in enumerate(interface.spacings):
-        window = max(lengths * nucleation[axis], 8.0 * spacing)
-        window = min(window, 0.25 * interface.lengths[axis])
-        through = tuple(slice(None) if i == axis else node for i, node in enumerate(began))
-        speeds = rupture_speed(arrival[through], spacing, window)
-        speeds = speeds[np.isfinite(speeds)]
-        found.append(float(statistic(speeds)) if speeds.size else np.nan)
+    for axis, length in enumerate(nucleation):
+        through: Any = (*began[:axis], slice(None), *began[axis + 1 :])
+        found.append(front_speed(name, interface, axis, arrival[through], length))
     return found
 
 
@@ -137,19 +132,34 @@ def summary(run: Run, state: State) -> dict[str, Any]:
         "radiated_energy": spent["radiated_energy"],
         "fracture_energy": spent["fracture_energy"],
         "arrested_events": int(now["arrested"]),
-        "median_rupture_speed": _axis_speeds(run, state, 0.5, np.median),
+        "median_rupture_speed": _axis_speeds(run, state, "median_rupture_speed"),
         "start_load": float(now["start_load"]),
         "start_error": float(now["start_error"]),
         "implicit_steps": int(now["implicit_steps"]),
         "explicit_steps": int(now["explicit_steps"]),
     }
     if not interface.is_plane:
-        found["rupture_speed"] = _axis_speeds(run, state, 2.0, np.max)
+        found["rupture_speed"] = _axis_speeds(run, state, "rupture_speed")
     for name in {"critical_position", "rupture_speed", "median_rupture_speed"} & found.keys():
         # A number on a line; one along x and one along y on a plane.
         along = np.where(np.isnan(onset), np.nan, found[name])
         found[name] = along if interface.is_plane else along[0]
     return found
+
+
+def front_speed(
+    name: str, interface: Interface, axis: int, arrival: Floats, nucleation: float
+) -> float:
+    """Return one of `SPEEDS` of a front along a line of nodes, m/s; nan where none ran."""
+    lengths, statistic = SPANS[name]
+    spacing = interface.spacings[axis]
+    window = max(lengths * nucleation, 8.0 * spacing)
+    window = min(window, 0.25 * interface.lengths[axis])
+    if interface.is_free:  # fronts do not run round
+        arrival = np.append(arrival, np.full(round(window / spacing), np.nan))
+    speeds = rupture_speed(arrival, spacing, window)
+    speeds = speeds[np.isfinite(speeds)]
+    return float(statistic(speeds)) if speeds.size else np.nan
 
 
 def rupture_speed(arrival: Floats, spacing: float, window: float) -> Floats:
