@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import sys
 from pathlib import Path
 
 import numba
@@ -30,7 +29,7 @@ def test_an_edited_kernel_is_another_folder_for_those_who_call_it(tmp_path, monk
     for edited in (
         None,
         "base/errors.py",
-        "methods/dynamics/loading.py",  # kernels, called from explicit.py, and messages
+        "methods/dynamics/state.py",  # a kernel that is called from explicit.py
         "problem/friction/__init__.py",
     ):
         if edited:
@@ -85,9 +84,7 @@ def test_a_law_from_elsewhere_leaves_nothing_in_the_cache(tmp_path, monkeypatch,
 
 
 BITS = """
-import gc
 import numba, numpy as np
-from numba.core import event
 before = numba.config.CACHE_DIR
 import stiction as st
 from stiction.elasticity.operator import inner
@@ -98,14 +95,6 @@ law = st.PiecewiseWeakening(slip=[0.3, 1.0], strength=[0.4, 0.0], weakening_rate
 print(inner(x, x[::-1].copy()).hex())
 print(kernels.strengths(law, x, 0.1 * x, 1.0 + x, 0.3 * x).tobytes().hex())
 
-class Collects(event.Listener):
-    found = []
-    def on_start(self, event):
-        self.found.append(gc.isenabled())
-    on_end = on_start
-
-event.register("numba:compile", Collects())
-print(numba.njit(lambda y: y + 1.5)(x[0]).hex(), Collects.found)
 assert numba.config.CACHE_DIR == before
 """
 
@@ -119,28 +108,11 @@ def test_plain_numba_gives_the_same_bits_and_user_code_is_left_alone(monkeypatch
     places = {"PYTHONPATH": SOURCES, "STICTION_CACHE_DIR": Path(os.devnull) / "cache"}
     own, plain = (python("-c", start + BITS, **places) for start in ("", WITHOUT))
     assert own == plain
-    assert "[True, True]" in own  # garbage collection, during compilations that are not ours
 
 
 def imported():
     """Import the file with numba's private parts again, as a module of its own."""
     exec(Path(internals.__file__).read_text(), {"__name__": "stiction.base.jit.internals"})
-
-
-@pytest.mark.parametrize("owner", internals.PARTS)
-def test_a_numba_without_a_private_part_is_noticed_at_once(monkeypatch, owner):
-    """The import fails, and `jit` does without; later it would fail at the first kernel."""
-    imported()
-    with monkeypatch.context() as patch:
-        patch.delattr(sys.modules[owner.__module__], owner.__name__)
-        with pytest.raises(ImportError):
-            imported()
-    for name in internals.PARTS[owner].split():
-        with monkeypatch.context() as patch:
-            for holder in (one for one in owner.__mro__ if name in vars(one)):
-                patch.delattr(holder, name)
-            with pytest.raises(ImportError, match=f"{owner.__name__} lacks {name}"):
-                imported()
 
 
 def test_a_newer_numba_is_plain_numba(monkeypatch):

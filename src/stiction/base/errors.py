@@ -179,14 +179,13 @@ def _with_ranges(texts: Sequence[str]) -> str:
     """Return texts that differ only in numbers as one: '3 to 5 m' for '3 m' and '5 m'."""
     between, found = _NUMBER.split(texts[0]), ""
     for start, *numbers in zip(between, *map(_NUMBER.findall, texts), strict=False):
-        ends = sorted({end for one in numbers for end in one.split(" to ")}, key=_value)
+        ends = sorted(
+            {end for one in numbers for end in one.split(" to ")},
+            key=lambda end: float(end.replace(",", "")),
+        )
         same = len({*numbers}) == 1
         found += start + (numbers[0] if same else f"{ends[0]} to {ends[-1]}")
     return found + between[-1]
-
-
-def _value(number: str) -> float:
-    return float(number.replace(",", ""))
 
 
 def warn_of_samples(text: str, which: Any, sizes: Any = ()) -> None:
@@ -225,14 +224,9 @@ def issue(one: Warned) -> None:
         return
     if one.total and not one.affected:
         return
-    message, category = str(one), one.category
     level = 1
     frame = sys._getframe(1)
     # Objects are validated by pydantic, whose frames lie between ours.
     while frame.f_back and frame.f_globals.get("__name__", "").split(".")[0] in _OURS:
         frame, level = frame.f_back, level + 1
-    if frame.f_back is None and frame.f_globals.get("__name__") == "threading":
-        known = globals().setdefault("__warningregistry__", {})  # a thread has no caller's line
-        warnings.warn_explicit(message, category, "stiction", 0, registry=known)
-    else:
-        warnings.warn(message, category, stacklevel=level + 1)
+    warnings.warn(str(one), one.category, stacklevel=level + 1)

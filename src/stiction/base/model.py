@@ -160,13 +160,8 @@ def _names(value: Any) -> tuple[str, ...]:
 
 def _path(value: Any) -> Path:
     text = os.fspath(value) if isinstance(value, str | os.PathLike) else ""
-    valid = isinstance(text, str) and text == text.encode(errors="ignore").decode()
-    if (
-        not valid
-        or not text
-        or "\0" in text
-        or max(map(len, Path(text).parts), default=0) > 255
-    ):
+    usable = isinstance(text, str) and text != "" and text.isprintable()
+    if not usable or max(map(len, Path(text).parts), default=0) > 255:
         raise ValueError("must be a path in UTF-8, each name at most 255 letters")
     return Path(text)
 

@@ -107,15 +107,15 @@ def unit_for(units: str, values: Any) -> tuple[float, str]:
     largest = float(np.max(np.abs(array[np.isfinite(array)]), initial=0.0))
     least, multiples = _MULTIPLES[units]
     suited = [unit for unit, f in multiples.items() if largest * f >= least * (1.0 - 1e-9)]
-    unit = suited[0] if suited else list(multiples)[-1 if largest else 0]
+    unit = suited[0] if suited else list(multiples)[-1] if largest else units
     return multiples[unit], unit
 
 
-def in_words(units: str, value: float, digits: int = 3) -> str:
+def in_words(units: str, value: float) -> str:
     """Return an SI value in the unit that suits its size, such as '40 kN'."""
-    value = float(f"{value:.{digits}g}")  # 999.6 N are 1 kN
+    value = float(f"{value:.3g}")  # 999.6 N are 1 kN
     factor, unit = unit_for(units, value)
-    return f"{value * factor:.{digits}g} {unit}".rstrip()
+    return f"{value * factor:.3g} {unit}".rstrip()
 
 
 class Doubt(NamedTuple):

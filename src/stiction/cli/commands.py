@@ -293,12 +293,8 @@ def _numbers(problem: Any, random: Any) -> dict[tuple[str, str], float]:
     }
     if problem.uniform_rate is None:  # the nucleation length varies along the interface
         return found
-    length = found["nucleation length", "m"] = problem.nucleation_length
+    found["nucleation length", "m"] = problem.nucleation_length
     found["nodes in h_n", ""] = min(problem.nodes_in_nucleation_length(problem.uniform_rate))
-    for dim, whole in zip(problem.interface.dims, problem.interface.lengths, strict=True):
-        found[f"L / h_n along {dim}", ""] = whole / length
-    if hasattr(field.spectrum, "correlation_length"):
-        found["xi_0 / h_n", ""] = field.spectrum.correlation_length / length
     return found
 
 
@@ -373,8 +369,7 @@ def onset(
         options = {"loading_rate": LOADING_RATE} if timed else {}
         try:
             one = own if own is not None and own.type == name else METHODS[name](**options)
-            with Meter(f"onset by {name}"):
-                result = find(problem, profile, method=one)
+            result = find(problem, profile, method=one)
             found = table_of(result[[key for key in printed if key in result]])
             rows[name] = {key: v[0] for key, v in found.items() if key.startswith(printed)}
         except (InputError, TypeError) as error:  # TypeError: it has options without defaults
@@ -496,17 +491,12 @@ def reliability(
     }  # fmt: skip
     asked = {name: one for name, one in options.items() if one is not None}
     if out is None:
-        needs = [name for name, one in (("part", part), ("scheduler", scheduler)) if one]
-        if needs:
-            raise InputError(
-                [f"--{name}: shares the work of a curve; give --out" for name in needs]
-            )
+        if part or scheduler:
+            raise InputError("--part, --scheduler: share the work of a curve; give --out")
         _answer(loaded, asked, workers)
         return
     if asked:
-        raise InputError(
-            f"--out: is for the whole curve; leave out {' and '.join(asked)}, or --out"
-        )
+        raise InputError(f"--out: is for the whole curve; leave it or {', '.join(asked)} out")
     with _resumable(out), _executor(scheduler) as executor:
         curve = loaded.failure_curve(
             out=out, repetitions=repetitions, smallest=smallest, workers=workers,

@@ -86,7 +86,8 @@ def write_report(run: StoredRun, path: Path) -> None:
     """Write a page about a run: figures, tables, failed samples, the study and versions."""
     state = run.status()
     if not state.done:
-        raise InputError(f"{run.path}: no sample is stored yet")
+        reasons = state.damaged or ("no sample is stored yet",)
+        raise InputError(f"{run.path}: {reason}" for reason in reasons)
     what = "Failure probability" if run.settings else "Onset of sliding: a Monte Carlo study"
     page = Page(run.study.title or what)
     page.text(f"{state.done:,} of {state.samples:,} {run.counted} by {run.methods}.")

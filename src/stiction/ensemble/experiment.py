@@ -145,9 +145,7 @@ class Experiment:
             means = {name: mean_in_stress(self.problem, one, name) for name in one.names}
             friction = self.problem.friction
             residual = float(friction.residual(np.array(means["strength"])).mean())
-            scales: dict[str, Any] = {name: means[name] for name in SCALES if name in means}
-            if not scales and friction.weakening_rate is None:
-                scales = dict([friction.scale])
+            scales = {name: means[name] for name in SCALES if name in means}
             self.problem.warn_of_units(
                 means["strength"], means.get("residual_strength", residual), scales
             )

@@ -108,14 +108,10 @@ class Problem:
             self.load.profile.on(self.interface)  # refuses one that is not positive
         if self.interface.is_plane and self.solid.plane != "strain":
             problems.append(
-                "solid.plane: the solids beside a plane interface are three-dimensional,"
-                f" not in plane {self.solid.plane}; leave plane = 'strain'"
+                "solid.plane: solids beside a plane interface are three-dimensional; leave 'strain'"
             )
         if self.interface.is_plane and self.mode != "II":
-            problems.append(
-                "mode: on a plane, slip along x is mode II along x and mode III along y;"
-                f" leave mode = 'II', got {self.mode!r}"
-            )
+            problems.append(f"mode: a plane has both modes; leave 'II', got {self.mode!r}")
         if self.load.pressing_force is not None and self.area is None:
             problems.append(f"load.pressing_force: {NO_AREA}, or load.normal_pressure in Pa")
         problems += [f"friction: {text}" for text in contradictions(self.friction)]
@@ -133,10 +129,8 @@ class Problem:
         """Let the interface end with the specimen; return what does not go with one."""
         interface, specimen = self.interface, self.specimen
         if specimen is None:
-            return [
-                "interface.ends: free ends are those of a specimen: give"
-                " specimen=st.Blocks(...), or leave ends = 'periodic'"
-            ] * interface.is_free
+            text = "interface.ends: free ends are those of a specimen: give specimen=st.Blocks(...)"
+            return [text] * interface.is_free
         if interface.is_plane:
             return ["specimen: blocks meet on a line; give length and nodes one number each"]
         object.__setattr__(self, "interface", dataclasses.replace(interface, ends="free"))
@@ -145,13 +139,12 @@ class Problem:
             problems.append("interface.width: give the thickness of a specimen instead")
         if not (isinstance(self.load.profile, float) and self.load.profile == 1.0):
             problems.append(
-                "load.profile: the drive of a specimen makes its load profile; leave one of load"
-                " and specimen out"
+                "load.profile: that of a specimen comes from its drive; leave it out"
             )
         if specimen.pressing == "glued" and np.ndim(self.load.normal_pressure or 0.0):
             problems.append(
-                "load.normal_pressure: with pressing = 'glued' the blocks make the profile: give"
-                " the mean; or use pressing = 'frictionless' with the array"
+                "load.normal_pressure: with pressing = 'glued' blocks make its profile; give the"
+                " mean"
             )
         if specimen.height < 2.0 * interface.spacing:
             problems.append(
@@ -161,39 +154,30 @@ class Problem:
         high = specimen.height / interface.extent
         if self.mode == "II" and not FLATTEST <= high <= HIGHEST:
             problems.append(
-                f"specimen.height: is {high:.3g} times the length, which must be {FLATTEST:g} to"
-                f" {HIGHEST:g} in mode II; check the units. Blocks that are higher than long act as"
-                " if they had no top; of flat ones, take a shorter piece"
+                f"specimen.height: must be {FLATTEST:g} to {HIGHEST:g} times the length in mode II,"
+                f" is {high:.3g} times; check the units, or take a shorter piece of flat blocks"
             )
         return problems
 
     def _check_drive(self) -> None:
         """Refuse a drive that pulls somewhere in reverse, and blocks that open."""
-        lower = "lower the pusher, push from both sides, or use st.Platen()"
         for what, profile, advice in (
-            ("drive: shears in reverse", self.blocks.shear, lower),
-            (
-                "pressing: opens the interface",
-                self.blocks.pressure,
-                "use pressing = 'frictionless'",
-            ),
+            ("drive: shears in reverse", self.blocks.shear, "lower the pusher"),
+            ("pressing: opens the interface", self.blocks.pressure, "press frictionless"),
         ):
             if not profile.min() > 0.0:
                 at = self.interface.describe_node(int(np.argmin(profile)))
-                raise InputError(
-                    f"specimen.{what} at {at} ({profile.min():.3g} of the mean),"
-                    f" which is not modelled; {advice}"
-                )
+                least = f"{profile.min():.3g} of the mean"
+                raise InputError(f"specimen.{what} at {at} ({least}); {advice}")
         assert self.specimen is not None  # else there is no drive
         machine, depth = self.specimen.drive.stiffness, self.specimen.thickness or 1.0
         own = 0.5 * depth * self.blocks.drive_stiffness  # of both blocks, in series
-        if 0.0 < machine < SOFTEST * own:
-            warn_user(
+        if machine > 0.0:
+            text = (
                 f"specimen.drive.stiffness: {machine:.3g} N/m is {machine / own:.1g} of that of the"
-                f" blocks, {own:.3g} N/m: as good as dead load, 0; check its unit (N/m) if this is"
-                " not intended",
-                UnitWarning,
+                f" blocks, {own:.3g} N/m: as good as dead load, 0; check its unit (N/m)"
             )
+            doubt_units([Doubt(text, machine / own, (SOFTEST, math.inf), (0.0, math.inf))])
 
     def _place_profiles(self) -> list[str]:
         """Put profiles with coordinates of their own on the nodes; return what does not fit."""
@@ -225,8 +209,8 @@ class Problem:
         if self.specimen is None and patch >= length:
             warn_user(
                 f"the critical patch (nucleation length {patch:.3g} m) fills the interface"
-                f" ({length:.3g} m), which slides as a whole; if this is not intended, check"
-                " the units of the length, the shear modulus and the weakening rate",
+                f" ({length:.3g} m); if this is not intended, check the units of length, shear"
+                " modulus and weakening rate",
                 UnitWarning,
             )
         elif length < SHORT * patch and not self.interface.is_plane and self.specimen is None:
@@ -258,13 +242,9 @@ class Problem:
         It is an `InputError` if they cannot, or if scales of slip by name are not resolved at these
         strengths. The `pressure` is the problem's own if left out.
         """
-        modulus = self.solid.shear_modulus
+        friction, modulus = self.friction, self.solid.shear_modulus
         pressure = self.given_pressure if pressure is None else pressure
         compared = [("strength", strength, "shear modulus", modulus, RIGIDITY)]
-        rate, slip = self.friction.weakening_rate, math.inf
-        drop = strength - float(np.mean(self.friction.residual(np.array(strength))))
-        if rate is not None and drop > 0.0:
-            slip = drop / float(np.median(rate))
         if pressure is not None:
             mean = float(np.mean(pressure))
             compared.append(("strength", strength, "normal pressure", mean, FRICTION))
@@ -273,27 +253,29 @@ class Problem:
         doubts = [
             Doubt(
                 f"{name}: its mean, {mean:.4g} Pa, is {mean / of:.2g} of the {what}; check the"
-                " units of both (all in Pa; coefficients are fractions, not percentages, and"
-                " need of='friction_coefficient')",
+                " units of both (Pa; coefficients are fractions and need"
+                " of='friction_coefficient')",
                 mean / of,
                 *limits,
             )
             for name, mean, what, of, limits in compared
         ]
-        text = (
-            f"strength: its mean, {strength:.4g} Pa, falls within a slip of {slip:.2g} m, that of a"
-            " few atoms; check the units of strength or normal pressure (Pa) and weakening_rate"
-            " (Pa/m)"
-        )
-        if doubt_units([*doubts, Doubt(text, slip, *SLIP)]):
+        drop = strength - float(np.mean(friction.residual(np.array(strength))))
+        if friction.weakening_rate is not None and drop > 0.0:
+            slip = drop / float(np.median(friction.weakening_rate))
+            text = (
+                f"strength: its mean, {strength:.4g} Pa, falls within a slip of {slip:.2g} m, that"
+                " of a few atoms; check the units of strength (Pa) and weakening_rate (Pa/m)"
+            )
+            doubts.append(Doubt(text, slip, *SLIP))
+        if doubt_units(doubts):
             return
-        own = dict([self.friction.scale]) if self.friction.weakening_rate is None else {}
-        for scale, value in (own if scales is None else scales).items():
+        own = dict([friction.scale]) if friction.weakening_rate is None else {}
+        for scale, value in (scales or own).items():
             fall = np.array(strength - residual)
-            steep = max(float(self.friction.rate(fall, scale, np.median(value))), 1e-300)
+            steep = max(float(friction.rate(fall, scale, np.median(value))), 1e-300)
             self._warn_if_short(steep)
-            if scales is not None:
-                self._check_resolution(steep)
+            self._check_resolution(steep)
 
     @property
     def blocks(self) -> Driven:
@@ -381,9 +363,8 @@ class Problem:
         """
         if self.uniform_rate is None:
             raise InputError(
-                "friction.weakening_rate: a nucleation length needs a uniform one; give"
-                " weakening_rate, about (strength - residual_strength)/critical_slip, or use"
-                " st.Equilibrium() or st.Rupture(), which need none"
+                "friction.weakening_rate: a nucleation length needs a uniform one, about"
+                " (strength - residual_strength)/critical_slip; st.Equilibrium() needs none"
             )
         return self.nucleation_lengths(self.uniform_rate * self.friction.steepening)[0]
 
@@ -574,8 +555,7 @@ class Problem:
                 f"strength: must be above initial_stress everywhere; it is not at"
                 f" {over[number].sum()} of {over.shape[1]} nodes of sample {number}, the first at"
                 f" {self.interface.describe_node(node)}: {least:g} against {most:g} Pa"
-                f"{f', and in {others} more samples' * (others > 0)}; only st.Rupture() accepts"
-                " stress above the strength"
+                f"{f', and in {others} more samples' * (others > 0)}; st.Rupture() accepts this"
             )
         if np.max(strength, where=np.isfinite(strength), initial=0.0) > HUGE * strength.min():
             middle = np.median(strength, axis=along, keepdims=True)
@@ -586,8 +566,7 @@ class Problem:
                     f"strength: {strength[number].flat[node]:g} Pa at"
                     f" {self.interface.describe_node(node)} of sample {number} is more than"
                     f" {HUGE:g} times the median, {middle[number].item():g} Pa, which is lost"
-                    " beside it in round-off; less is as good where nothing breaks, or give"
-                    " np.inf to st.Rupture()"
+                    " beside it in round-off; less is as good where nothing breaks"
                 )
         nowhere = ~((strength > residual) & np.isfinite(strength)).any(axis=along)
         if nowhere.any():
@@ -596,8 +575,7 @@ class Problem:
             problems.append(
                 "strength: must be finite and above residual_strength at one node or more; in"
                 f" sample {number} strength is {least:g} to {most:g} Pa and residual_strength"
-                f" {residual[number].min():g} to {residual[number].max():g} Pa: check the units of"
-                " both"
+                f" {residual[number].min():g} to {residual[number].max():g} Pa: check their units"
             )
         return problems
 

@@ -9,10 +9,11 @@ import numpy as np
 from pydantic import Field, model_validator
 from pydantic_core import ArgsKwargs
 
-from stiction.base.errors import InputError, UnitWarning, warn_user
+from stiction.base.errors import InputError
 from stiction.base.model import Mode, Positive, Real, check, is_finite, model
+from stiction.base.units import Doubt, doubt_units
 
-SLOWEST, FASTEST = 0.3, 2e4
+POSSIBLE_SPEED = (0.3, 2e4)
 """m/s; shear waves run at 1 m/s in the softest gels and at 12 km/s in diamond."""
 
 
@@ -70,13 +71,11 @@ class Solid:
     @model_validator(mode="after")
     def _plausible(self) -> Solid:
         speed = self.shear_wave_speed
-        if not SLOWEST <= speed <= FASTEST:
-            warn_user(
-                f"solid: the shear wave speed is {speed:.4g} m/s, which no solid has;"
-                f" check the units of shear_modulus = {self.shear_modulus:g} Pa and"
-                f" density = {self.density:g} kg/m3",
-                UnitWarning,
-            )
+        text = (
+            f"solid: the shear wave speed is {speed:.4g} m/s, which no solid has; check the units"
+            f" of shear_modulus = {self.shear_modulus:g} Pa and density = {self.density:g} kg/m3"
+        )
+        doubt_units([Doubt(text, speed, POSSIBLE_SPEED, (0.0, math.inf))])
         return self
 
     @property

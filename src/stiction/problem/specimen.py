@@ -127,17 +127,12 @@ class Blocks:
             if low < -1e-9 * self.height or high > (1.0 + 1e-9) * self.height:
                 problems.append(
                     f"drive: the pusher reaches from {low:g} to {high:g} m above the interface, the"
-                    f" side of the block from 0 to {self.height:g} m;"
-                    f" {'raise' if low < 0.0 else 'lower'} or narrow it"
+                    f" side of the block from 0 to {self.height:g} m"
                 )
-        if 0.0 < drive.stiffness < math.inf and self.thickness is None:
+        if self.thickness is None and (drive.mass or 0.0 < drive.stiffness < math.inf):
             problems.append(
-                "thickness: is needed with a machine's stiffness in N/m; give it, or"
-                " stiffness = 0 (dead load) or inf (rigid)"
-            )
-        if drive.mass and self.thickness is None:
-            problems.append(
-                "thickness: is needed with drive.mass in kg; give it, or leave the mass out"
+                "thickness: is needed with drive.stiffness in N/m, but for 0 and inf, and with"
+                " drive.mass in kg"
             )
         if problems:
             raise InputError(problems)

@@ -7,35 +7,21 @@ bits.
 
 from __future__ import annotations
 
-import gc
 import hashlib
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numba
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
-from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
-from numba.core.compiler import Compiler, CompileResult, Flags
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler, Flags
 
 from stiction.base.jit.folder import kernel_folder
 
 NEWEST = (0, 68)
 """The newest numba with which the tests ran."""
-PARTS: dict[type, str] = {
-    Compiler: "compile_extra define_pipelines",
-    CompileResult: "_find_referenced_environments",
-    Flags: "values",
-    FunctionCache: "load_overload save_overload",
-    JITCPUCodegen: "set_env",
-    JITCodeLibrary: "_optimize_final_module _finalize_final_module _finalize_dynamic_globals"
-    " enable_object_caching serialize_using_bitcode serialize_using_object_code",
-}
-"""What is used of numba's classes; without it `decorators.py` makes do with plain numba."""
 if numba.version_info.short > NEWEST:
     raise ImportError(f"numba {numba.__version__} was not tried")
-for owner, names in PARTS.items():
-    if missing := [name for name in names.split() if not hasattr(owner, name)]:
-        raise ImportError(f"numba's {owner.__name__} lacks {', '.join(missing)}")
 
 
 class _Locator(_CacheLocator):
@@ -123,16 +109,6 @@ class _Compiler(Compiler):
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self.state.flags = _Flags(self.state.flags)
-
-    def compile_extra(self, function: Any) -> Any:
-        """Compile without garbage collection, which takes 7 % of the time."""
-        collects = gc.isenabled()
-        gc.disable()
-        try:
-            return super().compile_extra(function)
-        finally:
-            if collects:  # compilations are nested
-                gc.enable()
 
 
 class _InsideCompiler(_Compiler):

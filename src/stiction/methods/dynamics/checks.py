@@ -60,10 +60,7 @@ def at_first_slip(run: Run) -> State | None:
         )
     scale = run.scale_at(float(value_at(run.setting.load, time)))
     if not scale > 0.0:
-        raise InputError(
-            "initial_stress: too far from the strength for any scale of stress between them; "
-            "check the units of both"
-        )
+        raise InputError("initial_stress: too far from the strength; check the units of both")
     rise = run.slope(time) * step / scale
     if rise > _COARSE:
         courant = step / run.medium.largest_step * _COARSE / rise

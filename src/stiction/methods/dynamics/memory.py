@@ -164,12 +164,9 @@ def sum_memory(grid: Grid, memory: Floats, table: Floats, memory_sum: Floats) ->
     count, pairs = blocks(grid.frequency.size), grid.poles.size
     rows = table.reshape(count, pairs, 4, ENTRIES)
     y = memory.reshape(count, grid.multiplicity, pairs, 2, 2, ENTRIES)  # of both signals
-    for block in range(count):
-        real, imaginary = rows[block, :, 2, None, :], rows[block, :, 3, None, :]
-        for copy in range(grid.multiplicity):
-            own = y[block, copy]
-            terms = real * own[:, :, 0] - imaginary * own[:, :, 1]
-            memory_sum.reshape(count, grid.multiplicity, 2, ENTRIES)[block, copy] = terms.sum(0)
+    for block, total in enumerate(memory_sum.reshape(count, grid.multiplicity, 2, ENTRIES)):
+        real, imaginary = rows[block, :, 2, None], rows[block, :, 3, None]
+        total[:] = (real * y[block, ..., 0, :] - imaginary * y[block, ..., 1, :]).sum(axis=1)
 
 
 def scale_memory(grid: Grid, memory: Floats, step: float, *, divide: bool) -> None:

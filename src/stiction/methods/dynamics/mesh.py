@@ -19,7 +19,7 @@ import scipy.linalg
 import scipy.sparse as sp
 
 from stiction.base.arrays import Array, one_blas_thread
-from stiction.elasticity.driven import Driven
+from stiction.base.model import Mode
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
 from stiction.problem.solid import Solid
@@ -67,24 +67,12 @@ class Mesh(NamedTuple):
 def make_mesh(problem: Problem, courant: float = 0.9) -> Mesh:
     """Return the mesh of a block of a problem, its step being a share of the stability limit."""
     assert problem.specimen is not None
-    return _mesh(
-        problem.specimen,
-        problem.interface,
-        problem.solid,
-        problem.mode,
-        problem.blocks,
-        courant,
-    )
+    return _mesh(problem.specimen, problem.interface, problem.solid, problem.mode, courant)
 
 
 @lru_cache(maxsize=4)
 def _mesh(
-    specimen: Blocks,
-    interface: Interface,
-    solid: Solid,
-    mode: str,
-    blocks: Driven,
-    courant: float,
+    specimen: Blocks, interface: Interface, solid: Solid, mode: Mode, courant: float
 ) -> Mesh:
     dx, n, drive = interface.spacing, interface.size, specimen.drive
     depth = specimen.thickness or 1.0
@@ -115,6 +103,7 @@ def _mesh(
     if mesh.stiffness > 0.0:
         relief = 0.5 * own / (1.0 + own / mesh.stiffness) / interface.extent
         static = static + relief / n * np.outer(profile, profile)
+    blocks = specimen.driven(interface.extent, n, solid, mode)
     correction = blocks.stiffness - static
     speed = solid.shear_wave_speed * (1.0 if mesh.anti_plane else solid.wave_speed_ratio)
     viscous = VISCOSITY * dx / speed

@@ -249,23 +249,20 @@ class Rupture:
             state = run.start(min(run.setting.load.at[-1], run.setting.thresholds.end_time))
         else:
             state = rest if state is None else state
-            self._follow(run, state)
+            ended, reason = run.follow(state, self.max_steps)
+            checks.check_finite(run, state, reason)
+            if ended is None:
+                raise InputError(
+                    f"max_steps: {self.max_steps} steps led to tau_0 = {state.now['load']:.6g} Pa,"
+                    f" and {state.now['slid']} nodes to their residual strength, but not to stop="
+                    f"{self.stop!r}; raise max_steps or the loading rate"
+                )
         checks.warn_of_slip(run, state)
         found = summary(run, state)
         if self.stop == "onset":
             later = [name for name in _LATER if name in found]
             found |= {name: np.full(np.shape(found[name]), np.nan) for name in later}
         return found
-
-    def _follow(self, run: Run, state: State) -> None:
-        ended, reason = run.follow(state, self.max_steps)
-        checks.check_finite(run, state, reason)
-        if ended is None:
-            raise InputError(
-                f"max_steps: {self.max_steps} steps led to tau_0 = {state.now['load']:.6g} Pa, and "
-                f"{state.now['slid']} nodes to their residual strength, but not to stop="
-                f"{self.stop!r}; raise max_steps or the loading rate, or stop at 'onset' or 'rest'"
-            )
 
 
 def make_run(

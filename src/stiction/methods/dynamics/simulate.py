@@ -102,17 +102,13 @@ def simulate_rupture(
     rows, measured = problem.placed_sample(profiles, method.accepts)
     if rows.samples != 1:
         raise InputError(f"profiles: one sample at a time, got {rows.samples}")
-    if problem.specimen is not None:
-        problem.doubt(rows)
-        return with_gaps(
-            problem, simulate_event(problem, rows, method, save, event, progress), measured
-        )
-    if event is not None:
-        raise InputError(
-            "event: is of specimens only, whose events are one by one; leave it out"
-        )
-    stations = save.nodes(problem.interface)
     problem.doubt(rows)
+    if problem.specimen is not None:
+        result = simulate_event(problem, rows, method, save, event, progress)
+        return with_gaps(problem, result, measured)
+    if event is not None:
+        raise InputError("event: is of specimens only; leave it out")
+    stations = save.nodes(problem.interface)
     checks.warn_if_coarse(problem, rows)
     run = make_run(method, method.medium(problem), rows, 0, stations)
     state = checks.at_first_slip(run)

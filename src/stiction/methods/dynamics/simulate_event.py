@@ -63,8 +63,8 @@ def simulate_event(
     """Return one event of a specimen over time, by default the one that slides."""
     if save.to is not None or save.stations:
         raise InputError(
-            "save: an event on a specimen is short, and kept in memory with all nodes; leave 'to'"
-            " and 'stations' out, and take every = 1 for each step"
+            "save: an event on a specimen is kept in memory, with all nodes; leave 'to' and"
+            " 'stations' out"
         )
     refuse_barriers(rows)
     program: RuptureProgram = method.program(problem)
@@ -75,9 +75,7 @@ def simulate_event(
         states += [path.last] if path.last.unstable else []
         meter.advance(len(states))
         if not states:
-            raise InputError(
-                "problem: nothing becomes unstable behind so stiff a machine; it slides stably"
-            )
+            raise InputError("problem: nothing becomes unstable behind so stiff a machine")
         if (number or 0) >= len(states):
             raise InputError(
                 f"event: there are {len(states)} here, counted from 0; got {number}"

@@ -29,11 +29,8 @@ from stiction.methods.equilibrium.solver import OnsetSolver, Path
 from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
 
-RATES = (
-    "loading_rate", "load", "end_time", "kernel_tolerance", "slip_step", "load_step", "implicit",
-    "start", "stop",
-)  # fmt: skip
-"""Options of `Rupture` between half-spaces, under a load that rises in time."""
+TAKEN = ("courant", "arrival", "max_steps", "events")
+"""Options of `Rupture` on specimens; the others are those of a load that rises in time."""
 RAISED = 1e-5
 """Rise of the drive in an event, as a share of the mean fall of strength over its profile."""
 GROWN = 1e-3
@@ -47,10 +44,10 @@ LOOKS = 8
 def refusals(method: Any, problem: Problem) -> list[str]:
     """Return the reasons why a rupture cannot run on the specimen of a problem."""
     usual = type(method)()
-    given = [name for name in RATES if getattr(method, name) != getattr(usual, name)]
     reasons = [
         f"{name}: means nothing on a specimen, which is loaded slowly between events; leave it out"
-        for name in given
+        for name, value in vars(method).items()
+        if name not in TAKEN and value != getattr(usual, name)
     ]
     return reasons + refused(problem.friction)
 
@@ -190,14 +187,10 @@ class RuptureSolver(OnsetSolver):
 def refuse_barriers(rows: Sample) -> None:
     """Refuse what only half-spaces take: infinite strength, and stress above the strength."""
     if not np.isfinite(rows.strength).all():
-        raise InputError(
-            "strength: barriers that never break (infinite strength) are taken between half-spaces"
-            " only; give a finite strength, such as ten times the others"
-        )
+        raise InputError("strength: infinite strength is taken between half-spaces only")
     if np.any(rows.strength < rows.initial_stress):
         raise InputError(
-            "initial_stress: is above the strength, which is taken between half-spaces only; on"
-            " specimens lower it"
+            "initial_stress: is above the strength, which is taken between half-spaces only"
         )
 
 

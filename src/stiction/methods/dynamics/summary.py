@@ -125,18 +125,14 @@ def summary(run: Run, state: State) -> dict[str, Any]:
         "first_instability": first,
         "critical_position": [i * h for i, h in zip(node, interface.spacings, strict=True)],
         "applied_load": float(now["onset_load"]),
-        "onset_time": float(now["onset_time"]),
         "kinetic_stress": kinetic,
         "stress_drop": critical - kinetic,
         "seismic_moment": seismic_moment(run, state),
-        "radiated_energy": spent["radiated_energy"],
-        "fracture_energy": spent["fracture_energy"],
         "arrested_events": int(now["arrested"]),
         "median_rupture_speed": _axis_speeds(run, state, "median_rupture_speed"),
-        "start_load": float(now["start_load"]),
-        "start_error": float(now["start_error"]),
-        "implicit_steps": int(now["implicit_steps"]),
-        "explicit_steps": int(now["explicit_steps"]),
+        **{name: spent[name] for name in ("radiated_energy", "fracture_energy")},
+        **{name: float(now[name]) for name in ("onset_time", "start_load", "start_error")},
+        **{name: int(now[name]) for name in ("implicit_steps", "explicit_steps")},
     }
     if not interface.is_plane:
         found["rupture_speed"] = _axis_speeds(run, state, "rupture_speed")

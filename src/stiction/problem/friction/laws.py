@@ -392,10 +392,11 @@ def contradictions(law: FrictionLaw) -> list[str]:
     if type(law).__module__.startswith("stiction."):
         return []
     name, parameters, end = type(law).__name__, law.parameters, law.slip_at(0.0)
-    if not (hasattr(parameters, "_fields") and hasattr(parameters, "f")):
-        return [f"{name}: its parameters must be a NamedTuple with a method f(self, u)"]
-    if not hasattr(parameters, "initial_slope"):
-        return [f"{name}: its parameters need a field initial_slope, -f'(0)"]
+    if not all(hasattr(parameters, one) for one in ("_fields", "f", "initial_slope")):
+        return [
+            f"{name}: its parameters must be a NamedTuple with a field initial_slope, -f'(0), and"
+            " a method f(self, u)"
+        ]
     if not 0.0 < law.reach < np.inf:
         return [
             f"{name}: slip_at(0), or slip_at({NEARLY_RESIDUAL}) if that is infinite, must be"
