@@ -253,7 +253,7 @@ class Problem:
         doubts = [
             Doubt(
                 f"{name}: its mean, {mean:.4g} Pa, is {mean / of:.2g} of the {what}; check the"
-                " units of both (Pa; coefficients are fractions and need"
+                " units of both (all in Pa; coefficients are fractions, not percentages, and need"
                 " of='friction_coefficient')",
                 mean / of,
                 *limits,
@@ -265,7 +265,8 @@ class Problem:
             slip = drop / float(np.median(friction.weakening_rate))
             text = (
                 f"strength: its mean, {strength:.4g} Pa, falls within a slip of {slip:.2g} m, that"
-                " of a few atoms; check the units of strength (Pa) and weakening_rate (Pa/m)"
+                " of a few atoms; check the units of strength or normal pressure (Pa) and"
+                " weakening_rate (Pa/m)"
             )
             doubts.append(Doubt(text, slip, *SLIP))
         if doubt_units(doubts):
