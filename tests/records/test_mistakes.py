@@ -398,7 +398,7 @@ table_of(calls, {
         lambda: simulator(("marginal.low",))([]),
     ],
     "agreement": [
-        *each(partial(st.statistics.agreement, PREDICTED), {}, [1015.0, 998.0, 1031.0],
+        *each(partial(st.statistics.agreement, PREDICTED), [1015.0, 998.0, 1031.0],
               {"peaks": SEVEN, "unit": "N"}),
         *(partial(st.statistics.agreement, one, SEVEN)
           for one in (xr.Dataset({"load": 1.0}), np.nan * PREDICTED,

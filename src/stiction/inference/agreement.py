@@ -72,7 +72,7 @@ class Agreement:
 @checked
 def agreement(
     prediction: xr.Dataset | Posterior,
-    peaks: Any = None,
+    peaks: Any,
     *,
     unit: str = "Pa",
     load_cell_error: NotNegative = 0.0,
@@ -135,8 +135,6 @@ def agreement(
     True
     """
     rng = np.random.default_rng([seed, 3])
-    if peaks is None:
-        raise InputError("peaks: are needed beside the prediction")
     measured = make_peaks(peaks, unit)
     if isinstance(prediction, Posterior):
         if load_cell_error:

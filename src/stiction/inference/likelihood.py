@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_user
 from stiction.base.progress import SILENT, Meter, duration
-from stiction.base.units import is_in
 from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import LimitState, no_single_length
 from stiction.inference.density import ERRORS, Densities, log_likelihoods, tabulate
+from stiction.inference.peaks import VARIABLES, si_of
 from stiction.inference.prior import Prior
 from stiction.inference.scaling import Scaling, find_scaling
 from stiction.methods.criterion.local import LocalCriterion
@@ -187,21 +187,19 @@ def area_of(prior: Prior, method: Any, length: float | None) -> Area:
 def variable_of(prior: Prior, unit: str) -> str:
     """Return the name of what tests measure in a unit, if the problem says enough for it."""
     problem, random = prior.at(prior.middle)
-    if is_in(unit, "N"):
-        if problem.area is None:
-            raise InputError(
-                "peaks: are forces, which need the area of the interface: give"
-                " Blocks(thickness=...), or Interface(width=...) of a line"
-            )
-        return "critical_force"
-    if not is_in(unit, "1"):
-        return "critical_stress"
-    if problem.given_pressure is None and "normal_pressure" not in random.names:
+    variable = VARIABLES[si_of(unit)]
+    if variable == "critical_force" and problem.area is None:
+        raise InputError(
+            "peaks: are forces, which need the area of the interface: give"
+            " Blocks(thickness=...), or Interface(width=...) of a line"
+        )
+    pressed = problem.given_pressure is not None or "normal_pressure" in random.names
+    if variable == "friction_coefficient" and not pressed:
         raise InputError(
             "peaks: are coefficients of friction, which need a normal pressure: give"
             " Load(normal_pressure=...) in Pa, or peaks as stresses with their unit"
         )
-    return "friction_coefficient"
+    return variable
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from scipy.special import betainc, betaln, gammainc, ndtr
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, unknown_name
-from stiction.base.model import describe, is_finite
+from stiction.base.model import Real, check, describe
 from stiction.random.dotted_keys import with_values
 from stiction.random.marginals import MARGINALS, Beta, ScipyMarginal, marginal_of
 
@@ -236,22 +236,17 @@ def family_of(given: Any) -> Family:
     fixed = table_of(given)
     name = str(fixed.pop("type", None))
     if name in KINDS:
-        known = ("low", "high") if name == "beta" else ("low",)
+        known = ["low", "high"] if name == "beta" else ["low"]
     else:
         family = getattr(scipy.stats, SCIPYS.get(name, name), None)
         if not isinstance(family, scipy.stats.rv_continuous):
             raise InputError(unknown_name("type", name, [*KINDS, *SCIPYS, "uniform"]))
-        known = (*(family.shapes or "").replace(" ", "").split(","), "loc", "scale")
-    problems = [unknown_name(name, key, known) for key in fixed if key not in known]
-    problems += [
-        f"{name}.{key}: must be a finite number, got {describe(value)}"
-        for key, value in fixed.items()
-        if not is_finite(value)
-    ]
-    if problems:
+        known = [*(family.shapes or "").replace(" ", "").split(","), "loc", "scale"]
+    if problems := [unknown_name(name, key, known) for key in fixed if key not in known]:
         raise InputError(problems)
     zero = {"low": 0.0} if name in KINDS and name != "beta" else {}
-    return Family(name, zero | {key: float(value) for key, value in fixed.items()})
+    own = {key: check(f"{name}.{key}", value, Real) for key, value in fixed.items()}
+    return Family(name, zero | own)
 
 
 def _by_scale(family: Family, values: Array, quiet: Array, noise: float, start: Any) -> Search:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,6 +20,8 @@ FAR = 50.0
 """Ratio of measured and predicted peaks that no experiment explains: their unit is wrong."""
 PEAK = ("peak", "tau", "stress", "strength", "force", "friction")
 LENGTH = ("length", "specimen")
+VARIABLES = {"Pa": "critical_stress", "N": "critical_force", "1": "friction_coefficient"}
+"""What is measured in each unit, by its name among the results of a method."""
 
 
 class Peaks(NamedTuple):
@@ -52,8 +54,7 @@ class Peaks(NamedTuple):
     @property
     def variable(self) -> str:
         """Name of the measured quantity among the results of a method."""
-        names = {"Pa": "critical_stress", "N": "critical_force", "1": "friction_coefficient"}
-        return names[self.unit]
+        return VARIABLES[self.unit]
 
     def __str__(self) -> str:
         pairs = zip(self.lengths, self.values, strict=True)
@@ -87,7 +88,7 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
 
 def si_of(unit: str) -> str:
     """Return the SI unit of what has a unit: "1", "N", else "Pa"."""
-    return next((one for one in ("1", "N") if is_in(unit, one)), "Pa")
+    return next((one for one in VARIABLES if is_in(unit, one)), "Pa")
 
 
 def factor_of(unit: str) -> float:
@@ -159,7 +160,7 @@ def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
     path = check("path", path, FilePath)
     with prefixed(str(path)):
         table = read_table(Path(path))
-        length, peak = _column(table, LENGTH), _column(table, PEAK, ("Pa", "N", "1"))
+        length, peak = _column(table, LENGTH), _column(table, PEAK, VARIABLES)
         if peak is None:
             names = ", ".join(map(str, table.data_vars))
             raise InputError(f"no column has a name like 'peak [MPa]'; found {names}")
@@ -183,7 +184,7 @@ def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
         return make_peaks(groups, stated)
 
 
-def _column(table: Any, kinds: tuple[str, ...], units: tuple[str, ...] = ()) -> Any:
+def _column(table: Any, kinds: tuple[str, ...], units: Iterable[str] = ()) -> Any:
     """Return the one column whose name begins with one of some words, else the only in a unit."""
     firsts = {name: name.lower().partition(" ")[0].strip("_:.") for name in table.data_vars}
     found = [name for name, first in firsts.items() if first in kinds]
