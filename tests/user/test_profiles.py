@@ -180,9 +180,13 @@ def test_between_places_it_is_interpolated_where_it_is_asked_for():
     h = X[1]
     ends = np.r_[X[:11], 20.01 * h, X[21:], 40.5 * h]
     dense = np.delete(np.arange(1280) * 0.1 * h, range(297, 303))
-    for at, missing in ((ends, range(11, 20)), (dense, ())):
-        given = labelled(1e6 + 1e6 * at, at)
-        profile = st.read_profile(given, interface=LINE, interpolate=True, gaps="skip")
+    halves = np.arange(256) * 0.5 * h
+    for at, lost, missing in ((ends, [], range(11, 20)), (dense, [], ()), (halves, [0], [0])):
+        values = 1e6 + 1e6 * at
+        values[lost] = np.nan
+        profile = st.read_profile(
+            labelled(values, at), interface=LINE, interpolate=True, gaps="skip"
+        )
         assert [*np.flatnonzero(np.isnan(profile))] == [*missing]
         there = ~np.isnan(profile.values)
         np.testing.assert_allclose(profile[there], 1e6 + 1e6 * X[there], rtol=1e-14)
