@@ -113,6 +113,7 @@ def _continuous_width(nodes: int, rate: float) -> int:
     return int(min(2.0 * SMALLEST_EIGENVALUE / (np.pi * rate), 1.0) * nodes)
 
 
+@functools.lru_cache(maxsize=64)
 def widths_between(nodes: int, lowest: float, highest: float) -> tuple[int, ...]:
     """Widths for weakening rates from `lowest` to `highest`, the widest unstable at `lowest`.
 

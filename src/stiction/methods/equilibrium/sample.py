@@ -88,11 +88,14 @@ class StaticSample(NamedTuple):
 def make_sample(
     excess: Array, residual: Array, profile: Array, rate: Array, pieces: Pieces
 ) -> StaticSample:
-    """Return one sample; nodes whose strength is residual, but for round-off, do not weaken."""
+    """Return one sample, or many over the first axis.
+
+    Nodes whose strength is residual, but for round-off, do not weaken.
+    """
     fall = excess - residual
     largest = max(excess.max(), residual.max(), -excess.min(), -residual.min())
     if not fall.min() > FLAT * largest:
-        scale = np.maximum(np.abs(excess), np.abs(residual)).mean()
+        scale = np.maximum(np.abs(excess), np.abs(residual)).mean(axis=-1, keepdims=True)
         constant = ~(fall > FLAT * scale)
         residual = np.where(constant, excess, residual)
         fall, rate = np.where(constant, 0.0, (fall, rate))
@@ -101,14 +104,21 @@ def make_sample(
     return StaticSample(excess, residual, profile, rate, critical, pieces)
 
 
-def sample_of(rows: Sample, pieces: Pieces, row: int) -> StaticSample:
-    """Return one sample of a batch as the kernels take it."""
+def sample_of(rows: Sample, pieces: Pieces, row: int | slice = slice(None)) -> StaticSample:
+    """Return one sample of a batch, or all of them, as the kernels take them."""
     initial = rows.initial_stress[row]
-    excess = (rows.strength[row] - initial).reshape(-1)
-    residual = (rows.residual_strength[row] - initial).reshape(-1)
-    # Copies: of read-only arrays, as of a law, each kernel would be compiled a second time.
-    profile, rate = rows.load_profile.flatten(), rows.weakening_rate[row].flatten()
-    return make_sample(excess, residual, profile, rate, pieces)
+    shape = (*initial.shape[: initial.ndim - rows.load_profile.ndim], -1)
+    excess = (rows.strength[row] - initial).reshape(shape)
+    residual = (rows.residual_strength[row] - initial).reshape(shape)
+    # A copy: of a read-only array, as of a law, each kernel would be compiled a second time.
+    rate = rows.weakening_rate[row].reshape(shape).copy()
+    return make_sample(excess, residual, rows.load_profile.flatten(), rate, pieces)
+
+
+def row_of(samples: StaticSample, row: int) -> StaticSample:
+    """Return one sample of a batch: together they take a tenth less time."""
+    excess, residual, profile, rate, critical, pieces = samples
+    return StaticSample(excess[row], residual[row], profile, rate[row], critical[row], pieces)
 
 
 class Present(NamedTuple):
@@ -137,6 +147,7 @@ class State:
     # Largest mean stress on the way here over the mean of the load profile, Pa: the load itself
     # (None), unless a machine drives.
     peak: float | None = None
+    stiff_direction: Array | None = None  # (n,): K times the direction, if it is known
     # The exact y with <p, y> = 1, if the direction is that; else the direction stands for it.
     multiplier: Array | None = None
 

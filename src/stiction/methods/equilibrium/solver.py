@@ -19,6 +19,7 @@ from stiction.methods.equilibrium.sample import (
     present_pieces,
     refused,
     residual_nodes,
+    row_of,
     sample_of,
 )
 from stiction.methods.equilibrium.transforms.plane import PlaneProgram
@@ -106,9 +107,9 @@ class OnsetSolver:
         """Return the onset of each sample; see `Equilibrium`."""
         warn_of_signs(self.problem)
         self.problem.warn_if_coarse(rows, FINE, ROUGHLY[len(self.problem.interface.shape)])
-        table, flags = [], []
+        samples, table, flags = sample_of(rows, self.program.pieces), [], []
         for row in range(rows.samples):
-            sample = sample_of(rows, self.program.pieces, row)
+            sample = row_of(samples, row)
             try:
                 path = follow(self.program, sample)
             except Exception as error:
@@ -139,8 +140,8 @@ class OnsetSolver:
             "critical_stress": path.peak,
             "first_instability": first.load - relief_of(self.problem, first.slip),
             "certificate_gap": first.gap,
-            "critical_position": np.squeeze(patch.centre),
-            "sliding_position": np.squeeze(slides.centre),
+            "critical_position": patch.centre if interface.is_plane else patch.centre[0],
+            "sliding_position": slides.centre if interface.is_plane else slides.centre[0],
             "slip_patches": patches_of(first.slip, interface),
             "arrested_events": len(path.events),
             "residual_reached": bool(residual_nodes(sample, last.slip).any()),

@@ -202,7 +202,10 @@ def solve_program(
 def certificate(
     sample: StaticSample, slip: Array, stiff: Array, multiplier: Array, workspace: Workspace
 ) -> float:
-    """Distance of the rigorous bounds from below (by the slip) and from above (by y), Pa."""
+    """Distance of the rigorous bounds from below (by the slip) and from above (by y), Pa.
+
+    K y is left in ``workspace.product``.
+    """
     n = slip.shape[0]
     lower = np.inf
     count = ZERO

@@ -161,6 +161,7 @@ class DenseProgram:
             straight = found is not None and (rests or found.load >= state.load)
             if found is not None and straight and not exceeds(sample, found.slip, piece):
                 self._certify(present, found, found.direction)
+                found.stiff_direction = self._workspaces[0].product[: self.nodes].copy()
                 return found
             by_events = not rests
         slip, stiff, direction = state.slip.copy(), state.stiff.copy(), state.direction.copy()
@@ -180,7 +181,7 @@ class DenseProgram:
         return found
 
     def _certify(self, present: StaticSample, found: State, multiplier: Array) -> None:
-        """Write the distance of the bounds of an instability."""
+        """Write the distance of the bounds of an instability; K y is left in the workspace."""
         found.gap = certificate(
             present, found.slip, found.stiff, multiplier, self._workspaces[0]
         )
@@ -219,11 +220,13 @@ class DenseProgram:
         if self.runs is None:
             step = step_to_corner(sample, slip, found.direction, np.inf)
             return (Outcome.SLIDING if step == np.inf else Outcome.UNDECIDED), np.inf
-        members, stiff_direction = np.flatnonzero(found.direction), np.empty(self.nodes)
-        apply_circular(
-            self.elastic.entries, members, members.size, found.direction[members],
-            np.empty((2, self.nodes // 2)), stiff_direction,
-        )  # fmt: skip
+        stiff_direction = found.stiff_direction
+        if stiff_direction is None:
+            members, stiff_direction = np.flatnonzero(found.direction), np.empty(self.nodes)
+            apply_circular(
+                self.elastic.entries, members, members.size, found.direction[members],
+                np.empty((2, self.nodes // 2)), stiff_direction,
+            )  # fmt: skip
         return runs_away(
             sample, self.runs, found.load, slip, found.stiff, found.direction,
             stiff_direction,
