@@ -44,20 +44,20 @@ def test_a_refusal_is_short_pickles_and_is_a_value_error():
 
 def test_errors_of_equilibrium_are_warned_of():
     no, ones = np.zeros(2, dtype=bool), np.ones(2)
-    values = dict.fromkeys(("stopped", "residual_reached"), no) | {
-        "certified": ~no,
+    values = {
+        "residual_reached": no,
         "certificate_gap": np.array([1e-6, np.nan]),
         "first_instability": 1e6 * ones,
         "critical_stress": 1e6 * ones,
     }
     rows = PROBLEM.sample(np.full((2, PROBLEM.interface.size), 1e6))
     with pytest.warns(st.AccuracyWarning, match="did not close to 1e-09 of it in 1 of 2"):
-        EXACT.prepare(PROBLEM)._warn(rows, values, no)
+        EXACT.prepare(PROBLEM)._warn(rows, values, known=no, certified=~no, stopped=no)
 
 
 def test_a_path_whose_end_is_not_known_is_said(monkeypatch):
     ends = "stiction.methods.equilibrium.path.follow"
-    monkeypatch.setattr(ends, lambda *given: dataclasses.replace(follow(*given), known=False))
+    monkeypatch.setattr(ends, lambda *given: follow(*given)._replace(known=False))
     with pytest.warns(st.AccuracyWarning, match="no equilibrium was found beyond 900000 Pa"):
         st.equilibrium_path(PROBLEM, 0.9 * ONE, [1e5, 2e6])
     with warnings.catch_warnings(action="error"):
