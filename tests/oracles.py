@@ -95,6 +95,24 @@ def by_relaxation(
     raise AssertionError("relaxation did not come to rest")
 
 
+def relaxed(
+    problem: st.Problem, strength: Any, load: float, slip: Any = None, rest: float = 5e-7
+) -> Any:
+    """Slip at a load with the friction of a problem, or None where all of it slides."""
+    law: Any = problem.friction
+    u, f = (np.r_[each] for each in (getattr(law, "slip", 1.0), getattr(law, "strength", 0.0)))
+    residual = np.minimum(law.residual_strength, strength)
+    drop = strength - residual
+    end = law.critical_slip or (1.0 - f[0]) / u[0] * drop / law.weakening_rate
+
+    def present(slip: Any) -> Any:
+        share = slip / np.maximum(end, 1e-30)  # some nodes do not weaken
+        return residual + drop * np.interp(share, np.r_[0.0, u], np.r_[1.0, f])
+
+    given = np.full(strength.shape, load), present, end
+    return by_relaxation(symbol_of(problem), *given, slip, rest)
+
+
 def angle_rule(count: int) -> tuple[Any, Any]:
     """Points s = cos t of (-1, 1) and their measure; exact as the integrand is smooth in t."""
     t = (np.arange(count) + 0.5) * np.pi / count

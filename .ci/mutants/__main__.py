@@ -27,10 +27,10 @@ ROOT = Path(__file__).parents[2]
 NEAREST = {
     "base": "refusals mistakes* progress cache warnings own_method",
     "cli": "runs cli warnings",
-    "criterion": "lines planes specimens criterion griffith crooked statistics_*",
+    "criterion": "lines planes specimens criterion griffith crooked",
     "dynamics": "ruptures dynamics_* rupture_stations plane_rupture",
-    "elasticity": "specimens lines planes blocks block_response dynamics_kernels dynamics_waves"
-    " criterion dynamics_convolution equilibrium",
+    "elasticity": "specimens lines planes blocks block_response dynamics_waves"
+    " criterion dynamics_equilibrium equilibrium",
     "ensemble": "runs fields store ensemble study progress own_method reliability",
     "equilibrium": "lines planes specimens crooked equilibrium plane_equilibrium instability"
     " friction_laws",
@@ -41,8 +41,7 @@ NEAREST = {
     "problem": "refusals mistakes* specimens bad_input crooked criterion equilibrium profiles"
     " study",
     "profiles": "profiles mistakes* refusals crooked fit_field",
-    "random": "fields refusals conditional* random_interface marginal_families plane_fields"
-    " reliability",
+    "random": "fields refusals conditional* random_interface reliability",
     "reliability": "reliability* failure_run runs pictures",
     "statistics": "fields statistics_* criterion inference",
     "study": "runs refusals mistakes* study store planes own_method failure_run",

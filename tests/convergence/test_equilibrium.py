@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 from checks import assert_second_order
 from oracles import angle_rule
-from planes import WAVENUMBERS, moduli
-from setups import LENGTH, RATE, exact_onset, make_problem, turns
+from setups import exact_onset, make_problem
 
 from stiction.methods.criterion import eigenfunction
-from stiction.methods.equilibrium.transforms.plane import plane_onset
 
 pytestmark = pytest.mark.slow
 DEPTH = 0.4e6
@@ -38,27 +36,3 @@ def test_second_order_in_the_spacing():
 def test_images_fall_with_the_square_of_the_period():
     # On a grid fine enough, what is left is the images': they attract, and reduce the onset.
     assert_second_order([relative_error(128, periods) for periods in (8, 16)], 0.5)
-
-
-def plane_errors(nodes, wavenumbers):
-    """Relative errors of the onset of a smooth plane, by numbers of nodes."""
-
-    def onset(count, name):
-        x, y = turns(count)[:, None], turns(count)[None, :]
-        strength = 1e6 - 1.5e5 * np.cos(x) * np.cos(y) - 1e5 * np.cos(2.0 * x + y + 0.3)
-        one = np.ones((count, count))
-        plane = WAVENUMBERS[name]((8.0 * LENGTH, 8.0 * LENGTH), moduli(1e9, 0.33))
-        found = plane_onset(plane, strength, one, RATE * one, 1e-8)
-        assert found.closed
-        return found.upper
-
-    reference = onset(256, "spectral")
-    return np.array([abs(onset(count, wavenumbers) / reference - 1.0) for count in nodes])
-
-
-def test_lattice_converges_at_second_order_to_the_spectral_onset_which_is_faster():
-    errors = plane_errors((48, 96, 192), "lattice")
-    # Not exactly two: nodes join one by one, and the reference is not exact.
-    assert 1.6 < np.log2(errors[:-1] / errors[1:]).mean() < 2.4
-    assert errors[-1] < 2e-4
-    assert np.all(plane_errors((48, 96), "spectral") < 0.5 * errors[:2])

@@ -3,27 +3,11 @@
 import numpy as np
 import pytest
 
-from stiction.elasticity.blocks import (
-    Pushes,
-    block_response,
-    glued_pressure,
-    lattice_entries,
-    lattice_symbol,
-)
+from stiction.elasticity.blocks import Pushes, block_response, glued_pressure
 
 KAPPA = (3.0 - 0.35) / (1.0 + 0.35)  # plane stress, nu = 0.35
 MODULUS = 1.3e9  # Pa
 EFFECTIVE = 4.0 * MODULUS / (KAPPA + 1.0)
-
-
-def test_the_entries_of_the_lattice_have_its_symbol():
-    entries = lattice_entries(4001)
-    for angle in (0.07, 0.9, np.pi):
-        series = entries[0] + 2.0 * np.cos(angle * np.arange(1, 4001)) @ entries[1:]
-        assert series == pytest.approx(
-            lattice_symbol(np.array(angle)), abs=1e-4
-        )  # tail 2/(pi n)
-    assert np.all(entries[1:] < 0.0)
 
 
 @pytest.mark.parametrize(("kappa", "published"), [(KAPPA, 0.445), (None, 0.579)])
@@ -38,7 +22,7 @@ def test_the_smallest_unstable_patch_at_a_free_end(kappa, published):
     assert 2.0 * lengths[30] - lengths[15] == pytest.approx(published, rel=1e-3)
 
 
-@pytest.mark.parametrize("kappa", [KAPPA, 3.0 - 4.0 * 0.45, None])
+@pytest.mark.parametrize("kappa", [3.0 - 4.0 * 0.45, None])
 @pytest.mark.parametrize("pushes", [None, Pushes(("right",), 0.03, 0.02)])
 def test_a_uniform_slip_is_free_and_stiffness_is_symmetric(kappa, pushes):
     stiffness, shear, drive, _ = block_response(0.1, 96, 0.07, MODULUS, kappa, pushes)
@@ -70,15 +54,6 @@ def test_a_clamped_strip_in_mode_three():
     kernel = -np.pi * MODULUS / (8.0 * height**2) / np.sinh(0.5 * np.pi * away / height) ** 2
     steps = np.rint(away / dx).astype(int)
     np.testing.assert_allclose(held[500, 500 + steps] / dx, kernel, rtol=1e-3)
-
-
-def test_far_from_the_ends_of_a_high_block_it_is_a_half_space():
-    length, nodes = 1.0, 800
-    stiffness, *_ = block_response(length, nodes, 1.4, MODULUS, KAPPA, None)
-    steps = np.arange(3, 12)
-    kernel = 0.5 * EFFECTIVE * nodes / length * lattice_entries(12)[3:]
-    # What the ends add, some (G*/2 pi)(10/L²), counts 2e-3 of this at twelve nodes.
-    np.testing.assert_allclose(stiffness[400, 400 + steps], kernel, rtol=3e-3)
 
 
 def test_figures_of_a_platen_and_of_glued_pressing():

@@ -47,12 +47,21 @@ def strengths(random, samples, seed):
     return random.profiles(LINE, samples=samples, seed=seed)["strength"]
 
 
-def correlation(field, interface, one, other):
-    """Of z between places (dimensions, points), as a sum over waves."""
+def kriging(field, interface, places, z, error, grid):
+    """Mean and covariance on a grid from z at places, by sums over waves and dense matrices."""
     modes = field.modes(interface)
-    lag = (one[:, :, None] - other[:, None, :]) / np.array(interface.lengths)[:, None, None]
-    phase = 2.0 * np.pi * np.tensordot(lag, modes.numbers, axes=(0, 0))
-    return np.cos(phase) @ modes.sigma**2
+
+    def correlation(one, other):
+        apart = one[:, :, None] - other[:, None, :]
+        phase = np.tensordot(
+            apart / np.reshape(interface.lengths, (-1, 1, 1)), modes.numbers, (0, 0)
+        )
+        return np.cos(2.0 * np.pi * phase) @ modes.sigma**2
+
+    across = correlation(grid, places)
+    inner = correlation(places, places) + error**2 * np.eye(z.size)
+    weights = np.linalg.solve(inner, across.T).T
+    return weights @ z, correlation(grid, grid) - weights @ across.T
 
 
 @pytest.mark.parametrize(
@@ -73,14 +82,10 @@ def test_mean_and_deviation_are_those_of_dense_kriging(interface, shift, mean_mo
     values = scan(interface, places, field)
     known = xr.DataArray(values.reshape([one.size for one in at.values()]), at, tuple(at))
     given = field.given(known, noise=20e3)
-    z, error = (values - 1e6) / 0.2e6, 0.1
-    across = correlation(field, interface, grid, places)
-    inner = correlation(field, interface, places, places) + error**2 * np.eye(values.size)
-    weights = np.linalg.solve(inner, across.T).T
-    covariance = correlation(field, interface, grid, grid) - weights @ across.T
+    expected, covariance = kriging(field, interface, places, (values - 1e6) / 0.2e6, 0.1, grid)
     known = conditioning(given, interface)
     mean, deviation = known.regression.moments(field.modes(interface).basis(grid))
-    np.testing.assert_allclose(mean, weights @ z, atol=1e-10)  # round-off of the dense solution
+    np.testing.assert_allclose(mean, expected, atol=1e-10)  # round-off of the dense solution
     np.testing.assert_allclose(deviation**2, np.diag(covariance), atol=1e-10)
     # 20,000 samples: an entry of a covariance scatters by 0.01, the largest of 16,384 by 4.5 of it.
     draws = known.draws(st.RandomInterface(strength=field).draws(interface, 20_000, seed=1))
@@ -90,20 +95,17 @@ def test_mean_and_deviation_are_those_of_dense_kriging(interface, shift, mean_mo
     assert given.quantile(interface, 0.5).shape == interface.shape
 
 
-@pytest.mark.parametrize("rough", [20e3, 100e3])
-def test_values_that_contradict_each_other_are_those_of_dense_kriging_with_a_warning(rough):
+def test_values_that_contradict_each_other_are_those_of_dense_kriging_with_a_warning():
     """A rough surface whose roughness is neither in the field nor in the noise of 2 kPa."""
     field = st.RandomField(scipy.stats.norm(1e6, 0.2e6), FIELD.spectrum)
     places = np.random.default_rng(5).uniform(0.0, 0.03, (1, 30))
-    values = scan(LINE, places, field) + rough * np.random.default_rng(6).normal(size=30)
-    z, error = (values - 1e6) / 0.2e6, 0.01
-    across = correlation(field, LINE, LINE.x[None], places)
-    inner = correlation(field, LINE, places, places) + error**2 * np.eye(30)
-    weights = np.linalg.solve(inner, across.T).T
-    deviation = np.sqrt(np.maximum(1.0 - (weights * across).sum(axis=1), 0.0))
+    values = scan(LINE, places, field) + 20e3 * np.random.default_rng(6).normal(size=30)
+    grid = LINE.x[None]
+    mean, covariance = kriging(field, LINE, places, (values - 1e6) / 0.2e6, 0.01, grid)
+    deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     known = conditioning(given_on(places[0], values, 2e3, field), LINE)
-    found = known.regression.moments(field.modes(LINE).basis(LINE.x[None]))
-    np.testing.assert_allclose(found[0], weights @ z, rtol=1e-6, atol=1e-6)
+    found = known.regression.moments(field.modes(LINE).basis(grid))
+    np.testing.assert_allclose(found[0], mean, rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(found[1], deviation, rtol=1e-6, atol=1e-6)
     with pytest.warns(st.AccuracyWarning, match="unlikely for this field"):
         known.warn()
@@ -161,15 +163,6 @@ def test_posteriors_of_skewed_values_beyond_two_moments(case):
         known.warn()
 
 
-def test_values_with_an_endless_error_move_no_sample():
-    places = np.random.default_rng(0).uniform(0.0, 0.05, 3000)
-    values = scan(LINE, places[None])
-    vague = given_on(places, values, 1e9)
-    moved = vague.sample(LINE, samples=50, seed=1) - FIELD.sample(LINE, samples=50, seed=1)
-    # By linear regression with the slope at most, 3,000 (sd/noise)^2 sds.
-    assert np.abs(moved).max() < 3000 * (0.4e6 / 1e9) ** 2 * 1e6
-
-
 def test_values_drawn_from_the_field_are_not_unlikely():
     """A skewed marginal with a noise of two standard deviations, and one with two bounds, five."""
     for marginal, noise in ((st.Lognormal(mean=1e6, cv=0.25), 0.5e6), (BETA, 0.9e6)):
@@ -198,7 +191,7 @@ def test_conditional_probabilities_average_to_the_unconditional_one():
     onsets = ensemble(COARSE, field, 4000, seed=0).critical_stress
     stress = float(onsets.quantile(0.2))
     shares, rng = [], np.random.default_rng(5)
-    for specimen in field.sample(line, samples=75, seed=3):
+    for specimen in field.sample(line, samples=40, seed=3):
         measured = specimen[:24] + noise * rng.standard_normal(24)
         given = given_on(line.x[:24], measured, noise, field)
         found = ensemble(COARSE, given, 100, seed=1).critical_stress

@@ -1,8 +1,10 @@
-"""The local criterion against closed forms."""
+"""The local criterion, and mean and variance of its stress, against closed forms."""
+
+import dataclasses
 
 import numpy as np
 import pytest
-from setups import QUARTER, ROUND_OFF, SOLID, local_onset, make_problem, turns
+from setups import ROUND_OFF, local_onset, make_problem, turns
 
 import stiction as st
 from stiction.elasticity.protocol import SMALLEST_EIGENVALUE
@@ -14,16 +16,12 @@ from stiction.methods.criterion.eigenfunction import (
     weight,
 )
 from stiction.methods.criterion.windows import windows_of
+from stiction.statistics.moments import nucleation_statistics
 
 
 def first_onset(problem, tau_p):
     """Of one sample: the values of the results by name."""
     return {name: values.item() for name, values in local_onset(problem, tau_p).items()}
-
-
-def multiplier_of(problem):
-    """What the moving average does to each wave of a line."""
-    return windows_of(problem, problem.uniform_rate)[0].spectrum
 
 
 def test_smallest_eigenvalue_and_its_vector():
@@ -46,40 +44,19 @@ def test_integrals_of_the_weight():
     assert np.sqrt(np.trapezoid(g * g, s)) == pytest.approx(0.7499991, abs=1e-7)
 
 
-def test_eigenfunction_solves_the_integral_equation():
-    """v = (1/(2 pi lambda)) times the finite-part integral of v/(s - s')^2, term by term.
-
-    The finite part of sin(m t)-terms is -pi m sin(m t)/sin t, so the residual must vanish.
-    """
-    value, a = eigenvalue_and_vector(400)
-    t = np.linspace(0.4, np.pi - 0.4, 400)  # away from the ends, where the cut series rings
-    m = np.arange(1, a.size + 1)
-    v = a @ np.sin(np.outer(m, t))
-    stress = 0.5 * (a * m) @ np.sin(np.outer(m, t)) / np.sin(t)
-    # The terms that were cut, a_m m/2 at m = 401, are of this size.
-    np.testing.assert_allclose(stress, value * v, atol=1e-6)
-
-
-@pytest.mark.parametrize("z", [0.0, 1e-6, 0.3, 3.0, 20.0, 150.0])
-def test_multiplier_is_the_fourier_transform_of_the_weight(z):
+def test_multiplier_is_the_fourier_transform_of_the_weight():
     s = np.cos(np.linspace(np.pi, 0.0, 200_001))
-    expected = np.trapezoid(weight(s) * np.cos(z * s), s)
+    z = np.array([0.0, 1e-6, 0.3, 3.0, 20.0, 150.0])
+    expected = [np.trapezoid(weight(s) * np.cos(one * s), s) for one in z]
     # The trapezoidal sum is good to (z dt)^2/12 of its value: 5e-9 at the largest z.
-    assert multiplier(np.array([z]))[0] == pytest.approx(expected, abs=1e-8)
-
-
-@pytest.mark.parametrize("half_width", [2.0, 3.3, 8.0, 17.5, 70.0, 700.3])
-def test_weights_on_a_grid_are_not_negative_and_add_up(half_width):
-    w = grid_weights(half_width)
-    assert w.min() >= 0.0
-    assert w.size - 1 == np.ceil(half_width) + 1  # one node beyond the end of the patch
-    assert w[0] + 2.0 * w[1:].sum() == pytest.approx(1.0, rel=1e-14)
+    np.testing.assert_allclose(multiplier(z), expected, atol=1e-8)
 
 
 # Largest error for waves of |k| h_n/2 up to 1, 3, 6 and 12, rounded up from what was measured.
 @pytest.mark.parametrize(
     ("half_width", "errors"),
     [
+        (2.0, (1.0, 1.0, 1.0, 1.0)),
         (4.4, (2e-5, 2e-4, 2e-3, 2e-2)),
         (8.0, (2e-6, 1e-5, 1e-4, 2e-3)),
         (17.5, (1e-9, 5e-9, 2e-8, 1e-6)),
@@ -89,46 +66,26 @@ def test_weights_on_a_grid_are_not_negative_and_add_up(half_width):
 )
 def test_weights_on_a_grid_do_to_smooth_waves_what_the_eigenfunction_does(half_width, errors):
     nodes = 16 * int(np.ceil(half_width))
-    found = np.fft.rfft(around(grid_weights(half_width), nodes)).real
+    w = grid_weights(half_width)
+    assert w.min() >= 0.0
+    assert w.size - 1 == np.ceil(half_width) + 1  # one node beyond the end of the patch
+    assert w[0] + 2.0 * w[1:].sum() == pytest.approx(1.0, rel=1e-14)
+    found = np.fft.rfft(around(w, nodes)).real
     z = 2.0 * np.pi * np.arange(nodes // 2 + 1) / nodes * half_width
     error = np.abs(found - multiplier(z))
     for highest, allowed in zip((1.0, 3.0, 6.0, 12.0), errors, strict=True):
         assert error[z <= highest].max() < allowed
 
 
-def test_cosine_strength_has_its_minimum_between_the_nodes(problem):
-    x, mode, shift = problem.interface.x, 7, 0.0123
-    k = 2.0 * np.pi * mode / 0.1
-    tau_p = 1e6 - 2e5 * np.cos(k * (x - shift))
-    result = first_onset(problem, tau_p)
-    amplitude = multiplier_of(problem)[mode]
-    exact = multiplier(np.array([k * problem.nucleation_length / 2.0]))[0]
-    # |k| h_n/2 = 1 at 9 nodes in h_n: within the error of the weights on this grid.
-    assert amplitude == pytest.approx(exact, abs=2e-5)
-    assert result["critical_load"] == pytest.approx(1e6 - 2e5 * amplitude, rel=1e-12)
-    # Seven equal minima; Newton's method finds one of them to round-off in the slope.
-    beyond = (result["critical_position"] - shift) % (0.1 / mode)
-    assert min(beyond, 0.1 / mode - beyond) == pytest.approx(0.0, abs=1e-9)
-
-
-def test_moduli_and_speeds():
+@pytest.mark.parametrize(("plane", "nu"), [("stress", -0.5), ("strain", 0.33)])
+def test_moduli_and_wave_speeds_of_both_plane_states(plane, nu):
     """Plane stress: G (1 + nu), plane strain: G/(1 - nu), mode III: G."""
-    for plane, factor in (("stress", 1.33), ("strain", 1.0 / 0.67)):
-        solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane=plane)
-        assert solid.effective_modulus("II") == pytest.approx(factor * 1e9, rel=1e-14)
-        assert solid.effective_modulus("III") == 1e9
-    assert SOLID.shear_wave_speed == pytest.approx(924.5, abs=0.05)
-    # nu = 1/4 in plane strain: c_R/c_s = sqrt(2 - 2/sqrt(3)), a classical closed form.
-    ratio = QUARTER.rayleigh_wave_speed / QUARTER.shear_wave_speed
-    assert ratio == pytest.approx(np.sqrt(2.0 - 2.0 / np.sqrt(3.0)), rel=1e-13)
-
-
-@pytest.mark.parametrize(
-    ("plane", "nu"), [("stress", 0.33), ("strain", 0.33), ("strain", 0.0), ("stress", -0.5)]
-)
-def test_wave_speeds_of_both_plane_states(plane, nu):
-    """c_d from Lame's constants in plane strain, from E/(1-nu^2) in plane stress."""
     solid = st.Solid(shear_modulus=3.0, poisson_ratio=nu, density=2.0, plane=plane)
+    factor = 1.0 + nu if plane == "stress" else 1.0 / (1.0 - nu)
+    assert solid.effective_modulus("II") == pytest.approx(factor * 3.0, rel=1e-14)
+    assert solid.effective_modulus("III") == 3.0
+    assert solid.shear_wave_speed == pytest.approx(1.5**0.5, rel=1e-14)
+    # c_d from Lame's constants in plane strain, from E/(1-nu^2) in plane stress.
     young = 2.0 * 3.0 * (1.0 + nu)
     lame = young * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
     stiffness = lame + 6.0 if plane == "strain" else young / (1.0 - nu**2)
@@ -141,16 +98,15 @@ def test_wave_speeds_of_both_plane_states(plane, nu):
     assert function == pytest.approx(0.0, abs=1e-13)
 
 
-@pytest.mark.parametrize("nodes", [128, 1024])
-def test_load_that_varies_along_the_interface(nodes):
+def test_load_that_varies_along_the_interface():
     """Strength and load are single cosines, so both averages are known in closed form."""
-    x, k = 0.1 * np.arange(nodes) / nodes, 2.0 * np.pi / 0.1
+    x, k = 0.1 * np.arange(128) / 128, 2.0 * np.pi / 0.1
     load = st.Load(
         profile=1.0 + 0.6 * np.cos(2.0 * k * (x - 0.013)), normal_pressure=4e6 * (x + 1.0)
     )
-    problem = make_problem(nodes, load=load)
+    problem = make_problem(128, load=load)
     tau_p = 1e6 - 2e5 * np.cos(3.0 * k * (x - 0.031))
-    one, two = multiplier_of(problem)[[3, 2]]
+    one, two = windows_of(problem, problem.uniform_rate)[0].spectrum[[3, 2]]
 
     def tau_n(at):
         strength = 1e6 - 2e5 * one * np.cos(3.0 * k * (at - 0.031))
@@ -203,10 +159,10 @@ def test_critical_slip_is_a_weakening_rate():
 
 def test_position_lies_on_the_interface(problem):
     """A minimum a hair left of node 0 is at 0, not at L."""
-    for mode in (1, 3, 5):
-        tau_p = 1e6 - 2e5 * np.cos(mode * turns(256))
-        for signed in (tau_p, tau_p[::-1].copy(), np.roll(tau_p, 1)):
-            assert 0.0 <= first_onset(problem, signed)["critical_position"] < 0.1
+    tau_p = 1e6 - 2e5 * np.cos(np.outer([1, 3, 5], turns(256)))
+    for signed in (tau_p, tau_p[:, ::-1].copy(), np.roll(tau_p, 1, axis=1)):
+        places = local_onset(problem, signed)["critical_position"].values
+        assert 0.0 <= places.min() <= places.max() < 0.1
 
 
 def test_uniform_strength_lets_go_at_its_value_in_units_that_are_named(problem):
@@ -216,3 +172,43 @@ def test_uniform_strength_lets_go_at_its_value_in_units_that_are_named(problem):
     stresses = dict.fromkeys(("critical_load", "critical_stress", "first_instability"), "Pa")
     assert units == stresses | {"critical_position": "m", "sample": "1"}
     assert all(variable.attrs["long_name"] for variable in result.variables.values())
+
+
+def test_periodic_variance_is_that_of_the_grid(problem, make_strength):
+    """The covariance matrix of the nodes, averaged by the weights of nucleation_stress itself."""
+    strength = make_strength(0.5, mean_mode=True)
+    c = strength.correlation(problem.interface)
+    weights = st.theory.nucleation_stress(problem, 1e6 + np.eye(256))[:, 0] - 1e6
+    matrix = c[(np.arange(256)[:, None] - np.arange(256)[None, :]) % 256]
+    found = nucleation_statistics(problem, strength)
+    # 1e6 + 1 keeps ten digits of the one.
+    assert found.variance_ratio == pytest.approx(weights @ matrix @ weights, rel=1e-8)
+    assert found.mean == pytest.approx(strength.mean, rel=1e-14)
+
+
+def test_friction_coefficients_are_taken_times_the_pressure(problem):
+    """0.22 was taken for 0.22 Pa."""
+    pressed = dataclasses.replace(problem, load=st.Load(normal_pressure=2e6))
+    in_pascals, coefficient = (
+        st.RandomField(
+            st.Beta(alpha=2.0, beta=3.0, low=low, high=3.0 * low),
+            st.PowerLawSpectrum(correlation_length=5e-3),
+            of=of,
+        )
+        for low, of in ((0.4e6, None), (0.2, "friction_coefficient"))
+    )
+    found, expected = (nucleation_statistics(pressed, f) for f in (coefficient, in_pascals))
+    assert found.mean == pytest.approx(expected.mean, rel=1e-12)
+    assert found.variance == pytest.approx(expected.variance, rel=1e-12)
+    varying = make_problem(load=st.Load(normal_pressure=np.linspace(1e6, 2e6, 256)))
+    with pytest.raises(st.InputError, match=r"load\.normal_pressure: varies"):
+        nucleation_statistics(varying, coefficient)
+
+
+def test_uniform_load_and_initial_stress_scale(problem, make_strength):
+    """tau_n = (<g, tau_p> - tau_i)/p."""
+    loaded = dataclasses.replace(problem, load=st.Load(profile=2.0, initial_stress=1e5))
+    plain = nucleation_statistics(problem, make_strength())
+    found = nucleation_statistics(loaded, make_strength())
+    assert found.mean == pytest.approx((plain.mean - 1e5) / 2.0)
+    assert found.variance == pytest.approx(plain.variance / 4.0)

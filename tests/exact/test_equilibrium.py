@@ -2,137 +2,23 @@
 
 import numpy as np
 import pytest
-import scipy.linalg
 from oracles import symbol_of, times
 from setups import beta_strength, exact_onset, make_problem, turns
 
 import stiction as st
 from stiction.elasticity.line import (
-    circular_entries,
     stiffness_column,
-    widths_between,
-    window_mode,
 )
-from stiction.elasticity.stiffness import apply_circular
 from stiction.methods.equilibrium.dense.cholesky import (
-    append,
-    back_substitute,
-    factor_inside,
     make_workspace,
-    raise_diagonal,
-    row_start,
-    substitute,
 )
 from stiction.methods.equilibrium.dense.linear_program import certificate
 from stiction.methods.equilibrium.dense.program import DenseProgram
-from stiction.methods.equilibrium.dense.runaway import Runs, block_factor, unstoppable_length
+from stiction.methods.equilibrium.dense.runaway import Runs, unstoppable_length
 from stiction.methods.equilibrium.patches import count_patches, main_patch
 from stiction.methods.equilibrium.sample import LINEAR, make_sample, pieces_of, sample_of
 
 COLUMN = stiffness_column(256, 0.1, 1e9)
-
-
-def test_closed_form_of_the_stiffness_and_sparse_products(problem):
-    symbol = symbol_of(problem)
-    column = stiffness_column(256, 0.1, problem.effective_modulus)
-    # Both have a few units of round-off in sums of 256 terms.
-    np.testing.assert_allclose(column, times(symbol, np.eye(256)[0]), atol=1e-14 * column[0])
-    rng = np.random.default_rng(1)
-    members, values = rng.choice(256, 77, replace=False), rng.standard_normal(77)
-    field, result = np.zeros(256), np.empty(256)
-    field[members] = values
-    apply_circular(circular_entries(column), members, 77, values, np.empty((2, 128)), result)
-    np.testing.assert_allclose(result, times(symbol, field), atol=1e-13 * column[0])
-
-
-def growing_factor(nodes, column, diagonal, groups):
-    """The factor of A on these nodes, appended group by group, and how many are in it."""
-    workspace = make_workspace(circular_entries(column), column.size)
-    workspace.diagonal[:] = diagonal
-    size = 0
-    for group in groups:
-        workspace.order[:group] = nodes[size : size + group]
-        size = append(workspace, size, group)
-    return workspace.factor, size
-
-
-def as_matrix(factor, size):
-    rows = [factor[row_start(r) : row_start(r) + r + 1] for r in range(size)]
-    return np.array([np.pad(row, (0, size - row.size)) for row in rows])
-
-
-def some_nodes(seed):
-    """41 nodes in random order, and K on them."""
-    nodes = np.random.default_rng(seed).permutation(256)[:41]
-    return nodes, COLUMN[np.abs(nodes[:, None] - nodes)]
-
-
-def assert_factor(factor, size, matrix, tolerance):
-    reference = np.linalg.cholesky(matrix)
-    close = tolerance * reference.max()
-    np.testing.assert_allclose(as_matrix(factor, size), reference, atol=close)
-
-
-@pytest.mark.parametrize("groups", [[41], [1] * 41, [5, 17, 2, 17]])
-def test_growing_factor_is_the_cholesky_factor(groups):
-    nodes, matrix = some_nodes(2)
-    factor, size = growing_factor(nodes, COLUMN, COLUMN[0], groups)
-    assert_factor(factor, size, matrix, 1e-12)
-    solution = np.ones(size)
-    substitute(factor, 0, size, solution)
-    back_substitute(factor, size, solution)
-    # The condition number is below 100, so that 1e-12 is generous.
-    np.testing.assert_allclose(matrix @ solution, 1.0, atol=1e-12)
-
-
-def test_factor_of_a_run_of_nodes():
-    assert_factor(block_factor(COLUMN, 60), 60, scipy.linalg.toeplitz(COLUMN[:60]), 1e-13)
-
-
-@pytest.mark.parametrize("position", [0, 17, 40])
-def test_factor_of_a_matrix_with_a_raised_diagonal_entry(position):
-    nodes, matrix = some_nodes(3)
-    factor, _ = growing_factor(nodes, COLUMN, COLUMN[0], [41])
-    raise_diagonal(factor, 41, position, 0.3 * COLUMN[0], np.empty((2, 41)))
-    matrix[position, position] += 0.3 * COLUMN[0]
-    # Rotations are as stable as the factorisation itself.
-    assert_factor(factor, 41, matrix, 1e-12)
-
-
-def test_factor_of_a_crack_that_grows_keeps_rows_that_stand():
-    """Nodes that weaken no more come first; another rate, or another node, is a row made anew."""
-    rng = np.random.default_rng(5)
-    workspace = make_workspace(circular_entries(COLUMN), COLUMN.size)
-    workspace.inside[:] = False
-    workspace.diagonal[:] = 0.8 * COLUMN[0]
-    nodes = rng.permutation(256)[:60]
-    for slipping, residual, changed in (
-        (30, 0, 0.8),
-        (41, 17, 0.7),
-        (50, 23, 0.9),
-        (45, 23, 0.9),
-    ):
-        workspace.diagonal[nodes[residual:]] = changed * COLUMN[0]
-        workspace.diagonal[nodes[:residual]] = COLUMN[0]
-        workspace.inside[:] = False
-        workspace.inside[nodes[:slipping]] = True
-        assert factor_inside(workspace) == slipping
-        members = workspace.members[:slipping]
-        assert set(members) == set(nodes[:slipping])
-        assert set(members[:residual]) == set(nodes[:residual])
-        matrix = COLUMN[np.abs(members[:, None] - members)]
-        np.fill_diagonal(matrix, workspace.diagonal[members])
-        assert_factor(workspace.factor, slipping, matrix, 1e-12)
-
-
-def test_factor_stops_at_the_node_that_makes_the_matrix_singular():
-    nodes = 256
-    rate = 12.0  # in units of (G*/2)(2 pi/L)
-    (width,) = widths_between(nodes, rate, rate)
-    assert window_mode(nodes, width)[0] <= rate < window_mode(nodes, width - 1)[0]
-    column = stiffness_column(nodes, np.pi, 1.0)
-    _, size = growing_factor(np.arange(nodes), column, column[0] - rate, [nodes])
-    assert size == width - 1
 
 
 def test_uniform_strength_holds_until_every_node_is_at_it(problem):
@@ -143,9 +29,8 @@ def test_uniform_strength_holds_until_every_node_is_at_it(problem):
     assert not onset.residual_reached.item()
 
 
-@pytest.mark.parametrize("ratio", [0.25, 0.5, 1.0, 2.0])
-def test_conditions_of_optimality(problem, make_strength, ratio):
-    tau_p = make_strength(ratio).sample(problem.interface, samples=20, seed=3)
+def test_conditions_of_optimality(problem, make_strength):
+    tau_p = make_strength(0.25).sample(problem.interface, samples=20, seed=3)
     onset = exact_onset(problem, tau_p, sensitivity=True, slip=True)
     rate, symbol = problem.friction.weakening_rate, symbol_of(problem)
     for sample in range(20):
@@ -166,7 +51,7 @@ def test_conditions_of_optimality(problem, make_strength, ratio):
 def test_first_bound_is_a_bound(problem, make_strength):
     """A y <= 0 for the window chosen, where the weakening rate varies."""
     program, symbol = DenseProgram(problem), symbol_of(problem)
-    tau_p = make_strength(0.5).sample(problem.interface, samples=50, seed=6)
+    tau_p = make_strength(0.5).sample(problem.interface, samples=18, seed=6)
     for number, excess in enumerate(tau_p):
         rate = 0.4e12 * (1.0 + 0.6 * np.sin((number % 9 + 1) * turns(256)))
         sample = make_sample(excess, np.zeros(256), np.ones(256), rate, LINEAR)
@@ -248,16 +133,6 @@ def slope(problem, strength, change):
     both = np.array([strength + change, strength - change])
     above, below = exact_onset(problem, both).first_instability.values
     return 0.5 * (above - below)
-
-
-def test_sensitivity_is_the_gradient(problem, make_strength):
-    tau_p = make_strength(0.25).sample(problem.interface, samples=3, seed=5)
-    rng = np.random.default_rng(0)
-    found = exact_onset(problem, tau_p, sensitivity=True).sensitivity.values
-    for profile, y in zip(tau_p, found, strict=True):
-        change = rng.standard_normal(256) * (y > 0.0)
-        # The onset is piecewise linear in the strength.
-        assert slope(problem, profile, change) == pytest.approx(y @ change, abs=1e-6)
 
 
 def test_sensitivity_where_nodes_are_at_the_residual(wide):

@@ -17,12 +17,6 @@ def window_of(points, *options, spacing=SPACING):
     return RecordWindow((spacing,), np.ones(points, dtype=bool), *options)
 
 
-def model_of(name, parameters, **given):
-    """A family's spectrum at some values of its parameters, the first of which is the scale."""
-    family = SpectrumFamily(name, given, 1.0, 0.0, (1e-4, 1.0))
-    return family.model(np.log(parameters[: len(family.free)]), np.array([0.0, 1.0]))
-
-
 def by_brute_force(window, covariance):
     """E |u_k y|^2 with u = P (h exp(-ikx)), from the whole covariance matrix, (*half)."""
     known = window.measured.ravel()
@@ -35,8 +29,7 @@ def by_brute_force(window, covariance):
     return found.reshape(window.white.shape)
 
 
-@pytest.mark.parametrize("degree", [0, 1, 3])
-@pytest.mark.parametrize("gap", [slice(0, 0), slice(30, 40)])
+@pytest.mark.parametrize(("degree", "gap"), [(0, slice(0, 0)), (3, slice(30, 40))])
 def test_expectation_of_a_line(degree, gap):
     at, measured = np.arange(96), np.ones(96, dtype=bool)
     measured[gap] = False
@@ -72,28 +65,10 @@ def test_expectation_and_trend_of_a_map():
     np.testing.assert_allclose(powers[1:], [powers[0]] * 2, rtol=1e-8, atol=1e-12)
 
 
-def test_the_end_of_a_spectrum_is_seen_only_if_it_is_given():
-    """A long correlation whose usual truncation lies among the wavenumbers of the record.
-
-    A rough spectrum falls as (k xi_0)^-2 there: twice the correlation length is a constant factor
-    and nothing else, unless it moves the truncation, which then tells the correlation length.
-    """
-    whole, cut = (
-        np.divide(*(
-            model_of("exponential", [1.0, length], **given).signal(window_of(128))[20:-1]
-            for length in (6.4e-3, 3.2e-3)
-        ))
-        for given in ({}, {"truncation": 10.0})
-    )  # fmt: skip
-    # k xi_0 is 31 at the lowest of these wavenumbers; to that come leaks of the taper.
-    np.testing.assert_allclose(whole / whole.mean(), 1.0, atol=0.01)
-    assert cut.min() < 0.1 * cut.max()
-
-
-@pytest.mark.parametrize("name", ["exponential", "power_law"])
-def test_a_spectrum_whose_end_is_not_given_is_whole(name):
+def test_a_spectrum_whose_end_is_not_given_is_whole():
     """What its usual truncation leaves out, 1 % of a rough one, would be taken for noise."""
-    model, window = model_of(name, [1.0, 1e-3, 0.5]), window_of(512)
+    family, window = SpectrumFamily("exponential", {}, 1.0, 0.0, (1e-4, 1.0)), window_of(512)
+    model = family.model(np.log([1.0, 1e-3]), np.array([0.0, 1.0]))
     rho = window.correlation(model.power(window))[1:64]
     exact = model.spectrum.untruncated_correlation(SPACING * np.arange(1, 64))
     np.testing.assert_allclose(rho, exact, atol=5e-4)
@@ -125,10 +100,10 @@ def test_a_map_has_the_correlation_of_the_plane():
 def test_simulated_records_have_the_expectation():
     window, rng = window_of(128, 1), np.random.default_rng(0)
     power = window.power(SPECTRUM)
-    records = [window.periodogram(window.sample(power, rng)) for _ in range(4000)]
+    records = [window.periodogram(window.sample(power, rng)) for _ in range(2000)]
     ratio = np.mean(records, axis=0)[1:] / window.expectation(window.correlation(power))[1:]
-    # Each is a mean of 4,000 exponential numbers: 1.6 %; the largest of 64 reaches 3.5 times that.
-    assert np.abs(ratio - 1.0).max() < 0.06
+    # Each is a mean of 2,000 exponential numbers: 2.2 %; the largest of 64 reaches 3.5 times that.
+    assert np.abs(ratio - 1.0).max() < 0.08
 
 
 GAP = np.ones(64, dtype=bool)
@@ -196,7 +171,7 @@ def test_the_likelihood_of_many_records_is_the_sum_of_theirs():
     assert Whittle(family, SHARES, observed).value(at)[0] == pytest.approx(total, rel=1e-12)
 
 
-@pytest.mark.parametrize("window", [*CROOKED, MAP], ids=["gap", "line", "map"])
+@pytest.mark.parametrize("window", [CROOKED[0], MAP], ids=["gap", "map"])
 def test_bands_are_means_over_thirds_of_an_octave(window):
     """Of wavenumber, periodogram and expectation, one band after the other; not of the mean."""
     rng, shape = np.random.default_rng(4), window.white.shape

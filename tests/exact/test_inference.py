@@ -21,8 +21,6 @@ from stiction.inference.likelihood import (
 from stiction.inference.prior import make_prior
 from stiction.inference.scaling import find_scaling
 
-pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
-
 PROBLEM = st.paper.problem(nodes=256)
 H_N = PROBLEM.nucleation_length
 STRENGTH = st.paper.strength(PROBLEM, correlation_ratio=0.6)
@@ -69,13 +67,11 @@ COEFFICIENTS = dataclasses.replace(
 )
 
 SCALING = {
-    "bounds": (PROBLEM, STRENGTH, LOCAL, LOW, 1),
     "both bounds": (PROBLEM, STRENGTH, LOCAL, THREE, 2),
     "loc and scale": (
         PROBLEM, with_marginal(scipy.stats.lognorm(0.3, loc=0.3e6, scale=0.5e6)), LOCAL,
         {"marginal.loc": (0.1e6, 0.5e6), "marginal.scale": (0.3e6, 0.9e6)}, 2,
     ),
-    "residual strength, local": (WITH_RESIDUAL, STRENGTH, LOCAL, THREE, 2),
     "uniform initial stress, local": (
         with_load(initial_stress=0.1e6), STRENGTH, LOCAL, THREE, 2,
     ),
@@ -116,7 +112,6 @@ def test_parameters_scale_every_onset(name):
 
 NOT_SCALING = {
     "critical slip": (with_friction(critical_slip=2e-6), STRENGTH, EXACT, THREE),
-    "fracture energy": (with_friction(fracture_energy=1.0), STRENGTH, EXACT, THREE),
     "shift by equilibrium": (PROBLEM, STRENGTH, EXACT, LOW),
     "residual strength by equilibrium": (
         WITH_RESIDUAL, WEIBULL, EXACT, {"marginal.scale": (0.8e6, 2e6)},
@@ -127,9 +122,6 @@ NOT_SCALING = {
         {"marginal.scale": (0.8e6, 2e6)},
     ),
     "shift of coefficients under a pressure that varies": (UNEVEN, COEFFICIENTS, LOCAL, SMALL),
-    "gradient load": (
-        with_load(profile=st.GradientLoad(amplitude=0.4)), STRENGTH, LOCAL, LOW,
-    ),
     "normal pressure": (
         PRESSED, COEFFICIENTS, LOCAL, SMALL | {"problem.load.normal_pressure": (1e6, 2e6)},
     ),
@@ -144,15 +136,6 @@ def test_where_scaling_does_not_hold_it_is_not_used(name):
     assert scaling.keys == ()
 
 
-def test_a_load_profile_really_breaks_the_scaling():
-    """The test above would be met by never scaling: here a shift changes onsets otherwise."""
-    prior = make_prior(*NOT_SCALING["load profile"][:2], {"marginal.low": (0.4e6, 0.6e6)})
-    low, high = onsets(prior, [[0.4e6], [0.6e6]])
-    stretch = (1.66e6 - 0.6e6) / (1.66e6 - 0.4e6)
-    scaled = 0.6e6 + stretch * (low - 0.4e6)
-    assert np.abs(high / scaled - 1.0).max() > 0.01
-
-
 def log_densities_at(samples, points, error=0.0, bound=-np.inf):
     found, out = tabulate(samples[None, :], np.array([bound])), np.empty((1, points.size))
     nodes, weights, same = np.zeros((1, 1), dtype=np.int64), np.ones((1, 1)), [[0.0], [1.0]]
@@ -164,7 +147,7 @@ def log_densities_at(samples, points, error=0.0, bound=-np.inf):
 EVEN = (np.arange(4000) + 0.5) / 4000
 
 
-@pytest.mark.parametrize("error", [0.0, 0.1, 2.0])
+@pytest.mark.parametrize("error", [0.0, 2.0])
 def test_density_of_a_normal_sample(error):
     points = np.linspace(-8.0, 8.0, 1601)
     found = np.exp(log_densities_at(3.0 + scipy.stats.norm.ppf(EVEN), 3.0 + points, error))
@@ -183,7 +166,7 @@ def test_density_far_out_falls_and_stays_finite():
 
 @pytest.mark.parametrize(
     ("shape", "error", "most"),
-    [(1.5, 0.0, 0.03), (4.0, 0.0, 0.01), (4.0, 0.6, 0.01), (1.5, 0.2, 0.04), (1.5, 3.0, 0.01)],
+    [(1.5, 0.0, 0.03), (4.0, 0.6, 0.01), (1.5, 0.2, 0.04)],
 )
 def test_density_above_a_bound(shape, error, most):
     """Gamma distributions, one of which begins steeply at its bound, with a load cell's error."""
@@ -234,10 +217,9 @@ def test_specimens_of_two_lengths_have_samples_of_their_own():
 ONE = np.zeros((1, 1), dtype=np.int64), np.ones((1, 1))
 
 
-@pytest.mark.parametrize("alike", [0.9, 0.99])
-def test_onsets_moved_to_another_method_are_worth_what_they_say(alike):
+def test_onsets_moved_to_another_method_are_worth_what_they_say():
     """The scatter of their mean over many campaigns, in a unit of their own."""
-    rng, means = np.random.default_rng(5), []
+    rng, means, alike = np.random.default_rng(5), [], 0.9
     for _ in range(400):
         local = rng.standard_normal((1, 1000))
         rest = rng.standard_normal((1, 100))
@@ -273,16 +255,9 @@ def test_grid_against_a_sum_by_hand():
     assert np.quantile(draws, [0.05, 0.5, 0.95]) == pytest.approx(exact, abs=3e-3)
 
 
-@pytest.mark.parametrize(
-    "distribution",
-    [
-        scipy.stats.lognorm(0.4, scale=H_N),
-        scipy.stats.gamma(9.0, scale=H_N / 9.0),  # scipy has no density at its infinite end
-        scipy.stats.weibull_min(6.0, scale=H_N),
-    ],
-)
-def test_a_prior_that_begins_where_its_density_is_zero(distribution):
+def test_a_prior_that_begins_where_its_density_is_zero():
     """A length of zero is impossible, and so unlikely that it need not be simulated."""
+    distribution = scipy.stats.gamma(9.0, scale=H_N / 9.0)  # no density at its infinite end
     prior = make_prior(PROBLEM, STRENGTH, {"correlation_length": distribution})
     low, high = prior.ends[:, 0]
     assert 0.1 * H_N < low < high < 10.0 * H_N

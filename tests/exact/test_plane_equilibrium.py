@@ -6,11 +6,9 @@ from planes import Lattice, moduli
 from setups import RATE, exact_onset, make_problem, repeated, turns
 
 import stiction as st
-from stiction.elasticity.operator import make_operator, product
 from stiction.elasticity.protocol import HalfSpaces
 from stiction.methods.criterion.windows import ellipse_window
 from stiction.methods.equilibrium.patches import labelled_patches, patch_of
-from stiction.methods.equilibrium.transforms.growing_patch import window_around
 from stiction.methods.equilibrium.transforms.plane import doubled, halved, plane_onset
 
 NODES, LENGTH = 128, 0.04
@@ -21,8 +19,9 @@ UNEVEN = {
 
 
 @pytest.mark.filterwarnings("ignore::stiction.UnitWarning")
-@pytest.mark.parametrize("mode", ["II", "III"])
-@pytest.mark.parametrize(("across", "load"), [(8, UNEVEN), (8, {}), (12, {})])
+@pytest.mark.parametrize(
+    ("mode", "across", "load"), [("II", 8, UNEVEN), ("III", 12, UNEVEN), ("III", 8, {})]
+)
 def test_strength_along_one_axis_equals_the_line(mode, across, load):
     axis, turn = (0, 1) if mode == "II" else (1, -1)
     line = make_problem(NODES, LENGTH, load=st.Load(**load), mode=mode)
@@ -60,30 +59,6 @@ def test_uniform_strength_slides_at_it():
     assert found["certificate_gap"].item() == 0.0
     assert found["critical_patch_area"].item() == pytest.approx(0.02 * 0.03)
     assert found["critical_patch_extent"].values[0] == pytest.approx((0.02, 0.03))
-
-
-def test_a_single_dip_is_where_the_onset_is():
-    lengths = (0.03, 0.02)
-    plane = make_problem((128, 96), lengths)
-    centre = 0.029, 0.004  # near a border, so that the patch lies on both sides of it
-    x, y = (
-        (plane.interface.coordinates[dim] - c + 0.5 * length) % length - 0.5 * length
-        for dim, c, length in zip("xy", centre, lengths, strict=True)
-    )
-    strength = 1e6 - 3e5 * np.exp(-(x[:, None] ** 2 + y[None, :] ** 2) / 4e-3**2)
-    found = exact_onset(plane, strength, slip=True)
-    # A tenth of a spacing.
-    assert found["critical_position"].values[0] == pytest.approx(centre, abs=2e-5)
-    assert found["slip_patches"].item() == 1
-    slips = found["slip"].values[0] > 0.0
-    whole = patch_of(slips, found["slip"].values[0], plane.interface.spacings)
-    # y is below a tenth of its largest value in the outermost nodes only: one or two on each side.
-    shorter = np.array(whole.extents) - found["critical_patch_extent"].values[0]
-    assert (shorter >= 0.0).all()
-    assert (shorter <= 4.0 * np.array(plane.interface.spacings)).all()
-    assert 0.8 * whole.area < found["critical_patch_area"].item() <= whole.area
-    # Mode II along x is the stiffer one: the patch is longer there.
-    assert np.diff(found["critical_patch_extent"].values[0]).item() < 0.0
 
 
 def test_patches_are_connected_by_edges_and_across_the_borders():
@@ -133,54 +108,6 @@ def test_critical_disc_at_zero_poisson_ratio():
     assert errors[2] < 0.6 * errors[1] < 0.36 * errors[0]
 
 
-def test_symbol_of_single_waves():
-    shape = (32, 24)
-    operator = make_operator(
-        HalfSpaces((2.0, 3.0), moduli(1e9, 0.25)).symbol(shape), 1e8, shape
-    )
-    x = np.arange(32)[:, None] / 32 * 2.0 + np.zeros(shape)
-    y = np.arange(24)[None, :] / 24 * 3.0 + np.zeros(shape)
-    for kx, ky, wave in ((2, 0, np.cos(2 * np.pi * x)), (0, 1, np.sin(2 * np.pi * y / 3.0))):
-        k = 2.0 * np.pi * np.hypot(kx / 2.0, ky / 3.0)
-        expected = 0.5e9 * k / (0.75 if kx else 1.0) - 1e8
-        out = np.empty(wave.size)
-        product(operator, wave.flatten(), out)
-        assert np.abs(out - expected * wave.flatten()).max() < 1e-12 * expected
-
-
-def test_a_window_is_a_smaller_plane_around_a_patch():
-    shape, small = (64, 48), (16, 24)
-    rate = 1e8 * (1.0 + np.arange(64 * 48).reshape(shape))
-    operator = make_operator(
-        HalfSpaces((2.0, 3.0), moduli(1e9, 0.25)).symbol(shape), rate, shape
-    )
-    growth = np.zeros(shape)
-    growth[30, 40] = 0.9e-2  # too little to be part of the patch
-    growth[np.ix_([61, 62, 63, 0, 1], range(5, 15))] = 1.0
-    nodes, window = window_around(operator, growth.reshape(-1), 2.0)
-    # 2 times 5 and 10 nodes, at least 16: 64 over 4 and 48 over 2, around the middle.
-    assert window.transform.shape == small
-    expected = HalfSpaces((0.5, 1.5), moduli(1e9, 0.25)).symbol(small).reshape(-1)
-    np.testing.assert_allclose(window.symbol, expected, rtol=1e-14)
-    rows, columns = np.unravel_index(nodes, shape)
-    np.testing.assert_array_equal(rows.reshape(small)[:, 3], np.arange(56, 72) % 64)
-    np.testing.assert_array_equal(columns.reshape(small)[5], np.arange(46, 70) % 48)
-    assert (window.rate == rate[rows, columns]).all()
-    np.testing.assert_array_equal(window.inverse[0], operator.inverse[0])
-    nodes, plane = window_around(operator, growth.reshape(-1), 7.0)
-    assert (nodes, plane) == (slice(None), operator)
-
-
-def test_plane_too_small_for_a_patch_slides_near_the_mean():
-    """Stiffness evens out the stress of a plane much smaller than the critical patch."""
-    one = np.ones((16, 16))
-    strength = np.random.default_rng(0).uniform(0.9e6, 1.1e6, one.shape)
-    found = plane_onset(HalfSpaces((2e-4, 2e-4), moduli(1e9, 0.33)), strength, one, RATE * one)
-    assert found.closed
-    assert found.upper == pytest.approx(strength.mean(), rel=1e-3)
-    assert found.upper <= strength.mean() * (1.0 + 1e-9)
-
-
 def test_grid_transfer_keeps_linear_and_uniform_fields():
     x = np.arange(16.0)[:, None] + np.zeros((16, 12))
     assert np.allclose(halved(x)[1:-1], x[2:-2:2, ::2], rtol=0, atol=1e-12)
@@ -188,7 +115,7 @@ def test_grid_transfer_keeps_linear_and_uniform_fields():
     assert np.all(halved(np.ones((8, 6))) == 1.0)
 
 
-@pytest.mark.parametrize("nodes", [16, 32, 128])
+@pytest.mark.parametrize("nodes", [16, 128])
 def test_onset_close_to_the_weakest_node_or_to_the_mean(nodes):
     one, plane = np.ones((nodes, nodes)), HalfSpaces((0.03, 0.03), moduli(1e9, 0.33))
     for strength in (0.7e6, 0.9e6):

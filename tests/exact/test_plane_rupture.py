@@ -21,8 +21,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::stiction.UnitWarning")
 LENGTH, NODES = 0.024, 64
 
 
-@pytest.mark.parametrize("rate", [1e7, 1e9], ids=["implicit and explicit", "explicit"])
-@pytest.mark.parametrize("mode", ["II", "III"])
+@pytest.mark.parametrize(("mode", "rate"), [("II", 1e7), ("III", 1e9)])
 def test_fields_along_one_axis_are_those_of_the_line(mode, rate):
     along, turn = (0, 1) if mode == "II" else (1, -1)
     still = 1 - along
@@ -71,7 +70,7 @@ def weights_of(grid, share):
     return np.where(np.arange(grid.poles.size) < grid.split, share, 1.0 - share) * grid.weights
 
 
-@pytest.mark.parametrize("ratio", [-0.3, 0.0, 0.25, 0.45])
+@pytest.mark.parametrize("ratio", [-0.3, 0.45])
 def test_kernels_of_wave_vectors_are_the_exact_ones(ratio):
     """a C_II + b C_III from the arcs, a = (kx/k)², at all times up to 1e5."""
     solid, medium = medium_of(ratio, (0.01, 0.006), (12, 10))
@@ -92,8 +91,9 @@ def test_kernels_of_wave_vectors_are_the_exact_ones(ratio):
         assert grid.frequency[slot] == pytest.approx(k * solid.shear_wave_speed, rel=1e-12)
 
 
-@pytest.mark.parametrize("ratio", [0.0, 0.25, 0.45])
-@pytest.mark.parametrize("lengths", [(0.01, 0.01), (0.01, 0.004)])
+@pytest.mark.parametrize(
+    ("ratio", "lengths"), [(0.0, (0.01, 0.004)), (0.45, (0.01, 0.01)), (0.45, (0.01, 0.004))]
+)
 def test_no_wave_of_the_grid_grows_at_the_largest_step(ratio, lengths):
     solid, medium = medium_of(ratio, lengths, (16, 16))
     grid = medium.grid

@@ -9,7 +9,6 @@ import scipy.stats
 from setups import exact_onset, make_problem
 
 import stiction as st
-from stiction.random.fields import lower_factor
 
 LINE = st.Interface(length=0.1, nodes=256)
 
@@ -18,13 +17,6 @@ LINE = st.Interface(length=0.1, nodes=256)
 def residual(make_strength):
     return dataclasses.replace(
         make_strength(1.0), marginal=st.Beta(alpha=2.0, beta=2.0, low=0.1e6, high=0.5e6)
-    )
-
-
-def tied(strength, residual, rho=1.0):
-    correlation = {("residual_strength", "strength"): rho}
-    return st.RandomInterface(
-        strength=strength, residual_strength=residual, correlation=correlation
     )
 
 
@@ -46,13 +38,6 @@ def test_residual_ratio_is_the_same_thing(problem, make_strength):
     own = exact_onset(make_problem(residual_ratio=0.5), tau_p)
     other = exact_onset(problem, {"strength": tau_p, "residual_strength": 0.5 * tau_p})
     assert np.array_equal(own.critical_stress, other.critical_stress)
-
-
-def test_modes_beyond_a_short_spectrum_are_drawn_for_the_longer_one(make_strength):
-    """Two spectra of different lengths under full correlation share their draws mode by mode."""
-    short, long = make_strength(0.5), make_strength(4.0)
-    found = tied(long, short).profiles(LINE, samples=2, seed=4)["residual_strength"]
-    assert np.array_equal(found, short.sample(LINE, samples=2, seed=4))
 
 
 @pytest.mark.parametrize("nodes", [16, (10, 8)], ids=["line", "plane"])
@@ -104,9 +89,3 @@ def test_fracture_energy_and_critical_slip_as_random_properties(make_strength):
     assert np.allclose(by_energy.weakening_rate, tau_p**2 / (2.0 * energy), rtol=1e-15)
     by_slip = problem.sample({"strength": tau_p, "critical_slip": slip})
     assert np.allclose(by_slip.weakening_rate, tau_p / slip, rtol=1e-15)
-
-
-def test_factor_of_a_singular_matrix():
-    matrix = np.array([[1.0, 1.0, 0.3], [1.0, 1.0, 0.3], [0.3, 0.3, 1.0]])
-    factor = lower_factor(matrix)
-    assert np.allclose(factor @ factor.T, matrix, atol=1e-15)

@@ -52,18 +52,15 @@ class Elements:
         return skfem.asm(form, self.side)
 
 
-def zero(x):
-    return 0.0 * x
-
-
 def crooked(x):
-    return np.exp(-(((x - 0.3 * LENGTH) / (0.2 * LENGTH)) ** 2)) + 0.4 * np.cos(
-        7.0 * x / LENGTH
-    )
+    x = x / LENGTH
+    return np.exp(-(((x - 0.3) / 0.2) ** 2)) + 0.4 * np.cos(7.0 * x)
 
 
-def half_slip(x):
-    return 0.5 * crooked(x)
+STUCK, STILL = {("interface", "u^1"): np.zeros_like}, {("top", "u^2"): np.zeros_like}
+SLID = {("interface", "u^1"): lambda x: 0.5 * crooked(x)}
+DX = LENGTH / NODES
+SLIP = crooked((np.arange(NODES) + 0.5) * DX)
 
 
 @pytest.fixture(params=[(0.35, "stress"), (0.45, "strain")], ids=lambda p: f"{p[0]}-{p[1]}")
@@ -76,35 +73,23 @@ def material(request):
 def test_a_platen(material):
     kappa, elements = material
     response = block_response(LENGTH, NODES, HEIGHT, 1.0, kappa, None)
-    dx = LENGTH / NODES
-    x = (np.arange(NODES) + 0.5) * dx
-    still = {("top", "u^2"): zero}
-    held = still | {("top", "u^1"): zero}
-    moved = elements.solve(
-        {("interface", "u^1"): zero} | still | {("top", "u^1"): np.ones_like}
-    )
-    slid = elements.solve(held | {("interface", "u^1"): half_slip})
+    moved = elements.solve(STUCK | STILL | {("top", "u^1"): np.ones_like})
+    slid = elements.solve(SLID | STILL | {("top", "u^1"): np.zeros_like})
     # Elements are too stiff, by 1e-4 with this mesh, whose corners are singular.
     assert response.drive_stiffness == pytest.approx(moved @ elements.matrix @ moved, rel=3e-4)
-    d = crooked(x)
     traction = response.drive_stiffness / LENGTH * response.shear
-    force = 0.5 * dx * traction @ d  # that holds the platen
-    energy = 0.5 * dx * d @ response.stiffness @ d + force**2 / response.drive_stiffness
+    force = 0.5 * DX * traction @ SLIP  # that holds the platen
+    energy = 0.5 * DX * SLIP @ response.stiffness @ SLIP + force**2 / response.drive_stiffness
     assert energy == pytest.approx(slid @ elements.matrix @ slid, rel=3e-4)
     assert force == pytest.approx(-(moved @ elements.matrix @ slid), rel=3e-4)
 
 
 def test_a_pusher(material):
     kappa, elements = material
-    response = block_response(LENGTH, NODES, HEIGHT, 1.0, kappa, PUSHES)
-    dx = LENGTH / NODES
-    x = (np.arange(NODES) + 0.5) * dx
-    still, push = {("top", "u^2"): zero}, elements.push()
-    pushed = elements.solve({("interface", "u^1"): zero} | still, push)
-    slid = elements.solve({("interface", "u^1"): half_slip} | still)
-    d = crooked(x)
+    response, push = block_response(LENGTH, NODES, HEIGHT, 1.0, kappa, PUSHES), elements.push()
+    pushed, slid = elements.solve(STUCK | STILL, push), elements.solve(SLID | STILL)
     # The displacement below a push that ends abruptly converges slowly.
     assert 1.0 / response.drive_stiffness == pytest.approx(push @ pushed, rel=1e-3)
-    energy = 0.5 * dx * d @ response.stiffness @ d
+    energy = 0.5 * DX * SLIP @ response.stiffness @ SLIP
     assert energy == pytest.approx(slid @ elements.matrix @ slid, rel=3e-4)
-    assert 0.5 * dx / LENGTH * response.shear @ d == pytest.approx(push @ slid, rel=3e-4)
+    assert 0.5 * DX / LENGTH * response.shear @ SLIP == pytest.approx(push @ slid, rel=3e-4)

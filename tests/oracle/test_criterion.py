@@ -11,14 +11,11 @@ from setups import ROUND_OFF, ensemble, exact_onset, local_onset, make_problem
 from specimens import crooked, rough
 
 import stiction as st
-from stiction.methods.criterion import eigenfunction
 
 
 # Error of a polynomial through ten nodes where the strength varies within a quarter of h_n, in
-# standard deviations of the strength (0.2 MPa); h_n is 9, 18 and 35 nodes.
-@pytest.mark.parametrize(
-    ("nodes", "rms", "largest"), [(256, 4e-3, 3e-2), (512, 5e-4, 2e-3), (1024, 4e-6, 2e-5)]
-)
+# standard deviations of the strength (0.2 MPa); h_n is 9 and 35 nodes.
+@pytest.mark.parametrize(("nodes", "rms", "largest"), [(256, 4e-3, 3e-2), (1024, 4e-6, 2e-5)])
 def test_minimum_is_that_of_the_interpolant(make_strength, nodes, rms, largest):
     """Against a grid sixteen times finer, made by padding the spectrum with zeros."""
     problem = make_problem(nodes)
@@ -43,7 +40,7 @@ def test_minimum_is_that_of_the_interpolant(make_strength, nodes, rms, largest):
     assert np.mean(distance <= 0.1 / (4.0 * nodes)) > 0.95
 
 
-@pytest.mark.parametrize("contrast", [10.0, 50.0, 200.0, 1000.0, 1e6])
+@pytest.mark.parametrize("contrast", [10.0, 1e6])
 def test_a_barrier_leaves_the_weak_stretch_beside_it_alone(contrast):
     """The patch that lets go lies where there is no barrier, so its strength does not matter."""
     problem = make_problem(384)
@@ -58,20 +55,20 @@ def test_a_barrier_leaves_the_weak_stretch_beside_it_alone(contrast):
         assert tau_n.max() <= barred.max() * (1.0 + ROUND_OFF)
 
 
-@pytest.mark.parametrize("ratio", [0.25, 0.5, 1.0, 2.0])
-def test_mean_and_variance_of_the_nucleation_stress(problem, make_strength, ratio):
+@pytest.mark.parametrize(
+    ("ratio", "share"), [(0.25, 0.264), (0.5, 0.475), (1.0, 0.726), (2.0, 0.898)]
+)
+def test_mean_and_variance_of_the_nucleation_stress(problem, make_strength, ratio, share):
     """E[tau_n] = E[tau_p]; Var from the correlation."""
-    k = 2.0 * np.pi * np.abs(np.fft.fftfreq(256, 0.1 / 256.0))
-    multiplier = eigenfunction.multiplier(k * problem.nucleation_length / 2.0)
     strength = make_strength(ratio)
+    theory = st.theory.nucleation_statistics(problem, strength)
+    assert theory.variance_ratio == pytest.approx(share, abs=0.03)  # of this length and grid
     tau_p = strength.sample(problem.interface, samples=4096, seed=3)
     tau_n = st.theory.nucleation_stress(problem, tau_p)
     for one in (tau_p[1], {"strength": tau_p[1]}):
         np.testing.assert_array_equal(st.theory.nucleation_stress(problem, one), tau_n[1])
-    spectrum = np.fft.fft(strength.correlation(problem.interface)).real / 256.0
-    variance = strength.standard_deviation**2 * np.sum(spectrum * multiplier**2)
     assert_mean(tau_n.mean(axis=1), strength.mean, errors=4.0)
-    assert_mean(((tau_n - strength.mean) ** 2).mean(axis=1), variance, errors=4.0)
+    assert_mean(((tau_n - strength.mean) ** 2).mean(axis=1), theory.variance, errors=4.0)
 
 
 def test_critical_position_is_uniform(problem, make_strength):
@@ -117,14 +114,13 @@ def test_onset_says_how_far_the_local_criterion_is_off(kind):
     assert doubts(problem, calm)[1] == []
 
 
-@pytest.mark.parametrize("mode", ["II", "III"])
 @pytest.mark.parametrize(
-    "drive",
+    ("drive", "mode"),
     [
-        st.Platen(stiffness=4e7),
-        st.Platen(stiffness=float("inf")),
-        st.Pusher(height=0.004, width=0.003, stiffness=3e6),
-        st.Pusher(height=0.005, width=0.002, side="right", stiffness=float("inf")),
+        (st.Platen(stiffness=4e7), "III"),
+        (st.Platen(stiffness=float("inf")), "II"),
+        (st.Pusher(height=0.004, width=0.003, stiffness=3e6), "II"),
+        (st.Pusher(height=0.005, width=0.002, side="right", stiffness=float("inf")), "III"),
     ],
     ids=["platen", "rigid platen", "left pusher", "right pusher"],
 )
@@ -133,21 +129,17 @@ def test_behind_a_machine_the_local_criterion_returns_a_stress_and_not_the_drive
     rate = 0.16e12 if mode == "II" else 0.3e12  # below it nodes reach their residual strength
     problem = crooked(drive=drive, mode=mode, rate=rate, residual=0.0)
     tau_p = rough(problem, 5, 12)
-    local = local_onset(problem, tau_p)
-    exact = exact_onset(problem, tau_p, slip=True)
+    local, exact = local_onset(problem, tau_p), exact_onset(problem, tau_p, slip=True)
     relief = problem.blocks.mean_relief(exact.slip.values)
     initial = problem.load.initial_stress.mean()
-    first = exact.first_instability.values - initial
-    found = local.first_instability.values - initial
+    first, found = (one.first_instability.values - initial for one in (exact, local))
     np.testing.assert_array_equal(local.critical_stress, local.first_instability)
-    area = 0.083 * 0.0071
-    np.testing.assert_allclose(local.first_instability_force, (found + initial) * area)
+    np.testing.assert_allclose(
+        local.first_instability_force, (found + initial) * 0.083 * 0.0071
+    )
     assert (local.critical_load > (first + relief) * (1.0 - 1e-9)).all()
     assert (found < local.critical_load).all()
-    off, of_drive = (
-        found.mean() / first.mean() - 1.0,
-        (local.critical_load / first - 1.0).mean(),
-    )
-    assert 0.0 < off < of_drive
+    of_drive = (local.critical_load / first - 1.0).mean()
+    assert 0.0 < found.mean() / first.mean() - 1.0 < of_drive
     if mode == "II":
         assert 0.6 < (local.critical_load.values - found).mean() / relief.mean() < 1.2

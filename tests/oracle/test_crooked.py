@@ -25,8 +25,8 @@ from stiction.methods.criterion.windows import STRETCHES
 from stiction.theory import energy_release_rate, griffith_length
 
 BOTH = pytest.mark.parametrize(
-    ("problem", "strength", "gap"),
-    [(LINE, LINE_STRENGTH, LINE_GAP), (PLANE, PLANE_STRENGTH, PLANE_GAP)],
+    ("problem", "strength"),
+    [(LINE, LINE_STRENGTH), (PLANE, PLANE_STRENGTH)],
     ids=["line", "plane"],
 )
 
@@ -45,7 +45,7 @@ def interpolated(field, shares):
 
 
 @BOTH
-def test_first_instability_of_the_linear_programme(problem, strength, gap):
+def test_first_instability_of_the_linear_programme(problem, strength):
     """Load, mean stress, coefficient, and a critical patch across the seam."""
     load, slip, _ = largest_load(problem, strength)  # good to 4e-7
     found = exact_onset(problem, strength)
@@ -121,15 +121,16 @@ def test_critical_ellipses_of_a_plane_by_dense_eigenvectors():
         assert apart(place, at * h, length) <= 0.5 * h
 
 
-@BOTH
+@pytest.mark.parametrize(
+    ("problem", "strength", "gap"),
+    [(LINE, LINE_STRENGTH, LINE_GAP), (PLANE, PLANE_STRENGTH, PLANE_GAP)],
+)
 def test_what_is_measured_elsewhere_in_other_units_lands_on_its_nodes(
     problem, strength, gap, tmp_path
 ):
     """As an array and as a table, rolled, in mm and MPa; and a gap across the seam of a line."""
-    for source in (
-        as_measured(problem.interface, strength),
-        write_table(tmp_path / "scan.csv", as_measured(problem.interface, strength)),
-    ):
+    given = as_measured(problem.interface, strength)
+    for source in (given, write_table(tmp_path / "scan.csv", given)):
         read = st.read_profile(source, interface=problem.interface)
         np.testing.assert_allclose(read.values, strength, rtol=1e-9)
     holes = as_measured(problem.interface, np.where(gap, np.nan, strength))
@@ -144,23 +145,33 @@ def test_what_is_measured_elsewhere_in_other_units_lands_on_its_nodes(
     assert np.all(filled.values[gap] > strength[gap])
 
 
-def test_moving_the_origin_moves_places_only():
-    """Everything along x, rolled by 30 nodes."""
-    moved = {
-        name: np.roll(getattr(LINE.load, name), 30)
-        for name in ("profile", "initial_stress", "normal_pressure")
-    }
-    friction = dataclasses.replace(
-        LINE.friction, residual_strength=np.roll(LINE.friction.residual_strength, 30)
-    )
-    other = dataclasses.replace(LINE, load=st.Load(**moved), friction=friction)
-    for onset in (local_onset, exact_onset):
-        here, there = onset(LINE, LINE_STRENGTH), onset(other, np.roll(LINE_STRENGTH, 30))
-        for name in ("critical_load", "critical_stress", "friction_coefficient"):
-            assert there[name].item() == pytest.approx(here[name].item(), rel=1e-9)
-        for name in {"critical_position", "sliding_position"} & set(here):
-            place = (here[name].item() + 30 * LINE.interface.spacing) % 0.037
-            assert apart(there[name].item(), place, 0.037) < 1e-6
+@BOTH
+def test_moving_and_mirroring_everything_moves_places_only(problem, strength):
+    """By seven nodes along x, and about the first node of each axis."""
+    line = problem.interface
+    moves = [(lambda field: np.roll(field, 7, 0), 1.0, np.eye(len(line.shape))[0] * 7.0)]
+    for axis in range(len(line.shape)):
+        sign = 1.0 - 2.0 * np.eye(len(line.shape))[axis]
+        moves.append((lambda f, axis=axis: np.roll(np.flip(f, axis), 1, axis), sign, 0.0))
+    names = "profile", "initial_stress", "normal_pressure"
+    alike = "critical_patch_area", "critical_patch_extent", "slip_patches", "arrested_events"
+    for change, sign, nodes in moves:
+        load = st.Load(**{name: change(getattr(problem.load, name)) for name in names})
+        residual = change(problem.friction.residual_strength)
+        friction = dataclasses.replace(problem.friction, residual_strength=residual)
+        other = dataclasses.replace(problem, load=load, friction=friction)
+        for onset, options in ((local_onset, {}), (exact_onset, {"gap": 1e-10})):
+            here = onset(problem, strength, **options)
+            there = onset(other, change(strength), **options)
+            for name in ("critical_load", "critical_stress", "friction_coefficient"):
+                assert there[name].item() == pytest.approx(here[name].item(), rel=1e-9)
+            for name in {*alike} & {*here}:
+                assert there[name].values == pytest.approx(here[name].values, rel=1e-9)
+            for name in {"critical_position", "sliding_position"} & {*here}:
+                place = sign * here[name].values[0] + nodes * np.array(line.spacings)
+                off = apart(there[name].values[0], place, np.array(line.lengths))
+                # The multiplier goes with the root of the gap.
+                assert np.all(off < 1e-2 * np.array(line.spacings))
 
 
 @pytest.mark.parametrize(("problem", "radius"), [(LINE, 3.2e-3), (PLANE, 4.6e-3)])
@@ -221,20 +232,19 @@ def test_cracks_across_the_seam_under_an_uneven_load():
         assert found == pytest.approx(lengths[end] - 23e-6, abs=26e-6)
 
 
-def doubled_profile(problem):
-    """Twice the profile halves the load, and nothing else."""
-    load = dataclasses.replace(problem.load, profile=2.0 * problem.load.profile)
-    return dataclasses.replace(problem, load=load)
-
-
 @BOTH
-def test_bounds_and_gradient_have_no_unit_of_load(problem, strength, gap):
+def test_bounds_and_gradient_have_no_unit_of_load(problem, strength):
+    """Twice the profile halves the load, and nothing else."""
     friction = dataclasses.replace(problem.friction, residual_strength=0.0)
-    problem = dataclasses.replace(problem, friction=friction)
     one, other = (
-        exact_onset(each, strength, gap=1e-3, sensitivity=True)
-        for each in (problem, doubled_profile(problem))
-    )
+        exact_onset(
+            dataclasses.replace(problem, friction=friction, load=load), strength, gap=1e-3,
+            sensitivity=True,
+        )
+        for load in (
+            problem.load, dataclasses.replace(problem.load, profile=2.0 * problem.load.profile)
+        )
+    )  # fmt: skip
     for name in ("critical_stress", "first_instability", "sensitivity", "certificate_gap"):
         close = {"rtol": 1e-6, "atol": 1e-9 * one[name].values.max()}
         np.testing.assert_allclose(other[name], one[name], **close)

@@ -1,12 +1,13 @@
-"""Slow rupture against the exact equilibrium onset: of lines by HiGHS, of planes by equilibrium."""
+"""Ruptures against exact equilibrium at slow rates, and against the full history of their steps."""
 
 import numpy as np
 import pytest
 from oracles import largest_load
 from ruptures import run_of
-from setups import LENGTH, beta_strength, exact_onset, make_problem, turns
+from setups import LENGTH, beta_strength, exact_onset, make_problem
 
 import stiction as st
+from stiction.elasticity.memory_kernels import arc_quadrature
 
 PROBLEM = st.paper.problem(nodes=256)
 
@@ -44,41 +45,6 @@ def test_effect_of_the_loading_rate_is_smooth_and_vanishes():
     assert excess[3] < 2e-4
 
 
-def test_a_run_from_an_equilibrium_finds_the_same_onset():
-    strength = fields(0.5, 1)[0]
-    exact, slip, _ = largest_load(PROBLEM, strength)
-    method = st.Rupture(loading_rate=1e5, stop="onset")
-    # The slip of the onset, scaled back, is in equilibrium at no load; so take the load of the
-    # onset less a little, where that slip holds still.
-    run = run_of(PROBLEM, strength, method)
-    state = run.start(exact * (1.0 - 1e-6) / 1e5, slip * (1.0 - 1e-9))
-    assert run.follow(state, method.max_steps)[0] == "onset"
-    assert float(state.now["onset_stress"]) == pytest.approx(exact, rel=CLOSE)
-    assert int(state.now["implicit_steps"]) > 0
-
-
-@pytest.mark.parametrize(("mode", "ratio"), [("II", 0.0), ("II", 0.45), ("III", 0.25)])
-def test_everything_may_vary_along_the_interface(mode, ratio):
-    """tau_p, tau_r, W, load profile and initial stress, on a grid that is no power of two."""
-    rng, angle = np.random.default_rng(200), turns(200)
-    solid = st.Solid(shear_modulus=1e9, poisson_ratio=ratio, density=1170.0)
-
-    def varied(mean, spread, waves):
-        terms = [rng.standard_normal() * np.cos(j * angle + j * j) for j in range(1, waves)]
-        return mean + spread * np.tanh(sum(terms) / np.sqrt(waves / 2))
-
-    rate, profile = varied(2.5e11, 5e10, 6), varied(1.0, 0.2, 5)
-    initial, strength = varied(0.0, 1e5, 8), varied(1.2e6, 4e5, 20)
-    problem = make_problem(
-        200, solid=solid, mode=mode, weakening_rate=rate,
-        residual_strength=varied(2e5, 5e4, 5),
-        load=st.Load(profile=profile, initial_stress=initial),
-    )  # fmt: skip
-    found = rupture(problem, strength)["first_instability"][0]
-    load = (found - initial.mean()) / profile.mean()
-    assert load == pytest.approx(largest_load(problem, strength)[0], rel=CLOSE)
-
-
 def test_an_arrested_event_is_the_one_that_equilibrium_finds():
     """A rare field of the paper's interface whose first instability stops before it has run far."""
     problem = st.paper.problem(nodes=1024)
@@ -112,10 +78,9 @@ def test_arrested_events_are_those_of_equilibrium_whatever_the_rate(rate):
     assert found["arrested_events"].tolist() == expected == [1, 1]
 
 
-@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 @pytest.mark.parametrize(
     ("nodes", "lengths", "ratio", "samples"),
-    [(48, 5, 0.5, 2), (48, 5, 1.0, 2), pytest.param(80, 8, 0.5, 20, marks=pytest.mark.slow)],
+    [(48, 5, 0.5, 2), pytest.param(80, 8, 0.5, 20, marks=pytest.mark.slow)],
 )
 def test_first_instability_of_a_plane_at_a_slow_rate(nodes, lengths, ratio, samples):
     problem = make_problem((nodes, nodes), (lengths * LENGTH, lengths * LENGTH))
@@ -128,3 +93,56 @@ def test_first_instability_of_a_plane_at_a_slow_rate(nodes, lengths, ratio, samp
     apart = np.abs(slow.critical_position - exact.critical_position).max(axis=1).values
     # The same patch, perhaps around the period.
     assert np.all((apart < LENGTH) | (apart > (lengths - 1) * LENGTH))
+
+
+def direct_convolution(run, start, steps):
+    """Plain numpy: predictor-corrector with the whole history and the 280-term kernel."""
+    medium, nodes = run.medium, run.setting.nodes
+    n, h, z, pace = medium.interface.size, medium.step, medium.impedance, medium.grid.frequency
+    s, w = arc_quadrature("II", np.sqrt(2.0 / 0.67))
+    sk = np.multiply.outer(s, pace)
+    # int over step m of C(k c_s t) dt, exactly.
+    first = w[:, None] * np.expm1(sk * h) / sk
+    weights = np.empty((steps + 1, pace.size))
+    for m in range(steps + 1):
+        weights[m] = first.sum(axis=0).real
+        first *= np.exp(sk * h)
+    static, dynamic = medium.grid.stiffness[:, 1:]
+    slip, rate = np.zeros(n), start.rate.copy()
+    past = np.zeros((steps, pace.size), dtype=complex)
+    for i in range(steps):
+        load = run.setting.load.values[1] * (start.now["time"] + (i + 1) * h)
+        lag = np.einsum("mk,mk->k", weights[1 : i + 1], past[:i][::-1])
+
+        def moved(mean, lag=lag, load=load, slip=slip):
+            fresh = slip + h * mean
+            mean_hat, slip_hat = np.fft.rfft(mean)[1:], np.fft.rfft(fresh)[1:]
+            stress = np.fft.irfft(
+                np.r_[0.0, dynamic * (lag + weights[0] * mean_hat) - static * slip_hat], n
+            )
+            limit = np.maximum(nodes.strength - nodes.weakening * fresh, nodes.residual)
+            return fresh, np.maximum(
+                stress + load * nodes.profile + nodes.initial - limit, 0.0
+            ) / z
+
+        _, guess = moved(rate)
+        mean = 0.5 * (rate + guess)
+        slip, rate = moved(mean)
+        past[i] = np.fft.rfft(mean)[1:]
+    return slip, rate
+
+
+def test_slip_through_a_rupture_equals_that_of_the_full_history():
+    problem = make_problem(128, 0.05, solid=st.paper.problem().solid)
+    x = problem.interface.x
+    strength = 1e6 - 2e5 * np.exp(-(((x - 0.02) / 0.004) ** 2)) - 5e4 * np.cos(600.0 * x)
+    method = st.Rupture(loading_rate=3e9, implicit=False, stop="time", end_time=1.0)
+    run = run_of(problem, strength, method)
+    state = run.start(run.first_slip())
+    slip, rate = direct_convolution(run, state, 900)
+    run.advance(state, 900)
+    assert state.now["slid"] > 100  # through the rupture
+    # 1e-6 is asked for; errors of the kernel, up to 1e-6, have both signs and cancel.
+    assert np.abs(state.slip - slip).max() < 2e-7 * slip.max()
+    # Behind a steep front the slip rate shows ten times that.
+    assert np.abs(state.rate - rate).max() < 3e-5 * rate.max()

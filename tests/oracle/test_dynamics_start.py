@@ -4,16 +4,13 @@ import numpy as np
 import pytest
 from checks import assert_same
 from ruptures import CROOKED, CROOKED_STRENGTH, radiated_energy, run_of
-from setups import make_problem, turns
+from setups import make_problem
 
 import stiction as st
 from stiction.methods.dynamics import slow_start as module
 from stiction.methods.dynamics.slow_start import slow_start, static_program
 from stiction.methods.equilibrium.sample import sample_of
 
-RATES = (2e5, 2e7, 2e8)
-RATIOS = (0.25, 0.5, 1.0, 2.0)
-ARRESTED = (18, 819, 1083)  # of the samples of seed 0 at xi_0/h_n = 0.5
 PROBLEM = st.paper.problem(nodes=512)
 
 
@@ -45,9 +42,16 @@ def assert_agree(near, rest, median=5e-5):
     assert near["arrested_events"] == pytest.approx(rest["arrested_events"], nan_ok=True)
 
 
-@pytest.mark.parametrize("rate", RATES)
-@pytest.mark.parametrize("ratio", RATIOS)
-@pytest.mark.parametrize("samples", [3, pytest.param(20, marks=pytest.mark.slow)])
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    ("ratio", "rate", "samples"),
+    [
+        *((0.25, 2e8, 3), (0.5, 2e7, 3), (2.0, 2e5, 3)),
+        *(pytest.param(r, v, 20, marks=SLOW) for r in (0.25, 1.0) for v in (2e5, 2e7, 2e8)),
+    ],
+)
 def test_same_onset_as_from_rest(ratio, rate, samples):
     near, rest = both(profiles(ratio, samples), loading_rate=rate)
     assert_agree(near, rest)
@@ -59,25 +63,12 @@ def test_same_onset_as_from_rest(ratio, rate, samples):
         assert np.all(near["implicit_steps"][begun] < 0.8 * rest["implicit_steps"][begun])
 
 
-@pytest.mark.parametrize("number", ARRESTED)
-def test_with_an_event_arrested_before_the_onset(number):
-    near, rest = both(profiles(0.5, 1, number), loading_rate=2e7)
+def test_with_an_event_arrested_before_the_onset():
+    near, rest = both(profiles(0.5, 1, 819), loading_rate=2e7)
     assert_agree(near, rest, median=1e-4)  # of one; waves of the event scatter what follows
     assert near["start_error"][0] > 0.0
     assert near["arrested_events"][0] == rest["arrested_events"][0] == 1
     assert near["start_load"] < near["first_instability"] < 0.999 * near["critical_stress"]
-
-
-def test_where_the_onset_depends_most_on_the_rate():
-    """Of 40 fields the three whose onset rises most from 2e5 to 2e8 Pa/s."""
-    tau_p = profiles(0.5, 40)
-    slow, fast = (
-        solve(tau_p, loading_rate=rate, stop="onset")["critical_stress"] for rate in (2e5, 2e8)
-    )
-    worst = np.argsort(fast / slow)[-3:]
-    assert np.all((fast / slow)[worst] > 1.0 + 2e-3)  # ten times the agreement asked for
-    for rate in (2e7, 2e8):
-        assert_agree(*both(tau_p[worst], loading_rate=rate))
 
 
 def test_what_follows_the_onset_is_the_same():
@@ -152,19 +143,3 @@ def test_the_state_at_the_start_is_that_of_the_slow_path():
     # Extrapolated as at a fold, by 1/16; on this grid the path is straight there.
     assert np.all((state.rate >= 0.999 * rate) & (state.rate <= 1.07 * rate))
     assert abs(radiated_energy(run, state)) < 1e-12 * state.now["work"]
-
-
-def test_everything_may_vary_and_a_sample_alone_gives_the_same_bits():
-    angle = turns(256)
-    wave = np.cos(angle)
-    load = {"profile": 1.0 + 0.1 * np.roll(wave, 40), "initial_stress": np.roll(2e4 * wave, 90)}
-    weakening = {"weakening_rate": 4e11 + 5e10 * wave, "residual_strength": 1e5 + 2e4 * wave}
-    other = make_problem(solid=PROBLEM.solid, load=st.Load(**load), **weakening)
-    phases = np.random.default_rng(7).uniform(0.0, 2.0 * np.pi, (3, 1, 30))
-    waves = np.cos(np.arange(1, 31) * angle[:, None] + phases)
-    tau_p = 1.1e6 + 4e5 * np.tanh(waves.sum(axis=2) / np.sqrt(15.0))
-    near, rest = both(tau_p, other, loading_rate=1e6)
-    assert_agree(near, rest)
-    assert np.all(near["start_error"] > 0.0)
-    alone = solve(tau_p[2], other, loading_rate=1e6)
-    assert_same(alone, {name: values[2:] for name, values in near.items()})

@@ -4,27 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from oracles import by_relaxation, largest_load, symbol_of
-from setups import RATE, exact_onset, make_problem, turns
+from oracles import largest_load, relaxed
+from setups import exact_onset, make_problem, turns
 
 import stiction as st
 import stiction.methods.equilibrium.dense.program
-from stiction.elasticity.protocol import HalfSpaces
 from stiction.methods.equilibrium.dense.program import DenseProgram
 from stiction.methods.equilibrium.sample import at_rest, sample_of
 from stiction.methods.equilibrium.solver import follow
-from stiction.methods.equilibrium.transforms.plane import plane_onset
-
-
-def relaxed(problem, strength, load, rate=RATE):
-    """Slip at a load by relaxation, or None where the line slides."""
-    floor = np.minimum(problem.friction.residual_strength, strength)
-
-    def law(slip):
-        return np.maximum(strength - rate * slip, floor)
-
-    end = np.max((strength - floor) / rate)
-    return by_relaxation(symbol_of(problem), np.full(strength.size, load), law, end)
 
 
 def assert_first(problem, tau_p, rate=None):
@@ -49,12 +36,11 @@ def test_linear_programme_and_path_of_events(problem, make_strength, ratio):
         assert found.load == pytest.approx(load, rel=1e-11)
 
 
-@pytest.mark.parametrize("mode", ["II", "III"])
-def test_linear_programme_with_everything_varying(make_strength, mode):
+def test_linear_programme_with_everything_varying(make_strength):
     angle = turns(256)
     load = st.Load(profile=1.0 + 0.3 * np.cos(angle), initial_stress=1e5 * np.sin(2 * angle))
     rate = 0.4e12 * (1.0 + 0.6 * np.sin(3 * angle))
-    problem = make_problem(load=load, mode=mode, weakening_rate=rate)
+    problem = make_problem(load=load, mode="III", weakening_rate=rate)
     tau_p = make_strength(0.5).sample(problem.interface, samples=3, seed=8)
     ours = assert_first(problem, tau_p)
     assert np.all(ours.certificate_gap < 1e-9 * ours.critical_load)
@@ -78,14 +64,13 @@ def test_interface_shorter_than_a_critical_patch(solid, make_strength):
     assert np.all(onset.first_instability.values <= tau_p.mean(axis=1) * (1 + 1e-12))
 
 
-@pytest.mark.parametrize("rough", [0.0, 0.4])
-def test_transforms_agree_with_the_dense_factor(make_strength, monkeypatch, rough):
+def test_transforms_agree_with_the_dense_factor(make_strength, monkeypatch):
     """Lines on which very many nodes slip are solved as planes are."""
-    rate = 0.5e12 * (1.0 + rough * np.sin(5 * turns(2048)))
-    problem = make_problem(2048, 0.2, weakening_rate=rate)
+    rate = 0.5e12 * (1.0 + 0.4 * np.sin(5 * turns(1024)))
+    problem = make_problem(1024, weakening_rate=rate)
     program = DenseProgram(problem)
-    rows = problem.sample(make_strength(0.25).sample(problem.interface, samples=4, seed=12))
-    samples = [sample_of(rows, program.pieces, row) for row in range(4)]
+    rows = problem.sample(make_strength(0.25).sample(problem.interface, samples=3, seed=12))
+    samples = [sample_of(rows, program.pieces, row) for row in range(3)]
     dense = [program.solve(sample) for sample in samples]
     monkeypatch.setattr(stiction.methods.equilibrium.dense.program, "MANY_NODES", 10)
     for sample, exact in zip(samples, dense, strict=True):
@@ -96,25 +81,6 @@ def test_transforms_agree_with_the_dense_factor(make_strength, monkeypatch, roug
         np.testing.assert_allclose(found.slip, exact.slip, atol=1e-3 * sample.critical.max())
         # Nodes at rest have no part in the multiplier.
         assert np.mean((found.direction > 0.0) == (exact.direction > 0.0)) > 0.99
-
-
-def test_a_patch_that_does_not_slip_yet_is_no_division_by_zero(solid):
-    """One dip, so wide that hardly a node slips before the instability."""
-    strength, one = 1e6 + 3e5 * np.cos(turns(4096)), np.ones(4096)
-    line = HalfSpaces((0.4,), (solid.effective_modulus(),))
-    found = plane_onset(line, strength, one, RATE * one, 1e-9)
-    assert found.closed
-    assert 0.7e6 < found.lower < 0.701e6
-
-
-def test_onset_of_a_long_line(make_strength):
-    """Certified, and with the quick test for arrest, as shorter lines are."""
-    problem = make_problem(4096, 0.4)
-    tau_p = make_strength(0.25).sample(problem.interface, samples=2, seed=12)
-    onset = exact_onset(problem, tau_p, sensitivity=True)
-    assert np.all(onset.certificate_gap < 1e-9 * onset.critical_load)
-    loads = (onset.sensitivity.values * tau_p).sum(axis=1)
-    np.testing.assert_allclose(onset.first_instability, loads, rtol=1e-11)
 
 
 def test_patches_alike_on_a_long_interface():
@@ -131,15 +97,13 @@ def test_patches_alike_on_a_long_interface():
     assert loads[1] == pytest.approx(loads[0], rel=1e-11)
 
 
-@pytest.mark.parametrize("high", [1.66e6, 4.0e6])
-@pytest.mark.parametrize("low", [0.1e6, 0.66e6])
-def test_events_against_relaxation(problem, make_strength, low, high):
-    """Wide ranges of strength: nodes reach the floor, patches are arrested."""
-    strength = make_strength(0.5, low=low, high=high)
-    tau_p = strength.sample(problem.interface, samples=2, seed=13)
-    for profile, load in zip(
-        tau_p, exact_onset(problem, tau_p).critical_load.values, strict=True
-    ):
+def test_events_against_relaxation(problem, make_strength):
+    """A wide range of strength: nodes reach the floor, patches are arrested."""
+    strength = make_strength(0.5, low=0.1e6, high=4.0e6)
+    tau_p = strength.sample(problem.interface, samples=3, seed=13)
+    onset = exact_onset(problem, tau_p)
+    assert onset.arrested_events.max() > 0
+    for profile, load in zip(tau_p, onset.critical_load.values, strict=True):
         loads = load * np.array([0.8, 0.95, 0.999])
         path = st.equilibrium_path(problem, profile, loads)
         for i in range(3):
@@ -179,21 +143,10 @@ def test_arrested_samples_of_the_paper_rest_in_relaxation(problem, make_strength
     np.testing.assert_allclose(stresses.values[arrested, 0], firsts[arrested], rtol=1e-14)
 
 
-def test_residual_strength_only_shifts_the_stress(problem, make_strength):
-    """Only tau_p - tau_r and tau_0 - tau_r matter, floor and all."""
-    strength = make_strength(0.5).sample(problem.interface, samples=20, seed=15)
-    wide = 0.05e6 + 2.0 * (strength - 0.66e6)
-    one = exact_onset(problem, wide)
-    two = exact_onset(make_problem(residual_strength=0.3e6), wide + 0.3e6)
-    assert one.arrested_events.values.sum() > 0
-    np.testing.assert_allclose(two.critical_load, one.critical_load + 0.3e6, rtol=1e-11)
-    np.testing.assert_array_equal(two.arrested_events, one.arrested_events)
-
-
-def assert_onset(problem, profile, load, rate=RATE):
+def assert_onset(problem, profile, load):
     """Close enough to see that weak nodes matter, and far enough for relaxation to end."""
-    assert relaxed(problem, profile, 0.9995 * load, rate) is not None
-    assert relaxed(problem, profile, 1.0005 * load, rate) is None
+    assert relaxed(problem, profile, 0.9995 * load) is not None
+    assert relaxed(problem, profile, 1.0005 * load) is None
 
 
 @pytest.mark.parametrize("law", ["weakening_rate", "critical_slip"])
@@ -208,10 +161,8 @@ def test_nodes_that_do_not_weaken(make_strength, law):
     with pytest.warns(st.AccuracyWarning, match=words):
         onset = exact_onset(problem, tau_p)
     assert np.all(onset.certificate_gap < 1e-9 * onset.critical_load)
-    for row, profile in enumerate(tau_p):
-        rate = np.full(256, 0.5e12) if law == "weakening_rate" else (profile - 0.8e6) / 3e-6
-        rate[constant[row]] = 1e9  # any positive one
-        assert_onset(problem, profile, onset.critical_load.values[row], rate)
+    for profile, load in zip(tau_p, onset.critical_load.values, strict=True):
+        assert_onset(problem, profile, load)
 
 
 @pytest.mark.parametrize("above", [1e-13, 1e-9])
@@ -227,10 +178,9 @@ def test_flat_stretches_just_above_the_residual(make_strength, above):
     assert onset.arrested_events.max() < 30
 
 
-@pytest.mark.parametrize("high", [1.66e6, 2.66e6])
-def test_sliding_is_proved(problem, make_strength, high):
+def test_sliding_is_proved(problem, make_strength):
     """Without any length taken for unstoppable, the same loads and events."""
-    tau_p = make_strength(0.5, high=high).sample(problem.interface, samples=200, seed=17)
+    tau_p = make_strength(0.5, high=2.66e6).sample(problem.interface, samples=200, seed=17)
     plain = exact_onset(problem, tau_p)
     program = DenseProgram(problem)
     # Griffith's length grows with the modulus, of which the test for arrest knows only here.

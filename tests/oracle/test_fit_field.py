@@ -64,7 +64,7 @@ def test_noise_is_taken_out_of_a_marginal(name):
 
 @pytest.mark.parametrize(
     "given",
-    ["gamma", {"type": "beta", "low": 1e5}, {"type": "beta", "low": 1e5, "high": 4e6}, "norm"],
+    [{"type": "beta", "low": 1e5}, {"type": "beta", "low": 1e5, "high": 4e6}, "norm"],
 )
 def test_a_wider_marginal_keeps_its_mean_and_what_is_fixed(given):
     family = family_of(given)
@@ -126,8 +126,7 @@ def test_correlation_length_against_a_variogram():
     assert ours == pytest.approx(model.len_scale, rel=0.3)
 
 
-@pytest.mark.parametrize("records", [3, 20])
-@pytest.mark.parametrize("cv", [0.03, 0.15])
+@pytest.mark.parametrize(("records", "cv"), [(3, 0.15), (20, 0.03)])
 def test_intervals_hold_the_truth_whatever_the_number_of_records(records, cv):
     rng = np.random.default_rng(records)
     found = []
@@ -145,7 +144,7 @@ def test_intervals_hold_the_truth_whatever_the_number_of_records(records, cv):
         assert np.median([one[0] for one in found]) == pytest.approx(cv, rel=0.25)
 
 
-@pytest.mark.parametrize("records", [2, 3, 7])
+@pytest.mark.parametrize("records", [2, 7])
 def test_likely_scatter_and_mean_predict_another_specimen(records):
     """Whatever the number of records: the next level is as likely in each fifth of its forecast."""
     rng, held, within = np.random.default_rng(records), [], np.full(records, 0.04**2)
@@ -168,9 +167,12 @@ SIMPLE = {
 }  # fmt: skip
 
 
-def records_of(spectrum, seed, count=20):
+FIFTH = st.Lognormal(mean=1e6, cv=0.2)
+
+
+def records_of(spectrum, seed, count=20, marginal=FIFTH):
     """Pieces of five correlation lengths of long samples, (count, 64)."""
-    field = st.RandomField(st.Lognormal(mean=1e6, cv=0.2), spectrum, mean_mode=True)
+    field = st.RandomField(marginal, spectrum, mean_mode=True)
     line = st.Interface(length=21 * 0.05, nodes=21 * 64)
     return field.sample(line, samples=count, seed=seed)[:, :64]
 
@@ -180,22 +182,19 @@ def test_a_factor_between_short_records_leaves_the_field_as_it_is():
 
     A pair of fits of the same records, with a factor and without, differs by 1 % at random.
     """
-    ratios = []
-    for seed in (2, 3, 4):  # of ten intervals of 90 % one may miss, but none of these
-        records = records_of(st.PowerLawSpectrum(1e-2, exponent=2.0), seed)
-        factor = np.exp(0.15 * np.random.default_rng(seed).standard_normal((20, 1)))
-        plain, scattered = (
-            st.fit_field(rows, PIECE, between=between, **SIMPLE)
-            for rows, between in ((records, False), (records * factor, True))
-        )
-        one, other = (
-            fit.parameters["standard_deviation"] / fit.parameters["mean"]
-            for fit in (plain, scattered)
-        )
-        ratios.append(other / one)
-        low, high = scattered.interval["between"]
-        assert low < np.expm1(0.15**2) ** 0.5 < high < 0.3
-    assert np.mean(ratios) == pytest.approx(1.0, abs=0.02)
+    records = records_of(st.PowerLawSpectrum(1e-2, exponent=2.0), 4)
+    factor = np.exp(0.15 * np.random.default_rng(4).standard_normal((20, 1)))
+    plain, scattered = (
+        st.fit_field(rows, PIECE, between=between, **SIMPLE)
+        for rows, between in ((records, False), (records * factor, True))
+    )
+    one, other = (
+        fit.parameters["standard_deviation"] / fit.parameters["mean"]
+        for fit in (plain, scattered)
+    )
+    assert other / one == pytest.approx(1.0, abs=0.035)
+    low, high = scattered.interval["between"]  # of 90 %
+    assert low < np.expm1(0.15**2) ** 0.5 < high < 0.3
     assert "between" in str(scattered)
     # The mean of other specimens is as uncertain as the records' levels scatter.
     levels = np.log((records * factor).mean(axis=1))
@@ -219,9 +218,7 @@ def test_a_factor_between_short_records_leaves_the_field_as_it_is():
 def test_families_are_compared_by_one_number_of_independent_values():
     """Scores by hand, from the sum over all pairs of points; `interfaces` draws by weights."""
     spectrum = st.PowerLawSpectrum(1e-2, exponent=2.0)
-    field = st.RandomField(st.Weibull(mean=1e6, cv=0.25), spectrum, mean_mode=True)
-    line = st.Interface(length=21 * 0.05, nodes=21 * 64)
-    rows = field.sample(line, samples=3, seed=2)[:, :64]
+    rows = records_of(spectrum, 2, 3, st.Weibull(mean=1e6, cv=0.25))
     several = SIMPLE | {
         "marginal": ["lognormal", "gamma", "weibull", {"type": "beta", "low": 0.0}]
     }

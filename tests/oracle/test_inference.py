@@ -11,8 +11,6 @@ from specimens import crooked
 
 import stiction as st
 
-pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
-
 WAVE = 1.0 + 0.6 * np.cos(turns(128))
 SLOW = pytest.mark.slow
 

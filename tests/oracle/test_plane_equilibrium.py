@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from crooked import crooked
-from oracles import by_linear_programme, by_relaxation, dense, largest_load, symbol_of
-from planes import WAVENUMBERS, Lattice, moduli, plane_sample
+from oracles import by_linear_programme, dense, relaxed, symbol_of
+from planes import WAVENUMBERS, Lattice, moduli
 from scipy.linalg import eigh
 from setups import (
     LENGTH,
@@ -18,23 +18,14 @@ from setups import (
 )
 
 import stiction as st
-from stiction.elasticity.operator import (
-    SOLVED,
-    lowest_eigenvector,
-    make_operator,
-    solve_inside,
-)
+from stiction.elasticity.operator import lowest_eigenvector, make_operator
 from stiction.elasticity.protocol import HalfSpaces
-from stiction.methods.equilibrium.sample import Outcome, present_pieces, sample_of
-from stiction.methods.equilibrium.solver import follow
+from stiction.methods.equilibrium.sample import present_pieces, sample_of
 from stiction.methods.equilibrium.transforms.bracket import Bracket
 from stiction.methods.equilibrium.transforms.plane import PlaneProgram, plane_onset
 from stiction.methods.equilibrium.transforms.relaxation import (
-    least_equilibrium,
     stable_equilibrium,
 )
-
-pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")  # 24 nodes are few
 
 NODES, SMALL = (24, 24), (20, 20)
 SQUARE = (3.0 * LENGTH, 3.0 * LENGTH)
@@ -45,32 +36,14 @@ def noise(correlation, seed, shape=NODES):
     return smooth_noise(correlation, np.random.default_rng(seed), shape)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_onset_and_sensitivity_equal_the_linear_programme(seed):
-    rng = np.random.default_rng(seed)
-    rate = RATE * (0.8 + 0.3 * noise(6.0, rng))
-    load = st.Load(profile=1.0 + 0.4 * noise(6.0, rng), initial_stress=2e5 * noise(3.0, rng))
-    problem = make_problem(NODES, SQUARE, load=load, weakening_rate=rate)
-    strength = 0.66e6 + 1e6 * noise(rng.choice([2.0, 4.0, 8.0]), rng)
-    exact, _, multiplier = largest_load(problem, strength)
-    found = exact_onset(problem, strength, gap=1e-10, sensitivity=True)
-    mean = load.initial_stress.mean() + exact * load.profile.mean()
-    assert found["first_instability"].item() == pytest.approx(mean, rel=1e-9)
-    assert found["certified"].item()
-    sensitivity = multiplier.reshape(NODES) * load.profile.mean()
-    # The multiplier is that of a load 1e-10 off, with a quadratic fold between: the root of it.
-    error = np.abs(found["sensitivity"].values[0] - sensitivity).max()
-    assert error < 1e-4 * sensitivity.max()
-
-
-@pytest.mark.parametrize("wavenumbers", ["spectral", "lattice"])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(
+    ("seed", "wavenumbers"), [(0, "spectral"), (0, "lattice"), (1, "lattice")]
+)
 def test_bounds_and_multiplier_equal_the_linear_programme(seed, wavenumbers):
-    rng = np.random.default_rng(seed)
-    shape = (24, 24) if seed % 2 else (26, 24)
+    rng, shape = np.random.default_rng(seed), (26, 24)
     plane = WAVENUMBERS[wavenumbers](SQUARE, moduli(1e9, 0.33))
     strength = 0.66e6 + 1e6 * smooth_noise(rng.choice([2.0, 4.0, 8.0]), rng, shape)
-    if seed % 3 == 0:  # rough
+    if seed == 0:  # rough
         strength *= rng.uniform(0.9, 1.1, shape)
     profile = 1.0 + 0.4 * smooth_noise(6.0, rng, shape)
     rate = RATE * (0.8 + 0.4 * smooth_noise(6.0, rng, shape))
@@ -112,58 +85,17 @@ def test_any_multiplier_bounds_the_onset_where_some_nodes_do_not_weaken():
     assert bracket.upper == pytest.approx(exact, rel=1e-3)
 
 
-@pytest.mark.parametrize("size", [1.0, 1e-170])  # of the guess; the square of the other is zero
-def test_lowest_eigenvector_equals_a_dense_one(size):
-    shape = (20, 16)
+def test_lowest_eigenvector_equals_a_dense_one():
+    """From a guess whose square is zero."""
+    shape, inside = (20, 16), noise(4.0, 0, (20, 16)) < 0.5
     symbol = HalfSpaces((3.0 * LENGTH, 2.0 * LENGTH), moduli(1e9, 0.33)).symbol(shape)
-    inside = noise(4.0, 0, shape) < 0.5
-    matrix = dense(symbol, shape) - RATE * np.eye(inside.size)
-    nodes = np.flatnonzero(inside)
+    matrix, nodes = dense(symbol, shape) - RATE * np.eye(inside.size), np.flatnonzero(inside)
     values, vectors = eigh(matrix[np.ix_(nodes, nodes)], subset_by_index=[0, 0])
-    vector = size * inside
+    vector = 1e-170 * inside
     given = make_operator(symbol, RATE, shape), inside.reshape(-1), vector.reshape(-1)
     value, _ = lowest_eigenvector(*given, 1e-10 * RATE, 500)
     assert value == pytest.approx(values[0], rel=1e-10, abs=1e-10 * RATE)
     assert np.abs(vector[inside] - np.abs(vectors[:, 0])).max() < 1e-7
-
-
-def test_a_slow_direction_saves_iterations():
-    """A with one eigenvalue that is far below all others, as close to a turning point."""
-    shape, inside = (20, 16), noise(4.0, 0, (20, 16)).reshape(-1) < 0.5
-    symbol = HalfSpaces((3.0 * LENGTH, 2.0 * LENGTH), moduli(1e9, 0.33)).symbol(shape)
-    nodes = np.flatnonzero(inside)
-    block = dense(symbol, shape)[np.ix_(nodes, nodes)]
-    (lowest, second), vectors = eigh(block, subset_by_index=[0, 1])
-    rate = lowest - 1e-4 * (second - lowest)
-    # The strength of one node falls, as where it reaches a corner.
-    right = np.zeros(inside.size)
-    right[nodes[np.abs(vectors[:, 0]).argmax()]] = 1.0
-    exact = np.linalg.solve(block - rate * np.eye(nodes.size), right[nodes])
-    operator, taken = make_operator(symbol, rate, shape), []
-    rough = vectors[:, 0] + 0.003 * np.random.default_rng(3).standard_normal(nodes.size)
-    slow = np.zeros(inside.size)
-    slow[nodes] = rough / np.sqrt(rough @ block @ rough - rate * rough @ rough)
-    for each in (np.empty(0), slow):
-        x, residual = np.zeros(inside.size), right.copy()
-        given = operator._replace(slow=each), inside, x, residual
-        _, iterations = solve_inside(*given, 0.02)
-        taken.append(iterations)
-        status, _ = solve_inside(*given, 1e-10)
-        assert status == SOLVED
-        # The residual over the lowest eigenvalue.
-        np.testing.assert_allclose(x[nodes], exact, rtol=1e-6)
-    assert taken[1] < taken[0]
-
-
-def relaxed(problem, strength, load, slip):
-    """Slip at a load by relaxation to 1e-8 of the strength, or None where the plane slides."""
-    residual = problem.friction.residual_strength
-
-    def law(slip):
-        return np.maximum(strength - RATE * slip, residual)
-
-    given = np.full(strength.shape, load), law, (strength - residual) / RATE
-    return by_relaxation(symbol_of(problem), *given, slip, rest=1e-8 * strength.mean())
 
 
 @pytest.fixture(scope="module")
@@ -188,12 +120,18 @@ def test_arrest_equals_relaxation_node_by_node(wide):
         assert path["event_load"].item() == pytest.approx(first, rel=1e-5)
         assert list(path["arrested_events"].values) == [0, 1, 1, 1]
         assert list(path["sliding"].values) == [False, False, False, True]
-        slip = np.zeros(problem.interface.shape)
+        slip, rest = np.zeros(problem.interface.shape), 1e-8 * strength[number].mean()
         for load, ours in zip(loads[:3], path["slip"].values, strict=False):
-            slip = relaxed(problem, strength[number], load, slip)
+            slip = relaxed(problem, strength[number], load, slip, rest)
             # Relaxation stops at 1e-8 of the strength, over the lowest eigenvalue.
             assert np.abs(ours - slip).max() < 1e-4 * 9e-6
-        assert relaxed(problem, strength[number], loads[3], slip) is None
+        assert relaxed(problem, strength[number], loads[3], slip, rest) is None
+        # What slips is at its strength, all else below: 1e-7 of it is the path's own accuracy.
+        slip, stress = path["slip"].values[:3], path["stress"].values[:3]
+        over = stress - np.maximum(strength[number] - RATE * slip, 3.5e5)
+        assert np.abs(over[slip > 0.0]).max() < 1e-6 * strength[number].mean()
+        assert over.max() < 1e-6 * strength[number].mean()
+        assert path["mean_stress"].values[:3] == pytest.approx(loads[:3], rel=1e-12)
         near = first * (1 + np.r_[-1e-7, 3e-6])
         around = st.equilibrium_path(problem, strength[number], near)
         moved = np.diff(around["slip"].values, axis=0)
@@ -242,20 +180,6 @@ def test_nodes_that_become_residual_one_by_one_are_events_only_where_stability_i
     assert found["critical_load"].item() / first == pytest.approx(1.01224, abs=2e-4)
 
 
-def test_path_balances_where_it_slips(wide):
-    problem, (_, _, strength) = wide
-    path = st.equilibrium_path(problem, strength, np.array([5e5, 8e5, 1e6]))
-    slip, stress = path["slip"].values, path["stress"].values
-    held = np.maximum(strength - RATE * slip, 3.5e5)
-    moving = slip > 0.0
-    assert moving.any()
-    # 1e-7 of the mean strength is the accuracy of relaxation.
-    assert np.abs(stress - held)[moving].max() < 1e-6 * strength.mean()
-    assert (stress - held).max() < 1e-6 * strength.mean()
-    assert path["mean_stress"].values == pytest.approx(path["load"].values, rel=1e-12)
-    assert path["stress"].dims == ("load", "x", "y")
-
-
 LAWS = {
     "flattens": {"slip": [0.3, 1.0], "strength": [0.4, 0.0], "weakening_rate": RATE},
     "steepens": {"slip": [0.5, 1.0], "strength": [0.7, 0.0], "weakening_rate": 0.5 * RATE},
@@ -264,10 +188,9 @@ LAWS = {
 
 
 @pytest.mark.parametrize("name", LAWS)
-@pytest.mark.parametrize("residual", [0.0, 0.25e6])
-def test_laws_of_several_pieces_on_a_strip_are_those_of_the_line(name, residual):
+def test_laws_of_several_pieces_on_a_strip_are_those_of_the_line(name):
     """Strength uniform along y; the line follows each corner exactly, with a dense factor."""
-    law = st.PiecewiseWeakening(**LAWS[name], residual_strength=residual)
+    law = st.PiecewiseWeakening(**LAWS[name], residual_strength=0.25e6)
     line = make_problem(64, 0.02, friction=law)
     strip = make_problem((64, 8), (0.02, 0.0025), friction=law)
     tau_p = beta_strength(3e-3, 0.3e6, 2.66e6).sample(line.interface, samples=4, seed=2)
@@ -290,15 +213,8 @@ def test_laws_of_several_pieces_against_relaxation(name):
     problem = make_problem(NODES, SQUARE, friction=st.PiecewiseWeakening(**LAWS[name]))
     tau_p = 0.5e6 + 2e6 * noise(3.0, 5)
     load = exact_onset(problem, tau_p).critical_load.item()
-    u, f = np.r_[0.0, LAWS[name]["slip"]], np.r_[1.0, LAWS[name]["strength"]]
-    critical = (f[0] - f[1]) / u[1] * tau_p / LAWS[name]["weakening_rate"]
-
-    def law(slip):
-        return tau_p * np.interp(slip / critical, u, f)
-
     for share, slides in ((0.998, False), (1.002, True)):
-        loads = np.full(NODES, share * load)
-        slip = by_relaxation(symbol_of(problem), loads, law, critical, rest=1e-5)
+        slip = relaxed(problem, tau_p, share * load, rest=1e-5)
         assert (slip is None) == slides
 
 
@@ -335,45 +251,3 @@ def test_a_step_of_the_stable_path_passes_no_steeper_weakening_that_is_unstable(
             np.testing.assert_allclose(found, slip, atol=1e-6 * slip.max())
     assert taken > refused > 0
     assert spared > 0
-
-
-@pytest.fixture
-def program():
-    """Equilibria of a small plane on a lattice."""
-    found = PlaneProgram(make_problem((40, 40), WIDE))  # as few nodes as SMALL are refused
-    found.elastic, found.shape = Lattice(WIDE, moduli(1e9, 0.33)), SMALL
-    return found
-
-
-@pytest.mark.parametrize(("seed", "events"), [(0, 1), (1, 1), (2, 0), (3, 3)])
-def test_arrest_and_sliding_on_a_lattice_equal_relaxation(program, seed, events):
-    sample = plane_sample(0.2e6 + 4.0e6 * noise(4.0, seed, SMALL), 0.05e6, RATE)
-    path = follow(program, sample)
-    assert path.known
-    assert len(path.events) == events
-    assert path.last.load >= path.first.load
-    for before, after in path.events:
-        assert (after.slip >= before.slip - 1e-12 * sample.critical.max()).all()
-        assert path.first.load <= before.load <= path.last.load
-    # Before and after each instability, at some distance: near one, relaxation takes for ever.
-    marks = [path.first.load] + [event.before.load for event in path.events] + [path.last.load]
-    loads = np.unique(np.r_[[m * (1.0 + e) for m in marks for e in (-2e-3, 2e-3)]])
-    symbol = program.elastic.symbol(SMALL)
-    operator = make_operator(symbol, RATE, SMALL)
-    critical, rest = sample.critical.reshape(SMALL), 1e-8 * sample.excess.mean()
-
-    def law(slip):
-        strength = np.maximum(sample.excess - sample.rate * slip.ravel(), sample.residual)
-        return strength.reshape(SMALL)
-
-    slip, ours = np.zeros(SMALL), np.zeros(sample.excess.shape)
-    for load in loads:
-        found = least_equilibrium(operator, sample, load, ours, accuracy=1e-10)
-        ours = found.slip
-        slip = by_relaxation(symbol, np.full(SMALL, load), law, critical, slip, rest)
-        assert (slip is None) == (load > path.last.load)
-        assert found.status == (Outcome.SLIDING if slip is None else Outcome.ARRESTED)
-        if slip is not None:
-            # Relaxation stops at 1e-8 of the strength, over the lowest eigenvalue.
-            assert np.abs(ours - slip.ravel()).max() < 1e-4 * critical.max()
-    assert slip is None

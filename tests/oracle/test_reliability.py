@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 from brute_force import BruteForce
-from checks import assert_mean, standard_error
 from crooked import LINE
-from importance import by_importance, longer, mixture
+from importance import by_importance
 from setups import EXACT, LOCAL, beta_strength, ensemble
 from specimens import crooked
 
@@ -15,7 +14,6 @@ import stiction as st
 
 PROBLEM = st.paper.problem(nodes=256)
 SYSTEM = PROBLEM, st.paper.strength(PROBLEM, 0.5)
-FOUR_TIMES = longer(PROBLEM, 4), SYSTEM[1]
 
 
 def by(system, stress, algorithm, cv, *, method=LOCAL, seed=0):
@@ -31,31 +29,18 @@ def assert_agree(one, other):
     assert abs(math.log(one.probability / other.probability)) < 4.0 * error
 
 
-def test_weights_make_the_mixture_of_importance_sampling_normal_again():
-    """E[w h] over the mixture is E[h] over the normal density, for h that the mixture covers."""
-    shifts = np.zeros((3, 40))
-    shifts[:, :6] = (1.0, 0.5, 0.5, -0.5, 0.2, 0.1), (0.5, 1.0, 0.5, 0.5, 0, 0), (0.1,) * 6
-    draws, logs = mixture(shifts, 200_000, np.random.default_rng(2))
-    weights = np.exp(logs)
-    for found in (weights, weights * draws[:, 0] ** 2):
-        assert_mean(found, 1.0, errors=4.0)
-        assert standard_error(found) < 0.02
-
-
-# P is about 1e-2, of four times the length 5e-2, and 1e-3 and 1e-4.
+# P is about 1e-2 and 1e-4.
 @pytest.mark.parametrize(
-    ("system", "stress", "cvs", "least"),
+    ("stress", "cvs", "least"),
     [
-        (SYSTEM, 0.679e6, (0.07, 0.07, 0.05), 0),
-        (FOUR_TIMES, 0.679e6, (0.07, 0.07, 0.05), 0),
-        pytest.param(SYSTEM, 0.670e6, (0.06, 0.07, 0.04), 100_000, marks=pytest.mark.slow),
-        pytest.param(SYSTEM, 0.6656e6, (0.2, 0.07, 0.04), 100_000, marks=pytest.mark.slow),
+        (0.679e6, (0.07, 0.1, 0.05), 0),
+        pytest.param(0.6656e6, (0.2, 0.07, 0.04), 100_000, marks=pytest.mark.slow),
     ],
 )
-def test_subset_and_importance_against_plain_monte_carlo(system, stress, cvs, least):
+def test_subset_and_importance_against_plain_monte_carlo(stress, cvs, least):
     algorithms = "plain", "subset", "importance"
     plain, subset, importance = (
-        by(system, stress, algorithm, cv) for algorithm, cv in zip(algorithms, cvs, strict=True)
+        by(SYSTEM, stress, algorithm, cv) for algorithm, cv in zip(algorithms, cvs, strict=True)
     )
     assert plain.evaluations > least
     assert_agree(subset, plain)
@@ -80,15 +65,14 @@ def test_two_levels_where_patches_interact():
     """At xi_0/h_n = 0.25 interaction lowers the typical onset most; subset takes no short cut."""
     system = PROBLEM, st.paper.strength(PROBLEM, 0.25)
     two = by(system, 0.684e6, "two_level", 0.2, method=EXACT)
-    whole = by(system, 0.684e6, "subset", 0.25, method=EXACT)
+    whole = by(system, 0.684e6, "subset", 0.3, method=EXACT)
     assert whole.probability < 1e-3
     assert_agree(two, whole)
 
 
-@pytest.mark.parametrize("method", [LOCAL, EXACT], ids=["local", "equilibrium"])
-def test_design_stress_has_the_probability_asked_for(method):
-    answer = st.design_stress(*SYSTEM, probability=1e-5, method=method, target_cv=0.2)
-    back = by(SYSTEM, answer.stress, "importance", 0.07, method=method)
+def test_design_stress_has_the_probability_asked_for():
+    answer = st.design_stress(*SYSTEM, probability=1e-5, method=EXACT, target_cv=0.2)
+    back = by(SYSTEM, answer.stress, "importance", 0.07, method=EXACT)
     error = math.hypot(answer.cv, back.cv)
     assert abs(math.log(back.probability / 1e-5)) < 4.0 * error
     low, high = answer.interval
@@ -136,16 +120,16 @@ def test_two_very_different_interfaces_against_counting_and_each_alone():
         )
         for length, low, cv in ((2.3e-3, 0.66e6, 0.03), (17e-3, 0.73e6, 0.11))
     ]
-    onsets = [ensemble(problem, one, 6000, seed=4).critical_stress.values for one in pair]
-    together = ensemble(problem, pair, 6000, seed=9).critical_stress.values
+    onsets = [ensemble(problem, one, 4000, seed=4).critical_stress.values for one in pair]
+    together = ensemble(problem, pair, 4000, seed=9).critical_stress.values
     for share in (0.2, 0.02):
         stress = float(np.quantile(np.concatenate(onsets), share))
         each = np.array([(own < stress).mean() for own in onsets])
         # Counting the list, and the tail of the list, within four standard errors.
-        error = 4.0 * (share / 6000) ** 0.5
+        error = 4.0 * (share / 4000) ** 0.5
         assert (together < stress).mean() == pytest.approx(share, abs=error)
-    found = by((problem, pair), stress, "subset", 0.07)
-    error = math.hypot(found.cv, (share * 12_000) ** -0.5)
+    found = by((problem, pair), stress, "subset", 0.1)
+    error = math.hypot(found.cv, (share * 8000) ** -0.5)
     assert found.probability == pytest.approx(share, rel=4.0 * error)
     assert each.min() < 0.5 * each.max()
     assert found.members == pytest.approx(each, rel=0.3, abs=0.05 * each.max())
@@ -154,7 +138,7 @@ def test_two_very_different_interfaces_against_counting_and_each_alone():
     alone = [by((problem, one), design.stress, "subset", 0.1).probability for one in pair]
     assert np.mean(alone) == pytest.approx(0.001, rel=4.0 * math.hypot(0.1, 0.1))
     # In the other order they are the same two.
-    back = by((problem, pair[::-1]), stress, "plain", 0.07)
+    back = by((problem, pair[::-1]), stress, "plain", 0.1)
     assert back.members[::-1] == pytest.approx(each, rel=0.3, abs=0.05 * each.max())
 
 

@@ -69,16 +69,6 @@ def test_density_of_known_distributions(distribution, bounds):
     assert wrong.mean() < 0.02
 
 
-def test_density_does_not_leak_through_bounds():
-    """At the bound of a uniform density a plain Gaussian kernel loses half."""
-    sample = RNG.uniform(size=20_000)
-    found = density(sample, bounds=(0.0, 1.0))
-    assert found.x[0] > 0.0
-    assert found.x[-1] < 1.0
-    assert found.value[0] == pytest.approx(1.0, abs=0.1)  # three errors of about 0.03
-    assert scipy.stats.gaussian_kde(sample)(0.0)[0] < 0.6
-
-
 @pytest.mark.parametrize(
     "sample",
     [np.repeat([1.0, 2.0, 3.0], 10), np.concatenate([np.arange(20.0), 1e4 + np.arange(20.0)])],

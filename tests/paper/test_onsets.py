@@ -1,13 +1,15 @@
-"""The paper's onsets: bias of the local criterion, patches, and the lower tail."""
+"""The paper's onsets and fronts: bias of the local criterion, patches, the lower tail, speeds."""
 
 import math
 
 import numpy as np
 import pytest
 from importance import by_importance, longer
-from setups import LOCAL, beta_strength, exact_onset, local_onset, make_problem
+from setups import LOCAL, QUARTER, beta_strength, exact_onset, local_onset, make_problem
 
 import stiction as st
+from stiction.methods.dynamics.simulate import simulate_rupture
+from stiction.methods.dynamics.summary import rupture_speed
 
 
 @pytest.mark.parametrize(
@@ -51,3 +53,31 @@ def test_the_weakest_link_rule_holds_with_a_mean_mode_and_fails_without():
     # A dip at fixed mean of z has to be paid for; a longer interface can better afford it.
     ratio, error = growth(False)
     assert ratio > 4.0 * math.exp(2.0 * error)
+
+
+RATE, STRENGTH = 1e12, 1e6
+
+
+def final_speed(ratio, nodes):
+    """Speed in c_R of a rupture on a uniform interface at S = ratio, far from its weak patch."""
+    modulus = QUARTER.effective_modulus("II")
+    spacing = 1.158 * modulus / RATE / 16.0
+    problem = make_problem(nodes, nodes * spacing, solid=QUARTER, weakening_rate=RATE)
+    load = STRENGTH / (1.0 + ratio)
+    griffith = 2.0 * modulus * STRENGTH**2 / (np.pi * RATE * load**2)
+    x = problem.interface.x - 0.5 * problem.interface.length
+    run = simulate_rupture(
+        problem,
+        np.where(np.abs(x) < 0.75 * griffith, 0.98 * load, STRENGTH),
+        method=st.Rupture(load=([0.0, 1.0], [load, load]), implicit=False),
+        save=st.Save([], every=1000),
+    )
+    speed = rupture_speed(run["arrival_time"].values, spacing, problem.nucleation_length)
+    at = nodes // 2 + np.arange(int(0.38 * nodes), int(0.42 * nodes))
+    return float(np.mean(speed[at])) / QUARTER.rayleigh_wave_speed
+
+
+def test_weak_driving_tends_to_the_rayleigh_speed_from_below():
+    near, far = final_speed(2.0, 512), final_speed(2.0, 1024)
+    assert near < far < 1.0
+    assert far > 0.97

@@ -1,7 +1,5 @@
 """The local criterion on lines and planes: symmetries, bounds, and theory of its stress."""
 
-import warnings
-
 import numpy as np
 import pytest
 from checks import assert_mean
@@ -9,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as hs
 from importance import by_importance
 from oracles import symbol_of, times
+from refusals import said
 from setups import (
     LENGTH,
     LOCAL,
@@ -33,36 +32,7 @@ def onset(tau_p):
     return float(result.critical_load[0]), float(result.critical_position[0])
 
 
-def on_circle(difference):
-    return abs((difference + 0.05) % 0.1 - 0.05)
-
-
-profiles = hs.integers(0, 1000).map(
-    lambda i: beta_strength(2e-3).sample(PROBLEM.interface, samples=1, first=i)
-)
-
-
-@settings(max_examples=50, deadline=None)
-@given(tau_p=profiles, shift=hs.integers(0, 127), factor=hs.floats(0.1, 10.0),
-       offset=hs.floats(0.0, 1e6))  # fmt: skip
-def test_symmetries_of_a_line(tau_p, shift, factor, offset):
-    """Shifts move the place, reflection mirrors it, affine scaling keeps it and scales the load."""
-    load, place = onset(tau_p)
-    mirrored = np.roll(tau_p[:, ::-1], 1, axis=1)  # x -> -x on the circle
-    away = shift * PROBLEM.interface.spacing
-    for changed, its_load, its_place in (
-        (np.roll(tau_p, shift, axis=1), load, place + away),
-        (mirrored, load, -place),
-        (factor * tau_p + offset, factor * load + offset, place),
-    ):
-        found_load, found_place = onset(changed)
-        assert abs(found_load / its_load - 1.0) < 1e-12
-        # The slope vanishes at the minimum: round-off of the load is the square of the place's.
-        assert on_circle(found_place - its_place) < 1e-8
-    assert tau_p.min() < load <= tau_p.mean() * (1.0 + 1e-12)
-
-
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(levels=hs.lists(hs.floats(3.0, 9.0), min_size=2, max_size=12), seed=hs.integers(0, 1000))
 def test_lies_between_the_least_and_the_greatest_strength_whatever_the_jumps(levels, seed):
     """Blocks of strengths over six decades, 4.4 nodes in h_n."""
@@ -80,16 +50,6 @@ def field_of(ratio=0.7, **options):
     return beta_strength(ratio * LENGTH, **options)
 
 
-def test_the_minimum_of_a_rough_line_is_the_same_wherever_the_line_begins():
-    """Strengths without correlation, whose minima lie at every node, the seam among them."""
-    problem = make_problem(64, 0.02)
-    rough = np.random.default_rng(5).uniform(0.6e6, 1.4e6, (300, 64))
-    found = local_onset(problem, rough).critical_stress
-    for shift in range(1, 64):
-        there = local_onset(problem, np.roll(rough, shift, axis=1)).critical_stress
-        np.testing.assert_allclose(there, found, rtol=ROUND_OFF)
-
-
 def test_weights_certify_the_bound():
     """(K - W) y <= 0 everywhere, with spectral wave vectors too: an upper bound."""
     for window in windows_of(PLANE, RATE):
@@ -98,24 +58,6 @@ def test_weights_certify_the_bound():
         assert y.sum() == pytest.approx(1.0, rel=1e-12)
         forces = times(symbol_of(PLANE), y) - RATE * y
         assert forces.max() < 1e-6 * RATE * y.max()  # residual of the eigenvector
-
-
-def test_translations_and_reflections_of_a_plane_change_nothing():
-    strength = field_of().sample(PLANE.interface, samples=3, seed=1)
-    first = local_onset(PLANE, strength).critical_load
-    shifted = np.roll(strength, (7, -3), (1, 2))
-    for changed in (shifted, strength[:, ::-1].copy(), strength[:, :, ::-1].copy()):
-        found = local_onset(PLANE, changed).critical_load
-        np.testing.assert_allclose(first, found, rtol=1e-12)
-
-
-def test_between_least_and_greatest_strength_of_a_plane():
-    weak = np.random.default_rng(0).random((2, 48, 48)) < 0.5
-    tau_n = st.theory.nucleation_stress(PLANE, np.where(weak, 0.7e6, 1.6e6))
-    assert tau_n.min() >= 0.7e6 * (1.0 - ROUND_OFF)
-    assert tau_n.max() <= 1.6e6 * (1.0 + ROUND_OFF)
-    uniform = local_onset(PLANE, np.full((48, 48), 1e6))
-    assert uniform.critical_load.item() == pytest.approx(1e6, rel=1e-13)
 
 
 @pytest.mark.parametrize("mean_mode", [False, True])
@@ -131,7 +73,7 @@ def test_variance_of_the_nucleation_stress_of_a_plane_is_that_of_theory(mean_mod
 
 
 def test_failure_probability_of_a_plane_is_that_of_counting():
-    plane = make_problem((32, 32), (4.0 * LENGTH, 3.5 * LENGTH))
+    plane = make_problem((20, 24), (4.0 * LENGTH, 3.5 * LENGTH))
     field, options = field_of(), {"method": LOCAL, "progress": False, "target_cv": 0.25}
     onsets = ensemble(plane, field, 3000, seed=9).critical_stress.values
     stress, counted, own = float(np.quantile(onsets, 0.01)), 0.01, 1.0 / np.sqrt(30.0)
@@ -150,9 +92,6 @@ def test_coarse_directions_are_named():
     def onset_on(*nodes):
         local_onset(make_problem(nodes, PLANE.interface.length), np.full(nodes, 1e6))
 
-    words = r"9\.6 nodes along x and, in mode III, 4\.4 along"
-    with pytest.warns(st.AccuracyWarning, match=words):
-        onset_on(48, 26)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        onset_on(60, 72)
+    (text,) = said(lambda: onset_on(48, 26))
+    assert "9.6 nodes along x and, in mode III, 4.4 along" in text
+    assert said(lambda: onset_on(60, 72)) == []

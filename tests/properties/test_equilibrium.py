@@ -65,38 +65,6 @@ def test_never_above_the_discrete_local_criterion(problem, tau_p):
     assert onset.first_instability.item() <= bound * (1.0 + 1e-13)
 
 
-@settings(max_examples=30, deadline=None)
-@given(problem=problems, tau_p=profiles, other=profiles, weight=hs.floats(0.05, 0.95))
-def test_concave_and_monotone_in_the_strength(problem, tau_p, other, weight):
-    # The strength is far above the residual one here: floors would make it neither.
-    high = 50e6
-    three = np.array([tau_p, other, weight * tau_p + (1.0 - weight) * other]) + high
-    first = solve(problem, three).first_instability.values
-    first -= high * np.mean(problem.load.profile)
-    if not np.ptp(problem.load.profile):
-        # 1e-12 of 50 MPa is round-off.
-        assert first[2] >= weight * first[0] + (1.0 - weight) * first[1] - 5e-5
-    raised = np.array([tau_p, np.maximum(tau_p, other)]) + high
-    low, up = solve(problem, raised).first_instability.values
-    assert up >= low - 5e-5
-
-
-@settings(max_examples=30, deadline=None)
-@given(problem=uniform_problems, tau_p=profiles, shift=hs.integers(0, NODES - 1))
-def test_translation_and_reflection(problem, tau_p, shift):
-    several = np.array([tau_p, np.roll(tau_p, shift), tau_p[::-1]])
-    onset = solve(problem, several)
-    load = onset.critical_load.values
-    np.testing.assert_allclose(load, load[0], rtol=1e-11)
-    place = onset.critical_position.values
-    length = problem.interface.length
-    moved = (place[1] - place[0]) / problem.interface.spacing - shift
-    # The last digits of y move the centroid; two critical patches at once are ruled out by chance.
-    assert abs((moved + NODES / 2) % NODES - NODES / 2) < 1e-4
-    assert place.min() >= 0.0
-    assert place.max() < length
-
-
 @settings(max_examples=20, deadline=None)
 @given(problem=uniform_problems, tau_p=profiles, constant=hs.floats(1e4, 1e6))
 def test_a_constant_shifts_the_load(problem, tau_p, constant):

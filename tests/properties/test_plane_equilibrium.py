@@ -2,14 +2,12 @@
 
 import numpy as np
 import pytest
-from planes import WAVENUMBERS, Lattice, moduli, plane_sample
+from planes import WAVENUMBERS, moduli, plane_sample
 from setups import LENGTH, RATE, exact_onset, make_problem, smooth_noise
 
 import stiction as st
 from stiction.elasticity.operator import make_operator
-from stiction.elasticity.protocol import HalfSpaces
-from stiction.methods.criterion.average import _between_nodes, least_average
-from stiction.methods.criterion.windows import ellipse_window
+from stiction.methods.criterion.average import _between_nodes
 from stiction.methods.equilibrium.sample import Outcome
 from stiction.methods.equilibrium.transforms import growing_patch, relaxation
 from stiction.methods.equilibrium.transforms import plane as program
@@ -50,35 +48,6 @@ def bounds_of(strength, wavenumbers="lattice", gap=1e-9):
     found = plane_onset(PLANES[wavenumbers], strength, ONE, RATE * ONE, gap)
     assert found.closed
     return found
-
-
-@pytest.mark.parametrize(
-    ("change", "move"),
-    [
-        (lambda s: np.roll(s, (7, -3), (0, 1)), lambda x, y: (x + 7, y - 3)),
-        (lambda s: np.roll(s[::-1], 1, 0), lambda x, y: (-x, y)),
-        (lambda s: np.roll(s[:, ::-1], 1, 1), lambda x, y: (x, -y)),
-    ],
-)
-def test_translations_and_reflections(change, move):
-    strength = strength_of(0)
-    first, second = solve(strength), solve(change(strength))
-    for name in ("first_instability", "critical_load"):
-        # The gap asked for.
-        assert second[name].item() == pytest.approx(first[name].item(), rel=2e-9)
-    for name in (
-        "slip_patches", "critical_patch_extent", "critical_patch_area", "arrested_events",
-    ):  # fmt: skip
-        assert np.array_equal(second[name].values, first[name].values)
-    spacings, lengths = np.array(PLANE.interface.spacings), np.array(LENGTHS)
-    place = np.array(move(*(first["critical_position"].values[0] / spacings))) * spacings
-    off = second["critical_position"].values[0] - place
-    off = (off + 0.5 * lengths) % lengths - 0.5 * lengths
-    # y goes with the root of the gap.
-    assert np.abs(off).max() < 1e-2 * spacings.min()
-    for name in ("slip", "sensitivity"):
-        one, other = first[name].values[0], second[name].values[0]
-        assert np.abs(change(one) - other).max() < 1e-3 * one.max()
 
 
 LAWS = {
@@ -136,72 +105,6 @@ def test_no_sensitivity_where_the_turning_point_is_not_found(monkeypatch):
         assert found["critical_patch_area"].item() > 0.0
 
 
-def test_loads_scale_and_shift_with_the_strength():
-    strength = strength_of(3)
-    exact, shifted = first_of(np.array([strength, strength + 1e5]))
-    assert shifted == pytest.approx(exact + 1e5, rel=2e-9)
-    under = solve({"strength": strength, "initial_stress": np.full((1, 1), 1e5)})
-    assert under["first_instability"].item() == pytest.approx(exact, rel=2e-9)
-    assert under["critical_load"].item() == pytest.approx(exact - 1e5, rel=2e-9)
-
-
-def rough_case(seed):
-    """A strength that changes from node to node, on a grid of few nodes in h_n."""
-    rng = np.random.default_rng(seed)
-    nu = rng.choice([0.0, 0.2, 0.33, 0.45])
-    nucleation = 2.0 * 0.57889 * 1e9 / (1.0 - nu) / RATE
-    shape = tuple(int(n) for n in rng.choice([16, 24, 32, 48, 64], 2))
-    few = rng.uniform(1.5, 6.0, 2)
-    lengths = (shape[0] * nucleation / few[0], shape[1] * nucleation * (1.0 - nu) / few[1])
-    strength = rng.uniform(0.66e6, 0.66e6 + rng.choice([1e4, 1e5, 1e6, 1e7]), shape)
-    profile = np.ones(shape) if seed % 2 else rng.uniform(0.8, 1.3, shape)
-    rate = RATE * (np.ones(shape) if seed % 3 else rng.uniform(0.3, 1.0, shape))
-    return Lattice(lengths, moduli(1e9, nu)), strength, profile, rate
-
-
-def test_bounds_hold_where_they_do_not_meet():
-    closed = []
-    for seed in range(30):
-        lattice, strength, profile, rate = rough_case(seed)
-        bounds = plane_onset(lattice, strength, profile, rate, 1e-4)
-        spectral = plane_onset(HalfSpaces(*lattice), strength, profile, rate)
-        closed.append(spectral.closed)
-        assert spectral.lower <= spectral.upper
-        # Far fewer nodes than it takes: they agree to the error of such a grid.
-        assert spectral.lower < 1.5 * bounds.upper
-        assert spectral.upper > 0.6 * bounds.lower
-    assert 10 < sum(closed) < 30
-
-
-def test_bounds_hold_for_the_certificates_returned():
-    strength = rough_strength(1)
-    for name, plane in PLANES.items():
-        found = bounds_of(strength, name)
-        symbol = plane.symbol(SHAPE)
-
-        def product(field, symbol=symbol):
-            return np.fft.irfft2(symbol * np.fft.rfft2(field), SHAPE) - RATE * field
-
-        assert (found.slip >= 0.0).all()
-        assert (found.multiplier >= 0.0).all()
-        round_off = 1e-12 * strength.max()
-        assert (product(found.slip) + strength - found.lower).min() > -round_off
-        assert product(found.multiplier).max() < 1e-12 * RATE * found.multiplier.max()
-        assert found.multiplier.sum() == pytest.approx(1.0, abs=1e-12)
-        assert (found.multiplier * strength).sum() == pytest.approx(found.upper, rel=1e-12)
-
-
-def test_monotone_and_concave_in_the_strength():
-    first, second = rough_strength(2), rough_strength(3)
-    one, other = bounds_of(first).upper, bounds_of(second).upper
-    middle = bounds_of(0.5 * (first + second)).lower
-    assert middle >= 0.5 * (one + other) * (1.0 - 1e-9)
-    stronger = first.copy()
-    stronger[10:20, 5:15] *= 1.05
-    assert bounds_of(stronger).upper >= one * (1.0 - 1e-9)
-    assert bounds_of(first + 1e5).upper == pytest.approx(one + 1e5, rel=2e-9)
-
-
 def test_the_place_of_the_least_average_lies_between_nodes():
     """Of a paraboloid it is that of the vertex, also across the borders."""
     for x, y in ((11.7, 0.4), (0.2, 8.6), (3.4, 5.0)):
@@ -210,38 +113,6 @@ def test_the_place_of_the_least_average_lies_between_nodes():
         )
         average = 2.0 + 0.3 * along[:, None] ** 2 + 0.7 * across**2
         np.testing.assert_allclose(_between_nodes(average), (x, y), rtol=1e-12)
-
-
-def test_local_criterion_is_an_upper_bound_for_every_aspect():
-    plane = PLANES["lattice"]
-    symbol = plane.symbol(SHAPE)
-    aspects = (1.0, 1.25, 1.5)
-    windows = [ellipse_window(symbol, SHAPE, plane.lengths, RATE, a) for a in aspects]
-    interface = st.Interface(plane.lengths, SHAPE)
-    for seed in range(4):
-        strength = rough_strength(seed)
-        exact = bounds_of(strength, gap=1e-6)
-        local = least_average(interface, windows, strength[None], ONE)[0][0]
-        assert exact.lower <= local < 1.2 * exact.upper
-        uneven = 1.0 + 0.2 * rough_strength(seed + 10) / 1e6
-        found = plane_onset(plane, strength, uneven, RATE * ONE, 1e-6)
-        assert least_average(interface, windows, strength[None], uneven)[0][0] >= found.lower
-
-
-def test_path_is_the_slip_at_onset_just_below_it():
-    strength = rough_strength(5)
-    sample = plane_sample(strength, 0.0, RATE)
-    operator = make_operator(PLANES["lattice"].symbol(SHAPE), RATE, SHAPE)
-    found = bounds_of(strength)
-    slips, status = [np.zeros(strength.size)], []
-    for load in found.lower * np.array([0.9, 0.95, 1.0 - 1e-6, 1.01]):
-        there = least_equilibrium(operator, sample, load, slips[-1])
-        slips.append(there.slip)
-        status.append(there.status)
-    assert status == [*3 * [Outcome.ARRESTED], Outcome.SLIDING]
-    assert (np.diff(slips[:4], axis=0) >= -1e-12 * slips[3].max()).all()
-    # slip comes up to that at onset with the square root of the load, 1e-3 of it
-    assert np.abs(slips[3].reshape(SHAPE) - found.slip).max() < 0.01 * found.slip.max()
 
 
 def walled(seed, shape=SHAPE):
@@ -256,7 +127,7 @@ def walled(seed, shape=SHAPE):
     return plane_sample(strength, 3e5 * rng.uniform(0.5, 1.0), RATE)
 
 
-@pytest.mark.parametrize(("seed", "times"), [(13, 1), (19, 1), (4, 2), (1, 3), (4, 3)])
+@pytest.mark.parametrize(("seed", "times"), [(13, 1), (4, 2), (1, 3)])
 def test_a_growing_patch_stops_at_a_barrier_and_meets_others(monkeypatch, seed, times):
     """As with steps that solve for the least equilibrium of bounds; not if nothing is checked.
 

@@ -63,19 +63,6 @@ def test_subset_simulation_visits_disjoint_failure_regions():
     assert np.abs(counts / counts.sum() - 1.0 / 12).max() < 0.07
 
 
-def test_weak_places_are_spread_over_the_interface():
-    """The failing patch is as likely anywhere: its phase 2 pi x/L averages out."""
-    places = []
-    for seed in range(12):
-        failing = tail(0.667e6, target_cv=0.3, seed=seed).failing_profiles
-        places.append(failing["critical_position"].values / PROBLEM.interface.length)
-    # L/h_n is about 32: a single run's few failures lie in many different places.
-    assert all(np.unique((32 * one).astype(int)).size >= 5 for one in places)
-    # 12 runs with about ten families each: |mean| of 120 unit vectors, about 0.09; four times it.
-    assert abs(np.mean([np.exp(2j * np.pi * one).mean() for one in places])) < 0.36
-    assert np.histogram(np.concatenate(places), bins=4, range=(0.0, 1.0))[0].min() > 0
-
-
 def test_curve_and_design_stress_agree_and_are_monotone():
     options = {"method": LOCAL, "target_cv": 0.3}
     curve = st.failure_curve(PROBLEM, STRENGTH, smallest=1e-5, **options)

@@ -11,8 +11,6 @@ from setups import QUARTER, make_problem
 import stiction as st
 from stiction.methods.dynamics.save import open_rupture
 
-pytestmark = pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
-
 LINE = make_problem(64, 0.04, solid=QUARTER, weakening_rate=3e11, residual_strength=2e5)
 METHOD = st.Rupture(loading_rate=1e8)
 RECORDED = {f"station_{name}": name for name in ("slip", "slip_rate", "shear_stress")}

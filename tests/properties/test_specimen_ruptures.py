@@ -1,12 +1,11 @@
 """Ruptures with inertia on specimens, as a user asks for them."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
 import pydantic
 import pytest
+from setups import beta_strength
 from specimens import crooked, rough
 
 import stiction as st
@@ -51,10 +50,7 @@ def test_no_event_is_shorter_than_without_inertia_and_each_ends_in_equilibrium(d
 
 def test_an_ensemble_a_path_and_a_probability_rest_on_it():
     method = st.Rupture(events=2)
-    field = st.RandomField(
-        st.Beta(alpha=1.5, beta=3.0, low=0.68e6, high=1.61e6),
-        st.PowerLawSpectrum(correlation_length=4e-3),
-    )
+    field = beta_strength(4e-3, 0.68e6, 1.61e6)
     found = st.monte_carlo(SPECIMEN, field, method=method, samples=3, progress=False)
     onset = st.onset(SPECIMEN, rough(SPECIMEN, 0, samples=3), method=method)
     assert np.array_equal(found["critical_force"], onset["critical_force"])
@@ -75,9 +71,8 @@ def test_an_ensemble_a_path_and_a_probability_rest_on_it():
 
 def test_attenuation_and_mass_are_written_down_with_the_problem():
     problem = crooked(drive=st.Platen(mass=0.3))
-    problem = dataclasses.replace(
-        problem, specimen=dataclasses.replace(problem.specimen, quality_factor=float("inf"))
-    )
+    endless = dataclasses.replace(problem.specimen, quality_factor=float("inf"))
+    problem = dataclasses.replace(problem, specimen=endless)
     written = to_plain(problem)
     assert written["specimen"]["quality_factor"] == "inf"
     assert written["specimen"]["drive"]["mass"] == 0.3
@@ -87,9 +82,7 @@ def test_attenuation_and_mass_are_written_down_with_the_problem():
 
 
 def test_one_event_in_space_and_time(run):
-    energies = [
-        "friction_energy", "strain_energy", "kinetic_energy", "attenuated_energy",
-    ]  # fmt: skip
+    energies = (f"{name}_energy" for name in ("friction", "strain", "kinetic", "attenuated"))
     assert sum(run[name] for name in energies).values == pytest.approx(run["work"].values)
     assert run.attrs["stopped"] == "rest"
     assert run["attenuated_energy"].values[-1] > 0.0
@@ -98,9 +91,3 @@ def test_one_event_in_space_and_time(run):
     assert over.values[1:].max() < 0.02 * float(run["peak_strength"].mean())
     assert run["machine_force"].values[0] == pytest.approx(run["force"].values[0], rel=1e-3)
     assert run["block_velocity"].dims == ("snapshot", "height", "x")
-
-
-def test_its_pictures(run, tmp_path):
-    assert len(st.plot.block(run).axes) == 9
-    assert st.plot.rupture(run).get_ylabel().startswith("time")
-    assert st.plot.film(run, tmp_path / "event.gif", frames=3, progress=False).exists()

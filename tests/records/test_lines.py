@@ -124,7 +124,7 @@ def fracture_energy_along_x_and_residual_ratio():
     return st.onset(problem, {"strength": TWO}, method=EXACT)
 
 
-@calls("states checked as equilibria, tests/exact/test_equilibrium.py")
+@calls("states checked as equilibria, tests/properties/test_equilibrium.py")
 def a_path_through_an_arrested_event():
     loads = [1.1e5, 2.9e5, 3.6e5, 4.1e5, 4.6e5, 5.6e5, 9e5]
     return st.equilibrium_path(of_width(LINE, 0.0123), barred(INTERFACE), loads)
@@ -150,7 +150,7 @@ def energy_release_rate_and_griffith_length():
     }
 
 
-@calls("quadrature of the exact correlation, tests/exact/test_statistics_moments.py")
+@calls("covariance of the nodes by their weights, tests/exact/test_criterion.py")
 def nucleation_statistics():
     spectrum = st.ExponentialSpectrum(2.3e-3, power_kept=0.97)
     field = st.RandomField(st.Weibull(mean=1.05e6, cv=0.17, low=4e5), spectrum)

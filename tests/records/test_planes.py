@@ -75,12 +75,12 @@ def strength_that_hardly_weakens():
     }
 
 
-@calls("states checked as equilibria, tests/properties/test_plane_equilibrium.py", close=1e-4)
+@calls("states checked as equilibria, tests/oracle/test_plane_equilibrium.py", close=1e-4)
 def a_path():
     return st.equilibrium_path(PLANE, TWO[0], [2e5, 4.3e5, 5.1e5, 2e6])
 
 
-@calls("correlation on a line through the plane, tests/exact/test_plane_fields.py")
+@calls("correlation on a line through the plane, tests/exact/test_fields.py")
 def anisotropic_fields():
     field = beta_strength(3.1e-3, mean_mode=True, anisotropy=1.7)
     lag = np.linspace(0.0, 0.011, 5)
@@ -109,7 +109,7 @@ def an_ensemble_with_two_random_properties():
 
 
 @calls(
-    "uguca, docs/validation.md; energy and symmetry, tests/exact/test_plane_rupture.py",
+    "uguca, docs/validation.md; energy and symmetry, tests/properties/test_dynamics_properties.py",
     close=1e-5,
 )
 def a_rupture_with_stations():
