@@ -96,7 +96,7 @@ def test_onset_says_how_far_the_local_criterion_is_off(kind):
     if kind == "line":
         problem = make_problem(128, 0.0144, residual_ratio=0.3)  # 30 nodes in h_n
     elif kind == "plane":
-        problem = make_problem((32, 32), (0.012, 0.012), residual_ratio=0.75)
+        problem = make_problem((24, 24), (0.012, 0.012), residual_ratio=0.75)
     else:
         spread = 0.1
         problem = crooked(drive=st.Pusher(height=0.004, width=0.003, stiffness=3e7))

@@ -11,6 +11,7 @@ from setups import make_problem
 import stiction as st
 from stiction import Rupture, simulate_rupture
 from stiction.methods.dynamics.save import read_checkpoint, write_checkpoint
+from stiction.methods.dynamics.state import Reason
 
 NODES = 128
 PROBLEM = make_problem(NODES, 0.05, solid=st.paper.problem().solid)
@@ -54,26 +55,30 @@ def test_energy_is_never_created_and_stress_never_above_strength(seed, rate):
     assert np.all(run["shear_stress"].values <= run["strength"].values + 1e-7 * 1e6)
 
 
-def test_restart_at_any_step_is_the_uninterrupted_run(tmp_path):
-    """A weak spot that is arrested by a strong surrounding: implicit, explicit, and back."""
-    run, straight = fresh_run(WEAK_SPOT)
-    count = 0
-    while straight.now["arrested"] == 0 or straight.explicit:
-        run.advance(straight, 5)
-        count += 5
-        assert count < 20_000
-    run.advance(straight, 3)
-    run, state = fresh_run(WEAK_SPOT)
-    while not state.explicit:
-        run.advance(state, 1)
-    implicit = int(state.now["implicit_steps"])
-    assert implicit > 10
-    # In the implicit phase, just before, at and after the switch, in the rupture, and after it.
-    for cut in (1, implicit - 1, implicit, implicit + 1, count - 25, count, count + 1):
-        run, state = fresh_run(WEAK_SPOT)
+@pytest.mark.parametrize("arrested", [False, True])
+def test_restart_at_any_step_is_the_uninterrupted_run(tmp_path, arrested):
+    """A weak spot that is arrested by a strong surrounding returns to implicit steps."""
+    profile = WEAK_SPOT if arrested else strength(5)
+    run, straight = fresh_run(profile)
+    if arrested:
+        total = 0
+        while straight.now["arrested"] == 0 or straight.explicit:
+            total += run.advance(straight, 5)[0]
+            assert total < 20_000
+        cuts = total // 3, total - 25, total
+        total += run.advance(straight, 3)[0]
+    else:
+        total, reason = run.advance(straight, 100_000)
+        implicit = int(straight.now["implicit_steps"])
+        assert reason == Reason.ALL_SLID
+        assert implicit > 10
+        # In the implicit phase, just before, at and after the switch, in the rupture.
+        cuts = 1, 7, implicit - 1, implicit, implicit + 1, total - 20
+    for cut in cuts:
+        run, state = fresh_run(profile)
         run.advance(state, cut)
         state = through_file(tmp_path / "state.npz", run, state)
-        run.advance(state, count + 3 - cut)
+        run.advance(state, total - cut)
         assert_same(state._asdict(), straight._asdict())
 
 
