@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from brute_force import BruteForce, along
-from refusals import said
+from recording import said
 from setups import EXACT, LOCAL, beta_strength
 from specimens import crooked, rough
 

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as hs
 from importance import by_importance
 from oracles import symbol_of, times
-from refusals import said
+from recording import said
 from setups import (
     LENGTH,
     LOCAL,
