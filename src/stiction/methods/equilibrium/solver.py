@@ -133,6 +133,8 @@ class OnsetSolver:
         interface, shape = self.problem.interface, rows.strength[row].shape
         first, last = path.first, path.last
         slides = patch = critical_patch(multiplier_of(sample, first), interface)
+        # On lines the multiplier is known of a programme, which passes no corner.
+        straight = last is first and first.multiplier is not None and not interface.is_plane
         if last is not first and last.direction.any():
             slides = critical_patch(last.direction, interface)
         values: dict[str, Any] = {
@@ -144,7 +146,7 @@ class OnsetSolver:
             "sliding_position": slides.centre if interface.is_plane else slides.centre[0],
             "slip_patches": patches_of(first.slip, interface),
             "arrested_events": len(path.events),
-            "residual_reached": bool(residual_nodes(sample, last.slip).any()),
+            "residual_reached": not straight and bool(residual_nodes(sample, last.slip).any()),
         }
         if interface.is_plane:
             values["critical_patch_extent"] = patch.extents
