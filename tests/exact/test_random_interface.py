@@ -9,6 +9,7 @@ import scipy.stats
 from setups import exact_onset, make_problem
 
 import stiction as st
+from stiction.random.fields import lower_factor
 
 LINE = st.Interface(length=0.1, nodes=256)
 
@@ -89,3 +90,9 @@ def test_fracture_energy_and_critical_slip_as_random_properties(make_strength):
     assert np.allclose(by_energy.weakening_rate, tau_p**2 / (2.0 * energy), rtol=1e-15)
     by_slip = problem.sample({"strength": tau_p, "critical_slip": slip})
     assert np.allclose(by_slip.weakening_rate, tau_p / slip, rtol=1e-15)
+
+
+def test_factor_of_a_singular_matrix():
+    matrix = np.array([[1.0, 1.0, 0.3], [1.0, 1.0, 0.3], [0.3, 0.3, 1.0]])
+    factor = lower_factor(matrix)
+    assert np.allclose(factor @ factor.T, matrix, atol=1e-15)
