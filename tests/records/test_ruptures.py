@@ -198,7 +198,8 @@ def onsets_and_waves_of_slow_loads():
             method=method,
         )
     }
-    arrested = np.where(np.abs(np.arange(1024) / 1024 - 0.4) < 0.25, 0.8e6, 6e6)
+    at = np.arange(1024) / 1024
+    arrested = np.where(np.abs(at - 0.4) < 0.25, 0.8e6 + 1e3 * at, 6e6)  # not symmetric
     end = {"stop": "time", "end_time": 0.8e6 / 1e8 + 2.2e-4}  # four times the period over c_s
     method, save = st.Rupture(loading_rate=1e8, **end), st.Save([], every=500)
     line, _ = wavy_line(1024, rate=0.5e12)
