@@ -28,6 +28,8 @@ def register(kind: T) -> T:
     name = getattr(getattr(kind, "__dataclass_fields__", {}).get("type"), "default", None)
     if not isinstance(name, str):
         raise InputError(f'{kind}: needs a field such as type: Literal["mine"] = "mine"')
+    if missing := getattr(kind, "__abstractmethods__", ()):
+        raise InputError(f"{kind.__name__}: lacks {', '.join(sorted(missing))}")
     known = _registered.setdefault(getattr(kind, "family", "methods"), {})
     other = known.setdefault(name, kind)
     if (other.__module__, other.__qualname__) != (kind.__module__, kind.__qualname__):
