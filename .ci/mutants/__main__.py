@@ -28,7 +28,7 @@ NEAREST = {
     "base": "refusals mistakes* progress cache warnings own_method",
     "cli": "runs cli warnings",
     "criterion": "lines planes specimens criterion griffith crooked",
-    "dynamics": "ruptures dynamics_* rupture_stations plane_rupture",
+    "dynamics": "ruptures dynamics_* rupture_stations plane_rupture specimen_ruptures block_waves",
     "elasticity": "specimens lines planes blocks block_response dynamics_waves"
     " criterion dynamics_equilibrium equilibrium",
     "ensemble": "runs fields store ensemble study progress own_method reliability",
