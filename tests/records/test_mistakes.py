@@ -195,7 +195,8 @@ table_of(calls, {
     "laws": [
         *each(st.LinearWeakening, {}, {"weakening_rate": 1.0, "critical_slip": 1.0}),
         *(partial(st.PiecewiseWeakening, slip=slip, strength=[*strength, 0.0], critical_slip=1e-6)
-          for slip, strength in ((np.array(0.5), [0.5]), ([0.5, 0.8, 1.0], [0.5, 0.5]))),
+          for slip, strength in ((np.array(0.5), [0.5]), ([0.5, 0.8, 1.0], [0.5, 0.5]),
+                                 ([0.6, 0.4, 1.0], [0.5, 0.3]), ([0.4, 0.9], [0.5]))),
         lambda: st.PiecewiseWeakening.from_law(EXPONENTIAL, 1),
         lambda: st.PiecewiseWeakening.from_law("exponential", 4),
         lambda: with_law(0.2),

@@ -1,6 +1,7 @@
 """What a mistake or a doubt is about beside its words, which tests/records hold."""
 
 import dataclasses
+import os
 import pickle
 import warnings
 
@@ -12,16 +13,24 @@ from setups import EXACT, LOCAL, beta_strength, make_problem
 
 import stiction as st
 from stiction.elasticity.memory_kernels import fit_exponentials
+from stiction.ensemble.dataset import Gathered
+from stiction.ensemble.experiment import Experiment
 from stiction.methods.equilibrium.solver import follow
 from stiction.reliability import subset
 
 LINE, PLANE = st.Interface(0.1, 256), st.Interface((0.5, 0.5), (4096, 4096))
 PROBLEM, FIELD = make_problem(), beta_strength(2e-3)
 ONE = np.full(256, 1e6)
+KEPT = Experiment(PROBLEM, FIELD, LOCAL, keep=("strength",))
+THERE = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
 
 test_more_memory_than_there_is = refusals({
     "samples: this takes ... GiB of memory": lambda: st.monte_carlo(
         PROBLEM, FIELD, method=LOCAL, keep="strength", samples=10**9
+    ),
+    # 0.6 of the memory for the profiles of each point
+    "samples: this takes ... GiB of memory, more than": lambda: Gathered(
+        [KEPT, KEPT], st.Ensemble(samples=0.6 * THERE // (8 * 256))
     ),
     "this takes ... GiB of memory": lambda: FIELD.sample(PLANE, samples=10**6),
     "strength.given.profile: this takes ... GiB of memory ... fewer places":
