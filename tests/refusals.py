@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -18,6 +19,20 @@ def refuses(
         call()
     for word in words.split(" ... "):
         assert word in str(caught.value), str(caught.value)
+
+
+def warning_texts(call: Callable[[], Any]) -> list[str]:
+    """The different texts of the package's own warnings during a call, sorted."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        call()
+    return sorted(
+        {
+            str(warning.message)
+            for warning in caught
+            if warning.category.__module__.startswith("stiction")
+        }
+    )
 
 
 def refusals(table: dict[str, Any], call: Callable[..., Any] | None = None) -> Any:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from brute_force import BruteForce, along
-from recording import said
+from refusals import warning_texts
 from setups import EXACT, LOCAL, beta_strength
 from specimens import crooked, rough
 
@@ -194,7 +194,7 @@ def test_positive_entries_of_the_stiffness_are_doubted():
         assert off.max() > 0.0 or not isinstance(drive, st.Pusher)
         solve, rows = st.Equilibrium().prepare(problem), problem.sample(rough(problem, 3))
         for _ in range(2):  # of what is prepared once, too
-            texts = said(partial(solve, rows))
+            texts = warning_texts(partial(solve, rows))
             assert sum("off its diagonal, up to 2e-07" in text for text in texts) == doubted
 
 
@@ -215,7 +215,7 @@ def test_the_peak_is_said_to_be_residual_and_gaps_are_shares_of_the_first_instab
         nodes=128, residual=0.61e6, rate=0.25e12, drive=st.Pusher(height=0.004, width=0.003)
     )
     strength, found = rough(problem, 3, 4), []
-    texts = said(lambda: found.append(onset(problem, strength)))
+    texts = warning_texts(lambda: found.append(onset(problem, strength)))
     above = (found[0].critical_stress.values - 0.61e6) / np.median(strength - 0.61e6, axis=1)
     low = np.flatnonzero(above < 0.02)
     assert 0 < low.size < 4

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as hs
 from importance import by_importance
 from oracles import symbol_of, times
-from recording import said
+from refusals import warning_texts
 from setups import (
     LENGTH,
     LOCAL,
@@ -92,6 +92,6 @@ def test_coarse_directions_are_named():
     def onset_on(*nodes):
         local_onset(make_problem(nodes, PLANE.interface.length), np.full(nodes, 1e6))
 
-    (text,) = said(lambda: onset_on(48, 26))
+    (text,) = warning_texts(lambda: onset_on(48, 26))
     assert "9.6 nodes along x and, in mode III, 4.4 along" in text
-    assert said(lambda: onset_on(60, 72)) == []
+    assert warning_texts(lambda: onset_on(60, 72)) == []

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 from crooked import PLANE, PLANE_STRENGTH, across_the_seam, uneven
-from recording import Calls, compared, filmed, inside
+from recording import Calls, compared, inside
 from setups import LOCAL, beta_strength, make_problem
 
 import stiction as st
@@ -132,8 +132,7 @@ def a_rupture_with_stations():
         options = {"origin": (0.012, 0.011), "normal_stress": -5e6, "benchmark": "TPV5"}
         files = st.external.write_scec(found, folder, **options)
         written = {path.name: path.read_text().split("\n") for path in files}
-    picture = st.plot.rupture(found, problem=problem)
-    return {"run": found, "picture": picture, "film": filmed(found)} | {
+    return {"run": found} | {
         name: {
             "head": "\n".join(line for line in lines if line.startswith("# ")),
             "last": np.array([line.split() for line in lines[-40:-1]], dtype=float),

@@ -46,6 +46,7 @@ PUSHER = {"type": "pusher", "height": 0.012, "width": 0.006}
 PLAIN = re.compile(
     r"<script.*?</script>|<style.*?</style>|<[^>]+>|data:image/[^\"')]*", re.DOTALL
 )
+NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])", re.ASCII)
 CHANGES = re.compile(
     r"\d+(\.\d+)? (us|ms|s|min|h)\b|(numpy|numba|scipy|stiction|Python) [\d.]+\S*|\S*/tmp\S*"
     r"|(?<=chunks )\d+|(?<=on the )\d+(?= here)|probed at \d+|\d+ of \d+ (?=probed)"
@@ -61,7 +62,7 @@ def beside(study):
 
 
 def command(line):
-    """Exit code, output and errors of a command line."""
+    """Exit code of a command line, the numbers that it prints, and whether it complains."""
     out, err, code, before = io.StringIO(), io.StringIO(), 0, sys.argv
     sys.argv = ["stiction", *line.split()]
     with (
@@ -75,14 +76,13 @@ def command(line):
         except SystemExit as ended:
             code = ended.code or 0
     sys.argv = before
-    return {"code": code, "out": quiet(out.getvalue()), "err": quiet(err.getvalue())}
+    printed, complaints = out.getvalue(), err.getvalue().strip()
+    return {"code": code, "numbers": numbers_in(printed), "complains": bool(complaints)}
 
 
-def quiet(text):
-    """A text without times, versions and folders."""
-    return "\n".join(
-        CHANGES.sub("...", " ".join(line.split())) for line in text.splitlines() if line.strip()
-    )
+def numbers_in(text):
+    """The numbers of a text, without times, versions and folders."""
+    return [float(number) for number in NUMBER.findall(CHANGES.sub("...", text))]
 
 
 def of_commands(study, *lines):
@@ -99,7 +99,7 @@ def of_commands(study, *lines):
         found["table"] = pd.read_csv(folder / "all.csv")
         if (folder / "all.nc").exists():
             found["array"] = xr.load_dataset(folder / "all.nc")
-        found["page"] = quiet(PLAIN.sub(" ", (folder / "run/report.html").read_text()))
+        found["page"] = numbers_in(PLAIN.sub(" ", (folder / "run/report.html").read_text()))
     return found
 
 
