@@ -133,7 +133,6 @@ SKEWED = {  # marginal, places, values, noise, values at each place
 
 
 @pytest.mark.parametrize("case", SKEWED)
-@pytest.mark.filterwarnings("ignore::stiction.UnitWarning")
 def test_posteriors_of_skewed_values_beyond_two_moments(case):
     """Mean, scatter and lower tail are those of the field's own draws, weighted."""
     marginal, x, values, noise, times = SKEWED[case]
@@ -174,7 +173,6 @@ def test_values_drawn_from_the_field_are_not_unlikely():
         assert abs(known.misfit - 300) < 4.0 * 600**0.5  # chi-square of 300 values
 
 
-@pytest.mark.filterwarnings("ignore::stiction.UnitWarning")
 def test_what_remains_of_skewed_likelihoods_is_measured_and_warned_of():
     field = st.RandomField(LOGNORMAL, st.PowerLawSpectrum(2e-3), mean_mode=True)
     places = np.linspace(0.0, 0.05, 200)

@@ -102,6 +102,7 @@ def test_efolding_lengths():
         assert other == pytest.approx(one * scale, rel=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore:Error in function:RuntimeWarning")  # scipy, of invgauss
 @pytest.mark.parametrize(
     "distribution",
     [

@@ -18,7 +18,6 @@ UNEVEN = {
 }
 
 
-@pytest.mark.filterwarnings("ignore::stiction.UnitWarning")
 @pytest.mark.parametrize(
     ("mode", "across", "load"), [("II", 8, UNEVEN), ("III", 12, UNEVEN), ("III", 8, {})]
 )

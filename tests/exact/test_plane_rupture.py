@@ -16,7 +16,6 @@ from stiction.methods.dynamics.medium import amplification
 from stiction.methods.dynamics.simulate import simulate_rupture
 
 # Strips are narrow, and solids soft, where only waves count.
-pytestmark = pytest.mark.filterwarnings("ignore::stiction.UnitWarning")
 
 LENGTH, NODES = 0.024, 64
 

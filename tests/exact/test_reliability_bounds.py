@@ -62,7 +62,6 @@ def rigid(marginal, rate):
 FIRST = {"event": "first_instability", "method": EXACT, "progress": False}
 
 
-@pytest.mark.filterwarnings("ignore::stiction.UnitWarning")
 def test_what_survives_counts_as_survived():
     """A quarter slides stably: counted, by levels, of two members, and as a curve."""
     problem, field = rigid(st.Lognormal(mean=1e6, cv=0.12), 1.05)

@@ -183,7 +183,6 @@ def test_tiny_and_negative_loads_close_as_well():
         assert found.upper == pytest.approx(exact - shift, abs=1e-6 * exact)
 
 
-@pytest.mark.filterwarnings("ignore::stiction.UnitWarning")  # of a mean strength beyond G
 def test_barriers_that_never_slip_do_not_count():
     """However strong they are: the accuracy is a share of the load, not of their strength."""
     law = st.LinearWeakening(weakening_rate=RATE, residual_ratio=0.5)

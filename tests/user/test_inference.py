@@ -32,6 +32,7 @@ def infer(peaks=PEAKS, problem=PROBLEM, random=STRENGTH, prior=LOW, **options):
     return st.infer(problem, random, peaks, prior=prior, **options)
 
 
+@pytest.mark.filterwarnings("ignore:Estimated shape parameter:UserWarning")  # seven peaks
 def test_arviz():
     arviz = pytest.importorskip("arviz")
     posterior = infer(prior=PRIOR, samples=400, load_cell_error=5e3)
