@@ -13,6 +13,7 @@ from setups import beta_strength, ensemble, make_problem
 import stiction as st
 from stiction.random.fields import _conditioned
 from stiction.random.mapping import from_normal
+from stiction.random.transport import make_transport
 
 LINE = st.Interface(length=0.05, nodes=64)
 PLANE = st.Interface(length=(0.02, 0.01), nodes=(16, 8))
@@ -160,6 +161,24 @@ def test_posteriors_of_skewed_values_beyond_two_moments(case):
     with warnings.catch_warnings():  # neither unlikely nor approximate
         warnings.simplefilter("error")
         known.warn()
+
+
+def test_a_marginal_without_quantiles_far_out_is_mapped_all_the_same():
+    """Below -4.9 standard deviations the likelihood is zero instead of next to nothing."""
+
+    def log_ratio(places, z, end):
+        skewed = -0.5 * ((np.exp(0.5 * z) - 1.5) / 0.6) ** 2
+        return np.where(z < end, -1e9, skewed)
+
+    whole, cut = (
+        make_transport(
+            lambda places, z, end=end: log_ratio(places, z, end), np.zeros(1), np.eye(1)
+        )
+        for end in (-np.inf, -4.9)
+    )
+    assert len(whole[0].basis) == 1
+    np.testing.assert_allclose(cut[0].shared_table[:, 20:], whole[0].shared_table[:, 20:])
+    np.testing.assert_allclose(cut[1], whole[1], atol=1e-6)  # P(z < -4.9) is 5e-7
 
 
 def test_values_drawn_from_the_field_are_not_unlikely():

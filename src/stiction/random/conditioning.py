@@ -37,7 +37,13 @@ from stiction.problem.profiles.placing import MEASURED
 from stiction.problem.profiles.reading import in_si, unit_of
 from stiction.random.mapping import from_normal
 from stiction.random.synthesis import condition
-from stiction.random.transport import Left, Ratio, Transport, make_transport, transport
+from stiction.random.transport import (
+    ErrorEstimate,
+    LogRatio,
+    Transport,
+    make_transport,
+    transport,
+)
 
 DOUBTFUL = 5.0  # standard deviations of chi-square beyond which values do not suit a field
 UNCERTAIN = 0.1  # of a standard deviation of z, by which a posterior may be off
@@ -253,7 +259,7 @@ class Conditioning(NamedTuple):
 
     regression: Regression
     mapped: Transport  # of the draws, before the regression
-    left_over: Left
+    left_over: ErrorEstimate
     misfit: float  # squared, of values and of draws at the middle of the posterior
     points: int
 
@@ -335,7 +341,7 @@ def _gaussians(
 
 def _ratio(
     measured: Sequence[Measured], weighted: Array, precision: Array, middle: Array
-) -> Ratio:
+) -> LogRatio:
     """Logarithm of the likelihood over the Gaussian that stands for it, by place and z."""
 
     def found(at: NDArray[np.int64], z: Array) -> Array:

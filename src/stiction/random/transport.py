@@ -1,17 +1,48 @@
-"""From the Gaussian of a regression to the posterior itself, direction after direction.
+"""Map draws of a Gaussian to the posterior that it approximates, one direction at a time.
 
-With draws w of the Gaussian, z at place k is m_k + A_k w, and the posterior has the density
-N(w) prod_k r_k(z_k), r_k being the likelihood over the Gaussian that stands for it. Along
-orthonormal directions u_1, u_2, ... the map to it is triangular (Rosenblatt, 1952): e_j =
-u_j w goes, quantile by quantile, to the distribution of density
+Problem
+-------
+A regression has replaced the likelihood of each measured value by a Gaussian. In the Gaussian
+posterior that follows, the field at place k is z_k = m_k + a_k'w with standard normal w. The exact
+posterior of w has a density proportional to
 
-    N(e_j) prod_k E[r_k(z_k) | e_1, ..., e_j],
+    N(w) prod_k r_k(z_k),                                                                     (1)
 
-which takes places as independent given e_1 to e_j (Cseke and Heskes, 2011). That is exact
-for one place, for independent ones, and for many that measure one number. A direction is
-that of the place at which the posterior differs most from the Gaussian, as far as it is not
-yet spanned; the last are left out where there is hardly a difference. What is then left is
-measured by the weights of samples.
+where r_k is the likelihood of value k divided by the Gaussian that replaced it.
+
+Algorithm
+---------
+A triangular map along orthonormal directions u_1, u_2, ... (M. Rosenblatt, Annals of Mathematical
+Statistics 23, 1952). The coordinate u_j'w is moved, quantile by quantile, from the standard normal
+distribution to that of a coordinate e_j with the density, up to a constant,
+
+    p(e_j | e_1, ..., e_j-1) = N(e_j) prod_k E[r_k(z_k) | e_1, ..., e_j].                     (2)
+
+Here e_1, ..., e_j-1 are moved already, and the mean is over w orthogonal to u_1, ..., u_j. Equation
+(2) treats places as independent given e_1 to e_j (B. Cseke and T. Heskes, Journal of Machine
+Learning Research 12, 2011). It is exact for one place, for independent places each of which has a
+direction, and for many places that measure one number.
+
+Preparation (`make_transport`):
+
+1. Expand log r_k in Hermite polynomials of the standardised z_k. The norm of the coefficients says
+   how far the posterior at a place is from the Gaussian. Ignore the places with the smallest norms,
+   which together stay below `IGNORED_TOTAL`.
+2. Choose the directions greedily. The candidates are the a_k of the places that differ most from
+   the Gaussian, made orthogonal to the directions chosen before. The next direction is the one on
+   which the expansions of all places together have the largest projection.
+3. Tabulate the factors of (2) along each direction. A place that depends noticeably on earlier
+   coordinates has a table of its own, over its mean given e_1 to e_j. The other places share a
+   table over e_j, with earlier coordinates at zero.
+4. Estimate the error that is left: map samples, weight them by (1) divided by the density that they
+   have, and compare weighted and plain moments of z.
+
+Map of one draw (`transport`), for each direction in turn:
+
+5. Add up the tables on a grid of e_j, which gives the logarithm of (2).
+6. Integrate the density over each cell, taking its logarithm as linear there.
+7. Find the quantile, starting from the nearer end so that tails keep their digits, and move w along
+   u_j by the difference.
 """
 
 import math
@@ -24,218 +55,274 @@ from numpy.typing import NDArray
 from stiction.base.arrays import Array
 from stiction.base.jit import jit_allocating
 
-MOST, LISTED = 16, 12  # directions, and places whose dependence on the earlier ones counts
-WORTH = 0.1  # difference of the logarithm of a density that is worth a direction
-NOTHING = 0.005  # the same that is nothing
-DEPENDS = 0.02  # the same of a term that is worth its dependence on earlier directions
-CANDIDATES = 256  # places considered for a direction
-SPANNED = 0.2  # share of the scatter of a place below which it is spanned by earlier directions
-REACH, CELLS, ACROSS = 8.0, 96, 96  # of directions, and of places, in standard deviations
-BEYOND = 7.0  # reach of the average over what is not yet known
-LIMIT = 4.0  # of logarithms of ratios where they are compared
-ORDERS = 6  # Hermite polynomials in that comparison
-PROBES = 1024  # samples whose weights measure what is left
-POINTS = 25  # of that average
-TINY, FLOOR = 1e-300, 700.0  # least density, and least logarithm, that are floats
-UNMOVED = 0.01  # share of the scatter of a place below which a direction does not move it
+# Sizes of the map
+MAX_DIRECTIONS = 16
+MAX_DEPENDENT = 12  # places of a direction whose dependence on earlier coordinates is kept
+E_MAX, N_CELLS = 8.0, 96  # grid of e_j: from -E_MAX to E_MAX standard deviations
+N_TABLE_CELLS = 96  # the same for E[z_k | e_1, ..., e_j], standardised
 
-Ratio = Callable[[NDArray[np.int64], Array], Array]
-"""Logarithm of r at places (indices) and z (places, ...)."""
+# Thresholds on the logarithm of a density
+MIN_DIRECTION_GAIN = 0.1  # a direction that explains less is not worth its time
+IGNORED_TOTAL = 0.005
+MIN_DEPENDENCE = 0.02  # a dependence on earlier coordinates that matters less is dropped
+MAX_LOG_RATIO = 4.0  # log r_k is clipped so far from its median before it is expanded
+
+# Shares of the standard deviation of a place
+MIN_UNSPANNED = 0.2  # no candidate if less lies outside the earlier directions
+MIN_SLOPE = 0.01  # a direction that moves a place by less does not concern it
+
+# Accuracy of the preparation
+N_HERMITE, N_HERMITE_POINTS = 6, 97  # polynomials in an expansion, and points of its integrals
+Z_MAX, N_QUADRATURE = 7.0, 25  # averages over z: range in standard deviations, and points
+MAX_CANDIDATES = 256
+PLACES_PER_BLOCK = 256  # tabulated together, to bound memory
+N_CHECK_SAMPLES = 1024
+
+LOG_OF_ZERO = -700.0
+MAX_FALL = 600.0  # of a logarithm below its maximum: exp(-MAX_FALL) is a float
+
+LogRatio = Callable[[NDArray[np.int64], Array], Array]
+"""log r_k, finite, at places (indices) and values z (places, ...)."""
 
 
 class Transport(NamedTuple):
-    """Directions, and the logarithms of density ratios along them."""
+    """Directions, and tables of the logarithm of (2) along them, without its factor N(e_j).
 
-    basis: Array  # (directions, dimension), orthonormal
-    fixed: Array  # (directions, CELLS + 1): what depends on e_j only
-    counts: NDArray[np.int64]  # (directions,): places that depend on earlier directions, too
-    slopes: Array  # (directions, LISTED, directions): their z, in units of its deviation
-    tables: Array  # (directions, LISTED, ACROSS + 1): over that
+    The fields are the first arguments of `transport`, in this order. The caller may express `basis`
+    in other coordinates of the draws: `conditioning` does, since its draws are not whitened.
+    """
+
+    basis: Array  # (directions, dimension): u_j
+    shared_table: Array  # (directions, N_CELLS + 1): sum over the places that share it
+    n_dependent: NDArray[np.int64]  # (directions,): places with a table of their own
+    own_tables: Array  # (directions, MAX_DEPENDENT, N_TABLE_CELLS + 1): their tables
+    # Slope of the standardised mean E[z_k | e_1, ..., e_j] by e_i, for i <= j
+    mean_slopes: Array  # (directions j, MAX_DEPENDENT, directions i)
 
 
-class Left(NamedTuple):
-    """What is left, at most at any place, in standard deviations of z there."""
+class ErrorEstimate(NamedTuple):
+    """Largest error of the mapped draws at any place that step 1 keeps."""
 
-    mean: float  # by which the mean is off
-    deviation: float  # by which share the standard deviation is
+    mean: float  # of z, in standard deviations of z
+    deviation: float  # of the standard deviation of z, as a share of it
+
+
+def make_transport(
+    log_ratio: LogRatio, mean: Array, slopes: Array
+) -> tuple[Transport, ErrorEstimate]:
+    """Prepare the map for z = mean + slopes @ w, (places,) and (places, dimension)."""
+    # 1. How far the posterior of each place is from the Gaussian.
+    deviation = np.sqrt((slopes**2).sum(axis=1))
+    coefficients = _hermite(log_ratio, mean, deviation)
+    non_gaussianity = np.linalg.norm(coefficients, axis=0)
+    order = np.argsort(non_gaussianity)
+    kept = np.sort(order[np.cumsum(non_gaussianity[order]) > IGNORED_TOTAL])
+
+    def log_ratio_of_kept(places: NDArray[np.int64], z: Array) -> Array:
+        return log_ratio(kept[places], z)
+
+    mean, slopes, coefficients = mean[kept], slopes[kept], coefficients[:, kept]
+    basis = _choose_directions(coefficients, slopes / deviation[kept, None])
+    # Where log r_k is linear in z_k, earlier coordinates only multiply (2) by a constant.
+    nonlinearity = np.linalg.norm(coefficients[1:], axis=0)
+    tables = _tabulate(log_ratio_of_kept, mean, slopes, basis, nonlinearity)
+    if not kept.size:
+        return tables, ErrorEstimate(0.0, 0.0)
+    return tables, _estimate_error(log_ratio_of_kept, mean, slopes, tables)
+
+
+def _hermite(log_ratio: LogRatio, mean: Array, deviation: Array) -> Array:
+    """Step 1: coefficients in normalised Hermite polynomials 1, 2, ..., (N_HERMITE, places)."""
+    x = np.linspace(-Z_MAX, Z_MAX, N_HERMITE_POINTS)
+    value = log_ratio(np.arange(mean.size), mean[:, None] + deviation[:, None] * x)
+    weight = np.exp(-0.5 * x**2)
+    weight /= weight.sum()
+    # Where the marginal has no quantile, log r_k is so low that it would decide a mean over all
+    # points. The median within a standard deviation does not feel it.
+    typical = np.median(value[:, np.abs(x) <= 1.0], axis=1)
+    value = (value - typical[:, None]).clip(-MAX_LOG_RATIO, MAX_LOG_RATIO)
+    coefficients, previous, current = [], np.zeros_like(x), np.ones_like(x)
+    for n in range(1, N_HERMITE + 1):
+        following = (x * current - np.sqrt(n - 1.0) * previous) / np.sqrt(n)
+        previous, current = current, following
+        coefficients.append(value @ (weight * current))
+    return np.array(coefficients)
+
+
+def _choose_directions(coefficients: Array, unit: Array) -> Array:
+    """Step 2: the directions, (directions, dimension), from the unit vectors a_k / |a_k|."""
+    by_non_gaussianity = np.argsort(-np.linalg.norm(coefficients, axis=0))
+    unspanned = unit[by_non_gaussianity[:MAX_CANDIDATES]]
+    basis = np.empty((0, unit.shape[1]))
+    while len(basis) < MAX_DIRECTIONS:
+        norm = np.linalg.norm(unspanned, axis=1)
+        candidates = unspanned[norm > MIN_UNSPANNED] / norm[norm > MIN_UNSPANNED, None]
+        if not candidates.size:
+            break
+        # Along a unit vector u, polynomial n of z_k keeps the share (u'a_k / |a_k|)**n.
+        cosine = candidates @ unit.T
+        power, squared_gain = np.ones_like(cosine), np.zeros(len(candidates))
+        for coefficient in coefficients:
+            power *= cosine
+            squared_gain += (power @ coefficient) ** 2
+        best = int(np.argmax(squared_gain))
+        if not squared_gain[best] > MIN_DIRECTION_GAIN**2:  # NaN ends here, too
+            break
+        # Orthogonal once more, against round-off.
+        direction = candidates[best] - basis.T @ (basis @ candidates[best])
+        direction /= np.linalg.norm(direction)
+        basis = np.vstack([basis, direction])
+        unspanned = unspanned - np.outer(unspanned @ direction, direction)
+    return basis
+
+
+def _log_mean_ratio(
+    log_ratio: LogRatio, places: NDArray[np.int64], mean: Array, variance: Array
+) -> Array:
+    """log E[r_k(z_k)] up to a constant, for normal z_k of a mean (places, ...) and a variance."""
+    x = np.linspace(-Z_MAX, Z_MAX, N_QUADRATURE)
+    deviation = np.sqrt(np.maximum(variance, 0.0))[:, None, None]
+    value = log_ratio(places, mean[:, :, None] + deviation * x) - 0.5 * x**2
+    highest = value.max(axis=2)
+    highest = np.where(np.isfinite(highest), highest, LOG_OF_ZERO)
+    return np.log(np.exp(value - highest[:, :, None]).sum(axis=2) + 1e-300) + highest
+
+
+def _tabulate(
+    log_ratio: LogRatio, mean: Array, slopes: Array, basis: Array, nonlinearity: Array
+) -> Transport:
+    """Step 3: the tables. `nonlinearity` says how far log r_k is from a straight line."""
+    n_directions = len(basis)
+    e_slopes = slopes @ basis.T  # of z_k by e_j
+    variance = (slopes**2).sum(axis=1)
+    shared_table = np.zeros((n_directions, N_CELLS + 1))
+    n_dependent = np.zeros(n_directions, dtype=np.int64)
+    own_tables = np.zeros((n_directions, MAX_DEPENDENT, N_TABLE_CELLS + 1))
+    mean_slopes = np.zeros((n_directions, MAX_DEPENDENT, n_directions))
+    e = np.linspace(-E_MAX, E_MAX, N_CELLS + 1)
+    standardised_mean = np.linspace(-E_MAX, E_MAX, N_TABLE_CELLS + 1)
+    for j in range(n_directions):
+        # Variance of E[z_k | e_1, ..., e_j], and of z_k about it.
+        explained = (e_slopes[:, : j + 1] ** 2).sum(axis=1)
+        unexplained = variance - explained
+        # Size of the product of e_j and an earlier coordinate in log r_k.
+        earlier = np.sqrt(explained - e_slopes[:, j] ** 2)
+        dependence = nonlinearity * np.abs(e_slopes[:, j]) * earlier / variance
+        places = np.argsort(-dependence)[:MAX_DEPENDENT]
+        places = places[dependence[places] > MIN_DEPENDENCE]
+        n = n_dependent[j] = places.size
+        deviation = np.sqrt(explained[places])
+        mean_slopes[j, :n] = e_slopes[places] / deviation[:, None]
+        z = mean[places, None] + deviation[:, None] * standardised_mean
+        own_tables[j, :n] = _log_mean_ratio(log_ratio, places, z, unexplained[places])
+
+        # All other places that e_j moves, with earlier coordinates at zero.
+        others = np.flatnonzero(np.abs(e_slopes[:, j]) > MIN_SLOPE * np.sqrt(variance))
+        others = np.setdiff1d(others, places)
+        for block in np.array_split(others, 1 + others.size // PLACES_PER_BLOCK):
+            z = mean[block, None] + e_slopes[block, j, None] * e
+            log_mean = _log_mean_ratio(log_ratio, block, z, unexplained[block])
+            shared_table[j] += log_mean.sum(axis=0)
+    return Transport(basis, shared_table, n_dependent, own_tables, mean_slopes)
+
+
+def _estimate_error(
+    log_ratio: LogRatio, mean: Array, slopes: Array, tables: Transport
+) -> ErrorEstimate:
+    """Step 4: compare mapped samples with the same samples, weighted to have the density (1)."""
+    rng = np.random.default_rng(0)
+    draws = rng.standard_normal((N_CHECK_SAMPLES, slopes.shape[1]))
+    log_density = np.zeros(N_CHECK_SAMPLES)
+    if len(tables.basis):
+        transport(*tables, draws, log_density)
+    z = draws @ slopes.T  # less its mean
+    log_weight = log_ratio(np.arange(mean.size), mean[:, None] + z.T).sum(axis=0)
+    log_weight -= log_density + 0.5 * ((draws @ tables.basis.T) ** 2).sum(axis=1)
+    weight = np.exp(log_weight - log_weight.max())
+    weight = np.minimum(weight / weight.mean(), np.sqrt(N_CHECK_SAMPLES))  # truncated weights
+    weight /= weight.sum()
+    plain_mean, plain_deviation = z.mean(axis=0), z.std(axis=0)
+    weighted_mean = weight @ z
+    weighted_deviation = np.sqrt(weight @ (z - weighted_mean) ** 2)
+    return ErrorEstimate(
+        float(np.abs((weighted_mean - plain_mean) / plain_deviation).max()),
+        float(np.abs(weighted_deviation / plain_deviation - 1.0).max()),
+    )
 
 
 @jit_allocating
 def transport(
     basis: Array,
-    fixed: Array,
-    counts: NDArray[np.int64],
-    slopes: Array,
-    tables: Array,
-    out: Array,
-    density: Array,
+    shared_table: Array,
+    n_dependent: NDArray[np.int64],
+    own_tables: Array,
+    mean_slopes: Array,
+    draws: Array,
+    log_density: Array,
 ) -> None:
-    """Map each row of `out` in place; add the log density of e_j to `density`, (rows,)."""
-    directions, dimension = basis.shape
-    cells, across = fixed.shape[1] - 1, tables.shape[2] - 1
-    step, pace = 2.0 * REACH / cells, 0.5 * across / REACH
-    height, mass, moved = np.empty(cells + 1), np.empty(cells), np.empty(directions)
-    for i in range(out.shape[0]):
-        for j in range(directions):
+    """Map each row of `draws` (rows, dimension) in place.
+
+    The log density of the coordinates e, less a constant, is added to `log_density` (rows,).
+    """
+    n_directions, dimension = basis.shape
+    n_cells, n_table = shared_table.shape[1] - 1, own_tables.shape[2] - 1
+    width = 2.0 * E_MAX / n_cells
+    cells_per_unit = 0.5 * n_table / E_MAX
+    log_p, mass, e = np.empty(n_cells + 1), np.empty(n_cells), np.empty(n_directions)
+    for row in range(draws.shape[0]):
+        for j in range(n_directions):
             drawn = 0.0
             for d in range(dimension):
-                drawn += basis[j, d] * out[i, d]
-            for g in range(cells + 1):
-                height[g] = fixed[j, g]
-            for k in range(counts[j]):
-                begin = 0.0
-                for other in range(j):
-                    begin += slopes[j, k, other] * moved[other]
-                begin = (begin + REACH) * pace
-                rise = slopes[j, k, j] * pace
-                for g in range(cells + 1):
-                    place = begin + rise * (g * step - REACH)
-                    cell = int(min(max(place, 0.0), across - 1.0))
-                    left = tables[j, k, cell]
-                    height[g] += left + (place - cell) * (tables[j, k, cell + 1] - left)
-            top = -math.inf
-            for g in range(cells + 1):
-                height[g] -= 0.5 * (g * step - REACH) ** 2
-                top = max(top, height[g])
+                drawn += basis[j, d] * draws[row, d]
+
+            # 5. The logarithm of (2) on the grid of e_j: the tables, then the factor N(e_j).
+            for g in range(n_cells + 1):
+                log_p[g] = shared_table[j, g]
+            for slot in range(n_dependent[j]):
+                offset = 0.0
+                for i in range(j):
+                    offset += mean_slopes[j, slot, i] * e[i]
+                offset = (offset + E_MAX) * cells_per_unit
+                slope = mean_slopes[j, slot, j] * cells_per_unit
+                for g in range(n_cells + 1):
+                    position = offset + slope * (g * width - E_MAX)
+                    cell = int(min(max(position, 0.0), n_table - 1.0))
+                    value = own_tables[j, slot, cell]
+                    # Linear within the cell, and beyond the ends of the table.
+                    log_p[g] += value + (position - cell) * (
+                        own_tables[j, slot, cell + 1] - value
+                    )
+            highest = -math.inf
+            for g in range(n_cells + 1):
+                log_p[g] -= 0.5 * (g * width - E_MAX) ** 2
+                highest = max(highest, log_p[g])
+
+            # 6. The mass of each cell, divided by its width and by exp(highest).
             total = 0.0
-            for g in range(cells + 1):
-                height[g] = max(height[g], top - 600.0)  # exp is a float there
-            right = math.exp(height[0] - top)
-            for g in range(cells):  # log-linear between the nodes
-                left, right = right, math.exp(height[g + 1] - top)
-                rate = height[g + 1] - height[g]
-                flat = abs(rate) < 1e-4  # the trapezium is off by its square over twelve
-                mass[g] = 0.5 * (left + right) if flat else (right - left) / rate
+            for g in range(n_cells + 1):
+                log_p[g] = max(log_p[g], highest - MAX_FALL)
+            right = math.exp(log_p[0] - highest)
+            for g in range(n_cells):
+                left, right = right, math.exp(log_p[g + 1] - highest)
+                rise = log_p[g + 1] - log_p[g]
+                is_flat = abs(rise) < 1e-4  # the trapezium is off by rise**2 / 12
+                mass[g] = 0.5 * (left + right) if is_flat else (right - left) / rise
                 total += mass[g]
-            # From the nearer end, so that tails keep their digits.
-            wanted = 0.5 * math.erfc(abs(drawn) / math.sqrt(2.0)) * total
-            cell, last, turn = 0, cells - 1, 1
+
+            # 7. The quantile of the drawn value, counted from the nearer end.
+            remaining = 0.5 * math.erfc(abs(drawn) / math.sqrt(2.0)) * total
+            cell, last_cell, step = 0, n_cells - 1, 1
             if drawn > 0.0:
-                cell, last, turn = last, 0, -1
-            while wanted > mass[cell] and cell != last:
-                wanted -= mass[cell]
-                cell += turn
-            part = min(wanted / mass[cell], 1.0)
-            part = part if turn == 1 else 1.0 - part
-            rate = height[cell + 1] - height[cell]
-            if abs(rate) > 1e-5:  # else linear to half of it
-                part = math.log1p(part * math.expm1(rate)) / rate
-            moved[j] = (cell + part) * step - REACH
-            density[i] += height[cell] + part * rate - top - math.log(total * step)
+                cell, last_cell, step = last_cell, 0, -1
+            while remaining > mass[cell] and cell != last_cell:
+                remaining -= mass[cell]
+                cell += step
+            share = min(remaining / mass[cell], 1.0)
+            share = share if step == 1 else 1.0 - share
+            rise = log_p[cell + 1] - log_p[cell]
+            if abs(rise) > 1e-5:  # below, the share of the width is that of the mass
+                share = math.log1p(share * math.expm1(rise)) / rise
+            e[j] = (cell + share) * width - E_MAX
+            log_density[row] += log_p[cell] + share * rise - highest - math.log(total * width)
             for d in range(dimension):
-                out[i, d] += basis[j, d] * (moved[j] - drawn)
-
-
-def make_transport(ratio: Ratio, middle: Array, along: Array) -> tuple[Transport, Left]:
-    """Find directions and tables, and what is left.
-
-    z at the places is `middle` + `along` w, (places,) and (places, dimension).
-    """
-    whole = np.sqrt((along**2).sum(axis=1))
-    coefficients = _hermite(ratio, middle, whole)
-    own = np.linalg.norm(coefficients, axis=0)
-    order = np.argsort(own)
-    some = np.sort(order[np.cumsum(own[order]) > NOTHING])  # the others together are nothing
-
-    def here(at: NDArray[np.int64], z: Array) -> Array:
-        return ratio(some[at], z)
-
-    middle, along, coefficients = middle[some], along[some], coefficients[:, some]
-    basis = _directions(coefficients, along / whole[some, None])
-    strength = np.linalg.norm(coefficients[1:], axis=0)
-    found = _tables(here, middle, along, basis, strength)
-    return found, _left(here, middle, along, found) if some.size else Left(0.0, 0.0)
-
-
-def _hermite(ratio: Ratio, middle: Array, whole: Array) -> Array:
-    """Coefficients of log r at each place in Hermite polynomials, (ORDERS, places)."""
-    x = np.linspace(-BEYOND, BEYOND, CELLS + 1)
-    value = ratio(np.arange(middle.size), middle[:, None] + whole[:, None] * x)
-    weight = np.exp(-0.5 * x**2)
-    weight /= weight.sum()
-    value = (value - (value @ weight)[:, None]).clip(-LIMIT, LIMIT)
-    found, before, now = [], np.zeros_like(x), np.ones_like(x)
-    for order in range(1, ORDERS + 1):
-        before, now = now, (x * now - np.sqrt(order - 1.0) * before) / np.sqrt(order)
-        found.append(value @ (weight * now))
-    return np.array(found)
-
-
-def _directions(coefficients: Array, unit: Array) -> Array:
-    """Directions u_j of the draws w, in turn those of the largest difference, (dimension, J)."""
-    own = np.argsort(-np.linalg.norm(coefficients, axis=0))
-    left, chosen = unit[own[:CANDIDATES]], np.empty((0, unit.shape[1]))
-    while len(chosen) < MOST:
-        norm = np.linalg.norm(left, axis=1)
-        free = left[norm > SPANNED] / norm[norm > SPANNED, None]
-        if not free.size:
-            break
-        cosine = free @ unit.T
-        power, score = np.ones_like(cosine), np.zeros(len(free))
-        for row in coefficients:
-            power *= cosine
-            score += (power @ row) ** 2
-        best = int(np.argmax(score))
-        if not score[best] > WORTH**2:
-            break
-        new = free[best] - chosen.T @ (chosen @ free[best])
-        new /= np.linalg.norm(new)
-        chosen, left = np.vstack([chosen, new]), left - np.outer(left @ new, new)
-    return chosen
-
-
-def _averaged(ratio: Ratio, at: NDArray[np.int64], mean: Array, variance: Array) -> Array:
-    """Logarithm of E[r_k(z_k)] with z_k normal, (places, ...); variance (places,)."""
-    y = np.linspace(-BEYOND, BEYOND, POINTS)
-    deviation = np.sqrt(np.maximum(variance, 0.0))[:, None, None]
-    value = ratio(at, mean[:, :, None] + deviation * y) - 0.5 * y**2
-    top = value.max(axis=2)
-    top = np.where(np.isfinite(top), top, -FLOOR)
-    return np.log(np.exp(value - top[:, :, None]).sum(axis=2) + TINY) + top
-
-
-def _tables(ratio: Ratio, middle: Array, along: Array, basis: Array, own: Array) -> Transport:
-    """Tabulate the ratios along the directions; `own` is how much those of a place differ."""
-    slope, count = along @ basis.T, len(basis)
-    whole = (along**2).sum(axis=1)
-    fixed, counts = np.zeros((count, CELLS + 1)), np.zeros(count, dtype=np.int64)
-    slopes, tables = np.zeros((count, LISTED, count)), np.zeros((count, LISTED, ACROSS + 1))
-    e, t = np.linspace(-REACH, REACH, CELLS + 1), np.linspace(-REACH, REACH, ACROSS + 1)
-    for j in range(count):
-        known = (slope[:, : j + 1] ** 2).sum(axis=1)
-        rest = whole - known
-        depends = own * np.abs(slope[:, j]) * np.sqrt(known - slope[:, j] ** 2) / whole
-        some = np.argsort(-depends)[:LISTED]
-        some = some[depends[some] > DEPENDS]
-        counts[j] = some.size
-        deviation = np.sqrt(known[some])
-        slopes[j, : some.size] = slope[some] / deviation[:, None]
-        at = middle[some, None] + deviation[:, None] * t
-        tables[j, : some.size] = _averaged(ratio, some, at, rest[some])
-        others = np.flatnonzero(np.abs(slope[:, j]) > UNMOVED * np.sqrt(whole))
-        others = np.setdiff1d(others, some)
-        for part in np.array_split(others, 1 + others.size // CANDIDATES):
-            at = middle[part, None] + slope[part, j, None] * e
-            fixed[j] += _averaged(ratio, part, at, rest[part]).sum(axis=0)
-    return Transport(basis, fixed, counts, slopes, tables)
-
-
-def _left(ratio: Ratio, middle: Array, along: Array, found: Transport) -> Left:
-    """Compare samples with the same, weighted by the density over that which they have."""
-    rng = np.random.default_rng(0)
-    w, density = rng.standard_normal((PROBES, along.shape[1])), np.zeros(PROBES)
-    if len(found.basis):
-        transport(*found, w, density)
-    z = w @ along.T
-    weight = ratio(np.arange(middle.size), middle[:, None] + z.T).sum(axis=0)
-    weight -= density + 0.5 * ((w @ found.basis.T) ** 2).sum(axis=1)
-    weight = np.exp(weight - weight.max())
-    weight = np.minimum(weight / weight.mean(), np.sqrt(PROBES))
-    weight /= weight.sum()
-    plain, scatter = z.mean(axis=0), z.std(axis=0)
-    mean = weight @ z
-    deviation = np.sqrt(weight @ (z - mean) ** 2)
-    return Left(
-        float(np.abs((mean - plain) / scatter).max()),
-        float(np.abs(deviation / scatter - 1.0).max()),
-    )
+                draws[row, d] += basis[j, d] * (e[j] - drawn)
