@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from ruptures import BREAKING_PLANE, CROOKED, CROOKED_STRENGTH, dip
 from setups import QUARTER as SOLID
-from setups import beta_strength, ensemble, exact_onset, make_problem
+from setups import beta_strength, ensemble, exact_onset, make_problem, turns
 
 import stiction as st
 
@@ -104,15 +104,94 @@ def test_an_arrested_instability_is_no_sliding():
         assert np.isnan(found[name].item()), name
 
 
-def test_what_slides_without_an_instability_does_so_at_its_largest_stress():
+def test_what_breaks_without_an_instability_has_no_critical_stress():
     """A third of a nucleation length between barriers slips as the load drives it."""
     strength = np.where(np.abs(X / 0.05 - 0.37) < 0.03, CROOKED_STRENGTH, np.inf)
-    run = simulate(st.Rupture(loading_rate=1e7), strength)
-    assert run.attrs["stopped"] == "sliding"
+    with pytest.warns(st.AccuracyWarning, match="did not become unstable before its run ended"):
+        run = simulate(st.Rupture(loading_rate=1e7), strength)
+    assert run.attrs["stopped"] == "rest"
     assert run.arrested_events.item() == 0
-    assert run.critical_stress.item() == run.step_mean_stress.values[-1]
-    assert run.first_instability.item() == run.critical_stress.item()
-    assert run.onset_time.item() == run.step_time.values[-1]
+    assert run.kinetic_stress.item() == run.step_mean_stress.values[-1]
+    for name in ("critical_load", "critical_stress", "first_instability", "stress_drop"):
+        assert np.isnan(run[name].item()), name
+
+
+def highest_instability(stress, drop):
+    """The highest maximum of a mean stress under a rising load that then falls by `drop`."""
+    highest, maximum, fallen = -np.inf, -np.inf, False
+    for value in stress:
+        if value > maximum:
+            maximum, fallen = value, False
+        elif not fallen and value < maximum - drop:
+            highest, fallen = max(highest, maximum), True
+    return highest
+
+
+def test_nodes_that_creep_beside_a_barrier_do_not_raise_the_onset():
+    """The last of them breaks at a stress that grows with the number of nodes, without end."""
+    rng = np.random.default_rng(2)
+    waves = [(k, *rng.standard_normal(2)) for k in range(1, 11)]
+    onsets = []
+    for nodes in (128, 256):
+        angle = turns(nodes)
+        strength = 1e6 + 1.2e5 * sum(
+            a * np.cos(k * angle) + b * np.sin(k * angle) for k, a, b in waves
+        )
+        strength[nodes * 80 // 128 : nodes * 110 // 128] = np.inf
+        problem = make_problem(
+            nodes, 0.1, solid=SOLID, weakening_rate=1.4e11, residual_strength=3e5, mode="III"
+        )
+        run = simulate(st.Rupture(loading_rate=2e7), strength, problem)
+        stress = run.step_mean_stress.values
+        assert run.arrested_events.item() > 0
+        assert run.critical_stress.item() == highest_instability(stress, 70.0)
+        assert run.critical_stress.item() < 0.97 * run.kinetic_stress.item()
+        onsets.append(run.critical_stress.item())
+    assert onsets[1] == pytest.approx(onsets[0], rel=2e-3)  # 8e-4: of second order in the grid
+
+
+def fault_between_barriers():
+    """2 km of a period of 4 km, overstressed in the middle, under a load that stays."""
+    line = st.Interface(length=4e3, nodes=250)
+    away = np.abs(line.x - 2e3)
+    solid = st.Solid(shear_modulus=24.3e9, poisson_ratio=0.25, density=2700.0, plane="strain")
+    load = st.Load(initial_stress=np.where(away <= 200.0, 32.2e6, 30e6))
+    friction = st.LinearWeakening(critical_slip=0.06, residual_strength=25e6)
+    problem = st.Problem(solid, line, friction, load, mode="III")
+    return problem, np.where(away <= 1e3, 32e6, np.inf)
+
+
+def test_a_fault_between_barriers_is_followed_until_nothing_slips():
+    """All of it is at its residual strength long before, slipping at metres a second."""
+    problem, strength = fault_between_barriers()
+    runs = {}
+    for stop in ("rest", "sliding", "time"):
+        method = st.Rupture(load=([0.0, 20.0], [0.0, 0.0]), stop=stop, end_time=6.0)
+        runs[stop] = simulate(method, strength, problem)
+    for stop in ("rest", "sliding"):
+        run = runs[stop]
+        assert run.attrs["stopped"] == "rest"
+        assert run.step_time.values[-1] < 6.0
+        assert run.top_slip_rate.values[-1] == 0.0
+        assert np.array_equal(run.slip[-1], runs["time"].slip[-1])
+
+
+def test_an_interface_that_slid_is_at_rest_once_it_is_unloaded(exact):
+    top = 1.003 * exact.critical_load.item()
+    times = top / 2e7 + np.array([-top / 2e7, 0.0, 1e-4, 2e-4])
+    run = simulate(st.Rupture(load=(times, [0.0, top, 0.0, 0.0]), stop="rest"))
+    assert run.attrs["stopped"] == "rest"
+    assert run.critical_stress.item() == pytest.approx(exact.critical_stress.item(), rel=3e-4)
+    assert run.weakened_fraction.values[-1] == 1.0
+    assert run.top_slip_rate.values[-1] == 0.0
+
+
+def test_a_narrow_barrier_under_a_fast_load_does_not_keep_a_run_from_its_end():
+    """Slip that the load alone drives never rests there: it is steady instead."""
+    strength = np.where(np.abs(X / 0.05 - 0.7) < 0.01, np.inf, CROOKED_STRENGTH)
+    run = simulate(st.Rupture(loading_rate=3e9, max_steps=20_000), strength)
+    assert run.attrs["stopped"] == "rest"
+    assert run.critical_stress.item() > 0.0
 
 
 def test_an_ensemble_counts_what_survived():

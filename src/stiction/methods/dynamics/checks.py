@@ -77,9 +77,10 @@ def at_first_slip(run: Run) -> State | None:
 
 def warn_of_survival(stop: str, results: list[Any]) -> None:
     """Warn of interfaces that did not slide, or become unstable, before their run ended."""
-    name = "kinetic_stress" if stop == "sliding" else "first_instability"
-    if any(np.isnan(one[name]) for one in results):
-        what = "slide" if stop == "sliding" else "become unstable"
+    name = "critical_stress" if stop == "sliding" else "first_instability"
+    if any(np.isnan(result[name]) for result in results):
+        stuck = any(np.isnan(result["kinetic_stress"]) for result in results)
+        what = "slide" if stop == "sliding" and stuck else "become unstable"
         warn_accuracy(
             f"load: an interface did not {what} before its run ended: what did not happen is NaN,"
             " and failure_probability counts it as survived"

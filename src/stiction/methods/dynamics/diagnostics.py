@@ -93,9 +93,10 @@ def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
     above the strength the maximum is the stress without slip. No instability is a maximum that no
     such fall follows, be it the largest load or the stress that returns when slip dies. It ends
     when the mean stress rises above that maximum again or everything creeps, and was arrested if
-    a node slipped faster than `unstable_rate`; waves of an earlier one are slower. What slides as
-    a whole has become unstable at the last maximum. At slow loading all creeping patches are about
-    equally slow there, so that the place of the onset, the fastest node, is read just after it.
+    a node slipped faster than `unstable_rate`; waves of an earlier one are slower. The last nodes
+    that can break may also creep to their residual strength: that is none. At slow loading all
+    creeping patches are about equally slow there, so that the place of the onset, the fastest node,
+    is read just after it.
     """
     fall = min(now.local_stress - now.mean_stress, radiated - now.local_radiated)
     if now.local_stress - now.mean_stress < _PEAK_WIDTH * now.scale and fall > 0.0:
@@ -111,8 +112,6 @@ def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
         _begin(now)
     if now.slid >= thresholds.breakable and now.kinetic_stress == -np.inf:
         now.kinetic_stress = now.mean_stress
-        if not now.in_event:
-            _begin(now)
     return fall
 
 

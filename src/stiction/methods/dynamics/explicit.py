@@ -101,7 +101,9 @@ def _calm(now: Any, thresholds: Thresholds, step: float, impedance: float, rise:
     scale, before, top = now.scale, now.calm_rate, now.top_slip_rate
     quiet = top < _CALM_STRESS * scale / impedance + thresholds.calm_slip * rise / step
     steady = 0.5 * before <= top <= 2.0 * before
-    if quiet or (steady and top < STEADY_STRESS * scale / impedance):
+    # Once all has broken nothing but the load drives steady slip, however fast it rises.
+    slow = top < STEADY_STRESS * scale / impedance or now.slid >= thresholds.slid_stop
+    if quiet or (steady and slow):
         now.calm_steps += 1
     else:
         now.calm_steps, now.calm_rate = 0, top
@@ -156,11 +158,12 @@ def explicit_steps(
         done, limit = Step(time, step, load, work * grid.cell, radiated), tables.transfer
         fall = finish_step(state, grid, setting, done, tables.predicted, limit, record, taken)
         taken += 1
-        if now.slid >= thresholds.slid_stop:
+        calm = _calm(now, thresholds, step, impedance, rise)
+        if now.slid >= thresholds.slid_stop and (calm or not thresholds.held):
             reason = Reason.ALL_SLID
         elif thresholds.event_stop and fall > EVENT_DROP * now.scale:
             reason = Reason.DROPPED
-        elif _calm(now, thresholds, step, impedance, rise):
+        elif calm:
             end_event(now, thresholds.unstable_rate, radiated)
             if thresholds.rest_stop and now.first_stress > -np.inf:
                 reason = Reason.AT_REST

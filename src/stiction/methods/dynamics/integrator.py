@@ -160,6 +160,8 @@ class Run:
 
     def ending(self, state: State, reason: int) -> str | None:
         """Return the reason why a run ends here, in a word; None if it goes on."""
+        if reason == Reason.ALL_SLID and self.setting.thresholds.held:
+            return "rest"
         if reason in _ENDINGS:
             return _ENDINGS[reason]
         if self.ended(state):

@@ -104,9 +104,11 @@ class Rupture:
         0.5 is the middle of the cohesive zone, 1e-3 its tip.
     stop : {"sliding", "onset", "rest", "time"}
         When to end (see Notes), unless nothing slips and the load has stopped rising:
-        "sliding": every node that can break is at its residual strength. "onset": the first
-        instability has begun. "rest": the interface is at rest after an instability, or
-        slides. "time": at `end_time`; an interface that slides takes explicit steps until then.
+        "sliding": every node that can break is at its residual strength and, if barriers of
+        infinite strength hold the interface, has come to rest. "onset": the first instability
+        has begun. "rest": nothing slips after an instability any more, except as the load
+        drives it; an interface that slides and is never unloaded ends there. "time": at
+        `end_time`; an interface that slides takes explicit steps until then.
     implicit : bool
         False takes explicit steps only (slow loading then costs a million steps).
     max_steps : int
@@ -140,9 +142,14 @@ class Rupture:
     of the median of tau_p - tau_r before the mean stress is as high again or all is calm.
     `Equilibrium` also counts jumps too small for that. The stress scale is the mean over nodes
     of tau_p - tau_r, or of three times the drop tau_0 p + tau_i - tau_r at the largest load so
-    far where that is less, so that unbroken barriers do not count. `kinetic_stress` and the
-    energies are those of the first step after which every node that can break is at its
-    residual strength; radiated energy and moment grow by about 2 % in that step.
+    far where that is less, so that unbroken barriers do not count. `kinetic_stress` is the
+    mean stress after the first step in which every node that can break is at its residual
+    strength. Energies and moment are those of the end of the run. If that is this step, as in an
+    interface that slides, radiated energy and moment grow by about 2 % in it.
+
+    The last nodes beside a barrier may creep to their residual strength under a load that goes on
+    to rise. That is no instability, and `critical_stress` stays the mean stress at the highest
+    instability before. It is NaN if everything that can break did so without an instability.
 
     With "onset" and "rest", critical values are those of the highest instability, which need
     not end in sliding, and with "onset" what is not final is NaN: kinetic stress, stress drop,
@@ -299,7 +306,7 @@ def make_run(
         load=history,
         turning_times=history.at[1:-1][rising[1:] != rising[:-1]],
         scale=stress_scale(nodes),
-        thresholds=_thresholds(method, medium, nodes),
+        thresholds=_thresholds(method, medium, nodes, history),
         stations=np.empty(0, dtype=np.int64) if stations is None else stations,
     )
     least = _least_load(medium, nodes, steepest)
@@ -317,20 +324,25 @@ def _least_load(medium: Medium, nodes: Nodes, steepest: float) -> float:
     return float(np.partition(loads, weakest - 1)[:weakest].mean())
 
 
-def _thresholds(method: Rupture, medium: Medium, nodes: Nodes) -> Thresholds:
+def _thresholds(method: Rupture, medium: Medium, nodes: Nodes, load: History) -> Thresholds:
     """When steps change or end.
 
     Calm: for as long as shear waves need to cross the interface, nothing slips faster than a crack
     of half its length does when the load alone drives it, or nothing faster than before.
     """
     friction, finite = medium.problem.friction, np.isfinite(nodes.strength)
+    held = not finite.all()
+    stress = load.values[-1] * nodes.profile + nodes.initial  # at the end, and on from there
+    unloaded = load.values[-1] < load.values[-2] or stress.mean() < nodes.residual.mean()
+    rests_later = method.stop == "rest" and unloaded and not held
     frequency = medium.grid.frequency
     crossing = 2.0 * np.pi / frequency[frequency > 0.0].min() / medium.step
     typical = float(np.median((nodes.strength - nodes.residual)[finite]))
     arrival = min(friction.slip_at(1.0 - method.arrival), friction.reach) / friction.reach
     breakable = int(np.count_nonzero(finite))
     return Thresholds(
-        slid_stop=np.inf if method.stop == "time" else float(breakable),
+        slid_stop=np.inf if method.stop == "time" or rests_later else float(breakable),
+        held=held,
         event_stop=method.stop == "onset",
         rest_stop=method.stop == "rest",
         end_time=np.inf if method.end_time is None else method.end_time,

@@ -102,6 +102,7 @@ class Thresholds(NamedTuple):
     """Thresholds at which steps change or end, from the method and the problem."""
 
     slid_stop: float  # nodes at the residual strength at which to return
+    held: bool  # by nodes that never break: return only once the slip has come to rest, too
     event_stop: bool  # return at an event
     rest_stop: bool  # return when all is at rest after an event
     end_time: float  # s
