@@ -35,6 +35,8 @@ _UNITS = {
     for prefix, scale in _PREFIXES.items()
     for symbol, unit in _BASE.items()
 } | {
+    "\N{ANGSTROM SIGN}": Unit(1e-10, _LENGTH),
+    "\N{LATIN CAPITAL LETTER A WITH RING ABOVE}": Unit(1e-10, _LENGTH),
     "1": Unit(1.0, (0, 0, 0)),
     "-": Unit(1.0, (0, 0, 0)),
     "%": Unit(0.01, (0, 0, 0)),
@@ -42,6 +44,17 @@ _UNITS = {
     "psi": Unit(6894.757293168, _STRESS),
     "ksi": Unit(6894757.293168, _STRESS),
 }
+_NAMES = {
+    **dict.fromkeys(("meter", "metre"), "m"), "micron": "um", "newton": "N", "pascal": "Pa",
+    "second": "s", "gram": "g", "joule": "J", "bar": "bar", "inch": "in", "inche": "in",
+    "percent": "%", "angstrom": "\N{ANGSTROM SIGN}",
+}  # fmt: skip
+_PREFIX_NAMES = {
+    "": "", "tera": "T", "giga": "G", "mega": "M", "kilo": "k", "centi": "c", "milli": "m",
+    "micro": "u", "mikro": "u", "nano": "n",
+}  # fmt: skip
+_WORD = re.compile(rf"({'|'.join(_PREFIX_NAMES)})({'|'.join(_NAMES)})s?$", re.IGNORECASE)
+"""Units in words, such as millimeters, Megapascal and microns."""
 _COMMON = "m, cm, mm, um, nm, km, in, Pa, kPa, MPa, GPa, bar, psi, ksi, N, kN, s, ms"
 _MULTIPLES: dict[str, tuple[float, dict[str, float]]] = {
     "m": (1.0, {"km": 1e-3, "m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}),
@@ -52,6 +65,12 @@ _MULTIPLES: dict[str, tuple[float, dict[str, float]]] = {
 """Largest value on a scale from which on a unit is used, in that unit; units and their factors."""
 _SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴", "-01234")
 _POWER = re.compile(r"([^\W\d_]+|%|1(?!\d))(?:\^?([+-]?\d))?$")
+
+
+def _symbol(text: str) -> str:
+    """Return the symbol of a unit in words, and any other text as it is."""
+    match = _WORD.match(text)
+    return _PREFIX_NAMES[match[1].lower()] + _NAMES[match[2].lower()] if match else text
 
 
 def parse(text: str) -> Unit | None:
@@ -69,7 +88,7 @@ def parse(text: str) -> Unit | None:
     for place, part in enumerate(plain.split("/")):
         for number, word in enumerate(part.split() or ("",)):
             match = _POWER.match(word)
-            unit = _UNITS.get(match[1]) if match else None
+            unit = _UNITS.get(_symbol(match[1])) if match else None
             if match is None or unit is None:
                 return None
             power = int(match[2] or 1) * (-1 if place and number == 0 else 1)

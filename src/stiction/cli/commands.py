@@ -9,7 +9,7 @@ import signal
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -332,6 +332,17 @@ def onset(
     ] = "strength",
     interpolate: Annotated[bool, Option("--interpolate", help="Interpolate to nodes.")] = False,
     gaps: Annotated[Literal["refuse", "fill"], Option(help="Missing values.")] = "refuse",
+    missing: Annotated[
+        list[str] | None,
+        Option(help="Number or word for a missing value, such as -9999 (repeatable)."),
+    ] = None,
+    decimal: Annotated[Literal[".", ","] | None, Option(help="Decimal mark.")] = None,
+    skip: Annotated[int, Option(min=0, help="Lines above the headings.")] = 0,
+    sheet: Annotated[str, Option(help="Sheet of a workbook: name, or number from 0.")] = "0",
+    record: Annotated[int | None, Option(min=0, help="Number of the record, from 0.")] = None,
+    offset: Annotated[
+        str, Option(help="Added to x, in m; or 'centre' for the centre of the interface.")
+    ] = "0",
 ) -> None:
     """Compute the load and position at which one interface of given strength begins to slide.
 
@@ -355,7 +366,9 @@ def onset(
         raise InputError([unknown_name("--method", name, METHODS) for name in unknown])
     profile = read_profile(
         strength, interface=problem.interface, unit=unit, x_unit=x_unit, interpolate=interpolate,
-        gaps=gaps, value=_column(value), x=_column(x), quantity=quantity,
+        gaps=gaps, value=_column(value), x=_column(x), quantity=quantity, decimal=decimal,
+        missing=None if missing is None else [_number(text) for text in missing], skip=skip,
+        sheet=_column(sheet), record=record, offset=_number(offset),
     )  # fmt: skip
     # Each method refuses, and warns, for itself.
     problem.sample(profile, accept=("barriers", "overstress", "constant"))
@@ -380,6 +393,12 @@ def onset(
         echo(text)
     if not rows:
         raise typer.Exit(1)
+
+
+def _number(text: str) -> Any:
+    with suppress(ValueError):
+        return float(text)
+    return text
 
 
 def _column(text: str | None) -> int | str | None:

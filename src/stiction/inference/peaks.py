@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed
-from stiction.base.model import FilePath, Numbers, check, describe, is_finite
+from stiction.base.model import FilePath, Number, Numbers, check, checked, describe, is_finite
 from stiction.base.units import factor_to, is_in
+from stiction.problem.profiles.reading import Missing, reading_options, without_missing
 from stiction.problem.profiles.tables import read_table
 
 FEWEST = 3
@@ -116,12 +116,21 @@ def _values(given: Any, unit: str) -> Array:
     if bad.size:
         raise InputError(
             f"peaks: must be positive numbers; number {bad[0]} is {values[bad[0]]:g}; leave out"
-            " tests that gave no peak"
+            " tests that gave no peak, or pass missing= to st.read_peaks"
         )
     return values * factor_of(stated)
 
 
-def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
+@checked
+def read_peaks(
+    path: FilePath,
+    *,
+    unit: str | None = None,
+    missing: Missing = None,
+    decimal: Literal[".", ","] | None = None,
+    skip: Number = 0,
+    sheet: Number | str = 0,
+) -> Peaks:
     """Read the peaks of repeated tests from a text file or a workbook (.xlsx).
 
     Peaks that drift from test to test are no sample of one distribution: look at them in order.
@@ -136,6 +145,8 @@ def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
         the length of the specimen: ``length [mm]``. Other columns are not read.
     unit : str, optional
         Unit of the peaks if the file states none.
+    missing, decimal, skip, sheet
+        As in `stiction.read_profile`. Tests without a peak are left out.
 
     Returns
     -------
@@ -157,9 +168,9 @@ def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
     >>> print(st.read_peaks(path))
     3 peaks
     """
-    path = check("path", path, FilePath)
+    options = reading_options(missing, decimal, skip, sheet)
     with prefixed(str(path)):
-        table = read_table(Path(path))
+        table = read_table(path, options)
         length, peak = _column(table, LENGTH), _column(table, PEAK, VARIABLES)
         if peak is None:
             names = ", ".join(map(str, table.data_vars))
@@ -170,17 +181,19 @@ def read_peaks(path: str | Path, *, unit: str | None = None) -> Peaks:
                 f"the unit of the peaks is {'not stated' if stated is None else stated}, and"
                 f" unit = {unit!r}; write it into the heading, 'peak [MPa]', or give unit="
             )
+        peak = without_missing(peak, options)
+        kept = ~np.isnan(peak.values) if missing is not None else slice(None)
         if length is None:
-            return make_peaks(peak.values, stated)
+            return make_peaks(peak.values[kept], stated)
         if "units" not in length.attrs:
             raise InputError("the unit of the length is not stated; write 'length [mm]'")
-        lengths = length.values * factor_to("m", length.attrs["units"])
+        lengths = length.values[kept] * factor_to("m", length.attrs["units"])
         if np.isnan(lengths).any():
             row = int(np.argmax(np.isnan(lengths)))
             raise InputError(
                 f"length: missing in row {row}; specimens of unknown length are mixed in"
             )
-        groups = {one: peak.values[lengths == one] for one in np.unique(lengths)}
+        groups = {one: peak.values[kept][lengths == one] for one in np.unique(lengths)}
         return make_peaks(groups, stated)
 
 

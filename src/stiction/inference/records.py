@@ -9,7 +9,7 @@ from stiction.base.errors import InputError, prefixed, warn_accuracy
 from stiction.base.model import real_array
 from stiction.problem.interface import Interface
 from stiction.problem.profiles.placing import points_of
-from stiction.problem.profiles.reading import is_labelled, labelled, simplified
+from stiction.problem.profiles.reading import POSITIVE, is_labelled, labelled, simplified
 
 FEWEST = 64
 """Fewest measured points from which a spectrum can be estimated."""
@@ -19,6 +19,8 @@ UNEVEN = 0.02
 """Share of a spacing by which rounding in a file may move a point."""
 OUTLYING = 8.0
 """Distance of an outlier from the median, in robust standard deviations."""
+JUMPING = 10.0
+"""Difference of a dropout from its neighbours, in robust standard deviations of differences."""
 
 
 class Record(NamedTuple):
@@ -38,7 +40,9 @@ def records_of(profiles: Any, interface: Interface | None, quantity: str) -> lis
     for number, one in enumerate(profiles if several else [profiles]):
         try:
             with prefixed(f"profiles[{number}]" if several else "profiles"):
-                found += map(_checked, _records(one, interface, quantity))
+                found += [
+                    _checked(record, quantity) for record in _records(one, interface, quantity)
+                ]
         except InputError as error:
             problems += error.problems
     if not found and not problems:
@@ -103,7 +107,8 @@ def _spacing(x: Array, name: str) -> float:
     spacing = float(np.median(steps))
     if not steps.min() > 1e-6 * spacing:
         raise InputError(f"{name} repeats: there are two values at {x[steps.argmin()]:.9g} m")
-    spacing = float((x[-1] - x[0]) / np.round((x[-1] - x[0]) / spacing))
+    # Each step is a whole number of spacings, even where few printed digits make them uneven.
+    spacing = float((x[-1] - x[0]) / np.maximum(np.round(steps / spacing), 1.0).sum())
     place = (x - x[0]) / spacing
     off = np.abs(place - np.round(place))
     uneven = off.max() > 10.0 * UNEVEN or np.median(off) > UNEVEN
@@ -116,7 +121,7 @@ def _spacing(x: Array, name: str) -> float:
     return spacing
 
 
-def _checked(record: Record) -> Record:
+def _checked(record: Record, quantity: str) -> Record:
     """Refuse a record that cannot be fitted, and warn of outliers."""
     values = record.values[~np.isnan(record.values)]
     if np.isinf(values).any():
@@ -129,6 +134,13 @@ def _checked(record: Record) -> Record:
         )
     if np.ptp(values) <= 1e-12 * np.abs(values).max():
         raise InputError(f"is constant, {values[0]:g} everywhere; there is nothing to fit")
+    if quantity in POSITIVE and (values <= 0.0).any():
+        entry = int(np.argmax(record.values.ravel() <= 0.0))
+        raise InputError(
+            f"{quantity} must be positive, entry {entry} is {record.values.flat[entry]:.6g} ("
+            f"{int((values <= 0.0).sum())} such values); make missing values NaN, or read the file"
+            " with st.read_profile(..., missing=...)"
+        )
     aside = np.abs(values - np.median(values))
     far = aside > OUTLYING * 1.4826 * np.median(aside)
     if np.median(aside) > 0.0 and far.any():
@@ -137,4 +149,28 @@ def _checked(record: Record) -> Record:
             f" standard deviations from the median, such as {values[aside.argmax()]:.4g}; if they"
             " are not real, make them NaN: missing values are left out"
         )
+    else:
+        _doubt_jumps(record)
     return record
+
+
+def _doubt_jumps(record: Record) -> None:
+    """Warn of values that lie much further from both neighbours than others do.
+
+    In a smooth record with a dropout these are far from their neighbours, not from the median.
+    """
+    middle = record.values[1:-1]
+    jumps = middle - 0.5 * (record.values[:-2] + record.values[2:])
+    same_side = (middle - record.values[:-2]) * (middle - record.values[2:]) > 0.0
+    known = jumps[np.isfinite(jumps)]
+    scale = 1.4826 * np.median(np.abs(known)) if known.size else 0.0
+    size = np.where(same_side & np.isfinite(jumps), np.abs(jumps), 0.0)
+    far = size > JUMPING * scale
+    if scale > 0.0 and far.any():
+        entry = int(np.argmax(size))
+        warn_accuracy(
+            f"{int(far.sum())} of {record.values.size} values differ from their neighbours by more"
+            f" than {JUMPING:g} times the usual difference, such as {middle.flat[entry]:.4g} beside"
+            f" {record.values[:-2].flat[entry]:.4g}: neither the field nor the noise of the record"
+            " explains them; if they are dropouts, make them NaN: missing values are left out"
+        )

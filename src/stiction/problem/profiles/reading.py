@@ -7,21 +7,39 @@ or, as a list of points, along 'row', with places (m) as coordinates 'x' and 'y'
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError, UnitWarning, prefixed, unknown_name, warn_user
-from stiction.base.model import FilePath, Flag, as_numbers, check, checked, describe, real_array
+from stiction.base.errors import (
+    AccuracyWarning,
+    InputError,
+    UnitWarning,
+    prefixed,
+    unknown_name,
+    warn_user,
+)
+from stiction.base.model import (
+    FilePath,
+    Flag,
+    Number,
+    Positive,
+    Real,
+    as_numbers,
+    check,
+    checked,
+    describe,
+    real_array,
+)
 from stiction.base.units import factor_to, is_in, parse
 from stiction.base.variables import QUANTITIES
 from stiction.problem.interface import Interface
 from stiction.problem.profiles.placing import MEASURED, OF_A_PLANE, Gaps, close_gaps, place
-from stiction.problem.profiles.tables import load
+from stiction.problem.profiles.tables import IMAGES, Options, load, sizes_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,15 +55,28 @@ NAMES = {
     "height": ("heights", "topography", "z"),
 }
 """What else a quantity may be called."""
-PLACES = ("x", "position", "pos", "distance", "coordinate")
+PLACES = ("x", "position", "pos", "distance", "coordinate", "lateral")
+POSITIVE = (
+    "strength", "normal_pressure", "critical_slip", "weakening_rate", "fracture_energy",
+    "friction_coefficient",
+)  # fmt: skip
+"""Quantities whose values lie above zero."""
+SENTINELS = np.array(
+    [-99.0, -999.0, -999.25, -9999.0, -99999.0, -32768.0, 1e20, 1e30, 1e38, 9.96921e36, 1.70141e38,
+     3.40282e38, -3.40282e38]
+)  # fmt: skip
+"""Numbers that instruments and formats write for a missing value."""
 SAMPLES = ("sample", "samples")
-_UNNAMED = re.compile(r"\d+$|values?$")
+_UNNAMED = re.compile(r"\d+$|values?$|y\d*$")
 """Columns that say nothing of what they hold; without a heading they are called by numbers."""
 
 TALL = 1e-3
 """Range of heights, m, from which on a unit must be stated: numbers in um or nm have more."""
 
 Column = str | int | None
+Spacing = Positive | tuple[Positive, Positive]
+Offset = Real | tuple[Real, Real]
+Missing = float | str | tuple[float | str, ...] | list[float | str] | None
 
 
 @checked
@@ -57,7 +88,16 @@ def read_profile(
     unit: str | None = None,
     x_unit: str | None = None,
     quantity: str = "strength",
+    strength: Callable[[Any], Any] | None = None,
+    missing: Missing = None,
+    decimal: Literal[".", ","] | None = None,
+    skip: Number = 0,
+    sheet: Number | str = 0,
+    record: Number | None = None,
+    spacing: Spacing | None = None,
+    rows: Literal["x", "y"] | None = None,
     interface: Interface | None = None,
+    offset: Offset | Literal["centre"] = 0.0,
     interpolate: Flag = False,
     gaps: Gaps = "refuse",
 ) -> xr.DataArray:
@@ -69,7 +109,8 @@ def read_profile(
         ``.npy``: shape (nodes,) or (nx, ny). ``.csv``, ``.txt``, ``.dat``, ``.tsv``,
         ``.xlsx``: columns, with or without a line of names such as ``x (mm); strength
         (MPa)``. ``.nc``: variables with `units`, and x as a coordinate. A map is over 'x'
-        and 'y'; a table has both as columns.
+        and 'y': a table with both as columns, a matrix without headings, or a grey image
+        (``.png``, ``.tif``).
     x, value : str or int, optional
         Name, heading or number (from 0) of the column, coordinate or variable. By default the one
         with such a name (``x``, ``position``; ``strength``, ``tau_p``), the only one in a unit of
@@ -79,14 +120,37 @@ def read_profile(
     quantity : str
         'strength', 'residual_strength', 'initial_stress', 'normal_pressure' (Pa), 'critical_slip',
         'height' (m), 'weakening_rate' (Pa/m), 'load_profile' or 'friction_coefficient' (1).
+    strength : callable, optional
+        Map from heights (m, an array), or from the grey values of an image, to strengths (Pa):
+        ``strength=lambda h: 1e6 + 5e11 * h``. Heights are then read.
+    missing : float, str or sequence of them, optional
+        Numbers and words that stand for a missing value, such as ``-9999`` or ``"Bad"``. Empty
+        cells, ``nan``, ``n/a``, ``-``, ``***`` and ``#N/A`` always do.
+    decimal : {".", ","}, optional
+        Decimal mark of a text, if the file does not tell it from a mark of thousands.
+    skip : int
+        Number of lines, or rows of a sheet, to pass over before the headings.
+    sheet : int or str
+        Number (from 0) or name of the sheet of a workbook.
+    record : int, optional
+        Number (from 0) of the record, if empty lines or repeated headings separate several.
+    spacing : float or (float, float), optional
+        Distance of the points along x, and along y, of an array, a matrix or an image, m.
+    rows : {"x", "y"}, optional
+        Direction in which the lines of a matrix in a text follow each other. It is y if
+        comments state the width and height of the map, as Gwyddion writes them.
     interface : Interface, optional
         Map the profile to the nodes x_i = i L/n, modulo L, from points in any order.
+    offset : float, (float, float) or "centre"
+        Is added to the coordinates, m; or the centre of the record is put on the centre of
+        the interface.
     interpolate : bool
         Interpolate linearly if the points of a line do not coincide with the nodes.
     gaps : {"refuse", "fill", "skip"}
         Refuse missing values (NaN, empty cells, missing points), fill them with straight
-        lines (not on planes and specimens), or leave NaN, for `stiction.fit_field`. Without
-        an interface, they always stay.
+        lines (on planes with triangles), or leave NaN, for `stiction.fit_field` and
+        `RandomField.given`, which fills them with equally likely values. Without an
+        interface, they always stay.
 
     Returns
     -------
@@ -129,9 +193,20 @@ def read_profile(
         raise InputError("interface: needed to interpolate, or to fill gaps")
     if interpolate and interface is not None and interface.is_plane:
         raise InputError("interpolate: is an option of profiles of a line")
+    if strength is not None and quantity != "strength":
+        raise InputError("strength: is a map to a strength; leave quantity='strength'")
+    if offset == "centre" and interface is None:
+        raise InputError("offset: 'centre' needs an interface")
+    options = reading_options(missing, decimal, skip, sheet, record)
     dims = None if interface is None else interface.dims
     with prefixed(str(source) if isinstance(source, str | Path) else "source"):
-        array = labelled(source, quantity, dims, x=x, value=value, unit=unit, x_unit=x_unit)
+        array = labelled(
+            source, "height" if strength else quantity, dims, x=x, value=value, unit=unit,
+            x_unit=x_unit, options=options, rows=rows, spacing=spacing,
+        )  # fmt: skip
+        if strength is not None:
+            array = array.copy(data=_mapped(strength, array.values))
+        array = _moved(array, offset, interface)
         if not {*array.dims} <= {"x", "y", "row"}:
             raise InputError(f"must hold one profile, got shape {array.shape}")
         if interface is not None:
@@ -149,6 +224,60 @@ def read_profile(
     return array.rename(quantity)
 
 
+def reading_options(
+    missing: Missing,
+    decimal: str | None = None,
+    skip: int = 0,
+    sheet: int | str = 0,
+    record: int | None = None,
+) -> Options:
+    """Return what a caller states about a file."""
+    several = missing if isinstance(missing, tuple | list | None) else (missing,)
+    return Options(skip, sheet, None if several is None else (*several,), decimal, record)
+
+
+def without_missing(array: Any, options: Options) -> Any:
+    """Return an array with NaN in the place of numbers that stand for missing values."""
+    numbers = [one for one in options.missing or () if not isinstance(one, str)]
+    absent = [np.isclose(array.values, number, rtol=1e-6, atol=0.0) for number in numbers]
+    return array.where(~np.any(absent, axis=0)) if absent else array
+
+
+def _mapped(strength: Callable[[Any], Any], heights: Array) -> Array:
+    """Return strengths (Pa) of heights (m), NaN where there is no height."""
+    values = as_numbers(strength(heights.copy()))
+    if values.shape != heights.shape:
+        raise InputError(
+            f"strength: must return one strength for each height, got shape {values.shape} for"
+            f" {heights.shape}"
+        )
+    values = np.where(np.isnan(heights), np.nan, values)
+    _check_positive(values, "strength", _Places())
+    return values
+
+
+def _moved(array: Any, offset: Any, interface: Interface | None) -> Any:
+    """Return a profile whose coordinates are moved by an offset (m), or to the centre."""
+    dims = [dim for dim in ("x", "y") if dim in array.coords]
+    if offset == 0.0:
+        return array
+    if not dims:
+        raise InputError("offset: the source has no coordinates; its points are the nodes")
+    if offset == "centre":
+        assert interface is not None
+        centres = zip(interface.dims, interface.shape, interface.spacings, strict=True)
+        middle = {dim: (interface.first + 0.5 * (n - 1)) * h for dim, n, h in centres}
+        offsets = [
+            middle[dim] - 0.5 * float(array[dim].min() + array[dim].max()) for dim in dims
+        ]
+    else:
+        offsets = [*np.broadcast_to(offset, len(dims))]
+    moved = {
+        d: (array[d].dims, array[d].values + a) for d, a in zip(dims, offsets, strict=True)
+    }
+    return array.assign_coords(moved)
+
+
 def _in_order(array: Any) -> Any:
     """Return a profile with rising coordinates, and points on a plane as a map."""
     if "row" in array.dims:
@@ -156,6 +285,11 @@ def _in_order(array: Any) -> Any:
     for index in array.indexes.values():
         if index.has_duplicates:
             twin = index[index.duplicated()]
+            if (blocks := array.attrs.get("blocks", 1)) > 1:
+                raise InputError(
+                    f"x repeats, and empty lines separate {blocks} records; pass record=0 to"
+                    f" {blocks - 1} for one of them"
+                )
             raise InputError(
                 f"x repeats: there are two values at {twin[0]} m ({twin.size} such places); keep"
                 f" one of the two, or their mean{OF_A_PLANE}"
@@ -230,14 +364,24 @@ def labelled(
     value: Column = None,
     unit: str | None = None,
     x_unit: str | None = None,
+    options: Options = Options(),  # noqa: B008
+    rows: str | None = None,
+    spacing: Any = None,
 ) -> Any:
     """Return a quantity of `source` in SI along the directions `dims`, or those that it has.
 
     A dimension of another name comes first. It is the only one if there is one value a sample.
     """
-    data: Any = load(Path(source)) if isinstance(source, str | Path) else source
+    data: Any = load(Path(source), options) if isinstance(source, str | Path) else source
     if not is_labelled(data):
         raise InputError(f"must be a path, a DataArray or a Dataset, got {describe(source)}")
+    if isinstance(source, str | Path) and Path(source).suffix.lower() in IMAGES and not unit:
+        if quantity != "height":
+            raise InputError("holds grey values; pass strength= with a map to strengths (Pa)")
+        unit = "m"  # the map takes grey values as they are
+    if _is_matrix(data, dims, rows, spacing, value):
+        data = _matrix(data, rows)
+    data = _spaced(data, spacing)
     if not hasattr(data, "data_vars"):
         if value not in (None, data.name):
             only = f"the name of the only variable, {data.name!r}"
@@ -255,7 +399,15 @@ def labelled(
     array = _directed(array.drop_vars(own).assign_coords(at), dims)
     if len({*dims} & {*array.coords}) == 1 < len(dims):
         raise InputError("has the coordinate x or y only; a map has both, or none")
+    array = without_missing(array, options)
     values = in_si(array, quantity, QUANTITIES[quantity].units, unit)
+    raw = array.values if isinstance(array.data, np.ndarray) else values
+    lines = data.attrs.get("lines", ())
+    where = _Places(lines if np.size(lines) == values.size else None)
+    _check_positive(values, quantity, where, raw)
+    if options.missing is None:
+        _doubt_sentinels(raw, quantity, where)
+    array.attrs["blocks"] = data.attrs.get("blocks", 1)
     if quantity == "height" and not (unit or unit_of(array) or hasattr(array.data, "units")):
         _doubt_metres(values[np.isfinite(values)])
     for dim in {*dims} & {*array.coords}:
@@ -266,6 +418,46 @@ def labelled(
             raise InputError(f"{dim} must be finite; entry {entry}{line} is not")
         array = array.assign_coords({dim: (array[dim].dims, place)})
     return array.copy(data=values)
+
+
+class _Places(NamedTuple):
+    """Where values stand: the numbers of their lines if they come from a table."""
+
+    lines: Any = None
+
+    def of(self, entry: int) -> str:
+        """Return the place of an entry in words."""
+        return f"entry {entry}" if self.lines is None else f"line {self.lines[entry]}"
+
+
+def _check_positive(values: Array, quantity: str, where: _Places, raw: Any = None) -> None:
+    """Refuse values of a positive quantity that are zero or less."""
+    wrong = np.flatnonzero(values <= 0.0)
+    if quantity in POSITIVE and wrong.size:
+        entry, given = int(wrong[0]), np.ravel(values if raw is None else raw)
+        number = f"{given[entry]:.9g}"
+        raise InputError(
+            f"{quantity} must be positive, is {number} in {where.of(entry)} ({wrong.size} such"
+            f" values); if it stands for no value, pass missing={number} to st.read_profile, or"
+            " make it NaN"
+        )
+
+
+def _doubt_sentinels(values: Any, quantity: str, where: _Places) -> None:
+    """Warn of a number far from all others that usually stands for a missing value."""
+    flat = np.ravel(values)
+    known = flat[np.isfinite(flat)]
+    for end in (known.min(), known.max()) if known.size else ():
+        rest = known[known != end]
+        usual = np.isclose(end, SENTINELS, rtol=1e-5, atol=0.0).any()
+        if usual and rest.size and min(abs(rest - end)) > np.ptp(rest):
+            count, entry = known.size - rest.size, int(np.argmax(flat == end))
+            warn_user(
+                f"{quantity}: {end:.9g} stands in {where.of(entry)} ({count} such values), far from"
+                f" all others, and often means that a value is missing; pass missing={end:.9g} to"
+                " st.read_profile, or missing=() if it is a value",
+                AccuracyWarning,
+            )
 
 
 def _doubt_metres(heights: Array) -> None:
@@ -283,11 +475,17 @@ def _chosen(
 ) -> tuple[Any, dict[str, Any]]:
     """Return the names of the variable, and of its places by direction if there are any."""
     names, table, si = list(data.data_vars), "row" in data.dims, QUANTITIES[quantity].units
+    if table and data.attrs.get("headed"):  # a column without a name is an index
+        names = [name for name in names if data[name].attrs["heading"]]
     words = (quantity, *NAMES.get(quantity, ()))
     chosen = None if value is None else _column(data, names, "value", value)
+    indices = {*data.data_vars} - {*names}
     along = [name for name in data.variables if data[name].ndim == 1 and name != chosen]
+    along = [name for name in along if name not in indices]
     if len(dims) == 2:
         places = {_plain(name): name for name in along if _plain(name) in dims}
+        if [*map(str, names)] == ["0", "1", "2"] and table:
+            places, chosen = {"x": names[0], "y": names[1]}, chosen or names[2]
     else:
         name = _choose(data, [name for name in along if name in data.dims], PLACES)
         name = name or _choose(data, along, PLACES, "m" if table and si != "m" else "")
@@ -310,11 +508,60 @@ def _chosen(
     return chosen, places
 
 
+def _is_matrix(data: Any, dims: Any, rows: Any, spacing: Any, value: Column) -> bool:
+    """Return whether a table without headings is a map, with one line of the file for each row."""
+    if "row" not in data.dims or data.attrs.get("headed") or len(data.data_vars) < 2:
+        return False
+    if rows is not None or sizes_of(data.attrs.get("comments", ())).keys() >= {
+        "width",
+        "height",
+    }:
+        return True
+    is_map = value is None and (spacing is not None or (dims is not None and len(dims) == 2))
+    if is_map and len(data.data_vars) != 3:
+        raise InputError(
+            f"holds {len(data.data_vars)} columns without names; pass rows='x' if each line of the"
+            " file has one x, rows='y' if it has one y"
+        )
+    return False
+
+
+def _matrix(data: Any, rows: str | None) -> Any:
+    """Return a map from a table without headings, with the sizes that its comments state."""
+    import xarray as xr
+
+    sizes = sizes_of(data.attrs["comments"])
+    values = np.stack([column.values for column in data.values()])  # (columns, lines)
+    array = xr.DataArray(values if rows != "x" else values.T, dims=("x", "y"))
+    for dim, called in (("x", "width"), ("y", "height")):
+        if called in sizes:
+            length, unit = sizes[called]
+            x = np.arange(array.sizes[dim]) * (length / array.sizes[dim])
+            array = array.assign_coords({dim: (dim, x, {"units": unit or "m"})})
+    if "value units" in sizes:
+        array.attrs["units"] = sizes["value units"][1]
+    return array
+
+
+def _spaced(data: Any, spacing: Any) -> Any:
+    """Return an array with coordinates at equal distances (m) if these are given."""
+    if spacing is None:
+        return data
+    dims = [dim for dim in ("x", "y") if dim in data.dims]
+    if not dims or any(dim in data.coords for dim in dims):
+        raise InputError("spacing: the source has coordinates of its own; leave it out")
+    steps = np.broadcast_to(spacing, len(dims))
+    places = zip(dims, steps, strict=True)
+    return data.assign_coords({dim: (dim, h * np.arange(data.sizes[dim])) for dim, h in places})
+
+
 def _is_map(data: Any) -> bool:
     """Whether values lie on a plane: over x and y, or in a table of both where x repeats."""
     if "row" not in data.dims:
         return {"x", "y"} <= {*data.dims}
     columns = {_plain(name): data[name].values for name in data.data_vars}
+    if [*columns] == ["0", "1", "2"]:  # without headings both must repeat
+        return all(np.unique(columns[one]).size <= columns[one].size // 2 for one in "01")
     both = len(columns) > 2 and {"x", "y"} <= {*columns}
     return both and np.unique(columns["x"]).size < columns["x"].size
 
@@ -322,19 +569,37 @@ def _is_map(data: Any) -> bool:
 def _choose(data: Any, names: list[Any], called: tuple[str, ...], si: str = "") -> Any:
     """Return the variable with one of several names, or else the only one that states a unit."""
     for word in called:
-        if found := [name for name in names if _plain(name) == word]:
-            return found[0]
+        if fitting := [name for name in names if _plain(_name(data, name)) == word]:
+            return _only(data, fitting)
     fitting = [name for name in names if is_in(unit_of(data[name]), si)]
     return fitting[0] if len(fitting) == 1 else None
 
 
+def _name(data: Any, name: Any) -> Any:
+    """Return what a column is called, which may be the name of several."""
+    return data[name].attrs.get("name", name)
+
+
+def _only(data: Any, names: list[Any]) -> Any:
+    """Return the only one of several columns, or refuse them: they have one heading."""
+    if len(names) > 1:
+        numbers = " and ".join(str(data[name].attrs.get("column", name)) for name in names)
+        raise InputError(
+            f"columns {numbers} are all called {_name(data, names[0])!r}; pass the number of one of"
+            " them, value= or x="
+        )
+    return names[0]
+
+
 def _column(data: Any, names: list[Any], what: str, wanted: Column) -> Any:
-    columns = list(data.data_vars)
-    if isinstance(wanted, int) and "row" in data.dims and 0 <= wanted < len(columns):
-        wanted = columns[wanted]
-    for name in names:
-        if wanted in (name, data[name].attrs.get("heading")):
-            return name
+    if isinstance(wanted, int) and "row" in data.dims:
+        for name, column in data.items():
+            if column.attrs.get("column") == str(wanted):
+                return name
+    if fitting := [
+        n for n in names if wanted in (n, _name(data, n), data[n].attrs.get("heading"))
+    ]:
+        return _only(data, fitting)
     raise InputError(unknown_name(what, str(wanted), map(str, names)))
 
 

@@ -1,4 +1,18 @@
-"""Files of measured data: tables, .npy and NetCDF. Nothing in them is trusted."""
+"""Files of measured data: tables, .npy, NetCDF and images. Nothing in them is trusted.
+
+A table is text, or a sheet of a workbook. It is read in five steps:
+
+1. Lines become cells. The last lines with numbers show what separates them.
+2. Lines above the first line of numbers are headings, a line of units below them, or words of
+   the instrument. Empty lines are passed over.
+3. One decimal mark holds for the whole file. Where points or commas may also mark thousands,
+   the file is refused unless the caller states the mark.
+4. Cells become numbers, and NaN where they are empty or say that a value is missing.
+5. Headings are taken apart into names and units.
+
+Files above `LARGE` bytes follow the same steps for their first lines; pandas reads the others if
+they are all of the same kind, and the steps above read the whole file if they are not.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +20,10 @@ import csv
 import io
 import math
 import re
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -20,25 +36,90 @@ from stiction.base.units import parse
 if TYPE_CHECKING:
     import xarray as xr
 
-TEXT, EXCEL, NETCDF = (".csv", ".txt", ".dat", ".tsv"), ".xlsx", (".nc", ".nc4")
+TEXT, EXCEL, NETCDF = (".csv", ".txt", ".dat", ".tsv", ".asc", ".xyz"), ".xlsx", (".nc", ".nc4")
+IMAGES = (".png", ".tif", ".tiff")
+LARGE = 2**19
+"""Bytes of a text from which on pandas reads the lines behind the first of them."""
+END = 20
+"""Lines at the end of a text that show what separates its columns."""
+HEAD = 2**16
+"""Bytes of a large text that show how the others are written."""
+MAX_COLUMNS = 50_000
+"""Columns of a table; a file with more has its values in a single line."""
 
-_EMPTY = ("", "nan", "na", "n/a", "null", "none", "-", "--")
+_EMPTY = {
+    "", "-", "--", "---", "nan", "na", "n/a", "<na>", "#n/a", "#na", "null", "none", "#div/0!",
+    "1.#qnan", "-1.#qnan", "1.#ind", "-1.#ind", "#wert!", "#value!", "#nv",
+}  # fmt: skip
+"""What stands in a cell without a value, in small letters; a row of stars is such a cell, too."""
 _WORDS = re.compile(r"[^\s(\[{]+(?:\s*[(\[{][^)\]}]*[)\]}])?|[(\[{][^)\]}]*[)\]}]")
-_BRACKETS = re.compile(r"^(?P<name>.*?)\s*[(\[{]\s*(?P<unit>[^()\[\]{}]*?)\s*[)\]}]\s*$")
+_NUMBER = re.compile(
+    r"[+-]?(?:(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?"
+    r"|\d{1,3}(?:(?:,\d{3})+(?:\.\d*)?|(?:\.\d{3})+(?:,\d*)?))$"
+)
+_BETWEEN = r"['\N{RIGHT SINGLE QUOTATION MARK} \N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}]"
+_GROUPS = re.compile(rf"([+-]?\d{{1,3}})((?:{_BETWEEN}\d{{3}})+)(?!\d)")
+_THOUSANDS = {
+    mark: re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:{re.escape(mark)}\d{{3}})+(?!\d)")
+    for mark in ".,"
+}
+"""Numbers whose mark may be one of thousands: 1.020 and 1.020.000, but 0.020 and 1.02 are not."""
 
 
-def load(path: Path) -> xr.Dataset | xr.DataArray:
+class Options(NamedTuple):
+    """What a caller knows about the file."""
+
+    skip: int = 0
+    sheet: int | str = 0
+    missing: tuple[float | str, ...] | None = None
+    decimal: str | None = None
+    record: int | None = None
+
+    @property
+    def words(self) -> set[str]:
+        """Cells without a value, in small letters."""
+        given = [one for one in self.missing or () if isinstance(one, str)]
+        return _EMPTY | {word.strip().casefold() for word in given}
+
+
+class Row(NamedTuple):
+    """A line of a table: its number, from 1, and its cells."""
+
+    number: int
+    cells: list[str]
+
+
+class Grid(NamedTuple):
+    """The cells of a file, and what stands around them."""
+
+    rows: list[Row]
+    comments: list[str]  # above the numbers
+    separator: str  # empty if the file is a workbook
+
+
+class Table(NamedTuple):
+    """Numbers of a table by column, and what its head and its lines say of them."""
+
+    columns: Array  # (columns, rows)
+    header: list[Row]
+    lines: Array  # the number of each row's line
+    blocks: Array  # the number of each row's block; empty lines separate blocks
+    texts: dict[int, str]  # what a column without any number holds
+    mark: str | None  # the decimal mark that was seen
+
+
+def load(path: Path, options: Options = Options()) -> xr.Dataset | xr.DataArray:  # noqa: B008
     """Read a file: its variables, those of a table along 'row', or the one array of an .npy."""
     import xarray as xr
 
     ending = path.suffix.lower()
     if ending in (*TEXT, EXCEL):
-        return read_table(path)
-    if ending == ".npy":
-        array = _read_npy(path)
+        return read_table(path, options)
+    if ending == ".npy" or ending in IMAGES:
+        array = _read_npy(path) if ending == ".npy" else _read_image(path)
         return xr.DataArray(array, dims=("x", "y")[: array.ndim])
     if ending not in NETCDF:
-        endings = ", ".join((".npy", *TEXT, EXCEL, *NETCDF))
+        endings = ", ".join((".npy", *TEXT, EXCEL, *NETCDF, *IMAGES))
         raise InputError(
             f"must end in {endings}, got {path.name!r}; export text from the instrument"
         )
@@ -67,179 +148,428 @@ def _read_npy(path: Path) -> Array:
     return array
 
 
-def read_table(path: Path) -> xr.Dataset:
-    """Read a table of numbers from a text file, or from the first sheet of a workbook.
+def _read_image(path: Path) -> Array:
+    """Return the grey values of an image, (nx, ny); y rises from its lowest line."""
+    from PIL import Image
 
-    Columns are separated by semicolons, tabs, commas or blanks, in this order; the decimal
-    sign may be a comma unless commas separate. Lines that begin with ``#`` are comments.
-    The last line above the numbers names the columns, or states their units below a line of
-    names; without one, the last comment may name them. Columns become variables along
-    'row', NaN where a cell is empty; those without names are called by their numbers, from
-    0. What is empty at the end is left out. The attribute `lines` has the number of each
-    row's line; `text` of a column without any number says what it holds.
+    try:
+        with Image.open(io.BytesIO(content_of(path)), formats=("PNG", "TIFF")) as image:
+            grey = np.asarray(image)
+    except Exception as error:  # the library lets through whatever a broken file leads to
+        raise InputError(f"is not an image: {error}") from None
+    if grey.ndim != 2 or grey.dtype.kind not in "fiu":
+        raise InputError(f"must be a grey image, got shape {grey.shape} of {grey.dtype}")
+    return grey[::-1].T.astype(np.float64)
+
+
+# -- tables --------------------------------------------------------------------------------------
+
+
+def read_table(path: Path, options: Options = Options()) -> xr.Dataset:  # noqa: B008
+    """Read a table of numbers from a text file, or from a sheet of a workbook.
+
+    Columns are separated by semicolons, tabs, commas or blanks. Lines that begin with ``#``
+    are comments. The last line above the numbers names the columns, or states their units
+    below a line of names; without one, the last comment may name them. Columns become
+    variables along 'row', NaN where a cell is empty; those without names are called by their
+    numbers, from 0. The attribute `lines` has the number of each row's line, `comments` the
+    comments, `headed` is whether columns have names; `text` of a column without any number
+    says what it holds.
     """
     import xarray as xr
 
     if path.suffix.lower() == EXCEL:
-        rows, comment, separator = _sheet(path), "", ""
+        grid = _sheet(path, options)
+        table = _parsed(grid, options)
     else:
-        rows, comment, separator = _lines(path)
-    while rows and not any(rows[-1][1]):
-        rows.pop()
-    width = max((i for _, cells in rows for i, cell in enumerate(cells, 1) if cell), default=0)
-    rows = [(number, cells[:width]) for number, cells in rows]
-    values = [[_number(cell, separator) for cell in cells] for _, cells in rows]
-    with_numbers = [row for row in values if any(v == v for v in row if v is not None)]
-    if not with_numbers:
-        raise InputError("holds no numbers")
-    numeric = [i for i, v in enumerate(with_numbers[-1]) if v is not None and v == v]
-
-    def is_header(place: int) -> bool:
-        own, cells = values[place], rows[place][1]
-        at = [i for i in numeric if i < len(own)]
-        return not any(cells[i] for i in at) or any(own[i] is None for i in at)
-
-    start = next(place for place in range(len(rows)) if not is_header(place))
-    header, rows, values = rows[:start], rows[start:], values[start:]
-    for number, cells in header[-1:]:
-        named = [cells[i] for i in numeric if i < len(cells)]
-        wrong = [cell for cell in named if _number(cell, separator) is None]
-        if len(wrong) < len(named):  # no names: a value that went wrong
-            raise InputError(f"line {number}: {describe(wrong[0])} is not a number")
-    if not header and comment:
-        cells = [comment] if width == 1 else _split(comment, separator)
-        header = [(0, cells)] if len(cells) == width else []
-    integers = all(re.fullmatch(r"[+-]?\d+", cell) for _, cells in rows for cell in cells)
-    if separator == "," and not header and width == 2 and integers:
-        raise InputError(
-            f"line {rows[0][0]}: {','.join(rows[0][1])!r} may be one number or two; separate"
-            " columns with ';', or write decimal points"
-        )
-    first = len(rows[0][1])
-    for number, cells in rows:
-        if len(cells) != first:
-            raise InputError(
-                f"line {number} has {len(cells)} columns, line {rows[0][0]} has {first}"
-            )
-    columns = np.array(values, dtype=np.float64).T
-    texts: dict[int, str] = {}  # such as dates: nobody may want a column without a number
-    for (number, cells), own in zip(rows, values, strict=True):
-        for column, (cell, value) in enumerate(zip(cells, own, strict=True)):
-            if value is None:
-                texts.setdefault(column, f"line {number}: {describe(cell)} is not a number")
-    if mixed := [text for column, text in texts.items() if np.isfinite(columns[column]).any()]:
-        raise InputError(mixed)
-    data = xr.Dataset(attrs={"lines": [number for number, _ in rows]})
-    for number, (name, about) in enumerate(_headings(header, first)):
+        content = content_of(path)
+        large = _large(content, options) if len(content) > LARGE else None
+        if large is None:
+            grid = _lines(_text(content), options)
+            table = _parsed(grid, options)
+        else:
+            grid, table = large
+    if options.record is not None:
+        table = _record(table, options.record)
+    width = len(table.columns)
+    attributes = {
+        "lines": table.lines, "blocks": int(table.blocks[-1] - table.blocks[0]) + 1,
+        "comments": grid.comments, "headed": any({*row.cells} - {"", "-"} for row in table.header),
+    }  # fmt: skip
+    data = xr.Dataset(attrs=attributes)
+    for number, (name, about) in enumerate(_headings(table.header, width)):
+        about |= {"name": name}
         if name in data:
             name = about["heading"] if about["heading"] not in data else f"{name} {number}"
-        data[name] = ("row", columns[number], about | {"text": texts.get(number, "")})
+        about |= {"text": table.texts.get(number, ""), "column": str(number)}
+        data[name] = ("row", table.columns[number], about)
     return data
 
 
-def _lines(path: Path) -> tuple[list[tuple[int, list[str]]], str, str]:
-    """Return the cells of each line with its number, the last comment above them, and what
-    separates them.
+def _parsed(grid: Grid, options: Options) -> Table:
+    """Return the numbers of a table (steps 2 to 4)."""
+    words, separator = options.words, grid.separator
+    rows = [row for row in grid.rows if any(row.cells)]
+    start, numeric = _start(rows, words)
+    header, rows = rows[:start], rows[start:]
+    if header and rows:  # a heading that is repeated begins another block
+        again = header[-1].cells
+        rows = [row for row in rows if row.cells != again]
+    # Empty cells at the end of all rows, as of a trailing separator, are no columns.
+    width = max(len(row.cells) for row in rows)
+    while not any(len(row.cells) >= width and row.cells[width - 1] for row in rows):
+        width -= 1
+    if width > MAX_COLUMNS:
+        raise InputError(
+            f"line {rows[0].number} has {width} columns, more than {MAX_COLUMNS}; write each value"
+            " of a profile into a line of its own"
+        )
+    for row in rows:
+        if len(row.cells) < width:
+            most = next(row.number for row in rows if len(row.cells) >= width)
+            raise InputError(
+                f"line {row.number} has {len(row.cells)} columns, line {most} has {width}"
+            )
+    if not header and grid.comments:
+        comment = grid.comments[-1]
+        cells = [comment] if width == 1 else _split(comment, separator, words)
+        header = [Row(0, cells)] if len(cells) == width and not _is_size(comment) else []
+    header = [_without_empty_end(row, width) for row in header]
+    columns = [list(cells) for cells in zip(*(row.cells[:width] for row in rows), strict=True)]
+    _check_integers(columns, header, rows, separator)
+    mark, marked = _decimal_mark(columns, numeric, rows, separator, options.decimal)
+    numbers = np.empty((width, len(rows)))
+    texts, mixed = {}, []
+    for column, cells in enumerate(columns):
+        try:
+            numbers[column] = list(map(float, cells))
+            if not marked and not any("_" in cell for cell in cells):
+                continue
+        except ValueError:
+            pass
+        values = [_number(cell, words, mark) for cell in cells]
+        numbers[column] = [math.nan if value is None else value for value in values]
+        if None in values:
+            wrong = values.index(None)
+            text = f"line {rows[wrong].number}: {describe(cells[wrong])} is not a number"
+            texts[column] = text
+            if np.isfinite(numbers[column]).any():
+                mixed.append(
+                    f"{text}; if it stands for no value, pass missing={cells[wrong]!r}"
+                )
+    if mixed:
+        raise InputError(mixed)
+    lines = np.array([row.number for row in rows])
+    blocks = np.cumsum(np.diff(lines, prepend=lines[0]) > 1)
+    return Table(numbers, header, lines, blocks, texts, mark)
+
+
+def _start(rows: Sequence[Row], words: set[str]) -> tuple[int, list[int]]:
+    """Return the index of the first row of numbers, and the columns that hold numbers."""
+
+    def is_value(cell: str, or_empty: bool = False) -> bool:
+        value = _number(cell, words, None)
+        return bool(_NUMBER.match(cell)) or (value is not None and (or_empty or value == value))
+
+    last = next((row for row in reversed(rows) if any(map(is_value, row.cells))), None)
+    if last is None:
+        raise InputError("holds no numbers")
+    numeric = [i for i, cell in enumerate(last.cells) if is_value(cell)]
+
+    def is_header(row: Row) -> bool:
+        cells = [row.cells[i] for i in numeric if i < len(row.cells)]
+        return {*row.cells} <= {"", "-"} or any(not is_value(cell, True) for cell in cells)
+
+    start = next(place for place, row in enumerate(rows) if not is_header(row))
+    if start > 0 and not _are_units(rows[start - 1].cells):
+        number, cells = rows[start - 1]
+        named = [cells[i] for i in numeric if i < len(cells) and cells[i]]
+        wrong = [cell for cell in named if not is_value(cell, True)]
+        if len(wrong) < len(named) and wrong:  # no names: a value that went wrong
+            text = f"line {number}: {describe(wrong[0])} is not a number"
+            raise InputError(f"{text}; if it stands for no value, pass missing={wrong[0]!r}")
+    return start, numeric
+
+
+def _are_units(cells: Iterable[str]) -> bool:
+    """Return whether a row states units: each cell is one, or empty."""
+    bare = [cell.strip("()[]{} ") for cell in cells]
+    known = [cell for cell in bare if parse(cell)]
+    return len(known) == len([cell for cell in bare if cell]) and any(
+        cell not in ("1", "-", "%") for cell in known
+    )
+
+
+def _without_empty_end(row: Row, width: int) -> Row:
+    cells = list(row.cells)
+    while len(cells) > width and not cells[-1]:
+        cells.pop()
+    return Row(row.number, cells + [""] * (width - len(cells)) if any(cells) else cells)
+
+
+def _check_integers(
+    columns: Sequence[Sequence[str]], header: list[Row], rows: list[Row], separator: str
+) -> None:
+    """Refuse pairs of whole numbers between commas, which may be decimal commas."""
+    if separator == "," and not header and len(columns) == 2:
+        digits = re.compile(r"[+-]?\d+")
+        if all(digits.fullmatch(cell) for cells in columns for cell in cells):
+            raise InputError(
+                f"line {rows[0].number}: {','.join(rows[0].cells)!r} may be one number or two;"
+                " separate columns with ';', or write decimal points"
+            )
+
+
+def _decimal_mark(
+    columns: Sequence[Sequence[str]],
+    numeric: Sequence[int],
+    rows: Sequence[Row],
+    separator: str,
+    stated: str | None,
+) -> tuple[str | None, bool]:
+    """Return the decimal mark of a file, and whether its cells must be rewritten.
+
+    A comma or a point may also mark thousands: 1.020 is 1.02 in one country and 1020 in
+    another. That is refused unless another cell decides, or the caller.
     """
-    lines: list[tuple[int, str]] = []
-    comment = ""
-    for number, line in enumerate(_text(path).splitlines(), 1):
-        if line.lstrip().startswith("#"):
-            comment = comment if lines else line.strip().lstrip("#").strip()
-        elif line.strip():
-            lines.append((number, line))
-    separator = _separator([line for _, line in lines])
-    return [(number, _split(line, separator)) for number, line in lines], comment, separator
+    first: dict[str, str] = {}  # a cell with each mark, with its line
+    told: set[str] = set()  # marks that stand where none of thousands can stand
+    for column in numeric:
+        for row, cell in enumerate(columns[column]):
+            for mark in ".,":
+                if mark in cell and mark not in told and _NUMBER.match(cell):
+                    first.setdefault(mark, f"line {rows[row].number} has {cell!r}")
+                    if not _THOUSANDS[mark].match(cell):
+                        told.add(mark)
+                        first[mark] = f"line {rows[row].number} has {cell!r}"
+        if len(told) == 2:
+            break
+    if stated is not None:
+        (thousands,) = {".", ","} - {stated}
+        if thousands in told:
+            raise InputError(
+                f"{first[thousands]}, in which {thousands!r} does not mark thousands; pass"
+                f" decimal={thousands!r}"
+            )
+        return stated, bool(first)
+    if len(first) == 2:
+        raise InputError(
+            f"{first[',']}, and {first['.']}: two decimal marks; if points mark thousands, pass"
+            " decimal=',', and decimal='.' if commas do"
+        )
+    doubtful = {mark for mark in first if mark == "," or separator in (";", "\t")} - told
+    for mark in doubtful:
+        (thousands,) = {".", ","} - {mark}
+        raise InputError(
+            f"{first[mark]}, which may be a number with three decimals or a thousand times as"
+            f" large; pass decimal={mark!r} or decimal={thousands!r}"
+        )
+    return (next(iter(first)), "," in first) if first else (None, False)
 
 
-def _sheet(path: Path) -> list[tuple[int, list[str]]]:
-    import pandas as pd
-
-    options: Any = {"header": None, "dtype": str, "na_filter": False, "engine": "openpyxl"}
-    try:
-        sheet = pd.read_excel(io.BytesIO(content_of(path)), **options)
-    except ImportError:
-        raise InputError("needs openpyxl (pip install openpyxl), or save it as .csv") from None
-    except Exception as error:  # the library lets through whatever a broken file leads to
-        raise InputError(f"is not a workbook: {error}") from None
-    rows = enumerate(sheet.to_numpy().tolist(), 1)
-    return [(number, [cell.strip() for cell in row]) for number, row in rows]
-
-
-def _text(path: Path) -> str:
-    """Return the text of a file in UTF-8, UTF-16 with a mark, or else Windows' western code."""
-    data = content_of(path)
-    try:
-        wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
-        text = data.decode("utf-16" if wide else "utf-8-sig")
-    except UnicodeDecodeError:
-        text = data.decode("cp1252", errors="replace")
-    if "\0" in text:
-        raise InputError("is not a text file")
-    return text
-
-
-def _separator(lines: list[str]) -> str:
-    for mark in (";", "\t"):
-        if any(mark in line for line in lines):
-            return mark
-    if not any("," in line for line in lines):
-        return " "
-    # Blanks separate numbers with decimal commas: '0,1 1000,5'; but '0.1, 1000.5' has commas.
-    last = lines[-1]
-    return " " if re.search(r"\d\s+[+-]?\d", last) and not re.search(r",\s", last) else ","
-
-
-def _split(line: str, separator: str) -> list[str]:
-    if separator != " ":
-        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
-    cells = line.split()
-    if all(_number(cell, " ") is not None for cell in cells):
-        return cells
-    return [cell.strip() for cell in _WORDS.findall(line)]
-
-
-def _number(cell: str, separator: str) -> float | None:
+def _number(cell: str, words: set[str], mark: str | None) -> float | None:
     """Return the number in a cell, NaN if it is empty or says so, None for a text."""
-    if cell.lower() in _EMPTY:
+    if cell.casefold() in words or not cell.strip("*"):
         return math.nan
-    if separator != "," and cell.count(",") == 1 and "." not in cell:
-        cell = cell.replace(",", ".")
+    if not cell[-1:].isdigit() and cell[-1:] not in ".,fFyY":  # inf, infinity
+        return None
+    cell = _GROUPS.sub(lambda match: match[1] + re.sub(r"\D", "", match[2]), cell)
+    cell = cell.replace("\N{MINUS SIGN}", "-")
+    if mark is not None:
+        (thousands,) = {".", ","} - {mark}
+        if thousands in cell and _THOUSANDS[thousands].match(cell):
+            cell = cell.replace(thousands, "")
+        if mark == "," and "." not in cell:
+            cell = cell.replace(",", ".")
     try:
         return None if "_" in cell else float(cell)  # Python reads 1_000, people do not
     except ValueError:
         return None
 
 
-def _headings(
-    header: list[tuple[int, list[str]]], width: int
-) -> list[tuple[str, dict[str, str]]]:
+def _record(table: Table, record: int) -> Table:
+    """Return one block of a table."""
+    chosen = table.blocks == record
+    if not chosen.any():
+        raise InputError(f"record: must be 0 to {table.blocks[-1]}, got {record}")
+    return table._replace(
+        columns=table.columns[:, chosen], lines=table.lines[chosen], blocks=table.blocks[chosen]
+    )
+
+
+# -- where cells come from -----------------------------------------------------------------------
+
+
+def _lines(text: str, options: Options) -> Grid:
+    """Return the cells of each line of a text, and the comments above them (step 1)."""
+    lines: list[tuple[int, str]] = []
+    comments: list[str] = []
+    for number, line in enumerate(text.splitlines(), 1):
+        if number <= options.skip:
+            continue
+        if line.lstrip().startswith("#"):
+            if not lines:
+                comments.append(line.strip().lstrip("#").strip())
+        elif line.strip():
+            lines.append((number, line))
+    if lines and lines[0][1].strip().startswith("sep="):  # what Excel writes and reads
+        lines = lines[1:]
+    separator = _separator([line for _, line in lines])
+    for number, line in lines:
+        if separator != " " and line.count(separator) > 2 * MAX_COLUMNS:
+            raise InputError(
+                f"line {number} has {line.count(separator) + 1} columns; write each value of a"
+                " profile into a line of its own"
+            )
+    if separator == " ":
+        rows = [Row(number, _split(line, " ", options.words)) for number, line in lines]
+    else:
+        cells = csv.reader([line for _, line in lines], delimiter=separator)
+        try:
+            rows = [
+                Row(n, [c.strip() for c in row])
+                for (n, _), row in zip(lines, cells, strict=True)
+            ]
+        except (ValueError, csv.Error):
+            raise InputError("has a quotation mark that does not end in its line") from None
+    return Grid(rows, comments, separator)
+
+
+def _large(content: bytes, options: Options) -> tuple[Grid, Table] | None:
+    """Return a large table whose lines are all of the same kind; None for any other."""
+    import pandas as pd
+
+    end = content.find(b"\n", HEAD) + 1
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")) or options.decimal or end == 0:
+        return None
+    with suppress(InputError, UnicodeDecodeError, ValueError):
+        grid = _lines(_text(content[:end]), options)
+        table = _parsed(grid, options)
+        body, width = content[end:].rstrip(), len(table.columns)
+        separator = {" ": r"\s+"}.get(grid.separator, grid.separator)
+        marks = body.count(grid.separator.encode()) if separator != r"\s+" else -1
+        lines = body.count(b"\n") + 1
+        trailing = len(grid.rows[-1].cells) - width
+        even = marks in (-1, lines * (width + trailing - 1))
+        # From pandas 3 on numbers are read to the last digit without being asked to.
+        exact: Any = {"float_precision": "round_trip"} if pd.__version__ < "3" else {}
+        words = [w for word in options.words for w in (word, word.upper(), word.title())]
+        if table.mark and not table.texts and even and b"#" not in body and b'"' not in body:
+            frame = pd.read_csv(
+                io.BytesIO(body), sep=separator, header=None, decimal=table.mark,
+                names=range(width + trailing), index_col=False, keep_default_na=False,
+                na_values=words, skip_blank_lines=False,
+                encoding="utf-8",
+                **exact,
+            ).iloc[:, :width]  # fmt: skip
+            whole = all(kind.kind in "fiu" for kind in frame.dtypes) and len(frame) == lines
+            if whole and not (separator == r"\s+" and frame.isna().to_numpy().any()):
+                first = table.lines[-1] + 1
+                return grid, table._replace(
+                    columns=np.hstack([table.columns, frame.to_numpy(np.float64).T]),
+                    lines=np.r_[table.lines, first : first + lines],
+                    blocks=np.r_[table.blocks, np.full(lines, table.blocks[-1])],
+                )
+    return None
+
+
+def _sheet(path: Path, options: Options) -> Grid:
+    import pandas as pd
+
+    content = content_of(path)
+    given: Any = {"header": None, "dtype": str, "na_filter": False}
+    try:
+        with pd.ExcelFile(io.BytesIO(content), engine="openpyxl") as book:
+            names = [str(name) for name in book.sheet_names]
+            known = options.sheet in (
+                range(len(names)) if isinstance(options.sheet, int) else names
+            )
+            sheet = pd.read_excel(book, options.sheet, **given) if known else None
+    except ImportError:
+        raise InputError("needs openpyxl (pip install openpyxl), or save it as .csv") from None
+    except Exception as error:  # the library lets through whatever a broken file leads to
+        raise InputError(f"is not a workbook: {error}") from None
+    if sheet is None:
+        raise InputError(
+            f"sheet: {options.sheet!r} is not one of {', '.join(map(repr, names))}"
+        )
+    cells = enumerate(sheet.to_numpy().tolist(), 1)
+    rows = [Row(number, [cell.strip() for cell in row]) for number, row in cells]
+    if len(names) > 1 and not any(any(map(_NUMBER.match, row.cells)) for row in rows):
+        raise InputError(
+            f"sheet {names[0]!r} holds no numbers; pass sheet= for another:"
+            f" {', '.join(map(repr, names))}"
+        )
+    return Grid(rows[options.skip :], [], "")
+
+
+def _text(data: bytes) -> str:
+    """Return a text in UTF-8, UTF-16 with a mark, or else Windows' western code."""
+    try:
+        wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
+        text = data.decode("utf-16" if wide else "utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("cp1252", errors="replace")
+    if "\0" in text:
+        raise InputError("is not a text file (UTF-8, or UTF-16 with a byte order mark)")
+    return text
+
+
+def _separator(lines: Sequence[str]) -> str:
+    """Return what separates columns, as most of the last lines with numbers show it."""
+    ends = [line for line in lines[-2 * END :] if re.search(r"\d", line)][-END:]
+    for mark in (";", "\t"):
+        if ends and 2 * sum(mark in line for line in ends) >= len(ends):
+            return mark
+    last = ends[-1] if ends else ""
+    # Blanks separate numbers with decimal commas: '0,1 1000,5'; but '0.1, 1000.5' has commas.
+    between = re.search(r"\d\s+[+-]?\d", last) and not re.search(r",\s", last)
+    return " " if "," not in last or between else ","
+
+
+def _split(line: str, separator: str, words: set[str]) -> list[str]:
+    if separator not in ("", " "):
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
+    cells = line.split()
+    if all(_NUMBER.match(cell) or cell.casefold() in words for cell in cells):
+        return cells
+    return [cell.strip() for cell in _WORDS.findall(line)]
+
+
+# -- headings ------------------------------------------------------------------------------------
+
+
+def _headings(header: list[Row], width: int) -> list[tuple[str, dict[str, str]]]:
+    """Return the name, the heading and the unit of each column (step 5)."""
+    header = [row for row in header if not {*row.cells} <= {"", "-"}]
     if not header:
-        return [(str(number), {}) for number in range(width)]
+        return [(str(number), {"heading": ""}) for number in range(width)]
     number, names = header[-1]
     if len(names) != width:
         raise InputError(
             f"line {number} names {len(names)} columns, the numbers below it have {width}; begin"
-            " comment lines with '#'"
+            " comment lines with '#', or pass skip= with the number of lines above the headings"
         )
     units = [""] * width
-    bare = [cell.strip("()[]{} ") for cell in names]
-    if len(header) > 1 and len(header[-2][1]) == width and any(map(parse, filter(None, bare))):
-        names, units = header[-2][1], bare
-    found = []
-    for heading, below in zip(names, units, strict=True):
+    if len(header) > 1 and len(header[-2].cells) == width and _are_units(names):
+        units = [cell.strip("()[]{} ") for cell in names]
+        names = header[-2].cells
+    headings = []
+    for column, (heading, below) in enumerate(zip(names, units, strict=True)):
         name, unit = name_and_unit(heading)
         if unit and below not in ("", unit):
             raise InputError(f"{heading!r} has {below!r} below it, which is another unit")
         unit = unit or below
-        found.append((name, {"heading": heading} | ({"units": unit} if unit else {})))
-    return found
+        name = name if heading else str(column)  # such as the index that pandas writes
+        headings.append((name, {"heading": heading} | ({"units": unit} if unit else {})))
+    return headings
 
 
 def name_and_unit(text: str) -> tuple[str, str]:
     """Take a heading apart: 'strength (MPa)', 'tau / MPa', 'x_mm', 'x in mm', 'tau MPa'."""
-    if match := _BRACKETS.match(text):
-        return match["name"].strip(), match["unit"]
+    text = text.strip()
+    if text[-1:] in tuple(")]}") and (start := max(map(text.rfind, "([{"))) >= 0:
+        return text[:start].strip(" _"), text[start + 1 : -1].strip()
     if " / " in text:
         name, unit = text.split(" / ", 1)
         return name.strip(), unit.strip()
@@ -248,3 +578,16 @@ def name_and_unit(text: str) -> tuple[str, str]:
         name = text[: text.rindex(last)].rstrip(" ,_:") if before else ""
         return name.removesuffix(" in"), last
     return text.strip(), ""
+
+
+_SIZE = re.compile(r"(width|height|value units)\s*[:=]\s*(?:([\d.,eE+-]+)\s*)?(\S*)$", re.I)
+
+
+def _is_size(comment: str) -> bool:
+    return _SIZE.match(comment) is not None
+
+
+def sizes_of(comments: Iterable[str]) -> dict[str, tuple[float, str]]:
+    """Return what comments state of an image: width, height and value units, with their units."""
+    matches = filter(None, map(_SIZE.match, comments))
+    return {m[1].lower(): (float(m[2] or 1.0), m[3]) for m in matches}

@@ -1,0 +1,186 @@
+"""Files as instruments and spreadsheets write them: the same numbers, or a refusal that helps."""
+
+import numpy as np
+import openpyxl
+import pandas as pd
+import pytest
+from refusals import refuses
+
+import stiction as st
+from stiction.problem.profiles import tables
+
+X = np.array([0.0, 1.0, 2.0, 3.5])  # mm
+STRENGTH = np.array([1.0, 1.25, 0.975, 1.03])  # MPa
+ROWS = [f"{x};{v}" for x, v in zip(X, STRENGTH, strict=True)]
+
+
+def read(folder, text, **options):
+    path = folder / "file.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return st.read_profile(path, **options)
+
+
+def is_read(profile, values=STRENGTH * 1e6, x=X * 1e-3):
+    np.testing.assert_allclose(profile, values, rtol=1e-14)
+    np.testing.assert_allclose(profile.x, x, rtol=1e-14)
+    return True
+
+
+HEADS = {
+    "a blank row below the heading": "x (mm);strength (MPa)\n;",
+    "words as units": "x (millimetres);strength (Megapascal)",
+    "a title, an empty line, and units below": "Scan 3;21,5;x;y;z\n\nx;strength\nmm;MPa",
+}
+
+
+def test_heads_of_instruments(tmp_path):
+    for head in HEADS.values():
+        assert is_read(read(tmp_path, "\n".join([head, *ROWS])))
+    text = "\n".join(["1;2", "speed;0.5", "x (mm);strength (MPa)", *ROWS])
+    refuses("line 3 ... is not a number", lambda: read(tmp_path, text))
+    assert is_read(read(tmp_path, text, skip=2))
+    trailing = "\n".join(["a,1,2,3,4,5", "Lateral mm,Raw um,", *(f"{r},,," for r in ROWS)])
+    heights = read(tmp_path, trailing.replace(";", ","), quantity="height")
+    assert is_read(heights, STRENGTH * 1e-6)
+    microns = read(tmp_path, "\n".join(["X_(microns);y1", *ROWS]), quantity="height", unit="um")
+    assert is_read(microns, STRENGTH * 1e-6, X * 1e-6)
+    for unit in ("-", "1"):
+        head = f"x;mu\nmm;{unit}"
+        mu = read(tmp_path, "\n".join([head, *ROWS]), quantity="friction_coefficient")
+        assert is_read(mu, STRENGTH)
+
+
+def test_tables_of_pandas_with_their_index(tmp_path):
+    frame = pd.DataFrame({"x (mm)": X, "strength (MPa)": STRENGTH})
+    frame.to_csv(tmp_path / "t.csv")
+    frame.to_excel(tmp_path / "t.xlsx")
+    for name in ("t.csv", "t.xlsx"):
+        assert is_read(st.read_profile(tmp_path / name))
+        np.testing.assert_array_equal(
+            st.read_profile(tmp_path / name, x=0, value=2).x, range(4)
+        )
+    pd.DataFrame({"peak (MPa)": STRENGTH}).to_csv(tmp_path / "p.csv")
+    np.testing.assert_allclose(st.read_peaks(tmp_path / "p.csv").values[0], STRENGTH * 1e6)
+
+
+def test_a_number_chooses_the_column_where_headings_are_equal(tmp_path):
+    rows = [f"{row};{2 * v}" for row, v in zip(ROWS, STRENGTH, strict=True)]
+    text = "\n".join(["x (mm);strength (MPa);strength (MPa)", *rows])
+    assert is_read(read(tmp_path, text, value=1))
+    assert is_read(read(tmp_path, text, value=2), 2e6 * STRENGTH)
+    for value in (None, "strength", "strength (MPa)"):
+        refuses("columns 1 and 2 ... 'strength", lambda v=value: read(tmp_path, text, value=v))
+
+
+def test_marks_of_thousands_are_never_guessed(tmp_path):
+    head, values = "x (mm);strength (kPa)\n", [980.5e3, 1020e3, 975.2e3]
+    mixed = head + "0,5;980,5\n1,5;1.020\n2,5;975,2\n"
+    refuses("line 2 ... '0,5' ... line 3 ... '1.020'", lambda: read(tmp_path, mixed))
+    np.testing.assert_allclose(read(tmp_path, mixed, decimal=","), values)
+    refuses("'0,5' ... pass decimal=','", lambda: read(tmp_path, mixed, decimal="."))
+    for mark, factor in ((",", 1.0), (".", 1000.0)):
+        alone = head + "0;1,020\n1;1,034\n"
+        refuses("line 2 ... '1,020'", lambda text=alone: read(tmp_path, text))
+        given = read(tmp_path, alone, decimal=mark)
+        np.testing.assert_allclose(given, np.array([1.020e3, 1.034e3]) * factor)
+    swiss = head + "0,5;1'020,5\n1,5;1\N{NARROW NO-BREAK SPACE}034,25\n"
+    np.testing.assert_allclose(read(tmp_path, swiss), [1020.5e3, 1034.25e3])
+    refuses("line 2 ... two decimal marks", lambda: read(tmp_path, head + "0;1.020,5\n"))
+
+
+def test_words_and_numbers_for_missing_values(tmp_path):
+    text = "\n".join(["x (mm);strength (MPa)", *ROWS, "4;***", "5;#N/A", "6;1.#QNAN", "7;Bad"])
+    refuses("line 9: 'Bad' ... missing='Bad'", lambda: read(tmp_path, text))
+    profile = read(tmp_path, text, missing="Bad")
+    assert np.isnan(profile.values[4:]).all()
+    assert is_read(profile[:4])
+    zero = "\n".join(["x (mm);strength (MPa)", *ROWS, "4;0", "5;-9999"])
+    refuses("is 0 in line 6 (2 such values) ... missing=0", lambda: read(tmp_path, zero))
+    assert is_read(read(tmp_path, zero, missing=[0, -9999])[:4])
+    heights = zero.replace("strength (MPa)", "height (um)")
+    with pytest.warns(st.AccuracyWarning, match="-9999 stands in line 7"):
+        assert read(tmp_path, heights, quantity="height")[-1] == pytest.approx(-9999e-6)
+    peaks = tmp_path / "peaks.csv"
+    peaks.write_text("length (mm);peak (N)\n10;71.5\n10;72\n20;-1\n20;69\n10;lost\n20;75\n")
+    found = st.read_peaks(peaks, missing=("lost", -1))
+    assert [list(values) for values in found.values] == [[71.5, 72.0], [69.0, 75.0]]
+
+
+def test_a_table_on_another_sheet(tmp_path):
+    book, path = openpyxl.Workbook(), tmp_path / "book.xlsx"
+    book.active.append(["Certificate of the instrument"])
+    data = book.create_sheet("DATA")
+    for row in [["x (mm)", "strength (MPa)"], *zip(X, STRENGTH, strict=True)]:
+        data.append(list(row))
+    book.save(path)
+    refuses("holds no numbers ... sheet= ... 'DATA'", lambda: st.read_profile(path))
+    refuses("sheet: 'data' ... 'DATA'", lambda: st.read_profile(path, sheet="data"))
+    for sheet in (1, "DATA"):
+        assert is_read(st.read_profile(path, sheet=sheet))
+
+
+def test_one_of_several_records(tmp_path):
+    block = "\n".join(["x (mm);strength (MPa)", *ROWS])
+    later = block.replace("1.25", "1.5")
+    refuses("record=0 to 1", lambda: read(tmp_path, f"{block}\n\n{later}\n"))
+    assert is_read(read(tmp_path, f"{block}\n\n{later}\n", record=0))
+    assert read(tmp_path, f"{block}\n\n{later}\n", record=1)[1] == 1.5e6
+    refuses("record: must be 0 to 1", lambda: read(tmp_path, f"{block}\n\n{later}", record=2))
+
+
+def test_maps_without_headings(tmp_path):
+    interface = st.Interface(length=(8e-3, 10e-3), nodes=(8, 10))
+    heights = 1e6 + np.arange(80.0).reshape(8, 10)
+    places = np.stack(np.meshgrid(*interface.coordinates.values(), indexing="ij")).reshape(
+        2, 80
+    )
+    lines = [
+        " ".join(f"{v:.12g}" for v in row) for row in np.vstack([places, heights.ravel()]).T
+    ]
+    for options in ({"interface": interface}, {}):
+        given = read(tmp_path, "\n".join(lines), **options)
+        np.testing.assert_array_equal(given, heights)
+    size = "# Channel: Height\n# Width: 8.00 mm\n# Height: 10.00 mm\n# Value units: Pa\n"
+    matrix = "\n".join("\t".join(f"{v:.12g}" for v in row) for row in heights.T)
+    for options in ({}, {"interface": interface}):
+        given = read(tmp_path, size + matrix, **options)
+        np.testing.assert_array_equal(given, heights)
+        np.testing.assert_allclose(given.y, interface.coordinates["y"])
+    refuses("rows='x' ... rows='y'", lambda: read(tmp_path, matrix, interface=interface))
+    given = read(tmp_path, matrix, rows="y", spacing=1e-3, interface=interface)
+    np.testing.assert_array_equal(given, heights)
+
+
+def test_a_large_table_is_read_as_a_small_one(tmp_path, monkeypatch):
+    """pandas reads regular lines; any other file is read line by line, with the same refusals."""
+    rng = np.random.default_rng(0)
+    x, values = np.arange(40_000) * 1e-3, np.round(1.0 + rng.random(40_000), 6)
+    lines = [f"{a:.3f};{b:.6f}" for a, b in zip(x, values, strict=True)]
+    assert len("\n".join(lines)) > tables.LARGE
+    head = "x (mm);strength (MPa)"
+    for text in ("\n".join([head, *lines]), "\n".join([head, *lines]).replace(".", ",")):
+        np.testing.assert_array_equal(read(tmp_path, text), values * 1e6)
+    for wrong, words in (
+        ("30.000;1,5", "two decimal marks"),
+        ("30.000;1.5;2", "line"),
+        ("30.000;Bad", "line 30002: 'Bad'"),
+        ("30.000;-1", "in line 30002"),
+    ):
+        lines[30_000] = wrong
+        refuses(words, lambda: read(tmp_path, "\n".join([head, *lines])))
+    lines[30_000] = "30.000;"
+    assert np.flatnonzero(np.isnan(read(tmp_path, "\n".join([head, *lines])))) == [30_000]
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    for text, words in {
+        "": "no numbers",
+        b"\x00\x01\x02": "is not a text file",
+        "x;strength\n" + ";".join(["1"] * 200_001): "200001 columns",
+        'x;strength\n0;"1\n1;2': "quotation mark",
+        "x (mm);strength (MPa)\n0;1\n1\n": "line 3 has 1 columns, line 2 has 2",
+        "x (mm);strength (MPa)\nm;MPa\n0;1\n": "another unit",
+    }.items():
+        refuses(words, lambda text=text: read(tmp_path, text))
+    (tmp_path / "folder.csv").mkdir()
+    refuses("is not a regular file", lambda: st.read_profile(tmp_path / "folder.csv"))
