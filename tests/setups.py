@@ -30,7 +30,7 @@ def make_problem(
 ) -> st.Problem:
     """The paper's system in plane strain but for what is given; pairs make it a plane."""
     if not {"weakening_rate", "critical_slip"} & set(weakening):
-        weakening["weakening_rate"] = RATE
+        weakening["weakening_rate"] = RATE  # None leaves it to profiles
     law = st.LinearWeakening(**weakening) if friction is None else friction
     return st.Problem(solid, st.Interface(length, nodes), law, load or st.Load(), mode)
 

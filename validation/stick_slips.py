@@ -306,7 +306,11 @@ def infer(machine, table, peaks, rows):
             )
         )
     found = st.infer(
-        rig(machine, nodes=64), members, peaks, method=st.Equilibrium(), samples=samples
+        rig(machine, rate=None, nodes=64),
+        members,
+        peaks,
+        method=st.Equilibrium(),
+        samples=samples,
     )
     print(found)
     problem, strength = rig(machine, CENTRAL[0]), strength_of(CENTRAL[1], 0.5, 0.2)

@@ -137,8 +137,9 @@ def test_a_load_that_jumps_keeps_the_ratio_between_its_bounds():
     assert tau_n.max() <= 1e9 * (1.0 + ROUND_OFF)
 
 
-def test_weakening_rate_of_each_sample(problem, make_strength):
+def test_weakening_rate_of_each_sample(make_strength):
     """Samples of different W in one call are the same as one by one; columns are broadcast."""
+    problem = make_problem(weakening_rate=None)
     tau_p = make_strength(0.5).sample(problem.interface, samples=5, seed=1)
     rates = np.array([[0.5], [0.4], [0.5], [0.3], [0.45]]) * 1e12
     together = local_onset(problem, {"strength": tau_p, "weakening_rate": rates})

@@ -83,7 +83,7 @@ def test_covariance_of_a_chain_of_properties_with_spectra_of_their_own(nodes):
 
 def test_fracture_energy_and_critical_slip_as_random_properties(make_strength):
     """W follows from tau_p - tau_r and Gamma or d_c, node by node."""
-    problem = st.paper.problem(nodes=512)
+    problem = make_problem(512, weakening_rate=None)
     tau_p = make_strength(1.0).sample(problem.interface, samples=2, seed=1)
     energy, slip = 0.8, 1.9e-6
     by_energy = problem.sample({"strength": tau_p, "fracture_energy": energy})

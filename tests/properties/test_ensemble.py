@@ -17,7 +17,8 @@ import stiction as st
 from stiction.ensemble.experiment import Experiment
 
 SAMPLES = 1500  # more than one piece of the local criterion, and not a multiple of it
-PLANE = make_problem((48, 40), (6.0 * LENGTH, 4.0 * LENGTH))
+SIZES = (48, 40), (6.0 * LENGTH, 4.0 * LENGTH)
+PLANE = make_problem(*SIZES)
 
 
 @pytest.fixture
@@ -34,12 +35,17 @@ def profiles(problem, samples, length=2e-3):
     return {"strength": beta_strength(length).sample(problem.interface, samples=samples)}
 
 
-DETAILED = st.Equilibrium(gap=1e-9, slip=True, sensitivity=True)
-LINE, SHORT = make_problem(96, 0.03), make_problem(128, 0.05, solid=st.paper.problem().solid)
+DETAILED = {"slip": True, "sensitivity": True}
+LINE, SHORT = (
+    make_problem(96, 0.03, weakening_rate=None),
+    make_problem(128, 0.05, solid=st.paper.problem().solid),
+)
 RATES = 0.5e12 * np.array([1.0, 0.83, 1.17, 1.0, 0.9, 1.1])[:, None]
 CASES = {
-    "equilibrium, line": (LINE, DETAILED, profiles(LINE, 6) | {"weakening_rate": RATES}),
-    "equilibrium, plane": (PLANE, DETAILED, profiles(PLANE, 4, 0.01)),
+    "equilibrium, line": (
+        LINE, st.Equilibrium(**DETAILED), profiles(LINE, 6) | {"weakening_rate": RATES},
+    ),
+    "equilibrium, plane": (PLANE, st.Equilibrium(gap=1e-9, **DETAILED), profiles(PLANE, 4, 0.01)),
     "rupture, line": (SHORT, st.Rupture(loading_rate=1e7), profiles(SHORT, 4)),
     "rupture, plane": (
         BREAKING_PLANE, st.Rupture(loading_rate=1e8),
@@ -109,11 +115,12 @@ SEVERAL = st.RandomInterface(
 def test_an_ensemble_of_planes_may_be_continued_and_computed_again():
     names = SEVERAL.names
     given = {"method": EXACT, "seed": 3, "keep": tuple(names), "progress": False}
-    result = st.monte_carlo(PLANE, SEVERAL, samples=4, workers=2, **given)
-    part = st.monte_carlo(PLANE, SEVERAL, samples=2, first=2, workers=1, **given)
+    plane = make_problem(*SIZES, weakening_rate=None)
+    result = st.monte_carlo(plane, SEVERAL, samples=4, workers=2, **given)
+    part = st.monte_carlo(plane, SEVERAL, samples=2, first=2, workers=1, **given)
     assert_same(part, result.isel(sample=slice(2, 4)))
     kept = {name: result[name].isel(sample=[1]) for name in names}
-    again = st.onset(PLANE, kept, method=EXACT)
+    again = st.onset(plane, kept, method=EXACT)
     assert again["critical_load"].values[0] == result["critical_load"].values[1]
     assert result["critical_position"].dims == ("sample", "direction")
 

@@ -31,6 +31,7 @@ from stiction.theory import energy_release_rate, nucleation_statistics, nucleati
 
 calls = Calls()
 LINE, PROBLEM = st.Interface(0.1, 256), make_problem()
+SCALELESS = make_problem(weakening_rate=None)
 ONE, NODE = np.full(256, 1e6), np.arange(256)
 FIELD = beta_strength(2e-3)
 PRESSED = make_problem(load=st.Load(normal_pressure=2e6))
@@ -154,7 +155,9 @@ def steep(critical_slip):
 
 def with_residual(residual, method=EXACT):
     profiles = {"strength": LINE_STRENGTH, "residual_strength": residual}
-    return st.onset(CROOKED, profiles, method=method).critical_stress
+    law = dataclasses.replace(CROOKED.friction, residual_strength=0.0)
+    problem = dataclasses.replace(CROOKED, friction=law)
+    return st.onset(problem, profiles, method=method).critical_stress
 
 
 def inferred(peaks=(7e5, 7.1e5, 7.3e5), problem=PROBLEM, random=FIELD, prior=None, **options):
@@ -278,7 +281,7 @@ table_of(calls, {
               np.where(NODE == 3, np.inf, ONE),
               np.stack([ONE, np.where(NODE == 30, 1e90, ONE)]),
               make_problem(512).sample(np.full(512, 1e6)), OTHER.sample(ONE)),
-        *each(onset, {"residual_strength": 2e6}, {"method": EXACT, "weakening_rate": np.nan},
+        *each(onset, {"residual_strength": 2e6}, {"problem": SCALELESS, "weakening_rate": np.nan},
               {"method": st.LocalCriterion},
               {"strength": np.ones((3, 256)), "initial_stress": np.zeros((2, 256))},
               {"strength": np.stack([3.0 * ONE, ONE]),
@@ -314,7 +317,8 @@ table_of(calls, {
               {"save": st.Save(to="run")},
               {"problem": dataclasses.replace(EVENTS, friction=FALLING)},
               {"profiles": np.where(STRONG > 1.2e6, np.inf, STRONG)},
-              {"profiles": {"strength": STRONG, "initial_stress": STRONG + 1.0}},
+              {"problem": dataclasses.replace(EVENTS, load=st.Load()),
+               "profiles": {"strength": STRONG, "initial_stress": STRONG + 1.0}},
               {"problem": crooked(nodes=64, rate=0.01e12, height=0.02, drive=STIFF)}),
     ],
     "ruptures": [

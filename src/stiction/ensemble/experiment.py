@@ -58,6 +58,7 @@ class Experiment:
         random = as_random(self.random, self.seed)
         found: dict[str, None] = {}  # equally likely interfaces have the same mistakes
         for one in random.members:
+            found |= dict.fromkeys(self.problem.given_twice(one.names, "random"))
             try:
                 check_pressure(self.problem, one)
             except InputError as error:

@@ -119,6 +119,11 @@ class LimitState:
         return len(self.experiment.random.members) > 1
 
     @property
+    def is_sample(self) -> bool:
+        """Whether these interfaces are a sample of those that may be true."""
+        return self.several and not self.experiment.random.complete
+
+    @property
     def may_survive(self) -> bool:
         """Whether slip before the event lowers the stress: it need not happen at all."""
         specimen = self.experiment.problem.specimen

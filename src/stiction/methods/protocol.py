@@ -225,7 +225,7 @@ def onset(
     profiles : array, mapping of arrays, xarray.Dataset or Sample
         Peak strength tau_p (Pa), of shape (samples, nodes) or (nodes,), on a plane
         (samples, nx, ny) or (nx, ny); or several profiles by name, such as ``{"strength":
-        ..., "residual_strength": ...}``, which replace the problem's own; see
+        ..., "residual_strength": ...}``, each given here or in the problem, not in both; see
         `Problem.sample`. In a DataArray or Dataset, the dimension 'x' runs along the
         interface (on a plane 'x' and 'y'), its coordinate (m) gives the position of each
         value, and stated `units` are converted; see `stiction.read_profile`. A DataArray in the

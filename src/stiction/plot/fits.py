@@ -1,6 +1,5 @@
 """Figures for checking fits: a field fitted to profiles, measured and predicted peaks."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,6 @@ from scipy import fft
 from stiction.base.units import unit_for
 from stiction.base.variables import QUANTITIES
 from stiction.inference.agreement import Agreement
-from stiction.inference.estimate import bands
 from stiction.inference.fit import FieldFit
 from stiction.inference.whittle import Observed, observe
 from stiction.plot.axes import on_axes, with_unit
@@ -33,6 +31,8 @@ SHOWN = 100
 """Repetitions, or simulated records, that a band is drawn from: it holds 90 % of them."""
 LAGS = 2.5
 """Correlation lengths that the panel of the correlation shows."""
+PER_OCTAVE = 4
+"""Bands of wavenumbers in an octave."""
 
 
 def fit(found: FieldFit) -> Figure:
@@ -49,24 +49,19 @@ def fit(found: FieldFit) -> Figure:
         (a) Values and the fitted marginal; (b) quantiles of the data against those of the
         fit; (c) correlation, with the effect of the window; (d) spectrum. Shaded in (a) and
         (b): 90 % of the fits to records simulated from the fitted field; in (c) and (d): 90
-        % of such records.
+        % of such sets of records. Each panel is of all records together.
     """
-    estimate = found._estimate
+    estimate, rng = found._estimate, np.random.default_rng(0)
     windows = estimate.setting.windows
-    one = max(observe(found._rows, windows), key=lambda record: record.window.shape[0])
-    alike = replace(estimate.setting, windows=(one.window,) * one.records)
-    rng, simulator = np.random.default_rng(0), replace(estimate, setting=alike)
-    simulated = [
-        np.mean([one.window.periodogram(row) for row in simulator.simulate(rng)], axis=0)
-        for _ in range(SHOWN)
-    ]
+    observed = observe(found._rows, windows)
+    simulated = [observe(estimate.simulate(rng), windows) for _ in range(SHOWN)]
     with paper_style():
         figure = Figure(figsize=(PAGE, 5.4))
         panels = figure.subplots(2, 2).ravel()
         _histogram(panels[0], found)
         _quantiles(panels[1], found)
-        _correlation(panels[2], found, one, simulated)
-        _spectrum(panels[3], found, one, simulated)
+        _correlation(panels[2], found, observed, simulated)
+        _spectrum(panels[3], found, observed, simulated)
         for letter, axes in zip("abcd", panels, strict=True):
             panel(axes, letter)
     return figure
@@ -106,41 +101,79 @@ def _quantiles(axes: Axes, found: FieldFit) -> None:
     axes.set_ylabel(with_unit("quantile of the data", unit))
 
 
-def _correlation(axes: Axes, found: FieldFit, one: Observed, simulated: list[Array]) -> None:
-    model, spacing = found._estimate.model, one.window.spacings[0]
+def _powers(observed: list[Observed]) -> list[Array]:
+    return [of_window.average for of_window in observed]
+
+
+def _pooled_correlation(lag: Array, observed: list[Observed], powers: list[Array]) -> Array:
+    """Return the correlation in the windows at lags (m), weighted by the values in each.
+
+    A record counts at lags up to half of its length: beyond, its own period repeats them.
+    """
+    total, variance = np.zeros(lag.size), np.zeros(lag.size)
+    for (window, records, *_), power in zip(observed, powers, strict=True):
+        length, spacing = window.shape[0], window.spacings[0]
+        covariance = fft.irfftn(power, window.shape).reshape(length, -1)[:, 0]
+        reached = lag <= (length // 2) * spacing * (1.0 + 1e-9)
+        weight = records * int(window.measured.sum()) * reached
+        total += weight * np.interp(lag, np.arange(length) * spacing, covariance)
+        variance += weight * covariance[0]
+    return total / variance
+
+
+def _correlation(
+    axes: Axes, found: FieldFit, observed: list[Observed], simulated: list[list[Observed]]
+) -> None:
+    model, windows = found._estimate.model, [of_window.window for of_window in observed]
+    spacing = min(window.spacings[0] for window in windows)
+    longest = max(window.shape[0] * window.spacings[0] for window in windows)
     most = LAGS * model.spectrum.correlation_length
-    count = int(np.clip(round(most / spacing), 12, one.window.shape[0] // 2))
+    count = int(np.clip(round(most / spacing), 12, 0.5 * longest / spacing))
     factor, unit = unit_for("m", count * spacing)
-
-    def correlation(power: Array) -> Array:
-        covariance = fft.irfftn(power, one.window.shape)
-        along: Array = covariance.reshape(covariance.shape[0], -1)[:count, 0]
-        return along / along[0]
-
-    fitted = correlation(model.expectation(one.window))
-    spread = [correlation(power) for power in simulated]
-    lag = np.arange(count) * spacing * factor
-    _compare(axes, lag, correlation(one.average), fitted, spread, "measured", "fitted")
+    lag: Any = np.arange(count) * spacing
+    measured = _pooled_correlation(lag, observed, _powers(observed))
+    fitted = _pooled_correlation(lag, observed, [model.expectation(w) for w in windows])
+    spread = [_pooled_correlation(lag, some, _powers(some)) for some in simulated]
+    _compare(axes, lag * factor, measured, fitted, spread, "measured", "fitted")
     axes.axhline(0.0, color=QUIET, linewidth=0.6)
     axes.set_xlabel(with_unit("lag along x", unit))
     axes.set_ylabel("correlation in the window")
     axes.legend()
 
 
-def _spectrum(axes: Axes, found: FieldFit, one: Observed, simulated: list[Array]) -> None:
+def _pooled_spectrum(observed: list[Observed], powers: list[Array]) -> Array:
+    """Return wavenumber (rad/m) and spectral density averaged over bands, (2, bands)."""
+    rows: list[tuple[Array, Array, Array]] = []
+    for (window, records, *_), power in zip(observed, powers, strict=True):
+        kept = window.weights > 0.0
+        squares: Any = sum(vector**2 for vector in window.wave_vectors)
+        k = np.broadcast_to(np.sqrt(squares), kept.shape)[kept]
+        density = power[kept] * np.prod(window.spacings)
+        rows.append((k, density, np.full(k.size, records)))
+    k, density, counts = (np.concatenate(column) for column in zip(*rows, strict=True))
+    octaves = np.round(PER_OCTAVE * np.log2(k / k.min()))
+    band = np.unique(octaves, return_inverse=True)[1]
+    sums = [np.bincount(band, weights=counts * values) for values in (k, density)]
+    return np.array(sums) / np.bincount(band, weights=counts)
+
+
+def _spectrum(
+    axes: Axes, found: FieldFit, observed: list[Observed], simulated: list[list[Observed]]
+) -> None:
     scale, unit = unit_for(QUANTITIES[found.quantity].units, np.concatenate(found._rows))
-    model = found._estimate.model
-    factor = float(np.prod(one.window.spacings)) * scale**2
-    k, measured, fitted = bands(one, model.expectation(one.window), 4).T
-    spread = [factor * bands(one, power, 4)[:, 2] for power in simulated]
+    model, windows = found._estimate.model, [of_window.window for of_window in observed]
+    k, measured = _pooled_spectrum(observed, _powers(observed))
+    fitted = _pooled_spectrum(observed, [model.expectation(w) for w in windows])[1]
+    spread = [scale**2 * _pooled_spectrum(some, _powers(some))[1] for some in simulated]
     labels = "measured, averaged", "fitted, with the window"
-    _compare(axes, k, factor * measured, factor * fitted, spread, *labels)
-    if model.noise**2 > 1e-6 * fitted.max():
-        level = factor * model.noise**2
+    _compare(axes, k, scale**2 * measured, scale**2 * fitted, spread, *labels)
+    cell = float(np.prod(windows[0].spacings))
+    if model.noise**2 > 1e-6 * fitted.max() / cell:
+        level = cell * scale**2 * model.noise**2
         axes.axhline(level, label="noise", color=ACCENT, linewidth=0.8, linestyle="--")
     axes.set(xscale="log", yscale="log")
-    axes.set_ylim(bottom=0.1 * factor * min(measured.min(), fitted.min()))
-    dimension = "m" if len(one.window.shape) == 1 else "m²"
+    axes.set_ylim(bottom=0.1 * scale**2 * min(measured.min(), fitted.min()))
+    dimension = "m" if len(windows[0].shape) == 1 else "m²"
     axes.set_xlabel("wavenumber (rad/m)")
     axes.set_ylabel(f"spectral density ({f'{unit}² ' if unit else ''}{dimension})")
     axes.legend(loc="lower left")  # spectra fall to the right

@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Collection, Mapping
 from functools import reduce
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,15 @@ NO_AREA = (
     " interface.width of a line (m)"
 )
 """What to do with a force where the area is unknown."""
+
+
+REPLACED = {
+    "residual_strength": ("friction.residual_strength", "friction.residual_ratio"),
+    "initial_stress": ("load.initial_stress",),
+    "normal_pressure": ("load.normal_pressure", "load.pressing_force"),
+    **dict.fromkeys(SCALES, tuple(f"friction.{name}" for name in SCALES)),
+}
+"""What a profile, or a random property, of each name would replace."""
 
 
 @model
@@ -271,7 +281,8 @@ class Problem:
             doubts.append(Doubt(text, slip, *SLIP))
         if doubt_units(doubts):
             return
-        own = dict([friction.scale]) if friction.weakening_rate is None else {}
+        given = friction.scale if friction.weakening_rate is None else None
+        own = {} if given is None else dict([given])
         for scale, value in (scales or own).items():
             fall = np.array(strength - residual)
             steep = max(float(friction.rate(fall, scale, np.median(value))), 1e-300)
@@ -429,10 +440,10 @@ class Problem:
         profiles : array, mapping of arrays, xarray.Dataset or Sample
             Peak strength tau_p (Pa), of shape (samples, *shape) or (*shape); or profiles by
             name: 'strength' and any others of `PROFILES`, but only one of 'weakening_rate',
-            'critical_slip' and 'fracture_energy'. They replace the problem's own; all but the
-            strength may also be (samples, 1) or a number: of 'normal_pressure' the mean, which
-            glued blocks distribute. A 'friction_coefficient' in the place of the strength, or a
-            DataArray that states the unit 1, is multiplied by the pressure.
+            'critical_slip' and 'fracture_energy'. Give each here or in the problem, not in both.
+            All but the strength may also be (samples, 1) or a number: of 'normal_pressure' the
+            mean, which glued blocks distribute. A 'friction_coefficient' in the place of the
+            strength, or a DataArray that states the unit 1, is multiplied by the pressure.
         accept : collection of {"barriers", "overstress", "constant"}
             What the method accepts: infinite strength where nothing breaks; initial stress
             above the strength; nodes that do not weaken, of which the caller has warned; fewer
@@ -458,13 +469,15 @@ class Problem:
     ) -> tuple[Sample, Any]:
         """Return a sample, and a mask of where all of its profiles were measured, or True."""
         friction, interface = self.friction, self.interface
+        problems: list[str] = []
         if isinstance(profiles, Sample):
-            profiles, accept = self._given_sample(profiles), {*accept, "constant"}
-        given = named_profiles(profiles)
+            given, accept = self._given_sample(profiles), {*accept, "constant"}
+        else:
+            given = named_profiles(profiles)
+            problems += self.given_twice(given, "profiles")
         of = "strength" if "strength" in given else "friction_coefficient"
         if of not in given:
             raise InputError("strength: missing among the profiles")
-        problems: list[str] = []
         measured = [np.ones((1, *interface.shape), dtype=bool)]
         scales = [name for name in SCALES if name in given]
         if len(scales) > 1:
@@ -495,7 +508,7 @@ class Problem:
         residual = friction.residual(np.where(np.isinf(strength), 0.0, strength))
         residual = read("residual_strength", residual, samples)
         initial = read("initial_stress", self.load.initial_stress, samples)
-        scale, value = friction.scale
+        scale, value = friction.scale or (SCALES[0], 1.0)
         scale = scales[0] if scales else scale
         value = read(scale, value, samples)
         problems = problems or self._impossible(strength, residual, initial, accept)
@@ -524,6 +537,31 @@ class Problem:
         if "steep" not in accept:
             self._check_resolution(sample.steepest_rate)
         return sample, reduce(np.logical_and, measured)
+
+    def given_twice(self, names: Collection[str], owner: str) -> list[str]:
+        """Return refusals of values that profiles, or random properties, would replace.
+
+        They also tell what is missing in both. The `owner` of the names begins each text.
+        """
+        twice = [
+            f"problem.{key}: has no effect beside {owner}.{name}, which replaces it; leave one of"
+            " them out"
+            for name in names
+            for key in REPLACED.get(name, ())
+            if (value := attrgetter(key)(self)) is not None and np.any(value)
+        ]
+        if self.friction.scale is None and not {*SCALES} & {*names}:
+            twice.append(
+                f"problem.friction: give one of {', '.join(SCALES)}, or {owner}.{SCALES[0]} and so"
+                " on where it varies from sample to sample; got none"
+            )
+        glued = self.specimen is not None and self.specimen.pressing == "glued"
+        if glued and self.given_pressure is None and "normal_pressure" not in names:
+            twice.append(
+                "problem.specimen.pressing: 'glued' has no effect without a normal pressure; give"
+                " load.normal_pressure (Pa) or load.pressing_force (N), or leave it out"
+            )
+        return twice
 
     def _given_sample(self, sample: Sample) -> dict[str, Array]:
         """Return the profiles of a ready-made sample by name; refuse one of another problem."""

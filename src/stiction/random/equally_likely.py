@@ -53,6 +53,7 @@ class EquallyLikely:
     members: tuple[RandomInterface, ...]
     order: tuple[int, ...] = ()  # of the members along the first draw; empty: as they are
     source: Source | None = None  # that they were drawn from
+    complete: bool = False  # they are all there are, and no sample of more
 
     def __post_init__(self) -> None:
         if not self.members:
@@ -154,13 +155,22 @@ def _named(kinds: Mapping[str, Any]) -> str:
     return " and ".join(f"{name} ({of})" if of else name for name, of in kinds.items())
 
 
-def as_random(given: Any, seed: int = 0) -> RandomInterface | EquallyLikely:
-    """Return what is random; a list of one is that one, of several one that stands for them."""
+def as_random(
+    given: Any, seed: int = 0, mixture: bool = False
+) -> RandomInterface | EquallyLikely:
+    """Return what is random; a list of one is that one, of several one that stands for them.
+
+    In a `mixture` the list is complete: no other interface may be true.
+    """
+    if mixture and not (isinstance(given, list | tuple) and len(given) > 1):
+        raise InputError(
+            "mixture: is of a list of two or more interfaces that are all there are; leave it out"
+        )
     if isinstance(given, EquallyLikely):
         return given
     if isinstance(given, Source):
         return EquallyLikely(tuple(given.interfaces(FIRST, seed)), source=given)
     if not isinstance(given, list | tuple):
         return as_random_interface(given)
-    found = EquallyLikely(tuple(map(as_random_interface, given)))
+    found = EquallyLikely(tuple(map(as_random_interface, given)), complete=mixture)
     return found if len(found.members) > 1 else found.members[0]

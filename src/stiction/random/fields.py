@@ -293,9 +293,9 @@ class RandomInterface:
         Peak strength, Pa; or friction coefficients, with ``of="friction_coefficient"``, which
         are multiplied by the normal pressure. The other stresses may be coefficients too.
     residual_strength, initial_stress, normal_pressure : RandomField, optional
-        Pa.
+        Pa. What is random here is left out of the problem.
     weakening_rate, critical_slip, fracture_energy : RandomField, optional
-        At most one of them: Pa/m, m or J/m².
+        At most one of them: Pa/m, m or J/m². The friction law then has none.
     correlation : mapping, optional
         Correlation coefficients of the Gaussian fields of two properties, mode by mode:
         ``{("strength", "residual_strength"): 0.8}``, in a study file

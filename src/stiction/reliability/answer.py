@@ -65,13 +65,14 @@ class Estimate:
 
     @cached_property
     def members_cv(self) -> float:
-        """That by the list of interfaces, 0 of a single one."""
-        random = self.state.experiment.random
-        return self.tail.members_cv(self.stress, random.kinds) if self.state.several else 0.0
+        """Part of `cv` by the list of interfaces, 0 of a single interface and of a mixture."""
+        if not self.state.is_sample:
+            return 0.0
+        return self.tail.members_cv(self.stress, self.state.experiment.random.kinds)
 
     @cached_property
     def cv(self) -> float:
-        """That by both."""
+        """Coefficient of variation of the probability by both."""
         return math.hypot(self.sampling_cv, self.members_cv)
 
     @cached_property
@@ -99,7 +100,8 @@ class Answer:
         estimate; infinite without a failure, zero if exact.
     members_cv : float
         Part of `cv` that is due to a list of equally likely interfaces being a sample of those
-        that may be true; the rest, with which it adds in squares, is that of sampling.
+        that may be true; the rest, with which it adds in squares, is that of sampling. 0 of a
+        mixture.
     evaluations, first_stage_evaluations : int
         Samples solved by the method, and by its less expensive first stage only.
     lower_bound, stress_above_bound : float
@@ -224,6 +226,7 @@ class Answer:
             band = zip(("5 %", "95 %"), self.band, strict=True)
             parts = [f"{share} have at most P = {p:.2g}" for share, p in band if p >= 0.0]
             result += f", of which {' and '.join(parts)}" if parts else ""
+        if self.members_cv:
             sampled = math.sqrt(max(self.cv**2 - self.members_cv**2, 0.0))
             result += f" (c.o.v. by the list {self.members_cv:.2g}, by sampling {sampled:.2g})"
         if self.algorithm == "exact":

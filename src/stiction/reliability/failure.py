@@ -10,7 +10,7 @@ import xarray as xr
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, Warned, merge_warnings, texts_of, warn_accuracy
-from stiction.base.model import Count, Number, Positive, Progress, Real, checked
+from stiction.base.model import Count, Flag, Number, Positive, Progress, Real, checked
 from stiction.base.progress import Meter, Show
 from stiction.base.units import Doubt, doubt_units, in_words
 from stiction.base.variables import ONSET_VARIABLES, PROFILES, Variable
@@ -19,7 +19,7 @@ from stiction.ensemble.limit_state import Event, LimitState
 from stiction.methods.protocol import MethodObject, label
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset
-from stiction.random.equally_likely import AnyRandom
+from stiction.random.equally_likely import AnyRandom, as_random
 from stiction.reliability.answer import (
     SAMPLED,
     Answer,
@@ -101,6 +101,7 @@ def failure_probability(
     seed: Number = 0,
     max_evaluations: Budget | None = None,
     event: Event = "critical_stress",
+    mixture: Flag = False,
     workers: Count | None = None,
     progress: Progress = True,
 ) -> Answer:
@@ -136,6 +137,11 @@ def failure_probability(
     event : {"critical_stress", "first_instability"}
         Whether the interface as a whole has to slide, or the first patch to become
         unstable, arrested or not. By the local criterion they are the same.
+    mixture : bool
+        Whether a list of interfaces is complete, such as three batches of which each is
+        equally common. The interval then holds the sampling error only. By default the list
+        counts as a sample of the interfaces that may be true, and a short one makes the
+        interval wide.
 
     Returns
     -------
@@ -191,7 +197,7 @@ def failure_probability(
         )
         return replace(found, quantity=name)
 
-    experiment = Experiment(problem, random, method, seed=seed)
+    experiment = Experiment(problem, as_random(random, seed, mixture), method, seed=seed)
     return _answered(experiment, target_cv, "failure_probability", progress, solve)
 
 
@@ -264,7 +270,7 @@ def _probability(
         algorithm = "auto" if rare else "plain"
         reason = f"{failures} failure{'s' * (failures != 1)} of {least} plain samples: "
         reason += "rare" if rare else "frequent enough to count"
-    target_cv *= SAMPLED if state.several else 1.0
+    target_cv *= SAMPLED if state.is_sample else 1.0
     if algorithm == "plain":
         begun = 0 if pilot is None else least
         return _by_counting(state, stress, target_cv, budget, least, begun, reason)
@@ -286,7 +292,7 @@ def _certain(state: LimitState, stress: float, likely: tuple[float, float]) -> A
         reason = f"no interface carries more than {high:.7g} Pa"
     reason += "" if certain else f", but for a probability below {doubt:g}"
     members = len(state.experiment.random.members)
-    if state.several:  # another list might hold others
+    if state.is_sample:  # another list might hold others
         doubt = max(doubt, binomial_interval(0, members)[1])
     return Answer.of(
         Estimate(state, Tail((), "exact", reason), stress),
@@ -390,6 +396,7 @@ def design_stress(
     seed: Number = 0,
     max_evaluations: Budget | None = None,
     event: Event = "critical_stress",
+    mixture: Flag = False,
     workers: Count | None = None,
     progress: Progress = True,
 ) -> Answer:
@@ -406,7 +413,7 @@ def design_stress(
         is refused unless `max_evaluations` is 20,000 or more.
     target_cv : float
         Coefficient of variation to reach, of the failure probability at the stress.
-    problem, random, seed, max_evaluations, event, workers, progress
+    problem, random, seed, max_evaluations, event, mixture, workers, progress
         As in `failure_probability`.
 
     Returns
@@ -440,13 +447,13 @@ def design_stress(
         found = _quantile(state, probability, target_cv, budget)
         return replace(found, quantity="stress" if math.isnan(found.area) else "force")
 
-    experiment = Experiment(problem, random, method, seed=seed)
+    experiment = Experiment(problem, as_random(random, seed, mixture), method, seed=seed)
     return _answered(experiment, target_cv, "design_stress", progress, solve)
 
 
 def _quantile(state: LimitState, probability: float, target_cv: float, budget: int) -> Answer:
     often, lowest = probability >= FREQUENT, state.bounds[0]
-    target_cv *= SAMPLED if state.several else 1.0
+    target_cv *= SAMPLED if state.is_sample else 1.0
     tail = sample_tail(
         state, Goal(target_cv, probability=probability), budget=budget,
         algorithm="subset" if often else "auto", reason="frequent" if often else "rare",
@@ -490,6 +497,7 @@ def failure_curve(
     seed: Number = 0,
     max_evaluations: Budget | None = None,
     event: Event = "critical_stress",
+    mixture: Flag = False,
     workers: Count | None = None,
     progress: Progress = True,
 ) -> xr.Dataset:
@@ -503,7 +511,7 @@ def failure_curve(
         Coefficient of variation to reach at the smallest probability; it is lower
         elsewhere. Repetitions are added until it is reached: the same, of the same numbers,
         as those of `Study.failure_curve`.
-    problem, random, method, seed, max_evaluations, event, workers, progress
+    problem, random, method, seed, max_evaluations, event, mixture, workers, progress
         As in `design_stress`.
 
     Returns
@@ -535,12 +543,12 @@ def failure_curve(
     >>> bool((curve.stress.diff("point") < 0.0).all())
     True
     """
-    experiment = Experiment(problem, random, method, seed=seed)
+    experiment = Experiment(problem, as_random(random, seed, mixture), method, seed=seed)
     with Meter("failure_curve", show=progress) as meter, merge_warnings() as warned:
 
         def solve(own: Experiment, meter: Meter) -> Estimate:
             state, budget = prepare(own, event, workers, meter, max_evaluations)
-            aim = target_cv * (SAMPLED if state.several else 1.0)
+            aim = target_cv * (SAMPLED if state.is_sample else 1.0)
             tail = sample_curve(state, Goal(aim, probability=smallest), budget)
             reached = tail.quantile(smallest) if tail.complete else tail.reached
             return Estimate(state, tail, reached)
@@ -549,7 +557,7 @@ def failure_curve(
         for text in curve_doubts(end, smallest, target_cv):
             warn_accuracy(text)
     attributes = study_attributes(problem=problem, random=experiment.given, method=method)
-    attributes |= {"seed": seed}
+    attributes |= {"seed": seed} | ({"mixture": 1} if mixture else {})
     smallest = smallest if end.tail.complete else end.probability
     return curve_of(end.tail, end.state, chances(smallest), attributes)
 

@@ -42,6 +42,7 @@ from stiction.methods.protocol import METHODS, as_method
 from stiction.problem.problem import Problem
 from stiction.problem.profiles.reading import profile_in_file
 from stiction.random.dotted_keys import with_values
+from stiction.random.equally_likely import as_random
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 from stiction.reliability.answer import Answer, Probability, TargetCv
 from stiction.reliability.failure import design_stress, failure_probability
@@ -113,6 +114,7 @@ class Question:
             name: one for name, one in vars(self).items() if one is not None
         }
         options |= {"method": experiment.method, "seed": experiment.seed, "workers": workers}
+        options["mixture"] = getattr(experiment.random, "complete", False)
         ask = failure_probability if self.probability is None else design_stress
         return ask(experiment.problem, experiment.given, **options)
 
@@ -152,6 +154,8 @@ class Study(_Parts):
         Distributions of parameters of ``random`` by dotted key, as of `RandomInterface.uncertain`,
         and their ``count``, by default 30: that many interfaces, drawn with the seed, are equally
         likely. `failure_curve` gives their mean and band; `run` samples over them.
+    mixture : bool
+        Whether a list in ``random`` is complete, as of `stiction.failure_probability`.
     save : Save, optional
         Results that `stiction rupture` keeps, and the places of its stations.
     reliability : Question, optional
@@ -185,6 +189,7 @@ class Study(_Parts):
 
     sweep: Sweep = ()
     uncertain: Uncertain = None
+    mixture: Flag = False
     save: Save | None = None
     reliability: Question | None = None
     title: Text = ""
@@ -235,6 +240,10 @@ class Study(_Parts):
                     likely = "uncertain", id(random)
                     made[likely] = made.get(likely) or self._likely(random)
                     random = made[likely]
+                if self.mixture:
+                    complete = "mixture", id(random)
+                    made[complete] = made.get(complete) or self._mixture(random)
+                    random = made[complete]
                 key = id(problem), id(random), id(method)
                 if key not in made:
                     made[key] = Experiment(problem, random, method, self.ensemble.keep)
@@ -246,6 +255,12 @@ class Study(_Parts):
         if problems:
             raise InputError(problems.values())
         return found
+
+    def _mixture(self, random: Any) -> Any:
+        """Return a list of interfaces as all that there are."""
+        if self.uncertain:
+            raise InputError("mixture: interfaces of [uncertain] are a sample; leave it out")
+        return as_random(random, mixture=True)
 
     def _likely(self, random: Any) -> list[RandomInterface]:
         """Return the equally likely interfaces of uncertain parameters."""
@@ -402,7 +417,8 @@ class Study(_Parts):
             If a part exists in Python only (a spectrum that is a function).
         """
         plain = to_plain(self).items()
-        return {name: one for name, one in plain if one or name not in ("title", "sweep")}
+        left_out = ("title", "sweep", "mixture")
+        return {name: value for name, value in plain if value or name not in left_out}
 
     def to_toml(self, path: str | Path) -> None:
         """Write the study as a TOML file.

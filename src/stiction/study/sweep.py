@@ -21,6 +21,8 @@ from stiction.random.marginals import Marginal, marginal_of
 INTERFACES = 30
 """Number of equally likely interfaces of a study with uncertain parameters."""
 MOST_POINTS = 100_000
+SELECTION_KEYWORDS = ("method", "tolerance", "drop", "indexers", "missing_dims")
+"""Keywords of xarray's `sel` and `isel`, by which no dimension of that name can be selected."""
 _FIXED = ("ensemble", "ensemble.samples", "ensemble.first", "ensemble.keep")
 _TABLES = ("problem", "random", "method", "ensemble")
 
@@ -168,15 +170,17 @@ def grid_axes(
 ) -> GridAxes:
     """Return the axes as dimensions of a result.
 
-    Their names are the last parts of their keys, or the whole keys if that is not clear.
+    Their names are the last parts of their keys, or the whole keys if the last part is not clear
+    or a keyword of xarray. The axis of the key 'method' is called 'onset_method'.
     """
     keys = [key for axis in axes for key in axis]
     last = {key: key.rpartition(".")[2] for key in keys}
-    count = Counter([*last.values(), *taken])
+    count = Counter([*last.values(), *taken, *(2 * SELECTION_KEYWORDS)])
     names = {
-        key: key.replace(".", "_") if count[one] > 1 or ".correlation." in key else one
-        for key, one in last.items()
+        key: key.replace(".", "_") if count[end] > 1 or ".correlation." in key else end
+        for key, end in last.items()
     }
+    names |= {key: f"onset_{key}" for key, name in names.items() if name in SELECTION_KEYWORDS}
     result: dict[str, Coordinates] = {}
     for axis in axes:
         dim = names[next(iter(axis))]

@@ -91,9 +91,10 @@ class Rupture:
     start : {"equilibrium", "rest"}
         "rest": at the first slip. "equilibrium": on the quasi-static path, as close below
         the first instability as the estimated error allows; `start_load` is the load there,
-        and `start_error` (Pa) the estimate. The run still begins at the first slip if the
-        loading rate is too high, if a node loses half of its strength before, on planes, with
-        laws that are not piecewise linear, and with barriers or stress above the strength.
+        and `start_error` (Pa) the estimate. The run still begins at the first slip with `load`,
+        if the loading rate is too high, if a node loses half of its strength before, on
+        planes, with laws that are not piecewise linear, and with barriers or stress above the
+        strength.
     end_time : float, optional
         Time at which a run ends at the latest, s, but for a part of the last explicit step.
     load : (times, values), optional
@@ -186,6 +187,12 @@ class Rupture:
             problems.append("loading_rate: give either loading_rate or load, not both")
         if self.stop == "time" and self.end_time is None:
             problems.append("end_time: needed with stop='time', got None")
+        if not self.implicit:
+            problems += [
+                f"{name}: is of implicit steps and has no effect with implicit=False; leave it out"
+                for name in ("slip_step", "load_step")
+                if getattr(self, name) != type(self).__dataclass_fields__[name].default
+            ]
         if problems:
             raise InputError(problems)
         return self

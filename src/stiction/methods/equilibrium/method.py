@@ -125,7 +125,10 @@ class Equilibrium:
 
     def supports(self, problem: Problem) -> list[str]:
         """Return the reasons why it cannot solve a problem; none if it can."""
-        return refused(problem.friction)
+        reasons = refused(problem.friction)
+        if not problem.interface.is_plane and self.gap != type(self)().gap:
+            reasons.append("gap: is of planes; lines are solved to round-off, so leave it out")
+        return reasons
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
         """Return the variables that the solver computes for each sample."""

@@ -70,9 +70,8 @@ class FrictionLaw(ABC):
                 worst = np.ravel(value)[~valid(np.ravel(value))].min()
                 problems.append(f"{name} must {words}, got {worst:g}")
         scales = [name for name in SCALES if name in given]
-        if len(scales) != 1:
-            found = " and ".join(scales) or "none"
-            problems.append(f"give one of {', '.join(SCALES)}, got {found}")
+        if len(scales) > 1:
+            problems.append(f"give one of {', '.join(SCALES)}, got {' and '.join(scales)}")
         residual = self.residual_strength
         if "residual_ratio" in given and (is_unplaced(residual) or np.any(residual)):
             problems.append("give either residual_strength or residual_ratio, got both")
@@ -134,9 +133,11 @@ class FrictionLaw(ABC):
         return end if np.isfinite(end) else self.slip_at(NEARLY_RESIDUAL)
 
     @property
-    def scale(self) -> tuple[str, Any]:
-        """Which of W, d_c and Gamma was given, and its value."""
-        return next((s, getattr(self, s)) for s in SCALES if getattr(self, s) is not None)
+    def scale(self) -> tuple[str, Any] | None:
+        """Which of W, d_c and Gamma was given, and its value; None if it comes with profiles."""
+        return next(
+            ((s, getattr(self, s)) for s in SCALES if getattr(self, s) is not None), None
+        )
 
     def residual(self, strength: Array) -> Array:
         """Return tau_r, Pa, of a peak strength (Pa, any shape)."""
@@ -183,9 +184,10 @@ class LinearWeakening(FrictionLaw):
     Parameters
     ----------
     weakening_rate, critical_slip, fracture_energy : float or (nodes,) array, optional
-        Exactly one of W (Pa/m), d_c (m) and Gamma (J/m²), positive. With d_c,
+        One of W (Pa/m), d_c (m) and Gamma (J/m²), positive. With d_c,
         W = (tau_p - tau_r)/d_c varies with the strength; with Gamma,
-        W = (tau_p - tau_r)²/(2 Gamma) does.
+        W = (tau_p - tau_r)²/(2 Gamma) does. Leave all three out if one of them is a profile
+        or random (`RandomInterface`).
     residual_strength, residual_ratio : float or (nodes,) array, optional
         tau_r (Pa) or tau_r/tau_p in [0, 1).
 
@@ -364,13 +366,13 @@ class PiecewiseWeakening(FrictionLaw):
             "critical_slip": float(u[-1]),
             "fracture_energy": area / law.integral,
         }
-        scale, value = law.scale
+        scales = [law.scale] if law.scale is not None else []
         return cls(
             slip=tuple((u / u[-1]).tolist()),
             strength=tuple(fraction.tolist()),
             residual_strength=law.residual_strength,
             residual_ratio=law.residual_ratio,
-            **{scale: factors[scale] * value},
+            **{scale: factors[scale] * value for scale, value in scales},
         )
 
 
