@@ -31,6 +31,7 @@ from pydantic.dataclasses import dataclass as pydantic_dataclass
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, unknown
 from stiction.base.progress import Show
+from stiction.base.quantities import is_quantity, magnitude_in_one_of, units_of_argument
 
 T = TypeVar("T")
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -49,6 +50,21 @@ def as_number(value: Any) -> float:
         return float(value)
     except OverflowError:
         raise ValueError("must be finite") from None
+
+
+def _real(value: Any, info: pydantic.ValidationInfo) -> float:
+    """A number in SI: of a quantity with a unit, by the name of the argument."""
+    return as_number(in_si(value, info.field_name or ""))
+
+
+def in_si(value: Any, name: str) -> Any:
+    """Return the number of a quantity, in the SI unit of the argument; anything else as it is."""
+    if not is_quantity(value):
+        return value
+    try:
+        return magnitude_in_one_of(value, units_of_argument(name))[0]
+    except InputError as error:
+        raise ValueError(str(error)) from None
 
 
 def as_count(value: Any) -> int:
@@ -79,7 +95,7 @@ def is_finite(value: Any) -> bool:
 def real_array(value: Any) -> Array:
     """Return `value` as a float64 array, or raise a TypeError that names what it is instead."""
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
-        raise TypeError("got a masked array")
+        raise TypeError("got a masked array; fill it, as in np.ma.filled(values, np.nan)")
     try:
         given = np.asarray(value)
     except ValueError:
@@ -100,8 +116,7 @@ def as_numbers(value: Any) -> Array:
 
 def is_unplaced(value: Any) -> bool:
     """Whether a profile has coordinates or units of its own, which its problem resolves."""
-    own = ("dims", "to_xarray", "magnitude", "to_value")
-    return any(hasattr(value, name) for name in own)
+    return is_quantity(value) or any(hasattr(value, name) for name in ("dims", "to_xarray"))
 
 
 def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
@@ -174,7 +189,7 @@ def at_least(least: int) -> Any:
 
 Count: TypeAlias = at_least(1)  # type: ignore[valid-type]  # a call makes it
 Number: TypeAlias = at_least(0)  # type: ignore[valid-type]
-Real: TypeAlias = Annotated[float, BeforeValidator(as_number), Field(allow_inf_nan=False)]
+Real: TypeAlias = Annotated[float, BeforeValidator(_real), Field(allow_inf_nan=False)]
 Positive: TypeAlias = Annotated[Real, Field(gt=0)]
 Numbers: TypeAlias = Annotated[Any, BeforeValidator(as_numbers)]
 """Real numbers of any shape, as a float64 array."""

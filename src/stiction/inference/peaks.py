@@ -10,9 +10,15 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed
 from stiction.base.model import FilePath, Number, Numbers, check, checked, describe, is_finite
+from stiction.base.quantities import magnitude
 from stiction.base.units import factor_to, is_in
-from stiction.problem.profiles.reading import Missing, reading_options, without_missing
-from stiction.problem.profiles.tables import read_table
+from stiction.problem.profiles.reading import (
+    Missing,
+    reading_options,
+    with_stated_unit,
+    without_missing,
+)
+from stiction.problem.profiles.tables import Options, read_table, table_of_frame
 
 FEWEST = 3
 """Fewest peaks in all: of two numbers, one may be a mistake."""
@@ -68,7 +74,11 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
     """Validate an array, or a mapping of arrays by length; `Peaks` are returned as they are."""
     if isinstance(peaks, Peaks):
         return peaks
+    if hasattr(peaks, "columns") and hasattr(peaks, "to_xarray"):
+        with prefixed("peaks"):
+            return _of_table(table_of_frame(peaks), None, reading_options(None))
     groups: dict[Any, Any] = dict(peaks) if isinstance(peaks, Mapping) else {None: peaks}
+    groups = {magnitude(length, "m"): values for length, values in groups.items()}
     if not all(key is None or (is_finite(key) and key > 0.0) for key in groups):
         raise InputError(
             "peaks: for several specimens, map each length (m) to its peaks, such"
@@ -102,11 +112,12 @@ def factor_of(unit: str) -> float:
 
 
 def _values(given: Any, unit: str) -> Array:
-    """Return the peaks of one kind of specimen, in SI."""
-    stated = str(getattr(given, "attrs", {}).get("units", unit))
-    if si_of(stated) != si_of(unit):
-        raise InputError(f"peaks: are in {stated}, but unit = {unit!r}")
-    values: Array = check("peaks", getattr(given, "values", given), Numbers)
+    """Return the peaks of one kind of specimen, in SI, by the unit that they state themselves."""
+    with prefixed("peaks"):
+        numbers, stated = with_stated_unit(given, VARIABLES)
+    if si_of(stated or unit) != si_of(unit):
+        raise InputError(f"peaks: are in {stated}, but unit = {unit!r}; pass unit={stated!r}")
+    values: Array = check("peaks", numbers, Numbers)
     if values.ndim != 1:
         raise InputError(
             f"peaks: must be one list of numbers for one kind of specimen, got {describe(given)};"
@@ -118,7 +129,7 @@ def _values(given: Any, unit: str) -> Array:
             f"peaks: must be positive numbers; number {bad[0]} is {values[bad[0]]:g}; leave out"
             " tests that gave no peak, or pass missing= to st.read_peaks"
         )
-    return values * factor_of(stated)
+    return values * factor_of(stated or unit)
 
 
 @checked
@@ -170,31 +181,38 @@ def read_peaks(
     """
     options = reading_options(missing, decimal, skip, sheet)
     with prefixed(str(path)):
-        table = read_table(path, options)
-        length, peak = _column(table, LENGTH), _column(table, PEAK, VARIABLES)
-        if peak is None:
-            names = ", ".join(map(str, table.data_vars))
-            raise InputError(f"no column has a name like 'peak [MPa]'; found {names}")
-        stated = peak.attrs.get("units", unit)
-        if stated is None or stated != (unit or stated):
-            raise InputError(
-                f"the unit of the peaks is {'not stated' if stated is None else stated}, and"
-                f" unit = {unit!r}; write it into the heading, 'peak [MPa]', or give unit="
-            )
-        peak = without_missing(peak, options)
-        kept = ~np.isnan(peak.values) if missing is not None else slice(None)
-        if length is None:
-            return make_peaks(peak.values[kept], stated)
-        if "units" not in length.attrs:
-            raise InputError("the unit of the length is not stated; write 'length [mm]'")
-        lengths = length.values[kept] * factor_to("m", length.attrs["units"])
-        if np.isnan(lengths).any():
-            row = int(np.argmax(np.isnan(lengths)))
-            raise InputError(
-                f"length: missing in row {row}; specimens of unknown length are mixed in"
-            )
-        groups = {one: peak.values[kept][lengths == one] for one in np.unique(lengths)}
-        return make_peaks(groups, stated)
+        return _of_table(read_table(path, options), unit, options)
+
+
+def _of_table(table: Any, unit: str | None, options: Options) -> Peaks:
+    """Return the peaks in a table of tests."""
+    length, peak = _column(table, LENGTH), _column(table, PEAK, VARIABLES)
+    if peak is None:
+        names = ", ".join(map(str, table.data_vars))
+        raise InputError(f"no column has a name like 'peak [MPa]'; found {names}")
+    stated = peak.attrs.get("units", unit)
+    if stated is None or stated != (unit or stated):
+        raise InputError(
+            f"the unit of the peaks is {'not stated' if stated is None else stated}, and"
+            f" unit = {unit!r}; write it into the heading, 'peak [MPa]', or give unit="
+        )
+    texts = [column.attrs["text"] for column in (length, peak) if column is not None]
+    if any(texts):
+        raise InputError(filter(None, texts))
+    peak = without_missing(peak, options)
+    kept = ~np.isnan(peak.values) if options.missing is not None else slice(None)
+    if length is None:
+        return make_peaks(peak.values[kept], stated)
+    if "units" not in length.attrs:
+        raise InputError("the unit of the length is not stated; write 'length [mm]'")
+    lengths = length.values[kept] * factor_to("m", length.attrs["units"])
+    if np.isnan(lengths).any():
+        row = int(np.argmax(np.isnan(lengths)))
+        raise InputError(
+            f"length: missing in row {row}; specimens of unknown length are mixed in"
+        )
+    groups = {size: peak.values[kept][lengths == size] for size in np.unique(lengths)}
+    return make_peaks(groups, stated)
 
 
 def _column(table: Any, kinds: tuple[str, ...], units: Iterable[str] = ()) -> Any:

@@ -33,7 +33,7 @@ class Record(NamedTuple):
 def records_of(profiles: Any, interface: Interface | None, quantity: str) -> list[Record]:
     """Return all profiles as records, see `stiction.fit_field`; errors name the profile."""
     several = isinstance(profiles, list | tuple) and not (
-        profiles and all(map(np.isscalar, profiles))
+        profiles and all(map(_is_scalar, profiles))
     )
     found: list[Record] = []
     problems: list[str] = []
@@ -57,6 +57,11 @@ def records_of(profiles: Any, interface: Interface | None, quantity: str) -> lis
             " further measurements, and make intervals too narrow; leave them out"
         )
     return found
+
+
+def _is_scalar(value: Any) -> bool:
+    """Return whether a value is a number, None or a quantity of one number."""
+    return not isinstance(value, list | tuple | str) and getattr(value, "shape", ()) == ()
 
 
 def _records(source: Any, interface: Interface | None, quantity: str) -> list[Record]:

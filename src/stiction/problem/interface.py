@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, model_validator
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
-from stiction.base.model import Positive, as_count, as_number, model
+from stiction.base.model import Positive, as_count, as_number, in_si, model
 
 FEWEST, MOST = 8, 2**24
 """Nodes in each direction, and in all."""
@@ -22,13 +22,14 @@ SHORTEST = 1e-30
 
 def _one_or_two(value: Any, read: Callable[[Any], Any]) -> Any:
     """Return what was given, entry by entry: one of a line, two of a plane."""
+    value = in_si(value, "length")
     if isinstance(value, np.ndarray):
         value = value.tolist()
     if not isinstance(value, list | tuple):
         return read(value)
     if len(value) != 2:
         raise ValueError("must be a number for a line, or two, (along x, along y), for a plane")
-    return tuple(map(read, value))
+    return tuple(read(in_si(item, "length")) for item in value)
 
 
 def _length(value: Any) -> float:

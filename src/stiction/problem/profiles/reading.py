@@ -7,7 +7,7 @@ or, as a list of points, along 'row', with places (m) as coordinates 'x' and 'y'
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -35,11 +35,19 @@ from stiction.base.model import (
     describe,
     real_array,
 )
+from stiction.base.quantities import magnitude, plain
 from stiction.base.units import factor_to, is_in, parse
 from stiction.base.variables import QUANTITIES
 from stiction.problem.interface import Interface
 from stiction.problem.profiles.placing import MEASURED, OF_A_PLANE, Gaps, close_gaps, place
-from stiction.problem.profiles.tables import IMAGES, Options, load, sizes_of
+from stiction.problem.profiles.tables import (
+    IMAGES,
+    Options,
+    load,
+    name_and_unit,
+    sizes_of,
+    table_of_frame,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -105,7 +113,8 @@ def read_profile(
 
     Parameters
     ----------
-    source : path, xarray.DataArray or xarray.Dataset
+    source : path, array, or table with labels
+        Labels of xarray, pandas and quantities of pint and astropy count. Of files:
         ``.npy``: shape (nodes,) or (nx, ny). ``.csv``, ``.txt``, ``.dat``, ``.tsv``,
         ``.xlsx``: columns, with or without a line of names such as ``x (mm); strength
         (MPa)``. ``.nc``: variables with `units`, and x as a coordinate. A map is over 'x'
@@ -207,6 +216,9 @@ def read_profile(
         if strength is not None:
             array = array.copy(data=_mapped(strength, array.values))
         array = _moved(array, offset, interface)
+        array = array.squeeze(
+            [dim for dim in {*array.dims} - {"x", "y", "row"} if array.sizes[dim] == 1]
+        )
         if not {*array.dims} <= {"x", "y", "row"}:
             raise InputError(f"must hold one profile, got shape {array.shape}")
         if interface is not None:
@@ -312,35 +324,81 @@ def is_coefficient(value: Any) -> bool:
 
 
 def simplified(value: Any, quantity: str) -> Any:
-    """Return `value` as labelled, a pandas Series over positions too, or as numbers in SI."""
+    """Return `value` as labelled, pandas objects over positions too, or as numbers in SI."""
     si = QUANTITIES[quantity].units
     if is_labelled(value):
-        plain = not value.dims and not hasattr(value, "data_vars")
-        return in_si(value, quantity, si) if plain else value
-    kind = getattr(getattr(getattr(value, "index", None), "dtype", None), "kind", "")
-    if kind == "f" and hasattr(value, "to_xarray"):
-        return value.to_xarray()
-    return _magnitude(value, si)
+        whole = value.dims or hasattr(value, "data_vars")
+        return value if whole else in_si(value, quantity, si)
+    if hasattr(value, "to_xarray") and hasattr(value, "index"):
+        return of_pandas(value)
+    return plain(value, (si,))[0]
 
 
-def _magnitude(value: Any, si: str) -> Any:
-    """Return the number of a pint or astropy quantity in an SI unit; anything else as it is."""
-    si = re.sub(r"(-\d)", r"**\1", si).replace(" ", "*")  # Pa m-1: Pa*m**-1
-    try:
-        if hasattr(value, "magnitude") and hasattr(value, "to"):
-            return value.to(si).magnitude
-        if hasattr(value, "to_value") and hasattr(value, "unit"):
-            return value.to_value(si)
-    except Exception as error:  # each library has its own for 'no such unit'
-        raise InputError(f"cannot be converted to {si}: {error}") from None
-    return value
+def with_stated_unit(value: Any, units: Iterable[str]) -> tuple[Any, str | None]:
+    """Return numbers, whose labels do not count, and the unit that they state, if they do.
+
+    It is the unit of a quantity, the attribute `units`, or stands in the name of a Series.
+    """
+    stated = ""
+    if is_labelled(value) and not hasattr(value, "data_vars"):
+        stated, value = unit_of(value), value.data
+    elif hasattr(value, "to_xarray") and hasattr(value, "name"):
+        stated, value = name_and_unit(str(value.name or ""))[1], value.to_numpy()
+    numbers, si = plain(value, units)
+    return numbers, si or stated or None
+
+
+def of_pandas(value: Any) -> Any:
+    """Return a Series or DataFrame as labelled, or as an array if its labels are 0, 1, 2, ...
+
+    Labels that are floats are positions (m). A table with headings is that of a file.
+    """
+    import xarray as xr
+
+    if value.ndim == 1:
+        if value.dtype == object:
+            value = value.astype(np.float64)
+        name, unit = name_and_unit(str(value.name or ""))
+        attributes = {"units": unit} if unit else {}
+        if _in_order_of_nodes(value.index, "index of the Series") and not unit:
+            return value.to_numpy()
+        coords = {} if _is_range(value.index) else {"x": value.index.to_numpy()}
+        return xr.DataArray(value.to_numpy(), coords, ("x",), name or None, attributes)
+    if all(isinstance(name, str) for name in value.columns):
+        return table_of_frame(value)
+    values, columns, index = value.to_numpy(), value.columns, value.index
+    if values.dtype.kind not in "fiu":
+        raise InputError("must hold numbers only; the DataFrame has columns of another type")
+    if index.dtype.kind == "f" and _is_range(columns):
+        return xr.DataArray(values.T, {"x": index.to_numpy()}, ("sample", "x"))
+    coords = {"x": columns.to_numpy()}
+    if _in_order_of_nodes(columns, "columns of the DataFrame"):
+        coords = {}
+    return xr.DataArray(values, coords, ("sample", "x"))
+
+
+def _is_range(index: Any) -> bool:
+    return index.dtype.kind in "iu" and bool(np.all(index == np.arange(index.size)))
+
+
+def _in_order_of_nodes(index: Any, what: str) -> bool:
+    """Return whether labels are 0, 1, 2, ...; refuse those that are no positions either."""
+    if _is_range(index):
+        return True
+    if index.dtype.kind != "f" or not np.all(np.isfinite(index)):
+        raise InputError(
+            f"has labels that are not positions in m: the {what} holds {index.dtype} such as"
+            f" {index[0]!r}; give positions as floats, or take values in their order by"
+            " .to_numpy()"
+        )
+    return False
 
 
 def in_si(array: Any, what: str, si: str, given: str | None = None) -> Any:
     """Return the values of a DataArray in SI, by its unit or the one that the caller gives."""
     stated = unit_of(array)
     with prefixed(what, " "):
-        values = as_numbers(_magnitude(array.data, si))
+        values = as_numbers(magnitude(array.data, si))
         factor = factor_to(si, given or stated or si)
         known = given and parse(stated)
         if known and not np.isclose(factor_to(si, stated), factor, rtol=1e-12):
@@ -372,10 +430,11 @@ def labelled(
 
     A dimension of another name comes first. It is the only one if there is one value a sample.
     """
-    data: Any = load(Path(source), options) if isinstance(source, str | Path) else source
+    is_file = isinstance(source, str | Path)
+    data: Any = load(Path(source), options) if is_file else simplified(source, quantity)
     if not is_labelled(data):
-        raise InputError(f"must be a path, a DataArray or a Dataset, got {describe(source)}")
-    if isinstance(source, str | Path) and Path(source).suffix.lower() in IMAGES and not unit:
+        data = _of_array(data, source, quantity)
+    if is_file and Path(source).suffix.lower() in IMAGES and not unit:
         if quantity != "height":
             raise InputError("holds grey values; pass strength= with a map to strengths (Pa)")
         unit = "m"  # the map takes grey values as they are
@@ -418,6 +477,21 @@ def labelled(
             raise InputError(f"{dim} must be finite; entry {entry}{line} is not")
         array = array.assign_coords({dim: (array[dim].dims, place)})
     return array.copy(data=values)
+
+
+def _of_array(values: Any, source: Any, quantity: str) -> Any:
+    """Return an array without labels as a profile of a line or a plane."""
+    import xarray as xr
+
+    try:
+        array = real_array(values)
+    except TypeError as error:
+        raise InputError(
+            f"must be a path, an array, or a table with labels, got {describe(source)}; {error}"
+        ) from None
+    if array.ndim not in (1, 2) or array.size == 0:
+        raise InputError(f"must have shape (nodes,) or (nx, ny), got shape {array.shape}")
+    return xr.DataArray(array, dims=("x", "y")[: array.ndim])
 
 
 class _Places(NamedTuple):

@@ -176,8 +176,6 @@ def read_table(path: Path, options: Options = Options()) -> xr.Dataset:  # noqa:
     comments, `headed` is whether columns have names; `text` of a column without any number
     says what it holds.
     """
-    import xarray as xr
-
     if path.suffix.lower() == EXCEL:
         grid = _sheet(path, options)
         table = _parsed(grid, options)
@@ -196,13 +194,43 @@ def read_table(path: Path, options: Options = Options()) -> xr.Dataset:  # noqa:
         "lines": table.lines, "blocks": int(table.blocks[-1] - table.blocks[0]) + 1,
         "comments": grid.comments, "headed": any({*row.cells} - {"", "-"} for row in table.header),
     }  # fmt: skip
+    return _labelled([*table.columns], _headings(table.header, width), table.texts, attributes)
+
+
+def table_of_frame(frame: Any) -> xr.Dataset:
+    """Return a DataFrame whose columns have headings as the table of a file."""
+    import pandas as pd
+
+    headings = [str(name) for name in frame.columns]
+    if frame.index.dtype.kind == "f":  # positions
+        frame, headings = frame.reset_index(), [str(frame.index.name or "x"), *headings]
+    columns, texts = [], {}
+    for number, heading in enumerate(headings):
+        column = frame.iloc[:, number]
+        numbers = pd.to_numeric(column, errors="coerce") if column.dtype == object else column
+        if numbers.dtype.kind not in "fiu" or (numbers.isna() & column.notna()).any():
+            texts[number] = f"column {heading!r} does not hold numbers"
+            numbers = np.full(len(frame), np.nan)
+        columns.append(np.asarray(numbers, dtype=np.float64))
+    attributes = {"headed": True, "comments": []}
+    return _labelled(columns, _headings([Row(0, headings)], len(columns)), texts, attributes)
+
+
+def _labelled(
+    columns: Sequence[Array],
+    headings: Sequence[tuple[str, dict[str, str]]],
+    texts: dict[int, str],
+    attributes: dict[str, Any],
+) -> xr.Dataset:
+    """Return columns with their headings as variables along 'row'."""
+    import xarray as xr
+
     data = xr.Dataset(attrs=attributes)
-    for number, (name, about) in enumerate(_headings(table.header, width)):
-        about |= {"name": name}
+    for number, (name, about) in enumerate(headings):
+        about |= {"name": name, "text": texts.get(number, ""), "column": str(number)}
         if name in data:
             name = about["heading"] if about["heading"] not in data else f"{name} {number}"
-        about |= {"text": table.texts.get(number, ""), "column": str(number)}
-        data[name] = ("row", table.columns[number], about)
+        data[name] = ("row", columns[number], about)
     return data
 
 

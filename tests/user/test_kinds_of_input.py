@@ -1,0 +1,165 @@
+"""What users hold, at every argument that takes numbers: read by its unit and labels, or refused.
+
+The table stands in docs/measured-profiles.md; here each pair of a kind and an argument is tried.
+"""
+
+import astropy.units as u
+import numpy as np
+import pandas as pd
+import pint
+import pytest
+import xarray as xr
+from refusals import refuses
+from setups import LOCAL, make_problem
+
+import stiction as st
+from stiction.inference.peaks import make_peaks
+from stiction.inference.records import records_of
+from stiction.problem.profiles.reading import at_nodes
+
+NODES = 128
+LINE = st.Interface(length=0.1, nodes=NODES)
+X = LINE.x
+STRENGTH = np.random.default_rng(0).uniform(0.8e6, 1.2e6, NODES)
+ORDER = np.random.default_rng(1).permutation(NODES)
+Q = pint.UnitRegistry()
+HOLES = np.where(np.arange(NODES) == 5, np.nan, STRENGTH)
+MASKED = np.ma.masked_invalid(HOLES)
+KPA = STRENGTH * 1e-3
+LABELS = "to_numpy()"  # the way out
+IN_ORDER, PLACED, GAP = STRENGTH, STRENGTH, HOLES
+
+PROFILES = {  # of a line, and what comes of it: values at the nodes, or words of a refusal
+    "array": (STRENGTH, IN_ORDER),
+    "list": (STRENGTH.tolist(), IN_ORDER),
+    "tuple": (tuple(STRENGTH), IN_ORDER),
+    "masked array": (MASKED, GAP),
+    "list with None": ([None if v != v else v for v in HOLES], GAP),
+    "object array": (HOLES.astype(object), GAP),
+    "Series": (pd.Series(STRENGTH), IN_ORDER),
+    "Series over positions": (pd.Series(STRENGTH[ORDER], index=X[ORDER]), PLACED),
+    "Series with a unit": (pd.Series(KPA, name="strength (kPa)"), IN_ORDER),
+    "Series of dates": (pd.Series(STRENGTH, pd.date_range("2026", periods=NODES)), LABELS),
+    "Series of words": (pd.Series(STRENGTH, [f"n{i}" for i in range(NODES)]), LABELS),
+    "shuffled Series": (pd.Series(STRENGTH).sample(frac=1.0, random_state=0), LABELS),
+    "DataFrame over positions": (pd.DataFrame([STRENGTH[ORDER]], columns=X[ORDER]), PLACED),
+    "DataFrame of rows": (pd.DataFrame([STRENGTH]), IN_ORDER),
+    "DataFrame of columns": (pd.DataFrame(STRENGTH[ORDER], index=X[ORDER]), PLACED),
+    "DataFrame of dates": (
+        pd.DataFrame([STRENGTH], columns=pd.date_range("2026", periods=NODES)), LABELS,
+    ),
+    "table": (pd.DataFrame({"x (mm)": X * 1e3, "strength (kPa)": KPA}).loc[ORDER], PLACED),
+    "table with an index": (pd.DataFrame({"x": X, "strength": STRENGTH}).set_index("x"), PLACED),
+    "table of text": (pd.DataFrame({"x": X, "strength": [f"a{v}" for v in X]}), "numbers"),
+    "DataArray": (xr.DataArray(KPA, {"x": X}, ("x",), attrs={"units": "kPa"}), PLACED),
+    "pint": (KPA * Q.kPa, IN_ORDER),
+    "astropy": (KPA * u.kPa, IN_ORDER),
+    "list of pint": ([v * Q.kPa for v in KPA], IN_ORDER),
+    "list of astropy": ([v * u.kPa for v in KPA], IN_ORDER),
+    "lengths": (KPA * u.m, "Pa"),
+    "mixed list": ([KPA[0] * u.kPa, *STRENGTH[1:]], "without a unit"),
+    "a mask over all": (np.ma.masked_all(NODES), "mask"),
+}  # fmt: skip
+
+
+def profile(given):
+    return at_nodes("strength", given, LINE, "skip")[0]
+
+
+def record(given):
+    (record,) = records_of(given, LINE, "strength")
+    return record.values
+
+
+def onset(given):
+    """The onset, which a gap refuses: here only whether both take it for the same values."""
+    gaps = {"gaps": "fill"}
+    return st.onset(make_problem(NODES), given, method=LOCAL, **gaps).critical_stress.values
+
+
+def read(given):
+    return st.read_profile(given, interface=LINE, gaps="skip").values
+
+
+@pytest.mark.filterwarnings("ignore::stiction.UnitWarning")
+@pytest.mark.parametrize("kind", PROFILES)
+@pytest.mark.parametrize("argument", [profile, record, onset, read])
+def test_profiles(kind, argument):
+    given, expected = PROFILES[kind]
+    if isinstance(expected, str):
+        refuses(expected, lambda: argument(given))
+    elif argument is onset:
+        np.testing.assert_allclose(onset(given), onset(expected), rtol=1e-12)
+    else:
+        np.testing.assert_allclose(np.squeeze(argument(given)), expected, rtol=1e-14)
+
+
+PEAKS = np.array([700.0, 720.0, 750.0, 690.0])  # kPa
+TESTS = {
+    "array": PEAKS * 1e3,
+    "list": [*(PEAKS * 1e3)],
+    "Series": pd.Series(PEAKS * 1e3),
+    "shuffled Series": pd.Series(PEAKS * 1e3).sample(frac=1.0, random_state=0).sort_values(),
+    "Series with a unit": pd.Series(PEAKS, name="peak [kPa]"),
+    "table": pd.DataFrame({"test": [*"abcd"], "peak (kPa)": PEAKS}),
+    "DataArray": xr.DataArray(PEAKS, dims="test", attrs={"units": "kPa"}),
+    "pint": PEAKS * Q.kPa,
+    "astropy": PEAKS * u.kPa,
+    "list of pint": [v * Q.kPa for v in PEAKS],
+    "list of astropy": [v * u.kPa for v in PEAKS],
+}
+
+
+@pytest.mark.parametrize("kind", TESTS)
+def test_peaks(kind):
+    np.testing.assert_allclose(np.sort(make_peaks(TESTS[kind]).values[0]), np.sort(PEAKS) * 1e3)
+    if kind != "table":
+        peaks = make_peaks({0.1: TESTS[kind], 0.2 * u.m: TESTS[kind]})
+        assert peaks.lengths == (0.1, 0.2)
+
+
+def test_peaks_that_are_refused():
+    for words, given in {
+        "N ... unit = 'Pa'": PEAKS * u.N,
+        "cannot be converted": PEAKS * u.m,
+        "must be positive": np.ma.masked_less(PEAKS, 700.0),
+        "name like 'peak": pd.DataFrame({"a": PEAKS, "b": PEAKS}),
+    }.items():
+        refuses(words, lambda given=given: make_peaks(given))
+    # Were the unit dropped, 700 MPa would be 0.7 MPa and fit.
+    problem = make_problem(NODES)
+    strength = st.paper.strength(problem, correlation_ratio=1.0)
+    prior = {"correlation_length": (1e-3, 1e-2)}
+    refuses("out of reach", lambda: st.infer(
+        problem, strength, 1e3 * PEAKS * u.kPa, prior=prior, method=LOCAL, progress=False
+    ))  # fmt: skip
+
+
+@pytest.mark.parametrize("library", [u.Unit, Q.Unit])
+def test_numbers_with_units(library):
+    """Stresses, lengths, moduli, forces and densities, by the names of their arguments."""
+    unit = lambda number, text: number * library(text)  # noqa: E731
+    plain = st.Solid(shear_modulus=1e9, poisson_ratio=0.3, density=1000.0)
+    assert st.Solid(
+        shear_modulus=unit(1.0, "GPa"), poisson_ratio=0.3, density=unit(1.0, "g/cm**3")
+    ).shear_modulus == pytest.approx(plain.shear_modulus)
+    for length in (unit(100.0, "mm"), np.array(0.1)[()]):
+        assert st.Interface(length=length, nodes=NODES) == LINE
+    plane = st.Interface(length=(unit(10.0, "cm"), unit(50.0, "mm")), nodes=(16, 8))
+    assert plane.lengths == pytest.approx((0.1, 0.05))
+    load = st.Load(normal_pressure=unit(2.0, "MPa"), initial_stress=unit(1.0, "kPa"))
+    load = make_problem(NODES, load=load).load
+    assert (load.normal_pressure, load.initial_stress) == pytest.approx((2e6, 1e3))
+    assert st.Load(pressing_force=unit(3.0, "kN")).pressing_force == pytest.approx(3e3)
+    law = make_problem(NODES, weakening_rate=unit(0.15, "MPa/um")).friction
+    assert law.weakening_rate == pytest.approx(0.15e12)
+    field = st.RandomField(
+        st.Lognormal(mean=unit(1.0, "MPa"), cv=0.2), st.PowerLawSpectrum(unit(2.0, "mm"))
+    )
+    assert (field.marginal.mean, field.spectrum.correlation_length) == pytest.approx(
+        (1e6, 2e-3)
+    )
+    refuses("length ... cannot be converted to m", lambda: st.Interface(unit(1.0, "s"), 8))
+    refuses("shear_modulus ... to Pa", lambda: st.Solid(
+        shear_modulus=unit(1.0, "m"), poisson_ratio=0.3, density=1.0
+    ))  # fmt: skip
