@@ -62,7 +62,7 @@ def test_restart_at_any_step_is_the_uninterrupted_run(tmp_path, arrested):
     run, straight = fresh_run(profile)
     if arrested:
         total = 0
-        while straight.now["arrested"] == 0 or straight.explicit:
+        while straight.now["arrested_events"] == 0 or straight.explicit:
             total += run.advance(straight, 5)[0]
             assert total < 20_000
         cuts = total // 3, total - 25, total

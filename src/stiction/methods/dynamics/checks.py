@@ -6,7 +6,7 @@ import numpy as np
 
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.methods.dynamics.integrator import Run
-from stiction.methods.dynamics.state import Reason, State, value_at
+from stiction.methods.dynamics.state import Reason, RuptureState, value_at
 from stiction.problem.problem import FEWEST_NODES, Problem
 from stiction.problem.sample import Sample
 
@@ -28,7 +28,7 @@ def warn_if_coarse(problem: Problem, rows: Sample) -> None:
     )
 
 
-def warn_of_slip(run: Run, state: State) -> None:
+def warn_of_slip(run: Run, state: RuptureState) -> None:
     """Warn of nodes that weaken too steeply for the grid, such as barriers, and of reversal."""
     rates, interface, now = run.setting.nodes.weakening, run.medium.interface, state.now
     shortest = FEWEST_NODES * interface.spacing
@@ -40,15 +40,15 @@ def warn_of_slip(run: Run, state: State) -> None:
             f"where the strength falls by up to {rates[steep].max():.3g} Pa/m, too steeply for this"
             " grid; take more nodes, or infinite strength for barriers that never break"
         )
-    if now["least"] < -_REVERSED * now["scale"]:
+    if now["reverse_margin"] < -_REVERSED * now["scale"]:
         warn_accuracy(
-            f"the stress fell below minus the strength, by {-now['least']:.3g} Pa at "
-            f"{interface.describe_node(int(now['least_node']))}: what would slip in reverse there, "
-            "which is not modelled, was kept at rest; change the sign of the load, or unload less"
+            f"the stress fell below minus the strength, by {-now['reverse_margin']:.3g} Pa at "
+            f"{interface.describe_node(int(now['reverse_node']))}: what would slip in reverse"
+            " there, which is not modelled, was kept at rest; change the sign of the load, or unload less"
         )
 
 
-def at_first_slip(run: Run) -> State | None:
+def at_first_slip(run: Run) -> RuptureState | None:
     """Return the state of rest at first slip, None if none comes; refuse or warn of loads."""
     time, step = run.first_slip(), run.medium.step
     if not time < run.setting.thresholds.end_time:
@@ -87,11 +87,11 @@ def warn_of_survival(stop: str, results: list[Any]) -> None:
         )
 
 
-def check_finite(run: Run, state: State, reason: int) -> None:
+def check_finite(run: Run, state: RuptureState, reason: int) -> None:
     """Raise a `FloatingPointError` with the time and place at which a run became non-finite."""
     if reason == Reason.NOT_FINITE:
         now = state.now
-        node = int(now["bad_node"])
+        node = int(now["non_finite_node"])
         raise FloatingPointError(
             f"the slip rate became non-finite at t = {now['time']:.9g} s, "
             f"{run.medium.interface.describe_node(node)} (node {node}), tau_0 = "

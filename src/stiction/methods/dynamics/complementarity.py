@@ -1,9 +1,33 @@
-"""One implicit step: slip increments u >= 0 with the stress nowhere above the strength.
+"""One implicit step: slip increments with the stress nowhere above the strength.
 
-(M - W) u = g - strength on the slipping set, u = 0 and stress below strength elsewhere; M is a
-circulant with positive symbol, W the rate at which each node weakens. A semismooth Newton
-iteration finds the slipping set and the straight line that the strength of each node follows;
-conjugate gradients, preconditioned with the inverse circulant, solve each linear problem.
+Problem
+-------
+Find the increments u >= 0 of slip (m) of a step, such that at every node
+
+    stress g - M u <= strength after the slip,   and equality where u > 0.                    (1)
+
+g is the stress at the end of the step if nothing slipped in it (`tables.trial_stress`), and M a
+circulant matrix with positive eigenvalues (`tables.symbol`, Pa/m): elasticity, memory and
+radiation. The strength of a node follows straight lines, b - w u, whose line may change with u; w
+is the rate at which it weakens (`tables.falling`), g - b its `tables.driving`.
+
+Algorithm (`solve_increment`)
+-----------------------------
+A semismooth Newton iteration, in the form of a primal-dual active set (M. Hintermueller, K. Ito and
+K. Kunisch, SIAM Journal on Optimization 13, 2002):
+
+1. Begin with the nodes that slip already and those whose trial stress is above their strength, on
+   the straight lines that belong to the first guess.
+2. On the slipping set S solve (M - W) u = g - b, W = diag(w), with u = 0 elsewhere (`_solve`): the
+   preconditioned conjugate gradients of M. R. Hestenes and E. Stiefel (1952), with the inverse
+   circulant, cut to S, as preconditioner. Letters are theirs: residual r, direction p, z = M^-1 r.
+3. Nodes outside S whose stress is above their strength join it, and nodes with u < 0 leave it. Every
+   node takes the straight line that belongs to its u.
+4. Repeat from 2 until no node has changed.
+
+Departures: a direction of negative curvature (an unstable patch, at this size of the step) ends the
+search without a result, as do too many iterations. Laws that are not made of straight lines have
+changed only if the stress on the lines differs by more than a bound.
 """
 
 from typing import Any
@@ -14,52 +38,56 @@ from stiction.elasticity.operator import Transform, convolve
 from stiction.methods.dynamics.state import ImplicitTables, Setting
 from stiction.problem.friction.kernels import line_at, strength_at
 
+_MAX_CG, _MAX_NEWTON = 400, 60  # iterations
+_MIN_CURVATURE = 1e-10  # of p (M - W) p as a share of p M p
+_JOINING = 10.0  # stress above the strength with which a node joins, in units of the accuracy
+
 
 @jit_inside
 def _solve(transform: Transform, tables: ImplicitTables, accuracy: float) -> Any:
-    """Conjugate gradients on the slipping set, from u in place; False at negative curvature."""
+    """Step 2, from u in place, to a residual of `accuracy` (Pa); return whether it was reached."""
     u, slipping, driving = tables.increment, tables.slipping, tables.driving
-    falling, product, residual = tables.falling, tables.product, tables.residual
-    z, direction, work = tables.other, tables.direction, tables.work
+    falling, product, work = tables.falling, tables.product, tables.work
+    r, p, z = tables.cg_residual, tables.cg_direction, tables.cg_preconditioned
     n = u.size
     convolve(transform, tables.symbol, u, work, product)
-    worst = 0.0
+    largest = 0.0
     for i in range(n):
-        residual[i] = direction[i] = 0.0
+        r[i] = p[i] = 0.0
         if slipping[i] > 0:
-            residual[i] = driving[i] - product[i] + falling[i] * u[i]
-            worst = max(worst, abs(residual[i]))
-    if not worst > accuracy:
-        return worst <= accuracy
-    gain_before = 1.0
-    for iteration in range(400):
-        convolve(transform, tables.inverse, residual, work, z)
-        gain = 0.0
+            r[i] = driving[i] - product[i] + falling[i] * u[i]
+            largest = max(largest, abs(r[i]))
+    if not largest > accuracy:
+        return largest <= accuracy  # not if it is NaN
+    rz_before = 1.0
+    for iteration in range(_MAX_CG):
+        convolve(transform, tables.inverse, r, work, z)
+        rz = 0.0
         for i in range(n):
             if slipping[i] > 0:
-                gain += z[i] * residual[i]
-        beta = gain / gain_before if iteration > 0 else 0.0
+                rz += z[i] * r[i]
+        beta = rz / rz_before if iteration > 0 else 0.0
         for i in range(n):
-            direction[i] = z[i] + beta * direction[i] if slipping[i] > 0 else 0.0
-        convolve(transform, tables.symbol, direction, work, product)
-        curvature, stiff = 0.0, 0.0
+            p[i] = z[i] + beta * p[i] if slipping[i] > 0 else 0.0
+        convolve(transform, tables.symbol, p, work, product)
+        curvature, elastic = 0.0, 0.0  # p (M - W) p and p M p
         for i in range(n):
             if slipping[i] > 0:
-                stiff += direction[i] * product[i]
-                product[i] -= falling[i] * direction[i]
-                curvature += direction[i] * product[i]
-        if not curvature > 1e-10 * stiff:
+                elastic += p[i] * product[i]
+                product[i] -= falling[i] * p[i]
+                curvature += p[i] * product[i]
+        if not curvature > _MIN_CURVATURE * elastic:
             return False
-        alpha = gain / curvature
-        worst = 0.0
+        alpha = rz / curvature
+        largest = 0.0
         for i in range(n):
             if slipping[i] > 0:
-                u[i] += alpha * direction[i]
-                residual[i] -= alpha * product[i]
-                worst = max(worst, abs(residual[i]))
-        if worst <= accuracy:
+                u[i] += alpha * p[i]
+                r[i] -= alpha * product[i]
+                largest = max(largest, abs(r[i]))
+        if largest <= accuracy:
             return True
-        gain_before = gain
+        rz_before = rz
     return False
 
 
@@ -70,48 +98,52 @@ def solve_increment(
     slip: Array,
     tables: ImplicitTables,
     accuracy: float,
-    near: float,
+    line_accuracy: float,
 ) -> Any:
     """Find the slip increments of one implicit step; return whether they were found.
 
     `tables.increment` and `tables.slipping` hold the first guess, and then the solution. The
-    stress is met to `accuracy` (Pa); the strength may be as far as `near` (Pa) from the straight
-    line that stands for it.
+    stress is met to `accuracy` (Pa); the strength may be as far as `line_accuracy` (Pa) from the
+    straight line that stands for it.
     """
     law, nodes = setting.law, setting.nodes
-    strength, floor, weakening = nodes.strength, nodes.residual, nodes.weakening
+    peak, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
     u, slipping, trial = tables.increment, tables.slipping, tables.trial_stress
     driving, falling, product = tables.driving, tables.falling, tables.product
     n = u.size
+    # 1. The first slipping set and its lines.
     for i in range(n):
-        limit = strength_at(law, strength[i], floor[i], weakening[i], slip[i])
-        if slipping[i] == 0 and trial[i] > limit:
+        strength = strength_at(law, peak[i], residual[i], weakening[i], slip[i])
+        if slipping[i] == 0 and trial[i] > strength:
             slipping[i] = 1
         if slipping[i] == 0:
             u[i] = 0.0
-        start, falling[i] = line_at(law, strength[i], floor[i], weakening[i], slip[i], u[i])
+        start, falling[i] = line_at(law, peak[i], residual[i], weakening[i], slip[i], u[i])
         driving[i] = trial[i] - start
-    for _ in range(60):
+    for _ in range(_MAX_NEWTON):
+        # 2. The increments of this set on these lines.
         if not _solve(transform, tables, accuracy):
             return False
+        # 3. Nodes that join, that leave, or that go on along another line.
         convolve(transform, tables.symbol, u, tables.work, product)
         changed = 0
         for i in range(n):
             if slipping[i] == 0:
-                limit = strength_at(law, strength[i], floor[i], weakening[i], slip[i])
-                if trial[i] - product[i] > limit + 10.0 * accuracy:
+                strength = strength_at(law, peak[i], residual[i], weakening[i], slip[i])
+                if trial[i] - product[i] > strength + _JOINING * accuracy:
                     slipping[i] = 1
                     changed += 1
             elif u[i] < 0.0:
                 slipping[i] = 0
                 u[i] = 0.0
                 changed += 1
-            start, slope = line_at(law, strength[i], floor[i], weakening[i], slip[i], u[i])
-            old = driving[i] + falling[i] * u[i]
+            start, slope = line_at(law, peak[i], residual[i], weakening[i], slip[i], u[i])
+            before = driving[i] + falling[i] * u[i]
             driving[i] = trial[i] - start
-            if slipping[i] > 0 and abs(driving[i] + slope * u[i] - old) > near:
+            if slipping[i] > 0 and abs(driving[i] + slope * u[i] - before) > line_accuracy:
                 changed += 1
             falling[i] = slope
+        # 4. Done once nothing changes.
         if changed == 0:
             return True
     return False

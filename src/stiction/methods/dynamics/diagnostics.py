@@ -1,4 +1,36 @@
-"""Updates after a step of either kind: peaks, events, arrival, the record."""
+"""What is known after every step: the last maximum of the mean stress, instabilities, arrivals.
+
+Problem
+-------
+Waves carry the stress that has lost its balance, so that the mean stress of the interface is
+
+    <tau> = tau_0 <p> + <tau_i> - Z <V>.                                                      (1)
+
+An instability is slip that the load does not drive: after a maximum of <tau>, waves lower it by
+`EVENT_DROP` of the stress scale (`docs/theory.md`). It began at that maximum. A fall of the load
+lowers <tau>, too, but is no instability. So the fall that counts is
+
+    fall = min(max <tau> - <tau>, Z <V> - Z <V> at the maximum).                              (2)
+
+Steps, after each step of a run (`observe`)
+-------------------------------------------
+1. Compute the fall (2).
+2. While <tau> is practically at its maximum, the fastest node is the place of the maximum. At slow
+   loading all creeping patches are about equally slow at the maximum itself, and only just after
+   it the one that becomes unstable is faster.
+3. If an instability has begun, it ends when <tau> rises above the maximum at which it began. It
+   was arrested if a node slipped faster than `Thresholds.unstable_rate`, which the waves of an
+   earlier one do not reach. The present <tau> is the next maximum. (Explicit steps also end it
+   when everything is calm, see `explicit`.)
+4. If none has begun, a higher <tau> is the next maximum, and a fall by `EVENT_DROP` is the
+   beginning of an instability. The highest one so far is the onset.
+5. Note <tau> once all nodes that can break are at their residual strength. Nothing becomes unstable
+   from then on. That alone is no instability: the last nodes beside a barrier may creep there.
+
+Two consequences: a maximum that no such fall follows, such as the largest load or the stress that
+returns when slip dies, is no instability; and where the stress is above the strength at the start,
+the maximum is the mean stress before anything slips, with which a run begins (`Run.start`).
+"""
 
 from typing import Any, NamedTuple
 
@@ -8,154 +40,158 @@ from stiction.base.arrays import Array
 from stiction.base.jit import jit_inside
 from stiction.methods.dynamics.state import (
     Grid,
-    History,
     Nodes,
-    Record,
+    PiecewiseLinear,
+    RuptureState,
     Setting,
-    State,
+    StepRecord,
     Thresholds,
     value_at,
 )
 
-REACH = 3.0  # a node counts with at most so many times the stress drop that the load provides
-# In units of the stress scale:
+MAX_DROP_RATIO = 3.0  # tau_p - tau_r of a node counts up to so many times the drop of the load
+# Shares of the stress scale:
 EVENT_DROP = 1e-4  # fall of the mean stress that begins an event
 STEADY_STRESS = 1e-2  # Z V of creep whose waves implicit steps may smear
-_PEAK_WIDTH = 1e-5  # distance below its maximum at which the mean stress counts as at it
+_AT_MAXIMUM = 1e-5  # distance from its maximum at which the mean stress counts as being there
 
 
-class Step(NamedTuple):
-    """A step that was taken: its end, its size, the work of the load, and Z <V> at the end."""
+class TakenStep(NamedTuple):
+    """A step that was taken."""
 
-    time: float
-    size: float
-    load: float
-    work: float
-    radiated: float
+    time: float  # at its end, s
+    size: float  # s
+    load: float  # tau_0 at its end, Pa
+    work: float  # of the load on the slip, J/m
+    radiated: float  # Z <V> at its end, Pa
 
 
-def stress_scale(nodes: Nodes) -> History:
+def stress_scale(nodes: Nodes) -> PiecewiseLinear:
     """Return the stress scale as a function of the load, both Pa.
 
-    It is the mean over nodes of tau_p - tau_r, no node counting for more than `REACH` times
-    tau_0 p + tau_i - tau_r, the drop that the load provides there. Where strengths are alike it
-    is the mean of tau_p - tau_r; barriers that the load is far from breaking, infinite ones among
-    them, do not raise it, and it grows with the load that comes to break them.
+    It is the mean over nodes of
+
+        min(tau_p - tau_r, MAX_DROP_RATIO (tau_0 p + tau_i - tau_r)), or 0 if that is negative.
+
+    The second term is the drop that the load provides. Where strengths are alike the scale is the
+    mean of tau_p - tau_r. Barriers that the load is far from breaking, infinite ones among them,
+    do not raise it, and it grows with the load that comes to break them.
     """
     strength, residual = nodes.strength, nodes.residual
     profile, initial = nodes.profile, nodes.initial
-    begin = (residual - initial) / profile
-    end = begin + (strength - residual) / (REACH * profile)
-    slope = REACH * profile / profile.size
-    stops = np.isfinite(end)
-    loads, at = np.unique(np.concatenate([begin, end[stops]]), return_inverse=True)
-    bends = np.bincount(at, np.concatenate([slope, -slope[stops]]))
+    # Loads between which the term of a node rises, with this slope.
+    first = (residual - initial) / profile
+    last = first + (strength - residual) / (MAX_DROP_RATIO * profile)
+    slope = MAX_DROP_RATIO * profile / profile.size
+    ends = np.isfinite(last)
+    loads, kink = np.unique(np.concatenate([first, last[ends]]), return_inverse=True)
+    bends = np.bincount(kink, np.concatenate([slope, -slope[ends]]))
     # The last slope goes on beyond the last load; one more load makes it visible.
     loads = np.append(loads, loads[-1] + max(1.0, abs(loads[-1])))
     scales = np.concatenate([[0.0], np.cumsum(np.cumsum(bends) * np.diff(loads))])
-    return History(loads, scales)
+    return PiecewiseLinear(loads, scales)
 
 
 @jit_inside
-def _at_maximum(now: Any, radiated: float) -> None:
+def _set_maximum(now: Any, radiated: float) -> None:
     """Take the present mean stress for its last maximum."""
-    now.local_stress, now.local_radiated = now.mean_stress, radiated
-    now.local_time, now.local_load, now.local_node = now.time, now.load, now.top_node
+    now.maximum_stress, now.maximum_radiated = now.mean_stress, radiated
+    now.maximum_time, now.maximum_load, now.maximum_node = now.time, now.load, now.top_node
 
 
 @jit_inside
-def _begin(now: Any) -> None:
-    """Keep where an instability began: at the last maximum of the mean stress."""
-    if now.first_stress == -np.inf:
-        now.first_stress = now.local_stress
-    if now.local_stress > now.onset_stress:
-        now.onset_stress, now.onset_time = now.local_stress, now.local_time
-        now.onset_load, now.onset_node = now.local_load, now.local_node
+def _begin_event(now: Any) -> None:
+    """Step 4: an instability has begun at the last maximum of the mean stress."""
+    now.in_event, now.event_slip_rate = 1, now.top_slip_rate
+    is_first = now.instabilities == 0
+    now.instabilities += 1
+    if is_first:
+        now.first_stress = now.maximum_stress
+    if is_first or now.maximum_stress > now.onset_stress:
+        now.onset_stress, now.onset_time = now.maximum_stress, now.maximum_time
+        now.onset_load, now.onset_node = now.maximum_load, now.maximum_node
 
 
 @jit_inside
 def end_event(now: Any, unstable_rate: float, radiated: float) -> None:
-    """End an event that is under way: the mean stress is as high as before, or all is calm."""
+    """Step 3: end an event that is under way: the mean stress is as high as before, or all calm."""
     if now.in_event:
         now.in_event = 0
-        # After global sliding there is nothing left to arrest.
-        if now.kinetic_stress == -np.inf and now.event_rate > unstable_rate:
-            now.arrested += 1
-        _at_maximum(now, radiated)
+        # Once all has broken there is nothing left to arrest.
+        if not now.all_broken and now.event_slip_rate > unstable_rate:
+            now.arrested_events += 1
+        _set_maximum(now, radiated)
 
 
 @jit_inside
 def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
-    """Update events with the state after a step; return the fall of the mean stress, Pa.
-
-    An instability is slip that the load does not drive: waves lower the mean stress by EVENT_DROP
-    below its last maximum, where it began; a fall of the load itself does not count. Before a start
-    above the strength the maximum is the stress without slip. No instability is a maximum that no
-    such fall follows, be it the largest load or the stress that returns when slip dies. It ends
-    when the mean stress rises above that maximum again or everything creeps, and was arrested if
-    a node slipped faster than `unstable_rate`; waves of an earlier one are slower. The last nodes
-    that can break may also creep to their residual strength: that is none. At slow loading all
-    creeping patches are about equally slow there, so that the place of the onset, the fastest node,
-    is read just after it.
-    """
-    fall = min(now.local_stress - now.mean_stress, radiated - now.local_radiated)
-    if now.local_stress - now.mean_stress < _PEAK_WIDTH * now.scale and fall > 0.0:
-        now.local_node = now.top_node
+    """Update maximum and instabilities after a step; return the fall of the mean stress, Pa."""
+    # 1. The fall by waves.
+    below = now.maximum_stress - now.mean_stress
+    fall = min(below, radiated - now.maximum_radiated)
+    # 2. The place of the maximum.
+    if below < _AT_MAXIMUM * now.scale and fall > 0.0:
+        now.maximum_node = now.top_node
     if now.in_event:
-        now.event_rate = max(now.event_rate, now.top_slip_rate)
-        if now.mean_stress > now.local_stress:
+        # 3. The end of an instability.
+        now.event_slip_rate = max(now.event_slip_rate, now.top_slip_rate)
+        if now.mean_stress > now.maximum_stress:
             end_event(now, thresholds.unstable_rate, radiated)
-    elif now.mean_stress > now.local_stress:
-        _at_maximum(now, radiated)
-    elif fall > EVENT_DROP * now.scale and now.kinetic_stress == -np.inf:
-        now.in_event, now.event_rate = 1, now.top_slip_rate
-        _begin(now)
-    if now.slid >= thresholds.breakable and now.kinetic_stress == -np.inf:
-        now.kinetic_stress = now.mean_stress
+    elif now.mean_stress > now.maximum_stress:
+        # 4. Another maximum, or the beginning of an instability.
+        _set_maximum(now, radiated)
+    elif fall > EVENT_DROP * now.scale and not now.all_broken:
+        _begin_event(now)
+    # 5. The end of all strength above the residual.
+    if now.weakened_nodes >= thresholds.breakable and not now.all_broken:
+        now.all_broken, now.kinetic_stress = 1, now.mean_stress
     return fall
 
 
 @jit_inside
 def finish_step(
-    state: State,
+    state: RuptureState,
     grid: Grid,
     setting: Setting,
-    step: Step,
+    step: TakenStep,
     increments: Array,
     strength: Array,
-    record: Record,
+    record: StepRecord,
     row: int,
 ) -> Any:
     """Update diagnostics, arrivals, and the record if there is one; return the fall of the stress.
 
-    `increments` are those of slip in the step (m), `strength` is that after it (Pa), at the nodes.
+    `increments` is the slip in the step (m), `strength` the strength after it (Pa), at the nodes.
     """
     now, slip, rate, stress = state.diagnostics[0], state.slip, state.rate, state.stress
-    critical, arrival, half = setting.nodes.critical, state.arrival, setting.thresholds.arrival
-    top, node, slid, slip_sum = -1.0, 0, 0, 0.0
-    least, least_node = now.least, now.least_node
+    critical, arrival, share = setting.nodes.critical, state.arrival, setting.thresholds.arrival
+    top_rate, top_node, weakened, slip_sum = -1.0, 0, 0, 0.0
+    margin, margin_node = now.reverse_margin, now.reverse_node
     for i in range(slip.size):
-        if rate[i] > top:
-            top, node = rate[i], i
-        if stress[i] + strength[i] < least:
-            least, least_node = stress[i] + strength[i], i
+        if rate[i] > top_rate:
+            top_rate, top_node = rate[i], i
+        if stress[i] + strength[i] < margin:
+            margin, margin_node = stress[i] + strength[i], i
         if slip[i] >= critical[i]:
-            slid += 1
+            weakened += 1
         # d_c = 0 where nothing weakens: there the first slip counts.
-        if np.isnan(arrival[i]) and slip[i] > 0.0 and slip[i] >= half * critical[i]:
-            beyond = (slip[i] - half * critical[i]) / max(increments[i], 1e-300)
-            arrival[i] = step.time - step.size * min(1.0, beyond)
+        if np.isnan(arrival[i]) and slip[i] > 0.0 and slip[i] >= share * critical[i]:
+            # The slip grew steadily in the step: how long ago did the front pass?
+            passed = (slip[i] - share * critical[i]) / max(increments[i], 1e-300)
+            arrival[i] = step.time - step.size * min(1.0, passed)
         slip_sum += slip[i]
     mean_stress = setting.mean_initial + step.load * setting.mean_profile - step.radiated
     now.time, now.size, now.load = step.time, step.size, step.load
-    now.mean_stress, now.top_slip_rate, now.top_node, now.slid = mean_stress, top, node, slid
-    now.least, now.least_node = least, least_node
+    now.mean_stress, now.weakened_nodes = mean_stress, weakened
+    now.top_slip_rate, now.top_node = top_rate, top_node
+    now.reverse_margin, now.reverse_node = margin, margin_node
     now.work, now.mean_slip = now.work + step.work, slip_sum / slip.size
     now.scale = max(now.scale, value_at(setting.scale, step.load))
     fall = observe(now, setting.thresholds, step.radiated)
     if record.steps.size > 0:
         record.steps[row] = now
         for s in range(setting.stations.size):
-            node, one = setting.stations[s], record.stations[row, s]
-            one.slip, one.slip_rate, one.shear_stress = slip[node], rate[node], stress[node]
+            node, station = setting.stations[s], record.stations[row, s]
+            station.slip, station.slip_rate = slip[node], rate[node]
+            station.shear_stress = stress[node]
     return fall

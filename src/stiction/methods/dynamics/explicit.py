@@ -10,7 +10,7 @@ from stiction.elasticity.operator import backward, forward
 from stiction.methods.dynamics.diagnostics import (
     EVENT_DROP,
     STEADY_STRESS,
-    Step,
+    TakenStep,
     end_event,
     finish_step,
 )
@@ -19,9 +19,9 @@ from stiction.methods.dynamics.state import (
     ExplicitTables,
     Grid,
     Reason,
-    Record,
+    RuptureState,
     Setting,
-    State,
+    StepRecord,
     Thresholds,
     value_at,
 )
@@ -49,7 +49,7 @@ def _transfer(grid: Grid, slip_hat: Array, memory_sum: Array, tables: ExplicitTa
 
 @jit_inside
 def _predict(
-    state: State, setting: Setting, tables: ExplicitTables, load: float, impedance: float
+    state: RuptureState, setting: Setting, tables: ExplicitTables, load: float, impedance: float
 ) -> None:
     """Slip rate `tables.predicted` at the end of the step if the present one acted all along."""
     nodes, law = setting.nodes, setting.law
@@ -65,7 +65,7 @@ def _predict(
 
 @jit_inside
 def _correct(
-    state: State, setting: Setting, tables: ExplicitTables, load: float, impedance: float
+    state: RuptureState, setting: Setting, tables: ExplicitTables, load: float, impedance: float
 ) -> Any:
     """Slip, rate and stress after the step; return (work, sum of V).
 
@@ -102,7 +102,7 @@ def _calm(now: Any, thresholds: Thresholds, step: float, impedance: float, rise:
     quiet = top < _CALM_STRESS * scale / impedance + thresholds.calm_slip * rise / step
     steady = 0.5 * before <= top <= 2.0 * before
     # Once all has broken nothing but the load drives steady slip, however fast it rises.
-    slow = top < STEADY_STRESS * scale / impedance or now.slid >= thresholds.slid_stop
+    slow = top < STEADY_STRESS * scale / impedance or now.weakened_nodes >= thresholds.slid_stop
     if quiet or (steady and slow):
         now.calm_steps += 1
     else:
@@ -113,11 +113,11 @@ def _calm(now: Any, thresholds: Thresholds, step: float, impedance: float, rise:
 @jit
 def explicit_steps(
     count: int,
-    state: State,
+    state: RuptureState,
     grid: Grid,
     setting: Setting,
     tables: ExplicitTables,
-    record: Record,
+    record: StepRecord,
 ) -> Any:
     """Take up to `count` explicit steps in place; return (steps taken, reason).
 
@@ -141,7 +141,7 @@ def explicit_steps(
         if not np.isfinite(total):
             for i in range(n):
                 if not np.isfinite(state.rate[i]):
-                    now.bad_node = i
+                    now.non_finite_node = i
                     break
             now.time = time
             reason = Reason.NOT_FINITE
@@ -155,17 +155,17 @@ def explicit_steps(
         )  # fmt: skip
         rise, radiated = abs(load - now.load), impedance * total / n
         now.explicit_steps += 1
-        done, limit = Step(time, step, load, work * grid.cell, radiated), tables.transfer
+        done, limit = TakenStep(time, step, load, work * grid.cell, radiated), tables.transfer
         fall = finish_step(state, grid, setting, done, tables.predicted, limit, record, taken)
         taken += 1
         calm = _calm(now, thresholds, step, impedance, rise)
-        if now.slid >= thresholds.slid_stop and (calm or not thresholds.held):
+        if now.weakened_nodes >= thresholds.slid_stop and (calm or not thresholds.held):
             reason = Reason.ALL_SLID
         elif thresholds.event_stop and fall > EVENT_DROP * now.scale:
             reason = Reason.DROPPED
         elif calm:
             end_event(now, thresholds.unstable_rate, radiated)
-            if thresholds.rest_stop and now.first_stress > -np.inf:
+            if thresholds.rest_stop and now.instabilities > 0:
                 reason = Reason.AT_REST
             elif not thresholds.explicit_only:
                 reason = Reason.TO_IMPLICIT

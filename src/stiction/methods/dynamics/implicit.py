@@ -8,15 +8,20 @@ from stiction.base.arrays import Array
 from stiction.base.jit import ZERO, jit, jit_inside
 from stiction.elasticity.operator import backward, forward
 from stiction.methods.dynamics.complementarity import solve_increment
-from stiction.methods.dynamics.diagnostics import EVENT_DROP, STEADY_STRESS, Step, finish_step
+from stiction.methods.dynamics.diagnostics import (
+    EVENT_DROP,
+    STEADY_STRESS,
+    TakenStep,
+    finish_step,
+)
 from stiction.methods.dynamics.memory import advance_with_ramp, fading_memory, tabulate
 from stiction.methods.dynamics.state import (
     Grid,
     ImplicitTables,
     Reason,
-    Record,
+    RuptureState,
     Setting,
-    State,
+    StepRecord,
     Thresholds,
     value_at,
 )
@@ -73,7 +78,7 @@ def _choose_size(now: Any, setting: Setting, step: float) -> Any:
 
 @jit_inside
 def _assemble(
-    state: State, grid: Grid, setting: Setting, tables: ImplicitTables, attempt: _Attempt
+    state: RuptureState, grid: Grid, setting: Setting, tables: ImplicitTables, attempt: _Attempt
 ) -> Any:
     """Matrix, stress if nothing slipped, and first guess; return the accuracy to ask for, Pa."""
     stiffness, entry, symbol = grid.stiffness, grid.entry, tables.symbol
@@ -116,7 +121,7 @@ def _assemble(
 
 @jit_inside
 def _effect(
-    state: State, setting: Setting, u: Array, impedance: float, attempt: _Attempt
+    state: RuptureState, setting: Setting, u: Array, impedance: float, attempt: _Attempt
 ) -> Any:
     """Return (largest loss of strength of a node, total slip, Z <V>) of slip increments u."""
     nodes, law, slip, past = setting.nodes, setting.law, state.slip, state.past
@@ -145,7 +150,7 @@ def _accelerates(
     # A step that hardly raises the load cannot put the onset wrong.
     matters = abs(attempt.load - now.load) > _NEGLIGIBLE * now.scale
     noticed = _NOTICED * now.scale
-    growing = radiated > noticed and radiated > _GROWTH * max(now.radiated, noticed)
+    growing = radiated > noticed and radiated > _GROWTH * max(now.previous_radiated, noticed)
     # At the smallest size, waves of an arrested event alone do not call for explicit steps.
     halved = 0.5 * attempt.size >= thresholds.smallest_step
     shorter = halved or largest > 0.1 * thresholds.slip_step
@@ -154,7 +159,7 @@ def _accelerates(
 
 @jit_inside
 def _accept(
-    state: State,
+    state: RuptureState,
     grid: Grid,
     setting: Setting,
     tables: ImplicitTables,
@@ -194,7 +199,7 @@ def _accept(
         past[i] = u[i] / size
         stress[i] = transfer[i] + load * profile[i] + initial[i] - grid.impedance * rate[i]
         limit[i] = strength_at(law, strength[i], residual[i], weakening[i], slip[i])
-    return Step(attempt.time, size, load, work * grid.cell, radiated)
+    return TakenStep(attempt.time, size, load, work * grid.cell, radiated)
 
 
 @jit_inside
@@ -214,11 +219,11 @@ def _next_size(asked: float, size: float, largest: float, growing: bool) -> Any:
 def implicit_steps(
     count: int,
     step: float,
-    state: State,
+    state: RuptureState,
     grid: Grid,
     setting: Setting,
     tables: ImplicitTables,
-    record: Record,
+    record: StepRecord,
 ) -> Any:
     """Take up to `count` accepted implicit steps in place; return (steps, next size, reason).
 
@@ -237,8 +242,7 @@ def implicit_steps(
         if size < smallest and not clipped:
             reason = Reason.TO_EXPLICIT
             break
-        past_step = now.past_step
-        ratio = size / (size + past_step) if past_step > 0.0 else 0.0
+        ratio = size / (size + now.previous_size) if now.two_step else 0.0
         time = now.time + size
         load = value_at(setting.load, time)
         attempt = _Attempt(size, time, load, ratio, 2.0 * ratio / size)
@@ -250,7 +254,7 @@ def implicit_steps(
         if not failed:
             largest, total, radiated = _effect(state, setting, u, grid.impedance, attempt)
         if not np.isfinite(total):
-            now.bad_node = 0
+            now.non_finite_node = 0
             reason = Reason.NOT_FINITE
             break
         too_much = largest > 2.0 * thresholds.slip_step
@@ -260,15 +264,18 @@ def implicit_steps(
                 reason = Reason.TO_EXPLICIT
                 break
             continue
-        growing = radiated > _NOTICED * now.scale and radiated > np.sqrt(_GROWTH) * now.radiated
+        growing = (
+            radiated > _NOTICED * now.scale
+            and radiated > np.sqrt(_GROWTH) * now.previous_radiated
+        )
         done = _accept(state, grid, setting, tables, attempt, radiated)
         now.implicit_steps += 1
-        now.past_step, now.radiated = size, radiated
+        now.two_step, now.previous_size, now.previous_radiated = 1, size, radiated
         fall = finish_step(state, grid, setting, done, u, tables.driving, record, taken)
         taken += 1
         if not clipped:
             step = _next_size(thresholds.slip_step, size, largest, growing)
-        if now.slid >= thresholds.slid_stop:
+        if now.weakened_nodes >= thresholds.slid_stop:
             reason = Reason.ALL_SLID
         elif thresholds.event_stop and fall > EVENT_DROP * now.scale:
             reason = Reason.DROPPED

@@ -12,9 +12,9 @@ from stiction.methods.dynamics.memory import (
     empty_memory,
     explicit_tables,
     implicit_tables,
-    scale_memory,
     step_table,
-    sum_memory,
+    to_explicit,
+    to_implicit,
 )
 from stiction.methods.dynamics.state import (
     DIAGNOSTICS,
@@ -22,10 +22,11 @@ from stiction.methods.dynamics.state import (
     ExplicitTables,
     Floats,
     ImplicitTables,
+    Phase,
     Reason,
-    Record,
+    RuptureState,
     Setting,
-    State,
+    StepRecord,
     value_at,
 )
 from stiction.problem.friction.kernels import strengths
@@ -39,7 +40,7 @@ _ENDINGS: dict[int, str] = {
     Reason.DROPPED: "onset",
     Reason.AT_REST: "rest",
 }
-NOTHING = Record(np.empty(0, DIAGNOSTICS), np.empty((0, 0), STATION))
+NOTHING = StepRecord(np.empty(0, DIAGNOSTICS), np.empty((0, 0), STATION))
 
 
 @dataclasses.dataclass(eq=False)
@@ -96,7 +97,7 @@ class Run:
         i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, times.size - 2))
         return float(abs(values[i + 1] - values[i]) / (times[i + 1] - times[i]))
 
-    def start(self, time: float, slip: Floats | None = None) -> State:
+    def start(self, time: float, slip: Floats | None = None) -> RuptureState:
         """Return the state of rest, or of an equilibrium with a slip, with an empty memory.
 
         Where the stress is above the strength by more than round-off, explicit steps come first.
@@ -117,21 +118,20 @@ class Run:
         stress = stress - impedance * rate
         diagnostics = np.zeros(1, DIAGNOSTICS)
         now = diagnostics[0]
-        now["time"] = now["local_time"] = time
-        now["load"] = now["local_load"] = now["start_load"] = load
+        now["time"] = now["maximum_time"] = time
+        now["load"] = now["maximum_load"] = now["start_load"] = load
         # Before anything slips: nothing is radiated.
-        now["local_stress"] = setting.mean_initial + load * setting.mean_profile
+        now["maximum_stress"] = setting.mean_initial + load * setting.mean_profile
         now["mean_stress"] = stress.mean()
-        now["local_node"] = now["top_node"] = int(np.argmax(excess))
-        now["first_stress"] = now["onset_stress"] = now["kinetic_stress"] = -np.inf  # not yet
+        now["maximum_node"] = now["top_node"] = int(np.argmax(excess))
+        now["first_stress"] = now["onset_stress"] = now["kinetic_stress"] = np.nan  # not yet
         now["onset_time"] = now["onset_load"] = np.nan
-        now["bad_node"] = -1
         times, values = setting.load
         lowest = min(load, values[times <= time].min()) if slip is None else load
         left = stress + limit - (load - lowest) * nodes.profile  # at rest, at the lowest load
-        now["least"], now["least_node"] = left.min(), int(np.argmin(left))
+        now["reverse_margin"], now["reverse_node"] = left.min(), int(np.argmin(left))
         now["top_slip_rate"], now["mean_slip"] = rate.max(), delta.mean()
-        now["slid"] = np.count_nonzero(delta >= nodes.critical)
+        now["weakened_nodes"] = np.count_nonzero(delta >= nodes.critical)
         scale = max(0.0, self.scale_at(load))
         now["scale"] = scale
         front = thresholds.arrival * nodes.critical
@@ -139,8 +139,9 @@ class Run:
         size, slope = thresholds.smallest_step, self.slope(time)
         first = 0.1 * thresholds.load_step * scale / slope if slope > 0.0 else size
         explicit = thresholds.explicit_only or impedance * rate.max() > _OVERSTRESSED * scale
-        phase = np.array([float(explicit), min(max(size, first), LARGEST_STEP)])
-        return State(
+        now["phase"] = Phase.EXPLICIT if explicit else Phase.IMPLICIT
+        now["next_size"] = min(max(size, first), LARGEST_STEP)
+        return RuptureState(
             slip=delta,
             rate=rate,
             stress=stress,
@@ -150,15 +151,14 @@ class Run:
             memory_sum=memory_sum,
             arrival=arrival,
             diagnostics=diagnostics,
-            phase=phase,
         )
 
-    def ended(self, state: State) -> bool:
+    def ended(self, state: RuptureState) -> bool:
         """Return whether the end time is reached, up to the rounding of a sum of many steps."""
         left = self.setting.thresholds.end_time - state.now["time"]
         return bool(left <= 1e-6 * self.medium.step)
 
-    def ending(self, state: State, reason: int) -> str | None:
+    def ending(self, state: RuptureState, reason: int) -> str | None:
         """Return the reason why a run ends here, in a word; None if it goes on."""
         if reason == Reason.ALL_SLID and self.setting.thresholds.held:
             return "rest"
@@ -175,7 +175,7 @@ class Run:
         )
         return "rest" if self.stop != "time" and resting else None
 
-    def follow(self, state: State, most: int) -> tuple[str | None, int]:
+    def follow(self, state: RuptureState, most: int) -> tuple[str | None, int]:
         """Go on to the end of the run, or to `most` steps in all; return why it ended and the code.
 
         The reason is None if it has not ended; the code is then NOT_FINITE or DONE (all steps).
@@ -186,7 +186,9 @@ class Run:
             word = self.ending(state, reason)
         return word, reason
 
-    def advance(self, state: State, count: int, record: Record = NOTHING) -> tuple[int, int]:
+    def advance(
+        self, state: RuptureState, count: int, record: StepRecord = NOTHING
+    ) -> tuple[int, int]:
         """Take up to `count` steps in place; return (steps taken, why it returned).
 
         The reason is DONE after `count` steps or at the end time, else ALL_SLID, DROPPED, AT_REST
@@ -194,7 +196,7 @@ class Run:
         """
         taken = 0
         while taken < count:
-            part = Record(*(rows[taken:] for rows in record))
+            part = StepRecord(*(rows[taken:] for rows in record))
             steps = self._explicit if state.explicit else self._implicit
             more, reason = steps(state, count - taken, part)
             taken += more
@@ -206,19 +208,19 @@ class Run:
                 return taken, reason
         return taken, Reason.DONE
 
-    def _explicit(self, state: State, count: int, record: Record) -> tuple[int, int]:
+    def _explicit(self, state: RuptureState, count: int, record: StepRecord) -> tuple[int, int]:
         medium, tables = self.medium, self._explicit_tables()
         left = self.setting.thresholds.end_time - state.now["time"]
         if left < count * medium.step:
             count = min(count, max(1, int(np.ceil(left / medium.step - 1e-6))))
         return explicit_steps(count, state, medium.grid, self.setting, tables, record)
 
-    def _implicit(self, state: State, count: int, record: Record) -> tuple[int, int]:
-        size, grid = float(state.phase[1]), self.medium.grid
+    def _implicit(self, state: RuptureState, count: int, record: StepRecord) -> tuple[int, int]:
+        size, grid = float(state.now["next_size"]), self.medium.grid
         if not isinstance(self.tables, ImplicitTables):
             self.tables = None  # release the others before these are made
             self.tables = implicit_tables(grid)
-        taken, state.phase[1], reason = implicit_steps(
+        taken, state.now["next_size"], reason = implicit_steps(
             count, size, state, grid, self.setting, self.tables, record
         )
         return taken, reason
@@ -230,16 +232,14 @@ class Run:
             self.tables = explicit_tables(medium.grid, medium.step, *table)
         return self.tables
 
-    def _to_explicit(self, state: State) -> None:
-        grid, tables = self.medium.grid, self._explicit_tables()
-        scale_memory(grid, state.memory, tables.step, divide=True)
-        sum_memory(grid, state.memory, tables.table, state.memory_sum)
-        state.phase[0] = 1.0
+    def _to_explicit(self, state: RuptureState) -> None:
+        tables = self._explicit_tables()
+        to_explicit(self.medium.grid, state, tables.step, tables.table, state.memory_sum)
         state.now["calm_steps"], state.now["calm_rate"] = 0, state.rate.max()
 
-    def _to_implicit(self, state: State) -> None:
-        scale_memory(self.medium.grid, state.memory, self.medium.step, divide=False)
+    def _to_implicit(self, state: RuptureState) -> None:
+        to_implicit(self.medium.grid, state, self.medium.step)
         state.past[:] = state.rate
-        state.phase[:] = 0.0, 2.0 * self.setting.thresholds.smallest_step
-        state.now["past_step"] = 0.0  # the first implicit step is one of first order
-        state.now["radiated"] = self.medium.impedance * state.rate.mean()
+        state.now["next_size"] = 2.0 * self.setting.thresholds.smallest_step
+        state.now["two_step"] = 0  # the first implicit step is one of first order
+        state.now["previous_radiated"] = self.medium.impedance * state.rate.mean()

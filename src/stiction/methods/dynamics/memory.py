@@ -1,12 +1,50 @@
-"""The memory of past slip rates: the layout of its variables, and how steps advance them.
+"""The memory of past slip rates: what is remembered of each mode, and how steps advance it.
 
+Problem
+-------
+The stress that a mode k of past slip rates V transfers is (G|k|/2) times the convolution
+
+    S(t) = int_0^t C(|k| c_s t') V(t - t') dt',   C(T) = Re sum_p w_p exp(s_p T).             (1)
+
+So it is enough to know one memory variable for each pair (s_p, w_p) and mode,
+
+    psi_p(t) = int_0^t exp(s_p |k| c_s t') V(t - t') dt',   S = Re sum_p w_p psi_p.           (2)
+
+V has a real and an imaginary part, and each is a real signal with a complex psi_p of its own. On a
+plane the pairs before `Grid.split` have the weight (kx/k)² w_p and those of mode III, which follow,
+the weight (1 - (kx/k)²) w_p.
+
+Algorithm
+---------
+Exponential time differencing (S. M. Cox and P. C. Matthews, Journal of Computational Physics 176,
+2002): psi' = z/h psi + V is integrated exactly for a slip rate that is a polynomial in a step h.
+With z = s_p |k| c_s h, E = exp(z), and phi(z) = (exp(z) - 1)/z:
+
+1. Explicit step, constant slip rate V. psi <- E psi + B V, with B = h phi(z). The variables are
+   kept as y = psi/B, so that the pass has one multiplication less:
+
+       y <- E y + V,   and for the next step at once   Re sum_p w_p E B y                     (3)
+
+   (`advance_memory`). The sum is the part of S at the end of the next step that is known before
+   it. The current slip rate adds V Re sum_p w_p B (`response` of `step_table`).
+2. Implicit step, slip rate V + a (t - h/2) for 0 < t < h. The variables are psi itself:
+
+       psi <- E psi + B V + R a,   R = int_0^h exp(s_p |k| c_s (h - t)) (t - h/2) dt          (4)
+
+   (`advance_with_ramp`, with the tables of `tabulate`), after `fading_memory` has summed
+   Re sum_p w_p E psi, the part of S at the end of the step that is known before it.
+3. Between the two kinds `to_explicit` divides by B and `to_implicit` multiplies by it. They set
+   `Phase`, which says in which of both forms `RuptureState.memory` is.
+
+Layout
+------
 Variables lie in blocks of 64 modes, so that one pass stays in registers. Tables have an entry for
 each wave vector that differs in what waves do: on a line k > 0, on a plane kx >= 0 and ky >= 0,
-because (kx, ky) and (-kx, ky) share |k| and the share of mode II: such an entry has multiplicity 2.
+because (kx, ky) and (-kx, ky) share |k| and the share of mode II. Such an entry has multiplicity 2.
 Entries are padded to whole blocks. Tables are packed as [block][pair][row][64], Fourier arrays as
-[block][copy][real, imaginary][64] and memory variables as [block][copy][pair][4][64] with the four
-rows real and imaginary part of the memory of the real signal, then of the imaginary signal. The
-constant row length lets the compiler vectorise without run-time checks of overlap.
+[block][copy][real, imaginary][64] and memory variables as [block][copy][pair][4][64]. The four
+rows are the real and imaginary part of the memory of the real signal, then of the imaginary signal.
+The constant row length lets the compiler vectorise without run-time checks of overlap.
 """
 
 from typing import Any
@@ -22,15 +60,17 @@ from stiction.methods.dynamics.state import (
     Grid,
     ImplicitTables,
     Ints,
+    Phase,
+    RuptureState,
     Spectrum,
 )
 
 ENTRIES = 64
 """Entries of a block of the memory, which a pass takes together."""
-TWO, THREE, FOUR = 2 * ENTRIES, 3 * ENTRIES, 4 * ENTRIES
+TWO_ROWS, THREE_ROWS, FOUR_ROWS = 2 * ENTRIES, 3 * ENTRIES, 4 * ENTRIES
 """Numbers in so many rows of a block."""
-LINE = 64
-"""Bytes of a cache line."""
+CACHE_LINE = 64
+"""Bytes."""
 
 
 def phi(z: Spectrum) -> Spectrum:
@@ -66,20 +106,20 @@ def zeros(size: int, kind: type = float) -> NDArray[Any]:
     (Allocated memory begins 16 bytes later: every second load would touch two lines, which
     costs a third of the pass.)
     """
-    whole = np.zeros(size * np.dtype(kind).itemsize + LINE, dtype=np.uint8)
-    first = -whole.ctypes.data % LINE
-    return whole[first : whole.size - LINE + first].view(kind)
+    buffer = np.zeros(size * np.dtype(kind).itemsize + CACHE_LINE, dtype=np.uint8)
+    first = -buffer.ctypes.data % CACHE_LINE
+    return buffer[first : buffer.size - CACHE_LINE + first].view(kind)
 
 
 def work_arrays(count: int, size: int, kind: type) -> list[NDArray[Any]]:
-    """Arrays to work in, apart by what is no multiple of a page: stores then hold up no loads.
+    """Arrays to work in, whose distance is no multiple of a page: stores then hold up no loads.
 
-    (Of addresses that are equal modulo 4096 bytes, processors take a load to depend on the store
-    before it; with grids of powers of two that would cost half a step.)
+    (If two addresses are equal modulo 4096 bytes, processors take a load from one to depend on the
+    store to the other before it. With grids of powers of two that would cost half a step.)
     """
-    apart = -(-size // 8) * 8 + 80
-    whole = zeros(count * apart, kind)
-    return [whole[i * apart : i * apart + size] for i in range(count)]
+    distance = -(-size // 8) * 8 + 80
+    buffer = zeros(count * distance, kind)
+    return [buffer[i * distance : i * distance + size] for i in range(count)]
 
 
 def empty_memory(grid: Grid) -> tuple[Floats, Floats]:
@@ -89,21 +129,21 @@ def empty_memory(grid: Grid) -> tuple[Floats, Floats]:
 
 
 def step_table(grid: Grid, step: float) -> tuple[Floats, Floats]:
-    """Tables of one fixed explicit step h: `table` and `response` of `ExplicitTables`."""
+    """Step 1: `table` and `response` of `ExplicitTables` for one fixed explicit step h."""
     pairs, count = grid.poles.size, blocks(grid.frequency.size)
     table = zeros(count * pairs * 4 * ENTRIES).reshape(count, pairs, 4, ENTRIES)
     response = np.empty(grid.frequency.size)
     in_plane = (np.arange(pairs) < grid.split)[:, None]
-    for block in range(count):  # one by one: all exponentials together would take more
-        some = slice(block * ENTRIES, (block + 1) * ENTRIES)
-        z = np.multiply.outer(grid.poles, grid.frequency[some] * step)
-        share = np.where(in_plane, grid.mode_two[some], 1.0 - grid.mode_two[some])
+    for block in range(count):  # not all exponentials together: they would take more memory
+        entries = slice(block * ENTRIES, (block + 1) * ENTRIES)
+        z = np.multiply.outer(grid.poles, grid.frequency[entries] * step)
+        share = np.where(in_plane, grid.mode_two[entries], 1.0 - grid.mode_two[entries])
         decay, gain, weights = np.exp(z), step * phi(z), grid.weights[:, None] * share
         product = weights * decay * gain
         rows = (decay.real, decay.imag, product.real, product.imag)
         for row, values in enumerate(rows):
             table[block, :, row, : values.shape[1]] = values
-        response[some] = np.sum((weights * gain).real, axis=0)
+        response[entries] = np.sum((weights * gain).real, axis=0)
     return table.ravel(), response[grid.entry]
 
 
@@ -128,59 +168,75 @@ def pack(offset: Array, spectrum: Array, packed: Array) -> None:
 def advance_memory(
     memory: Array, table: Array, rate: Array, memory_sum: Array, pairs: int, multiplicity: int
 ) -> None:
-    """y <- E y + V and memory_sum = Re sum w E B y, for all modes and pairs: the one pass."""
-    size = pairs * FOUR
-    for own in range(table.size // size):
-        # Views that begin at zero: the compiler can then exclude negative indices. One of each
-        # a block and none a pair: making a view costs as much as a few modes.
-        e = table[own * size :][:size]
+    """Step 1: y <- E y + V and memory_sum = Re sum w E B y, for all modes and pairs in one pass.
+
+    `e` has four rows for each pair: the real and imaginary part of E, then of w E B.
+    """
+    size = pairs * FOUR_ROWS
+    for table_block in range(table.size // size):
+        # Views that begin at zero: the compiler can then exclude negative indices. Each block has
+        # one view of each array and a pair has none: making a view costs as much as a few modes.
+        e = table[table_block * size :][:size]
         for copy in range(multiplicity):
-            block = own * multiplicity + copy
+            block = table_block * multiplicity + copy
             y = memory[block * size :][:size]
-            v, c = rate[block * TWO :][:TWO], memory_sum[block * TWO :][:TWO]
-            for j in range(TWO):
+            v, c = (
+                rate[block * TWO_ROWS :][:TWO_ROWS],
+                memory_sum[block * TWO_ROWS :][:TWO_ROWS],
+            )
+            for j in range(TWO_ROWS):
                 c[j] = 0.0
             for p in range(pairs):
-                o = p * FOUR
+                o = p * FOUR_ROWS
                 for j in range(ENTRIES):
                     er, ei = e[o + j], e[o + ENTRIES + j]
-                    cr, ci = e[o + TWO + j], e[o + THREE + j]
+                    cr, ci = e[o + TWO_ROWS + j], e[o + THREE_ROWS + j]
                     yr, yi = y[o + j], y[o + ENTRIES + j]
                     ar = er * yr - ei * yi + v[j]
                     ai = er * yi + ei * yr
                     y[o + j] = ar
                     y[o + ENTRIES + j] = ai
                     c[j] += cr * ar - ci * ai
-                    yr, yi = y[o + TWO + j], y[o + THREE + j]
+                    yr, yi = y[o + TWO_ROWS + j], y[o + THREE_ROWS + j]
                     ar = er * yr - ei * yi + v[ENTRIES + j]
                     ai = er * yi + ei * yr
-                    y[o + TWO + j] = ar
-                    y[o + THREE + j] = ai
+                    y[o + TWO_ROWS + j] = ar
+                    y[o + THREE_ROWS + j] = ai
                     c[ENTRIES + j] += cr * ar - ci * ai
 
 
-def sum_memory(grid: Grid, memory: Floats, table: Floats, memory_sum: Floats) -> None:
-    """Put Re sum w E B y into `memory_sum` without advancing: where an explicit phase begins."""
+def to_explicit(
+    grid: Grid, state: RuptureState, step: float, table: Floats, memory_sum: Floats
+) -> None:
+    """Step 3: psi becomes psi/B of explicit steps h; put Re sum w E psi into `memory_sum`."""
+    _scale_memory(grid, state.memory, step, divide=True)
     count, pairs = blocks(grid.frequency.size), grid.poles.size
     rows = table.reshape(count, pairs, 4, ENTRIES)
-    y = memory.reshape(count, grid.multiplicity, pairs, 2, 2, ENTRIES)  # of both signals
+    y = state.memory.reshape(count, grid.multiplicity, pairs, 2, 2, ENTRIES)  # of both signals
     for block, total in enumerate(memory_sum.reshape(count, grid.multiplicity, 2, ENTRIES)):
         real, imaginary = rows[block, :, 2, None], rows[block, :, 3, None]
         total[:] = (real * y[block, ..., 0, :] - imaginary * y[block, ..., 1, :]).sum(axis=1)
+    state.now["phase"] = Phase.EXPLICIT
 
 
-def scale_memory(grid: Grid, memory: Floats, step: float, *, divide: bool) -> None:
-    """psi = B y, or y = psi/B with `divide`, in place: at the switch between kinds of step."""
+def to_implicit(grid: Grid, state: RuptureState, step: float) -> None:
+    """Step 3: psi/B of explicit steps h becomes psi."""
+    _scale_memory(grid, state.memory, step, divide=False)
+    state.now["phase"] = Phase.IMPLICIT
+
+
+def _scale_memory(grid: Grid, memory: Floats, step: float, *, divide: bool) -> None:
+    """Multiply or divide memory variables by B, in place."""
     count = blocks(grid.frequency.size)
     y = memory.reshape(count, grid.multiplicity, grid.poles.size, 4, ENTRIES)
     for block in range(count):
         frequency = grid.frequency[block * ENTRIES : (block + 1) * ENTRIES]
         factor = step * phi(np.multiply.outer(grid.poles, frequency * step))
-        part = y[block, ..., : frequency.size]
+        rows = y[block, ..., : frequency.size]
         for row in (0, 2):
-            value = part[:, :, row] + 1j * part[:, :, row + 1]
+            value = rows[:, :, row] + 1j * rows[:, :, row + 1]
             value = value / factor if divide else value * factor
-            part[:, :, row], part[:, :, row + 1] = value.real, value.imag
+            rows[:, :, row], rows[:, :, row + 1] = value.real, value.imag
 
 
 @jit_inside
@@ -209,18 +265,18 @@ def implicit_tables(grid: Grid) -> ImplicitTables:
         *work_arrays(8, nodes, float),
         np.zeros(nodes, dtype=np.int64),
         *np.zeros((2, count * grid.multiplicity * 2 * ENTRIES)),
-        np.empty((2, TWO)),
+        np.empty((2, TWO_ROWS)),
     )
-    return ImplicitTables(np.array([-1.0, -1.0]), *arrays)
+    return ImplicitTables(np.full(2, np.nan), *arrays)
 
 
 @jit_inside
 def tabulate(grid: Grid, step: float, tables: ImplicitTables) -> None:
-    """E and B = int_0^h exp(s |k| c_s t') dt' into `table`.
+    """Step 2: E, B and R of (4) for a step h, and their weighted sums.
 
-    `ramp`, [block][pair][2][64], gets the counterpart of B for a slip rate that rises linearly with
-    zero mean; `response` and `ramp_response` get their sums Re sum w B. On a line |k| c_s is j + 1
-    times the lowest, so the exponentials of a pole are powers of one number: a product each, with a
+    `table`, [block][pair][4][64], gets E and B, `ramp`, [block][pair][2][64], gets R. `response`
+    and `ramp_response` get Re sum w B and Re sum w R. On a line |k| c_s is j + 1 times the lowest,
+    so that the exponentials of a pole are powers of one number. That takes a product each, with a
     relative error of 1e-16 j.
     """
     table, ramp = tables.table, tables.ramp
@@ -232,97 +288,108 @@ def tabulate(grid: Grid, step: float, tables: ImplicitTables) -> None:
         pole, weight = grid.poles[p], grid.weights[p]
         unit = pole * (grid.frequency[0] * step)
         base = np.exp(unit)
-        inverse = 1.0 / unit if grid.multiplicity == 1 else 0.0j  # on a plane the first is 0
+        # On a plane the lowest frequency is zero, and z is taken entry by entry.
+        inverse = 1.0 / unit if grid.multiplicity == 1 else 0.0j
         decay = 1.0 + 0.0j
         for j in range(response.size):
             if grid.multiplicity == 1:
                 decay = decay * base
                 z = unit * (j + 1)
-                part = 1.0
+                share = 1.0
             else:
                 z = pole * (grid.frequency[j] * step)
                 decay = np.exp(z)
-                part = grid.mode_two[j] if p < grid.split else 1.0 - grid.mode_two[j]
-            if z.real * z.real + z.imag * z.imag < 4e-4:
+                share = grid.mode_two[j] if p < grid.split else 1.0 - grid.mode_two[j]
+            if z.real * z.real + z.imag * z.imag < 4e-4:  # |z| < 0.02: series
                 gain, ramp_gain = step * _phi(z), step * step * _ramp(z)
             else:
                 per_z = inverse * (1.0 / (j + 1)) if grid.multiplicity == 1 else 1.0 / z
                 ratio = (decay - 1.0) * per_z
                 gain = step * ratio
                 ramp_gain = step * step * ((ratio - 1.0) * per_z - 0.5 * ratio)
-            o = ((j // ENTRIES) * pairs + p) * FOUR + j % ENTRIES
+            o = ((j // ENTRIES) * pairs + p) * FOUR_ROWS + j % ENTRIES
             table[o], table[o + ENTRIES] = decay.real, decay.imag
-            table[o + TWO], table[o + THREE] = gain.real, gain.imag
-            o = ((j // ENTRIES) * pairs + p) * TWO + j % ENTRIES
+            table[o + TWO_ROWS], table[o + THREE_ROWS] = gain.real, gain.imag
+            o = ((j // ENTRIES) * pairs + p) * TWO_ROWS + j % ENTRIES
             ramp[o], ramp[o + ENTRIES] = ramp_gain.real, ramp_gain.imag
-            response[j] += part * (weight * gain).real
-            ramp_response[j] += part * (weight * ramp_gain).real
+            response[j] += share * (weight * gain).real
+            ramp_response[j] += share * (weight * ramp_gain).real
 
 
 @jit_inside
 def fading_memory(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
-    """Put Re sum w E psi of all modes into `memory_sum`: what the past leaves after the step."""
+    """Step 2: put Re sum w E psi of all modes into `tables.memory_sum`."""
     pairs, multiplicity, split = grid.poles.size, grid.multiplicity, grid.split
-    sums = tables.sums  # of the pairs before `split`, and of those from there on
-    for block in range(memory.size // (FOUR * pairs)):
-        for j in range(TWO):
+    sums = tables.sums  # of the pairs before `split`, and of the pairs of mode III
+    for block in range(memory.size // (FOUR_ROWS * pairs)):
+        for j in range(TWO_ROWS):
             sums[0, j] = sums[1, j] = 0.0
         for p in range(pairs):
             # Views that begin at zero: the compiler can then exclude negative indices.
-            y = memory[(block * pairs + p) * FOUR :][:FOUR]
-            e = tables.table[(block // multiplicity * pairs + p) * FOUR :][:FOUR]
+            y = memory[(block * pairs + p) * FOUR_ROWS :][:FOUR_ROWS]
+            e = tables.table[(block // multiplicity * pairs + p) * FOUR_ROWS :][:FOUR_ROWS]
             out = sums[0 if p < split else 1]
             wr, wi = grid.weights[p].real, grid.weights[p].imag
             for j in range(ENTRIES):
                 cr, ci = wr * e[j] - wi * e[ENTRIES + j], wr * e[ENTRIES + j] + wi * e[j]
                 out[j] += cr * y[j] - ci * y[ENTRIES + j]
-                out[ENTRIES + j] += cr * y[TWO + j] - ci * y[THREE + j]
-        for j in range(TWO):
-            tables.packed[block * TWO + j] = sums[0, j]
-            tables.others[block * TWO + j] = sums[1, j]
+                out[ENTRIES + j] += cr * y[TWO_ROWS + j] - ci * y[THREE_ROWS + j]
+        for j in range(TWO_ROWS):
+            tables.packed[block * TWO_ROWS + j] = sums[0, j]
+            tables.second_packed[block * TWO_ROWS + j] = sums[1, j]
     for q in range(1, tables.memory_sum.size):
         o, share = grid.offset[q], grid.mode_two[grid.entry[q]]
-        rest = 1.0 - share
+        share_three = 1.0 - share
         tables.memory_sum[q] = complex(
-            share * tables.packed[o] + rest * tables.others[o],
-            share * tables.packed[o + ENTRIES] + rest * tables.others[o + ENTRIES],
+            share * tables.packed[o] + share_three * tables.second_packed[o],
+            share * tables.packed[o + ENTRIES]
+            + share_three * tables.second_packed[o + ENTRIES],
         )
 
 
 @jit_inside
 def advance_with_ramp(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
-    """psi <- E psi + B V, V = `rate_hat`, with a slip rate that changes by `past_hat` in it."""
+    """Step 2: psi <- E psi + B V + R a, with V = `rate_hat` (m/s) and a = `past_hat` (m/s²)."""
     pairs, multiplicity = grid.poles.size, grid.multiplicity
     pack(grid.offset, tables.rate_hat, tables.packed)
-    pack(grid.offset, tables.past_hat, tables.others)
-    for block in range(memory.size // (FOUR * pairs)):
-        v, a = tables.packed[block * TWO :][:TWO], tables.others[block * TWO :][:TWO]
+    pack(grid.offset, tables.past_hat, tables.second_packed)
+    for block in range(memory.size // (FOUR_ROWS * pairs)):
+        v, a = (
+            tables.packed[block * TWO_ROWS :][:TWO_ROWS],
+            tables.second_packed[block * TWO_ROWS :][:TWO_ROWS],
+        )
         for p in range(pairs):
-            y = memory[(block * pairs + p) * FOUR :][:FOUR]
-            own = block // multiplicity * pairs + p
-            e, s = tables.table[own * FOUR :][:FOUR], tables.ramp[own * TWO :][:TWO]
+            y = memory[(block * pairs + p) * FOUR_ROWS :][:FOUR_ROWS]
+            entry = block // multiplicity * pairs + p
+            e = tables.table[entry * FOUR_ROWS :][:FOUR_ROWS]
+            r = tables.ramp[entry * TWO_ROWS :][:TWO_ROWS]
             for j in range(ENTRIES):
-                er, ei, gr, gi = e[j], e[ENTRIES + j], e[TWO + j], e[THREE + j]
-                lr, li = s[j], s[ENTRIES + j]
+                er, ei, br, bi = e[j], e[ENTRIES + j], e[TWO_ROWS + j], e[THREE_ROWS + j]
+                rr, ri = r[j], r[ENTRIES + j]
                 yr, yi = y[j], y[ENTRIES + j]
-                y[j] = er * yr - ei * yi + gr * v[j] + lr * a[j]
-                y[ENTRIES + j] = er * yi + ei * yr + gi * v[j] + li * a[j]
-                yr, yi = y[TWO + j], y[THREE + j]
-                y[TWO + j] = er * yr - ei * yi + gr * v[ENTRIES + j] + lr * a[ENTRIES + j]
-                y[THREE + j] = er * yi + ei * yr + gi * v[ENTRIES + j] + li * a[ENTRIES + j]
+                y[j] = er * yr - ei * yi + br * v[j] + rr * a[j]
+                y[ENTRIES + j] = er * yi + ei * yr + bi * v[j] + ri * a[j]
+                yr, yi = y[TWO_ROWS + j], y[THREE_ROWS + j]
+                y[TWO_ROWS + j] = er * yr - ei * yi + br * v[ENTRIES + j] + rr * a[ENTRIES + j]
+                y[THREE_ROWS + j] = (
+                    er * yi + ei * yr + bi * v[ENTRIES + j] + ri * a[ENTRIES + j]
+                )
 
 
 def grown_memory(grid: Grid, memory: Floats, rate_hat: Spectrum, growth: float) -> Spectrum:
-    """psi of a slip rate that has always grown as exp(growth t); return Re sum w psi, (modes,)."""
+    """Set psi = V/(growth - s |k| c_s) of a slip rate that has always grown as exp(growth t).
+
+    Returned is Re sum w psi, (modes,).
+    """
     total = np.zeros(rate_hat.size, dtype=np.complex128)
     rate, entry, pairs = rate_hat[1:], grid.entry[1:], grid.poles.size
-    first = grid.offset[1:] // (2 * ENTRIES) * pairs * 4 * ENTRIES + grid.offset[1:] % ENTRIES
+    first = grid.offset[1:] // TWO_ROWS * pairs * FOUR_ROWS + grid.offset[1:] % ENTRIES
     for p in range(pairs):
-        part = grid.mode_two[entry] if p < grid.split else 1.0 - grid.mode_two[entry]
+        share = grid.mode_two[entry] if p < grid.split else 1.0 - grid.mode_two[entry]
         gain = 1.0 / (growth - grid.poles[p] * grid.frequency[entry])
-        own = first + p * 4 * ENTRIES
+        place = first + p * FOUR_ROWS
         for row, signal in enumerate((rate.real, rate.imag)):
-            memory[own + 2 * row * ENTRIES] = gain.real * signal
-            memory[own + (2 * row + 1) * ENTRIES] = gain.imag * signal
-        total[1:] += part * (grid.weights[p] * gain).real * rate
+            memory[place + row * TWO_ROWS] = gain.real * signal
+            memory[place + row * TWO_ROWS + ENTRIES] = gain.imag * signal
+        total[1:] += share * (grid.weights[p] * gain).real * rate
     return total

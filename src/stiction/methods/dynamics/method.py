@@ -18,7 +18,13 @@ from stiction.methods.dynamics.diagnostics import stress_scale
 from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.medium import Medium, prepare_medium
 from stiction.methods.dynamics.slow_start import slow_start, static_program
-from stiction.methods.dynamics.state import History, Nodes, Setting, State, Thresholds
+from stiction.methods.dynamics.state import (
+    Nodes,
+    PiecewiseLinear,
+    RuptureState,
+    Setting,
+    Thresholds,
+)
 from stiction.methods.dynamics.summary import scalars, summary
 from stiction.problem.problem import Problem, refusals
 from stiction.problem.results import onset_variables
@@ -41,7 +47,7 @@ _LATER = (
 )  # fmt: skip
 
 
-def _load_history(load: Any) -> History | None:
+def _load_history(load: Any) -> PiecewiseLinear | None:
     """Return times (s) and values (Pa) of tau_0 from samples (times, values), checked."""
     if load is None:
         return None
@@ -56,10 +62,10 @@ def _load_history(load: Any) -> History | None:
         raise InputError("times and values must be finite")
     if times[0] != 0.0 or np.any(np.diff(times) <= 0.0):
         raise InputError("times must begin at 0 s and increase")
-    return History(times, values)
+    return PiecewiseLinear(times, values)
 
 
-def _written(load: History | None) -> Any:
+def _written(load: PiecewiseLinear | None) -> Any:
     return None if load is None else [one.tolist() for one in load]
 
 
@@ -257,7 +263,7 @@ class Rupture:
             raise InputError(reasons)
         return specimens.RuptureProgram(problem, self)
 
-    def _one(self, run: Run, state: State | None) -> dict[str, Any]:
+    def _one(self, run: Run, state: RuptureState | None) -> dict[str, Any]:
         rest = checks.at_first_slip(run)
         if rest is None:  # nothing slips: what it came to is at the end of the load
             state = run.start(min(run.setting.load.at[-1], run.setting.thresholds.end_time))
@@ -268,8 +274,8 @@ class Rupture:
             if ended is None:
                 raise InputError(
                     f"max_steps: {self.max_steps} steps led to tau_0 = {state.now['load']:.6g} Pa,"
-                    f" and {state.now['slid']} nodes to their residual strength, but not to stop="
-                    f"{self.stop!r}; raise max_steps or the loading rate"
+                    f" and {state.now['weakened_nodes']} nodes to their residual strength, but not to"
+                    f" stop={self.stop!r}; raise max_steps or the loading rate"
                 )
         checks.warn_of_slip(run, state)
         found = summary(run, state)
@@ -303,7 +309,7 @@ def make_run(
     steepest *= friction.steepest_slope / friction.initial_slope
     history = method.load
     if history is None:
-        history = History(np.array([0.0, 1.0]), np.array([0.0, method.loading_rate]))
+        history = PiecewiseLinear(np.array([0.0, 1.0]), np.array([0.0, method.loading_rate]))
     rising = np.sign(np.diff(history.values))
     setting = Setting(
         law=friction.parameters,
@@ -331,7 +337,9 @@ def _least_load(medium: Medium, nodes: Nodes, steepest: float) -> float:
     return float(np.partition(loads, weakest - 1)[:weakest].mean())
 
 
-def _thresholds(method: Rupture, medium: Medium, nodes: Nodes, load: History) -> Thresholds:
+def _thresholds(
+    method: Rupture, medium: Medium, nodes: Nodes, load: PiecewiseLinear
+) -> Thresholds:
     """When steps change or end.
 
     Calm: for as long as shear waves need to cross the interface, nothing slips faster than a crack

@@ -16,7 +16,13 @@ from stiction.base.files import PART, UNREADABLE, read_arrays, write_arrays, wri
 from stiction.base.model import Count, FilePath, Names, Real, Text, checked, model
 from stiction.base.variables import Variable
 from stiction.methods.dynamics.integrator import Run
-from stiction.methods.dynamics.state import DIAGNOSTICS, STATION, Floats, Record, State
+from stiction.methods.dynamics.state import (
+    DIAGNOSTICS,
+    STATION,
+    Floats,
+    RuptureState,
+    StepRecord,
+)
 from stiction.methods.dynamics.summary import energy_balance, per_area, seismic_moment
 from stiction.problem.interface import Interface
 from stiction.problem.results import along, coordinate, to_dataset
@@ -144,7 +150,9 @@ class Recorder:
         interface = run.medium.interface
         self._others = repr([save.fields, save.stations])  # on which a folder depends, too
         rows, stations = save.every, len(save.stations)
-        self._record = Record(np.empty(rows, DIAGNOSTICS), np.empty((rows, stations), STATION))
+        self._record = StepRecord(
+            np.empty(rows, DIAGNOSTICS), np.empty((rows, stations), STATION)
+        )
         self._columns = {name: self._record.steps[name.removeprefix("step_")] for name in STEPS}
         for name in STATIONS if stations else ():
             self._columns[name] = self._record.stations[name.removeprefix("station_")]
@@ -154,21 +162,21 @@ class Recorder:
         over |= SCALARS | STEPS | STATIONS
         self.variables = {name: per_area(interface, what) for name, what in over.items()}
 
-    def advance(self, state: State, count: int) -> tuple[int, int]:
+    def advance(self, state: RuptureState, count: int) -> tuple[int, int]:
         """Take up to `count` steps and record them; return (steps taken, why it returned)."""
-        rows = Record(*(part[:count] for part in self._record))
+        rows = StepRecord(*(part[:count] for part in self._record))
         taken, reason = self.run.advance(state, count, rows)
         self._steps.append({name: one[:taken].copy() for name, one in self._columns.items()})
         return taken, reason
 
-    def add(self, state: State) -> None:
+    def add(self, state: RuptureState) -> None:
         """Keep a frame of the state as it is now."""
         run, now, medium = self.run, state.now, self.run.medium
         frame: dict[str, Any] = {name: float(now[name]) for name in _WATCHED}
         frame |= {
             "mean_slip": float(state.slip.mean()),
             "top_slip_rate": float(state.rate.max()),
-            "weakened_fraction": float(now["slid"]) / state.slip.size,
+            "weakened_fraction": float(now["weakened_nodes"]) / state.slip.size,
             "seismic_moment": seismic_moment(run, state),
         }
         with np.errstate(over="ignore"):  # just before a run becomes non-finite
@@ -204,7 +212,7 @@ class Recorder:
                 coordinates[f"station_{dim}"] = (i * spacing, place)
         return to_dataset(data, self.variables, coordinates, self.attributes)
 
-    def begin(self, state: State) -> bool:
+    def begin(self, state: RuptureState) -> bool:
         """Open the folder; return whether it holds this very run up to its end.
 
         If it holds a part of the run, the state becomes that which was written last.
@@ -230,7 +238,7 @@ class Recorder:
                 path.unlink()
         return False
 
-    def flush(self, state: State, *, at_once: bool = False, last: bool = False) -> None:
+    def flush(self, state: RuptureState, *, at_once: bool = False, last: bool = False) -> None:
         """Write what was gathered, if there is enough or at once, and the state to resume from.
 
         That is not the last one: a run that goes on may have no frame where `max_steps` ended it.
@@ -270,13 +278,15 @@ def _digest(run: Run, others: str) -> str:
     return digest.hexdigest()
 
 
-def write_checkpoint(path: Path, run: Run, state: State, others: str = "") -> None:
+def write_checkpoint(path: Path, run: Run, state: RuptureState, others: str = "") -> None:
     """Save the state of a run and a digest of all that it depends on, whole or not at all."""
     digest = np.frombuffer(_digest(run, others).encode(), np.uint8)
     write_arrays(path, {"digest": digest} | state._asdict())
 
 
-def read_checkpoint(path: Path, run: Run, state: State, others: str = "") -> State:
+def read_checkpoint(
+    path: Path, run: Run, state: RuptureState, others: str = ""
+) -> RuptureState:
     """Fill a state of this very run with the content of a checkpoint, and return it."""
     try:
         arrays = read_arrays(path)

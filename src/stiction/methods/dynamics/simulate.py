@@ -16,7 +16,7 @@ from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.method import Rupture, make_run
 from stiction.methods.dynamics.save import SCALARS, Recorder, Save, open_rupture
 from stiction.methods.dynamics.simulate_event import simulate_event
-from stiction.methods.dynamics.state import State
+from stiction.methods.dynamics.state import RuptureState
 from stiction.methods.dynamics.summary import summary
 from stiction.problem.problem import Problem, refusals
 from stiction.problem.profiles.placing import with_gaps
@@ -137,7 +137,7 @@ def simulate_rupture(
     return with_gaps(problem, result, measured)
 
 
-def _follow(run: Run, state: State, recorder: Recorder, most: int, meter: Meter) -> str:
+def _follow(run: Run, state: RuptureState, recorder: Recorder, most: int, meter: Meter) -> str:
     """Take steps and keep frames until the run ends; return the reason."""
     every = recorder.save.every
     while state.steps < most:
@@ -154,7 +154,7 @@ def _follow(run: Run, state: State, recorder: Recorder, most: int, meter: Meter)
         now = state.now
         meter.note = (
             f"t = {now['time']:.6g} s, mean stress {now['mean_stress'] * 1e-6:.4f} MPa, "
-            f"{now['slid'] / state.slip.size:.0%} weakened"
+            f"{now['weakened_nodes'] / state.slip.size:.0%} weakened"
         )
         meter.advance(taken)
         if stopped := run.ending(state, reason):
@@ -163,7 +163,9 @@ def _follow(run: Run, state: State, recorder: Recorder, most: int, meter: Meter)
     return "max_steps"
 
 
-def _complete(dataset: xr.Dataset, method: Rupture, run: Run, state: State) -> xr.Dataset:
+def _complete(
+    dataset: xr.Dataset, method: Rupture, run: Run, state: RuptureState
+) -> xr.Dataset:
     """Add the variables of the whole run."""
     problem, interface = run.medium.problem, run.medium.interface
     variables = {name: along(interface, variable) for name, variable in _ALONG.items()}

@@ -15,7 +15,7 @@ import numpy as np
 
 from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.memory import grown_memory
-from stiction.methods.dynamics.state import State
+from stiction.methods.dynamics.state import Phase, RuptureState
 from stiction.methods.dynamics.summary import energy_balance
 from stiction.methods.equilibrium.dense.program import DenseProgram
 from stiction.methods.equilibrium.sample import StaticSample, exceeds, refused, sample_of
@@ -37,7 +37,7 @@ def static_program(problem: Problem) -> DenseProgram | None:
 
 def slow_start(
     program: DenseProgram, run: Run, rows: Sample, number: int, rate: float
-) -> State | None:
+) -> RuptureState | None:
     """The state closest to the onset whose error is small enough, None if there is none."""
     nodes = run.setting.nodes
     if not np.all(np.isfinite(nodes.strength)) or np.any(nodes.strength <= nodes.initial):
@@ -71,8 +71,8 @@ def _at(
     onset: float,
     distance: float,
     rate: float,
-) -> State | None:
-    """State at a distance (Pa) below the onset; None where it is not determined well enough.
+) -> RuptureState | None:
+    """RuptureState at a distance (Pa) below the onset; None where it is not determined well enough.
 
     That is where a node is beyond the first piece of its law, so that the programme does not hold,
     or has lost half of its strength at a time that would be unknown.
@@ -99,11 +99,11 @@ def _at(
     stress -= run.medium.impedance * slip_rate
     missed = np.abs(stress - run.strength_after(here.slip))[here.slip > 0.0]
     state.rate[:], state.past[:], state.stress[:] = slip_rate, mean_rate, stress
-    state.phase[0] = 0.0
     now = state.now
-    now["past_step"], now["top_slip_rate"] = interval, slip_rate.max()
-    now["mean_stress"] = now["local_stress"] = stress.mean()
-    now["local_radiated"] = now["radiated"] = radiated
+    now["phase"], now["two_step"] = Phase.IMPLICIT, 1
+    now["previous_size"], now["top_slip_rate"] = interval, slip_rate.max()
+    now["mean_stress"] = now["maximum_stress"] = stress.mean()
+    now["maximum_radiated"] = now["previous_radiated"] = radiated
     # The slow path has radiated nothing: that is the work that was done on it.
     now["work"] -= energy_balance(run, state)["radiated_energy"]
     now["start_error"] = missed.max(initial=0.0)

@@ -1,5 +1,16 @@
 """The state of a rupture: constants of a run, variables, and diagnostics of every step.
 
+A run takes steps of two kinds. Implicit steps of adaptive size follow an interface that creeps
+(`implicit`), explicit steps of one size follow its waves (`explicit`); `RuptureState.phase` says
+which kind comes next. Both solve, at every node,
+
+    tau = tau_0 p + tau_i + f - Z V,   V = 0 or tau = strength(slip),   V >= 0.              (1)
+
+tau_0 p is the load, tau_i the initial stress, Z = G/(2 c_s) the impedance and f the stress that
+slip elsewhere transfers, mode by mode with the memory kernel C of `elasticity.memory_kernels`:
+
+    f(k, t) = -K(k) slip(k, t) + (G|k|/2) int_0^t C(|k| c_s t') V(k, t - t') dt'.            (2)
+
 Fields of the interface and their transforms are flat, whatever its shape; `Grid.transform` knows
 the shape. Modes q = 0, 1, ... are those of the real transform in its order, q = 0 the mean.
 """
@@ -19,7 +30,7 @@ Spectrum = NDArray[np.complex128]
 Floats = NDArray[np.float64]
 
 
-class History(NamedTuple):
+class PiecewiseLinear(NamedTuple):
     """A piecewise linear function, continued beyond its last point with its last slope."""
 
     at: Floats  # times, s, or loads, Pa; rising
@@ -27,7 +38,7 @@ class History(NamedTuple):
 
 
 @jit
-def value_at(history: History, t: float) -> Any:
+def value_at(history: PiecewiseLinear, t: float) -> Any:
     """Value of a piecewise linear function."""
     times, values = history
     low, high = 0, times.size - 1
@@ -46,43 +57,61 @@ Reason = IntEnum(
 )
 """Reasons why a compiled loop of steps returned."""
 
+
+class Phase(IntEnum):
+    """The kind of steps that comes next. It decides what `RuptureState.memory` holds."""
+
+    IMPLICIT = 0  # psi, the memory variables themselves
+    EXPLICIT = 1  # psi/B, the same divided by their response B to a unit slip rate
+
+
 DIAGNOSTICS = np.dtype(
     [
+        # The last step.
         ("time", "f8"),  # s
-        ("size", "f8"),  # of the last step, s
+        ("size", "f8"),  # s
         ("load", "f8"),  # tau_0, Pa
-        ("work", "f8"),  # of the load on the slip, J/m
+        ("work", "f8"),  # of the load on the slip so far, J/m
         ("mean_slip", "f8"),  # m
         ("mean_stress", "f8"),  # Pa, as all stresses here
-        ("local_stress", "f8"),  # last maximum of the mean stress, and there
-        ("local_radiated", "f8"),  # Z <V>, time, load and the fastest node
-        ("local_time", "f8"),
-        ("local_load", "f8"),
-        ("local_node", "i8"),
-        ("in_event", "i8"),  # whether an instability has begun there
-        ("event_rate", "f8"),  # largest slip rate since then, m/s
-        ("first_stress", "f8"),  # mean stress at the first instability; -inf before
-        ("onset_stress", "f8"),  # that of the highest one; -inf before
+        ("top_slip_rate", "f8"),  # largest slip rate, m/s, and where
+        ("top_node", "i8"),
+        ("weakened_nodes", "i8"),  # number of nodes at the residual strength
+        ("non_finite_node", "i8"),  # after Reason.NOT_FINITE, the first whose slip rate is not
+        # The last maximum of the mean stress.
+        ("maximum_stress", "f8"),
+        ("maximum_radiated", "f8"),  # Z <V>
+        ("maximum_time", "f8"),
+        ("maximum_load", "f8"),
+        ("maximum_node", "i8"),  # the fastest
+        # Instabilities. Stresses, times and loads are NaN until they have happened.
+        ("instabilities", "i8"),  # how many have begun
+        ("in_event", "i8"),  # whether one has begun at the last maximum and has not ended
+        ("event_slip_rate", "f8"),  # largest slip rate in it, m/s
+        ("arrested_events", "i8"),
+        ("first_stress", "f8"),  # mean stress at the first one
+        ("onset_stress", "f8"),  # mean stress at the highest one
         ("onset_time", "f8"),
         ("onset_load", "f8"),
         ("onset_node", "i8"),
-        ("arrested", "i8"),  # instabilities that have stopped
-        ("kinetic_stress", "f8"),  # mean stress when all that can break had broken; -inf before
-        ("top_slip_rate", "f8"),  # largest slip rate, m/s, and where
-        ("top_node", "i8"),
-        ("slid", "i8"),  # nodes at the residual strength
-        ("bad_node", "i8"),  # first node whose slip rate became non-finite; -1 if none
-        ("past_step", "f8"),  # of the last implicit step; 0 before the first one
-        ("radiated", "f8"),  # Z <V> after the last implicit step
+        ("all_broken", "i8"),  # whether all that can break has been at its residual strength
+        ("kinetic_stress", "f8"),  # mean stress when that happened
+        # Choice of steps.
+        ("phase", "i8"),  # a `Phase`
+        ("next_size", "f8"),  # that the next implicit step tries, s
+        ("two_step", "i8"),  # whether it knows the rate of an implicit step before it
+        ("previous_size", "f8"),  # of the last implicit step, s
+        ("previous_radiated", "f8"),  # Z <V> after it
         ("explicit_steps", "i8"),
         ("implicit_steps", "i8"),
         ("calm_steps", "i8"),  # in a row, and the largest slip rate when the row began, m/s
         ("calm_rate", "f8"),
-        ("scale", "f8"),  # stress scale of the largest load so far
-        ("start_load", "f8"),  # where the run began, and what that may cost
+        # The whole run so far.
+        ("scale", "f8"),  # stress scale of the largest load
+        ("start_load", "f8"),  # where the run began, and the error that this may cause
         ("start_error", "f8"),
-        ("least", "f8"),  # smallest sum of stress and strength so far, and where
-        ("least_node", "i8"),
+        ("reverse_margin", "f8"),  # smallest sum of stress and strength, and where:
+        ("reverse_node", "i8"),  # below zero, slip would reverse there
     ]
 )
 """Diagnostics of every step: one record, which compiled steps and checkpoints share."""
@@ -91,8 +120,8 @@ STATION = np.dtype([("slip", "f8"), ("slip_rate", "f8"), ("shear_stress", "f8")]
 """Slip (m), slip rate (m/s) and stress (Pa) of a node."""
 
 
-class Record(NamedTuple):
-    """What is kept of every step; with no rows, nothing."""
+class StepRecord(NamedTuple):
+    """Rows to keep every step in. Without rows, nothing is kept."""
 
     steps: NDArray[Any]  # (steps,) array of DIAGNOSTICS
     stations: NDArray[Any]  # (steps, stations) array of STATION
@@ -153,14 +182,14 @@ class Setting(NamedTuple):
     nodes: Nodes
     mean_profile: float  # <p>
     mean_initial: float  # <tau_i>, Pa
-    load: History  # tau_0(t)
+    load: PiecewiseLinear  # tau_0(t)
     turning_times: Array  # when the load begins to fall or to rise again, s
-    scale: History  # stress scale against the load, Pa
+    scale: PiecewiseLinear  # stress scale against the load, Pa
     thresholds: Thresholds
-    stations: Ints  # nodes that `Record.stations` holds
+    stations: Ints  # nodes that `StepRecord.stations` holds
 
 
-class State(NamedTuple):
+class RuptureState(NamedTuple):
     """Variables of a run; two runs from equal states are the same run, bit by bit."""
 
     slip: Floats  # (nodes,), m; flat, also on a plane
@@ -168,11 +197,10 @@ class State(NamedTuple):
     stress: Floats  # Pa
     slip_hat: Spectrum  # (modes,) real transform of the slip
     past: Floats  # mean slip rate in the last implicit step, m/s
-    memory: Floats  # as in `memory`: psi/B while explicit, psi while implicit
+    memory: Floats  # memory variables, packed as in `memory`; `Phase` says in which form
     memory_sum: Floats  # weighted sum of the memory variables for the next explicit step
     arrival: Floats  # when the front arrived, s; nan before
     diagnostics: NDArray[Any]  # (1,) array of DIAGNOSTICS
-    phase: Floats  # 1 if explicit steps come next, else 0; size that the next implicit one tries, s
 
     @property
     def now(self) -> Any:
@@ -182,11 +210,11 @@ class State(NamedTuple):
     @property
     def explicit(self) -> bool:
         """Whether explicit steps come next."""
-        return bool(self.phase[0])
+        return bool(self.now["phase"] == Phase.EXPLICIT)
 
     @property
     def steps(self) -> int:
-        """Steps taken so far, of both kinds."""
+        """Number of steps taken so far, of both kinds."""
         return int(self.now["explicit_steps"] + self.now["implicit_steps"])
 
 
@@ -206,7 +234,7 @@ class ExplicitTables(NamedTuple):
 class ImplicitTables(NamedTuple):
     """Tables of an implicit step of some size, with arrays to work in; belong to one run."""
 
-    valid_for: Array  # size (s) and ratio of the last step that they are for; -1 if none
+    valid_for: Array  # size (s) and ratio of the step that they are for; NaN before the first
     table: Array  # this one to `ramp_response`: see `memory.tabulate`
     ramp: Array
     response: Array
@@ -221,11 +249,11 @@ class ImplicitTables(NamedTuple):
     increment: Array
     driving: Array
     falling: Array
-    residual: Array
-    direction: Array
+    cg_residual: Array
+    cg_direction: Array
     product: Array
-    other: Array
+    cg_preconditioned: Array
     slipping: Ints  # 0 stuck, 1 slipping
-    packed: Array  # in packed order, as `others`
-    others: Array
+    packed: Array  # a Fourier array in packed order, as the next one
+    second_packed: Array
     sums: Array  # (2, 128)

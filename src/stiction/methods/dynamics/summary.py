@@ -7,7 +7,7 @@ import numpy as np
 
 from stiction.base.variables import Variable
 from stiction.methods.dynamics.integrator import Run
-from stiction.methods.dynamics.state import Floats, State
+from stiction.methods.dynamics.state import Floats, RuptureState
 from stiction.problem.interface import Interface
 from stiction.problem.results import position
 
@@ -58,13 +58,13 @@ def scalars(interface: Interface) -> dict[str, Variable]:
     return found
 
 
-def seismic_moment(run: Run, state: State) -> float:
+def seismic_moment(run: Run, state: RuptureState) -> float:
     """Return the moment of the slip, N; on a plane N m."""
     medium = run.medium
     return medium.problem.solid.shear_modulus * float(state.slip.sum()) * medium.grid.cell
 
 
-def energy_balance(run: Run, state: State) -> dict[str, float]:
+def energy_balance(run: Run, state: RuptureState) -> dict[str, float]:
     """Return strain, fracture and radiated energy, J/m; on a plane J.
 
     The static strain energy is the sum over modes of K(k)|delta_k|²/2. Waves carry away the work
@@ -86,7 +86,7 @@ def energy_balance(run: Run, state: State) -> dict[str, float]:
     }
 
 
-def _axis_speeds(run: Run, state: State, name: str) -> list[float]:
+def _axis_speeds(run: Run, state: RuptureState, name: str) -> list[float]:
     """Return a speed of the front along each axis, on the lines through its origin, m/s."""
     interface = run.medium.interface
     nucleation = run.medium.problem.nucleation_lengths(run.steepest_rate)
@@ -108,7 +108,7 @@ def _critical_load(run: Run, now: Any, stress: float) -> float:
     return load if not overstressed or load > now["start_load"] + margin else np.nan
 
 
-def summary(run: Run, state: State) -> dict[str, Any]:
+def summary(run: Run, state: RuptureState) -> dict[str, Any]:
     """Return the scalars of a finished run; NaN is what did not happen."""
     interface, now = run.medium.interface, state.now
     onset, first, kinetic = (
@@ -128,7 +128,7 @@ def summary(run: Run, state: State) -> dict[str, Any]:
         "kinetic_stress": kinetic,
         "stress_drop": critical - kinetic,
         "seismic_moment": seismic_moment(run, state),
-        "arrested_events": int(now["arrested"]),
+        "arrested_events": int(now["arrested_events"]),
         "median_rupture_speed": _axis_speeds(run, state, "median_rupture_speed"),
         **{name: spent[name] for name in ("radiated_energy", "fracture_energy")},
         **{name: float(now[name]) for name in ("onset_time", "start_load", "start_error")},
