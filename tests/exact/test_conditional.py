@@ -163,6 +163,21 @@ def test_posteriors_of_skewed_values_beyond_two_moments(case):
         known.warn()
 
 
+def test_draws_fit_contradictory_values_as_well_as_their_mean_does():
+    """A smooth field and 60 unrelated values of little noise: the updates do not settle."""
+    field = st.RandomField(BETA, st.PowerLawSpectrum(5e-3), mean_mode=True)
+    places, values = (
+        np.linspace(1e-3, 19e-3, 60),
+        np.random.default_rng(3).uniform(0.7, 1.6, 60),
+    )
+    known = conditioning(given_on(places, 1e6 * values, 2e3, field), LINE)
+    phi = field.modes(LINE).basis(places[None])
+    draws = known.draws(np.random.default_rng(0).standard_normal((200, phi.shape[1])))
+    off = (from_normal(BETA, draws @ phi.T) - 1e6 * values) / 2e3
+    misfits = (off**2).sum(axis=1) + (draws**2).sum(axis=1)
+    assert np.median(misfits) < 1.01 * known.misfit  # 0.98 of it; 7.4e5 for 60 values
+
+
 def test_a_marginal_without_quantiles_far_out_is_mapped_all_the_same():
     """Below -4.9 standard deviations the likelihood is zero instead of next to nothing."""
 

@@ -1,20 +1,46 @@
 """A field that was measured in places: values with errors, and the field elsewhere.
 
-A Gaussian field is a linear function of its draws, z(x) = phi(x)^T a with a standard
-normal. So measured z_k = phi(x_k)^T a + e_k are a linear regression, whose posterior is
+Problem
+-------
+A Gaussian field is a linear function of its draws, z(x) = phi(x)'a with standard normal a, and the
+property itself is v(x) = F^-1(Phi(z(x))) with its marginal F. Values v_k were measured at places
+x_k with normal errors of the standard deviation `noise`. With phi_k = phi(x_k), the posterior of
+the draws has a density proportional to
 
-    a | z ~ N(mu, P),  P = (1 + Psi^T Psi)^-1,  mu = P Psi^T (z_k/error_k)
+    N(a) prod_k l_k(phi_k'a),   log l_k(z) = -(v_k - F^-1(Phi(z)))^2 / (2 noise^2).           (1)
 
-with Psi = phi(x_k)/error_k. So mu + P^(1/2) a with the symmetric root turns the usual
-draws into conditioned ones, of the distribution that Matheron's rule gives (Journel and
-Huijbregts, 1978; Doucet, 2010). With the singular values of Psi = U s V^T, P^(1/2) =
-1 + V ((1 + s^2)^(-1/2) - 1) V^T is well conditioned however densely a smooth field was
-measured.
+If every l_k is replaced by a Gaussian exp(b_k z - p_k z^2/2), whose precision p_k may be negative,
+this is a linear regression. The posterior of the draws is then normal, with
 
-Values are measured of the marginal and not of z. Their likelihood, a function of z at each
-place, is replaced by the Gaussian of the same mean and variance, in turns with the
-regression (expectation propagation; Minka, 2001). Where that is not enough, draws are
-mapped before the regression (`stiction.random.transport`).
+    covariance P = (1 + sum_k p_k phi_k phi_k')^-1,   mean mu = P sum_k b_k phi_k.            (2)
+
+mu + P^(1/2) a with the symmetric root turns the usual draws into conditioned ones, of the
+distribution that Matheron's rule gives (A. G. Journel and C. J. Huijbregts, Mining Geostatistics,
+1978; A. Doucet, 2010). So nothing changes for a caller but the draws.
+
+Algorithm (`conditioned`)
+-------------------------
+Expectation propagation (T. P. Minka, Uncertainty in Artificial Intelligence 17, 2001), then a map
+for the skewness that Gaussians miss:
+
+1. Begin with z ~ N(0, 1) at every place, as if nothing else had been measured.
+2. Replace each l_k by the Gaussian with which the product of l_k and the normal distribution of z_k
+   given all other values keeps its mean and variance (`Measured.gaussian`, by quadrature).
+3. Find the regression (2) from a singular value decomposition (`_regression`). With the rows
+   |p_k|^(1/2) phi_k' = U s V' and positive p_k, P^(1/2) = 1 + V ((1 + s^2)^(-1/2) - 1) V' is well
+   conditioned however densely a smooth field was measured. Where some p_k are negative, V is turned
+   so that P is diagonal in it, and s^2 stands for the eigenvalues of P^-1 - 1, which may be below
+   zero.
+4. Take the Gaussian of each place out of the posterior again: z_k given all other values
+   (`_from_others`).
+5. Repeat from 2 until these means stay, or for `MAX_UPDATES`.
+6. Map draws before the regression, so that they have the density (1) instead of its Gaussian
+   approximation (`stiction.random.transport`, which also estimates the remaining error).
+7. Compare the misfit of values and draws at the mean with chi-square, for a warning.
+
+Departures from Minka: all places are updated at once; Gaussians that have no posterior (P not
+positive definite) are tempered, b and p by the same factor, and the precision that is left for a
+place in step 4 is at least half of that before any measurement.
 """
 
 from collections.abc import Sequence
@@ -45,28 +71,38 @@ from stiction.random.transport import (
     transport,
 )
 
-DOUBTFUL = 5.0  # standard deviations of chi-square beyond which values do not suit a field
-UNCERTAIN = 0.1  # of a standard deviation of z, by which a posterior may be off
-PROBES = 1024  # samples by which quantiles beyond the Gaussian are found
-IMPOSSIBLE = 4.0  # errors beyond a bound of the marginal that no measured value has
-FURTHEST = 37.0  # largest z whose tail of the normal distribution is a float
-REACH, NODES = 8.0, 49  # half width of Gaussians, and nodes across them
-CUT = 18.0  # fall of a log density from its peak to the ends that leaves nothing beyond
-NARROWINGS = 6  # of a range that holds a peak, each to two of its intervals at least
-TURNS, SETTLED = 8, 1e-3  # between likelihood and regression; change of z that ends them
-NEGLIGIBLE = 1e-8  # singular value below which a direction of the draws stays as it is
-FAINT, LEAST = 1e-10, -0.9  # precisions: of places, as scaled; of all, less that of the prior
-SHARP = 1e-4  # error of a measured z that needs no turns
-TINY, LOWEST = 1e-12, -1e9  # least variance, and least logarithm of a likelihood
+# Limits of errors and warnings
+MAX_CHI_SQUARE = 5.0  # standard deviations of chi-square above its mean: values suit the field
+MAX_POSTERIOR_ERROR = 0.1  # standard deviations of z by which a posterior may be off
+MAX_ERRORS_OUTSIDE = 4.0  # errors by which a measured value may lie beyond a bound
+
+# Quadrature of step 2
+MAX_Z = 37.0  # largest z whose tail of the normal distribution is a float
+HALF_WIDTH, RANGE_NODES = 8.0, 49  # of a Gaussian, in deviations, and nodes across the range
+MIN_END_FALL = 18.0  # of a log density from its peak to the ends of a range that holds it all
+MAX_NARROWINGS = 6  # of a range that holds a peak, each to two of its intervals at least
+MIN_HALF_RANGE = 1e-12
+LOG_OF_IMPOSSIBLE = -1e9  # lowest logarithm of a likelihood
+
+# Regression and rounds, in units of z
+MAX_UPDATES = 8
+SETTLED_MEAN = 1e-3  # change of the means of step 4 that ends the updates
+MIN_SINGULAR_VALUE = 1e-8  # below, a direction of the draws stays as it is
+MIN_SCALE = 1e-10  # of |p_k| where it scales a row
+MIN_EIGENVALUE = -0.9  # of s^2: P^-1 has 1 + s^2
+MIN_VARIANCE = 1e-12
+MIN_DEVIATION = 1e-4  # of a measured z; below, the map is linear and needs no updates
+
+QUANTILE_SAMPLES = 1024  # for quantiles beyond the Gaussian
 
 
-class Kept(np.ndarray):
+class ReadPoints(np.ndarray):
     """Places and values that were read before, unlike an array that a user gives."""
 
 
 def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
     """Places (rows x, and y on a plane) and values (last row) of a measurement."""
-    if isinstance(value, Kept):
+    if isinstance(value, ReadPoints):
         return value
     context = info.context or {}
     if "read" in context and not hasattr(value, "dims"):
@@ -83,8 +119,8 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
             )
         if MEASURED in value.coords:  # what was filled in was not measured
             value = value.where(value[MEASURED].astype(bool))
-        each = (in_si(value[name], name, "m") for name in names)
-        rows = [*np.meshgrid(*each, indexing="ij"), _values(value.transpose(*names))]
+        axes = (in_si(value[name], name, "m") for name in names)
+        rows = [*np.meshgrid(*axes, indexing="ij"), _values(value.transpose(*names))]
     points = np.array([np.ravel(row) for row in rows], dtype=np.float64)
     if np.isinf(points).any() or np.isnan(points[:-1]).any():
         raise ValueError("places must be known, and values finite, or NaN where not measured")
@@ -92,15 +128,15 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
     if points.shape[1] == 0:
         raise ValueError("must hold at least one value")
     points.flags.writeable = False
-    return points.view(Kept)
+    return points.view(ReadPoints)
 
 
 def _values(array: Any) -> Array:
     """Values of a labelled array, in the SI unit of whichever property has the one it states."""
     stated = unit_of(array)
-    for one in QUANTITIES.values():
-        if is_in(stated or "1", one.units):
-            return np.asarray(in_si(array, "values", one.units if stated else "1"))
+    for quantity in QUANTITIES.values():
+        if is_in(stated or "1", quantity.units):
+            return np.asarray(in_si(array, "values", quantity.units if stated else "1"))
     raise ValueError(
         f"must be in SI or state a known unit, not {stated!r}, which no property has"
     )
@@ -150,13 +186,13 @@ class Conditions:
             if row.min() < -1e-9 * length or row.max() > length * (1.0 + 1e-9)
         ]
         low, high = marginal.distribution.support()
-        away = np.maximum(low - self.values, self.values - high)
-        if away.max() > IMPOSSIBLE * self.noise:
-            *place, value = self.profile[:, away.argmax()]
+        outside = np.maximum(low - self.values, self.values - high)
+        if outside.max() > MAX_ERRORS_OUTSIDE * self.noise:
+            *place, value = self.profile[:, outside.argmax()]
             at = ", ".join(f"{name} = {x:g} m" for name, x in zip(names, place, strict=True))
             problems.append(
                 f"given.profile: {value:g} at {at} lies outside the marginal, from {low:g} to"
-                f" {high:g}, by more than {IMPOSSIBLE:g} times its error of {self.noise:g}"
+                f" {high:g}, by more than {MAX_ERRORS_OUTSIDE:g} times its error of {self.noise:g}"
             )
         if problems:
             raise InputError(problems)
@@ -169,57 +205,58 @@ class Measured(NamedTuple):
     marginal: Any
     phi: Array
 
-    def logarithm(self, at: NDArray[np.int64], z: Array) -> Array:
-        """Return the log likelihood of places `at` at z (places, ...); -inf without a quantile."""
-        value = self.conditions.values[at].reshape(-1, *(1 for _ in z.shape[1:]))
-        miss = (value - from_normal(self.marginal, z)) * (1.0 / self.conditions.noise)
+    def log_likelihood(self, places: NDArray[np.int64], z: Array) -> Array:
+        """Return log l_k at places (indices) and z (places, ...); -inf without a quantile."""
+        value = self.conditions.values[places].reshape(-1, *(1 for _ in z.shape[1:]))
+        misfit = (value - from_normal(self.marginal, z)) * (1.0 / self.conditions.noise)
         # Far out in the tail scipy may have no quantile.
-        return np.where(np.isnan(miss), -np.inf, -0.5 * miss**2)
+        return np.where(np.isnan(misfit), -np.inf, -0.5 * misfit**2)
 
     def gaussian(self, mean: Array, variance: Array) -> tuple[Array, Array]:
-        """Replace the likelihood of z at each place by a Gaussian, given z from all else.
-
-        Returned are p z, and precisions p, which may be negative, (points,).
-        """
+        """Step 2: return b and p, (points,), given mean and variance of z from all other values."""
         law, noise = self.marginal.distribution, self.conditions.noise
         value = self.conditions.values
-        # Where the likelihood and z from all else overlap.
-        edges = value + REACH * noise * np.array([[-1.0], [1.0]])
-        score = _normal_score(law.cdf(edges), law.sf(edges)).clip(-FURTHEST, FURTHEST)
-        width = REACH * np.sqrt(variance)
-        low, high = np.maximum(score[0], mean - width), np.minimum(score[1], mean + width)
+        # The range of z in which neither the likelihood nor the normal distribution is negligible.
+        edges = value + HALF_WIDTH * noise * np.array([[-1.0], [1.0]])
+        likely = _normal_score(law.cdf(edges), law.sf(edges)).clip(-MAX_Z, MAX_Z)
+        width = HALF_WIDTH * np.sqrt(variance)
+        low, high = np.maximum(likely[0], mean - width), np.minimum(likely[1], mean + width)
         overlap = low < high
         low, high = np.where(overlap, (low, high), (mean - width, mean + width))
 
         def evaluate() -> tuple[Array, Array, Array]:
-            half = np.maximum(0.5 * (high - low), TINY)[:, None]
-            z = 0.5 * (low + high)[:, None] + half * np.linspace(-1.0, 1.0, NODES)
-            off = (z - mean[:, None]) ** 2 / variance[:, None]
-            return half, z, self.logarithm(np.arange(len(z)), z) - 0.5 * off
+            half_range = np.maximum(0.5 * (high - low), MIN_HALF_RANGE)[:, None]
+            z = 0.5 * (low + high)[:, None] + half_range * np.linspace(-1.0, 1.0, RANGE_NODES)
+            square = (z - mean[:, None]) ** 2 / variance[:, None]
+            log_density = self.log_likelihood(np.arange(len(z)), z) - 0.5 * square
+            return half_range, z, log_density
 
-        half, z, density = evaluate()
-        # Where a value contradicts the others, their product peaks outside or at an end.
-        apart = ~overlap | (density[:, [0, -1]].max(axis=1) > density.max(axis=1) - CUT)
+        half_range, z, log_density = evaluate()
+        # Where a value contradicts the others, their product peaks outside or at an end. Then look
+        # at all of both, and narrow the range around the peak.
+        ends = log_density[:, [0, -1]].max(axis=1)
+        apart = ~overlap | (ends > log_density.max(axis=1) - MIN_END_FALL)
         if apart.any():
-            low = np.where(apart, np.minimum(score[0], mean - width), low)
-            high = np.where(apart, np.maximum(score[1], mean + width), high)
-            rows = np.arange(len(z))
-            half, z, density = evaluate()
-            for _ in range(NARROWINGS):
-                near = density > density.max(axis=1, keepdims=True) - 0.5 * REACH**2
-                first, last = near.argmax(axis=1), NODES - 1 - near[:, ::-1].argmax(axis=1)
-                first, last = np.maximum(first - 1, 0), np.minimum(last + 1, NODES - 1)
-                if not (2 * (last - first) < NODES)[apart].any():  # fine enough
+            low = np.where(apart, np.minimum(likely[0], mean - width), low)
+            high = np.where(apart, np.maximum(likely[1], mean + width), high)
+            rows, last_node = np.arange(len(z)), RANGE_NODES - 1
+            half_range, z, log_density = evaluate()
+            for _ in range(MAX_NARROWINGS):
+                peak = log_density.max(axis=1, keepdims=True)
+                near = log_density > peak - 0.5 * HALF_WIDTH**2
+                first, last = near.argmax(axis=1), last_node - near[:, ::-1].argmax(axis=1)
+                first, last = np.maximum(first - 1, 0), np.minimum(last + 1, last_node)
+                if not (2 * (last - first) < RANGE_NODES)[apart].any():  # fine enough
                     break
                 low = np.where(apart, z[rows, first], low)
                 high = np.where(apart, z[rows, last], high)
-                half, z, density = evaluate()
-        top = density.max(axis=1, keepdims=True)
-        weight = np.exp(density - top)
+                half_range, z, log_density = evaluate()
+        # Mean and variance of the product, and the Gaussian that gives it the same.
+        weight = np.exp(log_density - log_density.max(axis=1, keepdims=True))
         total = weight.sum(axis=1)
         centre = (weight * z).sum(axis=1) / total
         spread = (weight * (z - centre[:, None]) ** 2).sum(axis=1) / total
-        spread = np.maximum(spread, (half[:, 0] / NODES) ** 2)
+        spread = np.maximum(spread, (half_range[:, 0] / RANGE_NODES) ** 2)
         precision = 1.0 / spread - 1.0 / variance
         return centre / spread - mean / variance, precision
 
@@ -230,27 +267,25 @@ def _normal_score(below: Array, above: Array) -> Array:
 
 
 class Regression(NamedTuple):
-    """Posterior of the draws given Gaussians for the measured values.
+    """Step 3: the posterior (2) of the draws, given Gaussians for the measured values."""
 
-    With the singular values of Psi = U s V^T, turned where precisions have two signs.
-    """
-
-    left: Array  # U s over the errors, (points, directions)
-    power: Array  # s^2
+    left: Array  # U s over |p|^(1/2), (points, directions)
+    power: Array  # s^2, (directions,)
     right: Array  # V, (dimension, directions)
-    data: Array  # s U^T times the values, (1, directions)
+    data: Array  # V' sum_k b_k phi_k, (1, directions)
 
     def moments(self, phi: Array) -> tuple[Array, Array]:
         """Return mean and standard deviation of z = phi @ draws, (points,)."""
-        along, share = phi @ self.right, 1.0 + self.power
+        along, gain = phi @ self.right, 1.0 + self.power
+        # Variance in directions of the draws that no measurement touches.
         free = (phi**2).sum(axis=1) - (along**2).sum(axis=1)
-        variance = along**2 @ (1.0 / share) + np.where(free > TINY, free, 0.0)
-        return along @ (self.data[0] / share), np.sqrt(variance)
+        variance = along**2 @ (1.0 / gain) + np.where(free > MIN_VARIANCE, free, 0.0)
+        return along @ (self.data[0] / gain), np.sqrt(variance)
 
     def apply(self, out: Array) -> Array:
-        """Turn standard normal draws into those of the posterior, in place."""
-        share, transposed = 1.0 + self.power, np.ascontiguousarray(self.right.T)
-        condition(self.right, transposed, self.data / share, share**-0.5 - 1.0, out)
+        """Turn standard normal draws a into mu + P^(1/2) a, in place."""
+        gain, transposed = 1.0 + self.power, np.ascontiguousarray(self.right.T)
+        condition(self.right, transposed, self.data / gain, gain**-0.5 - 1.0, out)
         return out
 
 
@@ -259,8 +294,8 @@ class Conditioning(NamedTuple):
 
     regression: Regression
     mapped: Transport  # of the draws, before the regression
-    left_over: ErrorEstimate
-    misfit: float  # squared, of values and of draws at the middle of the posterior
+    remaining_error: ErrorEstimate
+    misfit: float  # squared, of values and of draws at the mean of the posterior
     points: int
 
     def draws(self, draws: Array) -> Array:
@@ -273,25 +308,25 @@ class Conditioning(NamedTuple):
     def quantile_at(self, phi: Array, probability: float) -> Array:
         """Return the quantile of z = phi @ draws, (points,); beyond the regression, by samples."""
         mean, deviation = self.regression.moments(phi)
-        found = mean + float(ndtri(probability)) * deviation
+        quantile = mean + float(ndtri(probability)) * deviation
         if len(self.mapped.basis):
-            draws = np.random.default_rng(0).standard_normal((PROBES, phi.shape[1]))
-            pair = [self.draws(draws), self.regression.apply(draws.copy())]
+            draws = np.random.default_rng(0).standard_normal((QUANTILE_SAMPLES, phi.shape[1]))
+            mapped, unmapped = self.draws(draws), self.regression.apply(draws.copy())
             for i, row in enumerate(phi):  # the difference scatters less than either
-                ends = [np.quantile(one @ row, probability) for one in pair]
-                found[i] += ends[0] - ends[1]
-        return found
+                with_map = np.quantile(mapped @ row, probability)
+                quantile[i] += with_map - np.quantile(unmapped @ row, probability)
+        return quantile
 
     def warn(self) -> None:
         """Warn of measured values that do not suit the field."""
-        if self.misfit > self.points + DOUBTFUL * np.sqrt(2.0 * self.points):
+        if self.misfit > self.points + MAX_CHI_SQUARE * np.sqrt(2.0 * self.points):
             warn_accuracy(
                 f"given: the measured values are unlikely for this field (chi-square"
                 f" {self.misfit:.4g} for {self.points} values): check its marginal, its correlation"
                 " length and the noise"
             )
-        if max(self.left_over) > UNCERTAIN:
-            mean, deviation = self.left_over
+        if max(self.remaining_error) > MAX_POSTERIOR_ERROR:
+            mean, deviation = self.remaining_error
             warn_accuracy(
                 f"given: the field is approximate where it was measured: its mean is off by up to"
                 f" about {mean:.2g} of its standard deviation, and that by up to about"
@@ -301,91 +336,96 @@ class Conditioning(NamedTuple):
 
 
 def conditioned(measured: Sequence[Measured]) -> Conditioning:
-    """Condition draws on measured values of properties.
-
-    Likelihood and regression take turns until z from all other places stays; what the
-    Gaussians miss is mapped before the regression (`transport`).
-    """
-    phi = np.concatenate([one.phi for one in measured])
-    others = np.zeros(len(phi)), np.ones(len(phi))
-    weighted, precision = _gaussians(measured, others)
-    for _ in range(TURNS):
-        found, weighted, precision = _regressed(phi, weighted, precision)
-        before, others = others, _from_others(phi, found, weighted, precision)
-        if np.abs(others[0] - before[0]).max() < SETTLED:
+    """Condition draws on measured values of properties, by the algorithm of this file."""
+    phi = np.concatenate([values.phi for values in measured])
+    # 1. and 2. Gaussians as if each value was the only one.
+    cavity = np.zeros(len(phi)), np.ones(len(phi))
+    shift, precision = _gaussians(measured, cavity)
+    for update in range(1, MAX_UPDATES + 1):
+        # 3. and 4. Everything together, and z at each place from all other values.
+        regression, shift, precision = _regression(phi, shift, precision)
+        previous_mean, cavity = cavity[0], _from_others(phi, regression, shift, precision)
+        # 5. The Gaussians of the regression are those that step 6 divides by.
+        if np.abs(cavity[0] - previous_mean).max() < SETTLED_MEAN or update == MAX_UPDATES:
             break
-        weighted, precision = _gaussians(measured, others)
-    along, share = phi @ found.right, np.sqrt(1.0 + found.power)
-    middle = along @ (found.data[0] / share**2)
-    ratio = _ratio(measured, weighted, precision, middle)
-    mapped, left_over = make_transport(ratio, middle, along / share)
-    mapped = mapped._replace(basis=np.ascontiguousarray(mapped.basis @ found.right.T))
-    none = np.zeros_like(middle)
-    likelihood = _ratio(measured, none, none, middle)(np.arange(middle.size), middle)
-    draws = found.data[0] / (1.0 + found.power)
-    misfit = -2.0 * float(likelihood.sum()) + float(draws @ draws)
-    found = found._replace(data=weighted[None, :] @ found.left)
-    return Conditioning(found, mapped, left_over, misfit, len(phi))
+        shift, precision = _gaussians(measured, cavity)
+    # 6. z = mean + (along / gain) w with standard normal w: the map from that to (1).
+    along, gain = phi @ regression.right, np.sqrt(1.0 + regression.power)
+    mean = along @ (regression.data[0] / gain**2)
+    log_ratio = _log_ratio(measured, shift, precision, mean)
+    mapped, remaining_error = make_transport(log_ratio, mean, along / gain)
+    mapped = mapped._replace(basis=np.ascontiguousarray(mapped.basis @ regression.right.T))
+    # 7. Squared misfits of the values and of the draws.
+    zero = np.zeros_like(mean)
+    log_likelihood = _log_ratio(measured, zero, zero, mean)(np.arange(mean.size), mean)
+    draws = regression.data[0] / (1.0 + regression.power)
+    misfit = -2.0 * float(log_likelihood.sum()) + float(draws @ draws)
+    return Conditioning(regression, mapped, remaining_error, misfit, len(phi))
 
 
 def _gaussians(
-    measured: Sequence[Measured], others: tuple[Array, Array]
+    measured: Sequence[Measured], cavity: tuple[Array, Array]
 ) -> tuple[Array, Array]:
-    """Gaussians that stand for the measured values, given z from all others."""
-    ends = np.cumsum([len(one.phi) for one in measured])[:-1]
-    each = zip(measured, *(np.split(part, ends) for part in others), strict=True)
-    found = (one.gaussian(*given) for one, *given in each)
-    weighted, precision = map(np.concatenate, zip(*found, strict=True))
-    return weighted, precision
+    """Step 2 for all properties: b and p given mean and variance of z from all other values."""
+    ends = np.cumsum([len(values.phi) for values in measured])[:-1]
+    moments = zip(*(np.split(moment, ends) for moment in cavity), strict=True)
+    gaussians = [
+        values.gaussian(mean, variance)
+        for values, (mean, variance) in zip(measured, moments, strict=True)
+    ]
+    shift, precision = map(np.concatenate, zip(*gaussians, strict=True))
+    return shift, precision
 
 
-def _ratio(
-    measured: Sequence[Measured], weighted: Array, precision: Array, middle: Array
+def _log_ratio(
+    measured: Sequence[Measured], shift: Array, precision: Array, mean: Array
 ) -> LogRatio:
-    """Logarithm of the likelihood over the Gaussian that stands for it, by place and z."""
+    """Logarithm of l_k over the Gaussian that replaced it, by place and z.
 
-    def found(at: NDArray[np.int64], z: Array) -> Array:
-        out, shape, begin = np.empty(z.shape), (-1, *(1 for _ in z.shape[1:])), 0
-        for one in measured:
-            here = (at >= begin) & (at < begin + len(one.phi))
-            out[here] = one.logarithm(at[here] - begin, z[here])
-            begin += len(one.phi)
-        off = z - middle[at].reshape(shape)
-        slope = (weighted - precision * middle)[at].reshape(shape)
-        gaussian: Array = off * (slope - 0.5 * precision[at].reshape(shape) * off)
-        return np.maximum(out, LOWEST) - gaussian
+    The Gaussian is 1 at the `mean`; constants of a place do not matter.
+    """
 
-    return found
+    def log_ratio(places: NDArray[np.int64], z: Array) -> Array:
+        log_likelihood, shape, begin = np.empty(z.shape), (-1, *(1 for _ in z.shape[1:])), 0
+        for values in measured:
+            inside = (places >= begin) & (places < begin + len(values.phi))
+            log_likelihood[inside] = values.log_likelihood(places[inside] - begin, z[inside])
+            begin += len(values.phi)
+        off = z - mean[places].reshape(shape)
+        slope = (shift - precision * mean)[places].reshape(shape)
+        gaussian: Array = off * (slope - 0.5 * precision[places].reshape(shape) * off)
+        return np.maximum(log_likelihood, LOG_OF_IMPOSSIBLE) - gaussian
+
+    return log_ratio
 
 
-def _regressed(
-    phi: Array, weighted: Array, precision: Array
-) -> tuple[Regression, Array, Array]:
-    """Find the posterior of the draws, and its Gaussians: as given, or tempered to have one."""
-    root = np.sqrt(np.maximum(np.abs(precision), FAINT))
-    left, values, right = svd(phi * root[:, None], full_matrices=False)
-    kept = values > NEGLIGIBLE
-    left, values, right = left[:, kept] * values[kept], values[kept], right[kept].T
-    power, sign = values**2, precision / root**2
+def _regression(phi: Array, shift: Array, precision: Array) -> tuple[Regression, Array, Array]:
+    """Step 3: the regression, and its b and p: as given, or tempered so that there is one."""
+    scale = np.sqrt(np.maximum(np.abs(precision), MIN_SCALE))
+    left, singular, right = svd(phi * scale[:, None], full_matrices=False)
+    kept = singular > MIN_SINGULAR_VALUE
+    left, singular, right = left[:, kept] * singular[kept], singular[kept], right[kept].T
+    power, sign = singular**2, precision / scale**2
     if (sign < 1.0).any():
+        # (U s)' sign (U s) = Q diag(power) Q', so that P is diagonal in V Q.
         power, turn = eigh(left.T * sign @ left)
         left, right = left @ turn, right @ turn
-        if power.size and power[0] < LEAST:
-            share = 0.5 * LEAST / power[0]
-            return _regressed(phi, share * weighted, share * precision)
-    left = left / root[:, None]
-    found = Regression(left, power, np.ascontiguousarray(right), (weighted @ left)[None, :])
-    return found, weighted, precision
+        if power.size and power[0] < MIN_EIGENVALUE:
+            share = 0.5 * MIN_EIGENVALUE / power[0]
+            return _regression(phi, share * shift, share * precision)
+    left = left / scale[:, None]
+    data = (shift @ left)[None, :]
+    return Regression(left, power, np.ascontiguousarray(right), data), shift, precision
 
 
 def _from_others(
-    phi: Array, found: Regression, weighted: Array, precision: Array
+    phi: Array, regression: Regression, shift: Array, precision: Array
 ) -> tuple[Array, Array]:
-    """Mean and variance of z at each place from what was measured at all others."""
-    mean, deviation = found.moments(phi)
+    """Step 4: mean and variance of z at each place from what was measured at all others."""
+    mean, deviation = regression.moments(phi)
     least = 0.5 / (phi**2).sum(axis=1)
-    rest = np.maximum(deviation**-2 - precision, least)
-    # Over so small an error the map is linear, and the difference would be round-off.
-    sharp = deviation < SHARP
-    moved = (mean / deviation**2 - weighted) / rest
-    return np.where(sharp, 0.0, moved), np.where(sharp, 1.0, 1.0 / rest)
+    remaining = np.maximum(deviation**-2 - precision, least)
+    # Over so small a deviation the map is linear, and the difference would be round-off.
+    sharp = deviation < MIN_DEVIATION
+    cavity_mean = (mean / deviation**2 - shift) / remaining
+    return np.where(sharp, 0.0, cavity_mean), np.where(sharp, 1.0, 1.0 / remaining)

@@ -44,7 +44,8 @@ def warn_of_slip(run: Run, state: RuptureState) -> None:
         warn_accuracy(
             f"the stress fell below minus the strength, by {-now['reverse_margin']:.3g} Pa at "
             f"{interface.describe_node(int(now['reverse_node']))}: what would slip in reverse"
-            " there, which is not modelled, was kept at rest; change the sign of the load, or unload less"
+            " there, which is not modelled, was kept at rest; change the sign of the load, or"
+            " unload less"
         )
 
 

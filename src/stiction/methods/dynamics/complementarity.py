@@ -21,8 +21,8 @@ K. Kunisch, SIAM Journal on Optimization 13, 2002):
 2. On the slipping set S solve (M - W) u = g - b, W = diag(w), with u = 0 elsewhere (`_solve`): the
    preconditioned conjugate gradients of M. R. Hestenes and E. Stiefel (1952), with the inverse
    circulant, cut to S, as preconditioner. Letters are theirs: residual r, direction p, z = M^-1 r.
-3. Nodes outside S whose stress is above their strength join it, and nodes with u < 0 leave it. Every
-   node takes the straight line that belongs to its u.
+3. Nodes outside S whose stress is above their strength join it, and nodes with u < 0 leave it.
+   Every node takes the straight line that belongs to its u.
 4. Repeat from 2 until no node has changed.
 
 Departures: a direction of negative curvature (an unstable patch, at this size of the step) ends the

@@ -274,8 +274,8 @@ class Rupture:
             if ended is None:
                 raise InputError(
                     f"max_steps: {self.max_steps} steps led to tau_0 = {state.now['load']:.6g} Pa,"
-                    f" and {state.now['weakened_nodes']} nodes to their residual strength, but not to"
-                    f" stop={self.stop!r}; raise max_steps or the loading rate"
+                    f" and {state.now['weakened_nodes']} nodes to their residual strength, but not"
+                    f" to stop={self.stop!r}; raise max_steps or the loading rate"
                 )
         checks.warn_of_slip(run, state)
         found = summary(run, state)
