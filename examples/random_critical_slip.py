@@ -1,7 +1,7 @@
 """The critical slip, or the fracture energy, varies along my interface: what does that do?
 
-Each is a random property beside the strength; it replaces the value of the friction law. With both
-the weakening rate W varies, and there is no single nucleation length, so the local criterion does
+Each is a random property beside the strength, and is left out of the friction law. With both the
+weakening rate W varies, and there is no single nucleation length, so the local criterion does
 not apply.
 """
 
@@ -21,8 +21,8 @@ def varying(mean):
 
 cases = {
     "d_c uniform": ({"critical_slip": critical_slip}, {}),
-    "d_c random": ({"critical_slip": critical_slip}, {"critical_slip": varying(critical_slip)}),
-    "Gamma random": ({"fracture_energy": energy}, {"fracture_energy": varying(energy)}),
+    "d_c random": ({}, {"critical_slip": varying(critical_slip)}),
+    "Gamma random": ({}, {"fracture_energy": varying(energy)}),
 }
 onsets = {}
 for name, (law, more) in cases.items():

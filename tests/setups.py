@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,17 @@ def make_problem(
         weakening["weakening_rate"] = RATE  # None leaves it to profiles
     law = st.LinearWeakening(**weakening) if friction is None else friction
     return st.Problem(solid, st.Interface(length, nodes), law, load or st.Load(), mode)
+
+
+def without(problem: st.Problem, *keys: str) -> st.Problem:
+    """The problem without values, such as 'load.initial_stress', that profiles give instead."""
+    for key in keys:
+        owner, name = key.split(".")
+        part = getattr(problem, owner)
+        none = 0.0 if name in ("initial_stress", "residual_strength") else None
+        part = dataclasses.replace(part, **{name: none})
+        problem = dataclasses.replace(problem, **{owner: part})
+    return problem
 
 
 def beta_strength(

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from crooked import LINE, TWO, of_width, uneven
 from recording import Calls, compared
-from setups import EXACT, LOCAL, make_problem
+from setups import EXACT, LOCAL, make_problem, without
 
 import stiction as st
 
@@ -113,7 +113,9 @@ def several_profiles_by_name():
             [1.6e5 * s + 8e5 * uneven(INTERFACE, seed=s) for s in (16, 17)]
         ),
     }
-    return st.onset(LINE, profiles, method=EXACT)
+    keys = "friction.residual_strength", "friction.weakening_rate"
+    bare = without(LINE, *keys, "load.initial_stress", "load.normal_pressure")
+    return st.onset(bare, profiles, method=EXACT)
 
 
 @calls(EVENTS)

@@ -8,7 +8,7 @@ import scipy.stats
 import xarray as xr
 from crooked import LINE, of_width
 from recording import Calls, compared
-from setups import EXACT, LOCAL, beta_strength, make_problem, turns
+from setups import EXACT, LOCAL, beta_strength, make_problem, turns, without
 from specimens import crooked
 
 import stiction as st
@@ -56,7 +56,8 @@ def two_levels():
 @calls(COUNTED, close=1e-5)
 def a_coefficient_under_a_random_pressure():
     given = {"algorithm": "subset", "max_evaluations": 20_000, "friction_coefficient": 0.31}
-    return probability(None, random=PRESSED, method=LOCAL, target_cv=0.5, seed=7, **given)
+    bare = without(SMALL, "load.normal_pressure")
+    return probability(None, bare, random=PRESSED, method=LOCAL, target_cv=0.5, seed=7, **given)
 
 
 @calls("bounds of the strength, tests/exact/test_reliability_bounds.py")
@@ -224,7 +225,8 @@ def a_specimen_in_newtons():
 
 @calls("onset of the profiles of the same draws")
 def limit_state_and_simulator():
-    state = st.external.limit_state(SMALL, PRESSED, EXACT, event="first_instability")
+    bare = without(SMALL, "load.normal_pressure")
+    state = st.external.limit_state(bare, PRESSED, EXACT, event="first_instability")
     draws = state.draws(seed=3, first=255, samples=3)
     field, names = (
         dataclasses.replace(BOUNDED, mean_mode=True),

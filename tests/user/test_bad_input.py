@@ -109,8 +109,8 @@ def test_what_people_study_raises_no_doubt():
 
 
 def test_a_ready_made_sample_gives_what_its_profiles_give():
-    load = st.Load(initial_stress=3e4, normal_pressure=7e6)
-    problem = make_problem(residual_ratio=0.3, load=load)
+    load = st.Load(initial_stress=3e4)
+    problem = make_problem(weakening_rate=None, load=load)
     strength = [1.0 + 0.2 * np.sin(np.arange(256)), 1.1 + 0.1 * np.cos(np.arange(256))]
     given = {"residual_strength": 2e5, "critical_slip": np.array([[5e-6], [6e-6]])}
     given |= {"strength": 1e6 * np.stack(strength)}
