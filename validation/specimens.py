@@ -69,7 +69,7 @@ def drawn(rng: np.random.Generator, joints: bool) -> tuple[str, st.Problem, np.n
             mode=mode,
             specimen=st.Blocks(height=height, thickness=0.0071, drive=drive, pressing=pressing),
         )  # fmt: skip
-    except st.InputError:  # the pusher is so high that it shears in reverse, or too few nodes
+    except st.InputError:  # too few nodes
         return drawn(rng, joints)
     spectrum = st.PowerLawSpectrum(correlation_length=10.0 ** rng.uniform(-2.7, -2.0))
     strength = problem.pressing * st.RandomField(MARGINAL, spectrum).sample(

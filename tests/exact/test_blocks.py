@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import stiction as st
 from stiction.elasticity.blocks import Pushes, block_response, glued_pressure
 
 KAPPA = (3.0 - 0.35) / (1.0 + 0.35)  # plane stress, nu = 0.35
@@ -79,3 +80,32 @@ def test_a_push_in_mode_three_carries_its_force_and_decays():
     cosh = np.cosh(k * (0.2 - (np.array([200, 240]) + 0.5) * dx))
     assert shear[200] / shear[240] == pytest.approx(cosh[0] / cosh[1], rel=1e-3)
     assert shear[0] > 3.0
+
+
+def test_flat_blocks_of_rubber_open_below_glue():
+    """Finite elements agree: the least pressure is -0.12 of the mean, at the ends."""
+    pressure = glued_pressure(1.0, 80, 0.0973, 3.0 - 4.0 * 0.4999)
+    assert pressure[[0, -1]] == pytest.approx(-0.1192, abs=1e-4)
+    with pytest.raises(st.InputError, match=r"opens the interface at .*-0\.119"):
+        st.Problem(
+            solid=st.Solid(youngs_modulus=1e7, poisson_ratio=0.4999, density=1100.0),
+            interface=st.Interface(length=1.0, nodes=80),
+            friction=st.LinearWeakening(weakening_rate=1e7, residual_strength=0.0),
+            specimen=st.Blocks(height=0.0973, pressing="glued"),
+            load=st.Load(normal_pressure=1e5),
+        )
+
+
+@pytest.mark.parametrize("mode", [KAPPA, None])
+def test_a_push_of_any_size_at_any_place(mode):
+    """No slip is pushed back, and the mean of two halves of a push is the whole push."""
+    response = {}
+    for low, high in ((0.0, 1.0), (0.0, 0.5), (0.5, 1.0), (1.0 - 1e-4, 1.0), (0.0, 1e-4)):
+        pushes = Pushes(("left",), 0.5 * (low + high) * 0.04, (high - low) * 0.04)
+        response[low, high] = block_response(0.1, 50, 0.04, MODULUS, mode, pushes)
+        assert response[low, high].shear.min() > 0.0
+    halves = response[0.0, 0.5].shear, response[0.5, 1.0].shear
+    # Each is over its own mean at the nodes, which misses a part of the peak of the lower half.
+    share = np.linalg.lstsq(np.transpose(halves), response[0.0, 1.0].shear, rcond=None)
+    assert share[1] < 1e-20
+    assert share[0] == pytest.approx(0.5, abs=1e-2)

@@ -307,7 +307,6 @@ table_of(calls, {
         *each(of_specimen, {"load": st.Load(profile=st.GradientLoad(amplitude=0.2))},
               {"interface": st.Interface((0.1, 0.1), (32, 32))}),
         *each(crooked, {"height": 1e-3}, {"height": 31.0}, {"height": 0.01, "rate": 0.01e12},
-              {"drive": st.Pusher(height=0.0295, width=0.001)},
               {"drive": st.Platen(stiffness=20.0)}),
         *(partial(st.Blocks, height=0.05, drive=one)
           for one in (st.Platen(stiffness=2e7), st.Platen(mass=1.0))),

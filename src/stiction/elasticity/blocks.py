@@ -1,43 +1,66 @@
 """Response of two identical blocks to slip between them and to the drive that pushes them.
 
+Problem
+-------
 Blocks of length L and height H are mirror images at the interface, free at their ends and driven in
 opposite directions, so that slip d changes no normal stress. Per unit depth, with the force F of
-the drive on one block (N/m), its travel U (m), the nodes' distance dx and the mean stress F/L,
+the drive on one block (N/m), its travel U (m), the distance dx of the nodes and the mean stress
+F/L,
 
     tau = (F/L) q - K d,    U = F/C + (dx/(2 L)) sum q d    (Betti's theorem).
 
-K is that of a given force; a uniform slip is free of stress. It is put together from the closed
-form for two free ends and a correction for the top and for the ends seeing each other.
-The correction is smooth, so that few points of the interface give it to many digits, one field of a
-block (`rectangle`) each. Mode III has closed forms throughout.
+K holds for a given force: a uniform slip is free of stress. `block_response` returns K, q and C.
 
-Beside a free end, the half-space x > 0 has a free surface x = 0 and an interface y = 0. Fields are
-given by Goursat's functions (`rectangle`), imaginary on the real axis, and found from those of the
-full space by reflection on the free surface (Muskhelishvili 1953, chapter 18).
+Algorithm
+---------
+1. Take K of two free ends that do not feel each other, averaged over the cells of the nodes
+   (`stiffness_between_ends`).
+2. Add at the nodes what the top, on rollers, and the ends together add to it: a smooth function, in
+   closed form apart from a few harmonics (`_rollers_correction`).
+3. Below a pusher, q and C of a block on rollers have closed forms, too (`_pushed`).
+4. Below a platen, find the shear traction t that keeps the top where it is (`glued_top`). With the
+   compliance G of the top and the stress A t on the interface, A' d/2 is the displacement of the
+   top that slip d causes (Betti's theorem), and
+
+       K = K_rollers + A G^-1 A'/2,    q = A G^-1 1 L/C,    C = 1' G^-1 1
+
+   for a platen that is held; take off the stress of its motion at a given force (`_glued`).
+5. Do steps 2 to 4 with less resolution, too: the largest change is the `error`.
+
+Mode III has closed forms throughout.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import lru_cache
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
+import scipy.integrate
 from scipy.fft import idct
 
 from stiction.base.arrays import Array, one_blas_thread
-from stiction.elasticity.rectangle import Goursat, Rectangle, total
+from stiction.elasticity.glued_top import GluedTop
+from stiction.elasticity.harmonics import SLOPE, THIRD, Harmonics
 
 Side: TypeAlias = Literal["left", "right"]
 
-POINTS = 24
-"""Points of the interface of a square block for which the correction is computed."""
-NEGLIGIBLE = 40.0
-"""Exponent beyond which terms of the series of mode III are round-off."""
-CORRECTION = 1.0 / 12.0
+
+class Resolution(NamedTuple):
+    """How finely the response is computed."""
+
+    max_decay: float  # harmonics beyond exp(-max_decay) are left out
+    step: float  # of the points of a glued top
+
+
+FINE, COARSE = Resolution(40.0, 0.28), Resolution(26.0, 0.42)
+"""Resolution of the response, and another one to measure the error."""
+QUADRATURE_RTOL = 1e-11
+"""Relative error of the compliance below a pusher."""
+LATTICE_CORRECTION = 1.0 / 12.0
 """Half of the 1/6 with which the symbol would be right to fourth order.
 
-The error that remains and that of a border of slip that lies between nodes, of the same order, have
+The error that remains and the error of a border of slip between nodes, of the same order, have
 opposite signs: with 1/12 the mean error of onsets vanishes (measured with random strengths).
 """
 
@@ -52,6 +75,11 @@ class Pushes(NamedTuple):
     height: float
     width: float
 
+    def edges(self, height: float) -> tuple[float, float]:
+        """Return the edges of the push on a side 0 <= y <= height, m, without round-off beyond."""
+        low, high = self.height - 0.5 * self.width, self.height + 0.5 * self.width
+        return max(low, 0.0), min(high, height)
+
 
 class BlockResponse(NamedTuple):
     """What a method needs of two blocks; nodes at (i + 1/2) dx."""
@@ -59,7 +87,9 @@ class BlockResponse(NamedTuple):
     stiffness: Array  # (n, n): K at a given force, Pa/m; symmetric, its rows sum to zero
     shear: Array  # (n,): q, shear stress of the drive over its mean
     drive_stiffness: float  # C, force per unit depth over travel of a block without slip, Pa
-    error: float = 0.0  # by how much K violates reciprocity at most, Pa/m
+    error: float = (
+        0.0  # of q, of C over C, and of K over its diagonal; without that of the lattice
+    )
 
 
 @lru_cache(maxsize=8)
@@ -73,14 +103,24 @@ def block_response(
 ) -> BlockResponse:
     """Return the response of two blocks to slip and to their drive.
 
-    Length L and height H are in m, the modulus is G (Pa), and kappa Kolosov's constant
-    (`rectangle`), None for mode III. A platen (no `pushes`) is glued to the top and moves along the
-    interface; the top of a block that is pushed lies on rollers (in mode III it is free).
+    Length L and height H are in m, the modulus is G (Pa), and kappa Kolosov's constant, 3 - 4 nu in
+    plane strain and (3 - nu)/(1 + nu) in plane stress, None for mode III. A platen (no `pushes`) is
+    glued to the top and moves along the interface; the top of a block that is pushed lies on
+    rollers (in mode III it is free).
     """
     with one_blas_thread():
         if kappa is None:
             return _anti_plane(length, nodes, height, modulus, pushes)
-        return _in_plane(length, nodes, height, modulus, kappa, pushes)
+        response, coarse = (
+            _in_plane(length, nodes, height, modulus, kappa, pushes, resolution)
+            for resolution in (FINE, COARSE)
+        )
+    changes = (
+        (response.stiffness - coarse.stiffness) / response.stiffness.diagonal().min(),
+        response.shear - coarse.shear,
+        coarse.drive_stiffness / response.drive_stiffness - 1.0,
+    )
+    return response._replace(error=max(float(np.abs(change).max()) for change in changes))
 
 
 def _in_plane(
@@ -90,120 +130,125 @@ def _in_plane(
     modulus: float,
     kappa: float,
     pushes: Pushes | None,
+    resolution: Resolution,
 ) -> BlockResponse:
     spacing = length / nodes
-    x = (np.arange(nodes) + 0.5) * spacing
-    block = Rectangle(length, height, kappa, glued=pushes is None)
+    harmonics = Harmonics(length, height, resolution.max_decay)
     effective = 4.0 * modulus / (kappa + 1.0)
     stiffness = stiffness_between_ends(nodes, spacing, effective)
-    correction, error = _correction(block, effective, x)
-    stiffness += spacing * correction
+    stiffness += spacing * _rollers_correction(harmonics, effective, nodes)
     if pushes is None:
-        traction = _with_moved_top(block, 2.0 * modulus, x).imag
-        drive = spacing * traction.sum()
-        stiffness -= 0.5 * spacing * np.outer(traction, traction) / drive
-        shear = traction * length / drive
+        top = GluedTop(harmonics, modulus, kappa, resolution.step)
+        addition, shear, drive = _glued(top, nodes)
+        stiffness += addition
     else:
-        shear, compliance = _pushed(block, pushes, x)
-        drive = 2.0 * modulus / compliance
-    # What discretisation leaves of the stress of a uniform slip, 1e-7 of the diagonal.
+        shear, compliance = _pushed(harmonics, pushes, nodes)
+        drive = 2.0 * effective / compliance
+    # The discretised stress of a uniform slip, 1e-7 of the diagonal.
     stiffness[np.diag_indices(nodes)] -= stiffness.sum(axis=1)
-    return BlockResponse(stiffness, shear / shear.mean(), float(drive), spacing * error)
+    return BlockResponse(stiffness, shear / shear.mean(), drive)
 
 
-def _correction(block: Rectangle, effective: float, x: Array) -> tuple[Array, float]:
-    """Return what a finite block adds to K of two ends that do not feel each other, Pa/m².
+def _rollers_correction(harmonics: Harmonics, effective: float, nodes: int) -> Array:
+    """Return what a block on rollers adds to K of two ends that do not feel each other, Pa/m².
 
-    And by how much it violates reciprocity.
-
-    For slip at Gauss points the field that clears its sides and its top; polynomials between them.
+    Its kernel (1/4 of E*/H) is a sum over k of k (1 - k r) exp(-k r) at a distance r, less
+    k (1 - k (x + s) + 2 k² x s) exp(-k (x + s)) for the left end, and the same for the right one;
+    those of half-spaces, which are taken off, are its limits for large H.
     """
-    length = block.length
-    count = round(POINTS * max(1.0, length / (2.0 * block.height)))
-    gauss, weights = np.polynomial.legendre.leggauss(count)
-    places = 0.5 * length * (1.0 + gauss)
+    spacing, c = harmonics.length / nodes, 0.5 * np.pi / harmonics.height
+    x, i = (np.arange(nodes) + 0.5) * spacing, np.arange(nodes)
+    r = spacing * np.arange(1, nodes)
+    sums = harmonics.sums(r)
+    along = np.append(c / 12.0, sums.first - r * sums.second + 0.5 / (c * r**2))
+    r = spacing * np.arange(1, 2 * nodes)  # x + s
+    sums = harmonics.sums(r)
+    even = r * sums.second - sums.first - 0.5 / (c * r**2)
+    odd = 6.0 / (c * r**4) - 2.0 * sums.third
+    mirrored = i[:, None] + i
+    end = even[mirrored] + np.outer(x, x) * odd[mirrored]
+    kernel = along[np.abs(i[:, None] - i)] + end + end[::-1, ::-1]
+    kernel += harmonics.reflected(harmonics.k, SLOPE, x, SLOPE, x)
+    scaled: Array = 0.5 * effective / harmonics.height * kernel
+    return scaled
 
-    def first(z: Array) -> Goursat:
-        return image_slip(places, z, effective)
 
-    def second(z: Array) -> Goursat:
-        return turned(image_slip(length - places, length - z, effective), length)
+def _glued(top: GluedTop, nodes: int) -> tuple[Array, Array, float]:
+    """Return what glue adds to K (Pa/m), the shear stress of a top moved by 1 m, and C."""
+    spacing = top.harmonics.length / nodes
+    on_interface = top.shear((np.arange(nodes) + 0.5) * spacing)
+    tractions = top.solve(np.column_stack([np.ones(top.x.size), on_interface.T]))
+    shear, *held = top.step * (on_interface @ tractions).T
+    addition = 0.5 * spacing * np.array(held)
+    addition -= 0.5 * np.outer(shear, shear) / shear.sum()
+    return 0.5 * (addition + addition.T), shear, float(top.step * tractions[:, 0].sum())
 
-    left, right, top = (z[:, None] for z in (block.left, block.right, block.top))
-    above = total(point_slip(places, top, effective), first(top), second(top))
-    fitted = block.fit(
-        -second(left).side(left),
-        -first(right).side(right),
-        -above.displacement(top, block.kappa),
-        -above.face(top).imag,
+
+def _pushed(harmonics: Harmonics, pushes: Pushes, nodes: int) -> tuple[Array, float]:
+    """Return the shear stress of a force of 1 N/m and 2 G* times the travel, of a pushed block.
+
+    The push has the harmonics 2/H `mean_sine`, and phi = mean_sine 2/H/k² at the clamp.
+    """
+    k, length, height = harmonics.k, harmonics.length, harmonics.height
+    low, high = pushes.edges(height)
+    mean_sine = (np.cos(k * low) - np.cos(k * high)) / (k * (high - low))
+    x = (np.arange(nodes) + 0.5) * length / nodes
+    ends = harmonics.sums(x + 1j * low).plain - harmonics.sums(x + 1j * high).plain
+    remainder = harmonics.raised - np.array([1.0, 1.0, 0.0, 0.0])
+    waves = np.einsum("mxi,mi,m->x", harmonics.solutions(SLOPE, x), remainder, mean_sine)
+    stress = 2.0 / height * (x * ends.real / (high - low) - waves)
+    at_ends = harmonics.solutions(THIRD, np.array([0.0, length]))
+    share = 2.0 * mean_sine**2 / k
+    near = 4.0 * _mean_logarithm(harmonics, low, high)
+    near += float(np.einsum("mi,mi,m->", at_ends[:, 0], remainder, share))
+    far = float(np.einsum("mi,mi,m->", at_ends[:, 1], harmonics.raised, share))
+    return _of_sides(pushes, stress, near / height, far / height)
+
+
+def _mean_logarithm(harmonics: Harmonics, low: float, high: float) -> float:
+    """Return the sum over k of the squared mean of sin(k y) over low < y < high, over k.
+
+    It is a double integral of logarithms of y - y' and of y + y', hence a single one of each.
+    """
+    width = high - low
+
+    def integrand(apart: float) -> float:
+        angles = np.array([apart, low + high - apart, low + high + apart])
+        logarithms = harmonics.sums(1j * angles).inverse.real
+        return float((width - apart) * (logarithms @ [1.0, -0.5, -0.5]))
+
+    integral, _ = scipy.integrate.quad(
+        integrand, 0.0, width, epsabs=0.0, epsrel=QUADRATURE_RTOL
     )
-    kernel = -block.face(fitted, places).imag
-    # Barycentric weights of the Gauss points (Wang and Xiang 2012).
-    share = (-1.0) ** np.arange(count) * np.sqrt((1.0 - gauss**2) * weights)
-    terms = share / (x[:, None] - places)
-    between = terms / terms.sum(axis=1, keepdims=True)
-    correction: Array = between @ (0.5 * (kernel + kernel.T)) @ between.T
-    return correction, float(np.abs(kernel - kernel.T).max())
+    return float(integral) / width**2
 
 
-def _pushed(block: Rectangle, pushes: Pushes, x: Array) -> tuple[Array, float]:
-    """Return the shear stress of a force of 1 N/m and 2 G times the travel, of a pushed block."""
-    length = block.length
-    low, high = pushes.height - 0.5 * pushes.width, pushes.height + 0.5 * pushes.width
-    right, top = block.right[:, None], block.top[:, None]
-    at_top = push(low, high, top)
-    fitted = block.fit(
-        np.zeros((block.left.size, 1)),
-        -push(low, high, right).side(right),
-        -at_top.displacement(top, block.kappa),
-        -at_top.face(top).imag,
-    )
-
-    def stress(x: Array) -> Array:
-        found: Array = block.face(fitted, x)[:, 0] + push(low, high, x + 0j).face(x)
-        return found.imag
-
-    def travel(end: float) -> float:
-        gauss, weights = np.polynomial.legendre.leggauss(64)
-        z = end + 1j * (pushes.height + 0.5 * pushes.width * gauss)
-        moved = block.field(fitted, z).displacement(z[:, None], block.kappa)[:, 0]
-        return float(
-            0.5 * weights @ (moved + push(low, high, z).displacement(z, block.kappa)).real
-        )
-
-    return _of_sides(pushes, stress, x, length, travel(0.0), travel(length))
-
-
-def _of_sides(
-    pushes: Pushes,
-    stress: Callable[[Array], Array],
-    x: Array,
-    length: float,
-    near: float,
-    far: float,
-) -> tuple[Array, float]:
-    """Return stress and travel of a drive from those of a force at the left end.
+def _of_sides(pushes: Pushes, stress: Array, near: float, far: float) -> tuple[Array, float]:
+    """Return stress and travel of a drive from the stress of a force at the left end.
 
     `near` and `far` are the displacements where the force acts and at the same place of the other
     end.
     """
     if len(pushes.sides) == 2:
-        return 0.5 * (stress(x) + stress(length - x)), 0.5 * (near + far)
-    return stress(x if pushes.sides[0] == "left" else length - x), near
-
-
-def _with_moved_top(block: Rectangle, by: complex, x: Array) -> Array:
-    """Return s_yy + i s_xy on the interface if the glued top moves `by` 2 G (u + iv)."""
-    none, moved = np.zeros((block.left.size, 1)), np.full((block.top.size, 1), by)
-    return block.face(block.fit(none, none, moved, 0.0 * moved.real), x)[:, 0]
+        return 0.5 * (stress + stress[::-1]), 0.5 * (near + far)
+    return stress if pushes.sides[0] == "left" else stress[::-1], near
 
 
 def glued_pressure(length: float, nodes: int, height: float, kappa: float) -> Array:
-    """Return pressure over its mean, (n,), between blocks whose tops are glued to rigid platens."""
-    x = (np.arange(nodes) + 0.5) * length / nodes
-    block = Rectangle(length, height, kappa, glued=True, pressed=True)
+    """Return pressure over its mean, (n,), between blocks whose tops are glued to rigid platens.
+
+    Below rollers it would be uniform, 1, and the top wider by (3 - kappa)/(8 G) of its length. Glue
+    takes the shear traction, without a resultant, that takes this back.
+    """
     with one_blas_thread():
-        pressure = -_with_moved_top(block, -1j, x).real
+        harmonics = Harmonics(length, height, FINE.max_decay, pressed=True)
+        top = GluedTop(harmonics, 1.0, kappa, FINE.step)
+        wider = (3.0 - kappa) / 16.0 * (top.x - top.to_right)
+        shifted, narrowed = top.solve(np.column_stack([np.ones(top.x.size), -wider])).T
+        traction = narrowed - narrowed.sum() / shifted.sum() * shifted
+        pressure = (
+            1.0 - top.step * top.normal((np.arange(nodes) + 0.5) * length / nodes) @ traction
+        )
     scaled: Array = pressure / pressure.mean()
     return scaled
 
@@ -222,70 +267,24 @@ def _anti_plane(
     symbol = np.append(0.0, lattice_symbol(k * spacing) / spacing + finite - k)
     cosines = idct(np.eye(nodes), norm="ortho", axis=0)
     stiffness = (cosines * (0.5 * modulus * symbol)) @ cosines.T
-    x = (np.arange(nodes) + 0.5) * spacing
     if pushes is None:
         return BlockResponse(stiffness, np.ones(nodes), modulus * length / height)
-    terms = int(NEGLIGIBLE * height / (np.pi * x[0])) + 1
-    k = (np.arange(terms) + 0.5) * np.pi / height
-    low, high = pushes.height - 0.5 * pushes.width, pushes.height + 0.5 * pushes.width
-    share = (np.cos(k * low) - np.cos(k * high)) / (k * pushes.width)  # mean of sin k y
+    harmonics = Harmonics(length, height, FINE.max_decay)
+    k, x = harmonics.k, (np.arange(nodes) + 0.5) * spacing
+    low, high = pushes.edges(height)
+    mean_sine = (np.cos(k * low) - np.cos(k * high)) / (k * (high - low))
+    ends = harmonics.sums(x + 1j * low).inverse - harmonics.sums(x + 1j * high).inverse
+    # Waves between the ends, without the first one on its way, which the closed forms hold.
     once = -np.expm1(-2.0 * k * length)
-
-    def stress(x: Array) -> Array:
-        waves = np.exp(-k * x[:, None]) + np.exp(-k * (2.0 * length - x[:, None]))
-        found: Array = waves @ (2.0 / height * share / once)
-        return found
-
-    series = 2.0 / height * share**2 / (k * once)
-    near = float(series @ (1.0 + np.exp(-2.0 * k * length)))
-    far = float(series @ (2.0 * np.exp(-k * length)))
-    shear, travel = _of_sides(pushes, stress, x, length, near, far)
+    waves = np.exp(-np.outer(2.0 * length + x, k)) + np.exp(-np.outer(2.0 * length - x, k))
+    stress = 2.0 / height * (ends.real / (high - low) + waves @ (mean_sine / once))
+    share = mean_sine**2 / (k * once)
+    near = _mean_logarithm(harmonics, low, high) + 2.0 * float(
+        share @ np.exp(-2.0 * k * length)
+    )
+    far = 2.0 * float(share @ np.exp(-k * length))
+    shear, travel = _of_sides(pushes, stress, 2.0 / height * near, 2.0 / height * far)
     return BlockResponse(stiffness, shear / shear.mean(), modulus / travel)
-
-
-def point_slip(place: Array, z: Array, modulus: float) -> Goursat:
-    """Return the field of a unit of slip (m²) at places on the interface of a full space.
-
-    The modulus is G*, Pa. Shear stress on the interface: (G*/2 pi)/(x - s)².
-    """
-    a, d = 0.25j * modulus / np.pi, z - place
-    return Goursat(a / d, -a / d**2, 2.0 * a / d**3, a * place / d**2, -2.0 * a * place / d**3)
-
-
-def image_slip(place: Array, z: Array, modulus: float) -> Goursat:
-    """Return what the free surface x = 0 adds to the field of a point of slip at x = s > 0.
-
-    Shear stress on the interface: (G*/2 pi) [12 x s/(x + s)^4 - 1/(x + s)²].
-    """
-    a, p = 0.25j * modulus / np.pi, z + place
-    f = a * (place - z) / p**2
-    df = a * (z - 3.0 * place) / p**3
-    ddf = a * (10.0 * place - 2.0 * z) / p**4
-    return Goursat(f, df, ddf, z * df - a / p, df + z * ddf + a / p**2)
-
-
-def push(low: float, high: float, z: Array) -> Goursat:
-    """Return the field of a unit force (N/m) on low < y < high of the free surface, along x.
-
-    The mirror image of the force acts the other way.
-    """
-    f, df, ddf = np.zeros((3, *z.shape), complex)
-    for place, sign in ((low, 1.0), (high, -1.0)):
-        for arm in (z - 1j * place, z + 1j * place):
-            log = np.log(arm)
-            f, df, ddf = f + sign * arm * log, df + sign * log, ddf + sign / arm
-    scale = 0.5j / (np.pi * (high - low))
-    f, df, ddf = scale * f, scale * df, scale * ddf
-    return Goursat(f, df, ddf, z * df - f, z * ddf)
-
-
-def turned(field: Goursat, length: float) -> Goursat:
-    """Return the field at z of a block that is turned by half a turn, from its values at L - z.
-
-    Slip keeps its sign, and a push at the left end becomes a pull at the right one.
-    """
-    f, df, ddf, g, dg = field
-    return Goursat(-f, df, -ddf, -g - length * df, dg + length * ddf)
 
 
 def lattice_symbol(angle: Array) -> Array:
@@ -296,7 +295,7 @@ def lattice_symbol(angle: Array) -> Array:
     correction, such as that of a finite block, would make them positive.
     """
     s = np.abs(np.sin(0.5 * angle))
-    symbol: Array = 2.0 * s * (1.0 + CORRECTION * s * s)
+    symbol: Array = 2.0 * s * (1.0 + LATTICE_CORRECTION * s * s)
     return symbol
 
 
@@ -308,15 +307,16 @@ def lattice_entries(count: int) -> Array:
     j = np.arange(-1.0, count + 1.0)
     entries = -1.0 / (np.pi * (j * j - 0.25))
     second: Array = 0.5 * entries[1:-1] - 0.25 * (entries[:-2] + entries[2:])
-    return entries[1:-1] + CORRECTION * second
+    return entries[1:-1] + LATTICE_CORRECTION * second
 
 
 def stiffness_between_ends(nodes: int, spacing: float, modulus: float) -> Array:
     """Return K of an interface with two free ends that do not feel each other, (n, n), Pa/m.
 
-    Nodes lie at (i + 1/2) dx. To the lattice and its mirror images at both ends comes the rest of
-    `image_slip`, (G*/2 pi)(12 x s/(x + s)^4 - 2/(x + s)²), averaged over the cells of x and s: it
-    is the mixed derivative of (G*/pi) x s/(x + s)².
+    Nodes lie at (i + 1/2) dx. A free end x = 0 adds (G*/2 pi)(12 x s/(x + s)^4 - 1/(x + s)²) to
+    the shear stress of slip at s (Muskhelishvili 1953, chapter 18). The lattice and its mirror
+    images at both ends hold 1/(x + s)² of it. The rest is averaged over the cells of x and s: it is
+    the mixed derivative of (G*/pi) x s/(x + s)².
     """
     entries, i = lattice_entries(2 * nodes), np.arange(nodes)
     mirrored = i[:, None] + i

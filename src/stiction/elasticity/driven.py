@@ -26,12 +26,10 @@ from stiction.elasticity.protocol import DenseEntries, HalfSpaces, Windows
 
 FINEST = 32
 """Windows that begin within the length of one, at most: weighted means change little between."""
-ROUND_OFF = 1e-12
+POSITIVE_RTOL = 1e-12
 """Share of the diagonal up to which a positive entry of K beside it is round-off."""
-FAINT = 1e-3
-"""Share of its largest value to which the profile of a drive is known where it has died away."""
-LEAST = 1e-9
-"""Share of its largest value that the profile of a drive has at least."""
+MIN_SHEAR = 1e-9
+"""Share of its largest value that the profile of a drive has at least, far from a pusher."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +56,8 @@ class Driven:
         None, if it is within the error.
         """
         off = self.stiffness - np.diag(np.diag(self.stiffness))
-        own, most = float(np.diag(self.stiffness).min()), float(off.max())
-        return most / own if most > max(self.error, ROUND_OFF * own) else 0.0
+        diagonal, most = float(np.diag(self.stiffness).min()), float(off.max())
+        return most / diagonal if most > max(self.error, POSITIVE_RTOL * diagonal) else 0.0
 
     def mean_relief(self, slip: Array) -> Array:
         """Return h <q, d>/n: by how much slip (..., n) lowers the mean stress, Pa."""
@@ -140,16 +138,17 @@ def driven(
     machine per unit depth, Pa, as one block sees it.
     """
     kind = None if anti_plane else kappa
-    found = block_response(length, nodes, height, modulus, kind, pushes)
-    shear, most = found.shear, found.shear.max()
-    if -FAINT * most < shear.min() < LEAST * most:  # far from a pusher: within the error
-        shear = np.maximum(shear, LEAST * most)
+    response = block_response(length, nodes, height, modulus, kind, pushes)
+    shear, floor = response.shear, MIN_SHEAR * response.shear.max()
+    if np.abs(shear).min() < floor:
+        shear = np.where(np.abs(shear) < floor, floor, shear)
         shear /= shear.mean()
     pressure = glued_pressure(length, nodes, height, kappa) if glued else np.ones(nodes)
-    drive = found.drive_stiffness
+    drive = response.drive_stiffness
     share = 1.0 / (1.0 + drive / machine) if machine > 0.0 else 0.0
     relief = 0.5 * share * drive / length
-    stiffness = found.stiffness
+    stiffness = response.stiffness
     if relief > 0.0:
         stiffness = stiffness + relief / nodes * np.outer(shear, shear)
-    return Driven(np.ascontiguousarray(stiffness), shear, pressure, relief, drive, found.error)
+    error = response.error * float(stiffness.diagonal().min())
+    return Driven(np.ascontiguousarray(stiffness), shear, pressure, relief, drive, error)

@@ -1,0 +1,158 @@
+"""A block whose top is glued to a rigid platen, from the same block with its top on rollers.
+
+Problem
+-------
+Rollers leave no v at the top, glue no u either. It takes a shear traction t(s) on the top that
+makes the given u there,
+
+    int G(x, s) t(s) ds = u(x),   0 < x < L,                                                   (1)
+
+where G is the compliance of a block on rollers, known in closed form (`harmonics`). At the corners
+t has singularities x^(lambda - 1) of many exponents, most of them complex (M. L. Williams, Journal
+of Applied Mechanics 19, 1952).
+
+Algorithm
+---------
+1. Map the line -inf < z < inf to the top so that x falls as exp(z) towards the corner and grows
+   evenly between corners (`GluedTop`). Then t dx/dz falls exponentially at both ends and is smooth,
+   whatever the exponents, and trapezoidal sums converge exponentially (F. Stenger, Numerical
+   Methods Based on Sinc and Analytic Functions, 1993).
+2. G has a logarithm at x = s. Split off log |2 sin(pi (z - z')/P)|, where P is the range of z. Its
+   integrals with trigonometric polynomials are known (R. Kress, Linear Integral Equations, 2014,
+   section 12.3).
+3. Solve (1) at the points: symmetric, and well conditioned as equations of the first kind go.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg
+from numpy.polynomial import Polynomial
+
+from stiction.base.arrays import Array
+from stiction.elasticity.harmonics import CURVATURE, SLOPE, Harmonics
+
+MAX_EXPONENT = 36.0
+"""Points reach to exp(-MAX_EXPONENT) of the block's size from its corners."""
+HEIGHTS_PER_UNIT = 0.5
+"""Length of the top, in heights of the block, that a unit of z covers between the corners."""
+
+
+class GluedTop:
+    """Points of the top, in z, and the response of the block to shear traction there.
+
+    Between the corners dx/dz is `HEIGHTS_PER_UNIT` heights of a flat block: its kernels vary over
+    a height.
+
+    Parameters
+    ----------
+    harmonics : Harmonics
+        Of the block.
+    modulus : float
+        G, Pa.
+    kappa : float
+        Kolosov's constant: 3 - 4 nu in plane strain, (3 - nu)/(1 + nu) in plane stress.
+    step : float
+        Distance of the points in z.
+    """
+
+    def __init__(self, harmonics: Harmonics, modulus: float, kappa: float, step: float) -> None:
+        self.harmonics, self.modulus, self.kappa = harmonics, modulus, kappa
+        length, height = harmonics.length, harmonics.height
+        # Step 1. z runs over 0 < z < width with a margin at both ends.
+        width = length / (HEIGHTS_PER_UNIT * height)
+        count = int(np.ceil((width + 2.0 * MAX_EXPONENT) / step))
+        z = step * (np.arange(count) - 0.5 * (count - 1))
+        self.step, unit = step, length / width
+
+        def from_corner(z: Array) -> Array:
+            """Return the distance from the corner at z = -inf, to full relative precision."""
+            grown: Array = np.exp(z)
+            return unit * np.log1p(-np.expm1(-width) * grown / (1.0 + grown * np.exp(-width)))
+
+        self.x, self.to_right = from_corner(z + 0.5 * width), from_corner(0.5 * width - z)
+        from_left, from_right = 1.0 + np.exp(-z - 0.5 * width), 1.0 + np.exp(z - 0.5 * width)
+        self.stretch = unit * -np.expm1(-width) / (from_left * from_right)
+        """dx/dz."""
+        ratio = (3.0 - kappa) / (kappa + 1.0)  # Poisson's ratio, as in plane stress
+        self._traction = Polynomial([0.0, 2.0 + ratio, 0.0, -1.0])
+        self.compliance = self._compliance()
+
+    def _compliance(self) -> Array:
+        """Return the matrix of (1) for values of t dx/dz at the points."""
+        harmonics, kappa, count = self.harmonics, self.kappa, self.x.size
+        distance = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+        apart = np.abs(np.subtract.outer(self.x, self.x))
+        from_right = np.abs(np.subtract.outer(self.to_right, self.to_right))
+        apart = np.where(np.add.outer(self.x, self.x) < harmonics.length, apart, from_right)
+        np.fill_diagonal(apart, self.stretch)
+        sums = harmonics.sums(apart)
+        kernel = kappa * sums.inverse + apart * sums.plain
+        # Step 2. The sum of exp(-k r)/k is -(H/pi) log(r) + a constant near r = 0.
+        weight, period = kappa * harmonics.height / np.pi, self.step * count
+        sine = 2.0 * np.sin(np.pi * distance / count)
+        np.fill_diagonal(sine, 2.0 * np.pi / period)
+        constant = np.log((1.0 if harmonics.pressed else 4.0) * harmonics.height / np.pi)
+        kernel += weight * np.log(sine)
+        kernel[np.diag_indices(count)] = harmonics.height / np.pi + weight * (
+            constant + np.log(2.0 * np.pi / period / self.stretch)
+        )
+        modes = np.arange(1, count // 2 + 1)
+        logarithm = np.fft.irfft(np.append(0.0, 0.5 * period / modes), count)
+        matrix = self.step * kernel + weight * logarithm[distance]
+        for end in (self.x, self.to_right):
+            across = np.add.outer(end, end)
+            sums = harmonics.sums(across)
+            kernel = 0.5 * (kappa * kappa + 1.0) * sums.inverse + kappa * across * sums.plain
+            matrix += self.step * (kernel + 2.0 * np.outer(end, end) * sums.first)
+        remainder = harmonics.reflected(
+            1.0 / harmonics.k, self._traction, self.x, self._traction, self.x
+        )
+        matrix -= self.step * (kappa + 1.0) ** 2 / 16.0 * remainder
+        scaled: Array = matrix / (self.modulus * harmonics.height * (kappa + 1.0))
+        return scaled
+
+    def solve(self, displacement: Array) -> Array:
+        """Return t dx/dz, Pa m, for displacements u (m) at the points, (points, cases)."""
+        traction: Array = scipy.linalg.solve(self.compliance, displacement, assume_a="sym")
+        return traction
+
+    def shear(self, x: Array) -> Array:
+        """Return the shear stress at places of the interface per unit of t at a point, 1/m."""
+        harmonics, kappa = self.harmonics, self.kappa
+        apart = np.abs(np.subtract.outer(x, self.x))
+        sums = harmonics.sums_at_top(apart)
+        stress = 0.5 * (kappa - 1.0) * sums.plain + apart * sums.first
+        for place, point in (
+            (x[:, None], self.x),
+            (harmonics.length - x[:, None], self.to_right),
+        ):
+            sums = harmonics.sums_at_top(place + point)
+            stress -= 0.5 * (kappa - 1.0) * (sums.plain - 2.0 * place * sums.first)
+            stress += (place - point) * sums.first + 2.0 * place * point * sums.second
+        remainder = harmonics.reflected(harmonics.at_top, SLOPE, x, self._traction, self.x)
+        stress -= 0.25 * (kappa + 1.0) * remainder
+        scaled: Array = stress * 2.0 / ((kappa + 1.0) * harmonics.height)
+        return scaled
+
+    def normal(self, x: Array) -> Array:
+        """Return s_yy on the interface of a pressed block per unit of t at a point, 1/m.
+
+        For tractions without a resultant.
+        """
+        harmonics, kappa = self.harmonics, self.kappa
+        towards = np.subtract.outer(x, self.x)
+        sums = harmonics.sums_at_top(np.abs(towards))
+        stress = towards * sums.first - 0.5 * (3.0 - kappa) * np.sign(towards) * sums.plain
+        for sign, place, point in (
+            (1.0, x[:, None], self.x),
+            (-1.0, harmonics.length - x[:, None], self.to_right),
+        ):
+            sums = harmonics.sums_at_top(place + point)
+            slope = (3.0 * point - kappa * place) * sums.first
+            stress -= sign * (0.5 * (3.0 * kappa - 1.0) * sums.plain + slope)
+            stress += sign * 2.0 * place * point * sums.second
+        remainder = harmonics.reflected(harmonics.at_top, CURVATURE, x, self._traction, self.x)
+        stress += 0.25 * (kappa + 1.0) * remainder
+        scaled: Array = stress * 2.0 / ((kappa + 1.0) * harmonics.height)
+        return scaled

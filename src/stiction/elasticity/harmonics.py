@@ -1,0 +1,147 @@
+"""Harmonics of a block 0 <= x <= L, 0 <= y <= H with free sides: plane elasticity in closed form.
+
+Problem
+-------
+Below a top on rollers (v = 0, s_xy given) lies an interface without s_yy, on which u is given. Both
+edges are mirrors, so that the stresses follow from Airy's function (Timoshenko and Goodier, Theory
+of Elasticity, article 24) as a sum of harmonics that do not feel each other,
+
+    phi = sum Phi_k(x) sin(k y),   s_xx = -k² Phi_k sin(k y),   s_yy = Phi_k'' sin(k y),
+    s_xy = -k Phi_k' cos(k y),     k = pi/(2 H), 3 pi/(2 H), ...                               (1)
+
+If the block is `pressed`, its interface has no v and no s_xy instead; then sin and cos change
+places, and k = pi/H, 2 pi/H, ... Free sides clamp Phi_k: it vanishes there with its slope. All
+fields follow from one function g_k(x, s), the deflection of a clamped beam,
+
+    (d²/dx² - k²)² g_k = delta(x - s),   g_k = dg_k/dx = 0 at x = 0 and at x = L.              (2)
+
+For example slip d on the interface makes the shear stress -(E*/H) sum k² int (d²g_k/dx ds) d ds on
+it, with E* = 8 G/(kappa + 1).
+
+Algorithm
+---------
+1. Write g_k as the beam without ends, (1 + k r) exp(-k r)/(4 k³) at a distance r, less what each
+   clamp reflects by itself, (1 + k (x + s) + 2 k² x s) exp(-k (x + s))/(4 k³) for the left one,
+   and less a `remainder`: what the clamps reflect to each other.
+2. Sums of the first two over k have closed forms (`sums`).
+3. The remainder falls as exp(-k L), so that few harmonics give it to round-off (`reflected`). It is
+   a combination of the four solutions of (2) without a load, exp(-k x), k x exp(-k x) and the same
+   in L - x; step 1 fixes their coefficients at the clamps.
+
+Derivatives of the four solutions are those of polynomials: an operator P(d/dx), in units of k,
+turns exp(-k x) into P(-1) exp(-k x), and k x exp(-k x) into (P'(-1) + k x P(-1)) exp(-k x).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+from stiction.base.arrays import Array
+
+SLOPE, CURVATURE, THIRD = (Polynomial.basis(order) for order in (1, 2, 3))
+"""Derivatives of a harmonic along x, in units of k."""
+
+
+class Sums(NamedTuple):
+    """Sums over k of k^j exp(-k z), one array for each power j from -1 to 3."""
+
+    inverse: Array
+    plain: Array
+    first: Array
+    second: Array
+    third: Array
+
+
+class Harmonics:
+    """Harmonics of a block: their sums in closed form, and what its sides reflect to each other.
+
+    Of a pressed block the sums count half of the constant harmonic, k = 0.
+
+    Parameters
+    ----------
+    length, height : float
+        L and H, m.
+    max_decay : float
+        The remainder leaves out harmonics whose exponent k L is larger.
+    pressed : bool
+        Whether the interface has no v and no s_xy, instead of no s_yy.
+    """
+
+    def __init__(
+        self, length: float, height: float, max_decay: float, *, pressed: bool = False
+    ) -> None:
+        self.length, self.height, self.pressed = length, height, pressed
+        count = int(max_decay * height / (np.pi * length)) + 2
+        self.k = (np.arange(count) + (1.0 if pressed else 0.5)) * np.pi / height
+        self.at_top = (-1.0) ** (np.arange(count) + pressed)  # cos(k H), or sin(k H)
+        # Step 3. Values and slopes of the four solutions at the left and the right clamp.
+        kl, decay = self.k * length, np.exp(-self.k * length)
+        zero, unit = np.zeros_like(kl), np.ones_like(kl)
+        clamps = np.array(
+            [
+                [unit, zero, decay, kl * decay],
+                [-unit, unit, decay, (kl - 1.0) * decay],
+                [decay, kl * decay, unit, zero],
+                [-decay, (1.0 - kl) * decay, unit, -unit],
+            ]
+        ).transpose(2, 0, 1)
+        endless = [
+            [1.0, 1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0, 1.0],
+            [0, 0, 0, -1],
+        ]
+        single = np.kron(np.eye(2), [[1.0, 1.0], [1.0, 2.0]])  # one clamp without the other
+        inverse = np.linalg.inv(clamps)
+        self._remainder = single - inverse @ endless
+        self.raised = inverse[:, :, 0]
+        """Coefficients of the solution that is 1, without a slope, at the left clamp."""
+
+    def sums(self, z: Array) -> Sums:
+        """Return the sums over k of k^j exp(-k z), z complex or real with a positive real part."""
+        c = 0.5 * np.pi / self.height
+        q, w = np.exp(-c * z), -np.expm1(-2.0 * c * z)
+        coth, square = (2.0 - w) / w, 4.0 * q * q / (w * w)  # and 1/sinh²
+        if self.pressed:
+            return Sums(
+                -0.5 * (np.log(w) / c + z),
+                0.5 * coth,
+                0.5 * c * square,
+                c * c * coth * square,
+                c**3 * square * (2.0 + 3.0 * square),
+            )
+        csch = 2.0 * q / w
+        return Sums(
+            -0.5 * np.log(-np.expm1(-c * z) / (1.0 + q)) / c,
+            0.5 * csch,
+            0.5 * c * coth * csch,
+            0.5 * c * c * csch * (1.0 + 2.0 * square),
+            0.5 * c**3 * coth * csch * (1.0 + 6.0 * square),
+        )
+
+    def sums_at_top(self, x: Array) -> Sums:
+        """Return the sums over k of +-k^j exp(-k x), with the signs `at_top` of harmonics there."""
+        turn = 1.0 if self.pressed else 1j
+        return Sums(*((turn * values).real for values in self.sums(x + 1j * self.height)))
+
+    def solutions(self, operator: Polynomial, x: Array) -> Array:
+        """Return the four solutions with an operator applied, (harmonics, points, 4)."""
+        value, slope = operator(-1.0), operator.deriv()(-1.0)
+        parity = operator(1.0) / value  # -1 for odd derivatives: towards the right end x falls
+        parts = []
+        for distance, sign in ((x, 1.0), (self.length - x, parity)):
+            y = self.k[:, None] * distance
+            wave = sign * np.exp(-y)
+            parts += [value * wave, (slope + value * y) * wave]
+        return np.stack(parts, axis=-1)
+
+    def reflected(
+        self, weights: Array, along_x: Polynomial, x: Array, along_s: Polynomial, s: Array
+    ) -> Array:
+        """Return the sum over k of weights times 4 k³ P(d/dx) Q(d/ds) of the remainder, (x, s)."""
+        left = self.solutions(along_x, x) @ (weights[:, None, None] * self._remainder)
+        total: Array = np.tensordot(left, self.solutions(along_s, s), ((0, 2), (0, 2)))
+        return total
