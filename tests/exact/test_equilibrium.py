@@ -6,12 +6,8 @@ from oracles import symbol_of, times
 from setups import beta_strength, exact_onset, make_problem, turns
 
 import stiction as st
-from stiction.elasticity.line import (
-    stiffness_column,
-)
-from stiction.methods.equilibrium.dense.cholesky import (
-    make_workspace,
-)
+from stiction.elasticity.line import stiffness_column
+from stiction.methods.equilibrium.dense.cholesky import make_workspace
 from stiction.methods.equilibrium.dense.linear_program import certificate
 from stiction.methods.equilibrium.dense.program import DenseProgram
 from stiction.methods.equilibrium.dense.runaway import Runs, unstoppable_length
@@ -79,7 +75,8 @@ def test_certificate_is_the_distance_of_both_bounds(problem, make_strength):
     load, multiplier = program.bound(sample)
     # Without slip nothing below the weakest node is overstressed; above is the local bound.
     workspace = make_workspace(program.elastic.entries, program.nodes)
-    gap = certificate(sample, *np.zeros((2, 256)), multiplier, workspace)
+    slip, Kd, Ky = np.zeros((3, 256))
+    gap = certificate(sample, slip, Kd, multiplier, workspace, Ky)
     assert gap == pytest.approx(load - excess.min(), rel=1e-9)
 
 

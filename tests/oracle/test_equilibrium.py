@@ -72,7 +72,7 @@ def test_transforms_agree_with_the_dense_factor(make_strength, monkeypatch):
     rows = problem.sample(make_strength(0.25).sample(problem.interface, samples=3, seed=12))
     samples = [sample_of(rows, program.pieces, row) for row in range(3)]
     dense = [program.solve(sample) for sample in samples]
-    monkeypatch.setattr(stiction.methods.equilibrium.dense.program, "MANY_NODES", 10)
+    monkeypatch.setattr(stiction.methods.equilibrium.dense.program, "MAX_WEAK_NODES", 10)
     for sample, exact in zip(samples, dense, strict=True):
         found = program.solve(sample)
         assert found.load == pytest.approx(exact.load, rel=1e-9)

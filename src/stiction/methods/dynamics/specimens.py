@@ -20,7 +20,7 @@ from stiction.base.variables import Variable
 from stiction.methods.dynamics.mesh import Mesh, make_mesh
 from stiction.methods.dynamics.summary import SPEEDS, front_speed
 from stiction.methods.dynamics.waves import Waves, at_rest, follow
-from stiction.methods.equilibrium.dense.cholesky import Course
+from stiction.methods.equilibrium.dense.cholesky import SlipState
 from stiction.methods.equilibrium.dense.jump import jump
 from stiction.methods.equilibrium.dense.program import DenseProgram
 from stiction.methods.equilibrium.method import Equilibrium
@@ -135,7 +135,7 @@ class RuptureProgram(DenseProgram):
 
     def __init__(self, problem: Problem, method: Any) -> None:
         super().__init__(problem)
-        self.stops = True
+        self.may_stop = True
         self.mesh, self.max_steps = make_mesh(problem, method.courant), method.max_steps
         law = problem.friction
         self.arrival = min(law.slip_at(1.0 - method.arrival), law.reach) / law.reach
@@ -153,8 +153,8 @@ class RuptureProgram(DenseProgram):
         outcome: int = Outcome.SLIDING
         if not event.slides:  # what still moves once the waves have died away comes to rest
             elastic, true = self._workspaces
-            course = Course(sample, slip, stiff, elastic, self.stops)
-            outcome = jump(course, found.load, np.inf, true)
+            slip_state = SlipState(sample, slip, stiff, elastic, self.may_stop)
+            outcome = jump(slip_state, found.load, np.inf, true)
         state = State(
             found.load, slip, found.direction, stiff, by_events=True, jumped=True, stopped=True
         )

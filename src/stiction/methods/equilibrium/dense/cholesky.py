@@ -1,7 +1,40 @@
-"""A Cholesky factor that grows: nodes are appended to it, in any order, until a pivot fails.
+"""The Cholesky factor L of A on the slipping nodes, which follows them as they change.
 
-The rows of the factor lie one after the other in a flat array, each padded to a multiple of eight
-numbers: half the memory of a square, and no two rows compete for the same cache sets.
+Problem
+-------
+K is the stiffness (Pa/m), W >= 0 the weakening rate of each node (Pa/m), A = K - diag(W), and S
+the list of the slipping nodes, in the order of the rows of L. This folder solves systems
+
+    A_SS x = b,  with A_SS = L L':  first L y = b (forward), then L' x = y (backward),           (1)
+
+for sets S and rates W that change a little from one system to the next. A pivot that is not
+positive shows that A_SS is not positive definite: then the equilibrium is unstable.
+
+Algorithm
+---------
+L is updated instead of being computed anew (P. Gill, G. Golub, W. Murray and M. Saunders,
+Mathematics of Computation 28, 1974; G. Golub and C. Van Loan, Matrix Computations, 2013,
+section 6.5).
+
+1. Append a node j (`append`). Its row l solves L l = A_Sj. Its pivot is (A_jj - l'l)^1/2. If
+   A_jj - l'l is not positive, the vector z = (-A_SS^-1 A_Sj, 1) has z'Az = A_jj - l'l <= 0, and
+   A z = 0 on S (`singular_direction`).
+2. Remove a node (`remove`). The rows below it move up, which leaves one entry in each of them
+   above the diagonal. Plane rotations of neighbouring columns make it zero.
+3. Raise a diagonal entry by a > 0 (`raise_diagonal`): A_SS + a e e', where e is the unit vector of
+   the node. Plane rotations of the columns of L with a^1/2 e make the latter zero.
+4. Factor A on any set of nodes (`factor_slipping`). Keep the leading rows whose nodes still slip
+   and weaken no more than before, raise the entries of those that weaken less, and append the
+   other nodes.
+
+Departures from the textbook, all for speed:
+
+- The rows of L lie one after the other in a flat array, each padded to a multiple of eight numbers.
+  This takes half the memory of a square, and no two rows compete for the same cache sets.
+- Four rows are appended together, so that each row of L is read once for four new ones.
+- A pivot counts as not positive if its square is below `PIVOT_RTOL` of the diagonal entry.
+
+Node numbers are called `i`, `node` or `nodes`; `r`, `t` and `position` count rows of L.
 """
 
 import math
@@ -17,28 +50,25 @@ from stiction.elasticity.operator import dot
 from stiction.elasticity.stiffness import apply, apply_outside, entry
 from stiction.methods.equilibrium.sample import StaticSample
 
-GROUP = 4
-"""Rows that are appended together: each row of the factor is then read once for four new ones."""
-PIVOT = 1e-13
-"""Share of the diagonal below which a pivot is round-off."""
-TURNING = 4
-"""Time of a rotation of two rows, in units of that of a row in a group that is appended."""
-MOST_MEMBERS = 8192
-"""Slipping nodes for which a dense factor has space (268 MB if all of it is used)."""
-CROWDED = -2
-"""In the place of a number of members or a status: more members than that."""
+ROWS_APPENDED_TOGETHER = 4
+PIVOT_RTOL = 1e-13
+"""Share of the diagonal entry below which the square of a pivot is round-off."""
+COST_OF_ROTATING_ROW = 4
+"""Time to rotate one entry of a row, in units of the time to append it in a group of rows."""
+MAX_SLIPPING = 8192
+"""Slipping nodes for which L has space (268 MB if all of it is used)."""
 
 
 @jit
 def row_start(row: int) -> int:
-    """Return the index at which a row begins in the flat array."""
+    """Return the index at which a row of L begins in the flat array."""
     block = row >> 3
     return 32 * block * (block + 1) + 8 * (row & 7) * (block + 1)
 
 
 @jit
-def substitute(factor: Array, first: int, last: int, values: Array) -> None:
-    """Solve L x = values in place, in the order of the rows; those before `first` are solved."""
+def forward_substitute(factor: Array, first: int, last: int, values: Array) -> None:
+    """Solve L x = values in place for the rows first..last-1; those before are solved."""
     for r in range(first, last):
         start = row_start(r)
         row = factor[start : start + r + 1]
@@ -46,29 +76,29 @@ def substitute(factor: Array, first: int, last: int, values: Array) -> None:
 
 
 @jit_inside
-def _solve_four(factor: Array, size: int) -> None:
-    """Forward substitution of four new rows that follow row `size` - 1, in place.
+def _forward_substitute_four(factor: Array, n_rows: int) -> None:
+    """Solve L x = values in place for four right sides: the rows that follow the `n_rows` of L.
 
     Two columns at a time: eight running sums keep the processor's vector units busy.
     """
-    s0 = row_start(size)
-    s1 = row_start(size + 1)
-    s2 = row_start(size + 2)
-    s3 = row_start(size + 3)
-    x0 = factor[s0 : s0 + size]
-    x1 = factor[s1 : s1 + size]
-    x2 = factor[s2 : s2 + size]
-    x3 = factor[s3 : s3 + size]
+    s0 = row_start(n_rows)
+    s1 = row_start(n_rows + 1)
+    s2 = row_start(n_rows + 2)
+    s3 = row_start(n_rows + 3)
+    x0 = factor[s0 : s0 + n_rows]
+    x1 = factor[s1 : s1 + n_rows]
+    x2 = factor[s2 : s2 + n_rows]
+    x3 = factor[s3 : s3 + n_rows]
     k = 0
-    while k + 1 < size:
+    while k + 1 < n_rows:
         base = row_start(k)
         u = factor[base : base + k + 1]
         base = row_start(k + 1)
         v = factor[base : base + k + 2]
-        whole = k - k % LANES
+        vectorised = k - k % LANES
         p0 = p1 = p2 = p3 = zeros()
         q0 = q1 = q2 = q3 = zeros()
-        for t in range(0, whole, LANES):
+        for t in range(0, vectorised, LANES):
             p = load(u, t)
             q = load(v, t)
             y = load(x0, t)
@@ -85,7 +115,7 @@ def _solve_four(factor: Array, size: int) -> None:
             q3 = multiply_add(q, y, q3)
         u0, u1, u2, u3 = totals(p0, p1, p2, p3)
         v0, v1, v2, v3 = totals(q0, q1, q2, q3)
-        for t in range(whole, k):
+        for t in range(vectorised, k):
             a = u[t]
             b = v[t]
             u0 = multiply_add(a, x0[t], u0)
@@ -107,7 +137,7 @@ def _solve_four(factor: Array, size: int) -> None:
         x2[k + 1] = (x2[k + 1] - v2 - v[k] * x2[k]) * inverse
         x3[k + 1] = (x3[k + 1] - v3 - v[k] * x3[k]) * inverse
         k += 2
-    if k < size:
+    if k < n_rows:
         base = row_start(k)
         u = factor[base : base + k + 1]
         x0[k] = (x0[k] - dot(u, x0, k)) / u[k]
@@ -118,31 +148,32 @@ def _solve_four(factor: Array, size: int) -> None:
 
 @jit
 def raise_diagonal(
-    factor: Array, size: int, position: int, amount: float, turns: Array
+    factor: Array, n_rows: int, position: int, amount: float, rotations: Array
 ) -> None:
-    """Add a positive amount to one diagonal entry of the factored matrix, by plane rotations.
+    """Step 3: add a positive amount to the diagonal entry of A_SS at a position.
 
-    The cosines and sines of the rotations are kept in `turns`, a workspace.
+    `rotations` is a workspace: the cosines and sines of the rotations.
     """
-    for r in range(position, size):
+    cosines, sines = rotations[0], rotations[1]
+    for r in range(position, n_rows):
         start = row_start(r)
         row = factor[start : start + r + 1]
-        # The column that is rotated into the factor: zero below the entry that rises.
-        extra = math.sqrt(amount) if r == position else 0.0
+        # The entry of this row in the column a^1/2 e, after the rotations of the rows above.
+        added = math.sqrt(amount) if r == position else 0.0
         for k in range(position, r):
-            entry = row[k]
-            row[k] = multiply_add(turns[1, k], extra, turns[0, k] * entry)
-            extra = multiply_add(turns[0, k], extra, -turns[1, k] * entry)
-        pivot = math.sqrt(row[r] * row[r] + extra * extra)
-        turns[0, r] = row[r] / pivot
-        turns[1, r] = extra / pivot
+            L_rk = row[k]
+            row[k] = multiply_add(sines[k], added, cosines[k] * L_rk)
+            added = multiply_add(cosines[k], added, -sines[k] * L_rk)
+        pivot = math.sqrt(row[r] * row[r] + added * added)
+        cosines[r] = row[r] / pivot
+        sines[r] = added / pivot
         row[r] = pivot
 
 
 @jit
-def back_substitute(factor: Array, size: int, values: Array) -> None:
-    """Solve L^T x = values in place, rows of L taken four at a time."""
-    i = size
+def back_substitute(factor: Array, n_rows: int, values: Array) -> None:
+    """Solve L' x = values in place, rows of L taken four at a time."""
+    i = n_rows
     while i >= 4:
         i -= 4
         s0 = row_start(i)
@@ -162,10 +193,10 @@ def back_substitute(factor: Array, size: int, values: Array) -> None:
         values[i + 2] = z2
         values[i + 3] = z3
         for t in range(i):
-            less = multiply_add(-z0, r0[t], values[t])
-            less = multiply_add(-z1, r1[t], less)
-            less = multiply_add(-z2, r2[t], less)
-            values[t] = multiply_add(-z3, r3[t], less)
+            reduced = multiply_add(-z0, r0[t], values[t])
+            reduced = multiply_add(-z1, r1[t], reduced)
+            reduced = multiply_add(-z2, r2[t], reduced)
+            values[t] = multiply_add(-z3, r3[t], reduced)
     while i > 0:
         i -= 1
         start = row_start(i)
@@ -177,39 +208,42 @@ def back_substitute(factor: Array, size: int, values: Array) -> None:
 
 
 class Workspace(NamedTuple):
-    """The factor of A on the slipping nodes of one sample, with the arrays that extend it.
+    """L of the slipping nodes of one sample, with the arrays that go with it.
 
-    Arrays are at nodes (n,), or of members: the slipping nodes in the order of the factor's rows.
+    Arrays have one entry for each node (n,), unless they are in S: one for each row of L.
     """
 
-    stiffness: Any
-    factor: Array
-    members: NDArray[np.int64]
-    order: NDArray[np.int64]  # nodes to append
-    inside: NDArray[np.bool_]  # marks the members
-    diagonal: Array  # of A, at nodes
-    turns: Array  # cosines and sines of rotations
-    halves: Array  # workspace of products
-    held: NDArray[np.int64]  # (1,): rows that are valid for members and `held_diagonal`
-    held_diagonal: Array  # of A as factored, of members
-    forward_load: Array  # forward substitution of the load profile
-    forward_strength: Array  # that of the strength
-    forward_drive: Array  # that of the drive in a jump
-    known_drive: Array  # the drive of which that is
-    keys: Array  # by which `order` is sorted
-    right: Array  # a right side, at nodes
-    resting: Array  # stress that nodes take off the interface which slipped and rest, at nodes
-    solution: Array  # of members
-    rates: Array  # of slip, of members
-    direction: Array  # at nodes
-    product: Array  # of K, at nodes
+    stiffness: Any  # K as kernels take it: `elasticity.stiffness`
+    max_slipping: int  # rows for which L has space
+    factor: Array  # L, row by row
+    slipping: NDArray[np.int64]  # S
+    queue: NDArray[np.int64]  # nodes to append
+    is_slipping: NDArray[np.bool_]
+    diagonal: Array  # of A
+    rotations: Array  # (2, n): cosines and sines
+    halves: Array  # workspace of products with K
+    n_factored: NDArray[np.int64]  # (1,): rows of L that hold for `slipping`
+    n_substituted: NDArray[np.int64]  # (1,): rows for which `Linv_drive` holds
+    factored_diagonal: Array  # of A as it is in L, in S
+    Linv_p: Array  # L^-1 times the load profile, in S
+    Linv_q: Array  # L^-1 times the strength at zero slip, in S
+    Linv_drive: Array  # L^-1 times `substituted_drive`, in S
+    substituted_drive: Array  # drive of the last step of a jump, in S
+    margins: Array  # by which `queue` is sorted
+    rhs: Array  # a right side
+    K_resting: Array  # K times the slip of nodes that slipped and rest
+    solution: Array  # in S
+    v: Array  # rate of slip with the load, in S
+    direction: Array
+    Kv: Array  # K times a rate
 
 
-def make_workspace(stiffness: Any, n: int) -> Workspace:
-    """Workspace for samples of n nodes. Pages of the factor that are never used cost no memory."""
-    capacity = min(n, MOST_MEMBERS)
+def make_workspace(stiffness: Any, n: int, max_slipping: int = MAX_SLIPPING) -> Workspace:
+    """Return a workspace for samples of n nodes. Pages of L that are never used cost no memory."""
+    capacity = min(n, max_slipping)
     return Workspace(
         stiffness,
+        max_slipping,
         np.empty(row_start(capacity + 4)),
         np.empty(n + 4, dtype=np.int64),
         np.empty(n, dtype=np.int64),
@@ -217,201 +251,214 @@ def make_workspace(stiffness: Any, n: int) -> Workspace:
         np.empty(n),
         np.empty((2, n + 4)),
         np.empty((2, n // 2)),
-        np.zeros(1, dtype=np.int64),
+        *np.zeros((2, 1), dtype=np.int64),
         *np.zeros((12, n + 4)),
     )
 
 
-class Course(NamedTuple):
-    """One sample on its way."""
+class SlipState(NamedTuple):
+    """Slip of one sample, which moves along as the load rises or a patch jumps."""
 
     sample: StaticSample
-    slip: Array  # d at nodes, m; it goes with it, as does the next
-    stiff: Array  # K d, Pa
+    slip: Array  # d, m
+    Kd: Array  # K d, Pa
     workspace: Workspace
-    stops: bool  # a node that slips may stop
+    may_stop: bool  # whether slip at one node can unload another, which then stops
 
 
 @jit
-def append(workspace: Workspace, size: int, count: int) -> int:
-    """Append order[:count] to the factor of A on members[:size], until done or a pivot fails.
+def append(workspace: Workspace, n_slipping: int, count: int) -> int:
+    """Step 1: append queue[:count] to S and L, until done or a pivot fails.
 
-    Returns the number of members: if it is below size + count, the node after the last member
-    failed, and its row, without the pivot, follows the last one in the factor.
+    Returns the number of rows of L. If it is below n_slipping + count, the pivot of the next node
+    of S failed; its row, without the pivot, follows the last row of L.
     """
-    factor, members, nodes = workspace.factor, workspace.members, workspace.order
+    factor, slipping, queue = workspace.factor, workspace.slipping, workspace.queue
     stiffness, diagonal = workspace.stiffness, workspace.diagonal
-    done = 0
-    while done < count:
-        group = min(GROUP, count - done)
+    appended = 0
+    while appended < count:
+        group = min(ROWS_APPENDED_TOGETHER, count - appended)
         for r in range(group):
-            node = nodes[done + r]
-            start = row_start(size + r)
-            row = factor[start : start + size]
-            for t in range(size):
-                row[t] = entry(stiffness, node, members[t])
+            node = queue[appended + r]
+            start = row_start(n_slipping + r)
+            row = factor[start : start + n_slipping]
+            for t in range(n_slipping):
+                row[t] = entry(stiffness, node, slipping[t])
         if group == 1:
-            start = row_start(size)
-            substitute(factor, ZERO, size, factor[start : start + size])
+            start = row_start(n_slipping)
+            forward_substitute(factor, ZERO, n_slipping, factor[start : start + n_slipping])
         else:
-            for r in range(group, GROUP):
-                start = row_start(size + r)
-                for t in range(size):
+            for r in range(group, ROWS_APPENDED_TOGETHER):
+                start = row_start(n_slipping + r)
+                for t in range(n_slipping):
                     factor[start + t] = 0.0
-            _solve_four(factor, size)
+            _forward_substitute_four(factor, n_slipping)
+        # The columns of the group itself, and the pivots.
         for r in range(group):
-            node = nodes[done + r]
-            start = row_start(size + r)
-            row = factor[start : start + size + r + 1]
-            for q in range(r):
-                base = row_start(size + q)
-                known = factor[base : base + size + q + 1]
-                own = entry(stiffness, node, members[size + q])
-                row[size + q] = (own - dot(known, row, size + q)) / known[size + q]
-            pivot = diagonal[node] - dot(row, row, size + r)
-            members[size + r] = node
-            if pivot <= PIVOT * diagonal[node]:
-                workspace.held[0] = size + r
-                return size + r
-            row[size + r] = math.sqrt(pivot)
-            workspace.held_diagonal[size + r] = diagonal[node]
-        size += group
-        done += group
-    workspace.held[0] = size
-    return size
+            node = queue[appended + r]
+            start = row_start(n_slipping + r)
+            row = factor[start : start + n_slipping + r + 1]
+            for k in range(r):
+                start = row_start(n_slipping + k)
+                above = factor[start : start + n_slipping + k + 1]
+                K_jk = entry(stiffness, node, slipping[n_slipping + k])
+                row[n_slipping + k] = (K_jk - dot(above, row, n_slipping + k)) / above[
+                    n_slipping + k
+                ]
+            pivot_squared = diagonal[node] - dot(row, row, n_slipping + r)
+            slipping[n_slipping + r] = node
+            if pivot_squared <= PIVOT_RTOL * diagonal[node]:
+                workspace.n_factored[0] = n_slipping + r
+                return n_slipping + r
+            row[n_slipping + r] = math.sqrt(pivot_squared)
+            workspace.factored_diagonal[n_slipping + r] = diagonal[node]
+        n_slipping += group
+        appended += group
+    workspace.n_factored[0] = n_slipping
+    return n_slipping
 
 
 @jit
-def remove(workspace: Workspace, size: int, position: int) -> int:
-    """Take one member out of the factor; returns the number of those that stay.
-
-    The rows below it move up, and plane rotations spread its column over the others.
-    """
-    factor, members, turns = workspace.factor, workspace.members, workspace.turns
-    for r in range(position + 1, size):
+def remove(workspace: Workspace, n_slipping: int, position: int) -> int:
+    """Step 2: take the node at a position out of S and L; returns how many stay."""
+    factor, slipping = workspace.factor, workspace.slipping
+    cosines, sines = workspace.rotations[0], workspace.rotations[1]
+    for r in range(position + 1, n_slipping):
         start = row_start(r)
         row = factor[start : start + r + 1]
         start = row_start(r - 1)
-        above = factor[start : start + r]
-        extra = row[position]
+        new = factor[start : start + r]  # the place of the row above, which has moved already
+        removed = row[position]
         for k in range(position):
-            above[k] = row[k]
+            new[k] = row[k]
         for k in range(position, r - 1):
-            own = row[k + 1]
-            above[k] = turns[0, k] * own + turns[1, k] * extra
-            extra = turns[0, k] * extra - turns[1, k] * own
-        pivot = math.sqrt(row[r] * row[r] + extra * extra)
-        turns[0, r - 1] = row[r] / pivot
-        turns[1, r - 1] = extra / pivot
-        above[r - 1] = pivot
-        members[r - 1] = members[r]
-        workspace.held_diagonal[r - 1] = workspace.held_diagonal[r]
-    workspace.held[0] = size - 1
-    return size - 1
+            L_rk = row[k + 1]
+            new[k] = cosines[k] * L_rk + sines[k] * removed
+            removed = cosines[k] * removed - sines[k] * L_rk
+        pivot = math.sqrt(row[r] * row[r] + removed * removed)
+        cosines[r - 1] = row[r] / pivot
+        sines[r - 1] = removed / pivot
+        new[r - 1] = pivot
+        slipping[r - 1] = slipping[r]
+        workspace.factored_diagonal[r - 1] = workspace.factored_diagonal[r]
+    workspace.n_factored[0] = n_slipping - 1
+    return n_slipping - 1
 
 
 @jit
-def factor_inside(workspace: Workspace) -> int:
-    """Factor A on the nodes that are `inside`; returns what `append` returns.
-
-    Rows stay up to the first node that is not inside any more, or that weakens more steeply than
-    before; those of nodes that weaken less are turned. Nodes that weaken no more come first in what
-    is appended: as a crack grows most nodes are such, and their rows stay longest.
-    """
+def factor_slipping(workspace: Workspace) -> int:
+    """Step 4: factor A on the nodes marked by `is_slipping`; returns as `append` does."""
     stiffness, diagonal = workspace.stiffness, workspace.diagonal
-    members, order, inside = workspace.members, workspace.order, workspace.inside
-    known, held = workspace.held_diagonal, workspace.held[0]
-    kept = first = turned = ZERO
-    while kept < held and inside[members[kept]] and diagonal[members[kept]] >= known[kept]:
-        if diagonal[members[kept]] > known[kept]:
-            turned += 1
-        elif turned == 0:
-            first += 1
-        kept += 1
-    if TURNING * turned * (kept - first) > kept * kept:
-        kept = first  # it is faster to compute their rows again
-    for t in range(kept):
-        i = members[t]
-        inside[i] = False
-        if diagonal[i] > known[t]:
-            raise_diagonal(workspace.factor, kept, t, diagonal[i] - known[t], workspace.turns)
-            known[t] = diagonal[i]
+    slipping, queue, is_slipping = workspace.slipping, workspace.queue, workspace.is_slipping
+    factored_diagonal, n_factored = workspace.factored_diagonal, workspace.n_factored[0]
+    n_kept = n_unchanged = n_raised = ZERO
+    while n_kept < n_factored:
+        i = slipping[n_kept]
+        if not is_slipping[i] or diagonal[i] < factored_diagonal[n_kept]:
+            break
+        if diagonal[i] > factored_diagonal[n_kept]:
+            n_raised += 1
+        elif n_raised == 0:
+            n_unchanged += 1
+        n_kept += 1
+    if COST_OF_ROTATING_ROW * n_raised * (n_kept - n_unchanged) > n_kept * n_kept:
+        n_kept = n_unchanged  # it is faster to compute the other rows again
+    for t in range(n_kept):
+        i = slipping[t]
+        is_slipping[i] = False  # for now: only nodes without a row are left marked
+        if diagonal[i] > factored_diagonal[t]:
+            rise = diagonal[i] - factored_diagonal[t]
+            raise_diagonal(workspace.factor, n_kept, t, rise, workspace.rotations)
+            factored_diagonal[t] = diagonal[i]
+    # Nodes that weaken no more come first. Most nodes of a growing crack are such, and the rows
+    # at the top of L are kept longest.
     count = ZERO
-    for weakening in (False, True):
-        for i in range(inside.shape[0]):
-            if inside[i] and (weakening or diagonal[i] == entry(stiffness, i, i)):
-                inside[i] = False
-                order[count] = i
+    for may_weaken in (False, True):
+        for i in range(is_slipping.shape[0]):
+            if is_slipping[i] and (may_weaken or diagonal[i] == entry(stiffness, i, i)):
+                is_slipping[i] = False
+                queue[count] = i
                 count += 1
     for t in range(count):
-        inside[order[t]] = True
-    for t in range(kept):
-        inside[members[t]] = True
-    return append(workspace, kept, count)
+        is_slipping[queue[t]] = True
+    for t in range(n_kept):
+        is_slipping[slipping[t]] = True
+    return append(workspace, n_kept, count)
 
 
 @jit_inside
-def substitute_members(
-    workspace: Workspace, first: int, last: int, values: Array, forward: Array
+def substitute_slipping(
+    workspace: Workspace, first: int, last: int, values: Array, Linv_values: Array
 ) -> None:
-    """Extend one of the forward substitutions by the members first..last-1."""
+    """Extend L^-1 times a field, which has `values` at the nodes, by the rows first..last-1."""
     for r in range(first, last):
-        forward[r] = values[workspace.members[r]]
-    substitute(workspace.factor, first, last, forward)
+        Linv_values[r] = values[workspace.slipping[r]]
+    forward_substitute(workspace.factor, first, last, Linv_values)
 
 
 @jit_inside
-def multiply_members(workspace: Workspace, size: int, values: Array, result: Array) -> None:
-    """Multiply K by a field given on the members; the result is at all nodes."""
-    apply(workspace.stiffness, workspace.members, size, values, workspace.halves, result)
-
-
-@jit_inside
-def multiply_outside(workspace: Workspace, size: int, values: Array, result: Array) -> None:
-    """Multiply K by a field given on the members; `result` holds the product there already."""
-    apply_outside(
-        workspace.stiffness, workspace.members, size, values, workspace.inside,
-        workspace.halves, result,
-    )  # fmt: skip
-
-
-@jit_inside
-def take_off_resting(course: Course) -> None:
-    """Multiply K by the slip of the nodes that rest, into `resting`."""
-    slip, workspace = course.slip, course.workspace
-    values, count = workspace.right, ZERO
-    for i in range(slip.shape[0]):
-        if slip[i] > 0.0 and not workspace.inside[i]:
-            workspace.order[count] = i
-            values[count] = slip[i]
-            count += 1
+def multiply_slipping(
+    workspace: Workspace, n_slipping: int, values: Array, product: Array
+) -> None:
+    """Multiply K by a field that has `values` in S and is zero elsewhere."""
     apply(
-        workspace.stiffness, workspace.order, count, values, workspace.halves, workspace.resting
+        workspace.stiffness, workspace.slipping, n_slipping, values, workspace.halves, product
     )
 
 
 @jit_inside
-def solve_forward(workspace: Workspace, size: int, load: float, solution: Array) -> None:
-    """Slip of the members at a load, A_SS d = load p - s, from the forward substitutions."""
-    for t in range(size):
-        solution[t] = load * workspace.forward_load[t] - workspace.forward_strength[t]
-    back_substitute(workspace.factor, size, solution)
+def multiply_outside(
+    workspace: Workspace, n_slipping: int, values: Array, product: Array
+) -> None:
+    """Multiply as `multiply_slipping` does, but leave the product at the slipping nodes as it is.
+
+    (On a line they are overwritten with the same product, up to round-off.)
+    """
+    apply_outside(
+        workspace.stiffness, workspace.slipping, n_slipping, values, workspace.is_slipping,
+        workspace.halves, product,
+    )  # fmt: skip
 
 
 @jit_inside
-def singular_direction(workspace: Workspace, size: int, direction: Array) -> None:
-    """The field y = (-A_SS^-1 A_Sj, 1) after `append` failed at the node j = members[size].
+def apply_stiffness_to_resting_slip(state: SlipState) -> None:
+    """Write K times the slip of the nodes that slipped and rest to `workspace.K_resting`.
 
-    It is not negative and A y <= 0, as A is a Z-matrix: a bound for the load, and the direction in
-    which slip runs away.
+    Overwrites `workspace.queue` and `workspace.rhs`.
     """
-    solution = workspace.solution
-    start = row_start(size)
-    for t in range(size):
-        solution[t] = -workspace.factor[start + t]
-    back_substitute(workspace.factor, size, solution)
+    slip, workspace = state.slip, state.workspace
+    nodes, values, count = workspace.queue, workspace.rhs, ZERO
+    for i in range(slip.shape[0]):
+        if slip[i] > 0.0 and not workspace.is_slipping[i]:
+            nodes[count] = i
+            values[count] = slip[i]
+            count += 1
+    apply(workspace.stiffness, nodes, count, values, workspace.halves, workspace.K_resting)
+
+
+@jit_inside
+def solve_slip(workspace: Workspace, n_slipping: int, load: float, slip: Array) -> None:
+    """Solve A_SS d = load p - q for the slip in S, from L^-1 p and L^-1 q."""
+    for t in range(n_slipping):
+        slip[t] = load * workspace.Linv_p[t] - workspace.Linv_q[t]
+    back_substitute(workspace.factor, n_slipping, slip)
+
+
+@jit_inside
+def singular_direction(workspace: Workspace, n_factored: int, direction: Array) -> None:
+    """Write z = (-A_SS^-1 A_Sj, 1), clipped at zero, after `append` failed at j, its next node.
+
+    If K has no positive entry off its diagonal, z >= 0 and A z <= 0 everywhere: a multiplier that
+    bounds the load from above, and the direction in which slip jumps. The entries of z in S are
+    left in `workspace.solution`, not clipped.
+    """
+    z = workspace.solution
+    start = row_start(n_factored)
+    for t in range(n_factored):
+        z[t] = -workspace.factor[start + t]
+    back_substitute(workspace.factor, n_factored, z)
     for i in range(direction.shape[0]):
         direction[i] = 0.0
-    for t in range(size):
-        direction[workspace.members[t]] = max(solution[t], 0.0)
-    direction[workspace.members[size]] = 1.0
+    for t in range(n_factored):
+        direction[workspace.slipping[t]] = max(z[t], 0.0)
+    direction[workspace.slipping[n_factored]] = 1.0

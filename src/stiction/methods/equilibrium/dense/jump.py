@@ -1,15 +1,45 @@
-"""Jump beyond an instability, to another equilibrium at the same load or to global sliding.
+"""The jump beyond an instability of a line or specimen: to another equilibrium, or to sliding.
 
-Slip beyond the instability can only grow, and strength only falls with slip. So every field from
-which all slipping nodes are still driven forward lies below the next equilibrium, and two kinds of
-step keep that property: with frozen strengths, solve the elastic problem (K on the slipping nodes);
-or move along a field z >= 0 with A z <= 0, or towards the solution of the linear problem of the
-present states, as far as the first node that reaches the next corner of its friction law.
+Problem
+-------
+At a load (Pa) at which an equilibrium became unstable, find the least equilibrium that is not below
+its slip, or show that there is none. K is the stiffness (Pa/m), d >= 0 the slip (m), s(d) the
+strength less initial stress (Pa), which falls along straight pieces, and p the load profile:
 
-Where K has positive entries off its diagonal, a step may unload a node that slips. Slip does not go
-back: that node is left out of the step and rests, until it is overstressed again. Every step then
-lowers the energy, so that they end, where no stress is above its strength.
+    load p - K d <= s(d),  with '=' at the slipping nodes S.                                  (1)
+
+A node is driven if load p - K d - s(d), its overload, is not negative. If K has no positive entry
+off its diagonal, and strength only falls with slip, a field of slip at which all slipping nodes are
+driven lies below the least equilibrium, and so do the fields of steps 1 and 2.
+
+Algorithm
+---------
+Our own: two kinds of step that do not pass the least equilibrium.
+
+1. Elastic step. Hold all strengths at their present values, and solve K_SS d_S = (load p - s)_S.
+   Slip moves to this solution, where it is larger. K_SS is factored once and only grows.
+2. Step with the true pieces. On S, let A = K - diag(W) with the weakening rates W of the present
+   pieces. If A_SS is positive definite, move towards the solution of the linear problem of these
+   pieces. If not, move along z >= 0 with A z <= 0 (step 1 in `cholesky`). The move ends where the
+   first node reaches the next corner of its law.
+3. After each step of either kind, the resting nodes that are overstressed join S.
+4. Step 1 is repeated as long as nodes join or pass corners, at most `MAX_ELASTIC_STEPS` times in a
+   row; then follows a step 2, and so on. Step 2 costs another factor. It is needed because step 1
+   alone creeps towards an equilibrium without reaching it.
+5. The interface slides if all nodes slip, if its mean strength cannot carry the load, if a run of
+   nodes at their residual strength is longer than a given length (Griffith's, which no fracture
+   energy can stop), or if nothing bounds a step 2. It is arrested if a step 2 ends at the solution
+   of the linear problem and no node joins.
+
+On a specimen K may have positive entries off its diagonal (`may_stop`), so that a step unloads a
+node that slips. Slip does not go back. In step 1 such a node leaves S and rests until it is
+overstressed again. In step 2 it is left out of the step only, and the interface is not arrested as
+long as this node is overstressed. Every step lowers the energy, so that the steps end, where no
+stress is above its strength.
 """
+
+from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,21 +47,26 @@ from stiction.base.arrays import Array
 from stiction.base.jit import ZERO, jit, jit_inside
 from stiction.elasticity.stiffness import entry, mean_relief
 from stiction.methods.equilibrium.dense.cholesky import (
-    CROWDED,
-    MOST_MEMBERS,
-    Course,
+    SlipState,
     Workspace,
     append,
+    apply_stiffness_to_resting_slip,
     back_substitute,
-    factor_inside,
-    multiply_members,
+    factor_slipping,
     multiply_outside,
+    multiply_slipping,
     singular_direction,
-    substitute_members,
-    take_off_resting,
+    substitute_slipping,
 )
-from stiction.methods.equilibrium.dense.linear_program import overstressed, stress_tolerance
-from stiction.methods.equilibrium.dense.stable_path import AT_STRENGTH, REVERSED, all_slip
+from stiction.methods.equilibrium.dense.linear_program import (
+    queue_overstressed,
+    stress_tolerance,
+)
+from stiction.methods.equilibrium.dense.stable_path import (
+    AT_STRENGTH,
+    NEGATIVE_RATE_RTOL,
+    all_slip,
+)
 from stiction.methods.equilibrium.sample import (
     Outcome,
     StaticSample,
@@ -41,233 +76,271 @@ from stiction.methods.equilibrium.sample import (
     unsupported,
 )
 
-ALL = -1
-"""In the place of a number of members: no node remains that never slipped."""
+MAX_ELASTIC_STEPS_IN_ALL = 4000
+MAX_ELASTIC_STEPS = 16
+"""Elastic steps in a row after which a step 2 follows although nodes keep joining."""
 
-STEPS = 4000
-"""Largest number of elastic steps."""
-PATIENCE = 16
-"""Number of elastic steps after which the true states are tried although nodes keep joining."""
+
+class Support(IntEnum):
+    """What holds the interface after the overstressed nodes have joined S."""
+
+    RESTING_NODES = 0
+    NONE = 1  # every node slips or has slipped
+    UNKNOWN = 2  # more nodes slip than L has space for
+
+
+class Joined(NamedTuple):
+    """S after the overstressed nodes have joined it."""
+
+    support: Support
+    n_slipping: int
 
 
 @jit_inside
 def _residual_runs(sample: StaticSample, slip: Array) -> tuple[int, int]:
-    """Longest run of residual nodes on the circle, and the number of corners passed in all."""
+    """Return the longest run of residual nodes on the circle, and how many corners were passed."""
     n = slip.shape[0]
     longest = 0
     run = 0
-    count = 0
+    n_corners = 0
     for q in range(2 * n):
         i = q if q < n else q - n
         residual = slip[i] > 0.0 and slip[i] >= sample.pieces.at_corner * sample.critical[i]
         run = run + 1 if residual else 0
         if q < n and residual:
-            count += sample.pieces.ends.shape[0]
+            n_corners += sample.pieces.ends.shape[0]
         elif q < n and slip[i] > 0.0:
-            count += piece_at(sample.pieces, sample.critical[i], slip[i])
+            n_corners += piece_at(sample.pieces, sample.critical[i], slip[i])
         longest = max(longest, run)
-    return min(longest, n), count
+    return min(longest, n), n_corners
 
 
 @jit_inside
-def _join(course: Course, load: float, size: int, tolerance: float) -> int:
-    """Append the overstressed nodes to the elastic factor.
-
-    Returns the number of members, ALL if no node remains that never slipped, CROWDED if they do not
-    fit.
-    """
-    workspace = course.workspace
-    count = overstressed(course, load, tolerance)
+def _join(state: SlipState, load: float, n_slipping: int, tolerance: float) -> Joined:
+    """Step 3: append the overstressed nodes to S and to the factor of K."""
+    workspace = state.workspace
+    count = queue_overstressed(state, load, tolerance)
     if count == 0:
-        return size
-    if size + count > MOST_MEMBERS:
-        return CROWDED
-    now = append(workspace, size, count)
-    if now < size + count:
-        return ALL
-    for t in range(size, now):
-        workspace.inside[workspace.members[t]] = True
-    return ALL if all_slip(course) else now
+        return Joined(Support.RESTING_NODES, n_slipping)
+    if n_slipping + count > workspace.max_slipping:
+        return Joined(Support.UNKNOWN, n_slipping)
+    n_factored = append(workspace, n_slipping, count)
+    if n_factored < n_slipping + count:  # K is singular on all nodes only
+        return Joined(Support.NONE, n_slipping)
+    for t in range(n_slipping, n_factored):
+        workspace.is_slipping[workspace.slipping[t]] = True
+    return Joined(Support.NONE if all_slip(state) else Support.RESTING_NODES, n_factored)
 
 
 @jit_inside
-def _forget(workspace: Workspace) -> None:
-    """Let no row of the factor have a forward substitution."""
-    for t in range(workspace.known_drive.shape[0]):
-        workspace.known_drive[t] = np.nan
+def _remove_unloaded(state: SlipState, n_slipping: int, tolerance: float) -> int:
+    """Step 1: unmark the nodes that an elastic step would move back; returns how many stay."""
+    workspace = state.workspace
+    n_stay = n_slipping
+    for t in range(n_slipping):
+        i = workspace.slipping[t]
+        back = (state.slip[i] - workspace.solution[t]) * workspace.diagonal[i]  # Pa
+        if back > AT_STRENGTH * tolerance:
+            workspace.is_slipping[i] = False
+            n_stay -= 1
+    return n_stay
 
 
 @jit_inside
-def _relax(course: Course, load: float, size: int, tolerance: float) -> int:
-    """Take one elastic step with frozen strengths; the nodes that it overstresses then join.
+def _elastic_step(state: SlipState, load: float, n_slipping: int, tolerance: float) -> Joined:
+    """Steps 1 and 3: one elastic step; the nodes that it overstresses join.
 
-    Returns what `_join` returns. Of rows whose drive is that of the step before, as it is at
-    residual strength, the forward substitution stays; `_forget` them with the factor.
+    The rows of L^-1 times the drive are kept for the leading nodes whose drive is that of the step
+    before: at the residual strength it does not change any more.
     """
-    sample, slip, stiff, workspace, stops = course
-    solution, drive = workspace.solution, workspace.right
-    resting, members = workspace.resting, workspace.members
-    forward, before = workspace.forward_drive, workspace.known_drive
-    if stops:
-        take_off_resting(course)
+    sample, slip, Kd, workspace, may_stop = state
+    solution, drive, K_resting = workspace.solution, workspace.rhs, workspace.K_resting
+    slipping, substituted_drive = workspace.slipping, workspace.substituted_drive
+    if may_stop:
+        apply_stiffness_to_resting_slip(state)
     while True:
-        for t in range(size):
-            i = members[t]
-            drive[i] = load * sample.profile[i] - strength_at(sample, slip, i) - resting[i]
-        known = ZERO
-        while known < size and drive[members[known]] == before[known]:
-            known += 1
-        substitute_members(workspace, known, size, drive, forward)
-        for t in range(size):
-            before[t] = drive[members[t]]
-            solution[t] = forward[t]
-        back_substitute(workspace.factor, size, solution)
-        stay = size
-        for t in range(size if stops else ZERO):
-            i = members[t]
-            if (slip[i] - solution[t]) * workspace.diagonal[i] > AT_STRENGTH * tolerance:
-                workspace.inside[i] = False
-                stay -= 1
-        if stay == size:
+        for t in range(n_slipping):
+            i = slipping[t]
+            drive[i] = load * sample.profile[i] - strength_at(sample, slip, i) - K_resting[i]
+        n_kept, n_substituted = ZERO, min(workspace.n_substituted[0], n_slipping)
+        while n_kept < n_substituted and drive[slipping[n_kept]] == substituted_drive[n_kept]:
+            n_kept += 1
+        substitute_slipping(workspace, n_kept, n_slipping, drive, workspace.Linv_drive)
+        for t in range(n_slipping):
+            substituted_drive[t] = drive[slipping[t]]
+            solution[t] = workspace.Linv_drive[t]
+        workspace.n_substituted[0] = n_slipping
+        back_substitute(workspace.factor, n_slipping, solution)
+        if not may_stop:
             break
-        size = factor_inside(workspace)
-        _forget(workspace)
-        take_off_resting(course)
-    for t in range(size):
-        i = members[t]
+        n_stay = _remove_unloaded(state, n_slipping, tolerance)
+        if n_stay == n_slipping:
+            break
+        n_slipping = factor_slipping(workspace)
+        workspace.n_substituted[0] = 0
+        apply_stiffness_to_resting_slip(state)
+    for t in range(n_slipping):
+        i = slipping[t]
         slip[i] = max(slip[i], solution[t])
         solution[t] = slip[i]
-        stiff[i] = drive[i]
-    multiply_outside(workspace, size, solution, stiff)
+        Kd[i] = drive[i]
+    multiply_outside(workspace, n_slipping, solution, Kd)
     for i in range(slip.shape[0]):
-        stiff[i] += resting[i]
-    return _join(course, load, size, tolerance)
+        Kd[i] += K_resting[i]
+    return _join(state, load, n_slipping, tolerance)
 
 
 @jit_inside
-def _leave_reversed(other: Workspace, size: int, least: float, share: float) -> int:
-    """Leave out the members whose solution is below zero; returns how many.
+def _leave_out_reversed(workspace: Workspace, n_slipping: int, atol: float, rtol: float) -> int:
+    """Step 2: unmark the nodes whose solution is below zero; returns how many.
 
-    By at least the stress `least` at the node, or the `share` of the largest.
+    A solution counts as below zero if K_ii times it is more than `atol` (Pa) below, or it is more
+    than the share `rtol` of the largest below.
     """
-    solution = other.solution
+    solution = workspace.solution
     largest = 1.0
-    for t in range(size):
+    for t in range(n_slipping):
         largest = max(largest, solution[t])
     count = ZERO
-    for t in range(size):
-        i = other.members[t]
-        if -solution[t] > max(least / entry(other.stiffness, i, i), share * largest):
-            other.inside[i] = False
+    for t in range(n_slipping):
+        i = workspace.slipping[t]
+        if -solution[t] > max(atol / entry(workspace.stiffness, i, i), rtol * largest):
+            workspace.is_slipping[i] = False
             count += 1
     return count
 
 
 @jit_inside
-def _settle(
-    course: Course, load: float, other: Workspace, size: int, tolerance: float
-) -> Outcome:
-    """Take one step with the true states: along the unstable direction or towards equilibrium.
+def _write_direction(
+    state: SlipState, true_pieces: Workspace, n_marked: int, drive: Array, tolerance: float
+) -> float:
+    """Step 2: write the direction of the step; returns the longest step along it.
 
-    Returns ARRESTED if the step ends in the equilibrium of the members, SLIDING if nothing bounds
-    it, else UNDECIDED.
+    It is 1 if the direction leads to the solution of the linear problem, otherwise infinite.
     """
-    sample, slip, stiff, workspace, stops = course
-    drive = workspace.right
-    for i in range(slip.shape[0]):
-        own = entry(workspace.stiffness, i, i)
-        other.inside[i] = workspace.inside[i]
-        piece = piece_at(sample.pieces, sample.critical[i], slip[i])
-        other.diagonal[i] = own - sample.pieces.slopes[piece] * sample.rate[i]
-        drive[i] = load * sample.profile[i] - strength_at(sample, slip, i) - stiff[i]
-    direction, solution = other.direction, other.solution
-    near = AT_STRENGTH * tolerance
-    count = size
+    slip, may_stop = state.slip, state.may_stop
+    direction, solution = true_pieces.direction, true_pieces.solution
     while True:
-        now = factor_inside(other)
-        if now < count:
-            singular_direction(other, now, direction)
+        n_factored = factor_slipping(true_pieces)
+        if n_factored < n_marked:
             longest = np.inf
-            gone = _leave_reversed(other, now, 0.0, REVERSED) if stops else ZERO
+            singular_direction(true_pieces, n_factored, direction)
+            n_reversed = ZERO
+            if may_stop:
+                n_reversed = _leave_out_reversed(
+                    true_pieces, n_factored, 0.0, NEGATIVE_RATE_RTOL
+                )
         else:
             longest = 1.0
-            substitute_members(other, ZERO, count, drive, solution)
-            back_substitute(other.factor, count, solution)
+            substitute_slipping(true_pieces, ZERO, n_marked, drive, solution)
+            back_substitute(true_pieces.factor, n_marked, solution)
             for i in range(slip.shape[0]):
                 direction[i] = 0.0
-            for t in range(count):
-                direction[other.members[t]] = max(solution[t], 0.0)
-            gone = _leave_reversed(other, count, near, 0.0) if stops else ZERO
-        if gone == 0:
-            break
-        count -= gone
-    step = step_to_corner(sample, slip, direction, longest)
+            for t in range(n_marked):
+                direction[true_pieces.slipping[t]] = max(solution[t], 0.0)
+            n_reversed = ZERO
+            if may_stop:
+                n_reversed = _leave_out_reversed(
+                    true_pieces, n_marked, AT_STRENGTH * tolerance, 0.0
+                )
+        if n_reversed == 0:
+            return longest
+        n_marked -= n_reversed
+
+
+@jit_inside
+def _step_with_true_pieces(
+    state: SlipState, load: float, true_pieces: Workspace, n_slipping: int, tolerance: float
+) -> Outcome:
+    """Step 2. `true_pieces` is the workspace with the factor of A = K - diag(W).
+
+    Returns ARRESTED if the step ends at the solution of the linear problem, SLIDING if nothing
+    bounds it, else UNDECIDED.
+    """
+    sample, slip, Kd, workspace, may_stop = state
+    overload = workspace.rhs
+    for i in range(slip.shape[0]):
+        piece = piece_at(sample.pieces, sample.critical[i], slip[i])
+        W = sample.pieces.slopes[piece] * sample.rate[i]
+        true_pieces.is_slipping[i] = workspace.is_slipping[i]
+        true_pieces.diagonal[i] = entry(workspace.stiffness, i, i) - W
+        overload[i] = load * sample.profile[i] - strength_at(sample, slip, i) - Kd[i]
+    longest = _write_direction(state, true_pieces, n_slipping, overload, tolerance)
+    step = step_to_corner(sample, slip, true_pieces.direction, longest)
     if step == np.inf:
         return Outcome.SLIDING
-    solution, resting = workspace.solution, workspace.resting
-    for t in range(size):
-        solution[t] = slip[workspace.members[t]]
-    multiply_members(workspace, size, solution, stiff)
-    if stops:
-        take_off_resting(course)
-    rests = step == 1.0 and longest == 1.0
+    for t in range(n_slipping):
+        workspace.solution[t] = slip[workspace.slipping[t]]
+    multiply_slipping(workspace, n_slipping, workspace.solution, Kd)
+    if may_stop:
+        apply_stiffness_to_resting_slip(state)
+    at_rest = step == 1.0 and longest == 1.0
     for i in range(slip.shape[0]):
-        stiff[i] += resting[i]
-        if workspace.inside[i] and not other.inside[i]:
-            over = load * sample.profile[i] - strength_at(sample, slip, i) - stiff[i]
-            rests = rests and over <= near
-    return Outcome.ARRESTED if rests else Outcome.UNDECIDED
+        Kd[i] += workspace.K_resting[i]
+        if workspace.is_slipping[i] and not true_pieces.is_slipping[i]:  # it was left out
+            overload_i = load * sample.profile[i] - strength_at(sample, slip, i) - Kd[i]
+            at_rest = at_rest and overload_i <= AT_STRENGTH * tolerance
+    return Outcome.ARRESTED if at_rest else Outcome.UNDECIDED
 
 
 @jit
-def jump(course: Course, load: float, griffith: float, other: Workspace) -> Outcome:
-    """Follow an instability at a fixed load to the next least equilibrium, or to sliding.
+def jump(state: SlipState, load: float, unstoppable: float, true_pieces: Workspace) -> Outcome:
+    """Follow an instability at a fixed load to the least equilibrium, or to sliding.
 
-    Slip d and K d are those of the state that became unstable, moved along the unstable direction
-    as far as `step_to_corner` goes; on return, of the next equilibrium or a lower bound of it.
-    A run of residual nodes as long as Griffith's length counts as global sliding.
+    Slip and K d of the state are those of the instability, perhaps moved along the direction of the
+    instability to a corner; on return they are those of the equilibrium, or of a lower bound of it.
+    A run of `unstoppable` nodes at their residual strength slides. `true_pieces` is a second
+    workspace.
     """
-    sample, slip, _, workspace, _ = course
+    sample, slip, _, workspace, _ = state
+    n = slip.shape[0]
     tolerance = stress_tolerance(sample, load)
-    count = ZERO
-    for i in range(slip.shape[0]):
+    n_marked = ZERO
+    for i in range(n):
         workspace.diagonal[i] = entry(workspace.stiffness, i, i)
-        workspace.inside[i] = slip[i] > 0.0
-        workspace.resting[i] = 0.0
-        count += workspace.inside[i]
-    if count > MOST_MEMBERS:
+        workspace.is_slipping[i] = slip[i] > 0.0
+        workspace.K_resting[i] = 0.0
+        n_marked += workspace.is_slipping[i]
+    if n_marked > workspace.max_slipping:
         return Outcome.UNDECIDED
-    size = factor_inside(workspace)
-    _forget(workspace)
-    if size < count or count == slip.shape[0]:
+    n_slipping = factor_slipping(workspace)
+    workspace.n_substituted[0] = 0
+    if n_slipping < n_marked or n_marked == n:
         return Outcome.SLIDING
-    waited = 0
-    passed = 0
-    for _ in range(STEPS):
-        before = size
-        size = _relax(course, load, size, tolerance)
-        if size == CROWDED:
+    steps_in_row = 0
+    n_corners_before = 0
+    for _ in range(MAX_ELASTIC_STEPS_IN_ALL):
+        # 1. and 3.
+        n_before = n_slipping
+        joined = _elastic_step(state, load, n_slipping, tolerance)
+        if joined.support == Support.UNKNOWN:
             return Outcome.UNDECIDED
-        fixed = mean_relief(workspace.stiffness, sample.profile, slip) == 0.0
-        if size == ALL or (fixed and unsupported(sample, load, slip)):
+        n_slipping = joined.n_slipping
+        # 5. Behind a machine slip lowers the load, so that the mean strength shows nothing.
+        dead_load = mean_relief(workspace.stiffness, sample.profile, slip) == 0.0
+        if joined.support == Support.NONE or (dead_load and unsupported(sample, load, slip)):
             return Outcome.SLIDING
-        run, corners = _residual_runs(sample, slip)
-        if run >= griffith:
+        run, n_corners = _residual_runs(sample, slip)
+        if run >= unstoppable:
             return Outcome.SLIDING
-        waited += 1
-        # A factor of their own pays once elastic steps change only the slip, or creep on.
-        if waited < PATIENCE and (size > before or corners > passed):
-            passed = corners
+        # 4.
+        steps_in_row += 1
+        progress = n_slipping > n_before or n_corners > n_corners_before
+        n_corners_before = n_corners
+        if progress and steps_in_row < MAX_ELASTIC_STEPS:
             continue
-        waited = 0
-        passed = corners
-        before = size
-        status = _settle(course, load, other, size, tolerance)
-        if status == Outcome.SLIDING:
+        steps_in_row = 0
+        # 2. and 3.
+        n_before = n_slipping
+        outcome = _step_with_true_pieces(state, load, true_pieces, n_slipping, tolerance)
+        if outcome == Outcome.SLIDING:
             return Outcome.SLIDING
-        size = _join(course, load, size, tolerance)
-        if size < 0:
-            return Outcome.UNDECIDED if size == CROWDED else Outcome.SLIDING
-        if status == Outcome.ARRESTED and size == before:
+        joined = _join(state, load, n_slipping, tolerance)
+        if joined.support == Support.UNKNOWN:
+            return Outcome.UNDECIDED
+        if joined.support == Support.NONE:
+            return Outcome.SLIDING
+        n_slipping = joined.n_slipping
+        if outcome == Outcome.ARRESTED and n_slipping == n_before:
             return Outcome.ARRESTED
     return Outcome.UNDECIDED

@@ -1,230 +1,284 @@
-"""The onset as a linear programme, by an active set that grows and dual cuts that lower the load.
+"""The load of the first instability of a line or specimen, as a linear programme.
 
-At a load the nodes that must slip are added until none is overstressed, the most overstressed
-first. If A on the slipping nodes ceases to be positive definite as node j joins, the load is too
-high, and y = (-A_SS^-1 A_Sj, 1) shows by how much: A y <= 0, so <s, y>/<p, y> is a lower upper
-bound (a cut). The same slipping nodes, less the few that do not slip at the lower load, go on from
-there. A load that is an upper bound and has an equilibrium is the critical one.
+Problem
+-------
+As long as strength falls linearly with slip, s_i = excess_i - W_i d_i, the largest load (Pa) with
+an equilibrium is, with A = K - diag(W), slip d >= 0 (m) and load profile p > 0,
+
+    max {load : d >= 0, A d + excess - load p >= 0}                                           (1)
+      = min {<excess, y>/<p, y> : y >= 0, A y <= 0}.                                          (2)
+
+Every feasible d bounds the load from below and every feasible y, a multiplier, from above. If K has
+no positive entry off its diagonal, the equilibrium at a load is the least feasible slip there
+(R. Cottle, J.-S. Pang and R. Stone, The Linear Complementarity Problem, 1992, section 3.11), and
+nodes only have to be added to the set S of the slipping nodes.
+
+Algorithm
+---------
+Our own: (1) by an active set that grows, (2) by cuts that lower the load. It starts from an upper
+bound of (2), for example the weakest window, and from a load below it.
+
+1. At the load, find the nodes at rest that are overstressed. If there are any, add them to S, the
+   most overstressed first, each as a row of the factor L of A_SS (`cholesky`).
+2. If all pivots are positive, solve A_SS d_S = load p_S - excess_S, and go to 1.
+3. If the pivot of node j fails, the load is too high. y = (-A_SS^-1 A_Sj, 1) is feasible in (2): a
+   cut. Lower the bound and the load to <excess, y>/<p, y>. Solve for the slip there, take out the
+   nodes that would slip backwards, and go to 1. If the cut lowers the load by round-off only, the
+   load is the solution: `_back_off` makes its slip feasible, and the algorithm ends.
+4. If no node is overstressed, the load has an equilibrium. If it is the upper bound, it is the
+   solution. Otherwise raise it towards the bound by `SHARE_TOWARDS_BOUND` of the way, or up to the
+   bound once within `CLOSE_RTOL` of it, solve for the slip, and go to 1.
+
+The order of the nodes in step 1 and the share in step 4 are for speed. In another order the search
+stalls near the solution, and at too high a load far too many nodes join before a pivot fails.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
 from stiction.base.jit import ZERO, jit, jit_inside
 from stiction.elasticity.stiffness import apply, entry
 from stiction.methods.equilibrium.dense.cholesky import (
-    MOST_MEMBERS,
-    Course,
+    SlipState,
     Workspace,
     append,
     back_substitute,
-    multiply_members,
+    multiply_slipping,
     singular_direction,
-    solve_forward,
-    substitute_members,
+    solve_slip,
+    substitute_slipping,
 )
 from stiction.methods.equilibrium.sample import StaticSample, strength_at
 
-OVERSTRESS = 1e-12
+OVERSTRESS_RTOL = 1e-12
 """Share of the mean strength below which an overstress is round-off."""
-CLOSE = 0.02
-"""Relative distance of a stable load below the bound at which the bound itself is tried."""
-PASSES = 10_000
-"""Bound of a loop in which each pass adds a node or lowers the load."""
-NEARER = 0.75
-"""Share of the way to the bound by which a stable load is raised until close to it."""
+CLOSE_RTOL = 0.02
+"""Relative distance below the bound from which a stable load is raised to the bound itself."""
+SHARE_TOWARDS_BOUND = 0.75
+"""Share of the way to the bound by which a stable load is raised."""
+MAX_PASSES = 10_000
+"""Passes of a loop in which each pass adds a node or changes the load."""
 
 
 @jit_inside
-def sort_by(keys: Array, order: Array, count: int) -> None:
-    """Sort `order[:count]` by rising `keys[:count]`, both in place (Shell, Ciura's gaps)."""
+def sort_by(keys: Array, nodes: NDArray[np.int64], count: int) -> None:
+    """Sort nodes[:count] by rising keys[:count], both in place (Shell sort, Ciura's gaps)."""
     for gap in (1750, 701, 301, 132, 57, 23, 10, 4, 1):
         for i in range(gap, count):
             key = keys[i]
-            node = order[i]
+            node = nodes[i]
             j = i
             while j >= gap and keys[j - gap] > key:
                 keys[j] = keys[j - gap]
-                order[j] = order[j - gap]
+                nodes[j] = nodes[j - gap]
                 j -= gap
             keys[j] = key
-            order[j] = node
+            nodes[j] = node
 
 
 @jit_inside
-def overstressed(course: Course, load: float, least: float) -> int:
-    """Put the nodes at rest above their strength into `order`, most overstressed first."""
-    sample, slip, stiff, workspace, _ = course
+def queue_overstressed(state: SlipState, load: float, tolerance: float) -> int:
+    """Write the resting nodes above their strength to `workspace.queue`; return how many.
+
+    The most overstressed node comes first. Overstresses within the tolerance (Pa) do not count.
+    """
+    sample, slip, Kd, workspace, _ = state
     count = ZERO
-    keys = workspace.keys
-    for i in range(stiff.shape[0]):
-        if not workspace.inside[i]:
-            present = strength_at(sample, slip, i) if slip[i] > 0.0 else sample.excess[i]
-            margin = present - load * sample.profile[i] + stiff[i]
-            if margin < -least:
-                keys[count] = margin
-                workspace.order[count] = i
+    for i in range(Kd.shape[0]):
+        if not workspace.is_slipping[i]:
+            never_slipped = slip[i] == 0.0  # then its strength is known without a search
+            strength = sample.excess[i] if never_slipped else strength_at(sample, slip, i)
+            margin = strength - load * sample.profile[i] + Kd[i]
+            if margin < -tolerance:
+                workspace.margins[count] = margin
+                workspace.queue[count] = i
                 count += 1
-    sort_by(keys, workspace.order, count)
+    sort_by(workspace.margins, workspace.queue, count)
     return count
 
 
 @jit_inside
 def stress_tolerance(sample: StaticSample, load: float) -> float:
     """Overstress, Pa, that counts as round-off."""
-    scale = 0.0
+    total = 0.0
     n = sample.excess.shape[0]
     for i in range(n):
-        scale += abs(sample.excess[i]) + abs(load) * sample.profile[i]
-    return OVERSTRESS * scale / n
+        total += abs(sample.excess[i]) + abs(load) * sample.profile[i]
+    return OVERSTRESS_RTOL * total / n
 
 
 @jit_inside
-def _back_off(course: Course, load: float, size: int) -> None:
-    """Lower the load of the slip by so little that no node at rest is overstressed.
+def _solve(state: SlipState, load: float, n_slipping: int) -> None:
+    """Write the slip in S at a load to `workspace.solution`, and K d."""
+    solve_slip(state.workspace, n_slipping, load, state.workspace.solution)
+    multiply_slipping(state.workspace, n_slipping, state.workspace.solution, state.Kd)
 
-    Close to the onset slip grows so fast with the load that round-off in the load alone may leave
-    a node overstressed. One step along the tangent d d/d load mends it.
+
+@jit_inside
+def _back_off(state: SlipState, load: float, n_slipping: int) -> None:
+    """Step 3: lower the load of the slip by so little that no resting node is overstressed.
+
+    Close to the solution slip grows so fast with the load that round-off in the load alone may
+    leave a node overstressed. One step along the tangent v = d d/d load mends it. The load that is
+    returned stays: the certificate shows by how much the load of the slip differs from it.
     """
-    sample, _, stiff, workspace, _ = course
-    solution, stiff_rate = workspace.solution, workspace.product
-    for t in range(size):
-        solution[t] = workspace.forward_load[t]
-    back_substitute(workspace.factor, size, solution)
-    multiply_members(workspace, size, solution, stiff_rate)
+    sample, _, Kd, workspace, _ = state
+    v, Kv = workspace.solution, workspace.Kv
+    for t in range(n_slipping):
+        v[t] = workspace.Linv_p[t]
+    back_substitute(workspace.factor, n_slipping, v)
+    multiply_slipping(workspace, n_slipping, v, Kv)
     step = 0.0
-    for i in range(stiff.shape[0]):
-        margin = sample.excess[i] - load * sample.profile[i] + stiff[i]
-        if margin < 0.0 and not workspace.inside[i]:
-            step = max(step, margin / (stiff_rate[i] - sample.profile[i]))
-    solve_forward(workspace, size, load - step, solution)
-    multiply_members(workspace, size, solution, stiff)
+    for i in range(Kd.shape[0]):
+        margin = sample.excess[i] - load * sample.profile[i] + Kd[i]
+        if margin < 0.0 and not workspace.is_slipping[i]:
+            step = max(step, margin / (Kv[i] - sample.profile[i]))
+    _solve(state, load - step, n_slipping)
 
 
 @jit_inside
-def _without_reversed(workspace: Workspace, size: int, load: float) -> int:
-    """Remove the members that would slip backwards at a load; return the number that stay."""
-    solution = workspace.solution
-    while size > 0:
-        kept = 0
-        while kept < size and solution[kept] >= 0.0:
-            kept += 1
-        if kept == size:
+def _remove_reversed(workspace: Workspace, n_slipping: int, load: float) -> int:
+    """Step 3: take the nodes that would slip backwards out of S; return how many stay.
+
+    L stays valid up to the first of them, so all nodes behind it leave, too. Those that belong to
+    S are overstressed then, and come back.
+    """
+    slip = workspace.solution
+    while n_slipping > 0:
+        n_forward = 0
+        while n_forward < n_slipping and slip[n_forward] >= 0.0:
+            n_forward += 1
+        if n_forward == n_slipping:
             break
-        for t in range(kept, size):
-            workspace.inside[workspace.members[t]] = False
-        size = kept
-        solve_forward(workspace, size, load, solution)
-    return size
+        for t in range(n_forward, n_slipping):
+            workspace.is_slipping[workspace.slipping[t]] = False
+        n_slipping = n_forward
+        solve_slip(workspace, n_slipping, load, slip)
+    return n_slipping
+
+
+@jit_inside
+def _cut(
+    state: SlipState, n_factored: int, bound: float, multiplier: Array
+) -> tuple[float, float]:
+    """Step 3: the load of the cut, and the lower of it and the bound, with its multiplier."""
+    sample, _, _, workspace, _ = state
+    y = workspace.direction
+    singular_direction(workspace, n_factored, y)
+    excess_y = 0.0
+    p_y = 0.0
+    for t in range(n_factored + 1):
+        i = workspace.slipping[t]
+        excess_y += y[i] * sample.excess[i]
+        p_y += y[i] * sample.profile[i]
+    cut = excess_y / p_y
+    if cut < bound:
+        bound = cut
+        for i in range(multiplier.shape[0]):
+            multiplier[i] = y[i] / p_y
+    return cut, bound
 
 
 @jit
 def solve_program(
-    course: Course, start: float, bound: float, cap: float, multiplier: Array
+    state: SlipState, start: float, bound: float, cap: float, multiplier: Array
 ) -> tuple[float, bool]:
-    """Critical load with slip d, K d and multiplier, from an upper bound and its multiplier.
+    """Return the load that solves (1), with slip d, K d and multiplier, and whether it is solved.
 
-    The load is first `start`, then each time three quarters nearer to the bound until close to
-    it: at too high a load far too many nodes join. Nodes that already slip (`slip`) join
-    first. If `cap` is below the critical load, the result is the least equilibrium there. It is not
-    solved after too many passes, or if the workspace cannot hold the members.
+    The bound is an upper bound with its multiplier, and the first load is `start`. Nodes that slip
+    already (`state.slip`) are the first to join. If `cap` is below the solution, the result is the
+    least equilibrium at this load. It is not solved if there are too many passes, or more slipping
+    nodes than the workspace can hold.
     """
-    sample, slip, stiff, workspace, _ = course
+    sample, slip, Kd, workspace, _ = state
     top = min(bound, cap)
     load = min(start, top)
     tolerance = stress_tolerance(sample, top)
-    members, inside = workspace.members, workspace.inside
-    solution = workspace.solution
-    size = ZERO
-    known = ZERO
+    slipping, is_slipping = workspace.slipping, workspace.is_slipping
+    n_slipping = ZERO
+    n_known = ZERO  # nodes that slip already, until they have joined
     for i in range(slip.shape[0]):
         workspace.diagonal[i] = entry(workspace.stiffness, i, i) - sample.rate[i]
-        inside[i] = False
-        stiff[i] = 0.0
+        is_slipping[i] = False
+        Kd[i] = 0.0
         if slip[i] > 0.0:
-            workspace.order[known] = i
-            known += 1
+            workspace.queue[n_known] = i
+            n_known += 1
             slip[i] = 0.0
     solved = False
-    for _ in range(PASSES):
-        count = known or overstressed(course, load, tolerance)
-        known = ZERO
-        if count == 0:
+    for _ in range(MAX_PASSES):
+        # 1. The nodes that must slip.
+        count = n_known or queue_overstressed(state, load, tolerance)
+        n_known = ZERO
+        if count == 0:  # 4.
             top = min(bound, cap)
             if load >= top:
                 solved = True
                 break
-            load = (
-                top if top - load <= CLOSE * abs(top) else (1.0 - NEARER) * load + NEARER * top
-            )
-            solve_forward(workspace, size, load, solution)
-            multiply_members(workspace, size, solution, stiff)
+            if top - load <= CLOSE_RTOL * abs(top):
+                load = top
+            else:
+                load = (1.0 - SHARE_TOWARDS_BOUND) * load + SHARE_TOWARDS_BOUND * top
+            _solve(state, load, n_slipping)
             continue
-        if size + count > MOST_MEMBERS:
+        if n_slipping + count > workspace.max_slipping:
             break
-        before = size
-        size = append(workspace, size, count)
-        substitute_members(workspace, before, size, sample.profile, workspace.forward_load)
-        substitute_members(workspace, before, size, sample.excess, workspace.forward_strength)
-        for t in range(before, size):
-            inside[members[t]] = True
-        failed = size < before + count
-        settled = False
-        if failed:
-            direction = workspace.direction
-            singular_direction(workspace, size, direction)
-            above = 0.0
-            below = 0.0
-            for t in range(size + 1):
-                node = members[t]
-                above += direction[node] * sample.excess[node]
-                below += direction[node] * sample.profile[node]
-            settled = above / below >= load - tolerance
-            if above / below < bound:
-                bound = above / below
-                for i in range(multiplier.shape[0]):
-                    multiplier[i] = direction[i] / below
-            load = min(load, bound)
-        solve_forward(workspace, size, load, solution)
-        if failed:  # members that joined only because the load was too high
-            size = _without_reversed(workspace, size, load)
-        multiply_members(workspace, size, solution, stiff)
-        if settled:  # a cut that lowers the load by round-off only: this is the optimum
+        n_before = n_slipping
+        n_slipping = append(workspace, n_slipping, count)
+        substitute_slipping(workspace, n_before, n_slipping, sample.profile, workspace.Linv_p)
+        substitute_slipping(workspace, n_before, n_slipping, sample.excess, workspace.Linv_q)
+        for t in range(n_before, n_slipping):
+            is_slipping[slipping[t]] = True
+        if n_slipping == n_before + count:  # 2.
+            _solve(state, load, n_slipping)
+            continue
+        # 3. A pivot failed.
+        cut, bound = _cut(state, n_slipping, bound, multiplier)
+        by_round_off_only = cut >= load - tolerance
+        load = min(load, bound)
+        solve_slip(workspace, n_slipping, load, workspace.solution)
+        n_slipping = _remove_reversed(workspace, n_slipping, load)
+        multiply_slipping(workspace, n_slipping, workspace.solution, Kd)
+        if by_round_off_only:
             solved = True
-            _back_off(course, load, size)
+            _back_off(state, load, n_slipping)
             break
-    for t in range(size):
-        slip[members[t]] = max(solution[t], 0.0)
+    for t in range(n_slipping):
+        slip[slipping[t]] = max(workspace.solution[t], 0.0)
     return load, solved
 
 
 @jit
 def certificate(
-    sample: StaticSample, slip: Array, stiff: Array, multiplier: Array, workspace: Workspace
+    sample: StaticSample,
+    slip: Array,
+    Kd: Array,
+    multiplier: Array,
+    workspace: Workspace,
+    Ky: Array,
 ) -> float:
-    """Distance of the rigorous bounds from below (by the slip) and from above (by y), Pa.
+    """Return the distance of the rigorous bounds (1) by the slip and (2) by the multiplier, Pa.
 
-    K y is left in ``workspace.product``.
+    Writes K times the multiplier y to `Ky`.
     """
     n = slip.shape[0]
     lower = np.inf
     count = ZERO
-    values = workspace.solution
-    product = workspace.product
     for i in range(n):
-        balance = sample.excess[i] + stiff[i] - sample.rate[i] * slip[i]
+        balance = sample.excess[i] + Kd[i] - sample.rate[i] * slip[i]
         lower = min(lower, balance / sample.profile[i])
         if multiplier[i] > 0.0:
-            workspace.order[count] = i
-            values[count] = multiplier[i]
+            workspace.queue[count] = i
+            workspace.solution[count] = multiplier[i]
             count += 1
-    apply(workspace.stiffness, workspace.order, count, values, workspace.halves, product)
-    above = 0.0
-    below = 0.0
-    excess = 0.0
+    apply(workspace.stiffness, workspace.queue, count, workspace.solution, workspace.halves, Ky)
+    excess_y = 0.0
+    p_y = 0.0
+    infeasible = 0.0
     for i in range(n):
-        above += multiplier[i] * sample.excess[i]
-        below += multiplier[i] * sample.profile[i]
-        # Round-off may leave A y slightly positive; what this can do to the bound is added to it.
-        excess += max(product[i] - sample.rate[i] * multiplier[i], 0.0) * slip[i]
-    return max((above + excess) / below - lower, 0.0)
+        excess_y += multiplier[i] * sample.excess[i]
+        p_y += multiplier[i] * sample.profile[i]
+        # Round-off may leave A y slightly positive. Its effect on the bound, <A y, d>, is added.
+        infeasible += max(Ky[i] - sample.rate[i] * multiplier[i], 0.0) * slip[i]
+    return max((excess_y + infeasible) / p_y - lower, 0.0)

@@ -1,9 +1,14 @@
-"""The linear programme with one dense factor of K, on a line or a specimen.
+"""Equilibria of a line or a specimen, with dense factors: which algorithm is used when.
 
-Where very many nodes of a line slip the factor is slower than transforms, which take over. Behind a
-machine the path is followed event by event: slip lowers the force, whose largest value may lie
-before the instability, and where all nodes slip without one the interface slides stably. Arrest in
-a specimen is always decided by following the jump.
+1. The next instability is a linear programme of the present pieces of the friction law
+   (`linear_program`), if no node reaches a corner of its law before. A line on which very many
+   nodes slip is handed over to transforms (`plane_onset`), which are faster there.
+2. Otherwise the path is followed event by event (`stable_path`). The programme is not tried again
+   on this path, except from rest.
+3. Behind a machine the path is always followed: slip lowers the force, whose largest value may lie
+   before the instability. If all nodes slip without one, the interface slides stably.
+4. Beyond an instability of a line, the quick test for sliding comes first (`runaway`). If it does
+   not decide, and on specimens always, the jump is followed to its end (`jump`).
 """
 
 import threading
@@ -16,11 +21,15 @@ from stiction.elasticity.line import line_of
 from stiction.elasticity.protocol import NONE, Elasticity
 from stiction.elasticity.stiffness import apply_circular
 from stiction.elasticity.weakest import window_bound
-from stiction.methods.equilibrium.dense.cholesky import Course, Workspace, make_workspace
+from stiction.methods.equilibrium.dense.cholesky import SlipState, Workspace, make_workspace
 from stiction.methods.equilibrium.dense.jump import jump
-from stiction.methods.equilibrium.dense.linear_program import NEARER, certificate, solve_program
+from stiction.methods.equilibrium.dense.linear_program import (
+    SHARE_TOWARDS_BOUND,
+    certificate,
+    solve_program,
+)
 from stiction.methods.equilibrium.dense.runaway import Runs, runs_away, runs_of
-from stiction.methods.equilibrium.dense.stable_path import REACHED, UNSTABLE, advance
+from stiction.methods.equilibrium.dense.stable_path import PathStatus, follow_stable_path
 from stiction.methods.equilibrium.sample import (
     Jump,
     Outcome,
@@ -36,14 +45,16 @@ from stiction.methods.equilibrium.sample import (
 from stiction.methods.equilibrium.transforms.plane import plane_onset
 from stiction.problem.problem import Problem
 
-MANY_NODES = 1500
+MAX_WEAK_NODES = 1500
 """Number of nodes weaker than the upper bound of the load above which transforms are faster."""
-GAP_OF_MANY = 3e-10
+TRANSFORMS_GAP_RTOL = 3e-10
 """Relative distance of the bounds by transforms, below `widest_gap`."""
-WIDEST_OF_STOPS = 1e-4
+WIDEST_GAP_IF_NODES_STOP = 1e-4
 """`widest_gap` where nodes may stop: positive entries of K leave bounds so far apart."""
-SAME = 1e-12
+WEAKENING_RATE_RTOL = 1e-12
 """Relative distance of weakening rates that differ by round-off."""
+RESTING_MULTIPLIER_RTOL = 1e-9
+"""Share of the largest multiplier below which it is zero: nodes at rest have none."""
 
 
 class DenseProgram:
@@ -64,28 +75,28 @@ class DenseProgram:
         else:
             self.elastic = problem.blocks
         self.driven = self.elastic.relief > 0.0
-        self.stops = self.elastic.positive > 0.0  # slip may unload a node that slips
-        self._own = threading.local()
-        if self.stops:
-            self.widest_gap = max(self.widest_gap, WIDEST_OF_STOPS)
+        self.may_stop = self.elastic.positive > 0.0  # slip may unload a node that slips
+        self._of_thread = threading.local()
+        if self.may_stop:
+            self.widest_gap = max(self.widest_gap, WIDEST_GAP_IF_NODES_STOP)
 
     @property
     def _workspaces(self) -> tuple[Workspace, Workspace]:
-        """The workspaces of the thread: for programmes and elastic steps, and for true states."""
-        if not hasattr(self._own, "workspaces"):
-            self._own.workspaces = tuple(
+        """The workspaces of the thread: for programmes and elastic steps, and for true pieces."""
+        if not hasattr(self._of_thread, "workspaces"):
+            self._of_thread.workspaces = tuple(
                 make_workspace(self.elastic.entries, self.nodes) for _ in range(2)
             )
-        pair: tuple[Workspace, Workspace] = self._own.workspaces
+        pair: tuple[Workspace, Workspace] = self._of_thread.workspaces
         return pair
 
     def bound(self, sample: StaticSample) -> tuple[float, Array]:
         """Return the bound of the weakest window of one sample (Pa), and its multiplier."""
         low, high = _rates(sample)
         windows = self.elastic.windows(low, high) if high > 0.0 else NONE
-        work, multiplier = np.empty((2, self.nodes))
+        workspace, multiplier = np.empty((2, self.nodes))
         bound = window_bound(
-            sample.excess, sample.profile, sample.rate, windows, work, multiplier
+            sample.excess, sample.profile, sample.rate, windows, workspace, multiplier
         )
         return bound, multiplier
 
@@ -101,155 +112,180 @@ class DenseProgram:
         equilibrium at a lower load, if one was found.
         """
         bound, multiplier = self.bound(sample)
-        if cap == np.inf and self.nodes > MANY_NODES:
-            weak = np.count_nonzero(sample.excess < bound * sample.profile)
-            found = self._by_transforms(sample, state) if weak > MANY_NODES else None
-            if found is not None:
-                return found
-        slip, stiff = np.zeros((2, self.nodes))
+        if cap == np.inf and self.nodes > MAX_WEAK_NODES:
+            weak_nodes = np.count_nonzero(sample.excess < bound * sample.profile)
+            if weak_nodes > MAX_WEAK_NODES:
+                solution = self._by_transforms(sample, state)
+                if solution is not None:
+                    return solution
+        slip, Kd = np.zeros((2, self.nodes))
         start = top = min(bound, cap)
         low, high = _rates(sample)
         if state is not None:
             start, slip = state.load, state.slip.copy()
         elif low < high:  # the bound is not close: at too high a load far too many nodes join
-            first = min(top, float((sample.excess / sample.profile).min()))
-            start = (1.0 - NEARER) * first + NEARER * top
-        course = Course(sample, slip, stiff, self._workspaces[0], self.stops)
-        load, solved = solve_program(course, start, bound, cap, multiplier)
+            first_slip = min(top, float((sample.excess / sample.profile).min()))
+            start = (1.0 - SHARE_TOWARDS_BOUND) * first_slip + SHARE_TOWARDS_BOUND * top
+        slip_state = SlipState(sample, slip, Kd, self._workspaces[0], self.may_stop)
+        load, solved = solve_program(slip_state, start, bound, cap, multiplier)
         if not solved:
             return None
-        return State(load, slip, multiplier, stiff, multiplier=multiplier)
+        return State(load, slip, multiplier, Kd, multiplier=multiplier)
 
     def _by_transforms(self, sample: StaticSample, state: State | None) -> State | None:
         """Solve a programme in which many nodes slip; None if its bounds stay apart."""
         half_spaces = self.elastic.half_spaces
         if half_spaces is None:
             return None
-        found = plane_onset(
-            half_spaces, sample.excess, sample.profile, sample.rate, GAP_OF_MANY,
+        onset = plane_onset(
+            half_spaces, sample.excess, sample.profile, sample.rate, TRANSFORMS_GAP_RTOL,
             None if state is None else state.slip,
         )  # fmt: skip
-        if not found.closed:
+        if not onset.closed:
             return None
         # The multiplier was lifted everywhere to be feasible; that of nodes at rest is zero.
-        multiplier = found.multiplier - found.multiplier.min()
-        multiplier[multiplier < 1e-9 * multiplier.max()] = 0.0
+        multiplier = onset.multiplier - onset.multiplier.min()
+        multiplier[multiplier < RESTING_MULTIPLIER_RTOL * multiplier.max()] = 0.0
         multiplier /= multiplier @ sample.profile
         symbol = half_spaces.symbol((self.nodes,))
-        stiff = np.fft.irfft(symbol * np.fft.rfft(found.slip), self.nodes)
-        return State(found.lower, found.slip, multiplier, stiff, multiplier=multiplier)
+        Kd = np.fft.irfft(symbol * np.fft.rfft(onset.slip), self.nodes)
+        return State(onset.lower, onset.slip, multiplier, Kd, multiplier=multiplier)
 
     def next(
         self, sample: StaticSample, state: State | None = None, target: float = np.inf
     ) -> State:
         """Return the next instability from a state or from rest, or the state at a load before it.
 
-        The programme of the present pieces gives it if no node reaches a further corner before.
-        That is not tried again after it once failed, but for from rest.
+        See steps 1 to 3 at the top of this file.
         """
         state = state or at_rest(sample)
-        rests, by_events = not state.slip.any(), state.by_events or self.driven
-        if rests:
-            for workspace in self._workspaces:  # what is held is of another sample
-                workspace.held[0] = 0
+        from_rest, by_events = not state.slip.any(), state.by_events or self.driven
+        if from_rest:
+            for workspace in self._workspaces:
+                workspace.n_factored[0] = 0  # the rows are those of another sample
         if target == np.inf and not by_events:
-            piece, present = None, sample
-            if not rests:
-                piece, strength, rate = present_pieces(sample, state.slip)
-                present = sample._replace(excess=strength, rate=rate)
-            found = self.solve(present, state=None if rests else state)
-            straight = found is not None and (rests or found.load >= state.load)
-            if found is not None and straight and not exceeds(sample, found.slip, piece):
-                self._certify(present, found, found.direction)
-                found.stiff_direction = self._workspaces[0].product[: self.nodes].copy()
-                return found
-            by_events = not rests
-        slip, stiff, direction = state.slip.copy(), state.stiff.copy(), state.direction.copy()
-        course = Course(sample, slip, stiff, self._workspaces[1], self.stops)
-        load, peak, stopped, status = advance(course, state.load, target, direction)
-        found = State(
-            load, slip, direction, stiff,
-            unstable=status == UNSTABLE, known=status in (UNSTABLE, REACHED), peak=peak,
-            by_events=by_events, jumped=state.jumped, stopped=stopped or state.stopped,
+            instability = self._next_by_programme(sample, state, from_rest)
+            if instability is not None:
+                return instability
+            by_events = not from_rest
+        slip, Kd, direction = state.slip.copy(), state.stiff.copy(), state.direction.copy()
+        slip_state = SlipState(sample, slip, Kd, self._workspaces[1], self.may_stop)
+        end = follow_stable_path(slip_state, state.load, target, direction)
+        reached = State(
+            end.load, slip, direction, Kd,
+            unstable=end.status == PathStatus.UNSTABLE,
+            known=end.status != PathStatus.GIVEN_UP,
+            peak=end.peak, by_events=by_events, jumped=state.jumped,
+            stopped=end.stopped or state.stopped,
         )  # fmt: skip
         # No multiplier bounds the load from above where a law steepens, or a node stopped.
-        found.certified = found.unstable and not (self.pieces.steepens or found.stopped)
-        if found.certified and rests:
-            _, strength, rate = present_pieces(sample, slip)
-            present = sample._replace(excess=strength, rate=rate)
-            self._certify(present, found, multiplier_of(sample, found))
-        return found
+        reached.certified = reached.unstable and not (self.pieces.steepens or reached.stopped)
+        if reached.certified and from_rest:
+            present = present_sample(sample, slip)
+            self._certify(present, reached, multiplier_of(sample, reached))
+        return reached
 
-    def _certify(self, present: StaticSample, found: State, multiplier: Array) -> None:
-        """Write the distance of the bounds of an instability; K y is left in the workspace."""
-        found.gap = certificate(
-            present, found.slip, found.stiff, multiplier, self._workspaces[0]
+    def _next_by_programme(
+        self, sample: StaticSample, state: State, from_rest: bool
+    ) -> State | None:
+        """Return the next instability by a linear programme; None if a corner comes before it."""
+        present = sample if from_rest else present_sample(sample, state.slip)
+        solution = self.solve(present, state=None if from_rest else state)
+        if solution is None or not (from_rest or solution.load >= state.load):
+            return None
+        piece = None if from_rest else present_pieces(sample, state.slip).piece
+        if exceeds(sample, solution.slip, piece):
+            return None
+        solution.stiff_direction = self._certify(present, solution, solution.direction)
+        return solution
+
+    def _certify(self, present: StaticSample, instability: State, multiplier: Array) -> Array:
+        """Write the distance of the bounds of an instability; return K times the multiplier."""
+        Ky = np.empty(self.nodes)
+        instability.gap = certificate(
+            present, instability.slip, instability.stiff, multiplier, self._workspaces[0], Ky
         )
+        return Ky
 
     def at(self, sample: StaticSample, state: State, load: float) -> State | None:
         if load <= state.load:
             return state
         if not (state.jumped or state.by_events or self.driven):
-            found = self.solve(sample, load)
-            if found is not None and not exceeds(sample, found.slip):
-                return replace(found, load=load, direction=state.direction, unstable=False)
-        there = self.next(sample, replace(state, by_events=True), load)
-        return None if there.unstable or not there.known else there
+            solution = self.solve(sample, load)
+            if solution is not None and not exceeds(sample, solution.slip):
+                return replace(solution, load=load, direction=state.direction, unstable=False)
+        reached = self.next(sample, replace(state, by_events=True), load)
+        return None if reached.unstable or not reached.known else reached
 
-    def jump(self, sample: StaticSample, found: State) -> Jump:
-        slip, stiff = found.slip.copy(), found.stiff.copy()
-        outcome, longest = self._run(sample, found, slip)
+    def jump(self, sample: StaticSample, instability: State) -> Jump:
+        slip, Kd = instability.slip.copy(), instability.stiff.copy()
+        outcome, unstoppable = self._run(sample, instability, slip)
         if outcome == Outcome.UNDECIDED:
-            elastic, true = self._workspaces
-            course = Course(sample, slip, stiff, elastic, self.stops)
-            outcome = jump(course, found.load, longest, true)
+            elastic, true_pieces = self._workspaces
+            slip_state = SlipState(sample, slip, Kd, elastic, self.may_stop)
+            outcome = jump(slip_state, instability.load, unstoppable, true_pieces)
         if outcome == Outcome.ARRESTED:
-            before, after = (present_pieces(sample, each).piece for each in (found.slip, slip))
+            before = present_pieces(sample, instability.slip).piece
+            after = present_pieces(sample, slip).piece
             if not np.any(after > before):
                 # Round-off: only nodes that pass a corner can stop an instability.
                 outcome = Outcome.UNDECIDED
         state = State(
-            found.load, slip, found.direction, stiff,
-            by_events=found.by_events, jumped=True, stopped=found.stopped,
+            instability.load, slip, instability.direction, Kd,
+            by_events=instability.by_events, jumped=True, stopped=instability.stopped,
         )  # fmt: skip
         return Jump(outcome == Outcome.ARRESTED, outcome != Outcome.UNDECIDED, state)
 
-    def _run(self, sample: StaticSample, found: State, slip: Array) -> tuple[int, float]:
-        """Try whether the patch certainly slides; return that, and a length of residual nodes that
-        shows it. The slip moves on to a lower bound of the next equilibrium."""
+    def _run(self, sample: StaticSample, instability: State, slip: Array) -> tuple[int, float]:
+        """Test for sliding (step 4); return the outcome, and a length that is unstoppable.
+
+        The length is a number of residual nodes. Slip moves on to a lower bound of the next
+        equilibrium.
+        """
+        direction = instability.direction
         if self.runs is None:
-            step = step_to_corner(sample, slip, found.direction, np.inf)
+            step = step_to_corner(sample, slip, direction, np.inf)
             return (Outcome.SLIDING if step == np.inf else Outcome.UNDECIDED), np.inf
-        stiff_direction = found.stiff_direction
-        if stiff_direction is None:
-            members, stiff_direction = np.flatnonzero(found.direction), np.empty(self.nodes)
+        K_direction = instability.stiff_direction
+        if K_direction is None:
+            nodes, K_direction = np.flatnonzero(direction), np.empty(self.nodes)
             apply_circular(
-                self.elastic.entries, members, members.size, found.direction[members],
-                np.empty((2, self.nodes // 2)), stiff_direction,
+                self.elastic.entries, nodes, nodes.size, direction[nodes],
+                np.empty((2, self.nodes // 2)), K_direction,
             )  # fmt: skip
         return runs_away(
-            sample, self.runs, found.load, slip, found.stiff, found.direction,
-            stiff_direction,
+            sample, self.runs, instability.load, slip, instability.stiff, direction,
+            K_direction,
         )  # fmt: skip
 
     def gradient(self, sample: StaticSample, state: State) -> Array:
-        """Find the multiplier, whose mean over the load profile is one.
+        """Return the multiplier y, or, behind a machine, the derivative of the mean stress.
 
-        Behind a machine the multiplier is that of the drive;
-        until the instability (K - W) d = D q - s on the nodes that slip, none of which rests.
+        With a relief of r (Pa/m) the mean stress is D - r <p, d>/n at a drive D, and y is the
+        derivative of the largest D by the strengths s. Up to the instability (K - W) d = D p - s on
+        the slipping nodes, none of which rests. So d grows with D at the rate d' = (K - W)^-1 p,
+        the derivative of <p, d> by s is -d', and the mean stress has the derivative
+
+            y - (r/n) (<p, d'> y - d').
         """
         y = multiplier_of(sample, state)
         if not self.driven:
             return y
         rate = present_pieces(sample, state.slip).rate
-        slips, q = state.slip > 0.0, sample.profile
-        moved = np.zeros(y.size)  # d' of a rise of the drive
+        slips, p = state.slip > 0.0, sample.profile
+        slip_rate = np.zeros(y.size)  # d'
         block = self.problem.blocks.stiffness[np.ix_(slips, slips)] - np.diag(rate[slips])
-        moved[slips] = np.linalg.solve(block, q[slips])
-        return y - self.elastic.relief / y.size * ((q @ moved) * y - moved)
+        slip_rate[slips] = np.linalg.solve(block, p[slips])
+        return y - self.elastic.relief / y.size * ((p @ slip_rate) * y - slip_rate)
 
     def stress_released(self, state: State) -> Array:
         return state.stiff
+
+
+def present_sample(sample: StaticSample, slip: Array) -> StaticSample:
+    """Return the sample whose only pieces are those on which the nodes are after a slip."""
+    present = present_pieces(sample, slip)
+    return sample._replace(excess=present.strength, rate=present.rate)
 
 
 def _rates(sample: StaticSample) -> tuple[float, float]:
@@ -261,4 +297,4 @@ def _rates(sample: StaticSample) -> tuple[float, float]:
     if rates.size == 0:
         return 0.0, 0.0
     low, high = float(rates.min()), float(rates.max())
-    return low, (high if low < high * (1.0 - SAME) else low)
+    return low, (high if low < high * (1.0 - WEAKENING_RATE_RTOL) else low)

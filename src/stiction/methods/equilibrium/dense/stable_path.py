@@ -1,21 +1,57 @@
-"""The path of equilibria, event by event: the load rises until a node slips or reaches a corner.
+"""Follow the stable equilibria of a line or a specimen while the load rises, event by event.
 
-Between events slip is linear in the load: d(load) = A_SS^-1 (load p - q). Here q is the value
-at zero slip of the piece on which a node is, less the initial stress, and W the slope of it.
-An event is a node at rest that reaches its strength (a new row of the factor), a slipping node
-that reaches the next corner (a diagonal entry that rises as the strength falls less steeply), or a
-node whose slipping, or weakening more steeply, makes A singular: there the path ends.
+Problem
+-------
+p is the profile of the load, K the stiffness (Pa/m), and d >= 0 the slip (m). The strength of node
+i, less its initial stress, falls with slip along straight pieces: s_i = q_i - W_i d_i. Slip is an
+equilibrium at a load (Pa) if no stress is above its strength, and equal to it where nodes slip:
 
-Slip never goes back. Where K has positive entries off its diagonal, slip may unload other nodes: at
-the nodes at their strength the rates v of slip solve v >= 0, A v - p >= 0, <v, A v - p> = 0, the
-conditions of a minimum of <v, A v>/2 - <p, v> over v >= 0. After an event the rates move from those
-before towards the minimum on the face of the slipping nodes; the first node whose rate reaches zero
-leaves it: it stops, and rests at the strength of the slip that it has reached. A node that comes to
-its strength, again or in no time, is an event as above. Each such move lowers the function, so that
-they end, at a minimum or in a direction y >= 0, <y, A y> <= 0 that nothing bounds: the instability.
+    load p - K d <= s(d),  with '=' at the slipping nodes S.                                  (1)
+
+With A = K - diag(W), slip and the rate v at which it grows with the load (m/Pa) follow from
+
+    A_SS d_S = load p_S - q_S - (K d_rest)_S,    A_SS v = p_S,                                (2)
+
+where d_rest is the slip of nodes that slipped before and rest. (2) holds until a node enters or
+leaves S, or reaches a corner of its friction law. The equilibrium is stable as long as A_SS is
+positive definite.
+
+On a line K has no positive entry off its diagonal, and a node that slips never stops. On a specimen
+it may have some (`may_stop`), so that slip at one node can unload another. Slip never goes back: a
+node that is unloaded rests. The rates of the nodes at their strength then satisfy the conditions of
+a minimum of v'Av/2 - p'v over v >= 0:
+
+    v >= 0,  A v - p >= 0,  v'(A v - p) = 0.                                                  (3)
+
+Algorithm
+---------
+Parametric quadratic programming: the solution is piecewise linear in the load, and its kinks are
+found one after the other, as on the critical line of H. Markowitz (Naval Research Logistics
+Quarterly 3, 1956). Step 2 is an active-set method for (3) (J. Nocedal and S. Wright, Numerical
+Optimization, 2006, section 16.5).
+
+1. Find S and factor A_SS = L L'. If a pivot fails, go to 5.
+2. Solve (2) for the rates v of slip, and multiply them by K. For (3), move v from its former value
+   towards the solution. The first node whose rate reaches zero on the way stops: take it out of S
+   and solve again.
+3. Find the smallest rise of the load at which a resting node reaches its strength (a start) or a
+   slipping node a corner of its law, and go there. If a node at its strength would be overstressed
+   by any rise, it starts at once, which is how A v >= p comes about.
+4. After a start, append a row to L. After a corner, A_SS changes in one diagonal entry: rotate the
+   rows of L from there on, or compute them again if the node now weakens more steeply.
+5. If a pivot of L fails, A_SS is no longer positive definite: z'Az <= 0 for the direction
+   z = (-A_SS^-1 A_Sj, 1) of the failed node j. If z >= 0 nothing bounds slip along z: it jumps at
+   constant load, and the path ends, unstable. Otherwise, for (3) only, v moves along z until a rate
+   reaches zero. If a start failed, that node stops, and the start is tried again. If a corner or
+   the first factor failed, the nodes without a row in L leave S, and may start again.
+6. The path ends at the target, or when every node has slipped. It is given up if S outgrows L, or
+   if nodes stop and start without end.
+
+Node numbers are called `i` or `node`, positions in S (the rows of L) `t` or `position`.
 """
 
-from typing import Any
+from enum import IntEnum
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,310 +60,405 @@ from stiction.base.arrays import Array
 from stiction.base.jit import ZERO, jit_allocating, jit_inside
 from stiction.elasticity.stiffness import entry, mean_relief
 from stiction.methods.equilibrium.dense.cholesky import (
-    CROWDED,
-    MOST_MEMBERS,
-    Course,
+    SlipState,
     Workspace,
     append,
+    apply_stiffness_to_resting_slip,
     back_substitute,
-    factor_inside,
-    multiply_members,
+    factor_slipping,
     multiply_outside,
+    multiply_slipping,
     raise_diagonal,
     remove,
     singular_direction,
-    solve_forward,
-    substitute_members,
-    take_off_resting,
+    solve_slip,
+    substitute_slipping,
 )
 from stiction.methods.equilibrium.dense.linear_program import stress_tolerance
 from stiction.methods.equilibrium.sample import piece_at, start_of, strength_at
 
-REACHED = 0
-UNSTABLE = 1
-
-ONE: Any = np.int64(1)
-"""An index that is no literal, as `ZERO`."""
-REFRESH = 16
-"""Events after which slip is solved for anew, so that round-off does not accumulate."""
+EVENTS_PER_REFRESH = 16
+"""Slip is computed anew from L after so many events, so that round-off does not accumulate."""
 AT_STRENGTH = 1e3
-"""Overstresses by round-off below its strength within which a node counts as at it."""
-STARTS = 16
-"""Times that a node may start again, on average."""
-REVERSED = 1e-10
-"""Share of the largest rate by which a rate below zero is round-off."""
+"""Distance below its strength at which a node counts as at it, in units of `stress_tolerance`."""
+MAX_RESTARTS_PER_NODE = 16
+"""How often a node may start again, on average, before the path is given up."""
+NEGATIVE_RATE_RTOL = 1e-10
+"""A rate below zero by less than this share of the largest rate is round-off."""
+
+ONE: Any = np.int64(1)  # as `ZERO`: numba would compile a kernel again for a literal
+NOBODY = -1  # no position in S, no node
+
+
+class PathStatus(IntEnum):
+    """Why a path ended."""
+
+    ENDED_STABLE = 0  # the load is the target, or every node has slipped
+    UNSTABLE = 1  # slip jumps along the direction that was written
+    GIVEN_UP = 2  # too many slipping nodes, or too many events
+
+
+class PathEnd(NamedTuple):
+    """Where a path ended."""
+
+    load: float  # Pa
+    peak: float  # largest mean stress on the way, divided by the mean of the load profile, Pa
+    stopped: bool  # whether a node stopped on the way, or had stopped before
+    status: PathStatus
+
+
+class Event(NamedTuple):
+    """The next start or corner; NOBODY in both places if the target comes first."""
+
+    step: float  # rise of the load, Pa
+    starting_node: int
+    corner_position: int  # in S
+
+
+class Start(NamedTuple):
+    """What became of S when a node started to slip."""
+
+    bounded: bool  # whether rates of slip exist; if not, the path ends
+    n_slipping: int
+    first_changed: int  # first row of the factor that is new
+    some_stopped: bool
 
 
 @jit_inside
-def _begin(
-    course: Course, load: float, piece: NDArray[np.int64], strength: Array
+def _find_slipping(
+    state: SlipState, load: float, piece: NDArray[np.int64], q: Array
 ) -> tuple[int, bool]:
-    """Strength and diagonal of A for the present pieces.
+    """Step 1: mark the slipping nodes, and write q and the diagonal of A.
 
-    Returns how many nodes slip, and whether others rest that slipped before.
+    Returns the number of slipping nodes, and whether a node rests that slipped before.
     """
-    sample, slip, stiff, workspace, stops = course
-    count = ZERO
-    rests = False
-    near = AT_STRENGTH * stress_tolerance(sample, load)
+    sample, slip, Kd, workspace, may_stop = state
+    n_slipping = ZERO
+    some_rest = False
+    atol = AT_STRENGTH * stress_tolerance(sample, load)
     for i in range(slip.shape[0]):
-        slips = slip[i] > 0.0
         piece[i] = piece_at(sample.pieces, sample.critical[i], slip[i])
-        strength[i] = start_of(sample, i, piece[i])
-        own = entry(workspace.stiffness, i, i)
-        workspace.diagonal[i] = own - sample.pieces.slopes[piece[i]] * sample.rate[i]
-        if stops and slips:
-            margin = strength_at(sample, slip, i) - load * sample.profile[i] + stiff[i]
-            slips = margin <= near
-            rests = rests or not slips
-        workspace.inside[i] = slips
-        if slips:
-            count += 1
-    return count, rests
+        q[i] = start_of(sample, i, piece[i])
+        W = sample.pieces.slopes[piece[i]] * sample.rate[i]
+        workspace.diagonal[i] = entry(workspace.stiffness, i, i) - W
+        is_slipping = slip[i] > 0.0
+        if may_stop and is_slipping:
+            margin = strength_at(sample, slip, i) - load * sample.profile[i] + Kd[i]
+            is_slipping = margin <= atol
+            some_rest = some_rest or not is_slipping
+        workspace.is_slipping[i] = is_slipping
+        n_slipping += is_slipping
+    return n_slipping, some_rest
+
+
+@jit_inside
+def _substitute(state: SlipState, q: Array, first: int, n_slipping: int) -> None:
+    """Extend L^-1 p and L^-1 (q + K d of resting nodes) by the rows first..n_slipping-1 of L."""
+    workspace = state.workspace
+    for t in range(first, n_slipping):
+        i = workspace.slipping[t]
+        workspace.rhs[i] = q[i] + workspace.K_resting[i]
+    substitute_slipping(workspace, first, n_slipping, state.sample.profile, workspace.Linv_p)
+    substitute_slipping(workspace, first, n_slipping, workspace.rhs, workspace.Linv_q)
 
 
 @jit_inside
 def _first_to_stop(
-    workspace: Workspace, size: int, values: Array, speed: Array, endless: bool
-) -> int:
-    """Member whose rate is the first to reach zero as rates go towards `values`; -1 for none.
+    state: SlipState, n_slipping: int, v_nodes: Array, new: Array, endless: bool
+) -> tuple[int, float]:
+    """Position in S of the node whose rate reaches zero first, and at which share of the move.
 
-    The rates (n,) move as far as that. If the move is `endless`, rates go along `values` instead.
+    Rates move from `v_nodes` to `new` (in S), or, if `endless`, along `new` without end.
     """
-    members = workspace.members
+    slipping = state.workspace.slipping
     largest = 0.0
-    for t in range(size):
-        largest = max(largest, abs(values[t]))
-    first = -1
+    for t in range(n_slipping):
+        largest = max(largest, abs(new[t]))
+    first = NOBODY
     share = np.inf
-    for t in range(size):
-        if values[t] < -REVERSED * largest:
-            now = speed[members[t]]
-            reach = now / ((0.0 if endless else now) - values[t])
-            if reach < share or (reach == share and values[t] < values[first]):
+    for t in range(n_slipping):
+        if new[t] < -NEGATIVE_RATE_RTOL * largest:
+            rate = v_nodes[slipping[t]]
+            zero_at = rate / ((0.0 if endless else rate) - new[t])
+            if zero_at < share or (zero_at == share and new[t] < new[first]):
                 first = t
-                share = reach
-    if first >= 0:
-        for t in range(size):
-            i = members[t]
-            change = values[t] - (0.0 if endless else speed[i])
-            speed[i] = max(speed[i] + share * change, 0.0)
-    return first
+                share = zero_at
+    return first, share
 
 
 @jit_inside
-def _fails(course: Course, size: int, speed: Array, direction: Array) -> int:
-    """Write the direction after a pivot failed; the member whose rate bounds it, -1 for none.
+def _move_rates(
+    state: SlipState, n_slipping: int, v_nodes: Array, new: Array, share: float, endless: bool
+) -> None:
+    """Move the rates by a share of the way to `new` (in S); see `_first_to_stop`."""
+    slipping = state.workspace.slipping
+    for t in range(n_slipping):
+        i = slipping[t]
+        change = new[t] - (0.0 if endless else v_nodes[i])
+        v_nodes[i] = max(v_nodes[i] + share * change, 0.0)
 
-    Rates then move along it until that of the member is zero.
+
+@jit_inside
+def _stop(state: SlipState, n_slipping: int, position: int, v_nodes: Array) -> int:
+    """Take a node out of S; returns how many nodes slip on."""
+    workspace = state.workspace
+    node = workspace.slipping[position]
+    workspace.is_slipping[node] = False
+    v_nodes[node] = 0.0
+    n_slipping = remove(workspace, n_slipping, position)
+    apply_stiffness_to_resting_slip(state)
+    return n_slipping
+
+
+@jit_inside
+def _solve_rates(workspace: Workspace, n_slipping: int) -> None:
+    """Step 2: write the solution v of (2) to `workspace.v`."""
+    for t in range(n_slipping):
+        workspace.v[t] = workspace.Linv_p[t]
+    back_substitute(workspace.factor, n_slipping, workspace.v)
+
+
+@jit_inside
+def _stop_unloaded(
+    state: SlipState, q: Array, n_slipping: int, v_nodes: Array
+) -> tuple[int, bool]:
+    """Step 2, for (3): move the rates from `v_nodes` towards v; nodes on the way to which stop.
+
+    Returns the number of slipping nodes, and whether a node stopped. `workspace.v` and `v_nodes`
+    are then the solution of (2) for them.
     """
-    workspace = course.workspace
-    singular_direction(workspace, size, direction)
-    if not course.stops:
-        return -1
-    solution = workspace.solution
-    solution[size] = 1.0
-    return _first_to_stop(workspace, size + 1, solution, speed, True)
+    workspace, v = state.workspace, state.workspace.v
+    some_stopped = False
+    while True:
+        first, share = _first_to_stop(state, n_slipping, v_nodes, v, endless=False)
+        if first == NOBODY:
+            break
+        _move_rates(state, n_slipping, v_nodes, v, share, endless=False)
+        n_slipping = _stop(state, n_slipping, first, v_nodes)
+        _substitute(state, q, ZERO, n_slipping)
+        _solve_rates(workspace, n_slipping)
+        some_stopped = True
+    for t in range(n_slipping):
+        v_nodes[workspace.slipping[t]] = max(v[t], 0.0)
+    return n_slipping, some_stopped
 
 
 @jit_inside
-def _stop(course: Course, size: int, member: int, speed: Array) -> int:
-    """Let a member rest; returns how many slip on."""
-    workspace = course.workspace
-    node = workspace.members[member]
-    workspace.inside[node] = False
-    speed[node] = 0.0
-    size = remove(workspace, size, member)
-    take_off_resting(course)
-    return size
-
-
-@jit_inside
-def _keep_members(course: Course, size: int, speed: Array) -> None:
-    """Let all others rest; those at their strength slip on in the next events."""
-    members, inside = course.workspace.members, course.workspace.inside
-    for i in range(speed.shape[0]):
-        inside[i] = False
-    for t in range(size):
-        inside[members[t]] = True
-    for i in range(speed.shape[0]):
-        if not inside[i]:
-            speed[i] = 0.0
-    take_off_resting(course)
-
-
-@jit_inside
-def _substitute(course: Course, strength: Array, first: int, size: int) -> None:
-    """Extend both forward substitutions by the members first..size-1."""
-    workspace, profile = course.workspace, course.sample.profile
-    right, resting = workspace.right, workspace.resting
-    for t in range(first, size):
-        i = workspace.members[t]
-        right[i] = strength[i] + resting[i]
-    substitute_members(workspace, first, size, profile, workspace.forward_load)
-    substitute_members(workspace, first, size, right, workspace.forward_strength)
-
-
-@jit_inside
-def all_slip(course: Course) -> bool:
-    """Whether every node slips or has slipped."""
-    slip, count = course.slip, ZERO
+def _refresh(state: SlipState, load: float, n_slipping: int) -> None:
+    """Compute slip and K d anew from the factor."""
+    _, slip, Kd, workspace, _ = state
+    solve_slip(workspace, n_slipping, load, workspace.solution)
+    multiply_slipping(workspace, n_slipping, workspace.solution, Kd)
+    for t in range(n_slipping):
+        slip[workspace.slipping[t]] = max(workspace.solution[t], 0.0)
     for i in range(slip.shape[0]):
-        count += course.workspace.inside[i] or slip[i] > 0.0
-    return bool(count == slip.shape[0])
+        Kd[i] += workspace.K_resting[i]
 
 
 @jit_inside
 def _next_event(
-    course: Course, load: float, target: float, piece: NDArray[np.int64], size: int
-) -> tuple[float, int, int]:
-    """Step of the load to the next event, the node that begins to slip and the member that reaches
-    a corner, -1 for none."""
-    sample, slip, stiff, workspace, _ = course
-    rate, stiff_rate, pieces = workspace.rates, workspace.product, sample.pieces
+    state: SlipState, load: float, target: float, piece: NDArray[np.int64], n_slipping: int
+) -> Event:
+    """Step 3: the first event on the way to the target."""
+    sample, slip, Kd, workspace, _ = state
+    p, corners = sample.profile, sample.pieces.ends
     step = target - load
-    starts = -1
-    ends = -1
+    starting_node = corner = NOBODY
     for i in range(slip.shape[0]):
-        if not workspace.inside[i]:
-            present = strength_at(sample, slip, i) if slip[i] > 0.0 else sample.excess[i]
-            margin = max(present - load * sample.profile[i] + stiff[i], 0.0)
-            closing = sample.profile[i] - stiff_rate[i]
+        if not workspace.is_slipping[i]:
+            never_slipped = slip[i] == 0.0  # then its strength is known without a search
+            strength = sample.excess[i] if never_slipped else strength_at(sample, slip, i)
+            margin = max(strength - load * p[i] + Kd[i], 0.0)
+            closing = p[i] - workspace.Kv[i]  # Pa of margin per Pa of load
             if closing > 0.0 and margin < step * closing:
                 step = margin / closing
-                starts = i
-    for t in range(size):
-        i = workspace.members[t]
-        if piece[i] < pieces.ends.shape[0] and rate[t] > 0.0:
-            left = max(pieces.ends[piece[i]] * sample.critical[i] - slip[i], 0.0)
-            if left < step * rate[t]:
-                step = left / rate[t]
-                starts = -1
-                ends = t
-    return step, starts, ends
+                starting_node = i
+    for t in range(n_slipping):
+        i = workspace.slipping[t]
+        if piece[i] < corners.shape[0] and workspace.v[t] > 0.0:
+            left = max(corners[piece[i]] * sample.critical[i] - slip[i], 0.0)
+            if left < step * workspace.v[t]:
+                step = left / workspace.v[t]
+                starting_node = NOBODY
+                corner = t
+    return Event(step, starting_node, corner)
 
 
 @jit_inside
-def _change_slope(
-    workspace: Workspace, size: int, member: int, before: float, after: float
+def _move_along_z(state: SlipState, n_factored: int, v_nodes: Array, direction: Array) -> int:
+    """Step 5: write the direction z after a pivot failed, and move the rates along it.
+
+    Returns the position in S of the node whose rate reaches zero; NOBODY if nothing bounds z.
+    """
+    workspace = state.workspace
+    singular_direction(workspace, n_factored, direction)
+    if not state.may_stop:
+        return NOBODY
+    # `direction` is z clipped at zero, by node. z itself is left in `solution`, in S, without its
+    # last entry; that is the failed node, which `append` left in `slipping[n_factored]`.
+    z = workspace.solution
+    z[n_factored] = 1.0
+    first, share = _first_to_stop(state, n_factored + 1, v_nodes, z, endless=True)
+    if first != NOBODY:
+        _move_rates(state, n_factored + 1, v_nodes, z, share, endless=True)
+    return first
+
+
+@jit_inside
+def _keep_factored(state: SlipState, n_factored: int, v_nodes: Array) -> None:
+    """Step 5 after a corner or the first factor: the nodes without a row in L leave S."""
+    slipping, is_slipping = state.workspace.slipping, state.workspace.is_slipping
+    for i in range(v_nodes.shape[0]):
+        is_slipping[i] = False
+    for t in range(n_factored):
+        is_slipping[slipping[t]] = True
+    for i in range(v_nodes.shape[0]):
+        if not is_slipping[i]:
+            v_nodes[i] = 0.0
+    apply_stiffness_to_resting_slip(state)
+
+
+@jit_inside
+def _pass_corner(
+    state: SlipState, piece: NDArray[np.int64], q: Array, n_slipping: int, corner: int
 ) -> int:
-    """Change the weakening rate of a member in the factor; returns the members still in it."""
-    node = workspace.members[member]
-    workspace.diagonal[node] = entry(workspace.stiffness, node, node) - after
-    if after <= before:
-        raise_diagonal(workspace.factor, size, member, before - after, workspace.turns)
-        workspace.held_diagonal[member] = workspace.diagonal[node]
-        return size
-    # It weakens more steeply: the factor is made anew from there on.
-    for t in range(member, size):
-        workspace.order[t - member] = workspace.members[t]
-    return append(workspace, member, size - member)
+    """Step 4 at a corner: put the node on its next piece, and change L accordingly.
+
+    Returns how many nodes are factored: fewer than before if a pivot failed.
+    """
+    sample, slip, _, workspace, _ = state
+    pieces = sample.pieces
+    i = workspace.slipping[corner]
+    slip[i] = pieces.ends[piece[i]] * sample.critical[i]
+    W_before = pieces.slopes[piece[i]] * sample.rate[i]
+    piece[i] += 1
+    q[i] = start_of(sample, i, piece[i])
+    W = pieces.slopes[piece[i]] * sample.rate[i]
+    workspace.diagonal[i] = entry(workspace.stiffness, i, i) - W
+    if W_before >= W:
+        raise_diagonal(workspace.factor, n_slipping, corner, W_before - W, workspace.rotations)
+        workspace.factored_diagonal[corner] = workspace.diagonal[i]
+        return n_slipping
+    # The node weakens more steeply: compute L again from its row on. `append` reads the queue.
+    for t in range(corner, n_slipping):
+        workspace.queue[t - corner] = workspace.slipping[t]
+    return append(workspace, corner, n_slipping - corner)
+
+
+@jit_inside
+def _start(
+    state: SlipState, node: int, n_slipping: int, v_nodes: Array, direction: Array
+) -> Start:
+    """Steps 4 and 5 at a start: append a node to S. The nodes that bound z stop."""
+    workspace = state.workspace
+    first_changed = n_slipping
+    some_stopped = False
+    while True:
+        workspace.queue[0] = node  # `append` reads it
+        if append(workspace, n_slipping, ONE) > n_slipping:
+            break
+        bounding = _move_along_z(state, n_slipping, v_nodes, direction)
+        if bounding == NOBODY:
+            return Start(False, n_slipping, first_changed, some_stopped)
+        n_slipping = _stop(state, n_slipping, bounding, v_nodes)
+        first_changed = ZERO
+        some_stopped = True
+    workspace.is_slipping[node] = True
+    if state.slip[node] > 0.0:  # it rested after slip
+        apply_stiffness_to_resting_slip(state)
+        first_changed = ZERO
+    return Start(True, n_slipping + 1, first_changed, some_stopped)
+
+
+@jit_inside
+def all_slip(state: SlipState) -> bool:
+    """Whether every node slips or has slipped."""
+    for i in range(state.slip.shape[0]):
+        if not (state.workspace.is_slipping[i] or state.slip[i] > 0.0):
+            return False
+    return True
 
 
 @jit_allocating
-def advance(
-    course: Course, load: float, target: float, direction: Array
-) -> tuple[float, float, bool, int]:
-    """Follow the stable path from a load towards another one.
+def follow_stable_path(
+    state: SlipState, load: float, target: float, direction: Array
+) -> PathEnd:
+    """Follow the stable equilibria from a load to a target (Pa, not below it), as far as they go.
 
-    It ends where all nodes have slipped, too. Returned are the load at the end, the largest mean
-    stress on the way (over the mean of the load profile; the load, unless a machine drives),
-    whether a node stopped or rests after slip, and the status: REACHED; UNSTABLE, in the direction
-    z >= 0, A z <= 0, that is then written; or CROWDED: more members than the workspace holds.
+    Slip and K d of the state move along. If the path ends unstable, the direction (n,) in which
+    slip jumps is written to `direction`.
     """
-    sample, slip, stiff, workspace, stops = course
-    n = slip.shape[0]
-    solution, stiff_rate, rate = workspace.solution, workspace.product, workspace.rates
-    resting = workspace.resting
-    pieces = sample.pieces
+    sample, slip, Kd, workspace, may_stop = state
+    n, n_corners = slip.shape[0], sample.pieces.ends.shape[0]
+    v, Kv = workspace.v, workspace.Kv
     piece = np.zeros(n, np.int64)
-    strength = np.empty(n)
-    speed = np.zeros(n)
-    members, order = workspace.members, workspace.order
-    count, stopped = _begin(course, load, piece, strength)
+    q = np.empty(n)
+    v_nodes = np.zeros(n)
+
+    # 1. The slipping nodes, and the factor of A on them.
+    n_marked, stopped = _find_slipping(state, load, piece, q)
     peak = load - mean_relief(workspace.stiffness, sample.profile, slip)
-    if count > MOST_MEMBERS:
-        return load, load, stopped, CROWDED
-    size = factor_inside(workspace)
-    if size < count:
-        # Stability was lost exactly as the residual strength was reached.
-        if _fails(course, size, speed, direction) < 0:
-            return load, peak, stopped, UNSTABLE
-        _keep_members(course, size, speed)
+    if n_marked > workspace.max_slipping:
+        return PathEnd(load, peak, stopped, PathStatus.GIVEN_UP)
     for i in range(n):
-        resting[i] = 0.0
-    if stopped or size < count:
-        take_off_resting(course)
-    _substitute(course, strength, ZERO, size)
-    # Unless it stops, a node begins to slip, and passes each corner, once.
-    for event in range((1 + STARTS * stops + pieces.ends.shape[0]) * n + 1):
-        while True:
-            for t in range(size):
-                rate[t] = workspace.forward_load[t]
-            back_substitute(workspace.factor, size, rate)
-            first = _first_to_stop(workspace, size, rate, speed, False) if stops else -1
-            if first < 0:
-                break
-            stopped = True
-            size = _stop(course, size, first, speed)
-            _substitute(course, strength, ZERO, size)
-        for t in range(size):
-            i = members[t]
-            speed[i] = max(rate[t], 0.0)
-            weakening = entry(workspace.stiffness, i, i) - workspace.diagonal[i]
-            stiff_rate[i] = sample.profile[i] + weakening * rate[t]
-        multiply_outside(workspace, size, rate, stiff_rate)
-        if event % REFRESH == 0:
-            solve_forward(workspace, size, load, solution)
-            multiply_members(workspace, size, solution, stiff)
-            for t in range(size):
-                slip[members[t]] = max(solution[t], 0.0)
-            for i in range(n):
-                stiff[i] += resting[i]
-        step, starts, ends = _next_event(course, load, target, piece, size)
-        load = target if starts < 0 and ends < 0 else load + step
-        for t in range(size):
-            slip[members[t]] += step * rate[t]
+        workspace.K_resting[i] = 0.0
+    n_slipping = factor_slipping(workspace)
+    if n_slipping < n_marked:
+        if _move_along_z(state, n_slipping, v_nodes, direction) == NOBODY:
+            return PathEnd(load, peak, stopped, PathStatus.UNSTABLE)
+        _keep_factored(state, n_slipping, v_nodes)
+    elif stopped:
+        apply_stiffness_to_resting_slip(state)
+    first_changed = ZERO
+
+    # Each node passes each corner once, and starts once unless nodes stop.
+    max_events = (1 + MAX_RESTARTS_PER_NODE * may_stop + n_corners) * n + 1
+    for event_number in range(max_events):
+        _substitute(state, q, first_changed, n_slipping)
+
+        # 2. The rates of slip and of K d. In S the latter follow from (2): K v = p + W v.
+        _solve_rates(workspace, n_slipping)
+        if may_stop:
+            n_slipping, some_stopped = _stop_unloaded(state, q, n_slipping, v_nodes)
+            stopped = stopped or some_stopped
+        for t in range(n_slipping):
+            i = workspace.slipping[t]
+            W = entry(workspace.stiffness, i, i) - workspace.diagonal[i]
+            Kv[i] = sample.profile[i] + W * v[t]
+        multiply_outside(workspace, n_slipping, v, Kv)
+        if event_number % EVENTS_PER_REFRESH == 0:
+            _refresh(state, load, n_slipping)  # safe here: S and L match until the event
+
+        # 3. On to the next event.
+        event = _next_event(state, load, target, piece, n_slipping)
+        at_target = event.starting_node == NOBODY and event.corner_position == NOBODY
+        load = target if at_target else load + event.step
+        for t in range(n_slipping):
+            slip[workspace.slipping[t]] += event.step * v[t]
         for i in range(n):
-            stiff[i] += step * stiff_rate[i]
+            Kd[i] += event.step * Kv[i]
         peak = max(peak, load - mean_relief(workspace.stiffness, sample.profile, slip))
-        changed = size
-        if ends >= 0:
-            i = members[ends]
-            slip[i] = pieces.ends[piece[i]] * sample.critical[i]
-            before = pieces.slopes[piece[i]] * sample.rate[i]
-            piece[i] += 1
-            strength[i] = start_of(sample, i, piece[i])
-            after = pieces.slopes[piece[i]] * sample.rate[i]
-            now = _change_slope(workspace, size, ends, before, after)
-            changed = ends
-            if now < size:
-                if _fails(course, now, speed, direction) < 0:
-                    return load, peak, stopped, UNSTABLE
-                size = now
-                _keep_members(course, size, speed)
-                changed = ZERO
-        elif starts >= 0:
-            if size == MOST_MEMBERS:
-                return load, peak, stopped, CROWDED
-            while True:
-                order[0] = starts
-                if append(workspace, size, ONE) > size:
-                    break
-                first = _fails(course, size, speed, direction)
-                if first < 0:
-                    return load, peak, stopped, UNSTABLE
-                stopped = True
-                size = _stop(course, size, first, speed)
-                changed = ZERO
-            workspace.inside[starts] = True
-            size += 1
-            if slip[starts] > 0.0:  # it had stopped
-                take_off_resting(course)
-                changed = ZERO
-            if all_slip(course):
-                return load, peak, stopped, REACHED
+        if at_target:  # 6.
+            return PathEnd(load, peak, stopped, PathStatus.ENDED_STABLE)
+
+        # 4. and 5. The factor after the event.
+        if event.corner_position != NOBODY:
+            first_changed = event.corner_position
+            n_factored = _pass_corner(state, piece, q, n_slipping, event.corner_position)
+            if n_factored < n_slipping:
+                if _move_along_z(state, n_factored, v_nodes, direction) == NOBODY:
+                    return PathEnd(load, peak, stopped, PathStatus.UNSTABLE)
+                n_slipping = n_factored
+                _keep_factored(state, n_slipping, v_nodes)
+                first_changed = ZERO
         else:
-            return load, peak, stopped, REACHED
-        _substitute(course, strength, changed, size)
-    return load, peak, stopped, CROWDED
+            if n_slipping == workspace.max_slipping:
+                return PathEnd(load, peak, stopped, PathStatus.GIVEN_UP)
+            start = _start(state, event.starting_node, n_slipping, v_nodes, direction)
+            stopped = stopped or start.some_stopped
+            if not start.bounded:
+                return PathEnd(load, peak, stopped, PathStatus.UNSTABLE)
+            n_slipping, first_changed = start.n_slipping, start.first_changed
+            if all_slip(state):  # 6. Behind a stiff machine the interface slides stably.
+                return PathEnd(load, peak, stopped, PathStatus.ENDED_STABLE)
+    return PathEnd(load, peak, stopped, PathStatus.GIVEN_UP)
