@@ -1,6 +1,12 @@
-"""Files that are whole or not there, archives of arrays, and the folders of the cache."""
+"""Files that are whole or not there, archives of arrays, and the folders of the cache.
 
+Files may come from strangers. Every reader of the package takes its bytes from `read_regular` or
+from `content_of`, and looks at the size of its result before it takes memory.
+"""
+
+import io
 import os
+import stat
 import struct
 import uuid
 import zipfile
@@ -17,8 +23,9 @@ from numpy.typing import NDArray
 from stiction.base.errors import InputError, StoreError
 
 PART = ".part"
-LARGEST = 2**30
-"""Bytes of a file that is read whole."""
+MAX_FILE_BYTES = 2**30
+MAX_HEADER_BYTES = 2**16
+"""Of the description of an array, which numpy takes apart by Python's own parser."""
 
 UNREADABLE = (
     OSError, ValueError, EOFError, KeyError, NotImplementedError, RuntimeError,
@@ -27,17 +34,49 @@ UNREADABLE = (
 """Errors that damaged archives raise."""
 
 
-def content_of(path: Path, *, read: bool = True) -> bytes:
-    """Return the bytes of a regular file of reasonable size, or only check that it is one."""
+def read_regular(
+    path: Path, *, max_bytes: int = MAX_FILE_BYTES, follow_links: bool = True
+) -> bytes:
+    """Return the content of a regular file; an `InputError` if it is of another kind or too large.
+
+    Other errors of the system (an OSError) pass. Steps:
+
+    1. Look at the kind of the file before it is opened: opening a device may act on it.
+    2. Open it without waiting, look at what was opened, and refuse what took its place meanwhile.
+    3. Read the bytes that it had then. Files that the system makes up, as in /proc, have none.
+    """
+    extra = getattr(os, "O_NONBLOCK", 0)
+    if not follow_links:
+        extra |= getattr(os, "O_NOFOLLOW", 0)
+        if stat.S_ISLNK(os.lstat(path).st_mode):
+            raise InputError("is a link where the file itself is expected")
+    _check_regular(os.stat(path), max_bytes)
+    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | extra)) as file:
+        state = os.fstat(file.fileno())
+        _check_regular(state, max_bytes)
+        return file.read(state.st_size)
+
+
+def _check_regular(state: os.stat_result, max_bytes: int) -> None:
+    if not stat.S_ISREG(state.st_mode):
+        raise InputError("is not a regular file")
+    if state.st_size > max_bytes:
+        raise InputError(f"has {state.st_size} bytes, more than the limit of {max_bytes}")
+
+
+def content_of(path: Path, *, max_bytes: int = MAX_FILE_BYTES) -> bytes:
+    """Return the content of a regular file, or raise an `InputError`."""
     try:
-        size = path.stat().st_size
-        if not path.is_file():
-            raise InputError("is not a regular file")
-        if size > LARGEST:
-            raise InputError(f"has {size} bytes, more than the {LARGEST} of a profile")
-        return path.read_bytes() if read else b""
+        return read_regular(path, max_bytes=max_bytes)
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror or error}") from None
+
+
+def check_unpacked(size: int, content: bytes, least: int, times: int) -> None:
+    """Refuse what would unpack to more than `least` and more than `times` the size of its file."""
+    limit = max(least, times * len(content))
+    if size > limit:
+        raise InputError(f"would unpack to {size}, more than the limit of {limit} for its size")
 
 
 def write_whole(path: Path, content: bytes | Callable[[Path], object]) -> None:
@@ -84,13 +123,28 @@ def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
     write_whole(path, write)
 
 
+def arrays_in(content: bytes) -> dict[str, NDArray[Any]]:
+    """Return the arrays of an .npz as `write_arrays` writes it; else one of `UNREADABLE`.
+
+    Compressed members, and members that are larger than the archive together, are refused.
+    """
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        members = archive.infolist()
+        packed = any(member.compress_type != zipfile.ZIP_STORED for member in members)
+        if packed or sum(member.file_size for member in members) > len(content):
+            raise ValueError("its members are compressed or larger than the file")
+        arrays = {}
+        for member in members:
+            with archive.open(member) as stream:
+                arrays[member.filename.removesuffix(".npy")] = np.lib.format.read_array(
+                    stream, allow_pickle=False, max_header_size=MAX_HEADER_BYTES
+                )
+        return arrays
+
+
 def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
     """Return the arrays of an .npz; one of `UNREADABLE` or FileNotFoundError if it is not one."""
-    with open(path, "rb") as stream:
-        data = np.load(stream, allow_pickle=False)
-        if not isinstance(data, np.lib.npyio.NpzFile):
-            raise ValueError("it holds one array only")
-        return {name: data[name] for name in data.files}
+    return arrays_in(read_regular(path))
 
 
 def cache_folder() -> Path:

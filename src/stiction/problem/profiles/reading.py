@@ -78,6 +78,8 @@ SAMPLES = ("sample", "samples")
 _UNNAMED = re.compile(r"\d+$|values?$|y\d*$")
 """Columns that say nothing of what they hold; without a heading they are called by numbers."""
 
+LISTED = 20
+"""Names of columns in a message."""
 TALL = 1e-3
 """Range of heights, m, from which on a unit must be stated: numbers in um or nm have more."""
 
@@ -448,7 +450,7 @@ def labelled(
         data, value = data.to_dataset(name=quantity), quantity
     dims = dims or (("x", "y") if _is_map(data) else ("x",))
     chosen, places = _chosen(data, quantity, dims, x, value)
-    texts = [data[name].attrs.get("text") for name in (chosen, *places.values())]
+    texts = [data.variables[name].attrs.get("text") for name in (chosen, *places.values())]
     if "row" in data.dims and any(texts):
         raise InputError(filter(None, texts))
     array = data[chosen]
@@ -550,11 +552,13 @@ def _chosen(
     """Return the names of the variable, and of its places by direction if there are any."""
     names, table, si = list(data.data_vars), "row" in data.dims, QUANTITIES[quantity].units
     if table and data.attrs.get("headed"):  # a column without a name is an index
-        names = [name for name in names if data[name].attrs["heading"]]
+        names = [name for name in names if data.variables[name].attrs["heading"]]
     words = (quantity, *NAMES.get(quantity, ()))
     chosen = None if value is None else _column(data, names, "value", value)
     indices = {*data.data_vars} - {*names}
-    along = [name for name in data.variables if data[name].ndim == 1 and name != chosen]
+    along = [
+        name for name in data.variables if data.variables[name].ndim == 1 and name != chosen
+    ]
     along = [name for name in along if name not in indices]
     if len(dims) == 2:
         places = {_plain(name): name for name in along if _plain(name) in dims}
@@ -569,7 +573,7 @@ def _chosen(
     if x is not None:
         places["x"] = _column(data, along, "x", x)
     left = [name for name in names if name not in places.values()]
-    left = [name for name in left if table or data[name].ndim >= len(dims)]
+    left = [name for name in left if table or data.variables[name].ndim >= len(dims)]
     if chosen is None:
         chosen = _choose(data, left, words, si)
     if chosen is None and len(left) == 1 and _UNNAMED.match(_plain(left[0])):
@@ -633,7 +637,7 @@ def _is_map(data: Any) -> bool:
     """Whether values lie on a plane: over x and y, or in a table of both where x repeats."""
     if "row" not in data.dims:
         return {"x", "y"} <= {*data.dims}
-    columns = {_plain(name): data[name].values for name in data.data_vars}
+    columns = {_plain(name): data.variables[name].values for name in data.data_vars}
     if [*columns] == ["0", "1", "2"]:  # without headings both must repeat
         return all(np.unique(columns[one]).size <= columns[one].size // 2 for one in "01")
     both = len(columns) > 2 and {"x", "y"} <= {*columns}
@@ -645,13 +649,13 @@ def _choose(data: Any, names: list[Any], called: tuple[str, ...], si: str = "") 
     for word in called:
         if fitting := [name for name in names if _plain(_name(data, name)) == word]:
             return _only(data, fitting)
-    fitting = [name for name in names if is_in(unit_of(data[name]), si)]
+    fitting = [name for name in names if is_in(unit_of(data.variables[name]), si)]
     return fitting[0] if len(fitting) == 1 else None
 
 
 def _name(data: Any, name: Any) -> Any:
     """Return what a column is called, which may be the name of several."""
-    return data[name].attrs.get("name", name)
+    return data.variables[name].attrs.get("name", name)
 
 
 def _only(data: Any, names: list[Any]) -> Any:
@@ -678,9 +682,10 @@ def _column(data: Any, names: list[Any], what: str, wanted: Column) -> Any:
 
 
 def _unclear(data: Any, names: list[Any], quantity: str, dims: tuple[str, ...]) -> str:
-    units = {name: unit_of(data[name]) for name in names if not str(name).isdecimal()}
+    units = {name: unit_of(data.variables[name]) for name in names if not str(name).isdecimal()}
     shown = [f"{name!r} in {unit}" if unit else repr(name) for name, unit in units.items()]
-    listed = ", ".join(shown) or f"{len(names)} columns without names"
+    listed = ", ".join(shown[:LISTED]) or f"{len(names)} columns without names"
+    listed += f" and {len(shown) - LISTED} more" * (len(shown) > LISTED)
     if len(dims) == 2 and not {*dims} <= {_plain(name) for name in data.variables}:
         return f"has no columns x and y: got {listed}{OF_A_PLANE}"
     return (

@@ -20,6 +20,7 @@ import csv
 import io
 import math
 import re
+import zipfile
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -29,8 +30,9 @@ import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
-from stiction.base.files import content_of
+from stiction.base.files import check_unpacked, content_of
 from stiction.base.model import describe
+from stiction.base.netcdf import read_netcdf
 from stiction.base.units import parse
 
 if TYPE_CHECKING:
@@ -44,17 +46,28 @@ END = 20
 """Lines at the end of a text that show what separates its columns."""
 HEAD = 2**16
 """Bytes of a large text that show how the others are written."""
-MAX_COLUMNS = 50_000
+MAX_COLUMNS = 2_000
 """Columns of a table; a file with more has its values in a single line."""
+MAX_LETTERS = 1_000
+"""Letters of a cell or of a comment: Python takes a long number apart slowly."""
+MAX_CELLS, CELLS_OF_SMALL, CELLS_A_BYTE = 2**23, 2**18, 4
+"""Cells of a sheet, whose empty cells take memory, too: at most the first, and at most the second
+or this many times the size of the file."""
+UNPACKED_BYTES, UNPACKED_TIMES = 2**23, 20
+"""A workbook unpacks to at most this many bytes, or to this many times its size."""
+ABOUT_BYTES = 2**20
+"""Of what describes a workbook, such as styles, beside its sheets, texts and images."""
+SHEETS, PICTURES = ("xl/worksheets/", "xl/sharedStrings"), ("xl/media/", "docProps/thumb")
 
 _EMPTY = {
     "", "-", "--", "---", "nan", "na", "n/a", "<na>", "#n/a", "#na", "null", "none", "#div/0!",
     "1.#qnan", "-1.#qnan", "1.#ind", "-1.#ind", "#wert!", "#value!", "#nv",
 }  # fmt: skip
 """What stands in a cell without a value, in small letters; a row of stars is such a cell, too."""
-_WORDS = re.compile(r"[^\s(\[{]+(?:\s*[(\[{][^)\]}]*[)\]}])?|[(\[{][^)\]}]*[)\]}]")
+# Patterns never go back over what they have passed: time grows linearly with the size of a file.
+_WORDS = re.compile(r"[^\s(\[{]+(?:\s*[(\[{][^)\]}]*[)\]}]?)?|[(\[{][^)\]}]*[)\]}]?")
 _NUMBER = re.compile(
-    r"[+-]?(?:(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?"
+    r"[+-]?(?:(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?"
     r"|\d{1,3}(?:(?:,\d{3})+(?:\.\d*)?|(?:\.\d{3})+(?:,\d*)?))$"
 )
 _BETWEEN = r"['\N{RIGHT SINGLE QUOTATION MARK} \N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}]"
@@ -123,14 +136,13 @@ def load(path: Path, options: Options = Options()) -> xr.Dataset | xr.DataArray:
         raise InputError(
             f"must end in {endings}, got {path.name!r}; export text from the instrument"
         )
-    content_of(path, read=False)
-    try:
-        # Times are not decoded: a variable in seconds is refused by its unit, like any other.
-        with xr.open_dataset(path, decode_times=False, decode_timedelta=False) as opened:
-            data = opened.squeeze(drop=True)
-            return data[[name for name, one in data.items() if one.dtype.kind in "fiu"]].load()
-    except Exception as error:  # the library lets through whatever a broken file leads to
-        raise InputError(f"is not a NetCDF file of numbers: {error}") from None
+    data = read_netcdf(content_of(path)).squeeze(drop=True)
+    data = data[[name for name, one in data.items() if one.dtype.kind in "fiu"]]
+    data.attrs = {}
+    for variable in data.variables.values():
+        given = variable.attrs
+        variable.attrs = {key: given[key] for key in ("unit", "units") if key in given}
+    return data
 
 
 def _read_npy(path: Path) -> Array:
@@ -225,13 +237,14 @@ def _labelled(
     """Return columns with their headings as variables along 'row'."""
     import xarray as xr
 
-    data = xr.Dataset(attrs=attributes)
+    variables: dict[str, Any] = {}  # a dataset that grows takes quadratic time
     for number, (name, about) in enumerate(headings):
         about |= {"name": name, "text": texts.get(number, ""), "column": str(number)}
-        if name in data:
-            name = about["heading"] if about["heading"] not in data else f"{name} {number}"
-        data[name] = ("row", columns[number], about)
-    return data
+        if name in variables:
+            heading = about["heading"]
+            name = heading if heading not in variables else f"{name} {number}"
+        variables[name] = ("row", columns[number], about)
+    return xr.Dataset(variables, attrs=attributes)
 
 
 def _parsed(grid: Grid, options: Options) -> Table:
@@ -437,18 +450,15 @@ def _lines(text: str, options: Options) -> Grid:
             continue
         if line.lstrip().startswith("#"):
             if not lines:
-                comments.append(line.strip().lstrip("#").strip())
+                comments.append(line.strip().lstrip("#").strip()[:MAX_LETTERS])
         elif line.strip():
             lines.append((number, line))
     if lines and lines[0][1].strip().startswith("sep="):  # what Excel writes and reads
         lines = lines[1:]
     separator = _separator([line for _, line in lines])
     for number, line in lines:
-        if separator != " " and line.count(separator) > 2 * MAX_COLUMNS:
-            raise InputError(
-                f"line {number} has {line.count(separator) + 1} columns; write each value of a"
-                " profile into a line of its own"
-            )
+        if len(line) > MAX_LETTERS:
+            _check_line(number, line, separator)
     if separator == " ":
         rows = [Row(number, _split(line, " ", options.words)) for number, line in lines]
     else:
@@ -461,6 +471,22 @@ def _lines(text: str, options: Options) -> Grid:
         except (ValueError, csv.Error):
             raise InputError("has a quotation mark that does not end in its line") from None
     return Grid(rows, comments, separator)
+
+
+def _check_line(number: int, line: str, separator: str) -> None:
+    """Refuse a line of very many columns, or with a very long cell."""
+    blank = separator == " "
+    cells = line.split(None if blank else separator, 2 * MAX_COLUMNS)
+    if len(cells) > 2 * MAX_COLUMNS:
+        raise InputError(
+            f"line {number} has {line.count(separator) + 1} columns; write each value of a"
+            " profile into a line of its own"
+        )
+    runs = re.split(r"\s{2,}", line) if blank else cells
+    if (letters := max(map(len, runs if len(runs) > 1 else cells))) > MAX_LETTERS:
+        raise InputError(
+            f"line {number} has a cell of {letters} letters, at most {MAX_LETTERS}"
+        )
 
 
 def _large(content: bytes, options: Options) -> tuple[Grid, Table] | None:
@@ -502,33 +528,68 @@ def _large(content: bytes, options: Options) -> tuple[Grid, Table] | None:
 
 
 def _sheet(path: Path, options: Options) -> Grid:
-    import pandas as pd
-
     content = content_of(path)
-    given: Any = {"header": None, "dtype": str, "na_filter": False}
     try:
-        with pd.ExcelFile(io.BytesIO(content), engine="openpyxl") as book:
-            names = [str(name) for name in book.sheet_names]
-            known = options.sheet in (
-                range(len(names)) if isinstance(options.sheet, int) else names
-            )
-            sheet = pd.read_excel(book, options.sheet, **given) if known else None
+        import openpyxl
     except ImportError:
         raise InputError("needs openpyxl (pip install openpyxl), or save it as .csv") from None
+    try:
+        _check_workbook(content)
+        book = openpyxl.load_workbook(
+            io.BytesIO(content), read_only=True, data_only=True, keep_links=False
+        )
+        names = [sheet.title for sheet in book.worksheets]
+        known = options.sheet in (
+            range(len(names)) if isinstance(options.sheet, int) else names
+        )
+        place = (
+            options.sheet
+            if isinstance(options.sheet, int) or not known
+            else names.index(options.sheet)
+        )
+        rows = _cells_of(book.worksheets[place], len(content)) if known else []
+    except InputError:
+        raise
     except Exception as error:  # the library lets through whatever a broken file leads to
         raise InputError(f"is not a workbook: {error}") from None
-    if sheet is None:
+    if not known:
         raise InputError(
             f"sheet: {options.sheet!r} is not one of {', '.join(map(repr, names))}"
         )
-    cells = enumerate(sheet.to_numpy().tolist(), 1)
-    rows = [Row(number, [cell.strip() for cell in row]) for number, row in cells]
     if len(names) > 1 and not any(any(map(_NUMBER.match, row.cells)) for row in rows):
         raise InputError(
             f"sheet {names[0]!r} holds no numbers; pass sheet= for another:"
             f" {', '.join(map(repr, names))}"
         )
     return Grid(rows[options.skip :], [], "")
+
+
+def _check_workbook(content: bytes) -> None:
+    """Refuse a workbook whose parts unpack to very much."""
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        sizes = {part.filename: part.file_size for part in archive.infolist()}
+    check_unpacked(sum(sizes.values()), content, UNPACKED_BYTES, UNPACKED_TIMES)
+    about = [name for name in sizes if not name.startswith(SHEETS + PICTURES)]
+    check_unpacked(sum(sizes[name] for name in about), b"", ABOUT_BYTES, 0)
+
+
+def _cells_of(sheet: Any, size: int) -> list[Row]:
+    """Return the cells of a sheet as texts; `size` is the number of bytes of its file."""
+    most = min(MAX_CELLS, max(CELLS_OF_SMALL, CELLS_A_BYTE * size))
+    sheet.reset_dimensions()  # what a workbook says of its size need not be true
+    rows, width = [], 0
+    for number, values in enumerate(sheet.iter_rows(values_only=True, max_row=2**20), 1):
+        cells = ["" if value is None else str(value).strip() for value in values]
+        width = max(width, len(cells))
+        if width * number > most or width > MAX_COLUMNS:
+            raise InputError(
+                f"spans {number} rows and {width} columns or more, beyond the limit of {most}"
+                f" cells for its size, or of {MAX_COLUMNS} columns"
+            )
+        rows.append(Row(number, cells))
+    for row in rows:
+        row.cells.extend([""] * (width - len(row.cells)))
+    return rows
 
 
 def _text(data: bytes) -> str:
