@@ -204,18 +204,17 @@ def forces_whose_area_is_unknown():
     return found
 
 
-@calls("weights of closed likelihoods, tests/user/test_joined.py", close=1e-5)
-def a_list_weighed_by_peaks():
+@calls("sums by hand, tests/user/test_joined.py", close=1e-5)
+def likely_fields_joined_with_peaks():
     likely = [
         dataclasses.replace(BOUNDED, marginal=st.Lognormal(mean=mean, cv=cv), mean_mode=True)
         for mean, cv in ((0.96e6, 0.14), (1.03e6, 0.11), (1.01e6, 0.19), (1.12e6, 0.16))
     ]
     found = inferred(field=likely, prior=None, samples=200, seed=0, load_cell_error=4e3)
     return {
-        "str": str(found),
         "draws": found.draws,
         "information": found.information,
-        "notes": found.notes,
+        "families": found.families,
         "members": [repr(one.strength) for one in found.interfaces(2, seed=4)],
         "at": repr(found.at(7)[1]),
     }

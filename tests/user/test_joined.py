@@ -1,4 +1,4 @@
-"""Equally likely interfaces, such as those of a fit, weighed by the peaks of tests."""
+"""Mean and scatter between specimens from profiles and peaks: what users give, and get."""
 
 import dataclasses
 
@@ -9,6 +9,7 @@ from refusals import refuses
 
 import stiction as st
 from stiction.inference import joined as joining
+from stiction.inference.specimens import PRIOR_SCALE
 
 PROBLEM = st.Problem(
     st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
@@ -16,132 +17,144 @@ PROBLEM = st.Problem(
     st.LinearWeakening(weakening_rate=0.25e12),
 )
 RNG = np.random.default_rng(8)
-MEANS, SCATTER = RNG.normal(1.03e6, 4e4, 20), RNG.uniform(0.03, 0.09, 20)
 PEAKS = 1.05e6 * np.exp(0.05 * RNG.standard_normal(9))
-LOCAL = {"method": st.LocalCriterion(), "progress": False}
+LOCAL = {"method": st.LocalCriterion(), "progress": False, "samples": 100}
+SPECTRUM = st.PowerLawSpectrum(4e-3)
+EVEN = st.RandomField(st.Lognormal(mean=1e6, cv=1e-4), SPECTRUM)
+"""Strength that hardly varies within a specimen: the onset is the factor times its mean."""
+ROUGH = st.RandomField(st.Gamma(mean=1e6, cv=0.2), SPECTRUM, mean_mode=True)
+RECORDS = [
+    ROUGH.sample(PROBLEM.interface, seed=number)[0] * factor
+    for number, factor in enumerate((1.0, 0.93, 1.08, 1.02, 0.96))
+]
+QUICK = {"marginal": "gamma", "noise": False, "bootstrap": 20, "progress": False}
 
 
-def even(mean, cv):
-    """Strength that hardly varies within a specimen: the onset is that of the factor."""
-    marginal = st.Lognormal(mean=mean, cv=1e-4)
-    field = st.RandomField(marginal, st.PowerLawSpectrum(4e-3))
-    return st.RandomInterface(
-        strength=field, between={"strength": st.Lognormal(mean=1.0, cv=cv)}
-    )
-
-
-LIST = [even(*pair) for pair in zip(MEANS, SCATTER, strict=True)]
-
-
-def chances(peaks, error):
-    """Return the closed logarithm of the likelihood for each interface of the list."""
-    z = np.linspace(-7.0, 7.0, 1401)
-    found = []
-    for mean, cv in zip(MEANS, SCATTER, strict=True):
-        sigma = np.sqrt(np.log1p(cv**2))
+def by_hand(peaks, error):
+    """Mean and deviation of mean and scatter of log-normal factors, by sums over a fine grid."""
+    cvs = PRIOR_SCALE * np.tan((np.arange(100) + 0.5) / 100 * np.arctan(0.9 / PRIOR_SCALE))
+    sigma, m = np.sqrt(np.log1p(cvs**2))[:, None], 1e6 * np.exp(np.linspace(-0.8, 0.8, 161))
+    total = np.zeros((cvs.size, m.size))
+    z = np.linspace(-6.0, 6.0, 121)
+    for peak in peaks:
         if error:
-            onset = mean * np.exp(sigma * z - 0.5 * sigma**2)
-            density = scipy.stats.norm(onset, error).pdf(peaks[:, None])
-            found.append(np.log(np.trapezoid(density * scipy.stats.norm.pdf(z), z)).sum())
+            onset = m[:, None] * np.exp(sigma[..., None] * z - 0.5 * sigma[..., None] ** 2)
+            density = scipy.stats.norm(onset, error).pdf(peak) * scipy.stats.norm.pdf(z)
+            total += np.log(np.trapezoid(density, z))
         else:
-            law = scipy.stats.lognorm(sigma, scale=mean * np.exp(-0.5 * sigma**2))
-            found.append(law.logpdf(peaks).sum())
-    return np.array(found)
+            away = np.log(peak / m) + 0.5 * sigma**2
+            total += -0.5 * (away / sigma) ** 2 - np.log(sigma)
+    mass = np.exp(total - total.max())
+    mass /= mass.sum()
+    found = []
+    for values, of in ((m, mass.sum(axis=0)), (cvs, mass.sum(axis=1))):
+        mean = of @ values
+        found += [mean, np.sqrt(of @ (values - mean) ** 2)]
+    return found
 
 
 @pytest.mark.parametrize(("lengths", "error"), [((0.05,), 0.0), ((0.05, 0.075), 3e4)])
-def test_weights_are_those_of_closed_likelihoods(lengths, error):
-    """Within three errors of 1000 samples; in newtons they are the same as in pascals."""
+def test_tests_alone_give_what_a_sum_by_hand_gives(lengths, error):
+    """Within four errors of 4,000 draws; in newtons they are the same as in pascals."""
     groups = dict(zip(lengths, np.split(PEAKS, [4] if len(lengths) > 1 else []), strict=True))
-    options = LOCAL | {"samples": 1000}
-    found = st.infer(PROBLEM, LIST, groups, load_cell_error=error, **options)
-    exact = chances(PEAKS, error)
-    own = found.likelihood(found.prior.u(np.arange(20.0)[:, None]))
-    near = exact > exact.max() - 4.0
-    assert near.sum() > 4
-    assert np.abs(own - exact)[near].max() < 0.7
-    weight = np.exp(exact - exact.max())
-    shift = found.log_evidence - (exact.max() + np.log(weight.mean()))
-    weight /= weight.sum()
-    names = "strength.mean", "between.strength"
-    for name, values in zip(names, (MEANS, SCATTER), strict=True):
-        mean = weight @ values
-        spread = np.sqrt(weight @ (values - mean) ** 2)
-        assert abs(found.mean(name) - mean) < 0.3 * spread
-        assert found.draws[name].std() == pytest.approx(spread, rel=0.15)
-        assert found.mean(name) == pytest.approx(found.draws[name].mean())
-    assert abs(shift) < 0.3
-    assert found.information["member"] == pytest.approx(
-        np.log(20.0) + weight @ np.log(weight), abs=0.15
-    )
-    assert 0.0 < found.information["strength.mean"] < found.information["member"] + 1e-9
+    given = LOCAL | {"between": "lognormal", "load_cell_error": error}
+    found = st.infer(PROBLEM, EVEN, groups, **given)
+    mean, spread, scatter, of_scatter = by_hand(PEAKS, error)
+    own = found.draws["strength.mean"], found.draws["between.strength"]
+    assert own[0].mean() == pytest.approx(mean, abs=0.07 * spread)
+    assert own[0].std() == pytest.approx(spread, rel=0.1)  # heavy tails
+    assert own[1].mean() == pytest.approx(scatter, abs=0.07 * of_scatter)
+    assert own[1].std() == pytest.approx(of_scatter, rel=0.1)
+    assert found.families == {"lognormal": pytest.approx(1.0)}
+    assert found.agreement is None
+    assert "strength.mean" not in found.information  # its prior is flat
     if len(lengths) > 1:
         forces = {one: 1e-3 * own * one * 0.013 for one, own in groups.items()}
-        quick = LOCAL | {"samples": 100}
-        exact_forces = st.infer(PROBLEM, LIST, forces, unit="kN", **quick)
-        again = st.infer(PROBLEM, LIST, groups, **quick)
-        np.testing.assert_array_equal(exact_forces.u, again.u)
+        given["load_cell_error"] = 0.0
+        in_newtons = st.infer(PROBLEM, EVEN, forces, unit="kN", **given)
+        in_pascals = st.infer(PROBLEM, EVEN, groups, **given)
+        np.testing.assert_allclose(in_newtons.u, in_pascals.u, rtol=1e-6)
 
 
-def test_members_are_solved_by_the_method_itself():
-    """Not moved from the local criterion by what others need, which differs by five per cent."""
-    friction = st.LinearWeakening(weakening_rate=0.25e12, residual_ratio=0.7)
+def test_five_strengths_give_what_proportion_gives(monkeypatch):
+    """The longer way, on a problem where both are possible; onsets by samples of the same draws."""
+    given = LOCAL | {"samples": 200}
+    short = st.infer(PROBLEM, ROUGH, 0.8 * PEAKS, **given)
+    monkeypatch.setattr(joining, "may_scale", lambda *_: False)
+    long = st.infer(PROBLEM, ROUGH, 0.8 * PEAKS, **given)
+    assert long.likelihood.onsets[0].ratios.shape == (1, 5, 200)
+    for name in ("strength.mean", "between.strength"):
+        assert long.mean(name) == pytest.approx(short.mean(name), rel=5e-3)
+    np.testing.assert_allclose(np.mean(long.predicted), np.mean(short.predicted), rtol=5e-3)
+
+
+def test_an_onset_that_is_not_in_proportion_is_interpolated():
+    """With a critical slip the weakening rate grows with the strength: R falls with c."""
+    friction = st.LinearWeakening(critical_slip=4e-6)
     problem = dataclasses.replace(PROBLEM, friction=friction)
-    many = [
-        st.RandomInterface(
-            strength=st.RandomField(st.Gamma(mean=1e6, cv=cv), st.PowerLawSpectrum(4e-3), True),
-            between={"strength": st.Lognormal(mean=1.0, cv=scatter)},
-        )
-        for cv, scatter in zip((0.1, 0.2, 0.3, 0.1, 0.3, 0.2, 0.1), SCATTER, strict=False)
-    ]
-    exact = st.Equilibrium()
-    found = st.infer(problem, many, 0.8 * PEAKS, method=exact, samples=100, progress=False)
-    for one, onsets in zip(many, found.likelihood.densities[0].onsets, strict=True):
-        own = st.monte_carlo(problem, one, method=exact, samples=100, progress=False)
-        np.testing.assert_allclose(onsets, own.critical_stress, rtol=1e-9)
+    given = LOCAL | {"method": st.Equilibrium(), "samples": 100}
+    found = st.infer(problem, ROUGH, 0.8 * PEAKS, **given)
+    onsets = found.likelihood.onsets[0]
+    x = 0.5 * (onsets.at[1] + onsets.at[2])
+    between = np.exp(0.5 * np.log(onsets.ratios[0, 1:3]).sum(axis=0))
+    strength = dataclasses.replace(ROUGH, marginal=st.Gamma(mean=1e6 * np.exp(x), cv=0.2))
+    exact = st.monte_carlo(problem, strength, **given).critical_stress / np.exp(x)
+    assert np.ptp(onsets.ratios.mean(axis=2)) > 1e3
+    # Five strengths over more than a factor of three: sample by sample, and on average.
+    np.testing.assert_allclose(between, exact, rtol=2e-2)
+    assert between.mean() == pytest.approx(float(exact.mean()), rel=2e-3)
 
 
-def test_peaks_that_contradict_the_list():
-    refuses(
-        "contradict the interfaces ... p = 0.001",
-        lambda: st.infer(PROBLEM, LIST, 1.3 * PEAKS, samples=200, **LOCAL),
+def test_profiles_and_peaks_are_joined():
+    fit = st.fit_field(RECORDS, PROBLEM.interface, between=True, **QUICK)
+    onsets = st.monte_carlo(PROBLEM, ROUGH, seed=3, **LOCAL | {"samples": 9})
+    peaks = onsets.critical_stress.values * (PEAKS / 1.05e6)
+    both = st.infer(PROBLEM, fit, peaks, **LOCAL)
+    alone = st.infer(PROBLEM, ROUGH, peaks, **LOCAL)
+    assert np.ptp(both.interval("strength.mean")) < np.ptp(alone.interval("strength.mean"))
+    assert np.ptp(both.interval("strength.mean")) < np.ptp(fit.interval["mean"])
+    assert min(both.agreement.p_values.values()) > 0.05
+    assert not both.notes
+    assert sum(both.families.values()) == pytest.approx(1.0)
+    assert f"p = {min(both.agreement.p_values.values()):.2g}" in str(both)
+    families = [one.between["strength"].type for one in both.interfaces(200)]
+    assert {*families} == {"lognormal", "weibull", "truncated_normal"}
+    assert families.count("lognormal") == pytest.approx(
+        200 * both.families["lognormal"], abs=28
     )
-    with pytest.warns(st.AccuracyWarning, match="the peaks contradict .* p = 0.0"):
-        found = st.infer(PROBLEM, LIST, 1.12 * PEAKS, samples=200, **LOCAL)
-    assert any("contradict" in note for note in found.notes)
+    with pytest.warns(st.AccuracyWarning, match="contradict the profiles, p = 0.0"):
+        apart = st.infer(PROBLEM, fit, 1.5 * peaks, **LOCAL)
+    assert any("contradict" in note for note in apart.notes)
+    # The prior of the scatter decides where it is narrow, and that of the mean.
+    prior = {"between.strength": (0.2, 0.21), "strength.mean": scipy.stats.norm(1.2e6, 1e3)}
+    told = st.infer(PROBLEM, fit, peaks, prior=prior, between=["weibull"], **LOCAL)
+    assert 0.2 < told.mean("between.strength") < 0.21
+    assert told.mean("strength.mean") == pytest.approx(1.2e6, rel=3e-3)
+    assert {*told.families} == {"weibull"}
     refuses(
-        "about 1.05 Pa, predictions",
-        lambda: st.infer(PROBLEM, LIST, 1e-6 * PEAKS, samples=200, **LOCAL),
+        "another unit?",
+        lambda: st.infer(PROBLEM, fit, 1e-6 * peaks, **LOCAL),
     )
 
 
-class Source:
-    """Draws interfaces like those of the list, perhaps no more than some, and counts them."""
+def test_what_joining_refuses():
+    given = LOCAL | {"between": "lognormal"}
+    found = st.infer(PROBLEM, EVEN, PEAKS, **given)
+    refuses("random: is a posterior", lambda: st.infer(PROBLEM, found, PEAKS, **LOCAL))
+    refuses(
+        "between.strength: is a coefficient of variation between 0 and 0.9",
+        lambda: st.infer(PROBLEM, EVEN, PEAKS, prior={"between.strength": (1.0, 2.0)}, **LOCAL),
+    )
+    refuses(
+        "did you mean 'weibull'",
+        lambda: st.infer(PROBLEM, EVEN, PEAKS, between="weibul", **LOCAL),
+    )
+    refuses("prior_transform: needs", lambda: found.prior_transform([0.5] * 4))
 
-    def __init__(self, some=None):
-        self.some = some
 
-    def interfaces(self, count, seed=0):
-        self.count = count
-        if self.some:
-            return [self.some[number % len(self.some)] for number in range(count)]
-        rng = np.random.default_rng(seed)
-        return [even(mean, 0.02) for mean in rng.normal(1.03e6, 6e4, count)]
-
-
-def test_more_are_drawn_from_a_source_where_few_keep_weight(monkeypatch):
-    monkeypatch.setattr(joining, "FIRST", 20)
-    monkeypatch.setattr(joining, "MOST", 70)
-    source = Source()
-    with pytest.warns(st.AccuracyWarning, match="weight of only .* give more `bootstrap`"):
-        found = st.infer(PROBLEM, source, 1.04 * PEAKS, samples=100, **LOCAL)
-    assert source.count == 70
-    assert found.prior.cells == source.count
-    # Those that are drawn again and again are worth one.
-    source = Source(LIST[:6])
-    with pytest.warns(st.AccuracyWarning, match="weight of only .* of 6 interfaces; give more"):
-        many = st.infer(PROBLEM, source, PEAKS, samples=100, **LOCAL)
-    assert source.count <= 10 * joining.FIRST
-    assert many.prior.cells == joining.FIRST
-    once = st.infer(PROBLEM, LIST[:6], PEAKS, samples=100, **LOCAL)
-    assert many.notes[0] == once.notes[0]
+def test_a_single_specimen_leaves_the_scatter_to_its_prior():
+    with pytest.warns(st.AccuracyWarning, match="1 specimen.* mostly by its prior"):
+        fit = st.fit_field(RECORDS[:1], PROBLEM.interface, between=True, **QUICK)
+    # The median of a half-Cauchy prior below 0.9.
+    median = PRIOR_SCALE * np.tan(0.5 * np.arctan(0.9 / PRIOR_SCALE))
+    assert fit.parameters["between"] == pytest.approx(median, rel=0.1)

@@ -23,6 +23,9 @@ POINTS, VALUES = 1000, 400
 """Parameters that stand for a posterior, and values at which the law of a peak is kept."""
 MARGIN = 0.25
 """What is added on either side to the range of the predicted peaks, as a share of it."""
+BEYOND = 1e-3
+"""Share of the predicted peaks on either side that does not count for this range: it may have
+heavy tails."""
 BAND = 0.9
 
 
@@ -221,9 +224,10 @@ def _with_posterior(
 
 def _law(posterior: Posterior, kind: int, u: Array, peaks: Array) -> tuple[Array, Array]:
     """Return peaks, and the shares up to each at parameters u, (points, VALUES)."""
-    every = np.concatenate([posterior.predicted[kind], peaks])
-    margin = MARGIN * float(np.ptp(every))
-    at = np.linspace(every.min() - margin, every.max() + margin, VALUES)
+    ends = np.quantile(posterior.predicted[kind], [BEYOND, 1.0 - BEYOND])
+    low, high = min(ends[0], peaks.min()), max(ends[1], peaks.max())
+    margin = MARGIN * (high - low)
+    at = np.linspace(max(low - margin, 0.5 * low), high + margin, VALUES)
     density = np.exp(posterior.likelihood.of([at], [kind]).parts(u))
     between = 0.5 * (density[:, 1:] + density[:, :-1])
     share = np.cumsum(np.pad(between, ((0, 0), (1, 0))), axis=1)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import chi2
-from scipy.stats import t as student
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
@@ -18,10 +17,10 @@ MOST_SCATTER = math.log(2.0)
 def levels_of(rows: Sequence[Array]) -> Array:
     """Return the means of records of different specimens, (records,)."""
     levels = np.array([row.mean() for row in rows])
-    if len(rows) < 2 or levels.min() <= 0.0:
+    if levels.min() <= 0.0:
         raise InputError(
-            f"between: needs several records of positive mean, got {len(rows)} with means from"
-            f" {levels.min():g} to {levels.max():g}"
+            f"between: needs records of positive mean, got means from {levels.min():g} to"
+            f" {levels.max():g}"
         )
     return levels
 
@@ -34,6 +33,8 @@ def as_of_one(rows: Sequence[Array], within: Array) -> list[Array]:
     without scatter between specimens; `within` are their variances from the field alone.
     """
     levels = levels_of(rows)
+    if levels.size < 2:
+        return list(rows)
     logarithms = np.log(levels)
     weight = 1.0 / np.maximum(within, 1e-300)
     away = logarithms - weight @ logarithms / weight.sum()
@@ -74,38 +75,11 @@ def variance_between(logarithms: Array, within: Array, level: float) -> float:
     return float(brentq(excess, 0, MOST_SCATTER))
 
 
-def likely_between(
-    logarithms: Array, within: Array, count: int, rng: np.random.Generator
-) -> tuple[Array, Array]:
-    """Draw likely variances between records, and the logarithm of the mean with each, (count,).
-
-    Levels of Q are those of chi-square that `MOST_SCATTER` leaves; given s, the mean
-    logarithm is normal. Factors are log-normal with mean 1.
-    """
-    freedom = logarithms.size - 1
-    least = chi2.cdf(_weighed(logarithms, within, MOST_SCATTER)[2], freedom)
-    shares, errors = rng.spawn(2)  # each draw depends on its number only
-    levels = chi2.ppf(least + (1.0 - least) * shares.random(count), freedom)
-    found = np.array([variance_between(logarithms, within, float(level)) for level in levels])
-    middles = [_weighed(logarithms, within, float(s))[:2] for s in found]
-    means = [
-        m + math.sqrt(v) * z
-        for (m, v), z in zip(middles, errors.standard_normal(count), strict=True)
-    ]
-    return found, np.array(means) + 0.5 * (found + within.mean())
-
-
-def scatter_between(
-    logarithms: Array, within: Array, confidence: float
-) -> tuple[float, tuple[float, float], float]:
+def scatter_between(logarithms: Array, within: Array) -> float:
     """Estimate the coefficient of variation of a log-normal factor between records.
 
-    The estimate is where Q is as large as expected (Paule and Mandel, 1982). Returns the
-    coefficient, its interval, and half the width of that of the mean logarithm.
+    It is where Q is as large as expected (Paule and Mandel, 1982); 0 of a single record.
     """
-    freedom, tail = logarithms.size - 1, 0.5 * (1.0 - confidence)
-    levels = (freedom, chi2.ppf(1.0 - tail, freedom), chi2.ppf(tail, freedom))
-    found, low, high = (variance_between(logarithms, within, float(one)) for one in levels)
-    error = float((1.0 / (found + within)).sum() ** -0.5)
-    cv, least, most = (math.sqrt(math.expm1(s)) for s in (found, low, high))
-    return cv, (least, most), float(student.ppf(0.5 + 0.5 * confidence, freedom)) * error
+    if logarithms.size < 2:
+        return 0.0
+    return math.sqrt(math.expm1(variance_between(logarithms, within, logarithms.size - 1)))

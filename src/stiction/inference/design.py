@@ -100,7 +100,7 @@ def design_of_tests(
     True
     """
     parameters = make_prior(problem, random, prior)
-    variable = variable_of(parameters, unit)
+    variable = variable_of(*parameters.at(parameters.middle), unit)
     plans = _plans(designs, parameters.names)
     lengths = list(dict.fromkeys(length for tests, _ in plans for length in tests))
     with Meter("design of tests", show=progress) as meter:

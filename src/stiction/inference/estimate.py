@@ -167,7 +167,7 @@ def estimate(
     found = start or _estimate(equal, setting, None)
     for _ in range(ROUNDS):
         found = _estimate(found.as_of_one(rows), setting, found)
-    between, *_ = scatter_between(np.log(levels_of(rows)), found.within, 0.5)
+    between = scatter_between(np.log(levels_of(rows)), found.within)
     return replace(found, between=between)
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import cycle
 from typing import Annotated, Any, Literal
@@ -12,20 +12,29 @@ from pydantic import BeforeValidator, Field
 from scipy.stats import t as student
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError, unknown_name, warn_accuracy
+from stiction.base.errors import InputError, prefixed, unknown_name, warn_accuracy
 from stiction.base.model import Count, Flag, Number, Positive, Progress, at_least, checked
 from stiction.base.variables import OF_THE_FIELD, QUANTITIES, UNITS
-from stiction.inference.between import chance_of_scatter, likely_between, scatter_between
+from stiction.inference.between import chance_of_scatter
 from stiction.inference.bootstrap import FEWEST, Repetitions, bootstrapped, intervals, likely
 from stiction.inference.estimate import Estimate, FitSetting, Goodness, compare, windowed
-from stiction.inference.marginal_fit import Family, family_of, multiplied
+from stiction.inference.marginal_fit import Family, family_of
 from stiction.inference.records import records_of
+from stiction.inference.specimens import (
+    MEAN,
+    SCATTER,
+    FactorPrior,
+    Grid,
+    Profiles,
+    families_of,
+    grid_of_profiles,
+    of_mean,
+)
 from stiction.inference.whittle import SpectrumFamily, spectrum_of
 from stiction.inference.window import RecordWindow
 from stiction.problem.interface import Interface
 from stiction.problem.load import NotNegative
 from stiction.random.fields import RandomField, RandomInterface
-from stiction.random.marginals import Lognormal
 from stiction.random.spectra import Share
 
 MARGINALS = ("lognormal", "weibull", "gamma", "beta")
@@ -46,8 +55,8 @@ FEW_SPECIMENS = 5
 """Specimens below which the scatter between them decides what is rare."""
 EVENLY = 0.5 * (math.sqrt(5.0) - 1.0)
 """Step of a sequence that fills [0, 1) evenly, however long it is (Niederreiter, 1992)."""
-LEAST_SCATTER = 1e-8
-"""Variance of the logarithm of a factor that stands for none."""
+DRAWS = 4000
+"""Draws of the posterior from which intervals are taken."""
 
 
 def _families(given: Any) -> list[Family]:
@@ -57,9 +66,14 @@ def _families(given: Any) -> list[Family]:
     return [family_of(one) for one in several]
 
 
+def _factors(given: Any) -> tuple[str, ...]:
+    return () if given is False else families_of(given)
+
+
 DEFAULT_TOO = Field(validate_default=True)
 Marginals = Annotated[Any, BeforeValidator(_families), DEFAULT_TOO]
 Spectrum = Annotated[Any, BeforeValidator(spectrum_of), DEFAULT_TOO]
+Factors = Annotated[Any, BeforeValidator(_factors), DEFAULT_TOO]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +91,9 @@ class FieldFit:
         measurement noise; and ``between``, the coefficient of variation between specimens.
     interval : dict of str to (float, float)
         Bootstrap interval of each parameter. The interval of the noise may begin at zero;
-        those of bounds of the marginal end outside the values; those of an exponent, of an
-        anisotropy and of `between` end at the searched ranges, 0.65 to 16, 0.05 to 20, 0 to 1.
+        those of bounds of the marginal end outside the values; those of an exponent and of an
+        anisotropy end at the searched ranges, 0.65 to 16, 0.05 to 20. With `between` the
+        intervals of ``mean`` and ``between`` are of the posterior by the levels of the records.
     confidence : float
         Confidence level of the intervals.
     repetitions : tuple of RandomField
@@ -111,6 +126,8 @@ class FieldFit:
     _repeated: Sequence[Repetitions]  # of the field, and of other families that may be drawn
     _rows: Sequence[Array]
     _levels: Array
+    _families: tuple[str, ...]  # of the factor between specimens; none without
+    _prior: FactorPrior
 
     @property
     def _estimate(self) -> Estimate:
@@ -137,8 +154,8 @@ class FieldFit:
 
         Each is the estimate less the error of one repetition, so that bias and scatter are those
         of the intervals. Families of the marginal have shares by their `weight`. With `between`,
-        each has a factor of its own likely scatter, of a coefficient of variation of at most 1,
-        and a likely mean with that scatter. A longer list of one seed begins with a shorter one.
+        each has a mean, and a factor with a family and a scatter, drawn from their posterior
+        (`stiction.inference.specimens`). A longer list of one seed begins with a shorter one.
 
         Parameters
         ----------
@@ -169,24 +186,53 @@ class FieldFit:
                 " quantity='strength' or 'friction_coefficient', or put the `repetitions` of this"
                 " into random interfaces of your own"
             )
+        chosen = self._chosen(count, seed)
+        if not self._families:
+            return [RandomInterface(strength=field) for field in chosen]
+        place = {own: number for number, own in enumerate(self._every)}
+        rng = np.random.default_rng([seed, 6])
+        drawn = self._posterior.draws(count, rng, [place[field] for field in chosen])
+        return [self._posterior.interface(one) for one in drawn]
+
+    def _chosen(self, count: int, seed: int) -> list[RandomField]:
+        """Return likely fields, of each family in proportion to its weight."""
         rng = np.random.default_rng([seed, 5])
         ends = np.cumsum([one.weight for one in self.families.values() if one.weight > 0.0])
         places = (rng.random() + EVENLY * np.arange(count)) % 1.0 * ends[-1]
         family = np.minimum(np.searchsorted(ends, places), ends.size - 1)
         orders = [cycle(rng.permutation(len(own))) for own in self._likely]
-        chosen = [self._likely[one][next(orders[one])] for one in family.tolist()]
-        if "between" not in self.parameters:
-            return [RandomInterface(strength=field) for field in chosen]
-        drawn = likely_between(np.log(self._levels), self._estimate.within, count, rng)
-        found = []
-        for field, variance, mean in zip(chosen, *drawn, strict=True):
-            marginal = multiplied(field.marginal, math.exp(mean) / field.mean)
-            cv = math.sqrt(math.expm1(max(variance, LEAST_SCATTER)))
-            factor = {"strength": Lognormal(mean=1.0, cv=cv)}
-            found.append(
-                RandomInterface(strength=replace(field, marginal=marginal), between=factor)
-            )
-        return found
+        return [self._likely[number][next(orders[number])] for number in family.tolist()]
+
+    @cached_property
+    def _every(self) -> list[RandomField]:
+        """All likely fields, which the posterior numbers."""
+        return list(dict.fromkeys(field for own in self._likely for field in own))
+
+    @cached_property
+    def _posterior(self) -> Grid:
+        """Posterior of mean and scatter between specimens by the levels of the profiles."""
+        return grid_of_profiles(self._with_levels(self._every))[0]
+
+    def profiles(self, count: int, seed: int) -> Profiles:
+        """Return likely fields and the levels of the records, for the posterior with peaks."""
+        return self._with_levels(list(dict.fromkeys(self._chosen(count, seed))))
+
+    def _with_levels(self, fields: Sequence[RandomField]) -> Profiles:
+        truth, levels = self._estimate, self._levels
+        mean, deviation = (truth.parameters[k] for k in ("mean", "standard_deviation"))
+        length = truth.field(self.quantity).spectrum.efolding_length
+        cvs = np.array([one.standard_deviation / one.mean for one in fields])
+        lengths = np.array([one.spectrum.efolding_length for one in fields])
+        # The variance of a mean grows with that of the field and with its correlation length.
+        share = np.minimum(cvs**2 * lengths / ((deviation / mean) ** 2 * length), 1e3)
+        within = np.minimum(np.outer(share, truth.within), np.log1p(cvs**2)[:, None])
+        if not self._families:  # all records are of one specimen
+            weight = 1.0 / np.maximum(truth.within, 1e-300)
+            levels = np.atleast_1d(weight @ levels / weight.sum())
+            within = 1.0 / np.sum(1.0 / np.maximum(within, 1e-300), axis=1, keepdims=True)
+        members = tuple(of_mean(RandomInterface(strength=one), mean) for one in fields)
+        families = self._families or families_of(True)
+        return Profiles(members, mean, levels, within, families, self._prior)
 
     def __str__(self) -> str:
         marginal = getattr(self.field.marginal, "type", "marginal").replace("_", " ")
@@ -227,7 +273,8 @@ def fit_field(
     detrend: Literal[0, 1, 2, 3] = 0,
     noise: Flag | NotNegative = True,
     anisotropy: Flag | Positive = False,
-    between: Flag = False,
+    between: Factors = False,
+    prior: Any = None,
     quantity: str = "strength",
     bootstrap: at_least(FEWEST) = 200,  # type: ignore[valid-type]
     confidence: Share = 0.9,
@@ -267,10 +314,16 @@ def fit_field(
         standard deviation, if known (SI).
     anisotropy : bool or float
         Ratio of the correlation lengths of maps along y and x. False: 1; True: estimated.
-    between : bool
-        Whether records come from different specimens, each with its own factor. The coefficient
-        of variation ``between`` of this factor, at most 1, is then estimated, for
-        `RandomInterface`. Two to four specimens say little of it, which a warning states.
+    between : bool, str or sequence of str
+        Whether records come from different specimens, each with its own factor of mean 1. The
+        coefficient of variation ``between`` of this factor is then estimated. The family of
+        the factor is one of those named: 'lognormal', 'normal' (above zero), 'weibull'; True
+        stands for all three, which are averaged. Fewer than five specimens say little of the
+        scatter between them, which a warning states.
+    prior : mapping, optional
+        Priors of the mean, ``"strength.mean"``, and of the coefficient of variation,
+        ``"between.strength"``, as of `infer`. By default the first is flat in its logarithm, and
+        the second half-Cauchy of scale 0.1.
     quantity : str
         Measured quantity, for its unit: 'strength', 'normal_pressure',
         'friction_coefficient', ... The fitted field of friction coefficients has
@@ -345,7 +398,9 @@ def fit_field(
     (name, fixed), deviation = spectrum, None if noise is True else float(noise)
     family = SpectrumFamily(name, fixed, ratio, deviation, (spacing, 2.0 * float(longest)))
     windows, rows = windowed(records, detrend)
-    settings = [FitSetting(windows, one, family, between) for one in marginal]
+    with prefixed("fit_field"):
+        factor_prior = FactorPrior.of(prior)
+    settings = [FitSetting(windows, one, family, bool(between)) for one in marginal]
     estimates, families, independent = compare(settings, rows)
     weights = [one.weight for one in families.values() if one.weight > 0.0]
     counts = [max(FEWEST, round(bootstrap * one / max(weights))) for one in weights[1:]]
@@ -355,7 +410,7 @@ def fit_field(
     )  # fmt: skip
     points = sum(record.values.size for record in records)
     fit = FieldFit(
-        **_judged(repeated, rows, confidence, bootstrap),
+        **_judged(repeated, rows, confidence, bootstrap, between, factor_prior),
         field=estimates[0].field(quantity),
         confidence=confidence,
         repetitions=tuple(one.field(quantity) for one in repeated[0].fits),
@@ -366,6 +421,8 @@ def fit_field(
         _repeated=[repeated[0], *others],
         _rows=estimates[0].as_of_one(rows),
         _levels=np.array([row.mean() for row in rows]),
+        _families=between,
+        _prior=factor_prior,
     )
     for doubt in fit.doubts:
         warn_accuracy(doubt)
@@ -376,7 +433,12 @@ def fit_field(
 
 
 def _judged(
-    repeated: Sequence[Repetitions], rows: Sequence[Array], confidence: float, count: int
+    repeated: Sequence[Repetitions],
+    rows: Sequence[Array],
+    confidence: float,
+    count: int,
+    families: tuple[str, ...],
+    prior: FactorPrior,
 ) -> dict[str, Any]:
     """Return parameters, their intervals, p-values and doubts; `count` repetitions were tried."""
     found, fits = repeated[0]
@@ -391,16 +453,23 @@ def _judged(
     if failed := len(repeated) * count - sum(len(one.fits) for one in repeated):
         doubts.append(f"the family does not fit {failed} repetitions, which the intervals omit")
     if found.setting.between:
-        cv, (low, high), width = scatter_between(np.log(levels), found.within, confidence)
+        field, mean = found.field("strength"), parameters["mean"]
+        one = (RandomInterface(strength=field),)
+        profiles = Profiles(one, mean, levels, found.within[None], families, prior)
+        grid, _ = grid_of_profiles(profiles)
+        draws = grid.described(grid.draws(DRAWS, np.random.default_rng(0)))
+        tails = 0.5 - 0.5 * confidence, 0.5 + 0.5 * confidence
         for name in {"mean", "marginal.mean"} & parameters.keys():  # of other specimens, too
-            ends[name] = parameters[name] * math.exp(-width), parameters[name] * math.exp(width)
-        parameters["between"], ends["between"] = cv, (low, high)
+            ends[name] = tuple(np.quantile(draws[MEAN], tails).tolist())
+        parameters["between"] = float(np.median(draws[SCATTER]))
+        low, high = ends["between"] = tuple(np.quantile(draws[SCATTER], tails).tolist())
         if len(rows) < FEW_SPECIMENS:
             doubts.append(
-                f"{len(rows)} specimens leave the coefficient of variation between them at"
-                f" {low:.2g} to {high:.2g}, which decides small probabilities under `interfaces`:"
-                f" measure at least {FEW_SPECIMENS}, or state it, as in RandomInterface("
-                "strength=fit.field, between={'strength': Lognormal(mean=1.0, cv=0.1)})"
+                f"{len(rows)} specimen(s) leave the coefficient of variation between specimens at"
+                f" {low:.2g} to {high:.2g}, mostly by its prior, and it decides small"
+                f" probabilities: measure at least {FEW_SPECIMENS}, or state it, as in"
+                " RandomInterface(strength=fit.field, between={'strength': Lognormal(mean=1.0,"
+                " cv=0.1)})"
             )
     return {
         "parameters": parameters, "interval": ends, "p_values": p_values, "doubts": tuple(doubts)

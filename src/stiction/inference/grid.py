@@ -48,18 +48,16 @@ def grid_of(
     function: Callable[[Array], Array],
     box: Array,
     points: int = POINTS,
-    cells: int | None = None,
 ) -> PosteriorGrid | None:
     """Return a density, given by its logarithm at points (points, parameters), in a box.
 
-    None if it is zero. One parameter that takes so many equally likely values has as many `cells`.
-
-    The first grid covers all of it; each next one the box that holds all but a millionth of
-    the last, until it no longer shrinks by a tenth in any direction. The midpoint rule
-    converges faster than any power of the step once a cell is narrower than the density.
+    None if it is zero. The first grid covers all of it; each next one the box that holds all
+    but a millionth of the last, until it no longer shrinks by a tenth in any direction. The
+    midpoint rule converges faster than any power of the step once a cell is narrower than the
+    density.
     """
     dimension = box.shape[1]
-    along = cells or int(min(MOST_ALONG, max(8, points ** (1.0 / dimension))))
+    along = int(min(MOST_ALONG, max(8, points ** (1.0 / dimension))))
     steps = [(np.arange(along) + 0.5) / along] * dimension
     unit = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1)
     for _ in range(ZOOMS):
@@ -78,6 +76,6 @@ def grid_of(
         empty = [[np.sum(np.cumsum(r) <= NEGLIGIBLE) - 1 for r in (o, o[::-1])] for o in rows]
         below, above = np.maximum(empty, 0).T * cell
         box = np.stack([low + below, high - above])
-        if cells or np.all(box[1] - box[0] > 0.9 * (high - low)):
+        if np.all(box[1] - box[0] > 0.9 * (high - low)):
             break
     return grid

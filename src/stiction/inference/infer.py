@@ -27,6 +27,7 @@ from stiction.inference.likelihood import (
 from stiction.inference.peaks import Peaks, factor_of, make_peaks
 from stiction.inference.posterior import DRAWS, Posterior, posterior_of
 from stiction.inference.prior import Prior, make_prior
+from stiction.inference.specimens import MEAN, SCATTER
 from stiction.methods.criterion.local import LocalCriterion
 from stiction.methods.protocol import MethodObject
 from stiction.problem.load import NotNegative
@@ -65,6 +66,7 @@ def infer(
     peaks: Any,
     *,
     prior: Any = None,
+    between: Any = None,
     method: MethodObject,
     load_cell_error: NotNegative = 0.0,
     unit: str = "Pa",
@@ -80,20 +82,27 @@ def infer(
     problem : Problem
         One specimen.
     random : RandomInterface, RandomField, a fit, or a list of interfaces
-        The random properties with known parameters; `prior` replaces their values. Without
-        a `prior`: what is known already, equally likely interfaces, such as a `FieldFit`, a
-        `Posterior`, anything with such `interfaces`, or a list. The peaks weigh them.
+        The random properties. With priors of other parameters than the two of specimens
+        below, one interface with known parameters, of which `prior` replaces some. Otherwise
+        a fit, whose records are joined with the peaks, or one or several equally likely
+        interfaces, of which only the field within a specimen counts: mean and scatter between
+        specimens are inferred.
     peaks : array, mapping of arrays, or Peaks
         Mean shear stress, or force, at which each specimen slid, in `unit`; for specimens
         of several lengths a mapping of each length (m) to its peaks,
         ``{0.1: [...], 0.2: [...]}``, with the node spacing of the problem. Or the result of
         `read_peaks`.
     prior : mapping, optional
-        Parameters and the prior of each: a frozen continuous `scipy.stats` distribution, a
-        range ``(low, high)``, or ``{"low": ..., "high": ..., "spacing": "log"}``. Priors
-        are independent. Keys are those of a sweep: for the strength,
-        ``"correlation_length"`` or ``"marginal.low"``; for others,
+        Of specimens: ``"strength.mean"``, by default flat in its logarithm, and
+        ``"between.strength"``, the coefficient of variation between specimens, by default
+        half-Cauchy of scale 0.1. Or other parameters and the prior of each: a frozen
+        continuous `scipy.stats` distribution, a range ``(low, high)``, or
+        ``{"low": ..., "high": ..., "spacing": "log"}``. Priors are independent. Keys are those
+        of a sweep: for the strength, ``"correlation_length"`` or ``"marginal.low"``; for others,
         ``"residual_strength.marginal.high"`` or ``"problem.friction.weakening_rate"``.
+    between : str or sequence of str, optional
+        Families of the factor between specimens, as in `fit_field`; those of the fit, or all,
+        by default, with equal prior weights.
     method : LocalCriterion, Equilibrium or any other
         The method that finds the onset. For all but the local criterion, that one, if applicable,
         first finds the relevant part of the prior, which grows until it contains the posterior.
@@ -106,7 +115,7 @@ def infer(
         coefficients, which need ``Load(normal_pressure=...)``.
     samples : int, optional
         Simulated specimens at each point: by default 2000 by the local criterion, 500 by
-        equilibrium, and 500 for each of a list.
+        equilibrium. Of each field within a specimen: 200 by the local criterion, 100 by others.
     seed : int
         Not negative. The same samples are used at every point, so that the likelihood is smooth.
     workers, progress
@@ -122,15 +131,14 @@ def infer(
     ------
     InputError
         If any argument is invalid, or no parameters in the prior can produce the peaks; the
-        message then names the bound that must move. If a list and the peaks contradict each
-        other: none of 999 simulated campaigns is as far off (`stiction.statistics.agreement`).
+        message then names the bound that must move.
 
     Warns
     -----
     AccuracyWarning
         If the posterior piles up at an end of the prior, the method is not accurate there,
-        or few samples are simulated for the number of peaks. If a list and the peaks hardly
-        agree, or few of its interfaces keep weight.
+        or few samples are simulated for the number of peaks. If profiles and peaks contradict
+        each other, with the p-value of `stiction.statistics.agreement`.
     UserWarning
         Beforehand, if the simulation will take more than a minute: how long, and what takes less.
 
@@ -144,9 +152,10 @@ def infer(
     `prior_transform` of the result to emcee or dynesty. After an interruption, or an error in one
     sample, an equal call in the same session goes on with the onsets that are there.
 
-    Of a fit 300 interfaces are drawn, and up to 3000 where the peaks leave few of them
-    weight. The parameters of the posterior are then what they differ in: mean, standard
-    deviation and correlation length of each property, and the scatter between specimens.
+    Mean and scatter between specimens are integrated on a grid, with sixty fields within a
+    specimen from the repetitions of the fit: see `stiction.inference.specimens`. The families
+    of the factor between specimens are averaged; `families` of the result has their
+    probabilities, and `agreement` the comparison of the peaks with the profiles alone.
 
     Examples
     --------
@@ -180,16 +189,16 @@ def infer(
             f"load_cell_error: {load_cell_error:g} {unit} is more than the largest peak; it is a"
             " standard deviation in the unit of the peaks"
         )
-    if prior is None:
+    if not (prior and {*prior} - {MEAN, SCATTER}):
         with _forgetting_errors(), Meter("infer", show=progress) as meter:
             found = join(
-                problem, random, measured, method=method, error=error, samples=samples,
-                seed=seed, workers=workers, meter=meter, done=UNFINISHED,
+                problem, random, measured, prior=prior, between=between, method=method, error=error,
+                samples=samples, seed=seed, workers=workers, meter=meter, done=UNFINISHED,
             )  # fmt: skip
         UNFINISHED.clear()
         return found
     parameters = make_prior(problem, random, prior)
-    variable = variable_of(parameters, measured.unit)
+    variable = variable_of(*parameters.at(parameters.middle), measured.unit)
     (own,) = experiments_at(parameters, parameters.middle, method)
     own.problem.warn_of_units(mean_in_stress(own.problem, own.random, "strength"))
     _check_reach(parameters, method, measured, error)

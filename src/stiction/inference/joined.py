@@ -1,11 +1,11 @@
-"""Profiles and peaks joined: equally likely interfaces, weighed by the peaks of repeated tests.
+"""Profiles and peaks joined: onsets of the fields within, their posterior, and its agreement.
 
-A list of interfaces that other evidence left equally likely is a prior over their number, and the
-posterior is a weight for each, in proportion to the likelihood of the peaks (importance sampling;
-Robert and Casella, 2004, section 3.3). The same samples serve all members.
+Read `stiction.inference.specimens` first: it has the model, its source and the steps. Here are the
+simulation (step 1), the result, and what is said about it.
 """
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -13,201 +13,267 @@ import numpy as np
 from scipy.stats import entropy
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError, prefixed, warn_accuracy
+from stiction.base.errors import InputError, warn_accuracy
+from stiction.base.model import Count, Number, checked
 from stiction.base.progress import Meter
-from stiction.inference.agreement import agreement
-from stiction.inference.grid import PosteriorGrid, grid_of
-from stiction.inference.likelihood import Likelihood, make_likelihood, variable_of
+from stiction.ensemble.batches import in_threads, usable_cores
+from stiction.inference.agreement import Agreement, agreement
+from stiction.inference.density import tabulate
+from stiction.inference.fit import FieldFit
+from stiction.inference.likelihood import (
+    SPECIMEN,
+    bounds_of,
+    experiment_on,
+    simulate,
+    variable_of,
+    warn_if_long,
+)
 from stiction.inference.peaks import Peaks
-from stiction.inference.posterior import MEMBER, Posterior, posterior_of
-from stiction.inference.prior import Prior, refuse_conditioned
+from stiction.inference.posterior import DRAWS, Posterior
+from stiction.inference.prior import refuse_conditioned
+from stiction.inference.scaling import may_scale
+from stiction.inference.specimens import (
+    MEAN,
+    SCATTER,
+    STEPS,
+    FactorPrior,
+    Grid,
+    Onsets,
+    Profiles,
+    Tables,
+    families_of,
+    grid_of_profiles,
+    of_mean,
+)
 from stiction.problem.problem import Problem
-from stiction.random.equally_likely import EquallyLikely, Source, as_random
+from stiction.random.equally_likely import Source, as_random
 from stiction.random.fields import RandomInterface
 
-FIRST, MOST = 300, 3_000
-"""Members that are drawn from a source at first, and at most."""
-ENOUGH, FEW = 100, 20
-"""Members' worth of weight from which on no more are drawn, and below which a warning says so."""
-SAMPLES = 500
-BINS = 20
+FIELDS = 60
+"""Fields within a specimen that stand for all that are likely."""
+ONSETS = {"local_criterion": 200}
+FEW_ONSETS = 100
+"""Simulated onsets of each field, by other methods."""
 DOUBT = 0.05
-"""P-value below which the list and the peaks are said to contradict each other."""
+"""P-value of agreement below which a warning says that peaks and profiles contradict."""
+MARGIN = 0.3
+"""Logarithm of the strength beyond what the peaks need at which onsets are simulated too."""
 
 
-@dataclass(frozen=True, eq=False)
-class Members(Prior):
-    """Equally likely interfaces by number; what else differs between them follows from it."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SpecimenPosterior(Posterior):
+    """Posterior of the mean, the scatter between specimens and the field within a specimen.
 
-    likely: EquallyLikely
+    Attributes
+    ----------
+    families : dict of str to float
+        Posterior probability of each family of the factor between specimens.
+    agreement : Agreement or None
+        Of the peaks with what the profiles alone predict; None without profiles.
+    """
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The number among interfaces that differ, and what describes these."""
-        return (MEMBER, *self._differing)
-
-    @property
-    def cells(self) -> int | None:
-        """Number of members."""
-        return len(self.likely.members)
-
-    @property
-    def ends(self) -> Array:
-        """Least and greatest number and description, (2, columns)."""
-        return np.stack([self.quantile(0.0), self.quantile(1.0)])
+    grid: Grid = field(repr=False)
+    by_profiles: Grid = field(repr=False)
+    agreement: Agreement | None = field(default=None, repr=False)
 
     @property
-    def dimension(self) -> int:
-        """One: which of them holds."""
-        return 1
+    def families(self) -> dict[str, float]:
+        """Posterior probability of each family of the factor between specimens."""
+        return self.grid.families
 
     @cached_property
-    def different(self) -> list[RandomInterface]:
-        """Interfaces of which no two are equal."""
-        return list(dict.fromkeys(self.likely.members))
+    def before(self) -> dict[str, Array]:
+        """Draws by the profiles alone, or from the prior without profiles."""
+        rng = np.random.default_rng([self.seed, 7])
+        return self.by_profiles.described(self.by_profiles.draws(DRAWS, rng))
 
-    @cached_property
-    def places(self) -> Array:
-        """Place of every member among those that differ, (members,)."""
-        number = {one: place for place, one in enumerate(self.different)}
-        return np.array([number[one] for one in self.likely.members], dtype=np.float64)
+    def at(self, draw: int) -> tuple[Problem, RandomInterface]:
+        """Return the problem and what is random at one draw, to compute with."""
+        return self.problem, self.grid.interface(self.u[draw])
 
-    def worth(self, mass: Array) -> float:
-        """Return how many interfaces of equal weight tell as much; equal members are one."""
-        return 1.0 / float(np.sum(np.bincount(self.places.astype(np.int64), mass) ** 2))
+    @checked
+    def interfaces(self, count: Count, seed: Number = 0) -> list[RandomInterface]:
+        """Return equally likely random interfaces: draws from the posterior.
 
-    @cached_property
-    def _differing(self) -> dict[str, Array]:
-        rows = [describing(one) for one in self.different]
-        found = {name: np.array([row.get(name, np.nan) for row in rows]) for name in rows[0]}
-        return {
-            name: values
-            for name, values in found.items()
-            if np.ptp(values) > 1e-9 * np.abs(values).max()
-        }
+        Parameters
+        ----------
+        count : int
+            Their number. A longer list does not begin with a shorter one.
+        seed : int
+            Not negative.
+        """
+        drawn = self.grid.draws(count, np.random.default_rng([seed, 4]))
+        return [self.grid.interface(one) for one in drawn]
 
-    def information(self, grid: PosteriorGrid) -> dict[str, float]:
-        """Return the divergence of each column alone, by its ranks in equal shares, nats."""
-        found, count = {MEMBER: grid.information(0)}, grid.mass.size
-        ends, bins = np.arange(count + 1) / count, np.linspace(0.0, 1.0, min(BINS, count) + 1)
-        every = self.theta((ends[1:] - 0.5 / count)[:, None])
-        for name, values in zip(self.names[1:], every.T[1:], strict=True):
-            ranked = np.append(0.0, np.cumsum(grid.mass[np.argsort(values, kind="stable")]))
-            shares = np.diff(np.interp(bins, ends, ranked))
-            found[name] = float(np.log(shares.size) - entropy(shares))
-        return found
+    def prior_transform(self, u: Any) -> Array:
+        """Raise an `InputError`: fields within a specimen are no parameters."""
+        raise InputError("prior_transform: needs parameters with a prior={...} of `infer`")
 
-    def theta(self, u: Array) -> Array:
-        """Return number and description at `u`, of which the first column alone counts."""
-        count = self.places.size
-        of = self.places[np.minimum((u[:, 0] * count).astype(np.int64), count - 1)]
-        return np.column_stack(
-            [of, *(v[of.astype(np.int64)] for v in self._differing.values())]
-        )
+    def log_likelihood(self, theta: Any) -> Array | float:
+        """Raise an `InputError`: fields within a specimen are no parameters."""
+        raise InputError("log_likelihood: needs parameters with a prior={...} of `infer`")
 
-    def u(self, theta: Array) -> Array:
-        """Return a point of each number, (points, 1)."""
-        first = [np.flatnonzero(self.places == number)[:1] for number in theta[:, 0]]
-        found = [(own[0] + 0.5) / self.places.size if own.size else -1.0 for own in first]
-        return np.array(found)[:, None]
-
-    def quantile(self, share: float) -> Array:
-        """Return the quantiles of number and description, each alone."""
-        steps = (np.arange(self.places.size) + 0.5) / self.places.size
-        return np.quantile(self.theta(steps[:, None]), share, axis=0)
-
-    def at(self, theta: Array) -> tuple[Problem, RandomInterface]:
-        """Return the problem and the interface of one number."""
-        return self.problem, self.different[int(theta[0])]
-
-    def named(self, theta: Array) -> Any:
-        """Begin the messages of errors of one number."""
-        return prefixed(f"random: {MEMBER} {theta[0]:.0f}")
+    def __str__(self) -> str:
+        shares = ", ".join(f"{name} {share:.0%}" for name, share in self.families.items())
+        lines = [super().__str__(), f"  families of the factor between specimens: {shares}"]
+        if self.agreement is not None:
+            p = min(self.agreement.p_values.values())
+            lines.append(f"  agreement of peaks and profiles: p = {p:.2g}")
+        return "\n".join(lines)
 
 
-def describing(random: RandomInterface) -> dict[str, float]:
-    """Return the numbers that describe each property, by keys like those of a prior."""
-    found = {}
-    for name, field in random.properties.items():
-        found[f"{name}.mean"] = field.mean
-        found[f"{name}.standard_deviation"] = field.standard_deviation
-        found[f"{name}.efolding_length"] = field.spectrum.efolding_length
-    for name, factor in (random.between or {}).items():
-        found[f"between.{name}"] = float(factor.distribution.std())
-    return found
-
-
-def members_of(problem: Problem, likely: Any) -> Members:
-    """Return the prior of a list, or raise an `InputError` where it cannot be weighed."""
-    refuse_conditioned(likely.members)
-    if len(set(likely.members)) < 2:
+def profiles_of(random: Any, prior: Any, families: Any, seed: int) -> Profiles:
+    """Return what is known from profiles of a fit, or fields of anything else without levels."""
+    more: dict[str, Any] = {} if prior is None else {"prior": FactorPrior.of(prior)}
+    more |= {} if families is None else {"families": families_of(families)}
+    if isinstance(random, FieldFit):
+        return random.profiles(FIELDS, seed)._replace(**more)
+    if isinstance(random, Posterior):
         raise InputError(
-            "prior: is left out, so `random` must hold several interfaces that differ, such as a"
-            " fit; give a single field a prior={...} for its unknown parameters"
+            "random: is a posterior, which holds its peaks already; give what it was made from,"
+            " and all peaks together"
         )
-    return Members(problem, likely.members[0], {}, likely)
+    given = random.interfaces(FIELDS, seed) if isinstance(random, Source) else random
+    members = as_random(given).members
+    refuse_conditioned(members)
+    return Profiles.of_interfaces(members, **more)
 
 
 def join(
-    problem: Problem, random: Any, measured: Peaks, *, samples: int | None, meter: Meter,
-    seed: int, **options: Any,
-) -> Posterior:  # fmt: skip
-    """Return the posterior of equally likely interfaces, or of as many as a source needs."""
-    source = random if isinstance(random, Source) else None
-    likely = as_random(source.interfaces(FIRST, seed) if source else random)
-    while True:
-        prior = members_of(problem, likely)
-        likelihood = make_likelihood(
-            prior, samples=samples or SAMPLES, lengths=measured.lengths, seed=seed, meter=meter,
-            variable=variable_of(prior, measured.unit), **options,
-        ).of(measured.values)  # fmt: skip
-        grid = grid_of(likelihood, prior.whole, cells=prior.cells)
-        worth = 0.0 if grid is None else prior.worth(grid.mass)
-        drawn, count = len(likely.members), len(prior.different)
-        if source is None or worth >= ENOUGH or drawn >= MOST:
-            break
-        wanted = min(MOST, int(np.clip(1.5 * ENOUGH / max(worth, 1.0), 2.0, 10.0) * drawn))
-        likely = EquallyLikely(tuple(source.interfaces(wanted, seed)))
-        if len(set(likely.members)) == count:  # the source has no others
-            break
-    notes = [f"{count} interfaces, weighed by the peaks, are worth {worth:.0f}"]
-    chance, possible = _chance(likelihood, measured, seed)
-    if grid is None or not possible:
-        raise InputError(
-            f"peaks: contradict the interfaces: none of these {count} gives such peaks (p ="
-            f" {chance:.2g} of their agreement); check the unit of both, the method, and whether"
-            " tests and profiles are of the same surfaces; give the load-cell error if peaks are"
-            " not exact"
+    problem: Problem,
+    random: Any,
+    measured: Peaks,
+    *,
+    prior: Any,
+    between: Any,
+    method: Any,
+    error: float,
+    samples: int | None,
+    seed: int,
+    workers: int | None,
+    meter: Meter,
+    done: dict[Any, Array],
+) -> SpecimenPosterior:
+    """Return the posterior of mean and scatter between specimens, from profiles and peaks."""
+    profiles = profiles_of(random, prior, between, seed)
+    variable = variable_of(problem, profiles.fields[0], measured.unit)
+    count = samples or ONSETS.get(method.type, FEW_ONSETS)
+    kinds = [
+        _simulated(
+            profiles, problem, method, measured.lengths[number], peaks, number, error,
+            variable=variable, samples=count, seed=seed, workers=workers, meter=meter, done=done,
         )
-    warnings = []
-    if chance < DOUBT:
-        warnings.append(
-            f"the peaks contradict the interfaces, p = {chance:.2g} of their agreement: one of the"
-            " two, or the model, misses something, and so would a design by both"
-        )
-    if worth < FEW:
-        warnings.append(
-            f"the peaks leave the weight of only {worth:.1f} of {count} interfaces; "
-            + (
-                "give more `bootstrap` repetitions of the fit"
-                if source
-                else "give a longer list"
-            )
-        )
-    for text in warnings:
-        warn_accuracy(text)
+        for number, peaks in enumerate(measured.values)
+    ]  # fmt: skip
+    predictions = [
+        kind.area * profiles_mean(profiles, peaks, kind) * kind.ratios[:, 0].ravel()
+        for kind, peaks in zip(kinds, measured.values, strict=True)
+    ]
+    if profiles.levels.size:
+        measured.refuse_far(predictions)
+    tables = Tables(profiles, method, tuple(kinds), error, tuple(measured.values))
+    by_profiles, grid = grid_of_profiles(profiles, tables)
     tests = sum(map(np.size, measured.values))
-    error = float(np.sqrt(tests / likelihood.samples + 1.0 / worth))
-    return posterior_of(likelihood, grid, measured, error, [*notes, *warnings], seed)
+    common: dict[str, Any] = {
+        "problem": problem, "likelihood": tables, "seed": seed, "by_profiles": by_profiles,
+        "monte_carlo_error": math.sqrt(tests / (len(profiles.fields) * count)),
+    }  # fmt: skip
+    known = profiles.levels.size > 0
+    found = None
+    if known:
+        alone = _result(
+            by_profiles, measured._replace(values=tuple(np.empty(0) for _ in kinds)), **common
+        )
+        found = agreement(alone, measured, seed=seed)
+    notes = _notes(profiles, tests, found)
+    for text in notes:
+        warn_accuracy(text)
+    proper = known or profiles.prior.mean is not None
+    evidence = grid.log_evidence if proper else math.nan
+    return _result(
+        grid, measured, notes=tuple(notes), agreement=found, log_evidence=evidence,
+        information=_information(grid, by_profiles, proper), **common,
+    )  # fmt: skip
 
 
-def _chance(likelihood: Likelihood, measured: Peaks, seed: int) -> tuple[float, bool]:
-    """Return the p-value of peaks under the list alone, and whether it may be chance at all."""
-    none = measured._replace(values=tuple(np.empty(0) for _ in measured.values))
-    before = likelihood.of(none.values)
-    grid = grid_of(before, likelihood.box, cells=before.prior.cells)
-    assert grid is not None
-    prediction = posterior_of(before, grid, none, 0.0, [], seed)
-    found = agreement(prediction, measured, seed=seed)
-    chance = min(found.p_values.values())
-    return chance, chance > 1.5e-3
+def profiles_mean(profiles: Profiles, peaks: Array, kind: Onsets) -> float:
+    """Return the mean level over the reference, or 1 without profiles."""
+    return float(profiles.levels.mean() / profiles.reference) if profiles.levels.size else 1.0
+
+
+def _result(grid: Grid, peaks: Peaks, **more: Any) -> SpecimenPosterior:
+    u = grid.draws(DRAWS, np.random.default_rng(more["seed"]))
+    options: dict[str, Any] = {"information": {}, "log_evidence": math.nan, "notes": ()} | more
+    return SpecimenPosterior(peaks=peaks, draws=grid.described(u), u=u, grid=grid, **options)
+
+
+def _simulated(
+    profiles: Profiles, problem: Problem, method: Any, length: float | None, peaks: Array,
+    number: int, error: float, *, variable: str, samples: int, seed: int, workers: int | None,
+    meter: Meter, done: dict[Any, Array],
+) -> Onsets:  # fmt: skip
+    """Return onsets of all fields on one kind of specimen (step 1 of `specimens`)."""
+    first = experiment_on(problem, profiles.fields[0], method, length)
+    forces = variable == "critical_force"
+    area = (first.problem.area or math.nan) if forces else 1.0
+    of = "critical_stress" if forces else variable
+
+    def onsets(place: int, at: Array) -> tuple[Array, Any]:
+        """Return onsets over c/reference, (steps, samples), and their densities."""
+        strengths = np.exp(at)
+        experiments = [
+            experiment_on(
+                problem, of_mean(profiles.fields[place], c * profiles.reference), method, length
+            )
+            for c in strengths
+        ]
+        found = simulate(
+            experiments, samples=samples, first=number * SPECIMEN + place * samples, seed=seed,
+            variable=of, workers=1, meter=meter, done=done,
+        ) / strengths[:, None]  # fmt: skip
+        if not np.isfinite(found).all() or found.min() <= 0.0:
+            raise InputError(
+                "method: some simulated specimens have no positive onset, so that their peaks say"
+                " nothing of the strength"
+            )
+        bounds = np.array([bounds_of(one, of)[0] for one in experiments]) / strengths
+        return found, tabulate(found, np.maximum(bounds, 0.0))
+
+    at, fields = np.zeros(1), len(profiles.fields)
+    if not may_scale(problem, profiles.fields[0], method):
+        ratios, known = onsets(0, at)
+        low, high, _ = Onsets(at, ratios[None], (known,), area).ranges(peaks, error)
+        at = np.linspace(low - MARGIN, high + MARGIN, STEPS)
+    warn_if_long(first, fields * at.size * samples, workers)
+    meter.stage("simulated onsets", fields * at.size * samples)
+    found = in_threads(
+        lambda place: onsets(place, at), range(fields), workers or usable_cores()
+    )
+    # Standardised densities differ little between fields: their mean has a smaller error.
+    table = np.log(np.mean([np.exp(known.table) for _, known in found], axis=0))
+    densities = tuple(known._replace(table=table) for _, known in found)
+    return Onsets(at, np.stack([ratios for ratios, _ in found]), densities, area)
+
+
+def _information(grid: Grid, before: Grid, proper: bool) -> dict[str, float]:
+    """Return the divergence of mean and scatter from what they were without peaks, nats."""
+    axes = {SCATTER: (0, 1, 3)} | ({MEAN: (0, 1, 2)} if proper else {})
+    return {
+        name: float(entropy(grid.mass.sum(axis=of), before.mass.sum(axis=of)))
+        for name, of in axes.items()
+    }
+
+
+def _notes(profiles: Profiles, tests: int, found: Agreement | None) -> list[str]:
+    notes = []
+    if found is not None and (p := min(found.p_values.values())) < DOUBT:
+        notes.append(
+            f"the peaks contradict the profiles, p = {p:.2g} of their agreement: the tests, the"
+            " profiles or the model miss something, and so does a force by both; check units,"
+            " method and surfaces, and design by the lower of both alone"
+        )
+    if profiles.levels.size + tests < 2:
+        notes.append(
+            "one specimen says nothing of the scatter between specimens: its prior decides"
+        )
+    return notes

@@ -20,6 +20,7 @@ from stiction.inference.peaks import VARIABLES, si_of
 from stiction.inference.prior import Prior
 from stiction.inference.scaling import Scaling, find_scaling
 from stiction.methods.criterion.local import LocalCriterion
+from stiction.problem.problem import Problem
 from stiction.random.dotted_keys import full_key
 from stiction.random.synthesis import BLOCK
 
@@ -53,8 +54,6 @@ def make_axes(
     prior: Prior, scaling: Scaling, box: Array, along: Mapping[int, int] = NODES
 ) -> tuple[Axis, ...]:
     """Place the nodes of the parameters that need simulation in a box of the prior."""
-    if prior.cells is not None:  # numbers 0, 1, ...
-        return (Axis(0, np.arange(prior.ends[1, 0] + 1.0), np.positive),)
     simulated = [i for i in range(prior.dimension) if i not in scaling.keys]
     if len(simulated) not in along:
         names = ", ".join(prior.names[i] for i in simulated)
@@ -102,22 +101,29 @@ def experiments_at(
     found = []
     for theta in np.atleast_2d(thetas):
         problem, random = prior.at(theta)
-        own = problem.interface
-        if length is not None and own.is_plane:
-            raise InputError(
-                "peaks: specimen lengths apply to lines only; the interface is a plane"
-            )
         with prior.named(theta):
-            if length is not None and not np.isclose(length, own.extent, rtol=1e-9):
-                if problem.load.pressing_force is not None:
-                    raise InputError(
-                        "peaks: on specimens of another length the pressing force is another"
-                        " pressure; give Load(normal_pressure=...) in Pa"
-                    )
-                nodes = 2 * max(4, round(0.5 * length / own.spacing))
-                problem = replace(problem, interface=replace(own, length=length, nodes=nodes))
-            found.append(Experiment(problem, random, method))
+            found.append(experiment_on(problem, random, method, length))
     return found
+
+
+def experiment_on(
+    problem: Problem, random: Any, method: Any, length: float | None
+) -> Experiment:
+    """Return an experiment on specimens of a length, m; None stands for the problem's own."""
+    interface = problem.interface
+    if length is not None and interface.is_plane:
+        raise InputError(
+            "peaks: specimen lengths apply to lines only; the interface is a plane"
+        )
+    if length is not None and not np.isclose(length, interface.extent, rtol=1e-9):
+        if problem.load.pressing_force is not None:
+            raise InputError(
+                "peaks: on specimens of another length the pressing force is another"
+                " pressure; give Load(normal_pressure=...) in Pa"
+            )
+        nodes = 2 * max(4, round(0.5 * length / interface.spacing))
+        problem = replace(problem, interface=replace(interface, length=length, nodes=nodes))
+    return Experiment(problem, random, method)
 
 
 def simulate(
@@ -184,9 +190,8 @@ def area_of(prior: Prior, method: Any, length: float | None) -> Area:
     return Area(float(area / np.prod(middle[sides])), sides)
 
 
-def variable_of(prior: Prior, unit: str) -> str:
+def variable_of(problem: Problem, random: Any, unit: str) -> str:
     """Return the name of what tests measure in a unit, if the problem says enough for it."""
-    problem, random = prior.at(prior.middle)
     variable = VARIABLES[si_of(unit)]
     if variable == "critical_force" and problem.area is None:
         raise InputError(
@@ -329,14 +334,12 @@ def make_likelihood(
     thetas = nodes_of(axes, scaling.reference)
     count = samples or SAMPLES.get(method.type, FEW)
     local = method.type == "local_criterion"
-    # Members of a list are in no order: what one needs is not between what two others do.
-    ordered = prior.cells is None
-    guided = not local and ordered and not no_single_length(*prior.at(prior.middle))
+    guided = not local and not no_single_length(*prior.at(prior.middle))
     few = make_axes(prior, scaling, box, COARSE) if guided else axes
     coarse, weights = nodes_of(few, scaling.reference), corners(few, thetas)
     total = len(coarse) * len(lengths) * count
     if not local:
-        _warn_if_long(experiments_at(prior, coarse[:1], method)[0], total, workers)
+        warn_if_long(experiments_at(prior, coarse[:1], method)[0], total, workers)
     meter.stage("simulated onsets", total)
     effective, densities = float(count), []
     for number, length in enumerate(lengths):
@@ -362,7 +365,7 @@ def make_likelihood(
                 found = moved(many, found, known, *weights)
                 effective = effective_samples(float(alike), many.shape[1], count)
             else:
-                _warn_if_long(experiments[0], len(thetas) * count, workers)
+                warn_if_long(experiments[0], len(thetas) * count, workers)
                 meter.stage("simulated onsets", len(thetas) * count)
                 found = simulate(experiments, **options | {"samples": count, "meter": meter})
         bounds = [bounds_of(own, variable)[0] for own in experiments]
@@ -400,7 +403,7 @@ def effective_samples(alike: float, many: int, few: int) -> float:
     return 1.0 / (alike**2 / many + (1.0 - alike**2) / few)
 
 
-def _warn_if_long(experiment: Experiment, samples: int, workers: int | None) -> None:
+def warn_if_long(experiment: Experiment, samples: int, workers: int | None) -> None:
     each = experiment.seconds
     seconds = samples * each / (workers or usable_cores())
     if seconds > LONG:

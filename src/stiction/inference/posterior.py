@@ -21,8 +21,6 @@ from stiction.random.spectra import Share
 
 DRAWS, CHAINS = 4000, 4
 """Number of draws, and of chains into which these independent ones are cut for ArviZ."""
-MEMBER = "member"
-"""Key of the number of an interface in a list, which says nothing by its size."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -57,8 +55,9 @@ class Posterior:
     log_evidence: float
     monte_carlo_error: float
     notes: tuple[str, ...]
-    likelihood: Likelihood = field(repr=False)
+    likelihood: Any = field(repr=False)
     u: Array = field(repr=False)
+    problem: Any = field(default=None, repr=False)
     seed: int = 0
 
     @property
@@ -74,7 +73,14 @@ class Posterior:
     @property
     def prior(self) -> Prior:
         """The prior: `theta(u)` and `u(theta)` map the unit cube to the parameters and back."""
-        return self.likelihood.prior
+        found: Prior = self.likelihood.prior
+        return found
+
+    @cached_property
+    def before(self) -> dict[str, Array]:
+        """Draws from the prior."""
+        u = np.random.default_rng(self.seed).random(self.u.shape)
+        return dict(zip(self.names, self.prior.theta(u).T, strict=True))
 
     def mean(self, name: str) -> float:
         """Return the posterior mean of a parameter."""
@@ -195,12 +201,11 @@ class Posterior:
             raise InputError(
                 "to_arviz: needs the package arviz; pip install 'stiction[inference]'"
             ) from None
-        before = self.prior.theta(np.random.default_rng(self.seed).random(self.u.shape))
         measured = np.concatenate(self.peaks.values)
         name = "friction_coefficient" if self.peaks.unit == "1" else "peak"
         groups = {
             "posterior": {key: _in_chains(own) for key, own in self.draws.items()},
-            "prior": {key: _in_chains(before[:, i]) for i, key in enumerate(self.names)},
+            "prior": {key: _in_chains(own) for key, own in self.before.items()},
             "log_likelihood": {name: _in_chains(self.likelihood.parts(self.u))},
             "posterior_predictive": {name: _in_chains(self._campaigns())},
             "observed_data": {name: measured},
@@ -221,14 +226,13 @@ class Posterior:
     def __str__(self) -> str:
         width = max(map(len, self.names))
         lines = [f"{self.peaks}; onset by {self.method}"]
-        prior = np.stack([self.prior.quantile(share) for share in (0.05, 0.95)], axis=1)
-        for name, before in zip(self.names, prior, strict=True):
-            if name == MEMBER:
-                continue
+        for name in self.names:
             low, high = self.interval(name)
+            least, most = np.quantile(self.before[name], [0.05, 0.95])
+            nats = f", {self.information[name]:.2f} nats" if name in self.information else ""
             lines.append(
-                f"  {name:{width}s}  mean {self.mean(name):.4g}, 90 % {low:.4g} to {high:.4g} (of"
-                f" the prior {before[0]:.4g} to {before[1]:.4g}), {self.information[name]:.2f} nats"
+                f"  {name:{width}s}  mean {self.mean(name):.4g}, 90 % {low:.4g} to {high:.4g}"
+                f" (before the tests {least:.4g} to {most:.4g}){nats}"
             )
         lines += [f"  {note}" for note in self.notes]
         return "\n".join(lines)

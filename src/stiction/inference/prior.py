@@ -59,11 +59,6 @@ class Prior:
         """Least and greatest values, (2, parameters)."""
         return self.theta(self.whole)
 
-    @property
-    def cells(self) -> int | None:
-        """Number of equally likely values of a single parameter; None if it is continuous."""
-        return None
-
     def quantile(self, share: float) -> Array:
         """Return a quantile of each parameter, (parameters,)."""
         return self.theta(np.full((1, self.dimension), share))[0]

@@ -55,7 +55,7 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
     problem, random = prior.at(middle)
     none = Scaling((), middle, np.zeros((0, 2)))
     field, full = random.strength, [full_key(name) for name in prior.names]
-    if not _may_scale(problem, random, method) or PRESSURE & {*full}:
+    if not may_scale(problem, random, method) or PRESSURE & {*full}:
         return none
     of_area = [
         key for key in full if key.startswith(("problem.interface.", "problem.specimen."))
@@ -79,7 +79,7 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
     return Scaling(tuple(places), middle, slopes)
 
 
-def _may_scale(problem: Any, random: Any, method: Any) -> bool:
+def may_scale(problem: Any, random: Any, method: Any) -> bool:
     """Whether the onset scales with the strength if this keeps its distribution."""
     friction, initial = problem.friction, np.asarray(problem.load.initial_stress)
     exact = method.type == "equilibrium"

@@ -377,7 +377,7 @@ class RandomInterface:
                     " one; leave one of them out"
                 )
             mean, low = marginal.distribution.mean(), marginal.distribution.support()[0]
-            if low < 0.0 or abs(float(mean) - 1.0) > 1e-6:
+            if low < -1e-12 or abs(float(mean) - 1.0) > 1e-6:
                 problems.append(
                     f"between.{name}: a factor must be positive with mean 1, got mean {mean:g} and"
                     f" lower bound {low:g}"

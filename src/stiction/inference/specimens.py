@@ -1,0 +1,388 @@
+"""Mean and scatter between specimens, from profiles and peaks: one posterior on a grid.
+
+Problem. Specimen k has strength m b_k f(x): a mean m, a factor b_k of mean 1 and coefficient of
+variation s, and a field f of mean 1 within the specimen. Measured are the levels (means) of some
+profiles, m b_k (1 + e_k), and the peaks of some tests, T(m b_k), where T(c) is the onset of a
+specimen of mean strength c. Each measured specimen has a factor of its own. Wanted is the
+posterior of m, s and the family of b, for some equally likely fields within.
+
+Sources. Hierarchical models are integrated in Gelman and others, Bayesian Data Analysis (2013),
+chapter 5; the half-Cauchy prior of a scatter is Gelman's (2006, Bayesian Analysis 1, 515).
+
+Steps, with x = log(m b/reference), the logarithm of the strength of one specimen:
+
+1. Simulate onsets T of each field at the reference mean. If T(c)/c does not depend on c, this is
+   all; otherwise simulate at `STEPS` means and interpolate T(c)/c, sample by sample.
+2. Tabulate the likelihood of each measured number as a function of x: the normal density of a level
+   about it, or the density of simulated onsets at a peak (`stiction.inference.density`).
+3. Take `CELLS` values of s at equal shares of its prior, and `MEANS` values of log m. The
+   likelihood of a number at (family, s, m) is the integral of step 2 over the density of x, that
+   of log b shifted by log m: a convolution.
+4. Multiply over the numbers, and close in on the means that hold the mass.
+5. Fields are equally likely given the profiles. The peaks then change their shares by the mean of
+   the likelihood over (family, s, m).
+
+Departure: the levels are a factor in the likelihood of (m, s) only; the field within is what
+`fit_field` finds from the same profiles without their levels.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+import scipy.stats
+
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, unknown_name
+from stiction.inference.density import Densities, log_likelihoods
+from stiction.inference.marginal_fit import multiplied
+from stiction.random.dotted_keys import distributions_of
+from stiction.random.fields import RandomInterface
+from stiction.random.marginals import Lognormal, TruncatedNormal, Weibull
+
+FAMILIES: dict[str, Any] = {
+    "lognormal": Lognormal,
+    "normal": TruncatedNormal,  # above zero
+    "weibull": Weibull,
+}
+MEAN, SCATTER = "strength.mean", "between.strength"
+"""Keys of the two parameters, in a prior and among the draws."""
+PRIOR_SCALE = 0.1
+"""Scale of the half-Cauchy prior of s."""
+LEAST_CV, MOST_CV = 2e-3, 0.9
+"""Smallest and largest s."""
+CELLS, MEANS, STEPS = 40, 48, 5
+"""Values of s and of log m on the grid, and means at which onsets are simulated where T(c)/c
+depends on c."""
+BEYOND = 1.0
+"""Range of log m beyond that of x at first."""
+NEGLIGIBLE = 1e-6
+"""Mass on either side of log m that is left out."""
+ZOOMS = 4
+FINE, MOST_POINTS = 4.0, 2_000
+"""Points of x for the least deviation of a number, and at most in all. Cells of x add a twelfth of
+their square to a variance: 0.5 % of the least one."""
+REACH = 6.0
+"""Standard deviations to which the likelihood of a number is tabulated."""
+LEAST_DEVIATION = 1e-3
+"""Least standard deviation of the logarithm of a level or a peak that the grid resolves."""
+
+
+@lru_cache(maxsize=1024)
+def factor_of_family(family: str, cv: float) -> Any:
+    """Return the marginal of a factor of mean 1."""
+    return FAMILIES[family](mean=1.0, cv=cv)
+
+
+def families_of(given: Any) -> tuple[str, ...]:
+    """Return the families of factors named by True (all), a name or several."""
+    names = tuple(FAMILIES) if given is True else (given,) if isinstance(given, str) else given
+    if not isinstance(names, list | tuple) or not names:
+        raise InputError(f"must be True, False, or some of {', '.join(FAMILIES)}")
+    unknown = [name for name in names if name not in FAMILIES]
+    if unknown:
+        raise InputError([unknown_name("family", str(name), FAMILIES) for name in unknown])
+    return tuple(dict.fromkeys(names))
+
+
+class FactorPrior(NamedTuple):
+    """Priors of the scatter s between specimens and of the mean; None: flat in its logarithm."""
+
+    scatter: Any = scipy.stats.halfcauchy(scale=PRIOR_SCALE)
+    mean: Any = None
+
+    @classmethod
+    def of(cls, given: Any) -> Self:
+        """Return the prior of a mapping of `MEAN` and `SCATTER` to distributions."""
+        found = distributions_of(given or {})
+        if unknown := [key for key in found if key not in (MEAN, SCATTER)]:
+            raise InputError([unknown_name("prior", key, (MEAN, SCATTER)) for key in unknown])
+        default = cls()
+        prior = cls(found.get(SCATTER, default.scatter), found.get(MEAN))
+        low, high = prior.scatter.cdf([0.0, MOST_CV])
+        if not low < high:
+            raise InputError(
+                f"prior: {SCATTER}: is a coefficient of variation between 0 and {MOST_CV:g}, where"
+                " this distribution has no mass"
+            )
+        return prior
+
+    def cells(self) -> Array:
+        """Return values of s at equal shares of the prior, (CELLS,)."""
+        low, high = self.scatter.cdf([0.0, MOST_CV])
+        shares = low + (high - low) * (np.arange(CELLS) + 0.5) / CELLS
+        return np.maximum(self.scatter.ppf(shares), LEAST_CV)
+
+
+class Profiles(NamedTuple):
+    """What profiles say: equally likely fields within a specimen, and a level of each specimen."""
+
+    fields: tuple[RandomInterface, ...]  # all of the reference mean
+    reference: float  # Pa, or a coefficient
+    levels: Array  # (specimens,), in the unit of the reference; empty without profiles
+    within: Array  # variance of the logarithm of a level by the field, (fields, specimens)
+    families: tuple[str, ...] = tuple(FAMILIES)
+    prior: FactorPrior = FactorPrior()
+
+    @classmethod
+    def of_interfaces(cls, members: Sequence[RandomInterface], **more: Any) -> Self:
+        """Return fields without levels; means and factors of the strength are left out."""
+        reference = float(np.mean([one.strength.mean for one in members]))
+        fields = tuple(dict.fromkeys(of_mean(one, reference) for one in members))
+        return cls(fields, reference, np.zeros(0), np.zeros((len(fields), 0)), **more)
+
+
+def of_mean(random: RandomInterface, mean: float, factor: Any = None) -> RandomInterface:
+    """Return a random interface of another mean strength, and another factor of the strength."""
+    others = {k: v for k, v in (random.between or {}).items() if k != "strength"}
+    between = others | ({} if factor is None else {"strength": factor})
+    field = random.strength
+    marginal = multiplied(field.marginal, mean / field.mean)
+    return replace(random, strength=replace(field, marginal=marginal), between=between or None)
+
+
+@dataclass(frozen=True, eq=False)
+class Onsets:
+    """Onsets of one kind of specimen per mean strength, by field, and their densities."""
+
+    at: Array  # logarithms of c over the reference, (steps,)
+    ratios: Array  # T(c) over c/reference, (fields, steps, samples)
+    densities: tuple[Densities, ...]  # of each field
+    area: float = 1.0  # of peaks per onset
+
+    def tabulated(self, field: int, peaks: Array, error: float, x: Array) -> Array:
+        """Return the density of each peak at x, (peaks, points), up to a factor of each peak."""
+        place = np.clip(np.interp(x, self.at, np.arange(self.at.size)), 0, self.at.size - 1)
+        first = np.minimum(place.astype(np.int64), max(self.at.size - 2, 0))
+        share = place - first
+        index = np.stack([first, np.minimum(first + 1, self.at.size - 1)], axis=1)
+        weight = np.stack([1.0 - share, share], axis=1)
+        known, out = self.densities[field], np.empty((x.size, peaks.size))
+        scales = self.area * np.stack([np.zeros(x.size), np.exp(x)])
+        of_v = known.between(index, weight)
+        log_likelihoods(known.table, index, weight, of_v, scales, error, peaks, out)
+        return out.T
+
+    def ranges(self, peaks: Array, error: float) -> tuple[float, float, float]:
+        """Return the range of x that such peaks leave, and the least deviation of x."""
+        logs = np.log(self.area * self.ratios)
+        deviation = max(float(logs.std(axis=2).min()), LEAST_DEVIATION)
+        away = REACH * np.hypot(float(logs.std()), error / peaks.min())
+        ends = np.log(peaks.min()), np.log(peaks.max())
+        return ends[0] - logs.max() - away, ends[1] - logs.min() + away, deviation
+
+
+def points_between(ranges: Sequence[tuple[float, float, float]]) -> Array:
+    """Return points of x that cover ranges in steps of a quarter of the least deviation."""
+    low, high, deviation = (
+        pick(v) for pick, v in zip((min, max, min), zip(*ranges, strict=True), strict=True)
+    )
+    count = int(np.clip(np.ceil(FINE * (high - low) / deviation), 64, MOST_POINTS))
+    return np.linspace(low, high, count)
+
+
+def masses(family: str, cv: float, means: Array, x: Array) -> Array:
+    """Return the probability that x lies in the cell of each point, (means, points)."""
+    half = 0.5 * (x[1] - x[0])
+    ends = np.append(x - half, x[-1] + half)
+    with np.errstate(over="ignore"):  # a power of what is far above
+        below = factor_of_family(family, cv).distribution.cdf(np.exp(ends - means[:, None]))
+    return np.diff(below, axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Posterior mass of field, family, s and log m, and how likely what made it was before."""
+
+    profiles: Profiles
+    means: Array  # log m over the reference, (means,), equidistant
+    mass: Array  # (fields, families, cells, means); sums to 1
+    log_evidence: float = math.nan
+
+    @property
+    def families(self) -> dict[str, float]:
+        """Posterior probability of each family of the factor."""
+        return dict(
+            zip(self.profiles.families, self.mass.sum(axis=(0, 2, 3)).tolist(), strict=True)
+        )
+
+    def draws(self, count: int, rng: np.random.Generator, fields: Any = None) -> Array:
+        """Draw field, family, s and log m, (count, 4); of given fields if there are some."""
+        cells, (rng, others) = self.mass[0].size, rng.spawn(2)  # a draw depends on its number
+        if fields is None:
+            places = rng.choice(self.mass.size, count, p=self.mass.ravel())
+        else:
+            below = np.cumsum(self.mass.reshape(-1, cells), axis=1)
+            shares = rng.random(count) * below[fields, -1]
+            own = [np.searchsorted(below[f], p) for f, p in zip(fields, shares, strict=True)]
+            places = np.asarray(fields) * cells + np.minimum(own, cells - 1)
+        field, family, cell, mean = np.unravel_index(places, self.mass.shape)
+        step = self.means[1] - self.means[0]
+        logs = self.means[mean] + step * (others.random(count) - 0.5)
+        return np.stack([field, family, self.profiles.prior.cells()[cell], logs], axis=1)
+
+    def interface(self, drawn: Array) -> RandomInterface:
+        """Return the random interface of one draw (4,)."""
+        own = self.profiles
+        factor = factor_of_family(own.families[int(drawn[1])], float(drawn[2]))
+        return of_mean(own.fields[int(drawn[0])], own.reference * math.exp(drawn[3]), factor)
+
+    def described(self, drawn: Array) -> dict[str, Array]:
+        """Return draws (draws, 4) as columns of parameters."""
+        own, field = self.profiles, drawn[:, 0].astype(np.int64)
+        means = own.reference * np.exp(drawn[:, 3])
+        strengths = [one.strength for one in own.fields]
+        of_field = {
+            "strength.standard_deviation": [one.standard_deviation for one in strengths],
+            "strength.efolding_length": [one.spectrum.efolding_length for one in strengths],
+        }
+        found = {MEAN: means, SCATTER: drawn[:, 2]}
+        for name, values in of_field.items():
+            found[name] = np.array(values)[field]
+        found["strength.standard_deviation"] *= means / own.reference
+        return found
+
+
+def grid_of_profiles(profiles: Profiles, tables: "Tables | None" = None) -> tuple[Grid, Grid]:
+    """Return the posterior of profiles alone, and of profiles and peaks (steps 2 to 5)."""
+    levels = np.log(profiles.levels / profiles.reference) + 0.5 * profiles.within
+    deviations = np.maximum(np.sqrt(profiles.within), LEAST_DEVIATION)
+    ranges = [] if tables is None else tables.ranges()
+    if levels.size:
+        reach = REACH * deviations
+        ranges.append(((levels - reach).min(), (levels + reach).max(), deviations.min()))
+    x = points_between(ranges)
+    # 2. the likelihood of each number as a function of x
+    of_levels = -0.5 * ((x - levels[..., None]) / deviations[..., None]) ** 2
+    of_levels -= np.log(deviations[..., None])
+    of_peaks = np.zeros((len(profiles.fields), 0, x.size)) if tables is None else tables(x)
+    box = np.array([x[0] - BEYOND, x[-1] + BEYOND])
+    for _ in range(ZOOMS):
+        means = box[0] + np.ptp(box) * (np.arange(MEANS) + 0.5) / MEANS
+        # 3. and 4.
+        kernel = np.array(
+            [
+                [masses(f, cv, means, x) for cv in profiles.prior.cells()]
+                for f in profiles.families
+            ]
+        )
+        before = _products(kernel, of_levels)
+        if profiles.prior.mean is not None:
+            before += profiles.prior.mean.logpdf(profiles.reference * np.exp(means)) + means
+        before -= _log_sum(before)[:, None, None, None] + math.log(len(profiles.fields))
+        after = before + _products(kernel, of_peaks)
+        evidence = float(_log_sum(after[None])[0])
+        if not math.isfinite(evidence):
+            raise InputError(
+                "peaks: contradict the profiles or the prior: no mean and scatter give both"
+            )
+        mass = np.exp(after - evidence)
+        along = [mass.sum(axis=(0, 1, 2))]
+        if levels.size or profiles.prior.mean is not None:
+            along.append(np.exp(before).sum(axis=(0, 1, 2)))
+        empty = [
+            min(int(np.sum(np.cumsum(own[::way]) <= NEGLIGIBLE)) for own in along)
+            for way in (1, -1)
+        ]
+        if sum(empty) <= 0.1 * MEANS:
+            break
+        cell = np.ptp(box) / MEANS
+        box = box + cell * np.array([max(empty[0] - 1, 0), -max(empty[1] - 1, 0)])
+    return Grid(profiles, means, np.exp(before)), Grid(profiles, means, mass, evidence)
+
+
+def _products(kernel: Array, tables: Array) -> Array:
+    """Return the sum over numbers of log likelihoods, (fields, families, cells, means).
+
+    `tables` are log likelihoods at x of numbers by field, (fields, numbers, points).
+    """
+    fields, numbers, points = tables.shape
+    total = np.zeros((fields, *kernel.shape[:-1]))
+    if not numbers:
+        return total
+    tops = tables.max(axis=2)
+    flat = kernel.reshape(-1, points).T
+    for number in range(numbers):
+        top = tops[:, number]
+        found = np.exp(tables[:, number] - top[:, None]) @ flat
+        total += np.log(np.maximum(found, 1e-300)).reshape(total.shape)
+        total += top[:, None, None, None]
+    return total
+
+
+def _log_sum(values: Array) -> Array:
+    """Return the logarithm of the sum of exponentials over all axes but the first."""
+    flat = values.reshape(len(values), -1)
+    top = flat.max(axis=1)
+    return top + np.log(np.exp(flat - top[:, None]).sum(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Tables:
+    """Likelihood of measured peaks by field and x; what a posterior predicts from."""
+
+    profiles: Profiles
+    method: Any
+    onsets: tuple[Onsets, ...]  # of each kind of specimen
+    error: float  # standard deviation of the load cell
+    peaks: tuple[Array, ...]
+
+    def of(self, peaks: Sequence[Array], kinds: Sequence[int] | None = None) -> Self:
+        """Return the same of other peaks, of some kinds of specimens if not of all."""
+        chosen = range(len(self.onsets)) if kinds is None else kinds
+        return replace(self, peaks=tuple(peaks), onsets=tuple(self.onsets[k] for k in chosen))
+
+    def ranges(self) -> list[tuple[float, float, float]]:
+        """Return the ranges of x of all kinds of peaks."""
+        pairs = zip(self.onsets, self.peaks, strict=True)
+        return [own.ranges(peaks, self.error) for own, peaks in pairs if peaks.size]
+
+    def __call__(self, x: Array) -> Array:
+        """Return log likelihoods of all peaks at x, (fields, peaks, points)."""
+        pairs = list(zip(self.onsets, self.peaks, strict=True))
+        return np.stack(
+            [
+                np.concatenate([own.tabulated(f, peaks, self.error, x) for own, peaks in pairs])
+                for f in range(len(self.profiles.fields))
+            ]
+        )
+
+    def parts(self, u: Array) -> Array:
+        """Return logarithms of the density of each peak at draws (draws, 4), (draws, peaks)."""
+        x = points_between(self.ranges())
+        rows = np.empty((len(u), x.size))
+        for family, cv, places in _laws(self.profiles, u):
+            rows[places] = masses(family, cv, u[places, 3], x)
+        found = np.empty((len(u), sum(map(np.size, self.peaks))))
+        pairs = list(zip(self.onsets, self.peaks, strict=True))
+        for f in np.unique(u[:, 0].astype(np.int64)):
+            own = np.flatnonzero(u[:, 0] == f)
+            table = np.concatenate([k.tabulated(f, p, self.error, x) for k, p in pairs])
+            found[own] = np.log(np.maximum(rows[own] @ np.exp(table).T, 1e-300))
+        return found
+
+    def predicted(self, kind: int, u: Array, seed: int) -> Array:
+        """Draw a peak of a kind of specimen at each of some draws (draws, 4)."""
+        rng = np.random.default_rng([seed, 1, kind])
+        known, share = self.onsets[kind], rng.random(len(u))
+        x = u[:, 3].copy()
+        for family, cv, places in _laws(self.profiles, u):
+            x[places] += np.log(factor_of_family(family, cv).distribution.ppf(share[places]))
+        sample = rng.integers(known.ratios.shape[2], size=len(u))
+        ratios = known.ratios[u[:, 0].astype(np.int64), :, sample]
+        ratio = np.array(
+            [np.interp(at, known.at, own) for at, own in zip(x, ratios, strict=True)]
+        )
+        return known.area * np.exp(x) * ratio + self.error * rng.standard_normal(len(u))
+
+
+def _laws(profiles: Profiles, u: Array) -> list[tuple[str, float, Any]]:
+    """Return family, s and places of all draws (draws, 4) that share both."""
+    pairs, group = np.unique(u[:, 1:3], axis=0, return_inverse=True)
+    return [
+        (profiles.families[int(family)], float(cv), np.flatnonzero(group.ravel() == number))
+        for number, (family, cv) in enumerate(pairs)
+    ]

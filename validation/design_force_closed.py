@@ -1,0 +1,165 @@
+"""Design force from few specimens, in closed form: promised and true failure probability.
+
+Problem. Specimen k has a factor b_k of mean 1 and coefficient of variation s. Measured are levels
+of profiles, L_j = m b_j (1 + e_j), and peaks, P_k = m b_k R. Here the logarithms of 1 + e, which
+has mean 1, and of R are normal with known deviations, so that nothing is simulated. Unknown are m,
+s and the family of b. The design is the stress that a further peak falls below with the promised
+probability, under the posterior.
+
+Steps, as in `stiction.inference.specimens`, but for arrays of its own:
+
+1. Take a grid of log m, and a grid of s at equal shares of the half-Cauchy prior.
+2. The density of log b convolved with the normal density of log(1 + e), or of log R, is the density
+   of log L - log m, or of log P - log m. The first is a product of characteristic functions here.
+3. The likelihood at (m, s) is the product over levels and peaks.
+4. The predictive distribution function of a further peak is the mean over the posterior.
+
+Truths of b have s = 0.08: log-normal, Weibull, gamma, normal, and two batches of 25 and 75 %.
+The right design is a quantile of two million draws.
+
+Run: ``python validation/design_force_closed.py [CAMPAIGNS [SEED]]``
+"""
+
+import sys
+
+import numpy as np
+import scipy.stats
+from scipy.optimize import brentq
+from scipy.special import gammaln
+
+LEVELS, PEAKS, SCATTER = 5, 8, 0.08
+OF_LEVEL, OF_PEAK = 0.03, 0.05  # deviations of log(1 + e) and of log R
+PROMISED = (1e-2, 1e-3)
+PRIOR_SCALE, WIDEST = 0.1, 0.9
+STEP = 0.004
+X = STEP * np.arange(-1024, 1024)  # of log b and of what is convolved with it
+
+
+def above_zero(cv):
+    """Return a normal distribution above zero, of mean 1 and deviation cv after truncation."""
+    if cv < 0.15:  # what is cut off is below 1e-10
+        return scipy.stats.truncnorm(-1.0 / cv, np.inf, 1.0, cv)
+
+    def parent(low):  # scaled to mean 1
+        mean = scipy.stats.truncnorm.mean(low, np.inf, -low)
+        return scipy.stats.truncnorm(low, np.inf, -low / mean, 1.0 / mean)
+
+    return parent(brentq(lambda low: parent(low).std() - cv, -8.0, 8.0))
+
+
+def law(family, cv):
+    """Return the distribution of a factor of mean 1."""
+    if family == "lognormal":
+        sigma = np.sqrt(np.log1p(cv**2))
+        return scipy.stats.lognorm(sigma, scale=np.exp(-0.5 * sigma**2))
+    if family == "gamma":
+        return scipy.stats.gamma(cv**-2, scale=cv**2)
+    if family == "normal":
+        return above_zero(cv)
+    shape = np.exp(
+        brentq(
+            lambda k: (
+                gammaln(1 + 2 * np.exp(-k)) - 2 * gammaln(1 + np.exp(-k)) - np.log1p(cv**2)
+            ),
+            -2.0,
+            8.0,
+        )
+    )
+    return scipy.stats.weibull_min(shape, scale=np.exp(-gammaln(1.0 + 1.0 / shape)))
+
+
+def factors(truth, count, rng):
+    """Draw factors of a truth."""
+    if truth == "two batches":  # two narrow ones: 25 % are weak
+        apart = SCATTER / np.sqrt(0.25 * 0.75)
+        means = np.where(rng.random(count) < 0.25, 1.0 - 0.75 * apart, 1.0 + 0.25 * apart)
+        return means * (1.0 + 0.02 * rng.standard_normal(count))
+    return law(truth, SCATTER).rvs(count, random_state=rng)
+
+
+def smoothed(family, cvs, deviation):
+    """Return log densities of log b + a normal number of this deviation at X, (cvs, X)."""
+    ends = np.append(X - 0.5 * STEP, X[-1] + 0.5 * STEP)
+    mass = np.array([np.diff(law(family, cv).cdf(np.exp(ends))) for cv in cvs])
+    away = np.fft.fftfreq(X.size, STEP)
+    kernel = np.exp(-2.0 * (np.pi * deviation * away) ** 2)
+    found = np.fft.ifft(np.fft.fft(mass, axis=1) * kernel, axis=1).real
+    return np.log(np.maximum(found, 1e-12) / STEP)
+
+
+CVS = PRIOR_SCALE * np.tan((np.arange(64) + 0.5) / 64 * np.arctan(WIDEST / PRIOR_SCALE))
+FAMILIES = ("lognormal", "normal", "weibull")
+DENSITIES = {
+    family: [smoothed(family, CVS, deviation) for deviation in (OF_LEVEL, OF_PEAK)]
+    for family in FAMILIES
+}
+BELOW = {f: np.cumsum(np.exp(own[1]), axis=1) * STEP for f, own in DENSITIES.items()}
+
+
+def posterior(levels, peaks):
+    """Return a grid of log m, and the posterior of s and m for each family, {name: (cvs, m)}."""
+    centre = np.mean(np.log(np.concatenate([levels, peaks])))
+    mean = centre + np.arange(-1.2, 1.2, 0.01)
+    parts = {}
+    for family, (of_level, of_peak) in DENSITIES.items():
+        total = np.zeros((CVS.size, mean.size))
+        own = (np.log(levels) + 0.5 * OF_LEVEL**2, of_level), (np.log(peaks), of_peak)
+        for values, table in own:
+            for value in values:
+                place = value - mean
+                total += np.array([np.interp(place, X, row) for row in table])
+        parts[family] = total
+    top = max(part.max() for part in parts.values())
+    weights = {family: np.exp(part - top) for family, part in parts.items()}
+    total = sum(own.sum() for own in weights.values())
+    return mean, {family: own / total for family, own in weights.items()}
+
+
+def designs(levels, peaks, promised=PROMISED):
+    """Return the design by each family and by their average, {name: (promised,)}."""
+    mean, weights = posterior(levels, peaks)
+    centre = mean.mean()
+    at = centre + np.linspace(-2.0, 0.5, 2501)
+    curves = {}
+    for family in FAMILIES:
+        w = weights[family]
+        found = np.zeros(at.size)
+        for place, own in zip(mean, w.T, strict=True):
+            found += np.interp(at - place, X, own @ BELOW[family])
+        curves[family] = found / w.sum(), w.sum()
+    total = sum(evidence for _, evidence in curves.values())
+    curves["average"] = sum(c * e for c, e in curves.values()) / total, total
+    return {n: np.exp(np.interp(promised, c, at)) for n, (c, _) in curves.items()}
+
+
+def main(campaigns=150, seed=1):
+    """Print true over promised probabilities, and designs over the right ones."""
+    rng = np.random.default_rng(seed)
+    for truth in ("lognormal", "weibull", "gamma", "normal", "two batches"):
+        known = np.sort(
+            factors(truth, 2_000_000, rng) * np.exp(OF_PEAK * rng.standard_normal(2_000_000))
+        )
+        right = np.quantile(known, PROMISED)
+        rows = []
+        for _ in range(campaigns):
+            errors = OF_LEVEL * rng.standard_normal(LEVELS) - 0.5 * OF_LEVEL**2
+            levels = factors(truth, LEVELS, rng) * np.exp(errors)
+            peaks = factors(truth, PEAKS, rng) * np.exp(OF_PEAK * rng.standard_normal(PEAKS))
+            found = designs(levels, peaks)
+            logs = np.log(np.concatenate([levels, peaks]))
+            t = scipy.stats.t.ppf(PROMISED, logs.size - 1) * np.sqrt(1.0 + 1.0 / logs.size)
+            found["student"] = np.exp(logs.mean() + t * logs.std(ddof=1))
+            rows.append([found[name] for name in ("lognormal", "average", "student")])
+        rows = np.array(rows)  # (campaigns, methods, promised)
+        chance = np.searchsorted(known, rows) / known.size / PROMISED
+        for number, name in enumerate(("log-normal", "average", "Student's t")):
+            cells = []
+            for place in (0, 1):
+                own, ratio = chance[:, number, place], rows[:, number, place] / right[place]
+                error = own.std(ddof=1) / np.sqrt(campaigns)
+                cells.append(f"{own.mean():.2f} +- {error:.2f} ({ratio.mean():.2f})")
+            print(f"| {truth} | {name} | {' | '.join(cells)} |", flush=True)
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))
