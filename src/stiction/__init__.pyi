@@ -22,7 +22,7 @@ from stiction.methods.dynamics.save import Save as Save
 from stiction.methods.dynamics.simulate import simulate_rupture as simulate_rupture
 from stiction.methods.equilibrium.method import Equilibrium as Equilibrium
 from stiction.methods.equilibrium.path import equilibrium_path as equilibrium_path
-from stiction.methods.protocol import onset as onset
+from stiction.methods.onset import onset as onset
 from stiction.problem.friction import ExponentialWeakening as ExponentialWeakening
 from stiction.problem.friction import LinearWeakening as LinearWeakening
 from stiction.problem.friction import PiecewiseWeakening as PiecewiseWeakening

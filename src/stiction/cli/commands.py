@@ -18,7 +18,7 @@ from typer import Argument, Option
 from typer.models import OptionInfo
 
 from stiction import __version__
-from stiction.base.errors import InputError, RunError, unknown_name
+from stiction.base.errors import InputError, RunError, collect_warnings, unknown_name
 from stiction.base.progress import Meter, duration, interrupted
 
 SHOWN = 12
@@ -354,8 +354,8 @@ def onset(
     import pandas as pd
 
     from stiction.base.variables import ONSET_VARIABLES
+    from stiction.methods.onset import onset as find
     from stiction.methods.protocol import METHODS
-    from stiction.methods.protocol import onset as find
     from stiction.problem.profiles.reading import read_profile
     from stiction.study.export import table_of
     from stiction.study.study import read_setup
@@ -370,8 +370,8 @@ def onset(
         missing=None if missing is None else [_number(text) for text in missing], skip=skip,
         sheet=_column(sheet), record=record, offset=_number(offset),
     )  # fmt: skip
-    # Each method refuses, and warns, for itself.
-    problem.sample(profile, accept=("barriers", "overstress", "constant"))
+    with collect_warnings():  # each method refuses, and warns, for itself
+        problem.sample(profile, accept=("barriers", "overstress"))
     printed = (
         *ONSET_VARIABLES, "friction_coefficient", "critical_force", "first_instability_force"
     )  # fmt: skip

@@ -21,6 +21,7 @@ from stiction.methods.protocol import (
     Solver,
     Values,
     batch_size,
+    optional_member,
     prepared,
     seconds_per_sample,
     variables_of,
@@ -28,6 +29,7 @@ from stiction.methods.protocol import (
 from stiction.problem.friction import SCALES
 from stiction.problem.problem import Problem, refusals
 from stiction.problem.results import along
+from stiction.problem.sample import Sample
 from stiction.random.equally_likely import as_random
 from stiction.random.stresses import (
     check_pressure,
@@ -162,9 +164,14 @@ class Experiment:
 
     def onset(self, profiles: Mapping[str, Array]) -> Values:
         """Solve profiles by name, (samples, *shape) each."""
-        # `check_fields` has looked at both; refusing samples would select the others.
-        accept = (*getattr(self.method, "accepts", ()), "constant", "steep")
-        return dict(self.prepare()(self.problem.sample(profiles, accept=accept)))
+        return dict(self.prepare()(self.sample(profiles)))
+
+    def sample(self, profiles: Mapping[str, Array]) -> Sample:
+        """Return profiles by name as a sample, which an `InputError` refuses if it does not fit.
+
+        `check_fields` has looked at the resolution and at nodes that do not weaken.
+        """
+        return self.problem.own_sample(profiles, optional_member(self.method, "accepts"))
 
     def prepare(self) -> Solver:
         """Return the prepared solver of the method, which is kept for the next call."""

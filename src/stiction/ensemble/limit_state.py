@@ -17,7 +17,7 @@ from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.monte_carlo import check_fields
 from stiction.methods.criterion.windows import windows_of
-from stiction.methods.protocol import METHODS, MethodObject
+from stiction.methods.protocol import METHODS, MethodObject, optional_member
 from stiction.problem.friction import SCALES
 from stiction.problem.problem import Problem
 from stiction.random.equally_likely import AnyRandom
@@ -126,32 +126,7 @@ class LimitState:
     @property
     def may_survive(self) -> bool:
         """Whether slip before the event lowers the stress: it need not happen at all."""
-        specimen = self.experiment.problem.specimen
-        machine = specimen is not None and specimen.drive.stiffness > 0.0
-        return machine and self.event == "first_instability"
-
-    @property
-    def _bounded(self) -> tuple[bool, bool]:
-        """Whether the strength bounds the stress at onset from below, and from above.
-
-        From below: nothing slips at a load below min (tau_p - tau_i)/p, where the mean stress
-        is <tau_i> + load <p>. Slip lowers it only behind a machine, and then the largest on the
-        way, `critical_stress`, is no lower. A rupture begins at a largest mean stress, however
-        the load moves: none is below that at the first slip. Of other methods nothing is known.
-        The local criterion has positive weights, but behind a machine it knows no slip.
-
-        From above: in equilibrium stress is nowhere above strength, nor is its mean above
-        the mean strength. By the local criterion load <g, p> <= <g, tau_p - tau_i> at each
-        place, and between half-spaces, by the mean over places, load <p> <= <tau_p - tau_i>.
-        What need not happen has no bound.
-        """
-        experiment, method = self.experiment, self.experiment.method
-        specimen = experiment.problem.specimen
-        if method.type == "equilibrium" or (specimen and method.type == "rupture"):
-            return not self.may_survive, not self.may_survive
-        if method.type == "local_criterion":
-            return specimen is None or specimen.drive.stiffness == 0.0, specimen is None
-        return method.type == "rupture", False
+        return self.experiment.problem.has_machine and self.event == "first_instability"
 
     @cached_property
     def bounds(self) -> tuple[float, float]:
@@ -187,7 +162,8 @@ class LimitState:
             mean = self.experiment.pressure
             ratios = mean / ends[1], mean / ends[0] if ends[0] > 0.0 else math.inf
             low, high = low * ratios[low < 0.0], high * ratios[1]
-        below, above = self._bounded
+        bounded = optional_member(self.experiment.method, "bounded_by_strength")
+        below, above = bounded(problem, self.event)
         return low if below else -math.inf, high if above else math.inf
 
 
@@ -201,7 +177,7 @@ def weakest_first(state: LimitState) -> LimitState:
     count = len(random.members)
     if count == 1:
         return state
-    first_stage: Any = getattr(experiment.method, "first_stage", None)
+    first_stage = optional_member(experiment.method, "first_stage")
     apt = first_stage and not no_single_length(experiment.problem, random)
     by = state.by(METHODS[first_stage]()) if apt else state
     ranked = int(np.clip(RANKINGS // count, 4, RANKED))

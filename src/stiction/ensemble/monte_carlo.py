@@ -30,7 +30,7 @@ from stiction.ensemble.batches import (
 )
 from stiction.ensemble.dataset import Gathered, GridAxes, distinct
 from stiction.ensemble.experiment import Ensemble, Experiment
-from stiction.ensemble.pilot import compare, doubt
+from stiction.ensemble.pilot import compare, pilot_doubt
 from stiction.ensemble.store import Store
 from stiction.methods.protocol import MethodObject
 from stiction.problem.problem import Problem
@@ -145,7 +145,7 @@ def gather(
     if found is None and pilot:
         found = compare(points, ensemble.first, ensemble.samples, progress is True, workers)
         where = " at the worst point of the sweep" if len(points) > 1 else ""
-        if text := doubt(found, where):
+        if text := pilot_doubt(points[0], found, where):
             warn_accuracy(text)
         if store:
             store.note_pilot(found)
@@ -196,9 +196,9 @@ def monte_carlo(
     progress : bool or callable
         True shows progress on standard error after two seconds; a callable gets (done, total).
     pilot : bool
-        With the local criterion, also solve the first samples (32 on a line, 8 on a plane),
-        and the weakest of the first thousand, by `Equilibrium` and report the difference;
-        the ensemble stays the same.
+        With the local criterion, check the first samples (32 on a line, 8 on a plane), and the
+        weakest of the first thousand. Where a quick test leaves a doubt, they are also solved by
+        `Equilibrium`, and the difference is reported; the ensemble stays the same.
 
     Returns
     -------
@@ -206,7 +206,7 @@ def monte_carlo(
         Over 'sample', as from `onset`. The attributes hold the version, the study as JSON and the
         seed: enough to run it again. Samples that could not be solved are NaN, and listed in the
         attribute 'failed_samples' (point, sample, seed, message, whether the sample itself does
-        not fit). With a pilot, 'pilot_bias' and 'pilot_scatter' are the mean and the standard
+        not fit). With a comparison, 'pilot_bias' and 'pilot_scatter' are the mean and the standard
         deviation of the difference in `critical_stress`, relative to the mean by `Equilibrium`;
         'pilot_weakest_bias' and 'pilot_weakest_scatter' are those of the weakest samples.
 

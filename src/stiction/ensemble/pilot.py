@@ -1,6 +1,6 @@
-"""A pilot: some samples of an inexpensive method solved by its exact counterpart too."""
+"""A pilot: some samples of an approximate method solved by its exact counterpart too."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,8 +10,8 @@ from stiction.base.errors import InputError, collect_warnings
 from stiction.base.progress import Meter
 from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.experiment import Experiment
-from stiction.methods.criterion.local import LocalCriterion
-from stiction.methods.equilibrium.method import Equilibrium
+from stiction.methods.onset import doubt, exact_counterpart, relative_differences
+from stiction.methods.protocol import optional_member
 
 ON_A_LINE, ON_A_PLANE = 32, 8
 """Numbers of first samples of a pilot, and of the weakest ones."""
@@ -21,15 +21,6 @@ BATCH = 64
 """Samples that the inexpensive method solves at once."""
 MOST_POINTS = 8
 """Number of points of a sweep that have a pilot."""
-WORTH_A_WARNING = 0.01
-
-
-def exact_counterpart(experiment: Experiment) -> Experiment | None:
-    """Return an experiment by the local criterion as one by `Equilibrium`, if possible."""
-    method = Equilibrium()
-    if not isinstance(experiment.method, LocalCriterion) or method.supports(experiment.problem):
-        return None
-    return experiment.by(method)
 
 
 def compare(
@@ -43,7 +34,7 @@ def compare(
 
     Return mean and scatter of the difference over the mean of the exact onset, of the
     points with the largest, for the first samples and for the weakest among more of them;
-    nothing if there is no exact counterpart.
+    nothing if there is no exact counterpart, or no doubt at any point.
     """
     chosen = np.unique(np.linspace(0, len(points) - 1, MOST_POINTS).round().astype(int))
     parts: dict[str, list[Array]] = {}
@@ -66,26 +57,37 @@ def compare(
 def _differences(
     experiment: Experiment, first: int, most: int, workers: int
 ) -> dict[str, Array]:
-    """Return the differences to the exact onset over its mean; none without one."""
-    exact = exact_counterpart(experiment)
+    """Return the differences to the exact onset over its mean, by kind of samples.
+
+    They are empty without an exact counterpart, and where a quick test leaves no doubt.
+    """
+    problem, method = experiment.problem, experiment.method
+    exact = exact_counterpart(problem, method)
     if exact is None:
         return {}
-    size = ON_A_PLANE if experiment.problem.interface.is_plane else ON_A_LINE
+    size = ON_A_PLANE if problem.interface.is_plane else ON_A_LINE
     with collect_warnings():  # the ensemble itself warns
         looked_at = max(size, min(LOOKED_AT, int(SECONDS / experiment.seconds)))
         draws = experiment.draws(first, min(looked_at, most))
-        near = _onsets(experiment, draws, BATCH, workers)
+        stress = _onsets(experiment, draws, BATCH, workers)
         chosen = {"pilot": np.arange(min(size, most))}
         if most > size:
-            chosen["pilot_weakest"] = np.argsort(near)[:size]
+            chosen["pilot_weakest"] = np.argsort(stress)[:size]
+        chosen = {name: rows[np.isfinite(stress[rows])] for name, rows in chosen.items()}
+        if not any(
+            optional_member(method, "may_differ")(
+                problem, experiment.sample(experiment.profiles(draws[rows])), stress[rows]
+            )
+            for rows in chosen.values()
+            if rows.size
+        ):
+            return {}
         some = np.unique(np.concatenate(list(chosen.values())))
-        true = np.full(near.size, np.nan)
-        true[some] = _onsets(exact, draws[some], 1, workers)
-    found = {}
-    for name, rows in chosen.items():
-        rows = rows[np.isfinite(near[rows]) & np.isfinite(true[rows])]
-        found[name] = (near[rows] - true[rows]) / abs(true[rows].mean()) if rows.size else rows
-    return found
+        true = np.full(stress.size, np.nan)
+        true[some] = _onsets(experiment.by(exact), draws[some], 1, workers)
+    return {
+        name: relative_differences(stress[rows], true[rows]) for name, rows in chosen.items()
+    }
 
 
 def _onsets(experiment: Experiment, draws: Array, batch: int, workers: int) -> Array:
@@ -103,19 +105,15 @@ def _onsets(experiment: Experiment, draws: Array, batch: int, workers: int) -> A
     return np.concatenate(in_threads(solve, parts, workers))
 
 
-def doubt(found: dict[str, Any], where: str = "") -> str | None:
+def pilot_doubt(
+    experiment: Experiment, found: Mapping[str, Any], where: str = ""
+) -> str | None:
     """Return the text of a warning if a difference is beyond 1 %."""
-    sizes = [abs(size) for name, size in found.items() if not name.endswith("samples")]
-    if max(sizes, default=0.0) <= WORTH_A_WARNING:
-        return None
-    each = (
-        f"{100.0 * found[f'{name}_bias']:+.2g} % on average, with a scatter of"
-        f" {100.0 * found[f'{name}_scatter']:.2g} %,{where} in the {found[f'{name}_samples']}"
-        f" {text}"
+    differences = {
+        f"the {found[f'{name}_samples']} {text}{where}": (
+            found[f"{name}_bias"], found[f"{name}_scatter"]
+        )
         for name, text in (("pilot", "first samples"), ("pilot_weakest", "weakest of more"))
         if f"{name}_bias" in found
-    )
-    return (
-        f"the local criterion differs from the exact onset by {', and by '.join(each)};"
-        " method=st.Equilibrium() has no such error"
-    )
+    }  # fmt: skip
+    return doubt(experiment.method, differences)

@@ -13,7 +13,7 @@ from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Count, Progress, at_least, checked
 from stiction.base.progress import Meter
 from stiction.ensemble.limit_state import no_single_length
-from stiction.ensemble.pilot import compare, doubt
+from stiction.ensemble.pilot import compare, pilot_doubt
 from stiction.inference.grid import grid_of
 from stiction.inference.joined import join
 from stiction.inference.likelihood import (
@@ -29,7 +29,7 @@ from stiction.inference.posterior import DRAWS, Posterior, posterior_of
 from stiction.inference.prior import Prior, make_prior
 from stiction.inference.specimens import MEAN, SCATTER
 from stiction.methods.criterion.local import LocalCriterion
-from stiction.methods.protocol import MethodObject
+from stiction.methods.protocol import MethodObject, optional_member
 from stiction.problem.load import NotNegative
 from stiction.problem.problem import Problem
 from stiction.random.equally_likely import AnyRandom
@@ -212,7 +212,8 @@ def infer(
             ).of(measured.values)  # fmt: skip
 
         whole = box = parameters.whole
-        if method.type != "local_criterion" and not no_single_length(own.problem, own.random):
+        approximate = optional_member(method, "exact_method") is not None
+        if not approximate and not no_single_length(own.problem, own.random):
             box = _first_box(likelihood_of(LocalCriterion(), None, whole))
         while True:
             likelihood = likelihood_of(method, samples, box)
@@ -274,7 +275,7 @@ def _notes(likelihood: Likelihood, error: float, u: Array) -> list[str]:
     notes = _piled_up(prior, u)
     middle = prior.theta(u.mean(axis=0, keepdims=True))
     (experiment,) = experiments_at(prior, middle, likelihood.method)
-    if text := doubt(compare([experiment])):
+    if text := pilot_doubt(experiment, compare([experiment])):
         notes.append(text)
     if error > TOLERABLE:
         notes.append(

@@ -20,6 +20,7 @@ from stiction.inference.peaks import VARIABLES, si_of
 from stiction.inference.prior import Prior
 from stiction.inference.scaling import Scaling, find_scaling
 from stiction.methods.criterion.local import LocalCriterion
+from stiction.methods.protocol import optional_member
 from stiction.problem.problem import Problem
 from stiction.random.dotted_keys import full_key
 from stiction.random.synthesis import BLOCK
@@ -30,8 +31,6 @@ COARSE = {0: 1, 1: 5, 2: 4, 3: 3, 4: 2}
 local criterion is simulated at those, and another method only at these."""
 LOG = 3.0
 """Ratio of the ends of a prior from which a parameter is interpolated in its logarithm."""
-SAMPLES = {"local_criterion": 2000, "equilibrium": 500}
-FEW = 100
 ALIKE = 0.8
 """Correlation of the onsets by two methods above which one helps the other."""
 SPECIMEN = 2**20
@@ -332,8 +331,8 @@ def make_likelihood(
     scaling = find_scaling(prior, method, variable)
     axes = make_axes(prior, scaling, box)
     thetas = nodes_of(axes, scaling.reference)
-    count = samples or SAMPLES.get(method.type, FEW)
-    local = method.type == "local_criterion"
+    count = samples or optional_member(method, "samples_at_point")
+    local = optional_member(method, "exact_method") is not None
     guided = not local and not no_single_length(*prior.at(prior.middle))
     few = make_axes(prior, scaling, box, COARSE) if guided else axes
     coarse, weights = nodes_of(few, scaling.reference), corners(few, thetas)
@@ -354,7 +353,7 @@ def make_likelihood(
             known = simulate(
                 [one.by(LocalCriterion()) for one in own], samples=count, **options
             )
-            options["samples"] = max(count, SAMPLES["local_criterion"])
+            options["samples"] = max(count, LocalCriterion.samples_at_point)
             meter.stage("onsets by the local criterion", len(thetas) * options["samples"])
             nearby = [one.by(LocalCriterion()) for one in experiments]
             many = simulate(nearby, meter=meter, **options)

@@ -27,6 +27,7 @@ import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.inference.prior import Prior
+from stiction.methods.protocol import optional_member
 from stiction.random.dotted_keys import full_key
 from stiction.random.marginals import affine_parameters
 
@@ -70,7 +71,8 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
     pressure = problem.normal_pressure
     varies = field.of is not None and np.ndim(pressure) > 0
     varies = varies or np.ptp(problem.load_profile) > 0.0
-    if (varies or method.type != "local_criterion") and (location or slopes[:, 0].any()):
+    affine = optional_member(method, "scaling") == "affine" and not varies
+    if not affine and (location or slopes[:, 0].any()):
         return none
     slopes[:, 1] /= scale
     slopes[:, 0] -= location * slopes[:, 1]
@@ -82,14 +84,13 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
 def may_scale(problem: Any, random: Any, method: Any) -> bool:
     """Whether the onset scales with the strength if this keeps its distribution."""
     friction, initial = problem.friction, np.asarray(problem.load.initial_stress)
-    exact = method.type == "equilibrium"
+    scaling = optional_member(method, "scaling")
+    zero = scaling == "stretch"  # neither residual strength nor initial stress scales
     return bool(
-        (exact or method.type == "local_criterion")
+        scaling != "none"
         and len(random.names) == 1
         and friction.weakening_rate is not None
         and np.ptp(initial) == 0.0
         and not (np.any(initial) and np.ptp(problem.load_profile))
-        # Neither of these scales with the strength; the local criterion needs no zero.
-        and not (exact and np.any(np.asarray(friction.residual_strength)))
-        and not (exact and np.any(initial))
+        and not (zero and (np.any(np.asarray(friction.residual_strength)) or np.any(initial)))
     )

@@ -1,19 +1,19 @@
-"""The protocol of methods, all methods, and the onset of given profiles by any of them."""
+"""The protocol of methods, all methods, and their solvers, checked."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
-from stiction.base.errors import InputError, collect_warnings, merge_warnings, warn_accuracy
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError
 from stiction.base.kinds import Kinds
-from stiction.base.model import Progress, checked, is_finite
-from stiction.base.progress import Meter
+from stiction.base.model import is_finite
 from stiction.base.variables import (
     DIRECTION,
     FRICTION_COEFFICIENT,
@@ -23,20 +23,15 @@ from stiction.base.variables import (
     force_variables,
     forces,
 )
-from stiction.problem.problem import Problem, refusals
-from stiction.problem.profiles.placing import with_gaps
-from stiction.problem.results import study_attributes, to_dataset
+from stiction.problem.problem import Problem
+from stiction.problem.results import to_dataset
 from stiction.problem.sample import Sample
 
 if TYPE_CHECKING:
     import xarray as xr
 
-TICK, MOST = 0.5, 512
+BATCH_SECONDS, MAX_BATCH_SAMPLES = 0.5, 512
 """Seconds of work, and most samples, that are solved at once."""
-COMPARED, SECONDS = 32, 2.0
-"""Most samples that are solved exactly beside the local criterion, and the seconds for them."""
-WORTH_A_WARNING = 1.0
-"""Mean or scatter of their differences, per cent, above which there is a warning."""
 
 Values = dict[str, NDArray[Any]]
 Solver = Callable[[Sample], Mapping[str, NDArray[Any]]]
@@ -55,9 +50,7 @@ class Method(Protocol):
 
     Any frozen dataclass with these members serves `stiction.onset` and `stiction.monte_carlo`, and
     study files too if `stiction.extensions.register` or an entry point makes its `type` known.
-    Two more members are optional: `accepts`, of "barriers" and "overstress" (see
-    `Problem.sample`); and `first_stage`, the type of a faster method with similar onsets, by which
-    rare failures are found first.
+    The members of `OptionalMembers` may be added.
     """
 
     @property
@@ -82,6 +75,46 @@ class Method(Protocol):
 
     def prepare(self, problem: Problem) -> Solver:
         """A solver of samples; what is the same for all of them is computed here, once."""
+
+
+class OptionalMembers:
+    """Members that a method may have, with the defaults for a method without them."""
+
+    accepts: ClassVar[tuple[str, ...]] = ()
+    """Profiles that it takes: "barriers" and "overstress", see `Problem.sample`."""
+    first_stage: ClassVar[str | None] = None
+    """Type of a faster method with similar onsets, by which rare failures are found first."""
+    exact_method: ClassVar[str | None] = None
+    """Type of the method that this one approximates. Some samples are solved by both, and a warning
+    gives the difference."""
+    scaling: ClassVar[Literal["none", "stretch", "affine"]] = "none"
+    """How onsets follow the strength at a given weakening rate and a uniform load. "affine":
+    onset(a + b s) = a + b onset(s). "stretch": onset(b s) = b onset(s) without residual strength
+    and initial stress."""
+    counted_only: ClassVar[bool] = False
+    """Whether failures are counted in plain samples, not sought by subset simulation."""
+    samples_at_point: ClassVar[int] = 100
+    """Samples with which `stiction.infer` simulates each point of a prior."""
+
+    def bounded_by_strength(self, problem: Problem, event: str) -> tuple[bool, bool]:
+        """Whether strength bounds the stress of an event from below, and from above.
+
+        From below: by min (tau_p - tau_i)/p, at which nothing slips yet. From above: by the mean
+        strength. The event is 'critical_stress' or 'first_instability'.
+        """
+        return False, False
+
+    def may_differ(self, problem: Problem, sample: Sample, stress: Array) -> bool:
+        """Whether to compare the onsets of samples, Pa, with those of `exact_method`.
+
+        It may be False where a quick test finds that they differ by less than 1 %.
+        """
+        return True
+
+
+def optional_member(method: Any, name: str) -> Any:
+    """Return an optional member of a method, or its default."""
+    return getattr(method if hasattr(method, name) else OptionalMembers(), name)
 
 
 MEMBERS = [name for name in vars(Method) if not name.startswith("_")]
@@ -156,7 +189,9 @@ def seconds_per_sample(problem: Problem, method: Method) -> float:
 
 def batch_size(problem: Problem, method: Method) -> int:
     """Return how many samples to solve at once: half a second of work, at most 512."""
-    return max(1, min(MOST, int(TICK / seconds_per_sample(problem, method))))
+    return max(
+        1, min(MAX_BATCH_SAMPLES, int(BATCH_SECONDS / seconds_per_sample(problem, method)))
+    )
 
 
 def variables_of(
@@ -183,108 +218,3 @@ def label(
     return to_dataset(
         values, variables | dict(more_variables), coordinates, attributes, problem.interface
     )
-
-
-def _doubt(problem: Problem, method: Method, sample: Sample, values: Values) -> str | None:
-    """Return a warning if the local criterion is off in the first samples; None if it is not.
-
-    As many are solved by `Equilibrium` as take two seconds.
-    """
-    exact = METHODS["equilibrium"]()
-    if method.type != "local_criterion" or exact.supports(problem):
-        return None
-    count = min(sample.samples, COMPARED, int(SECONDS / seconds_per_sample(problem, exact)))
-    if not count:
-        return None
-    with collect_warnings():
-        true = prepared(problem, exact)(sample.part(slice(0, count)))["critical_stress"]
-    off = 100.0 * (values["critical_stress"][:count] / true - 1.0)
-    if not max(abs(off.mean()), off.std()) > WORTH_A_WARNING:
-        return None
-    return (
-        f"the local criterion differs from the exact onset by {off.mean():+.2g} % on average, in"
-        f" one by {off[np.abs(off).argmax()]:+.2g} %, in the first {count} of {sample.samples}"
-        " samples; method=st.Equilibrium() has no such error"
-    )
-
-
-@checked
-def onset(
-    problem: Problem,
-    profiles: Any,
-    *,
-    method: MethodObject,
-    gaps: Literal["refuse", "fill"] = "refuse",
-    progress: Progress = True,
-) -> xr.Dataset:
-    """Compute the load and position at which interfaces of given strength begin to slide.
-
-    Parameters
-    ----------
-    problem : Problem
-    profiles : array, mapping of arrays, xarray.Dataset or Sample
-        Peak strength tau_p (Pa), of shape (samples, nodes) or (nodes,), on a plane
-        (samples, nx, ny) or (nx, ny); or several profiles by name, such as ``{"strength":
-        ..., "residual_strength": ...}``, each given here or in the problem, not in both; see
-        `Problem.sample`. In a DataArray or Dataset, the dimension 'x' runs along the
-        interface (on a plane 'x' and 'y'), its coordinate (m) gives the position of each
-        value, and stated `units` are converted; see `stiction.read_profile`. A DataArray in the
-        unit 1, or the name 'friction_coefficient', holds friction coefficients, which times the
-        normal pressure are the strength.
-    method : LocalCriterion, Equilibrium or Rupture
-        The method; there is no default.
-    gaps : {"refuse", "fill"}
-        Whether to refuse missing values (NaN) or fill them as `stiction.read_profile` does.
-    progress : bool or callable
-        True shows progress on standard error after two seconds; a callable gets (done, total).
-
-    Returns
-    -------
-    xarray.Dataset
-        Over 'sample': `critical_load`, `critical_stress`, `first_instability` (Pa),
-        `critical_position` (m), with a normal pressure `friction_coefficient`, with a thickness,
-        width or area `critical_force` and `first_instability_force` (N), and what the method
-        adds. Every variable has `units` and `long_name`. If gaps were filled, also
-        `in_gap`, whether the critical patch reaches into one, and the coordinate `measured`.
-
-    Raises
-    ------
-    InputError
-        If any argument is invalid; the message lists every problem.
-
-    Warns
-    -----
-    AccuracyWarning
-        If gaps are filled, or the onset lies in one; if the local criterion is off by more than
-        1 % in the first samples, at most 32, that `Equilibrium` solves in two seconds.
-    UnitWarning
-        If a value is so far from what solids have that its unit is in doubt.
-
-    Examples
-    --------
-    >>> import stiction as st
-    >>> problem = st.paper.problem(nodes=512)
-    >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(problem.interface, seed=1)
-    >>> found = st.onset(problem, tau_p, method=st.LocalCriterion())
-    >>> bool(found.critical_stress.item() > tau_p.min())
-    True
-    """
-    if refused := refusals(problem, method):
-        raise InputError(refused)
-    attributes = study_attributes(problem=problem, method=method)
-    sample, measured = problem.placed_sample(profiles, getattr(method, "accepts", ()), gaps)
-    problem.doubt(sample)
-    solver, parts, size = prepared(problem, method), [], batch_size(problem, method)
-    meter = Meter(f"onset by {method.label}", sample.samples, progress)
-    with meter, merge_warnings() as warned:
-        for start in range(0, sample.samples, size):
-            part = sample.part(slice(start, start + size))
-            with collect_warnings() as own:
-                parts.append(solver(part))
-            warned += (one.after(start) for one in own)
-            meter.advance(part.samples)
-    values = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
-    if text := _doubt(problem, method, sample, values):
-        warn_accuracy(text)
-    result = label(problem, method, values, np.arange(sample.samples), attributes)
-    return with_gaps(problem, result, measured)

@@ -30,7 +30,14 @@ from stiction.problem.interface import Interface
 from stiction.problem.load import Load, LoadShape
 from stiction.problem.profiles.placing import Gaps, turned
 from stiction.problem.profiles.reading import at_nodes
-from stiction.problem.sample import FRICTION, Sample, named_profiles, no_coefficients, rows_of
+from stiction.problem.sample import (
+    FRICTION,
+    Sample,
+    check_values,
+    named_profiles,
+    no_coefficients,
+    rows_of,
+)
 from stiction.problem.solid import Solid
 from stiction.problem.specimen import Blocks
 
@@ -297,6 +304,11 @@ class Problem:
         return self.specimen.driven(interface.extent, interface.size, self.solid, self.mode)
 
     @property
+    def has_machine(self) -> bool:
+        """Whether a machine of finite stiffness drives a specimen, which slip unloads."""
+        return self.specimen is not None and self.specimen.drive.stiffness > 0.0
+
+    @property
     def half_spaces(self) -> HalfSpaces:
         """The solids, if they were half-spaces: what gives K(k) and nucleation lengths."""
         lengths = self.interface.lengths
@@ -443,10 +455,9 @@ class Problem:
             All but the strength may also be (samples, 1) or a number: of 'normal_pressure' the
             mean, which glued blocks distribute. A 'friction_coefficient' in the place of the
             strength, or a DataArray that states the unit 1, is multiplied by the pressure.
-        accept : collection of {"barriers", "overstress", "constant"}
-            What the method accepts: infinite strength where nothing breaks; initial stress
-            above the strength; nodes that do not weaken, of which the caller has warned; fewer
-            than four nodes in the nucleation length of the steepest ones.
+        accept : collection of {"barriers", "overstress"}
+            What the method accepts: infinite strength where nothing breaks, initial stress above
+            the strength.
 
         Raises
         ------
@@ -466,11 +477,12 @@ class Problem:
     def placed_sample(
         self, profiles: Any, accept: Collection[str] = (), gaps: Gaps = "refuse"
     ) -> tuple[Sample, Any]:
-        """Return a sample, and a mask of where all of its profiles were measured, or True."""
+        """Return a sample of users' data, and a mask of where all were measured, or True."""
         friction, interface = self.friction, self.interface
         problems: list[str] = []
-        if isinstance(profiles, Sample):
-            given, accept = self._given_sample(profiles), {*accept, "constant"}
+        ready = isinstance(profiles, Sample)
+        if ready:
+            given = self._given_sample(profiles)
         else:
             given = named_profiles(profiles)
             problems += self.given_twice(given, "profiles")
@@ -482,9 +494,9 @@ class Problem:
         if len(scales) > 1:
             problems.append(f"give one of {', '.join(SCALES)}, got {' and '.join(scales)}")
 
-        def read(name: str, own: Any, samples: int | None) -> Any:
+        def read(name: str, default: Any, samples: int | None) -> Any:
             try:
-                value, known = at_nodes(name, given.get(name, own), interface, gaps)
+                value, known = at_nodes(name, given.get(name, default), interface, gaps)
                 if not np.all(known):
                     measured.append(known.reshape(-1, *interface.shape))
                 with prefixed(name):
@@ -498,8 +510,8 @@ class Problem:
         pressure = np.broadcast_to(np.nan, (samples, *interface.shape))
         if self.given_pressure is not None or "normal_pressure" in given:
             pressure = read("normal_pressure", self.normal_pressure, samples)
-            own = np.shape(given.get("normal_pressure", pressure))
-            if own in ((), (samples, 1)):  # that of each sample, which its blocks distribute
+            shape = np.shape(given.get("normal_pressure", pressure))
+            if shape in ((), (samples, 1)):  # of each sample, which its blocks distribute
                 pressure = pressure * self.pressing
         if of != "strength":
             problems += no_coefficients(strength, pressure)
@@ -510,32 +522,73 @@ class Problem:
         scale, value = friction.scale or (SCALES[0], 1.0)
         scale = scales[0] if scales else scale
         value = read(scale, value, samples)
-        problems = problems or self._impossible(strength, residual, initial, accept)
         if problems:
+            raise InputError(problems)
+        sample = self._made(strength, residual, initial, scale, value, pressure, accept)
+        constant = sample.strength <= sample.residual_strength
+        if constant.any() and not ready:
+            warn_accuracy(
+                f"strength is not above residual_strength at {100.0 * constant.mean():.2g}"
+                " % of the nodes; these do not weaken: their strength is constant"
+            )
+        self._check_resolution(sample.steepest_rate)
+        return sample, reduce(np.logical_and, measured)
+
+    def own_sample(self, profiles: Mapping[str, Array], accept: Collection[str] = ()) -> Sample:
+        """Return a sample of arrays by name that the package made, (samples, *shape) in SI.
+
+        Only their values are checked, as those of some samples may not fit the problem. Whoever
+        makes the arrays looks at the resolution, and at nodes that do not weaken, for all samples.
+        """
+        problems: list[str] = []
+        for name, rows in profiles.items():
+            try:
+                with prefixed(name):
+                    check_values(name, rows, self.interface, "barriers" in accept)
+            except InputError as error:
+                problems += error.problems
+        if problems:
+            raise InputError(problems)
+        strength = profiles["strength"]
+        scale, value = self.friction.scale or (SCALES[0], 1.0)
+        scale = next((name for name in SCALES if name in profiles), scale)
+        defaults = {
+            "residual_strength": self.friction.residual(
+                np.where(np.isinf(strength), 0.0, strength)
+            ),
+            "initial_stress": self.load.initial_stress,
+            scale: value,
+            "normal_pressure": np.nan if self.given_pressure is None else self.normal_pressure,
+        }
+        residual, initial, value, pressure = (
+            np.broadcast_to(profiles.get(name, default), strength.shape)
+            for name, default in defaults.items()
+        )
+        return self._made(strength, residual, initial, scale, value, pressure, accept)
+
+    def _made(
+        self, strength: Array, residual: Array, initial: Array, scale: str, value: Array,
+        pressure: Array, accept: Collection[str],
+    ) -> Sample:  # fmt: skip
+        """Return a sample of rows whose values are valid one by one, if they go together."""
+        if problems := self._impossible(strength, residual, initial, accept):
             raise InputError(problems)
         rates = self._rates(strength, residual, scale, value)
         constant = strength <= residual
         if constant.any():
             # Residual from the start, tau_r = tau_p: then d_c = 0, and W is of no consequence.
             residual = np.minimum(residual, strength)
-            along = interface.axes
+            along = self.interface.axes
             slowest = np.min(rates, axis=along, where=~constant, initial=np.inf, keepdims=True)
             rates = np.where(constant, slowest, rates)
-            if "constant" not in accept:
-                warn_accuracy(
-                    f"strength is not above residual_strength at {100.0 * constant.mean():.2g}"
-                    " % of the nodes; these do not weaken: their strength is constant"
-                )
         if initial.min() < 0.0 and (reversed_at := initial < -strength).any():
             warn_accuracy(
                 f"initial_stress is below minus the strength at {100.0 * reversed_at.mean():.2g} %"
                 " of the nodes; they would slip in reverse, which is not modelled, and are held"
             )
-        load_shape = np.array(np.broadcast_to(self.load_profile, interface.shape), dtype=float)
-        sample = Sample(strength, residual, rates, initial, load_shape, pressure, self)
-        if "steep" not in accept:
-            self._check_resolution(sample.steepest_rate)
-        return sample, reduce(np.logical_and, measured)
+        shape = self.interface.shape
+        load_profile = np.array(np.broadcast_to(self.load_profile, shape), dtype=float)
+        return Sample(strength, residual, rates, initial, load_profile, pressure, self)
 
     def given_twice(self, names: Collection[str], owner: str) -> list[str]:
         """Return refusals of values that profiles, or random properties, would replace.

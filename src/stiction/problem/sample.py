@@ -129,25 +129,35 @@ def rows_of(
     if not fits:
         hint = turned(array.shape[-2:], shape)
         raise InputError(f"must have shape {valid}, got shape {array.shape}{hint}")
-    infinite = barriers and name == "strength"
-    bad = ~(np.abs(array) <= LARGEST) & ~(infinite & (array == np.inf))
-    if bad.any():
-        entry = tuple(np.argwhere(bad)[0].tolist())
-        given = f"{array[entry]:g} (at most {LARGEST:g})"
-        raise InputError(f"must be finite; entry {entry} is {given}")
-    least = f"{array.min():g} {QUANTITIES[name].units}"
-    if name in SCALES and array.min() <= 0.0:
-        raise InputError(f"must be positive, got {least}")
-    if name == "residual_strength" and array.min() < 0.0:
-        raise InputError(f"must not be negative, got {least}")
+    check_values(name, array, interface, barriers)
+    if samples is None:
+        return array.reshape(-1, *shape)
+    return np.broadcast_to(array, (samples, *shape))
+
+
+def check_values(name: str, array: Array, interface: Interface, barriers: bool) -> None:
+    """Raise an `InputError` if a value is not possible for a profile of this name.
+
+    `array` is a number, a profile or rows of profiles. Strength may be infinite with `barriers`.
+    """
+    least, greatest = array.min(), array.max()
+    if not (least >= -LARGEST and greatest <= LARGEST):  # also NaN
+        infinite = (array == np.inf) & (barriers and name == "strength")
+        bad = ~(np.abs(array) <= LARGEST) & ~infinite
+        if bad.any():
+            entry = tuple(np.argwhere(bad)[0].tolist())
+            given = f"{array[entry]:g} (at most {LARGEST:g})"
+            raise InputError(f"must be finite; entry {entry} is {given}")
+    given = f"{least:g} {QUANTITIES[name].units}"
+    if name in SCALES and least <= 0.0:
+        raise InputError(f"must be positive, got {given}")
+    if name == "residual_strength" and least < 0.0:
+        raise InputError(f"must not be negative, got {given}")
     if name == "normal_pressure":
         means = np.atleast_1d(array.mean(axis=interface.axes) if array.ndim else array)
         if means.min() <= 0.0:
             worst = f"that of sample {int(np.argmin(means))} is {means.min():g} Pa"
             raise InputError(f"must be positive on average, {worst}")
-    if samples is None:
-        return array.reshape(-1, *shape)
-    return np.broadcast_to(array, (samples, *shape))
 
 
 def no_coefficients(values: Array, pressure: Array) -> list[str]:

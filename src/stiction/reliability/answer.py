@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Annotated, Any, Self, TypeAlias
 
@@ -22,7 +22,8 @@ from stiction.ensemble.batches import usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import Event, LimitState, weakest_first
 from stiction.ensemble.monte_carlo import check_fields
-from stiction.ensemble.pilot import exact_counterpart
+from stiction.methods.onset import exact_counterpart
+from stiction.methods.protocol import optional_member, seconds_per_sample
 from stiction.random.equally_likely import MOST as MOST_MEMBERS
 from stiction.reliability.tail import Tail, two_levels_refused
 
@@ -41,7 +42,9 @@ LISTED, SAMPLED = 0.6, 0.8
 MORE, CARRIED = 1.2, 0.9
 """Margin on the number of members wanted; share of the mean whose carriers are counted."""
 CHECKED = (8, 64)
-"""Fewest and most samples that are solved exactly to check those of the local criterion."""
+"""Fewest and most samples that are solved exactly to check those of an approximate method."""
+CHECK_SECONDS = 10.0
+"""Seconds of one core for these."""
 ESTIMATED = ("stress", "probability", "cv", "members_cv", "members")
 
 
@@ -279,7 +282,8 @@ def prepare(
 def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
     """Return why chains of samples take too long by this method; None if allowed."""
     seconds, kind = CHAIN * experiment.seconds, experiment.method.type
-    if (seconds <= PATIENCE and kind != "rupture") or (max_evaluations or 0) >= CHAIN:
+    fast = seconds <= PATIENCE and not optional_member(experiment.method, "counted_only")
+    if fast or (max_evaluations or 0) >= CHAIN:
         return None
     return (
         f"{CHAIN:,} evaluations of subset simulation by {kind!r} would take about"
@@ -349,26 +353,31 @@ def different(values: Array, count: int, rng: np.random.Generator) -> NDArray[np
 def exact_doubts(
     state: LimitState, near: tuple[Array, Array], stress: float, probability: float
 ) -> list[str]:
-    """Solve some samples of the local criterion exactly; return a warning if more or fewer fail.
+    """Solve some samples of an approximate method exactly; warn if more or fewer fail.
 
-    `near` holds draws and stresses on both sides of the stress, the lowest there are.
+    `near` holds draws and stresses on both sides of the stress, the lowest there are. In a tail a
+    difference that is negligible in stress may multiply a probability, so failures are counted.
     """
-    exact, (draws, values) = exact_counterpart(state.experiment), near
+    experiment, (draws, values) = state.experiment, near
+    exact = exact_counterpart(experiment.problem, experiment.method)
     if exact is None or not values.size:
         return []
-    count = int(np.clip(10.0 / exact.seconds, *CHECKED))
+    seconds = seconds_per_sample(experiment.problem, exact)
+    count = int(np.clip(CHECK_SECONDS / seconds, *CHECKED))
     chosen = different(values, count, np.random.default_rng(0))
-    state.meter.note = "checking by equilibrium"
+    state.meter.note = f"checking by {exact.label}"
     with collect_warnings():
-        below = replace(state, experiment=exact)(draws[chosen]) < stress
-    failed = values[chosen] < stress
-    by_one, by_other, differing = (int(np.sum(own)) for own in (failed, below, below != failed))
-    if abs(by_other - by_one) <= 2.0 * math.sqrt(max(differing, 1)):
+        fails_exactly = state.by(exact)(draws[chosen]) < stress
+    fails = values[chosen] < stress
+    failed, failed_exactly, differing = (
+        int(np.sum(which)) for which in (fails, fails_exactly, fails != fails_exactly)
+    )
+    if abs(failed_exactly - failed) <= 2.0 * math.sqrt(max(differing, 1)):
         return []
-    there = min(probability * max(by_other, 1) / max(by_one, 1), 1.0)
+    there = min(probability * max(failed_exactly, 1) / max(failed, 1), 1.0)
     return [
-        f"of {chosen.size} samples in the tail {by_one} fail by the local criterion and {by_other}"
-        " by equilibrium: by equilibrium the probability of failure is"
-        f" {'about' if by_other else 'below'} {there:.2g} instead of {probability:.2g}; use"
+        f"of {chosen.size} samples in the tail {failed} fail by the {experiment.method.label} and"
+        f" {failed_exactly} by {exact.label}: by {exact.label} the probability of failure is"
+        f" {'about' if failed_exactly else 'below'} {there:.2g} instead of {probability:.2g}; use"
         " method=st.Equilibrium()"
     ]

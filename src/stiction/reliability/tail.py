@@ -9,7 +9,7 @@ import numpy as np
 from stiction.base.arrays import Array, one_blas_thread
 from stiction.base.progress import SILENT, Meter
 from stiction.ensemble.limit_state import LimitState, no_single_length
-from stiction.methods.protocol import METHODS
+from stiction.methods.protocol import METHODS, optional_member
 from stiction.reliability.subset import Descent, descend
 from stiction.reliability.two_level import bridge
 from stiction.reliability.uncertainty import generator, log_width
@@ -229,7 +229,7 @@ def two_levels_refused(state: LimitState) -> str | None:
     experiment = state.experiment
     if state.may_survive:
         return "behind a machine, the first instability need not happen"
-    if getattr(experiment.method, "first_stage", None) is None:
+    if optional_member(experiment.method, "first_stage") is None:
         return f"{experiment.method.type!r} names no less expensive method as its first stage"
     return no_single_length(experiment.problem, experiment.random)
 

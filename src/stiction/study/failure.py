@@ -37,8 +37,9 @@ from stiction.ensemble.dataset import GridAxes, over_axes
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import LimitState, weakest_first
 from stiction.ensemble.monte_carlo import check_fields, complete
-from stiction.ensemble.pilot import exact_counterpart
 from stiction.ensemble.store import Store
+from stiction.methods.onset import exact_counterpart
+from stiction.methods.protocol import optional_member
 from stiction.problem.results import to_dataset
 from stiction.reliability.answer import Estimate
 from stiction.reliability.failure import CURVE, chances, curve_doubts, curve_of
@@ -115,7 +116,7 @@ class Repetitions:
         settings: Mapping[str, Any],
         only: Sequence[str] | None = None,
     ) -> None:
-        if any(point.method.type == "rupture" for point in points):
+        if any(optional_member(point.method, "counted_only") for point in points):
             raise InputError(
                 "method: failures by rupture are counted, not sampled by levels; use"
                 " st.Equilibrium() or st.LocalCriterion(), or failure_probability(...,"
@@ -200,7 +201,9 @@ def complete_curves(
             with merge_warnings() as warned:
                 for point, state in enumerate(states):
                     tail = rows.tail(point)
-                    if exact_counterpart(state.experiment):  # stored repetitions have no draws
+                    experiment = state.experiment
+                    if exact_counterpart(experiment.problem, experiment.method):
+                        # Stored repetitions have no draws.
                         tail = Tail([repetition_of(state, rows.smallest, 0)])
                     if tail is None:
                         continue

@@ -185,6 +185,7 @@ class Rupture:
     # Combinations that `Problem.sample` may let through.
     accepts: ClassVar[tuple[str, ...]] = ("barriers", "overstress")
     label: ClassVar[str] = "rupture"
+    counted_only: ClassVar[bool] = True
 
     @pydantic.model_validator(mode="after")
     def _consistent(self) -> Rupture:
@@ -225,6 +226,17 @@ class Rupture:
         if self.events:
             reasons.append("events: only those of specimens are known one by one; leave it out")
         return reasons
+
+    def bounded_by_strength(self, problem: Problem, event: str) -> tuple[bool, bool]:
+        """Return whether strength bounds the stress of an event from below and from above.
+
+        A rupture begins at a largest mean stress, however the load moves: none is below the stress
+        of the first slip. Specimens are in equilibrium up to each event.
+        """
+        if problem.specimen is None:
+            return True, False
+        certain = not (problem.has_machine and event == "first_instability")
+        return certain, certain
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
         """Return the variables that the solver computes for each sample."""

@@ -109,6 +109,8 @@ class Equilibrium:
     gap: Gap = 1e-6
     type: Literal["equilibrium"] = "equilibrium"
     first_stage: ClassVar[str] = "local_criterion"
+    scaling: ClassVar[str] = "stretch"
+    samples_at_point: ClassVar[int] = 500
     label: ClassVar[str] = "equilibrium"
 
     def seconds_per_sample(self, problem: Problem) -> float:
@@ -129,6 +131,17 @@ class Equilibrium:
         if not problem.interface.is_plane and self.gap != type(self)().gap:
             reasons.append("gap: is of planes; lines are solved to round-off, so leave it out")
         return reasons
+
+    def bounded_by_strength(self, problem: Problem, event: str) -> tuple[bool, bool]:
+        """Return whether strength bounds the stress of an event from below and from above.
+
+        From below: nothing slips at a load below min (tau_p - tau_i)/p. Slip lowers the mean stress
+        only behind a machine, and then `critical_stress`, the largest on the way, is no lower.
+        From above: stress is nowhere above strength, nor is its mean above the mean strength.
+        Behind a machine the first instability need not happen, and has no bound.
+        """
+        certain = not (problem.has_machine and event == "first_instability")
+        return certain, certain
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
         """Return the variables that the solver computes for each sample."""

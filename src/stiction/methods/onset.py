@@ -1,0 +1,171 @@
+"""The onset of given profiles by any method, and the check of a method that approximates another.
+
+`onset`, `monte_carlo`, `infer` and failure probabilities solve some samples of an approximate
+method, such as the local criterion, by the exact one. `exact_counterpart` says by which,
+`may_differ` whether that is worth its time, and `doubt` puts a difference into words.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, collect_warnings, merge_warnings, warn_accuracy
+from stiction.base.model import Progress, checked
+from stiction.base.progress import Meter
+from stiction.methods.protocol import (
+    METHODS,
+    Method,
+    MethodObject,
+    batch_size,
+    label,
+    optional_member,
+    prepared,
+    seconds_per_sample,
+)
+from stiction.problem.problem import Problem, refusals
+from stiction.problem.profiles.placing import with_gaps
+from stiction.problem.results import study_attributes
+from stiction.problem.sample import Sample
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+MAX_COMPARED, COMPARISON_SECONDS = 32, 2.0
+"""Samples that `onset` solves by the exact method too, and the seconds for them."""
+MAX_DIFFERENCE = 0.01
+"""Mean or scatter of the difference, over the exact onset, above which there is a warning."""
+
+
+def exact_counterpart(problem: Problem, method: Method) -> Method | None:
+    """Return the method that a method approximates; None without one that takes the problem."""
+    name = optional_member(method, "exact_method")
+    exact: Method | None = METHODS[name]() if name else None
+    return None if exact is None or exact.supports(problem) else exact
+
+
+def relative_differences(stress: Array, exact: Array) -> Array:
+    """Return the differences to exact onsets over their mean, of samples that both solve."""
+    known = np.isfinite(stress) & np.isfinite(exact)
+    mean = np.abs(exact.mean(where=known)) if known.any() else 1.0
+    return (stress - exact)[known] / mean
+
+
+def doubt(method: Method, differences: Mapping[str, tuple[float, float]]) -> str | None:
+    """Return a warning if a mean or a scatter by kind of samples is above 1 %."""
+    if not any(abs(size) > MAX_DIFFERENCE for pair in differences.values() for size in pair):
+        return None
+    texts = [
+        f"{100.0 * mean:+.2g} % on average, with a scatter of {100.0 * scatter:.2g} %, in {kind}"
+        for kind, (mean, scatter) in differences.items()
+    ]
+    return (
+        f"the {method.label} differs from the exact onset by {', and by '.join(texts)};"
+        " method=st.Equilibrium() has no such error"
+    )
+
+
+@checked
+def onset(
+    problem: Problem,
+    profiles: Any,
+    *,
+    method: MethodObject,
+    gaps: Literal["refuse", "fill"] = "refuse",
+    progress: Progress = True,
+) -> xr.Dataset:
+    """Compute the load and position at which interfaces of given strength begin to slide.
+
+    Parameters
+    ----------
+    problem : Problem
+    profiles : array, mapping of arrays, xarray.Dataset or Sample
+        Peak strength tau_p (Pa), of shape (samples, nodes) or (nodes,), on a plane
+        (samples, nx, ny) or (nx, ny); or several profiles by name, such as ``{"strength":
+        ..., "residual_strength": ...}``, each given here or in the problem, not in both; see
+        `Problem.sample`. In a DataArray or Dataset, the dimension 'x' runs along the
+        interface (on a plane 'x' and 'y'), its coordinate (m) gives the position of each
+        value, and stated `units` are converted; see `stiction.read_profile`. A DataArray in the
+        unit 1, or the name 'friction_coefficient', holds friction coefficients, which times the
+        normal pressure are the strength.
+    method : LocalCriterion, Equilibrium or Rupture
+        The method; there is no default.
+    gaps : {"refuse", "fill"}
+        Whether to refuse missing values (NaN) or fill them as `stiction.read_profile` does.
+    progress : bool or callable
+        True shows progress on standard error after two seconds; a callable gets (done, total).
+
+    Returns
+    -------
+    xarray.Dataset
+        Over 'sample': `critical_load`, `critical_stress`, `first_instability` (Pa),
+        `critical_position` (m), with a normal pressure `friction_coefficient`, with a thickness,
+        width or area `critical_force` and `first_instability_force` (N), and what the method
+        adds. Every variable has `units` and `long_name`. If gaps were filled, also
+        `in_gap`, whether the critical patch reaches into one, and the coordinate `measured`.
+
+    Raises
+    ------
+    InputError
+        If any argument is invalid; the message lists every problem.
+
+    Warns
+    -----
+    AccuracyWarning
+        If gaps are filled, or the onset lies in one; if the local criterion is off by more than
+        1 % in the first samples, at most 32, that `Equilibrium` solves in two seconds. They are
+        solved only if a quick test leaves a doubt.
+    UnitWarning
+        If a value is so far from what solids have that its unit is in doubt.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(problem.interface, seed=1)
+    >>> found = st.onset(problem, tau_p, method=st.LocalCriterion())
+    >>> bool(found.critical_stress.item() > tau_p.min())
+    True
+    """
+    if refused := refusals(problem, method):
+        raise InputError(refused)
+    attributes = study_attributes(problem=problem, method=method)
+    sample, measured = problem.placed_sample(profiles, optional_member(method, "accepts"), gaps)
+    problem.doubt(sample)
+    solver, parts, size = prepared(problem, method), [], batch_size(problem, method)
+    meter = Meter(f"onset by {method.label}", sample.samples, progress)
+    with meter, merge_warnings() as warned:
+        for start in range(0, sample.samples, size):
+            part = sample.part(slice(start, start + size))
+            with collect_warnings() as caught:
+                parts.append(solver(part))
+            warned += (text.after(start) for text in caught)
+            meter.advance(part.samples)
+    values = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+    _compare(problem, method, sample, values["critical_stress"])
+    result = label(problem, method, values, np.arange(sample.samples), attributes)
+    return with_gaps(problem, result, measured)
+
+
+def _compare(problem: Problem, method: Method, sample: Sample, stress: Array) -> None:
+    """Warn if a method that approximates another is off in the first samples.
+
+    As many are compared as the exact method solves in two seconds.
+    """
+    exact = exact_counterpart(problem, method)
+    if exact is None:
+        return
+    seconds = seconds_per_sample(problem, exact)
+    count = min(sample.samples, MAX_COMPARED, int(COMPARISON_SECONDS / seconds))
+    first, stress = sample.part(slice(0, count)), stress[:count]
+    if not count or not optional_member(method, "may_differ")(problem, first, stress):
+        return
+    with collect_warnings():
+        true = prepared(problem, exact)(first)["critical_stress"]
+    differences = relative_differences(stress, true)
+    kind = f"the first {count} of {sample.samples} samples"
+    if text := doubt(method, {kind: (differences.mean(), differences.std())}):
+        warn_accuracy(text)
