@@ -7,7 +7,16 @@ import numpy as np
 import pytest
 from checks import assert_mean
 from scipy.stats import kstest
-from setups import RATE, ROUND_OFF, ensemble, exact_onset, local_onset, make_problem, turns
+from setups import (
+    LENGTH,
+    RATE,
+    ROUND_OFF,
+    ensemble,
+    exact_onset,
+    local_onset,
+    make_problem,
+    turns,
+)
 from specimens import crooked, rough
 
 import stiction as st
@@ -144,8 +153,8 @@ def test_a_line_slides_above_its_exact_onset_only(ratio):
     """With arrested events, nodes at their residual strength and everything varying."""
     x = turns(256)
     load = st.Load(profile=1.0 + 0.2 * np.cos(x), initial_stress=2e5)
-    problem = make_problem(256, 0.03, load=load)
-    field = lognormal(0.5 * problem.nucleation_length, 0.3)
+    problem = make_problem(256, 0.03, load=load, friction=st.LinearWeakening())
+    field = lognormal(0.5 * LENGTH, 0.3)
     tau_p = np.maximum(field.sample(problem.interface, samples=12, seed=4), 3e5)
     rate = RATE * (1.0 + 0.3 * np.sin(3.0 * x))
     given = {
