@@ -1,11 +1,15 @@
 """`st.fit_field`: its intervals by hand, gaps and trends, members whose bounds are not known."""
 
+import warnings
+
 import numpy as np
 import pytest
 import xarray as xr
+from refusals import refuses
 
 import stiction as st
 from stiction.inference.bootstrap import bootstrapped
+from stiction.inference.records import records_of
 
 FIELD = st.RandomField(
     st.Lognormal(mean=1e6, cv=0.2), st.ExponentialSpectrum(1e-3), mean_mode=True
@@ -118,3 +122,48 @@ def test_a_picture_of_a_fit_is_of_all_records():
     mean = np.mean(covariances, axis=0)  # as many values in each
     measured = panels[0].lines[1].get_ydata()
     np.testing.assert_allclose(measured, (mean / mean[0])[: measured.size], rtol=1e-9)
+
+
+def test_white_noise_is_refused_by_what_it_is():
+    rng = np.random.default_rng(0)
+    white = 1e6 + 1e5 * rng.standard_normal(COUNT)
+    for given, place in ((labelled(white), None), (white, st.Interface(0.08, COUNT))):
+        refuses(
+            "are not correlated ... smaller spacing",
+            lambda g=given, p=place: fitted(g, interface=p),
+        )
+    assert fitted(labelled(VALUES + 5e4 * rng.standard_normal(COUNT))).field is not None
+
+
+def test_positions_of_few_digits_and_dropouts():
+    """x with an error of 0.3 % of the spacing at 8,064 points; a smooth record with a dropout."""
+    rng = np.random.default_rng(0)
+    x = np.round(np.arange(8064) * 1.5376e-4, 6)
+    (record,) = records_of(labelled(rng.random(8064) + 1.0, x), None, "strength")
+    assert record.values.size == 8064
+    assert record.spacings == pytest.approx((1.5376e-4,), rel=1e-6)
+    smooth = 1e6 + 2e5 * np.sin(X / 5e-3) + 1e3 * rng.standard_normal(COUNT)
+    smooth[200] *= 0.8
+    with pytest.warns(st.AccuracyWarning, match="1 of 400 values differ from their neighbours"):
+        records_of(labelled(smooth), None, "strength")
+
+
+def test_a_family_that_cannot_be_repeated_is_left_out(monkeypatch):
+    """Heights about zero: no doubts of units of numbers that were fitted, and no lost minutes."""
+    from stiction.inference import bootstrap
+
+    def fit(rows, setting, start):
+        if setting.marginal.name == "gamma" and start is not None:
+            raise st.InputError("too far")
+        return estimate(rows, setting, start)
+
+    estimate = bootstrap.estimate
+    monkeypatch.setattr(bootstrap, "estimate", fit)
+    with pytest.warns(st.AccuracyWarning, match="'gamma' could be fitted to only 0 of 20"):
+        kept = fitted(RECORD, marginal=["gamma", "lognormal"])
+    assert list(kept.families) == ["lognormal"]
+    refuses("'gamma' could be fitted to only 0 of 20", lambda: fitted(RECORD, marginal="gamma"))
+    heights = labelled((VALUES - VALUES.mean()) * 1e-12).assign_attrs(units="m")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", st.UnitWarning)
+        fitted(heights, quantity="height", marginal=["beta", "gamma"])

@@ -12,7 +12,7 @@ from stiction.base.errors import InputError
 from stiction.base.progress import Meter, Show
 from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.inference.estimate import NAMES, Estimate, estimate
-from stiction.inference.marginal_fit import beta_of
+from stiction.inference.marginal_fit import Family, beta_of
 from stiction.inference.whittle import RANGES, origin
 from stiction.random.dotted_keys import with_values
 from stiction.random.fields import RandomField
@@ -33,6 +33,17 @@ class Repetitions(NamedTuple):
 
     truth: Estimate
     fits: list[Estimate]
+
+
+class NotRepeated(InputError):
+    """A family that cannot be fitted to most records that are simulated from it."""
+
+    def __init__(self, family: Family, fits: int, count: int) -> None:
+        super().__init__(
+            f"marginal: {family.label!r} could be fitted to only {fits} of {count} records that were"
+            " simulated from its fit; take another marginal"
+        )
+        self.family = family
 
 
 def bootstrapped(
@@ -63,10 +74,7 @@ def bootstrapped(
         results = in_threads(one, range(count), workers or usable_cores())
         fits = [result for result in results if result is not None]
         if len(fits) < FEWEST:
-            raise InputError(
-                f"marginal: {truth.setting.marginal.name!r} could be fitted to only {len(fits)} of"
-                f" {count} repetitions; take another marginal"
-            )
+            raise NotRepeated(truth.setting.marginal, len(fits), count)
         return Repetitions(truth, fits)
 
     ends = "correlation_length" in found.setting.spectrum.free

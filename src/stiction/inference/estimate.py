@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError
+from stiction.base.errors import InputError, UnitWarning, collect_warnings, issue
 from stiction.inference.between import as_of_one, levels_of, scatter_between
 from stiction.inference.marginal_fit import Family, distance, mean_log_likelihood
 from stiction.inference.records import Record
@@ -159,8 +159,19 @@ def estimate(
     """Fit measured values (points,) of each record, without trend; from a start if there is one.
 
     Records of several specimens are scaled by what the fit itself finds of the field's own
-    share in the scatter of their means, in a few rounds.
+    share in the scatter of their means, in a few rounds. Fitted numbers raise no doubts of units.
     """
+    with collect_warnings() as caught:
+        result = _estimate_in_rounds(rows, setting, start)
+    for warning in caught:
+        if warning.category is not UnitWarning:
+            issue(warning)
+    return result
+
+
+def _estimate_in_rounds(
+    rows: Sequence[Array], setting: FitSetting, start: Estimate | None
+) -> Estimate:
     if not setting.between:
         return _estimate(rows, setting, start)
     equal = as_of_one(rows, np.zeros(len(rows)))

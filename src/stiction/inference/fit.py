@@ -16,10 +16,17 @@ from stiction.base.errors import InputError, prefixed, unknown_name, warn_accura
 from stiction.base.model import Count, Flag, Number, Positive, Progress, at_least, checked
 from stiction.base.variables import OF_THE_FIELD, QUANTITIES, UNITS
 from stiction.inference.between import chance_of_scatter
-from stiction.inference.bootstrap import FEWEST, Repetitions, bootstrapped, intervals, likely
+from stiction.inference.bootstrap import (
+    FEWEST,
+    NotRepeated,
+    Repetitions,
+    bootstrapped,
+    intervals,
+    likely,
+)
 from stiction.inference.estimate import Estimate, FitSetting, Goodness, compare, windowed
 from stiction.inference.marginal_fit import Family, family_of
-from stiction.inference.records import records_of
+from stiction.inference.records import records_of, refuse_uncorrelated
 from stiction.inference.specimens import (
     MEAN,
     SCATTER,
@@ -348,13 +355,15 @@ def fit_field(
     Raises
     ------
     InputError
-        If units are unknown, points repeat or are not equally spaced, records are constant
-        or short, or values lie outside the bounds of the marginal.
+        If units are unknown, points repeat or are not equally spaced, neighbouring points
+        are not correlated, records are constant or short, or values lie outside the bounds
+        of the marginal.
 
     Warns
     -----
     AccuracyWarning
-        If values are outliers, profiles repeat others, and for each reason in `doubts`:
+        If values are outliers or dropouts, a family cannot be fitted to records simulated
+        from it and is left out, profiles repeat others, and for each reason in `doubts`:
         records hold fewer than ten correlation lengths, a p-value is below 1 % (of
         ``level``: records of different specimens without `between`), the noise hides the
         cut-off of the spectrum, a parameter lies at the end of the range that is searched,
@@ -400,14 +409,25 @@ def fit_field(
     windows, rows = windowed(records, detrend)
     with prefixed("fit_field"):
         factor_prior = FactorPrior.of(prior)
+    refuse_uncorrelated(windows, rows)
     settings = [FitSetting(windows, one, family, bool(between)) for one in marginal]
-    estimates, families, independent = compare(settings, rows)
-    weights = [one.weight for one in families.values() if one.weight > 0.0]
-    counts = [max(FEWEST, round(bootstrap * one / max(weights))) for one in weights[1:]]
-    repeated, others = bootstrapped(
-        estimates[0], bootstrap, confidence, seed, progress, workers,
-        list(zip(estimates[1:], counts, strict=False)),
-    )  # fmt: skip
+    while True:
+        estimates, families, independent = compare(settings, rows)
+        weights = [one.weight for one in families.values() if one.weight > 0.0]
+        counts = [max(FEWEST, round(bootstrap * one / max(weights))) for one in weights[1:]]
+        try:
+            repeated, others = bootstrapped(
+                estimates[0], bootstrap, confidence, seed, progress, workers,
+                list(zip(estimates[1:], counts, strict=False)),
+            )  # fmt: skip
+            break
+        except NotRepeated as error:
+            settings = [setting for setting in settings if setting.marginal != error.family]
+            if not settings:
+                raise
+            warn_accuracy(
+                f"{error}: the family is left out, as records like these are too far from it"
+            )
     points = sum(record.values.size for record in records)
     fit = FieldFit(
         **_judged(repeated, rows, confidence, bootstrap, between, factor_prior),

@@ -1,5 +1,6 @@
 """Records: measured values at equal distances, on a line or a plane, with their gaps."""
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed, warn_accuracy
 from stiction.base.model import real_array
+from stiction.inference.window import RecordWindow
 from stiction.problem.interface import Interface
 from stiction.problem.profiles.placing import points_of
 from stiction.problem.profiles.reading import POSITIVE, is_labelled, labelled, simplified
@@ -19,6 +21,8 @@ UNEVEN = 0.02
 """Share of a spacing by which rounding in a file may move a point."""
 OUTLYING = 8.0
 """Distance of an outlier from the median, in robust standard deviations."""
+CORRELATED = 2.5
+"""Standard deviations by which the correlation of neighbours exceeds that of white noise."""
 JUMPING = 10.0
 """Difference of a dropout from its neighbours, in robust standard deviations of differences."""
 
@@ -159,6 +163,33 @@ def _checked(record: Record, quantity: str) -> Record:
     return record
 
 
+def refuse_uncorrelated(windows: Sequence[RecordWindow], rows: Sequence[Array]) -> None:
+    """Refuse records of white noise, whose correlation length lies below their spacing.
+
+    For white noise the sum of the products v_i v_(i+j) over all lags j up to k, over the variance,
+    has mean 0 and a variance equal to the number of products (Box and Pierce, 1970, in which
+    squares are summed). It is compared for k = 1, 2, 4, ..., pooled over records and directions.
+    """
+    lags = 2 ** np.arange(max(int(np.log2(max(windows[0].measured.shape) / 4)), 1))
+    sums, counts = np.zeros(lags[-1]), np.zeros(lags[-1])
+    for window, row in zip(windows, rows, strict=True):
+        values = np.zeros(window.measured.shape)
+        values[window.measured] = (row - row.mean()) / row.std()
+        for axis in range(values.ndim):
+            turned, known = np.moveaxis(values, axis, 0), np.moveaxis(window.measured, axis, 0)
+            for lag in range(1, min(lags[-1], len(turned) // 4) + 1):
+                sums[lag - 1] += float(np.sum(turned[lag:] * turned[:-lag]))
+                counts[lag - 1] += float(np.sum(known[lag:] & known[:-lag]))
+    scores = np.cumsum(sums) / np.sqrt(np.maximum(np.cumsum(counts), 1.0))
+    if scores[lags - 1].max() < CORRELATED:
+        raise InputError(
+            f"profiles: neighbouring points, {max(windows[0].spacings):.4g} m apart, are not"
+            f" correlated: {sums[0] / counts[0]:.2g} +- {counts[0] ** -0.5:.2g}. The correlation"
+            " length lies below the spacing, or noise hides it; measure at a smaller spacing, or"
+            " take the values as independent"
+        )
+
+
 def _doubt_jumps(record: Record) -> None:
     """Warn of values that lie much further from both neighbours than others do.
 
@@ -166,11 +197,12 @@ def _doubt_jumps(record: Record) -> None:
     """
     middle = record.values[1:-1]
     jumps = middle - 0.5 * (record.values[:-2] + record.values[2:])
-    same_side = (middle - record.values[:-2]) * (middle - record.values[2:]) > 0.0
     known = jumps[np.isfinite(jumps)]
     scale = 1.4826 * np.median(np.abs(known)) if known.size else 0.0
-    size = np.where(same_side & np.isfinite(jumps), np.abs(jumps), 0.0)
-    far = size > JUMPING * scale
+    size = np.pad(np.nan_to_num(np.abs(jumps)), [(1, 1)] + [(0, 0)] * (jumps.ndim - 1))
+    # A dropout makes its neighbours jump half as far.
+    far = (size[1:-1] > JUMPING * scale) & (size[1:-1] >= np.maximum(size[:-2], size[2:]))
+    size = size[1:-1]
     if scale > 0.0 and far.any():
         entry = int(np.argmax(size))
         warn_accuracy(
