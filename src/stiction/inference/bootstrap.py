@@ -40,8 +40,8 @@ class NotRepeated(InputError):
 
     def __init__(self, family: Family, fits: int, count: int) -> None:
         super().__init__(
-            f"marginal: {family.label!r} could be fitted to only {fits} of {count} records that were"
-            " simulated from its fit; take another marginal"
+            f"marginal: {family.label!r} could be fitted to only {fits} of {count} records"
+            " that were simulated from its fit; take another marginal"
         )
         self.family = family
 
