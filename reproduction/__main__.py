@@ -1,6 +1,7 @@
 """Recompute Albertini, Karrer, Grigoriu and Kammer (2020): `python reproduction`.
 
-Computes, draws, judges and writes a page. A second call completes what is missing.
+Computes, draws, judges and writes a page. The page exists as soon as the first figure does. A
+second call computes only the missing studies.
 """
 
 import argparse
@@ -18,86 +19,117 @@ if not __package__:  # `python reproduction`
 
 from reproduction import PARAMETERS
 
+FIGURES = tomllib.loads(Path(__file__).with_name("page.toml").read_text("utf-8"))["figure"]
+
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command."""
     options = _options(arguments)
     import stiction as st
     from reproduction import claims, modulus, page, runner, statements_onset, statements_rupture
-    from reproduction.runner import FULL, QUICK, USUAL
     from reproduction.studies import jobs
 
-    size = QUICK if options.quick else FULL if options.full else USUAL
+    size = runner.QUICK if options.quick else runner.USUAL
     if options.samples:
         names = ("readings", "trend", "what_if", "dynamic")  # lowered too, but not raised
-        others = {name: min(options.samples, getattr(size, name)) for name in names}
-        size = dataclasses.replace(size, samples=options.samples, **others)
+        lowered = {name: min(options.samples, getattr(size, name)) for name in names}
+        size = dataclasses.replace(size, samples=options.samples, **lowered)
     out = Path(options.out)
     run = runner.Runner(out, size, options.seed, options.workers)
-    rows = statements_onset.GROUPS | statements_rupture.GROUPS
-    rows |= {"Which modulus": modulus.CLAIMS}
+    wanted = list(jobs(size, options.full or options.figure is not None))
+    if options.figure:
+        needed = FIGURES[str(options.figure)]["needs"]
+        wanted = [job for job in wanted if job[0] in needed]
+    groups = statements_onset.GROUPS | statements_rupture.GROUPS
+    groups |= {"Which modulus": modulus.CLAIMS}
+    images: dict[int, Path] = {}
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", st.AccuracyWarning)
-        with run.started(jobs(size)) as studies:
+        with run.started(wanted) as studies:
             data = claims.Data(studies, size)
-            images = _draw(run, data, page.TEXTS["figure"], out / "figures")
-            groups = {
-                title: [one for claim in each if (one := claims.judge(claim, data))]
-                for title, each in rows.items()
+            so_far = claims.Data(studies, size, wait=False)
+            for number in _drawn(data, options.figure):
+                images[number] = _draw(data, number, out / "figures")
+                run.say(f"figure {number}: {images[number]}")
+                if not options.figure:
+                    page.write(out / "report.html", so_far, {}, images, run, [], done=False)
+            if options.figure:
+                return
+            found = {
+                title: [finding for claim in rows if (finding := claims.judge(claim, data))]
+                for title, rows in groups.items()
             }
     texts = (str(w.message) for w in caught if issubclass(w.category, st.AccuracyWarning))
     warned = sorted({re.sub(r"\d\S*", "", text): text for text in texts}.values())
-    claims.write_csv([found for each in groups.values() for found in each], out / "claims.csv")
-    page.write(out / "report.html", data, groups, images, run, warned)
+    claims.write_csv(
+        [finding for rows in found.values() for finding in rows], out / "claims.csv"
+    )
+    page.write(out / "report.html", data, found, images, run, warned, done=True)
     run.say(f"done: {out / 'report.html'}")
 
 
 def _options(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python reproduction", description=__doc__)
-    level = parser.add_mutually_exclusive_group()
-    level.add_argument("--quick", action="store_true", help="500 samples, for a first look")
-    level.add_argument("--full", action="store_true",
-                       help="also ruptures by the thousand; some six minutes more")  # fmt: skip
+    parser.add_argument("--quick", action="store_true", help="500 samples, for a first look")
+    parser.add_argument("--full", action="store_true",
+                        help="also what goes beyond the paper")  # fmt: skip
+    parser.add_argument("--figure", type=int, metavar="N", help="draw this figure only")
     parser.add_argument("--samples", type=int, metavar="N",
                         help="of each correlation length, 100 or more")  # fmt: skip
     parser.add_argument("--parameters", type=Path, metavar="FILE",
-                        help="TOML, in SI units, such as length = 0.2")  # fmt: skip
+                        help="tables of a study file, in place of the paper's")  # fmt: skip
     parser.add_argument("--out", default="stiction-paper", metavar="FOLDER")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=_cores(), help="threads")
     options = parser.parse_args(arguments)
     if options.samples is not None and options.samples < 100:
         parser.error(f"--samples: must be 100 or more, got {options.samples}")
+    if options.figure is not None and str(options.figure) not in FIGURES:
+        parser.error(f"--figure: must be 1 to {len(FIGURES)}, got {options.figure}")
     if options.parameters:
-        try:
-            PARAMETERS.update(tomllib.loads(options.parameters.read_text(encoding="utf-8")))
-            importlib.import_module("reproduction.setting")
-        except (OSError, ValueError) as error:
-            parser.error(f"--parameters: {options.parameters}: {error}")
+        _read_parameters(parser, options.parameters)
     return options
+
+
+def _read_parameters(parser: argparse.ArgumentParser, path: Path) -> None:
+    """Read a parameter file, and refuse it before anything is computed."""
+    import stiction as st
+
+    try:
+        PARAMETERS.update(tomllib.loads(path.read_text(encoding="utf-8")))
+        importlib.import_module("reproduction.setting")
+    except (OSError, ValueError, st.UnitWarning) as error:
+        parser.error(f"--parameters: {path}: {' | '.join(str(error).splitlines())}")
 
 
 def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
 
 
-def _draw(run, data, texts: dict, folder: Path) -> dict:
-    """Draw figures as soon as their studies are done."""
+def _drawn(data, chosen: int | None) -> list[int]:
+    """Return the numbers of the figures whose studies are computed in this run."""
+    if chosen:
+        return [chosen]
+    optional = {"printed", "readings"}  # left out with the reader's own parameters
+    return [
+        int(key)
+        for key, about in FIGURES.items()
+        if {*about["needs"]} - optional <= {*data.studies}
+    ]
+
+
+def _draw(data, number: int, folder: Path) -> Path:
+    """Draw a figure as soon as its studies are done, and return its file."""
     import stiction as st
     from reproduction.figures import beyond, paper
 
     folder.mkdir(parents=True, exist_ok=True)
-    images = {}
+    module = paper if number <= 7 else beyond
     with st.plot.paper_style():
-        for key, about in texts.items():
-            if not {*about.get("needs", ())} <= {*data.studies}:
-                continue
-            number, module = int(key), paper if int(key) <= 7 else beyond
-            images[number] = folder / f"figure_{number:02}.png"
-            figure = getattr(module, f"figure_{number}")(data)
-            run.say(f"figure {number}")
-            figure.savefig(images[number], dpi=200)
-    return images
+        figure = getattr(module, f"figure_{number}")(data)
+        path = folder / f"figure_{number:02}.png"
+        figure.savefig(path, dpi=200)
+    return path
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from reproduction import PARAMETERS
 from reproduction.numbers_with_errors import Number
 from reproduction.rules import Rule, Verdict, limits_times, together
 from reproduction.runner import Size
@@ -43,20 +44,23 @@ class Series:
 
 
 class LeftOut(KeyError):
-    """A study is not computed with the reader's own parameters."""
+    """A study is not computed in this run, or not yet."""
 
 
 class Data:
-    """The studies by name, as futures, with short ways to their numbers."""
+    """The studies by name, as futures, with short ways to their numbers.
 
-    def __init__(self, studies: Mapping[str, Future], size: Size) -> None:
-        self.studies, self.size = studies, size
+    With `wait=False` a study that is still being computed counts as left out.
+    """
+
+    def __init__(self, studies: Mapping[str, Future], size: Size, *, wait: bool = True) -> None:
+        self.studies, self.size, self.wait = studies, size, wait
 
     def __contains__(self, name: str) -> bool:
-        return name in self.studies
+        return name in self.studies and (self.wait or self.studies[name].done())
 
     def __getitem__(self, name: str) -> xr.Dataset:
-        if name not in self.studies:
+        if name not in self:
             raise LeftOut(name)
         return self.studies[name].result()
 
@@ -138,27 +142,32 @@ def verdicts(rule: Rule, cases: Mapping[str, Sequence[Series]]) -> dict[str, Ver
 
 
 def judge(claim: Claim, data: Data) -> Finding | None:
-    """Compute the numbers of a claim and apply its rule; None if a study is left out."""
+    """Compute the numbers of a claim and apply its rule; None if a study is left out.
+
+    Printed numbers are those of the paper's parameters, and are left out with others.
+    """
+    if PARAMETERS and claim.kind == "arithmetic":
+        return None
     try:
         judged, beside = claim.measure(data)
         note = claim.note(data) if claim.note else TEXTS[claim.name].get("note", "")
     except LeftOut:
         return None
     cases = judged if isinstance(judged, Mapping) else {"": judged}
-    found = verdicts(claim.rule, cases)
-    verdict, otherwise = together(found.values()), {}
+    readings = verdicts(claim.rule, cases)
+    verdict, otherwise = together(readings.values()), {}
     for factor, text in ((0.5, "half"), (2.0, "twice")):
         with limits_times(factor):
-            other = together(verdicts(claim.rule, cases).values())
-        if other is not verdict:
-            otherwise[text] = other
+            moved = together(verdicts(claim.rule, cases).values())
+        if moved is not verdict:
+            otherwise[text] = moved
     rows = [
         dataclasses.replace(series, label=f"({key}) {series.label}" if key else series.label)
-        for key, each in cases.items()
-        for series in each
+        for key, judged_series in cases.items()
+        for series in judged_series
     ]
     return Finding(
-        claim, rows, beside, verdict, found if "" not in found else {}, otherwise, note
+        claim, rows, beside, verdict, {} if "" in readings else readings, otherwise, note
     )
 
 
@@ -189,17 +198,32 @@ def rounded(number: Number) -> str:
     return (f"{value:.2g}" if small else f"{value:.4g}").replace("-", MINUS)
 
 
+def short(number: Number) -> str:
+    """Return a number rounded to what its standard error allows, without the error."""
+    value, error = number.value, number.error
+    if not math.isfinite(value):
+        return "not known"
+    if value == 0.0 and error == 0.0:
+        return "0"
+    size = abs(value) or error
+    places = 2 - math.floor(math.log10(size))  # three digits at most
+    if error > 0.0:
+        places = min(places, math.floor(-math.log10(error)))
+    value = round(value, places) + 0.0
+    return f"{value:,.{max(places, 0)}f}".replace("-", MINUS)
+
+
 def write_csv(findings: Sequence[Finding], path: Path) -> None:
     """Write every number of every claim, one a row."""
     rows = []
-    for found in findings:
-        for series in (*found.judged, *found.beside):
+    for finding in findings:
+        for series in (*finding.judged, *finding.beside):
             for key, number in series.rows:
                 ratio, case = (key, "") if isinstance(key, float) else ("", key)
                 rows.append({
-                    "claim": found.claim.name, "verdict": found.verdict.value,
+                    "claim": finding.claim.name, "verdict": finding.verdict.value,
                     "quantity": series.label, "xi_0/h_n": ratio, "case": case,
                     "value": number.value, "error": number.error, "unit": series.unit,
-                    "judged": series in found.judged,
+                    "judged": series in finding.judged,
                 })  # fmt: skip
     pd.DataFrame(rows).to_csv(path, index=False)

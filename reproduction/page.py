@@ -1,4 +1,7 @@
-"""The page: findings first, then departures, figures, statements and provenance."""
+"""The page: eight sentences, the figures, and an appendix with statements and provenance.
+
+The page is written whenever a figure is ready. A text whose studies are not ready is left out.
+"""
 
 import base64
 import platform
@@ -14,7 +17,7 @@ from markupsafe import Markup, escape
 
 import stiction as st
 from reproduction import PARAMETERS, setting, texts
-from reproduction.claims import Data, rounded
+from reproduction.claims import Data, LeftOut, rounded, short
 from reproduction.modulus import EVIDENCE, compare, odds
 from reproduction.rules import Verdict
 
@@ -39,56 +42,67 @@ def physics(text: str) -> Markup:
     return Markup(plain.replace(" +- ", " ± "))
 
 
-def write(path: Path, data: Data, groups, images, runner, warned) -> None:
+def write(path: Path, data: Data, groups, images, runner, warned, *, done: bool) -> None:
     """Write the page: groups of findings by title, images by figure number, texts of warnings."""
-    found = [finding for rows in groups.values() for finding in rows]
+    findings = [finding for rows in groups.values() for finding in rows]
     counts = {
-        kind: Counter(f.verdict.value for f in found if f.claim.kind == kind)
+        kind: Counter(f.verdict.value for f in findings if f.claim.kind == kind)
         for kind in ("arithmetic", "beyond")
     }
     environment = jinja2.Environment(autoescape=True, trim_blocks=True)
     environment.filters |= {"physics": physics, "number": rounded}
     plain = jinja2.Environment(undefined=jinja2.StrictUndefined)
-    plain.filters["number"] = rounded
-    known = texts.names(data, {f.claim.name: f for f in found})
+    plain.filters |= {"number": rounded, "short": short}
+    known = texts.names(data) | {"own": bool(PARAMETERS)}
 
     def filled(text: str) -> str:
-        return " ".join(plain.from_string(text).render(known).split())
+        """Return a text with its numbers, or nothing if one of its studies is left out."""
+        try:
+            return " ".join(plain.from_string(text).render(known).split())
+        except LeftOut:
+            return ""
+
+    def ready(function):
+        try:
+            return function()
+        except LeftOut:
+            return None
 
     template = environment.from_string(Path(__file__).with_name("page.html").read_text("utf-8"))
-    readings = compare(data)
+    readings = ready(lambda: compare(data)) or []
     order = [Verdict.FAILS, Verdict.TEXT, Verdict.OPEN, Verdict.CORRECTED]
-    exceptions = [f for f in found if f.verdict in order]
+    exceptions = [f for f in findings if f.verdict in order]
     exceptions.sort(key=lambda f: order.index(f.verdict))
     title = "What does not hold, is undecided, or holds only with a correction"
     sections = [(title, exceptions, True)]
     sections += [(title, rows, False) for title, rows in groups.items() if rows]
     text = template.render(
         version=st.__version__,
-        own=", ".join(f"{name} = {value:g}" for name, value in PARAMETERS.items()),
-        short=[filled(line) for line in TEXTS["short"]],
+        own=PARAMETERS,
+        short=[line for line in map(filled, TEXTS["short"]) if line],
+        done=done,
         verdicts=Verdict,
-        findings=[f.verdict for f in found if f.claim.kind == "finding"],
+        findings=[f.verdict for f in findings if f.claim.kind == "finding"],
         others={
             kind: f"{sum(row.values())} ({', '.join(f'{n} {v}' for v, n in row.items())})"
             for kind, row in counts.items()
         },
-        resting=sum(bool(f.otherwise) for f in found if f.claim.kind == "finding"),
+        resting=sum(bool(f.otherwise) for f in findings if f.claim.kind == "finding"),
         texts=TEXTS,
         figures=[_figure(number, image, filled) for number, image in images.items()],
-        few=texts.few_and_many(data),
+        few=ready(lambda: texts.few_and_many(data)),
         readings=readings,
-        best=max(float(reading.likelihood[0]) for reading in readings) or 1.0,
+        best=max((float(reading.likelihood[0]) for reading in readings), default=0.0) or 1.0,
         evidence=[(what, where) for what, where, _ in EVIDENCE],
-        odds=odds(data),
-        odds_of_counts=odds(data, slice(3)),
-        odds_otherwise=[odds(data, visible=visible)[0] for visible in (0.5, 2.0)],
+        odds=readings and odds(data),
+        odds_of_counts=readings and odds(data, slice(3)),
+        odds_otherwise=readings and [odds(data, visible=visible)[0] for visible in (0.5, 2.0)],
         claims=sections,
         setting=setting,
         taken={
             name.replace("_", " ").replace("-", " with "): data[name].sizes["sample"]
             for name in data.studies
-            if "sample" in data[name].dims
+            if name in data and "sample" in data[name].dims
         },
         size=data.size,
         runner=runner,

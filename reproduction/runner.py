@@ -1,13 +1,19 @@
-"""Where studies are run and kept: a folder that a second call only completes."""
+"""Where studies are run and kept: a folder that a second call only completes.
+
+A `st.Study` keeps its samples in a folder of its own. Any other study is a function with the
+decorator `kept`: its result is a file, and each part that it maps is a file until it is done.
+"""
 
 import collections
 import contextlib
+import copy
 import dataclasses
 import functools
 import hashlib
 import inspect
 import itertools
 import json
+import shutil
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -24,24 +30,38 @@ with contextlib.suppress(ImportError):  # xarray would import it in several thre
 
 @dataclasses.dataclass(frozen=True)
 class Size:
-    """How much of each kind is computed."""
+    """How much of each kind is computed; `dynamic` and what follows it by `--full` alone."""
 
     samples: int
     ruptures: int
     readings: int
+    few: int
     trend: int
     what_if: int
     arrests: int
     dynamic: int
-    few: int
 
 
-QUICK = Size(samples=500, ruptures=4, readings=200, trend=300, what_if=40, arrests=2, dynamic=0,
-             few=6)  # fmt: skip
-USUAL = Size(samples=10_000, ruptures=20, readings=1000, trend=2500, what_if=200, arrests=8,
-             dynamic=0, few=24)  # fmt: skip
-FULL = Size(samples=10_000, ruptures=20, readings=2000, trend=10_000, what_if=400, arrests=200,
-            dynamic=1000, few=60)  # fmt: skip
+QUICK = Size(samples=500, ruptures=4, readings=200, few=6, trend=300, what_if=40, arrests=2,
+             dynamic=0)  # fmt: skip
+USUAL = Size(samples=10_000, ruptures=20, readings=1000, few=60, trend=10_000, what_if=400,
+             arrests=200, dynamic=1000)  # fmt: skip
+
+
+class StoppablePool(ThreadPoolExecutor):
+    """Threads whose queued work ends at once after `stopped` is set, for those who wait for it."""
+
+    def __init__(self, workers: int) -> None:
+        super().__init__(workers)
+        self.stopped = threading.Event()
+
+    def submit(self, function, /, *arguments, **options):
+        def unless_stopped():
+            if self.stopped.is_set():
+                raise RuntimeError("the run has been stopped")
+            return function(*arguments, **options)
+
+        return super().submit(unless_stopped)
 
 
 class Runner:
@@ -67,17 +87,17 @@ class Runner:
             return function(self)
 
         with (
-            ThreadPoolExecutor(self.workers) as self.pool,
+            StoppablePool(self.workers) as self.pool,
             ThreadPoolExecutor(self.workers + 1) as studies,
         ):
             try:
-                found = {name: studies.submit(compute, *job) for name, *job in jobs}
-                yield found
-                for future in found.values():
+                futures = {name: studies.submit(compute, *job) for name, *job in jobs}
+                yield futures
+                for future in futures.values():
                     future.result()
             except BaseException:
-                for pool in (studies, self.pool):
-                    pool.shutdown(wait=False, cancel_futures=True)
+                self.pool.stopped.set()
+                studies.shutdown(wait=False, cancel_futures=True)
                 raise
 
     def say(self, text: str) -> None:
@@ -111,8 +131,24 @@ class Runner:
         return self.seed * 1000 + round(100 * ratio)
 
     def map(self, function, items) -> list:
-        """Return [function(*item) for item in items], computed by all threads."""
-        return list(self.pool.map(function, *zip(*items, strict=True)))
+        """Return the datasets function(*item) for item in items, computed by all threads.
+
+        Each is written as soon as it is computed, so that an interrupted study repeats none.
+        """
+        items = list(items)
+        places = [self.parts / f"{number}.nc" for number in range(len(items))]
+        compute = [functools.partial(function, *item) for item in items]
+        return list(self.pool.map(self.stored, places, compute))
+
+    def stored(self, place: Path, compute) -> xr.Dataset:
+        """Return a stored dataset, or compute and store it."""
+        result = None if place.exists() else compute()
+        with self.locks["netCDF"]:  # its library is for one thread at a time
+            if result is not None:
+                place.parent.mkdir(parents=True, exist_ok=True)
+                result.to_netcdf(place.with_suffix(".unfinished"))
+                place.with_suffix(".unfinished").replace(place)
+            return xr.load_dataset(place)
 
     def grid(self, function, **axes) -> xr.Dataset:
         """Return the datasets function(*point) of all points of a grid, along its axes."""
@@ -132,9 +168,9 @@ class Runner:
         parts, rows = self.map(function, items), []
         for i in range(0, len(parts), len(firsts)):
             row = parts[i : i + len(firsts)]
-            own = [name for name in row[0] if "sample" in row[0][name].dims]
-            added = sum(part.drop_vars(own) for part in row)
-            rows.append(xr.concat([part[own] for part in row], dim="sample").merge(added))
+            joined = [name for name in row[0] if "sample" in row[0][name].dims]
+            added = sum(part.drop_vars(joined) for part in row)
+            rows.append(xr.concat([part[joined] for part in row], dim="sample").merge(added))
         return along(dim, values, rows)
 
 
@@ -151,13 +187,12 @@ def kept(**inputs):
             source = inspect.getsource(function)
             mark = _digest([run.seed, st.__version__, source, values, PARAMETERS])
             place = run.folder / f"{function.__name__}-{mark}.nc"
+            within = copy.copy(run)
+            within.parts = place.with_suffix("")
             with run.locks[place]:
-                found = None if place.exists() else function(run, **values)
-                with run.locks["netCDF"]:  # its library is for one thread at a time
-                    if found is not None:
-                        found.to_netcdf(place.with_suffix(".unfinished"))
-                        place.with_suffix(".unfinished").replace(place)
-                    return xr.load_dataset(place)
+                result = run.stored(place, lambda: function(within, **values))
+                shutil.rmtree(within.parts, ignore_errors=True)
+                return result
 
         return study
 

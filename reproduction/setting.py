@@ -1,6 +1,12 @@
-"""The paper's setting, and the names of `stiction` that the other files share."""
+"""The paper's problem and random strength, or those of a parameter file, for all other files.
+
+A parameter file has the tables `[problem...]` and `[random.strength...]` of a study file, and two
+keys of its own: `correlation_ratios` (the list of xi_0/h_n) and `loading_rate` (Pa/s). A table
+replaces the paper's table of the same name as a whole.
+"""
 
 import dataclasses
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -8,58 +14,139 @@ import numpy as np
 import stiction as st
 from reproduction import PARAMETERS
 
-RATIOS = (0.25, 0.5, 1.0, 2.0)
+PRINTED_RATIOS = (0.25, 0.5, 1.0, 2.0)
 """xi_0/h_n of the paper's Monte Carlo study."""
-SIMULATED = (0.25, 0.5, 2.0)
-"""xi_0/h_n at which the paper ran 20 simulations each."""
-
-NAMES = ("shear_modulus", "poisson_ratio", "density", "length", "nodes", "weakening_rate",
-         "alpha", "beta", "low", "high")  # fmt: skip
-"""Parameters that a reader may replace, in SI units; the last four are those of the strength."""
-if _unknown := sorted(set(PARAMETERS) - set(NAMES)):
-    raise st.InputError(f"unknown {_unknown[0]!r} (valid: {', '.join(NAMES)})")
-
-
-def _replaced(part):
-    """Return a part of the paper's problem with the parameters that replace its own."""
-    names = {field.name for field in dataclasses.fields(part)} & set(PARAMETERS)
-    return dataclasses.replace(part, **{name: PARAMETERS[name] for name in names})
+PRINTED_RATE = 2e7
+"""Loading rate of the ruptures, Pa/s. The paper does not give its own."""
+OWN_KEYS = ("correlation_ratios", "loading_rate")
+MAX_RATIOS = 6
+"""As many correlation lengths can be told apart in a figure."""
+MIN_NODES = 16
+"""Fewest nodes in the nucleation length."""
+TAIL = 1e-4
+"""Probability beyond the ends of the range that figures show of an unbounded strength."""
 
 
-def _problem(plane: str = "stress"):
-    problem = st.paper.problem(plane=plane)
-    parts = {name: getattr(problem, name) for name in ("solid", "interface", "friction")}
-    return dataclasses.replace(problem, **{k: _replaced(part) for k, part in parts.items()})
+def _study(plane: str | None = None) -> st.Study:
+    """Return the paper's study with the tables that replace its own."""
+    problem = st.paper.problem()
+    random = st.paper.strength(problem)
+    unscaled = random.spectrum.correlation_length
+    study = st.Study(problem=problem, random=random, method=st.LocalCriterion(),
+                     ensemble=st.Ensemble(samples=1))  # fmt: skip
+    plain = study.to_dict()
+    valid = ("problem", "random", *OWN_KEYS)
+    if unknown := [key for key in PARAMETERS if key not in valid]:
+        raise st.InputError(f"{unknown[0]}: unknown key (valid: {', '.join(valid)})")
+    given = {key: value for key, value in PARAMETERS.items() if key not in OWN_KEYS}
+    _replace(plain, given)
+    spectrum = plain["random"]["strength"]["spectrum"]
+    if given and spectrum.setdefault("correlation_length", unscaled) != unscaled:
+        raise st.InputError("random.strength.spectrum.correlation_length: give correlation_ratios"
+                            " instead, in multiples of the nucleation length")  # fmt: skip
+    if plane:
+        plain["problem"]["solid"]["plane"] = plane
+    return st.Study.from_dict(plain, folder=Path.cwd())
 
 
-PROBLEM = _problem()
+def _replace(plain: dict, given: dict) -> None:
+    for key, value in given.items():
+        if key in ("problem", "random", "strength") and isinstance(value, dict):
+            _replace(plain.setdefault(key, {}), value)
+        else:
+            plain[key] = value
+
+
+def _check(study: st.Study) -> None:
+    """Refuse what the figures cannot show, before anything is computed."""
+    problem, mistakes = study.problem, []
+    if problem.interface.is_plane or problem.specimen is not None:
+        mistakes.append("problem: the report is about a line between half-spaces")
+    elif set(study.random.names) != {"strength"}:
+        mistakes.append("random: the report varies the strength alone")
+    elif not hasattr(study.random.properties["strength"].spectrum, "correlation_length"):
+        mistakes.append("random.strength.spectrum: needs a correlation length")
+    for method in (st.LocalCriterion(), st.Equilibrium()):
+        mistakes += [] if mistakes else method.supports(problem)
+    if not mistakes:
+        span = problem.nucleation_length / problem.interface.spacing
+        if span < MIN_NODES:
+            nodes = 2 * int(np.ceil(0.5 * problem.interface.size * MIN_NODES / span))
+            mistakes.append(f"problem.interface.nodes: the nucleation length spans {span:.1f} nodes"
+                            f" of at least {MIN_NODES}; give {nodes} or more")  # fmt: skip
+        if np.size(problem.friction.residual_strength or 0.0) > 1:
+            mistakes.append("problem.friction.residual_strength: give one number, no profile")
+    if mistakes:
+        raise st.InputError(mistakes)
+
+
+def _ratios() -> tuple[float, ...]:
+    values = PARAMETERS.get("correlation_ratios", PRINTED_RATIOS)
+    numbers = [value for value in values if isinstance(value, int | float)] if isinstance(
+        values, list | tuple) else []  # fmt: skip
+    rising = all(np.diff([0.0, *numbers]) > 0.0)
+    if not (2 <= len(numbers) <= MAX_RATIOS and len(numbers) == len(values) and rising):
+        raise st.InputError(f"correlation_ratios: give 2 to {MAX_RATIOS} rising positive numbers,"
+                            f" got {values!r}")  # fmt: skip
+    return tuple(map(float, numbers))
+
+
+RATIOS = _ratios()
+"""All xi_0/h_n."""
+SIMULATED = tuple(dict.fromkeys((RATIOS[0], RATIOS[1], RATIOS[-1])))
+"""xi_0/h_n at which ruptures are run. The paper ran 20 at each of 0.25, 0.5 and 2."""
+FIRST, SECOND, LAST = RATIOS[0], RATIOS[1], RATIOS[-1]
+with warnings.catch_warnings():
+    if PARAMETERS:  # a number of a wrong unit is a mistake in a parameter file
+        warnings.simplefilter("error", st.UnitWarning)
+    _own = _study()
+    _check(_own)
+PROBLEM = _own.problem
+FIELD = _own.random.properties["strength"]
 H = PROBLEM.nucleation_length
-"""Nucleation length h_n in plane stress, m."""
+"""Nucleation length h_n, m."""
 L = PROBLEM.interface.extent
 G_STAR = PROBLEM.effective_modulus
 W = PROBLEM.uniform_rate
 """Weakening rate, Pa/m."""
-STRAIN = _problem("strain")
+STRAIN = PROBLEM if PARAMETERS else _study("strain").problem
 """The same with the printed modulus, G/(1 - nu), which belongs to plane strain."""
 PRINTED_H = STRAIN.nucleation_length
 
-MARGINAL = _replaced(st.paper.strength(PROBLEM).marginal)
-LOW, HIGH = MARGINAL.low, MARGINAL.high
-MEAN = MARGINAL.distribution.mean()
-DEVIATION = MARGINAL.distribution.std()
+MARGINAL = FIELD.marginal
+_LAW = MARGINAL.distribution
+MEAN, DEVIATION = _LAW.mean(), _LAW.std()
+SUPPORT = _LAW.support()
+"""Bounds of the strength, Pa; the upper one may be infinite."""
+LOW = SUPPORT[0] if SUPPORT[0] > 0.0 else float(_LAW.ppf(TAIL))
+HIGH = SUPPORT[1] if np.isfinite(SUPPORT[1]) else float(_LAW.ppf(1.0 - TAIL))
+"""The range of the strength in figures, and the largest strength of the energy balance, Pa."""
 
-LOADING_RATE = 2e7
-"""Of the ruptures, Pa/s; the paper does not give its own."""
+
+def residual(strength):
+    """Return the residual strength that belongs to a peak strength, Pa."""
+    law = PROBLEM.friction
+    if getattr(law, "residual_ratio", None) is not None:
+        return law.residual_ratio * strength
+    return float(law.residual_strength or 0.0)
+
+
+LOADING_RATE = PARAMETERS.get("loading_rate") or (
+    float(f"{PRINTED_RATE * (MEAN / 1e6) / (L / PROBLEM.solid.shear_wave_speed / 1.08e-4):.2g}")
+    if PARAMETERS else PRINTED_RATE
+)  # fmt: skip
+"""Of the ruptures, Pa/s; by default the load rises by the same share of the mean strength while
+a shear wave runs along the interface as it does with the paper's parameters."""
+CROSSING = L / PROBLEM.solid.shear_wave_speed
+"""Time in which a shear wave runs along the interface, s."""
 WHAT_IF = Path(__file__).parent / "what_if"
 
 
 def strength(ratio: float, **changes):
-    """Return the paper's random strength at xi_0/h_n; `changes` replace parts of the field."""
+    """Return the random strength at xi_0/h_n; `changes` replace parts of the field."""
     length = changes.pop("nucleation_length", H)
-    spectrum = dataclasses.replace(
-        st.paper.strength(PROBLEM).spectrum, correlation_length=ratio * length
-    )
-    return st.RandomField(marginal=MARGINAL, spectrum=spectrum, **changes)
+    spectrum = dataclasses.replace(FIELD.spectrum, correlation_length=ratio * length)
+    return dataclasses.replace(FIELD, spectrum=spectrum, **changes)
 
 
 def grid(problem, *, length: float = 1.0, nodes: float = 1.0):
@@ -71,9 +158,9 @@ def grid(problem, *, length: float = 1.0, nodes: float = 1.0):
     return dataclasses.replace(problem, interface=changed)
 
 
-def distance(one, other, period: float = L):
+def distance(place, reference, period: float = L):
     """Return the distance of positions on the periodic interface, m."""
-    gap = np.abs(np.asarray(one) - np.asarray(other)) % period
+    gap = np.abs(np.asarray(place) - np.asarray(reference)) % period
     return np.minimum(gap, period - gap)
 
 

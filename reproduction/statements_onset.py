@@ -14,7 +14,7 @@ from reproduction.claims import Beyond, Check, Claim, Data, Series, one, over_ra
 from reproduction.modulus import at
 from reproduction.numbers_with_errors import Number, deviation, lower_spread, mean, share
 from reproduction.rules import above, alike, below, each, falling, graded, rising, within
-from reproduction.setting import DEVIATION, HIGH, LOW, MEAN, RATIOS, SIMULATED
+from reproduction.setting import DEVIATION, FIRST, HIGH, LOW, MEAN, RATIOS, SIMULATED
 from reproduction.studies import NORMAL, READINGS, infinite_variance_ratio
 
 PER_CENT, KPA, MPA = 100.0, 1e-3, 1e-6
@@ -33,8 +33,8 @@ def _from_normal(d: Data, ratio: float) -> Number:
     """Return the distance of tau_n from a normal distribution over that of tau_p."""
     rows = d.at("moments", "below", ratio)
     gaps = [abs(mean(row) - ndtr(z)) for row, z in zip(rows.T, NORMAL, strict=True)]
-    own = setting.MARGINAL.distribution.cdf(MEAN + NORMAL * DEVIATION) - ndtr(NORMAL)
-    return max(gaps, key=lambda gap: gap.value) / float(np.abs(own).max())
+    strength_gaps = setting.MARGINAL.distribution.cdf(MEAN + NORMAL * DEVIATION) - ndtr(NORMAL)
+    return max(gaps, key=lambda gap: gap.value) / float(np.abs(strength_gaps).max())
 
 
 def _slope(d: Data) -> Number:
@@ -114,10 +114,9 @@ def _towards_bound(d: Data):
 def _apart(stress, weakest) -> tuple[Number, Number]:
     """Return the distance of the two distributions, from different samples, and its p-value."""
     half = stress.size // 2
-    found = ks_2samp(stress[:half], weakest[half:])
-    return Number(float(found.statistic), 0.5 / math.sqrt(stress.size)), Number(
-        float(found.pvalue)
-    )
+    test = ks_2samp(stress[:half], weakest[half:])
+    distance = Number(float(test.statistic), 0.5 / math.sqrt(stress.size))
+    return distance, Number(float(test.pvalue))
 
 
 PARAMETERS = [
@@ -167,8 +166,8 @@ def _moment(order: int) -> float:
 
 
 def _relative(function, d: Data, ratio: float) -> Number:
-    found = function(d.stress(ratio))
-    return Number(PER_CENT * found.error / found.value * math.sqrt(d.size.samples / 10_000))
+    number = function(d.stress(ratio))
+    return Number(PER_CENT * number.error / number.value * math.sqrt(d.size.samples / 10_000))
 
 
 NUCLEATION = [
@@ -196,7 +195,7 @@ NUCLEATION = [
                         one("skewness of tau_p", POINT_SKEWNESS))),
     Claim("nearly-gaussian", below(0.5, "nearer to it than to the strength"),
         lambda d: ([Series("distance from a normal distribution, over that of the strength", "",
-                           [(0.25, _from_normal(d, 0.25))])],
+                           [(FIRST, _from_normal(d, FIRST))])],
                    [Series("the same", "", [(r, _from_normal(d, r)) for r in RATIOS[1:]])])),
     Claim("nucleation-extremes", each(falling(), rising()),
         lambda d: ([over_ratios("mean of min tau_n/<tau_p>", "", lambda r:
@@ -315,9 +314,9 @@ def _above_simulation(v, ratios=SIMULATED) -> Series:
 
 
 def _explained(d: Data) -> dict:
-    label = "share of what the theory lacks at 0.25 that interaction explains"
+    label = f"share of the theory's error at {FIRST:g} that interaction explains"
     shares = by_reading(lambda v: [one(label, estimates.ratio_of_means(
-        v("consistent_excess", 0.25), v("excess", 0.25)))])(d)  # fmt: skip
+        v("consistent_excess", FIRST), v("excess", FIRST)))])(d)  # fmt: skip
     rest = over_ratios("exact equilibrium against the ruptures, mean", "%", lambda r: abs(
         mean(offsets(d, r, "exact"))) * PER_CENT, SIMULATED)  # fmt: skip
     return {key: [*rows, rest] for key, rows in shares.items()}
@@ -388,7 +387,8 @@ def bound_above(d: Data, ratio: float) -> np.ndarray:
 
 def stress_density(d: Data, ratio: float):
     """Return the density of tau_cr."""
-    return st.statistics.density(d.stress(ratio), bounds=(LOW, HIGH))
+    bounds = [bound if np.isfinite(bound) else None for bound in setting.SUPPORT]
+    return st.statistics.density(d.stress(ratio), bounds=bounds)
 
 
 GROUPS = {

@@ -11,7 +11,7 @@ from reproduction.claims import Beyond, Check, Claim, Data, Series, one, over_ra
 from reproduction.modulus import at
 from reproduction.numbers_with_errors import Number, deviation, lower_spread, mean, share
 from reproduction.rules import above, alike, below, each, falling, graded, rising, within
-from reproduction.setting import HIGH, RATIOS, SIMULATED, H, L
+from reproduction.setting import FIRST, HIGH, LAST, MEAN, RATIOS, SECOND, SIMULATED, H, L
 from reproduction.statements_onset import TWENTY, by_reading
 from reproduction.studies import READINGS
 
@@ -21,18 +21,18 @@ RARE = below(0.01, "extremely unlikely: 60 simulations would not show it", share
 
 
 def _growth(d: Data):
-    study = d["growth"]["patches"].sel(correlation_ratio=RATIOS[0])
+    study = d["growth"]["patches"].sel(correlation_ratio=FIRST)
     rows = {level: study.sel(level=level).values for level in (0.92, 0.96, 0.999)}
     numbers = [(f"{level:g} tau_cr", mean(row)) for level, row in rows.items()]
     steps = [(f"{b:g} less {a:g} tau_cr", mean(rows[b] - rows[a])) for a, b in pairwise(rows)]
-    text = "slipping patches, xi_0/h_n = 0.25"
+    text = f"slipping patches, xi_0/h_n = {FIRST:g}"
     return [Series(text, "", numbers[-1:]), Series("increase", "", steps)], \
         [Series(text, "", numbers), patches_at_onset(d)]  # fmt: skip
 
 
 def patches_at_onset(d: Data) -> Series:
     """Return the number of slipping patches, of the samples of which growth is known and of all."""
-    number = d.at("exact", "slip_patches", RATIOS[0])
+    number = d.at("exact", "slip_patches", FIRST)
     few = d["growth"].sizes["sample"]
     rows = [(f"the same {few}", mean(number[:few])), ("all samples", mean(number))]
     return Series("at the onset itself", "", rows)
@@ -46,10 +46,10 @@ def _near_length(d: Data, ratio: float) -> Number:
 
 def _neighbours(v) -> list[Series]:
     """Return how close two places are where the onset is misplaced, and what interaction does."""
-    wrong, helped = v("misplaced", RATIOS[0]), v("helped", RATIOS[0]) * PER_CENT
+    wrong, helped = v("misplaced", FIRST), v("helped", FIRST) * PER_CENT
     if wrong.sum() < 2:
         return []
-    contest = v("contest", RATIOS[0])[wrong] * PER_CENT
+    contest = v("contest", FIRST)[wrong] * PER_CENT
     more = mean(helped[wrong]) - mean(helped[~wrong])
     return [one("the two differ by", mean(contest), "%"),
             one("more help than where the position is right", more, "%")]  # fmt: skip
@@ -58,11 +58,11 @@ def _neighbours(v) -> list[Series]:
 PATCHES = [
     Claim("patches-grow", each(above(1.0), above(0.0)), _growth),
     Claim("patches-merge", above(0.01, "one interface in a hundred", share=True),
-        lambda d: ([one("share of samples whose critical patch merged, xi_0/h_n = 0.25",
-                        share(d.at("growth", "merged", RATIOS[0])))], [])),
+        lambda d: ([one(f"share of samples whose critical patch merged, xi_0/h_n = {FIRST:g}",
+                        share(d.at("growth", "merged", FIRST)))], [])),
     Claim("not-the-first", above(0.01, "one interface in a hundred", share=True),
-        lambda d: ([one("share of critical patches without the weakest node, xi_0/h_n = 0.25",
-                        share(d.at("growth", "holds_weakest", RATIOS[0]) == 0))], [])),
+        lambda d: ([one(f"share of critical patches without the weakest node, xi_0/h_n = {FIRST:g}",
+                        share(d.at("growth", "holds_weakest", FIRST) == 0))], [])),
     Claim("critical-length", graded(above(0.95, "nearly all", share=True), MOST),
         lambda d: ([over_ratios("share within 10 % and one node of h_n", "",
                                 lambda r: _near_length(d, r))],
@@ -98,8 +98,13 @@ def runaway_length(stress, key: str):
     """Return the length over h_n from which on no fracture energy suffices, in a reading."""
     modulus = setting.STRAIN.effective_modulus if key == "b" else setting.G_STAR
     length = H if key == "a" else setting.PRINTED_H
-    energy = HIGH**2 / (2.0 * setting.W)
-    return 4.0 * modulus * energy / (math.pi * np.asarray(stress) ** 2) / length
+    drop = np.asarray(stress) - setting.residual(MEAN)
+    return 4.0 * modulus * largest_energy() / (math.pi * drop**2) / length
+
+
+def largest_energy() -> float:
+    """Return the fracture energy of the strongest place, J/m²."""
+    return (HIGH - setting.residual(HIGH)) ** 2 / (2.0 * setting.W)
 
 
 def arrested(d: Data, ratio: float, study: str = "exact") -> Number:
@@ -119,9 +124,9 @@ def with_inertia(d: Data, ratio: float) -> Number:
     moving = events["dynamic"].values[events["ratio"].values == ratio] > 0
     if not moving.size:
         return Number(0.0, still.error)
-    found = share(moving)
-    error = math.hypot(still.error * found.value, still.value * found.error)
-    return Number(still.value * found.value, error)
+    part = share(moving)
+    error = math.hypot(still.error * part.value, still.value * part.error)
+    return Number(still.value * part.value, error)
 
 
 def _arrests(d: Data) -> list[Series]:
@@ -131,18 +136,18 @@ def _arrests(d: Data) -> list[Series]:
 
 
 def _rarer(d: Data):
-    """Return shares, and by how much that at 2 exceeds those at 0.25 and 0.5: by each measure."""
+    """Return shares, and by how much the last exceeds the first two: by each measure."""
     rows = []
     for series, function in zip(_arrests(d), (arrested, with_inertia), strict=True):
-        less = [(f"less that at {r:g}", function(d, 2.0) - function(d, r)) for r in (0.25, 0.5)]
-        rows += [series, Series(f"share at 2, {series.label.split(', ')[-1]}", "", less)]
+        less = [(f"less that at {r:g}", function(d, LAST) - function(d, r)) for r in RATIOS[:2]]
+        rows += [series, Series(f"share at {LAST:g}, {series.label.split(', ')[-1]}", "", less)]
     return rows, []
 
 
 def _foreshocks(d: Data):
     study = "dynamic" if "dynamic" in d else "ruptures"
-    found = d[study]["arrested_events"].values > 0
-    return [one(f"share of {found.size:,} ruptures with an arrested event", share(found))], \
+    events = d[study]["arrested_events"].values > 0
+    return [one(f"share of {events.size:,} ruptures with an arrested event", share(events))], \
         _arrests(d)  # fmt: skip
 
 
@@ -215,8 +220,7 @@ def _single_events(d: Data) -> Series:
 
 
 def _variation(values) -> Number:
-    found = deviation(values)
-    return found * (1.0 / float(np.mean(values)))
+    return deviation(values) * (1.0 / float(np.mean(values)))
 
 
 def _lengths(d: Data, function, factor: float) -> list[tuple[str, Number]]:
@@ -233,8 +237,8 @@ def ends_change(d: Data, ratio: float) -> np.ndarray:
     return d["free_end"]["change"].values[RATIOS.index(ratio)] * PER_CENT
 
 
-SIZES = (("L/4", 4, 0.25), ("L/2", 5, 0.5), ("L", 0, 1.0))
-"""Lengths at xi_0 = h_n/4, their cases in the study of free ends, and their part of L."""
+SIZES = (("L/4", len(RATIOS), 0.25), ("L/2", len(RATIOS) + 1, 0.5), ("L", 0, 1.0))
+"""Lengths at the shortest correlation, their cases in the study of free ends, their part of L."""
 
 
 def _near_end(d: Data, low: float, high: float) -> Series:
@@ -243,8 +247,8 @@ def _near_end(d: Data, low: float, high: float) -> Series:
     rows = []
     for label, i, part in SIZES:
         end = d["free_end"]["end"].values[i]
-        found = share((end >= low) & (end < high))
-        rows.append((label, found * (part * L / (2.0 * (high - low) * length))))
+        near = share((end >= low) & (end < high))
+        rows.append((label, near * (part * L / (2.0 * (high - low) * length))))
     return Series(f"share of onsets {low:g} to {high:g} h_n from an end, over chance", "", rows)
 
 
@@ -257,7 +261,7 @@ def _by_size(d: Data):
     parts = [1.0 / part for *_, part in SIZES]
     line, covariance = np.polyfit(parts, value, 1, w=1.0 / error, cov="unscaled")
     limit = Number(float(line[1]), math.sqrt(covariance[1, 1]))
-    return [Series("change by free ends, mean, xi_0/h_n = 0.25", "%", rows),
+    return [Series(f"change by free ends, mean, xi_0/h_n = {FIRST:g}", "%", rows),
             one("as h_n/L vanishes, by a straight line", limit, "%")], []  # fmt: skip
 
 
@@ -276,10 +280,10 @@ def _counted(d: Data) -> Series:
     rows, study = [], d["failure"]
     for target in (1e-1, 1e-2):
         at = study.isel(point=int(np.abs(np.log(study["probability"] / target)).argmin()))
-        plain = share(d.stress(RATIOS[1]) < float(at["stress"]))
+        plain = share(d.stress(SECOND) < float(at["stress"]))
         value, cv = float(at["probability"]), float(at["cv"])
-        found = Number(value, cv * value)
-        rows.append((f"P = {target:g}", found / plain if plain.value else Number(math.nan)))
+        tail = Number(value, cv * value)
+        rows.append((f"P = {target:g}", tail / plain if plain.value else Number(math.nan)))
     return Series("probability over that by counting", "", rows)
 
 
@@ -355,7 +359,7 @@ def _many(d: Data, name: str, point: int) -> Series:
     """Return the chance of so many ruptures with an arrested event as at a point of a what-if."""
     row = d[f"{name}-inertia"]["arrested_events"].sel(point=point).values > 0
     text = f"chance of {row.sum()} of {row.size} ruptures, with the strength of the paper alone"
-    chance = numbers_with_errors.chance_of_so_many(row, with_inertia(d, RATIOS[1]))
+    chance = numbers_with_errors.chance_of_so_many(row, with_inertia(d, SECOND))
     return one(text, chance)
 
 
@@ -404,7 +408,7 @@ WHAT_IF = [
     Claim("small-events-interact", above(0.0), _triggered),
     Claim("random-stress-drop", each(above(0.0), rules.unlikely()),
         lambda d: ([one("134 kPa, short, without inertia, less random strength alone",
-                        shares(d, "random_residual", (4,)).rows[0][1] - arrested(d, RATIOS[1])),
+                        shares(d, "random_residual", (4,)).rows[0][1] - arrested(d, SECOND)),
                     _many(d, "random_residual", 4)], [shares(d, "random_residual")])),
     Claim("random-load", below(0.05, "one sample in twenty", share=True), _random_load(4)),
     Beyond("strong-random-load", below(0.05, "one sample in twenty", share=True),

@@ -10,7 +10,7 @@ import xarray as xr
 import stiction as st
 from reproduction import PARAMETERS, setting
 from reproduction.runner import Runner, Size, along, kept
-from reproduction.setting import MEAN, PROBLEM, RATIOS, SIMULATED, STRAIN, H, strength
+from reproduction.setting import FIRST, MEAN, PROBLEM, RATIOS, SIMULATED, STRAIN, H, strength
 
 LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
 RUPTURE = st.Rupture(loading_rate=setting.LOADING_RATE)
@@ -77,7 +77,7 @@ def moments(run: Runner, samples: int) -> xr.Dataset:
         # Least tau_n away from its minimum by more than h_n.
         where = tau_n.argmin(axis=1) * interface.spacing
         near = setting.distance(interface.x[None, :], where[:, None]) < H
-        each = {
+        variables = {
             "weakest_strength": tau_p.min(axis=1),
             "weakest_position": tau_p.argmin(axis=1) * interface.spacing,
             "largest_tau_n": tau_n.max(axis=1),
@@ -85,10 +85,10 @@ def moments(run: Runner, samples: int) -> xr.Dataset:
             "least_tau_n": tau_n.min(axis=1),
             "bound": bound.min(axis=1),
         }
-        found = xr.Dataset({name: ("sample", values) for name, values in each.items()})
+        extremes = xr.Dataset({name: ("sample", row) for name, row in variables.items()})
         counts = np.histogram(tau_n[:, ::16], edges)[0]
         limits = [MEAN + level * spread[ratio] for level in NORMAL]
-        return found.assign(
+        return extremes.assign(
             below=(("sample", "level"), np.array([(tau_n < s).mean(axis=1) for s in limits]).T),
             powers=(("sample", "order"), np.array(powers).T),
             counts=("cell", counts),
@@ -141,7 +141,7 @@ def readings(run: Runner) -> xr.Dataset:
     def first(dataset: xr.Dataset) -> xr.Dataset:
         return dataset.sel(correlation_ratio=list(SIMULATED)).isel(sample=slice(count))
 
-    own = first(exact(run)), first(local(run))
+    consistent = first(exact(run)), first(local(run))
     strain = run.sweep("strain-exact", STRAIN, in_printed, EXACT, count, SIMULATED)
     strain_local = run.sweep("strain-local", STRAIN, in_printed, LOCAL, count, SIMULATED)
     mixed = run.sweep("mixed-exact", PROBLEM, in_printed, EXACT, count, SIMULATED)
@@ -149,13 +149,13 @@ def readings(run: Runner) -> xr.Dataset:
     # Of each reading: the simulation, its prediction, the prediction with its own modulus, the
     # strength, and the problem of the prediction.
     cases = {
-        "a": (*own, own[1], strength, PROBLEM),
+        "a": (*consistent, consistent[1], strength, PROBLEM),
         "b": (strain, strain_local, strain_local, in_printed, STRAIN),
         "c": (mixed, strain_local, mixed_own, in_printed, STRAIN),
-        "c'": (own[0], printed(run), own[1], strength, STRAIN),
+        "c'": (consistent[0], printed(run), consistent[1], strength, STRAIN),
     }
     parts = []
-    for simulated, predicted, consistent, field_of, problem in cases.values():
+    for simulated, predicted, by_one_modulus, field_of, problem in cases.values():
         stress, place = simulated["first_instability"], simulated["critical_position"]
         length = problem.nucleation_length
         gap = setting.distance(predicted["critical_position"], place)
@@ -173,7 +173,7 @@ def readings(run: Runner) -> xr.Dataset:
                     "simulated": stress,
                     "predicted": predicted["first_instability"],
                     "excess": predicted["first_instability"] / stress - 1.0,
-                    "consistent_excess": consistent["first_instability"] / stress - 1.0,
+                    "consistent_excess": by_one_modulus["first_instability"] / stress - 1.0,
                     "misplaced": (("correlation_ratio", "sample"), gap > 0.5 * length),
                     "patches": simulated["slip_patches"],
                     "contest": least / predicted["first_instability"] - 1.0,
@@ -189,51 +189,47 @@ def _weakened(slip, tau_p, node: int) -> float:
     """Return the share of a rupture at its residual strength once it is 6 h_n long."""
     interface = PROBLEM.interface
     turn = interface.size // 2 - node
-    residual = np.roll(tau_p / setting.W, turn)
+    weakened = np.roll((tau_p - setting.residual(tau_p)) / setting.W, turn)
     for row in np.roll(slip, turn, axis=1):
         stopped = np.flatnonzero(row <= 1e-3 * row.max())
         left = stopped[stopped < interface.size // 2].max(initial=-1)
         right = stopped[stopped > interface.size // 2].min(initial=interface.size)
         if (right - left - 1) * interface.spacing >= 6.0 * H:
             inside = slice(left + 1, right)
-            return float(np.mean(row[inside] >= 0.999 * residual[inside]))
+            return float(np.mean(row[inside] >= 0.999 * weakened[inside]))
     return np.nan
 
 
 @kept(count=lambda size: 8 if size.few >= 24 else 2)
 def representative(run: Runner, count: int) -> xr.Dataset:
     """Ruptures in space and time at the shortest correlation length, the first one whole."""
-    ratio, interface = SIMULATED[0], PROBLEM.interface
+    ratio, interface = FIRST, PROBLEM.interface
 
-    def one(sample):
+    def rupture(sample):
         tau_p = strength(ratio).sample(interface, seed=run.seed_of(ratio), first=sample)[0]
         save = st.Save(["slip_rate", "slip"], every=6)
-        found = st.simulate_rupture(PROBLEM, tau_p, method=RUPTURE, save=save, progress=False)
-        slip = found["slip"].values
-        node = round(float(found["critical_position"]) / interface.spacing)
-        share = _weakened(slip, tau_p, node)
+        result = st.simulate_rupture(PROBLEM, tau_p, method=RUPTURE, save=save, progress=False)
+        slip = result["slip"].values
+        node = round(float(result["critical_position"]) / interface.spacing)
+        part = xr.Dataset({"weakened": _weakened(slip, tau_p, node)})
         if sample:
-            return None, share
+            return part
         # The patch around the onset when the mean stress is largest.
-        labels = patches(slip[int(found["mean_stress"].argmax())] > 0.0)
-        here = labels[node % interface.size]
-        length = np.sum(labels == here) * interface.spacing if here >= 0 else np.nan
-        return (tau_p, found, length), share
+        labels = patches(slip[int(result["mean_stress"].argmax())] > 0.0)
+        label = labels[node % interface.size]
+        length = np.sum(labels == label) * interface.spacing if label >= 0 else np.nan
+        return part.assign(
+            slip_rate=(("time", "x"), result["slip_rate"].values.astype(np.float32)),
+            mean_stress=("time", result["mean_stress"].values),
+            critical_position=float(result["critical_position"]),
+            patch_length=length,
+            strength=("x", tau_p),
+            tau_n=("x", np.ravel(st.theory.nucleation_stress(PROBLEM, tau_p))),
+        ).assign_coords(time=result["time"].values, x=interface.x)
 
-    parts = run.map(one, [(sample,) for sample in range(count)])
-    tau_p, found, patch_length = parts[0][0]
-    return xr.Dataset(
-        {
-            "slip_rate": (("time", "x"), found["slip_rate"].values.astype(np.float32)),
-            "mean_stress": ("time", found["mean_stress"].values),
-            "critical_position": float(found["critical_position"]),
-            "weakened": ("rupture", [share for _, share in parts]),
-            "patch_length": patch_length,
-            "strength": ("x", tau_p),
-            "tau_n": ("x", np.ravel(st.theory.nucleation_stress(PROBLEM, tau_p))),
-        },
-        coords={"time": found["time"].values, "x": PROBLEM.interface.x},
-    )
+    first, *rest = run.map(rupture, [(sample,) for sample in range(count)])
+    shares = [float(part["weakened"]) for part in (first, *rest)]
+    return first.assign(weakened=("rupture", shares))
 
 
 @kept(count=lambda size: 8 if size.ruptures >= 20 else 2)
@@ -254,21 +250,21 @@ def convergence(run: Runner, count: int) -> xr.Dataset:
         "twice the nodes": (setting.grid(PROBLEM, nodes=2.0), onset),
         "half the time step": (PROBLEM, half),
     }
-    ratio = SIMULATED[0]
+    ratio = FIRST
 
-    def one(case, sample):
+    def onset_of(case, sample):
         problem, method = cases[case]
         names = ("critical_stress", "critical_position", "offset")
         if sample >= 4 and (problem is not PROBLEM or method is half):
             return xr.Dataset(dict.fromkeys(names, np.nan))
         tau_p = strength(ratio).sample(problem.interface, seed=run.seed_of(ratio), first=sample)
-        found = st.onset(problem, tau_p, method=method, progress=False)
+        moving = st.onset(problem, tau_p, method=method, progress=False)
         static = st.onset(problem, tau_p, method=EXACT, progress=False)
-        stress, place = (float(found[name][0]) for name in names[:2])
+        stress, place = (float(moving[name][0]) for name in names[:2])
         offset = stress / float(static["first_instability"][0]) - 1.0
         return xr.Dataset(dict(zip(names, (stress, place, offset), strict=True)))
 
-    return run.grid(one, case=list(cases), sample=range(count))
+    return run.grid(onset_of, case=list(cases), sample=range(count))
 
 
 def trend(run: Runner) -> xr.Dataset:
@@ -280,8 +276,8 @@ def trend(run: Runner) -> xr.Dataset:
         ensemble=st.Ensemble(samples=run.size.trend, seed=run.seed),
         sweep=[{"random.strength.spectrum.correlation_length": [r * H for r in TREND]}],
     )
-    found = run.study("trend", study).rename(correlation_length="ratio")
-    return found[["critical_stress"]].assign_coords(ratio=list(TREND))
+    result = run.study("trend", study).rename(correlation_length="ratio")
+    return result[["critical_stress"]].assign_coords(ratio=list(TREND))
 
 
 @kept(samples=lambda size: size.trend)
@@ -304,10 +300,10 @@ def vanishing(run: Runner, samples: int) -> xr.Dataset:
 def window(run: Runner, samples: int) -> xr.Dataset:
     """Onsets as the nucleation length vanishes, with L/xi_0 held fixed."""
     fine = setting.grid(PROBLEM, nodes=2.0)
-    field = strength(RATIOS[-1])
+    field = strength(setting.LAST)
 
     def batch(ratio, first, count):
-        rate = setting.W * ratio / RATIOS[-1]
+        rate = setting.W * ratio / setting.LAST
         friction = dataclasses.replace(fine.friction, weakening_rate=rate)
         problem = dataclasses.replace(fine, friction=friction)
         tau_p = field.sample(fine.interface, samples=count, seed=run.seed, first=first)
@@ -334,15 +330,15 @@ def modes(run: Runner) -> xr.Dataset:
         average = weight @ np.cos(0.5 * H * np.outer(np.cos(t), interface.wavenumbers))
         rounded = np.fft.irfft(cut * average, interface.size, axis=1).min(axis=1)
         cut[:, interface.wavenumbers > 10.0 * np.pi / (ratio * H)] = 0.0
-        others = {
+        changed = {
             "untruncated": more.sample(interface, samples=200, seed=run.seed),
             "cut": np.fft.irfft(cut, interface.size, axis=1),
         }
         changes = {
             name: st.theory.nucleation_stress(PROBLEM, rows).min(axis=1) / usual - 1.0
-            for name, rows in others.items()
+            for name, rows in changed.items()
         } | {"rounded": rounded / usual - 1.0}
-        parts.append(xr.Dataset({name: ("sample", found) for name, found in changes.items()}))
+        parts.append(xr.Dataset({name: ("sample", row) for name, row in changes.items()}))
     return along("correlation_ratio", RATIOS, parts)
 
 
@@ -359,7 +355,7 @@ def growth(run: Runner, count: int) -> xr.Dataset:
     """Slip patches that appear, grow and merge while the load rises to the onset."""
     interface = PROBLEM.interface
 
-    def one(ratio, sample):
+    def grow(ratio, sample):
         tau_p = strength(ratio).sample(interface, seed=run.seed_of(ratio), first=sample)[0]
         onset = st.onset(PROBLEM, tau_p, method=EXACT, progress=False)
         load = float(onset["first_instability"][0])
@@ -376,11 +372,12 @@ def growth(run: Runner, count: int) -> xr.Dataset:
             merged = any(np.unique(row[critical & (row >= 0)]).size > 1 for row in labels[:-1])
             holds_weakest = critical[tau_p.argmin()]
         number = [row.max() + 1 for row in labels]
-        found = {"patches": ("level", number), "merged": merged, "holds_weakest": holds_weakest}
-        return xr.Dataset(found)
+        return xr.Dataset(
+            {"patches": ("level", number), "merged": merged, "holds_weakest": holds_weakest}
+        )
 
-    found = run.grid(one, correlation_ratio=RATIOS, sample=range(count))
-    return found.assign_coords(level=list(LEVELS))
+    growing = run.grid(grow, correlation_ratio=RATIOS, sample=range(count))
+    return growing.assign_coords(level=list(LEVELS))
 
 
 def dips(*places):
@@ -401,10 +398,10 @@ def mechanism(run: Runner) -> xr.Dataset:
         return float(st.theory.nucleation_stress(PROBLEM, profile).min())
 
     result = xr.Dataset(coords={"x": PROBLEM.interface.x})
-    one = dips((0.0, 0.30))
-    single = float(onset(one)["first_instability"][0])
-    path = st.equilibrium_path(PROBLEM, one, [0.999 * single]).isel(load=0)
-    result["one_strength"], result["one_stress"] = ("x", one), ("x", path["stress"].values)
+    dip = dips((0.0, 0.30))
+    single = float(onset(dip)["first_instability"][0])
+    path = st.equilibrium_path(PROBLEM, dip, [0.999 * single]).isel(load=0)
+    result["one_strength"], result["one_stress"] = ("x", dip), ("x", path["stress"].values)
     result["one_load"] = 0.999 * single
     slipping = path["slip"].values > 0.0
     change = path["stress"].values / (0.999 * single) - 1.0
@@ -418,8 +415,8 @@ def mechanism(run: Runner) -> xr.Dataset:
         two = dips((-0.5 * distance, 0.30), (0.5 * distance, 0.30))
         stress = float(onset(two)["first_instability"][0])
         # What a single dip misses is no interaction.
-        own = (local_stress(one) - single) / single
-        lowering.append((local_stress(two) - stress) / stress - own)
+        missed = (local_stress(dip) - single) / single
+        lowering.append((local_stress(two) - stress) / stress - missed)
     result["lowering"] = ("distance", lowering)
     result = result.assign_coords(distance=list(apart))
     pair = dips((-8.0, 0.30), (6.0, 0.298), (7.5, 0.28))
@@ -428,7 +425,7 @@ def mechanism(run: Runner) -> xr.Dataset:
     result["pair_local"] = PROBLEM.interface.x[tau_n.argmin()]
     result["pair_exact"] = float(onset(pair)["critical_position"][0])
     # Load and strength exchanged: tau_p(x), and max tau_p with an initial stress in its place.
-    field, gaps = strength(RATIOS[1]), []
+    field, gaps = strength(setting.SECOND), []
     for tau_p in field.sample(PROBLEM.interface, samples=16, seed=run.seed):
         highest = tau_p.max()
         loaded = dataclasses.replace(PROBLEM, load=st.Load(initial_stress=highest - tau_p))
@@ -442,12 +439,12 @@ def mechanism(run: Runner) -> xr.Dataset:
 @kept(samples=lambda size: size.samples, most=lambda size: 10)
 def arrest(run: Runner, samples: int, most: int) -> xr.Dataset:
     """Arrested samples again, with inertia."""
-    found = exact(run)["arrested_events"]
+    events = exact(run)["arrested_events"]
     interface = PROBLEM.interface
     chosen = [
         (ratio, int(number))
         for ratio in RATIOS
-        for number in np.flatnonzero(found.sel(correlation_ratio=ratio).values > 0)[:most]
+        for number in np.flatnonzero(events.sel(correlation_ratio=ratio).values > 0)[:most]
     ]
 
     def beside(tau_p, centre, length):
@@ -468,11 +465,14 @@ def arrest(run: Runner, samples: int, most: int) -> xr.Dataset:
         by_chance = [beside(tau_p, place, length) for place in interface.x[::8]]
         moving = st.onset(PROBLEM, tau_p, method=RUPTURE, progress=False)
         rank = float(np.mean(np.array(by_chance) < at))
-        return ratio, number, length, rank, float(moving["arrested_events"][0])
+        values = (ratio, number, length, rank, float(moving["arrested_events"][0]))
+        return xr.Dataset(dict(zip(names, values, strict=True)))
 
-    rows = np.array(run.map(again, chosen), dtype=float).reshape(-1, 5)
     names = ("ratio", "number", "length", "rank", "dynamic")
-    return xr.Dataset({name: ("event", rows[:, i]) for i, name in enumerate(names)})
+    parts = run.map(again, chosen)
+    return xr.Dataset({
+        name: ("event", [float(part[name]) for part in parts]) for name in names
+    })  # fmt: skip
 
 
 DRIVING = {
@@ -493,13 +493,13 @@ def driven(case: str):
 @kept(count=lambda size: 16 if size.few >= 24 else 4)
 def driving(run: Runner, count: int) -> xr.Dataset:
     """Arrested fronts under non-uniform loads, by equilibrium and with inertia."""
-    field = strength(RATIOS[1])
+    field = strength(setting.SECOND)
 
-    def one(case, sample):
+    def arrests(case, sample):
         problem = driven(case)
         tau_p = field.sample(problem.interface, seed=run.seed, first=sample)[0]
-        found = st.onset(problem, tau_p, method=st.Equilibrium(events=12), progress=False)
-        length, stress = found["event_length"].values[0], found["event_stress"].values[0]
+        static = st.onset(problem, tau_p, method=st.Equilibrium(events=12), progress=False)
+        length, stress = static["event_length"].values[0], static["event_stress"].values[0]
         drop = tau_p - problem.friction.residual_strength
         energy = float(np.mean(drop**2)) / (2.0 * setting.W)
         griffith = np.full(length.size, np.nan)
@@ -515,19 +515,20 @@ def driving(run: Runner, count: int) -> xr.Dataset:
         arrested = {"length": ("event", length), "griffith": ("event", griffith)}
         return xr.Dataset(arrested | {"dynamic_length": dynamic})
 
-    return run.grid(one, case=list(DRIVING), sample=range(count))
+    return run.grid(arrests, case=list(DRIVING), sample=range(count))
 
 
 def _held(problem, tau_p, stress: float) -> float:
     """Return the length of the patch in which a rupture comes to rest under a load that is held
     just above that of the first arrested event, m."""
     rise = 1.005 * stress / setting.LOADING_RATE
-    load = ([0.0, rise, rise + 1.0], [0.0, 1.005 * stress, 1.005 * stress])
-    method = st.Rupture(load=load, stop="rest", end_time=rise + 1e-3)
-    found = st.simulate_rupture(
+    hold = rise + 10.0 * setting.CROSSING
+    load = ([0.0, rise, hold], [0.0, 1.005 * stress, 1.005 * stress])
+    method = st.Rupture(load=load, stop="rest", end_time=hold)
+    rupture = st.simulate_rupture(
         problem, tau_p, method=method, save=st.Save(["slip"], every=1_000_000), progress=False
     )
-    slip = found["slip"].values[-1]
+    slip = rupture["slip"].values[-1]
     labels = patches(slip > 1e-2 * slip.max())
     longest = np.bincount(labels[labels >= 0]).max(initial=0)
     return float(longest) * problem.interface.spacing
@@ -542,7 +543,7 @@ def free_end(run: Runner, count: int) -> xr.Dataset:
     """
     base = dataclasses.replace(PROBLEM, mode="III")
     length = base.nucleation_length
-    cases = [(ratio, 1.0) for ratio in RATIOS] + [(RATIOS[0], 0.25), (RATIOS[0], 0.5)]
+    cases = [(ratio, 1.0) for ratio in RATIOS] + [(FIRST, 0.25), (FIRST, 0.5)]
 
     def batch(case, first, count):
         ratio, factor = cases[case]
@@ -567,7 +568,7 @@ def free_end(run: Runner, count: int) -> xr.Dataset:
 def failure(run: Runner) -> xr.Dataset:
     """Failure probability down to one in a million at xi_0 = h_n/2, by the local criterion."""
     return st.failure_curve(
-        PROBLEM, strength(RATIOS[1]), method=LOCAL, smallest=1e-6, target_cv=0.2,
+        PROBLEM, strength(setting.SECOND), method=LOCAL, smallest=1e-6, target_cv=0.2,
         seed=run.seed, progress=False,
     ).drop_attrs()  # fmt: skip
 
@@ -576,11 +577,7 @@ WHAT_IFS = (
     "wide_strength", "random_residual", "random_load", "normal_load", "length", "exponent",
     "skewness",
 )  # fmt: skip
-ARRESTS = {
-    "wide_strength": ((3,),),
-    "random_load": ((4, 5),),
-    "random_residual": ((2,), (0,)),
-}
+ARRESTS = {"wide_strength": ((3,),), "random_load": ((4, 5),), "random_residual": ((2,), (0,))}
 """What-ifs in which arrest is the question: of each axis, the values that are run with inertia."""
 TIMES = {"random_load": 2}
 """Samples by equilibrium, in multiples of the usual number: more where shares are small."""
@@ -598,10 +595,10 @@ def what_if(run: Runner, name: str) -> xr.Dataset:
     return stacked(run.study(name, dataclasses.replace(study, ensemble=ensemble)))
 
 
-def stacked(found: xr.Dataset) -> xr.Dataset:
+def stacked(result: xr.Dataset) -> xr.Dataset:
     """Return a dataset with its swept axes stacked along 'point', in the order of the file."""
-    swept = [dim for dim in found["critical_stress"].dims if dim != "sample"]
-    numbered = found.drop_vars([name for name in found.coords if name != "sample"])
+    swept = [dim for dim in result["critical_stress"].dims if dim != "sample"]
+    numbered = result.drop_vars([name for name in result.coords if name != "sample"])
     return numbered.stack(point=swept, create_index=False).transpose("point", ...)
 
 
@@ -617,22 +614,28 @@ def what_if_dynamic(run: Runner, name: str) -> xr.Dataset:
     plain["method"] = RUPTURE
     samples = min(run.size.arrests * TIMES_RUPTURES.get(name, 1), 200)
     plain["ensemble"] = {"samples": samples, "seed": run.seed}
-    found = stacked(run.study(f"{name}-inertia", st.Study.from_dict(plain)))
-    return found.assign_coords(point=numbers.ravel())
+    result = stacked(run.study(f"{name}-inertia", st.Study.from_dict(plain)))
+    return result.assign_coords(point=numbers.ravel())
 
 
-STUDIES = (
-    local, moments, exact, ruptures, printed, readings, theory, representative, convergence, trend,
-    vanishing, window, modes, growth, mechanism, arrest, driving, free_end, failure,
-)  # fmt: skip
-"""In the order in which they are computed."""
+PAPER = (local, moments, exact, ruptures, theory, representative)
+"""What the paper does, in the order in which it is computed."""
+MODULUS = (printed, readings)
+"""Which modulus the paper used: asked with the paper's parameters only."""
+BEYOND = (convergence, trend, vanishing, window, modes, growth, mechanism, arrest, driving,
+          free_end, failure)  # fmt: skip
+"""What `--full` adds."""
 
 
-def jobs(size: Size):
+def jobs(size: Size, full: bool):
     """Yield the name, the progress line and the function of every study."""
-    for study in (*STUDIES, dynamic) if size.dynamic else STUDIES:
+    studies = PAPER if PARAMETERS else PAPER + MODULUS
+    studies += BEYOND if full else ()
+    studies += (dynamic,) if full and size.dynamic else ()
+    for study in studies:
         yield study.__name__, study.__doc__.partition(".")[0], study
-    for name in () if PARAMETERS else WHAT_IFS:  # which state parameters of their own
+    # The what-ifs state parameters of their own.
+    for name in WHAT_IFS if full and not PARAMETERS else ():
         text = f"What if: {name.replace('_', ' ')}"
         yield name, text, functools.partial(what_if, name=name)
         if name in ARRESTS:

@@ -1,105 +1,214 @@
-"""Results that the texts of the page hold; the texts are templates in `page.toml`."""
+"""Numbers and words that the texts of the page name; the texts are templates in `page.toml`.
+
+Every function below takes the studies first. A template calls it by its name without them, and a
+text whose studies are not computed in this run is left out.
+"""
+
+import functools
 
 import numpy as np
 
 from reproduction import setting
 from reproduction import statements_onset as onset
 from reproduction import statements_rupture as rupture
-from reproduction.claims import Data, rounded
-from reproduction.modulus import at, odds
+from reproduction.claims import Data, LeftOut, judge, rounded, short
+from reproduction.modulus import odds
 from reproduction.numbers_with_errors import Number, lower_spread, mean, root_mean_square, share
 from reproduction.rules import Verdict
-from reproduction.setting import RATIOS, SIMULATED
+from reproduction.setting import FIRST, LAST, RATIOS, SIMULATED
 
-ABOVE = 1e-9  # relative; what is nearer than the tolerance of the solver is equal
+ABOVE = 1e-9
+"""Relative difference of two onsets that the tolerance of the solver cannot tell from zero."""
 PER_CENT = 100.0
 
 
-def names(d: Data, found: dict) -> dict:
-    """Return functions and numbers that a text may name; `found` has all findings by name."""
-    wide = onset.trend(d, mean, 1e-6)
-
-    def over(function, ratios=RATIOS) -> list[Number]:
-        return [function(ratio) for ratio in ratios]
-
-    def error(values) -> Number:
-        return root_mean_square(values) * PER_CENT
-
-    def shared(name: str, inertia: bool = True) -> list[tuple[str, Number]]:
-        return rupture.shares(d, name, inertia=inertia).rows
-
-    def counted(name: str) -> list[tuple[str, str]]:
-        size = d[f"{name}-inertia"].sizes["sample"]
-        return [(case, f"{n.value * size:.0f} of {size}") for case, n in shared(name)]
-
-    def over_mean(skew: int) -> list[Number]:
-        """Return the mean of tau_cr over that of the paper's strength, or of its mirror image."""
-        own = setting.LOW + setting.HIGH - setting.MEAN if skew else setting.MEAN
-        return over(lambda r: mean(rupture.skewed(d, skew, r)) / own)
-
-    widths = [1e-3 * onset.stress_density(d, ratio).bandwidth for ratio in RATIOS]
-    edge = d["driving"].sel(case="edge")
-    bounds = np.array([onset.bound_above(d, ratio) for ratio in RATIOS])
-    grown = d.at("growth", "patches", 0.25)[:, -1]
-    return {
-        "d": d,
-        "h": setting.H,
-        "numbers": lambda rows: ", ".join(rounded(number) for number in rows),
-        "stress": lambda ratio: mean(d.stress(ratio)) * 1e-6,
-        "spread": lambda ratio: lower_spread(d.stress(ratio)) * 1e-3,
-        "far_spread": dict(onset.trend(d, lower_spread, 1e-3)),
-        "tiny_spread": lower_spread(d["vanishing"]["stress"][0].values) * 1e-3,
-        "errors": over(lambda r: error(d.excess(r)), (0.25, 2.0)),
-        "mixed": over(lambda r: error(at(d, "c", "excess", r)), (0.25, 2.0)),
-        "rate": dict(onset.rate_offsets(d)),
-        "verb": verb(found["variability"].verdict),
-        "least": min(wide, key=lambda row: row[1].value),
-        "last": wide[-1],
-        "odds": odds(d),
-        "otherwise": [odds(d, visible=seen)[0] for seen in (0.5, 2.0)],
-        "depends": sum(len({*each.readings.values()}) > 1 for each in found.values()),
-        "still": over(lambda r: rupture.arrested(d, r) * PER_CENT),
-        "moving": over(lambda r: rupture.with_inertia(d, r) * PER_CENT),
-        "shared": shared,
-        "counted": counted,
-        "over_mean": over_mean,
-        "changes": lambda *cases: f"{max(onset.convergence(d, c) for c in cases):.2g}",
-        "patches": [mean(grown), *(number for _, number in rupture.patches_at_onset(d).rows)],
-        "far": over(lambda r: share(d.excess(r) > 0.02) * PER_CENT, RATIOS[:2]),
-        "furthest_above": [PER_CENT * d.excess(r).max() for r in RATIOS[:2]],
-        "smoothing": [f(widths) for f in (min, max)],
-        "endless": int((np.isinf(edge["griffith"]) & np.isfinite(edge["length"])).sum()),
-        "bound": [int(np.sum(bounds >= -ABOVE)), bounds.size],
-        "below": dict(zip(RATIOS, over(lambda r: local_below(d, r)), strict=True)),
-        "over_ruptures": over(lambda r: mean(onset.offsets(d, r, "local")) * 100.0, SIMULATED),
-        "misplaced": lambda study: sum(over(lambda r: _misplaced(d, study, r), SIMULATED)),
-        "shifted": over(lambda r: onset.dynamic_mean(d, r) * 1e-6, SIMULATED),
-        "arrested": sum(over(lambda r: int((d.at("exact", "arrested_events", r) > 0).sum()))),
-        "driven": lambda case: d["driving"]["length"].sel(case=case).values / setting.H,
-        "by_ends": over(lambda r: mean(rupture.ends_change(d, r))),
-    }
+def over(function, ratios=RATIOS) -> list[Number]:
+    """Return function(ratio) at several xi_0/h_n."""
+    return [function(ratio) for ratio in ratios]
 
 
-def verb(verdict: Verdict) -> str:
+def named(verdict: Verdict) -> str:
     """Return a verdict as the verb of a sentence."""
     return f"is {verdict.value}" if verdict in (Verdict.OPEN, Verdict.TEXT) else verdict.value
 
 
-def local_below(d: Data, ratio: float) -> tuple[Number, Number, Number]:
-    """Return the share of samples with the local criterion below the exact onset, and by how much
-    on average and at most, all in %."""
+def verdict(d: Data, name: str) -> str:
+    """Return the verdict on a statement as the verb of a sentence."""
+    claims = [claim for rows in (onset.GROUPS | rupture.GROUPS).values() for claim in rows]
+    finding = judge(next(claim for claim in claims if claim.name == name), d)
+    if finding is None:
+        raise LeftOut(name)
+    return named(finding.verdict)
+
+
+def moves(d: Data, function, first=FIRST, last=LAST) -> str:
+    """Return how a quantity changes from the first to the last correlation length, in words."""
+    start, end = function(first), function(last)
+    change = end - start
+    word = "falls" if change.value < -2.0 * change.error else "rises"
+    word = word if abs(change.value) > 2.0 * change.error else "hardly changes"
+    return f"{word} from {short(start)} to {short(end)}"
+
+
+def stress(d: Data, ratio: float) -> Number:
+    """Mean tau_cr by the local criterion, MPa."""
+    return mean(d.stress(ratio)) * 1e-6
+
+
+def spread(d: Data, ratio: float) -> Number:
+    """Median less lower quartile of tau_cr, kPa."""
+    return lower_spread(d.stress(ratio)) * 1e-3
+
+
+def error(d: Data, ratio: float) -> Number:
+    """Error of the local criterion against exact equilibrium, root mean square, %."""
+    return root_mean_square(d.excess(ratio)) * PER_CENT
+
+
+def above_ruptures(d: Data, study: str, ratio: float) -> Number:
+    """A static onset above the rupture of the same sample, mean, %."""
+    return mean(onset.offsets(d, ratio, study)) * PER_CENT
+
+
+def misplaced(d: Data, study: str) -> int:
+    """Ruptures whose onset a static method places more than h_n/2 elsewhere."""
+    count = 0
+    for ratio in SIMULATED:
+        place, predicted = (
+            d.at(name, "critical_position", ratio) for name in ("ruptures", study)
+        )
+        length = setting.PRINTED_H if study == "printed" else setting.H
+        count += int((setting.distance(place, predicted[: place.size]) > 0.5 * length).sum())
+    return count
+
+
+def likelier(d: Data, visible: float = 1.0) -> tuple[float, float, float]:
+    """How much more likely two moduli are than one, with a 95 % interval."""
+    return odds(d, visible=visible)
+
+
+def most_arrested(d: Data) -> tuple[float, Number]:
+    """The xi_0/h_n with the most arrested samples without inertia, and their share, %."""
+    shares = {ratio: rupture.arrested(d, ratio) * PER_CENT for ratio in RATIOS}
+    return max(shares.items(), key=lambda item: item[1].value)
+
+
+def front_speed(d: Data) -> Number:
+    """Median speed of the fronts of all ruptures over the shear wave speed, mean."""
+    speeds = [d.at("ruptures", "median_rupture_speed", ratio) for ratio in SIMULATED]
+    return mean(np.concatenate(speeds) / setting.PROBLEM.solid.shear_wave_speed)
+
+
+def bounded(d: Data) -> tuple[int, int]:
+    """Samples whose exact onset is below the bound of the grid, and all samples."""
+    bounds = np.array([onset.bound_above(d, ratio) for ratio in RATIOS])
+    return int(np.sum(bounds >= -ABOVE)), bounds.size
+
+
+def local_below(d: Data, ratio: float) -> tuple[Number, Number]:
+    """Share of samples with the local criterion below the exact onset, and the largest depth, %."""
     depth = -PER_CENT * d.excess(ratio)
-    found = depth > PER_CENT * ABOVE
-    often = share(found) * PER_CENT
-    if found.sum() < 2:
-        return often, Number(0.0), Number(0.0)
-    return often, mean(depth[found]), Number(float(depth.max()))
+    return share(depth > PER_CENT * ABOVE) * PER_CENT, Number(max(float(depth.max()), 0.0))
 
 
-def _misplaced(d: Data, study: str, ratio: float) -> int:
-    own, other = (d.at(name, "critical_position", ratio) for name in ("ruptures", study))
-    length = setting.PRINTED_H if study == "printed" else setting.H
-    return int((setting.distance(own, other[: own.size]) > 0.5 * length).sum())
+def smoothing(d: Data) -> list[float]:
+    """Least and largest width of the kernels of the densities, kPa."""
+    widths = [1e-3 * onset.stress_density(d, ratio).bandwidth for ratio in RATIOS]
+    return [min(widths), max(widths)]
+
+
+def shifted(d: Data, ratio: float) -> Number:
+    """Mean of exact equilibrium, shifted by the mean difference of the ruptures from it, MPa."""
+    return onset.dynamic_mean(d, ratio) * 1e-6
+
+
+def short_factor(d: Data) -> float:
+    """Factor between the variance ratio and xi_0/h_n for short correlation."""
+    return float(d["theory"]["infinite"][0] / d["theory"]["ratio"][0])
+
+
+def patch(d: Data) -> float:
+    """Length of the critical patch of the shown rupture at the peak of the load, over h_n."""
+    return float(d["representative"]["patch_length"]) / setting.H
+
+
+def least(d: Data) -> tuple[float, Number]:
+    """The xi_0/h_n of the least mean tau_cr over the wide range, and this mean, MPa."""
+    return min(onset.trend(d, mean, 1e-6), key=lambda row: row[1].value)
+
+
+def far_spread(d: Data, ratio: float) -> Number:
+    """Median less lower quartile of tau_cr over the wide range, kPa."""
+    return dict(onset.trend(d, lower_spread, 1e-3))[ratio]
+
+
+def rate(d: Data) -> dict[str, Number]:
+    """How far ruptures lie above equilibrium at each loading rate, %."""
+    return dict(onset.rate_offsets(d))
+
+
+def changes(d: Data, *cases: str) -> str:
+    """Largest change of tau_cr of a rupture with another grid or step, %."""
+    return f"{max(onset.convergence(d, case) for case in cases):.2g}"
+
+
+def patches(d: Data) -> list[Number]:
+    """Slipping patches at .999 of the onset, at the onset, and at the onset of all samples."""
+    grown = d.at("growth", "patches", FIRST)[:, -1]
+    return [mean(grown), *(number for _, number in rupture.patches_at_onset(d).rows)]
+
+
+def rerun(d: Data) -> tuple[int, int]:
+    """Arrested samples that were run again with inertia, and those arrested then, too."""
+    return d["arrest"].sizes["event"], int((d["arrest"]["dynamic"].values > 0).sum())
+
+
+def driven(d: Data, case: str) -> np.ndarray:
+    """Lengths of arrested fronts under a non-uniform load, over h_n."""
+    return d["driving"]["length"].sel(case=case).values / setting.H
+
+
+def counted(d: Data, name: str) -> list[tuple[str, str]]:
+    """Ruptures with an arrested event at the points of a what-if, in words."""
+    size = d[f"{name}-inertia"].sizes["sample"]
+    rows = rupture.shares(d, name, inertia=True).rows
+    return [(case, f"{number.value * size:.0f} of {size}") for case, number in rows]
+
+
+def over_mean(d: Data, skew: int) -> list[Number]:
+    """Mean of tau_cr over that of the paper's strength, or of its mirror image."""
+    strength = setting.LOW + setting.HIGH - setting.MEAN if skew else setting.MEAN
+    return over(lambda ratio: mean(rupture.skewed(d, skew, ratio)) / strength)
+
+
+def by_ends(d: Data) -> list[Number]:
+    """Mean change of tau_cr by free ends, %."""
+    return over(lambda ratio: mean(rupture.ends_change(d, ratio)))
+
+
+FUNCTIONS = (
+    above_ruptures, bounded, by_ends, changes, counted, driven, error, far_spread, front_speed,
+    least, likelier, local_below, misplaced, moves, most_arrested, over_mean, patch, patches, rate,
+    rerun, shifted, short_factor, smoothing, spread, stress, verdict,
+)  # fmt: skip
+
+
+def names(d: Data) -> dict:
+    """Return all that a text may name."""
+    known = {function.__name__: functools.partial(function, d) for function in FUNCTIONS}
+    return known | {
+        "d": d,
+        "setting": setting,
+        "first": FIRST,
+        "second": setting.SECOND,
+        "last": LAST,
+        "listed": lambda rows, form=short: ", ".join(form(number) for number in rows),
+        "above_ruptures_of": lambda study: functools.partial(above_ruptures, d, study),
+        "at_all": lambda function, ratios=RATIOS: over(function, ratios),
+        "ratios": ", ".join(f"{ratio:g}" for ratio in RATIOS),
+        "simulated": SIMULATED,
+        "number": rounded,
+    }
 
 
 def few_and_many(d: Data) -> list[tuple]:
@@ -117,9 +226,9 @@ def few_and_many(d: Data) -> list[tuple]:
         many = d.stress(ratio, "exact") * 1e-6 * (1.0 - shift)
         drawn = generator.choice(many, (4000, few.size))
         for name, function in (("mean", np.mean), ("standard deviation", np.std)):
-            found, null = float(function(few)), function(drawn, axis=1)
-            z = (found - null.mean()) / null.std()
-            below = float(np.mean(null <= found))
-            chance = min(2.0 * min(below, 1.0 - below) + 1.0 / null.size, 1.0)
-            rows.append((ratio, name, found, float(function(many)), z, chance))
+            value, resampled = float(function(few)), function(drawn, axis=1)
+            z = (value - resampled.mean()) / resampled.std()
+            below = float(np.mean(resampled <= value))
+            chance = min(2.0 * min(below, 1.0 - below) + 1.0 / resampled.size, 1.0)
+            rows.append((ratio, name, value, float(function(many)), z, chance))
     return rows

@@ -13,7 +13,7 @@ from reproduction.figures.common import COLOURS, GREY, INK, OVER_MEAN, RED, TAU_
 from reproduction.numbers_with_errors import deviation, lower_spread, mean
 from reproduction.setting import HIGH, MEAN, PROBLEM, RATIOS, SIMULATED, H, L
 from reproduction.statements_onset import bound_above, trend
-from reproduction.statements_rupture import arrested, shares, with_inertia
+from reproduction.statements_rupture import arrested, largest_energy, shares, with_inertia
 from reproduction.studies import DRIVING, LEVELS, RATES
 
 
@@ -45,8 +45,8 @@ def figure_9(d: Data):
     top, bottom = figure.subplots(2, 1, sharex=True)
     tiny = d["vanishing"]["stress"]
     for axes, function, factor in ((top, mean, 1 / MEAN), (bottom, lower_spread, 1e-3)):
-        found = [function(row.values) * factor for row in tiny]
-        common.numbers(axes, tiny.ratio.values, found, color=COLOURS[0], marker="o", mfc="white",
+        finer = [function(row.values) * factor for row in tiny]
+        common.numbers(axes, tiny.ratio.values, finer, color=COLOURS[0], marker="o", mfc="white",
                        ls="-", label="finer grid, other draws")  # fmt: skip
         rows = trend(d, function, factor)
         common.numbers(axes, [r for r, _ in rows], [n for _, n in rows], color=COLOURS[0],
@@ -56,12 +56,12 @@ def figure_9(d: Data):
                 label="standard deviation")  # fmt: skip
     for axes in (top, bottom):
         axes.axvspan(RATIOS[0], RATIOS[-1], color="#eeeeee", lw=0, zorder=0)
-    top.set(xscale="log", ylabel=rf"mean of $\tau_\mathrm{{cr}}{OVER_MEAN}", ylim=(0.68, 0.96))
-    top.text(0.71, 0.69, "the paper's range", ha="center", color=GREY)
+    top.set(xscale="log", ylabel=rf"mean of $\tau_\mathrm{{cr}}{OVER_MEAN}")
+    top.text((RATIOS[0] * RATIOS[-1]) ** 0.5, 0.03, "Figures 5 and 6", ha="center", color=GREY,
+             transform=top.get_xaxis_transform())  # fmt: skip
     bottom.set(yscale="log", xlabel=XI, ylabel="spread (kPa)")
     common.plain_ticks(bottom.xaxis, (1 / 64, 1 / 16, 0.25, 1, 4, 16),
                        ["1/64", "1/16", "1/4", "1", "4", "16"])  # fmt: skip
-    common.plain_ticks(bottom.yaxis, (10, 20, 50, 100))
     bottom.legend(loc="upper left")
     common.letters((top, bottom))
     return figure
@@ -80,9 +80,9 @@ def figure_10(d: Data):
     guide = rows.mean(axis=1)[2] * (rates / rates[2])
     axes.plot(rates, guide, ":", color=RED, label="in proportion to the rate")
     axes.axvline(rates[2], color=GREY, lw=0.8, ls="--")
-    axes.text(rates[2] * 0.92, 0.3, "all other ruptures", rotation=90, ha="right", va="center",
-              color=GREY)  # fmt: skip
-    axes.set(xscale="log", yscale="log", ylim=(5e-4, 1), xlabel="loading rate (MPa/s)",
+    axes.text(rates[2] * 0.92, 0.7, "other ruptures", rotation=90, ha="right", va="center",
+              color=GREY, transform=axes.get_xaxis_transform())  # fmt: skip
+    axes.set(xscale="log", yscale="log", xlabel="loading rate (MPa/s)",
              ylabel="rupture above equilibrium (%)")  # fmt: skip
     axes.legend(loc="upper left")
     return figure
@@ -92,7 +92,7 @@ def figure_11(d: Data):
     """Draw how patches grow in number and merge, and how they act on each other."""
     figure = common.new(7.6)
     grid = figure.add_gridspec(4, 1, height_ratios=(1.0, 0.85, 1.0, 0.9))
-    number, one, pair, lowering = (figure.add_subplot(grid[i]) for i in range(4))
+    number, single, pair, lowering = (figure.add_subplot(grid[i]) for i in range(4))
     for ratio in RATIOS:
         rows = d.at("growth", "patches", ratio)
         number.errorbar(LEVELS, rows.mean(axis=0), 2 * rows.std(axis=0) / np.sqrt(len(rows)),
@@ -102,10 +102,10 @@ def figure_11(d: Data):
     study = d["mechanism"]
     x = (PROBLEM.interface.x - 0.5 * L) / H
     load = float(study["one_load"])
-    one.plot(x, study["one_stress"] / load, color=COLOURS[0], label="stress over load")
-    one.plot(x, study["one_strength"] / load, "--", color=GREY, label="strength over load")
-    one.set(xlim=(-3, 3), xlabel=r"$x/h_\mathrm{n}$ from a single patch")
-    one.legend(loc="lower right")
+    single.plot(x, study["one_stress"] / load, color=COLOURS[0], label="stress over load")
+    single.plot(x, study["one_strength"] / load, "--", color=GREY, label="strength over load")
+    single.set(xlim=(-3, 3), xlabel=r"$x/h_\mathrm{n}$ from a single patch")
+    single.legend(loc="lower right")
     pair.plot(x, study["pair_strength"] / MEAN, "--", color=GREY, label=r"$\tau_\mathrm{p}$")
     pair.plot(x, study["pair_tau_n"] / MEAN, color=COLOURS[1], label=r"$\tau_\mathrm{n}$")
     for name, marker, face, text in (("pair_local", "s", "none", "local criterion"),
@@ -113,14 +113,13 @@ def figure_11(d: Data):
         place = float(study[name])
         height = float(np.interp(place, PROBLEM.interface.x, study["pair_tau_n"] / MEAN))
         pair.plot((place - 0.5 * L) / H, height, marker, color=RED, ms=6, mfc=face, label=text)
-    pair.set(xlim=(-12, 12), ylim=(0.68, 1.3), xlabel=r"$x/h_\mathrm{n}$",
+    pair.set(xlim=(-12, 12), ylim=(None, 1.3), xlabel=r"$x/h_\mathrm{n}$",
              ylabel=rf"stress ${OVER_MEAN}")  # fmt: skip
     pair.legend(loc="upper center", ncols=2)
     lowering.loglog(study["distance"], study["lowering"] * 100, "-o", color=COLOURS[0], ms=4)
     lowering.set(xlabel=r"distance of two dips over $h_\mathrm{n}$", ylabel="onset lowered (%)")
     common.plain_ticks(lowering.xaxis, (1.25, 2, 3, 5, 8))
-    common.plain_ticks(lowering.yaxis, (0.03, 0.1, 0.3))
-    common.letters((number, one, pair, lowering))
+    common.letters((number, single, pair, lowering))
     return figure
 
 
@@ -128,14 +127,17 @@ def figure_12(d: Data):
     """Draw the energy balance of a growing rupture, and the share of arrested ones."""
     figure = common.new(5.6)
     top, bottom = figure.subplots(2, 1, height_ratios=(1.2, 1.0))
-    length = np.linspace(0, 4.5, 100)
-    most = HIGH**2 / (2 * setting.W)
-    for ratio in RATIOS:
-        stress = d.stress(ratio, "exact").mean()
-        rate = math.pi * 0.5 * length * H * stress**2 / (2 * setting.G_STAR)
-        top.plot(length, rate / most, **common.line(ratio), label=f"{ratio:g}")
+    drops = {
+        ratio: d.stress(ratio, "exact").mean() - setting.residual(MEAN) for ratio in RATIOS
+    }
+    unit = math.pi * 0.5 * H / (2 * setting.G_STAR) / largest_energy()
+    length = np.linspace(0, 1.5 / (unit * max(drops.values()) ** 2), 100)
+    for ratio, drop in drops.items():
+        top.plot(length, unit * length * drop**2, **common.line(ratio), label=f"{ratio:g}")
     top.axhline(1, color=RED, lw=1)
-    top.text(0.1, 1.03, r"largest fracture energy $\Gamma_\mathrm{max}$", color=RED)
+    top.text(
+        0.02 * length[-1], 1.03, r"largest fracture energy $\Gamma_\mathrm{max}$", color=RED
+    )
     top.axvspan(0, 1, color="#eeeeee", lw=0, zorder=0)
     top.text(0.5, 0.6, "not yet\nunstable", ha="center", color=GREY)
     events = d["arrest"]
@@ -146,16 +148,16 @@ def figure_12(d: Data):
     ):
         place = events["length"].values[chosen] / H
         top.plot(place, y + 0 * place, marker, color=INK, ms=5, mfc="none", label=text)
-    top.set(xlabel=r"length of the rupture over $h_\mathrm{n}$", xlim=(0, 4.5), ylim=(0, 1.6),
-            ylabel=r"$G/\Gamma_\mathrm{max}$")  # fmt: skip
+    top.set(xlabel=r"length of the rupture over $h_\mathrm{n}$", xlim=(0, length[-1]),
+            ylim=(0, 1.6), ylabel=r"$G/\Gamma_\mathrm{max}$")  # fmt: skip
     top.legend(loc="lower right", title=XI)
     for function, shift, colour, marker, text in (
         (arrested, 0.0, COLOURS[0], "o", "without inertia"),
         (with_inertia, 0.1, RED, "D", "with inertia (drawn beside)"),
     ):
-        found = [function(d, ratio) * 100 for ratio in RATIOS]
+        rows = [function(d, ratio) * 100 for ratio in RATIOS]
         style = {"fmt": marker, "color": colour, "ms": 5, "label": text}
-        common.numbers(bottom, np.log2(RATIOS) + shift, found, **style)
+        common.numbers(bottom, np.log2(RATIOS) + shift, rows, **style)
     common.ratio_axis(bottom)
     bottom.set(ylabel="samples with an\narrested event (%)", ylim=(0, None))
     bottom.legend()
@@ -188,7 +190,7 @@ def figure_13(d: Data):
     bottom.plot(edge["griffith"].values[:, 0] / H, edge["dynamic_length"].values / H, "D",
                 color=RED, mfc="none", ms=5, label="edge, first event, with inertia"
                 f" ({np.isfinite(edge['dynamic_length'].values).sum()})")  # fmt: skip
-    bottom.plot([5, 40], [5, 40], color=GREY, lw=0.8)
+    bottom.axline((1, 1), (10, 10), color=GREY, lw=0.8)
     bottom.axvline(L / H, color=GREY, lw=0.8, ls=":")
     bottom.set(xscale="log", yscale="log", xlabel=r"Griffith's length over $h_\mathrm{n}$",
                ylabel=r"arrested length over $h_\mathrm{n}$", ylim=(0.8, 200))  # fmt: skip
@@ -238,8 +240,8 @@ def figure_15(d: Data):
     length, pressure, end, tail = figure.subplots(4, 1)
     extents = np.array((12.5, 25, 50, 100, 200, 400, 800))
     rows = d["length"]["critical_stress"].values
-    found = [deviation(row / row.mean()) * 100 for row in rows]
-    common.numbers(length, extents, found, color=COLOURS[0], marker="o")
+    scatter = [deviation(row / row.mean()) * 100 for row in rows]
+    common.numbers(length, extents, scatter, color=COLOURS[0], marker="o")
     length.set(xscale="log", yscale="log", xlabel="length of the interface (mm)",
                ylabel=f"variation of {TAU_CR} (%)")  # fmt: skip
     common.plain_ticks(length.xaxis, extents)
@@ -254,10 +256,11 @@ def figure_15(d: Data):
     pressure.set(xlabel="normal pressure (MPa)", ylabel="friction coefficient", xlim=(0.5, 4.5))
     pressure.legend(title="mean \N{PLUS-MINUS SIGN} sd of samples")
     change = [mean(row) * 100 for row in d["free_end"]["change"].values]
-    for x, found, look, text in ((np.log2(RATIOS), change[:4], 0, "$L$"),
-                                 ([-2], change[5:], 1, "$L/2$"),
-                                 ([-2], change[4:5], 2, "$L/4$")):  # fmt: skip
-        common.numbers(end, x, found, color=COLOURS[look], marker="os^"[look], label=text)
+    shortest, count = np.log2(RATIOS[:1]), len(RATIOS)
+    for x, rows, look, text in ((np.log2(RATIOS), change[:count], 0, "$L$"),
+                                (shortest, change[count + 1:], 1, "$L/2$"),
+                                (shortest, change[count:count + 1], 2, "$L/4$")):  # fmt: skip
+        common.numbers(end, x, rows, color=COLOURS[look], marker="os^"[look], label=text)
     end.axhline(0, color=GREY, lw=0.8)
     common.ratio_axis(end)
     end.set(ylabel=f"{TAU_CR} by free ends (%)")
@@ -284,11 +287,11 @@ def figure_16(d: Data):
     """Draw what other strengths and spectra do to the onset."""
     figure = common.new(4.6)
     skew, spectrum = figure.subplots(2, 1)
-    for own, start, colour, marker, text in (
+    for average, start, colour, marker, text in (
         (MEAN, 0, COLOURS[0], "o", "the paper's strength"),
         (setting.LOW + HIGH - MEAN, 4, COLOURS[2], "^", "its mirror image"),
     ):
-        rows = [d.what_if("skewness", "critical_stress", start + i) / own for i in range(4)]
+        rows = [d.what_if("skewness", "critical_stress", start + i) / average for i in range(4)]
         skew.errorbar(np.log2(RATIOS) + 0.01 * start, [row.mean() for row in rows],
                       [row.std() for row in rows], color=colour, marker=marker, ms=4, capsize=3,
                       label=text)  # fmt: skip

@@ -3,14 +3,24 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from reproduction.setting import RATIOS
+from reproduction.setting import HIGH, LOW, MAX_RATIOS, MEAN, RATIOS
 
 WIDTH = 4.5
 """Inches; type of 8.5 points is then 9 pixels high on a screen of 390 pixels."""
 INK, GREY, PALE, RED = "#1a1a1a", "#7a7a7a", "#d0d0d0", "#b5322a"
-COLOURS = ("#14213d", "#2a6f97", "#c8553d", "#e0a030")
-DASHES = ("-", (0, (5.0, 1.4)), (0, (3.5, 1.2, 1.0, 1.2)), (0, (1.2, 1.0)))
-MARKERS = ("o", "s", "^", "D")
+COLOURS = ("#14213d", "#2a6f97", "#c8553d", "#e0a030", "#6a994e", "#7b4f9e")
+DASHES = (
+    "-",
+    (0, (5.0, 1.4)),
+    (0, (3.5, 1.2, 1.0, 1.2)),
+    (0, (1.2, 1.0)),
+    "-",
+    (0, (5.0, 1.4)),
+)
+MARKERS = ("o", "s", "^", "D", "v", "P")
+assert len(COLOURS) == len(DASHES) == len(MARKERS) == MAX_RATIOS
+STRENGTHS = (LOW / MEAN, HIGH / MEAN)
+"""The range of the strength over its mean."""
 XI = r"$\xi_0/h_\mathrm{n}$"
 TAU_CR = r"$\tau_\mathrm{cr}$"
 MEAN_P = r"$\langle\tau_\mathrm{p}\rangle$"
@@ -39,15 +49,33 @@ def letter(axes, text: str, *, x: float = 0.0) -> None:
     axes.text(x, 1.02, f"({text})", transform=axes.transAxes, fontweight="bold", va="bottom")
 
 
+def span(*rows, margin: float = 0.06) -> tuple[float, float]:
+    """Return limits that hold all finite values, with a margin."""
+    values = np.concatenate([np.ravel(row) for row in rows])
+    values = values[np.isfinite(values)]
+    gap = margin * (np.ptp(values) or abs(values[0]) or 1.0)
+    return float(values.min() - gap), float(values.max() + gap)
+
+
+def left_out(axes, values, limits) -> None:
+    """Say how many values lie outside the limits of an axis."""
+    values = np.ravel(values)
+    count = int(np.sum((values < limits[0]) | (values > limits[1])))
+    if count:
+        axes.text(
+            0.99, 0.02, f"{count} outside", transform=axes.transAxes, ha="right", va="bottom"
+        )
+
+
 def letters(panels, *, x: float = -0.12) -> None:
     """Letter panels in their order."""
     for text, axes in zip("abcd", panels, strict=False):
         letter(axes, text, x=x)
 
 
-def numbers(axes, x, found, **style) -> None:
+def numbers(axes, x, rows, **style) -> None:
     """Draw numbers with two standard errors."""
-    values, errors = [n.value for n in found], [2 * n.error for n in found]
+    values, errors = [n.value for n in rows], [2 * n.error for n in rows]
     axes.errorbar(x, values, errors, **{"ms": 4} | style)
 
 

@@ -25,15 +25,16 @@ def figure_1(d: Data):
     field, density = (figure.add_subplot(bottom[i]) for i in (0, 1))
     tau_p, x = d["representative"]["strength"].values / MEAN, PROBLEM.interface.x / L
     field.plot(x, tau_p, color=COLOURS[0], lw=0.9)
+    low, high = common.span(tau_p, common.STRENGTHS)
     field.set(xlabel=r"$x/L$", ylabel=rf"$\tau_\mathrm{{p}}{OVER_MEAN}", xlim=(0, 1),
-              ylim=(0.6, 2.9))  # fmt: skip
+              ylim=(low, high + 1.1 * (high - low)))  # room for the inset  # fmt: skip
     common.letter(field, "d", x=-0.1)
     inset = field.inset_axes((0.3, 0.68, 0.66, 0.32))
     lag = PROBLEM.interface.x / H
     for name, style in (("correlation", "-"), ("gaussian_correlation", ":")):
-        inset.plot(lag, d["theory"][name].sel(correlation_ratio=0.25), style, color=INK, lw=0.9)
-    inset.set(xlim=(0, 0.6), ylabel=r"$C$", yticks=(0, 1))
-    inset.text(0.3, 0.3, r"$\xi/h_\mathrm{n}$", ha="center")
+        inset.plot(lag, d.at("theory", name, setting.FIRST), style, color=INK, lw=0.9)
+    inset.set(xlim=(0, 2.4 * setting.FIRST), ylabel=r"$C$", yticks=(0, 1))
+    inset.text(1.2 * setting.FIRST, 0.3, r"$\xi/h_\mathrm{n}$", ha="center")
     inset.legend([r"$\tau_\mathrm{p}$", "$z$"], loc="upper right", handlelength=1.2)
     s = np.linspace(LOW, HIGH, 300)
     density.plot(setting.MARGINAL.distribution.pdf(s) * MEAN, s / MEAN, color=COLOURS[0])
@@ -86,33 +87,41 @@ def figure_2(d: Data):
     grid = figure.add_gridspec(2, 2, height_ratios=(1.1, 1.0))
     left, right = (figure.add_subplot(grid[0, i]) for i in (0, 1))
     z = np.linspace(-3.5, 3.5, 300)
-    s = np.linspace(0.6e6, 1.75e6, 300)
+    s = np.linspace(*common.span((LOW, HIGH)), 300)
     law = setting.MARGINAL.distribution
+    peak = max(law.pdf(s)) * MEAN
     left.plot(z, norm.cdf(z), color=COLOURS[0], label=r"$\Phi$")
     left.plot(z, norm.pdf(z), "--", color=GREY, label="density")
     right.plot(s / MEAN, law.cdf(s), color=COLOURS[2], label="$F$")
-    right.plot(s / MEAN, law.pdf(s) * MEAN / 3, "--", color=GREY, label="density / 3")
+    right.plot(
+        s / MEAN, law.pdf(s) * MEAN / peak, "--", color=GREY, label=f"density / {peak:.2g}"
+    )
     for value, colour in ((-0.6, COLOURS[1]), (1.1, RED)):
         level = norm.cdf(value)
         left.plot(value, level, "o", color=colour, ms=5)
         right.plot(law.ppf(level) / MEAN, level, "o", color=colour, ms=5)
         left.plot([value, 3.5], [level, level], ":", color=colour, lw=0.9)
-        right.plot([0.6, law.ppf(level) / MEAN], [level, level], ":", color=colour, lw=0.9)
+        right.plot(np.array([s[0], law.ppf(level)]) / MEAN, [level, level], ":", color=colour,
+                   lw=0.9)  # fmt: skip
     left.set(xlabel="$z$", ylabel="cumulative probability", ylim=(0, 1.02), xlim=(-3.5, 3.5))
-    right.set(xlabel=rf"$\tau_\mathrm{{p}}{OVER_MEAN}", ylim=(0, 1.02), xlim=(0.6, 1.75))
+    right.set(xlabel=rf"$\tau_\mathrm{{p}}{OVER_MEAN}", ylim=(0, 1.02),
+              xlim=(s[0] / MEAN, s[-1] / MEAN))  # fmt: skip
     right.tick_params(labelleft=False)
     left.legend(loc="upper left")
     right.legend(loc="center right")
     common.letter(left, "a", x=-0.2)
     axes = figure.add_subplot(grid[1, :])
-    k = np.geomspace(0.03, 10, 300)
-    axes.loglog(k, (1.0 + k**2) ** -4.0, color=COLOURS[0], label=r"$g(k)/g(0)$")
-    axes.loglog(k[k > 1.4], k[k > 1.4] ** -8.0, "--", color=RED, label=r"$(k/\lambda)^{-8}$")
-    for place, text in ((1.0, r"$\lambda=2\pi/\xi_0$"), (2.5, r"$\bar k=2.5\,\lambda$")):
+    spectrum = setting.FIELD.spectrum
+    unit = 2.0 * np.pi / spectrum.correlation_length  # lambda
+    cutoff = spectrum.cutoff() / unit
+    k = np.geomspace(0.03, max(10.0, 1.5 * cutoff), 300)
+    value = spectrum.density(unit * k) / spectrum.density(np.zeros(1))
+    axes.loglog(k, value, color=COLOURS[0])
+    floor = max(float(value[k <= 1.2 * cutoff].min()) / 10.0, 1e-12)
+    for place, text in ((1.0, r"$\lambda=2\pi/\xi_0$"), (cutoff, "cut-off")):
         axes.axvline(place, color=GREY, lw=0.8, ls=":")
-        axes.text(place * 0.94, 3e-8, text, rotation=90, ha="right", va="bottom")
-    axes.set(xlabel=r"$k/\lambda$", ylabel=r"$g(k)/g(0)$", ylim=(1e-8, 3))
-    axes.legend(loc="lower left")
+        axes.text(place * 0.94, 2.0 * floor, text, rotation=90, ha="right", va="bottom")
+    axes.set(xlabel=r"$k/\lambda$", ylabel=r"$g(k)/g(0)$", ylim=(floor, 3))
     common.letter(axes, "b", x=-0.09)
     return figure
 
@@ -138,27 +147,32 @@ def figure_3(d: Data):
     centre, shift = 0.75, _shift(study)
     rate = np.roll(study["slip_rate"].values, shift, axis=1) * setting.G_STAR
     rate = np.maximum(rate / (MEAN * solid.shear_wave_speed), 1e-12)
+    top = float(rate.max()) / 2.0  # colours over five decades below the fastest
     zoom = figure.add_subplot(grid[0, :])
     late = (end / onset - 1.0) * 1e4
     picture = zoom.pcolormesh(x, (time / onset - 1.0) * 1e4, rate[:-1, :-1], rasterized=True,
-                              norm=LogNorm(1e-5, 3.0), cmap=SLOW_TO_FAST)  # fmt: skip
+                              norm=LogNorm(1e-5 * top, 3.0 * top), cmap=SLOW_TO_FAST)  # fmt: skip
     zoom.set(ylim=(-0.2 * late, late), ylabel=r"$(t/T-1)\times10^{4}$", xlim=(0, 1))
     for speed, text in (
         (solid.shear_wave_speed, r"$c_\mathrm{s}$"),
         (solid.dilatational_wave_speed, r"$c_\mathrm{d}$"),
     ):
-        away = np.array([0.12, 0.12 + 0.6 * late * 1e-4 * onset * speed / L])
-        zoom.plot(centre - away, (0.0, 0.6 * late), color=INK, lw=1.2, ls="--")
-        zoom.text(centre - away[1], 0.62 * late, text, ha="center", va="bottom")
+        way = 0.6 * late * 1e-4 * onset * speed / L
+        shown = min(1.0, 0.5 / way)  # the line stays within the panel
+        away = np.array([0.12, 0.12 + shown * way])
+        zoom.plot(centre - away, (0.0, 0.6 * late * shown), color=INK, lw=1.2, ls="--")
+        zoom.text(centre - away[1], 0.62 * late * shown, text, ha="center", va="bottom")
     common.letter(zoom, "a", x=-0.1)
     figure.colorbar(picture, ax=zoom, label=r"slip rate $\times\,G^*/(\langle\tau_\mathrm{p}\rangle"
-                    r" c_\mathrm{s})$", ticks=(1e-4, 1e-2, 1))  # fmt: skip
+                    r" c_\mathrm{s})$")  # fmt: skip
     load, wide = figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1:])
     load.plot(mean_stress / mean_stress.max(), time / onset, color=COLOURS[0])
-    wide.pcolormesh(x, time / onset, rate[:-1, :-1], norm=LogNorm(1e-8, 1e-2), cmap=SLOW_TO_FAST,
-                    rasterized=True)  # fmt: skip
+    wide.pcolormesh(x, time / onset, rate[:-1, :-1], norm=LogNorm(1e-8 * top, 1e-2 * top),
+                    cmap=SLOW_TO_FAST, rasterized=True)  # fmt: skip
     first = time[0] / onset
-    load.set(xlim=(0.8, 1.03), ylabel="$t/T$", xlabel=r"$\tau_0/\tau_\mathrm{cr}$")
+    shown = mean_stress[time <= onset] / mean_stress.max()
+    load.set(xlim=(min(0.8, shown.min()), 1.03), ylabel="$t/T$",
+             xlabel=r"$\tau_0/\tau_\mathrm{cr}$")  # fmt: skip
     wide.set(xlim=(0, 1), xlabel="$x/L$")
     wide.tick_params(labelleft=False)
     for axes, place in ((load, 1), (wide, centre)):
@@ -190,19 +204,20 @@ def figure_4(d: Data):
     top.plot(x, tau_p, "--", color=GREY, lw=0.8, label=r"$\tau_\mathrm{p}$")
     top.plot(x, tau_n, color=COLOURS[1], label=r"$\tau_\mathrm{n}$")
     top.plot(x[tau_n.argmin()], tau_n.min(), "o", color=INK, ms=5)
-    top.set(xlabel="$x/L$", ylabel=rf"stress ${OVER_MEAN}", xlim=(0, 1), ylim=(0.6, 1.75))
+    top.set(xlabel="$x/L$", ylabel=rf"stress ${OVER_MEAN}", xlim=(0, 1))
     top.legend(loc="upper right", ncols=2)
     common.letter(top, "a", x=-0.1)
     for ratio in SIMULATED:
         stress = d.stress(ratio, "ruptures") / MEAN
         style = common.dots(ratio)
         middle.plot(stress, 100 * offsets(d, ratio, "local"), **style, ms=4, label=f"{ratio:g}")
-        middle.plot(stress, 100 * offsets(d, ratio, "printed"), **{**style, "color": common.PALE},
-                    ms=3, mfc="none", zorder=1)  # fmt: skip
+        if "printed" in d:
+            middle.plot(stress, 100 * offsets(d, ratio, "printed"), ms=3, mfc="none", zorder=1,
+                        **{**style, "color": common.PALE})  # fmt: skip
     middle.axhline(0, color=GREY, lw=0.8)
     middle.set(xlabel=rf"$\tau_\mathrm{{cr}}{OVER_MEAN} of the rupture",
                ylabel="theory above rupture (%)")  # fmt: skip
-    middle.legend(title=XI, loc="upper left", ncols=3)
+    middle.legend(title=XI, ncols=3)
     common.letter(middle, "b", x=-0.1)
     bottom.plot([0, 1], [0, 1], color=GREY, lw=0.8)
     for ratio in SIMULATED:
@@ -211,9 +226,10 @@ def figure_4(d: Data):
         bottom.plot(predicted / L, place / L, **common.dots(ratio), ms=4)
         off = setting.distance(place, predicted) > 0.5 * H
         bottom.plot(predicted[off] / L, place[off] / L, "o", mfc="none", mec=RED, ms=9)
-        other = d.at("printed", "critical_position", ratio)[: place.size]
-        off = setting.distance(place, other) > 0.5 * setting.PRINTED_H
-        bottom.plot(other[off] / L, place[off] / L, "x", color=RED, ms=6)
+        if "printed" in d:
+            printed = d.at("printed", "critical_position", ratio)[: place.size]
+            off = setting.distance(place, printed) > 0.5 * setting.PRINTED_H
+            bottom.plot(printed[off] / L, place[off] / L, "x", color=RED, ms=6)
     bottom.set(xlabel=r"predicted $x_\mathrm{cr}/L$", ylabel=r"simulated $x_\mathrm{cr}/L$",
                xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), aspect="equal")  # fmt: skip
     common.letter(bottom, "c", x=-0.15)
@@ -224,42 +240,48 @@ def figure_5(d: Data):
     """Draw strength, nucleation stress and onset at four correlation lengths."""
     figure = common.new(8.4)
     grid = figure.add_gridspec(4, 1, height_ratios=(1.5, 0.9, 0.9, 0.6))
-    rows = [grid[i].subgridspec(4 - 3 * i, 3, width_ratios=(4, 1, 1.2), wspace=0.04, hspace=0.06)
-            for i in (0, 1)]  # fmt: skip
-    fields = [figure.add_subplot(rows[0][i, 0]) for i in range(4)]
+    count = len(RATIOS)
+    rows = [grid[i].subgridspec((count, 1)[i], 3, width_ratios=(4, 1, 1.2), wspace=0.04,
+                                hspace=0.06) for i in (0, 1)]  # fmt: skip
+    fields = [figure.add_subplot(rows[0][i, 0]) for i in range(count)]
+    low, high = common.span(common.STRENGTHS)
     upper = [figure.add_subplot(rows[0][:, i]) for i in (1, 2)]
     lower = [figure.add_subplot(rows[1][i]) for i in range(3)]
     x = PROBLEM.interface.x / L
     s = np.linspace(LOW, HIGH, 300)
+    minima, averages, ranges = [], [], []
     upper[0].plot(setting.MARGINAL.distribution.pdf(s) * MEAN, s / MEAN, color=INK)
     for ratio, strip in zip(RATIOS, fields, strict=True):
         tau_p = setting.strength(ratio).sample(PROBLEM.interface)  # of the same draws for each
         strip.plot(x, tau_p[0] / MEAN, color=common.line(ratio)["color"], lw=0.9)
         strip.plot([], [], **common.line(ratio), label=f"{XI} = {ratio:g}")
         strip.legend(loc="upper right", borderpad=0.1)
-        strip.set(xlim=(0, 1), ylim=(0.62, 2.1), yticks=(0.75, 1.25))
+        strip.set(xlim=(0, 1), ylim=(low, high + 0.8 * (high - low)))
+        strip.locator_params(axis="y", nbins=3)
         strip.tick_params(labelbottom=strip is fields[-1])
         tau_n = st.theory.nucleation_stress(PROBLEM, tau_p)[0]
         lower[0].plot(x, tau_n / MEAN, **common.line(ratio), lw=0.9)
         weakest = d.at("moments", "weakest_strength", ratio)
-        least = st.statistics.density(weakest, bounds=(LOW, HIGH))
+        least = st.statistics.density(weakest, bounds=_bounds())
+        minima.append(least.x[least.value > 1e-3 * least.value.max()] / MEAN)
+        averages.append(tau_n / MEAN)
         upper[1].plot(least.value / least.value.max(), least.x / MEAN, **common.line(ratio))
         counts = d.at("moments", "counts", ratio).reshape(-1, 32).sum(axis=1)
         edges = np.linspace(LOW, HIGH, counts.size + 1)
         centre = 0.5 * (edges[1:] + edges[:-1])
         density = counts / counts.sum() / (edges[1] - edges[0]) * MEAN
         lower[1].plot(density, centre / MEAN, **common.line(ratio))
-    for one in (*upper, *lower[1:]):  # narrow panels of densities
-        one.set_xticks([])
-        one.tick_params(labelleft=one is upper[0])
-    for one in lower:
-        one.set_ylim(0.62, 1.52)
+    for panel in (*upper, *lower[1:]):  # narrow panels of densities
+        panel.set_xticks([])
+        panel.tick_params(labelleft=panel is upper[0])
+    for panel in lower:
+        panel.set_ylim(common.span(*averages))
     fields[1].set_ylabel(rf"$\tau_\mathrm{{p}}{OVER_MEAN}", y=0.0)
-    upper[0].set_ylim(0.62, 1.72)
-    upper[1].set_ylim(LOW / MEAN, 0.76)
+    upper[0].set_ylim(low, high)
+    upper[1].set_ylim(common.span(*minima, margin=0.0))
     upper[1].yaxis.tick_right()
     upper[1].tick_params(labelright=True)
-    upper[1].set_yticks((0.68, 0.70, 0.72, 0.74))
+    upper[1].locator_params(axis="y", nbins=5)
     upper[0].set_title(r"$f(\tau_\mathrm{p})$")
     upper[1].set_title(r"$f(\min\tau_\mathrm{p})$")
     lower[0].set(ylabel=rf"$\tau_\mathrm{{n}}{OVER_MEAN}", xlabel="$x/L$", xlim=(0, 1))
@@ -269,46 +291,54 @@ def figure_5(d: Data):
     common.letter(lower[0], "b", x=-0.12)
     stress, place = figure.add_subplot(grid[2]), figure.add_subplot(grid[3])
     for ratio in RATIOS:
-        found, look = stress_density(d, ratio), common.line(ratio)
-        stress.plot(found.x / MEAN, found.value * MEAN, **look)
-        band = [(found.value + sign * 2 * found.error) * MEAN for sign in (-1, 1)]
-        stress.fill_between(found.x / MEAN, *band, color=look["color"], alpha=0.25, lw=0)
+        density, look = stress_density(d, ratio), common.line(ratio)
+        stress.plot(density.x / MEAN, density.value * MEAN, **look)
+        ranges.append(density.x[density.value > 1e-3 * density.value.max()] / MEAN)
+        band = [(density.value + sign * 2 * density.error) * MEAN for sign in (-1, 1)]
+        stress.fill_between(density.x / MEAN, *band, color=look["color"], alpha=0.25, lw=0)
         share, edges = np.histogram(d.at("local", "critical_position", ratio) / L, 20, (0, 1))
         share = share / d.size.samples * 20
         place.stairs(share, edges, baseline=None, color=common.line(ratio)["color"],
                      lw=0.9)  # fmt: skip
     error = np.sqrt(20.0 / d.size.samples)
     place.axhspan(1 - 2 * error, 1 + 2 * error, color="#eeeeee", lw=0, zorder=0)
-    stress.axvline(LOW / MEAN, color=GREY, lw=0.8, ls=":")
-    stress.set(xlim=(0.655, 0.88), ylim=(0, None), xlabel=rf"$\tau_\mathrm{{cr}}{OVER_MEAN}",
+    if setting.SUPPORT[0] > 0.0:
+        stress.axvline(LOW / MEAN, color=GREY, lw=0.8, ls=":")
+        ranges.append(LOW / MEAN)
+    stress.set(xlim=common.span(*ranges, margin=0.02), ylim=(0, None),
+               xlabel=rf"$\tau_\mathrm{{cr}}{OVER_MEAN}",
                ylabel=rf"$f(\tau_\mathrm{{cr}})\,${MEAN_P}")  # fmt: skip
-    place.set(xlim=(0, 1), ylim=(0, 1.5), xlabel=r"$x_\mathrm{cr}/L$",
+    place.set(xlim=(0, 1), ylim=(0, None), xlabel=r"$x_\mathrm{cr}/L$",
               ylabel=r"$f(x_\mathrm{cr})\,L$")  # fmt: skip
     common.letter(stress, "c", x=-0.12)
     common.letter(place, "d", x=-0.12)
     return figure
 
 
-_PLACES = np.array([-3.2, *np.log2(RATIOS), 2.2])
+def _bounds() -> list[float | None]:
+    return [bound if np.isfinite(bound) else None for bound in setting.SUPPORT]
+
+
+_PLACES = np.array([np.log2(setting.FIRST) - 1.2, *np.log2(RATIOS), np.log2(RATIOS[-1]) + 1.2])
 """Places on the axis: zero, the correlation lengths on a logarithm, and infinity."""
 
 
-def _statistics(axes, found, ends) -> None:
+def _statistics(axes, table, ends) -> None:
     """Draw mean, median and lower quartile; `ends` are those at zero and at infinity."""
     x = _PLACES[1:-1]
     styles = (("mean", "-", "o", COLOURS[0]), ("median", "--", "s", COLOURS[1]),
               ("25 % quantile", ":", "^", COLOURS[2]))  # fmt: skip
     for i, (name, dashes, marker, colour) in enumerate(styles):
-        row = [each[i].value for each in found]
+        row = [numbers[i].value for numbers in table]
         style = {"color": colour, "ls": dashes, "marker": marker, "label": name}
-        common.numbers(axes, x, [each[i] for each in found], **style)
+        common.numbers(axes, x, [numbers[i] for numbers in table], **style)
         axes.plot(_PLACES[:2], [ends[0][i], row[0]], color=colour, ls=(0, (1, 2)), lw=0.9)
         axes.plot(_PLACES[-2:], [row[-1], ends[1][i]], color=colour, ls=(0, (1, 2)), lw=0.9)
         axes.plot(_PLACES[[0, -1]], [ends[0][i], ends[1][i]], marker, color=colour, ms=4,
                   mfc="white", ls="none")  # fmt: skip
     labels = ("0", *(f"{ratio:g}" for ratio in RATIOS), r"$\infty$")
     axes.set_xticks(_PLACES, labels)
-    for place in (-2.6, 1.6):
+    for place in (_PLACES[0] + 0.6, _PLACES[-1] - 0.6):
         axes.text(place, 0, "//", transform=axes.get_xaxis_transform(), ha="center", va="center",
                   fontsize=9)  # fmt: skip
     axes.set_xlabel(XI)
@@ -321,26 +351,25 @@ def figure_6(d: Data):
     top, bottom = figure.add_subplot(grid[0]), figure.add_subplot(grid[1])
     law = setting.MARGINAL.distribution
     edges = np.linspace(LOW, HIGH, d["moments"].sizes["cell"] + 1)
-    found = []
+    table = []
     for ratio in RATIOS:
-        counts = (
-            np.cumsum(d.at("moments", "counts", ratio)) / d.at("moments", "counts", ratio).sum()
-        )
+        counts = np.cumsum(d.at("moments", "counts", ratio))
+        counts = counts / counts[-1]
         shift = d.at("moments", "powers", ratio)[:, 0]
         quantiles = [np.interp(p, counts, edges[1:]) / MEAN for p in (0.5, 0.25)]
-        found.append((mean(1.0 + shift), *(mean(np.array([q, q])) for q in quantiles)))
-    own = [1.0, law.ppf(0.5) / MEAN, law.ppf(0.25) / MEAN]
-    _statistics(top, found, ([1.0, 1.0, 1.0], own))
+        table.append((mean(1.0 + shift), *(mean(np.array([q, q])) for q in quantiles)))
+    uniform = [1.0, law.ppf(0.5) / MEAN, law.ppf(0.25) / MEAN]
+    _statistics(top, table, ([1.0, 1.0, 1.0], uniform))
     top.set(ylabel=rf"$\tau_\mathrm{{n}}{OVER_MEAN}")
     top.legend(loc="lower left")
     common.letter(top, "a", x=-0.12)
-    found = [
+    table = [
         tuple(number * (1 / MEAN) for number in (mean(v), quantile(v, 0.5), quantile(v, 0.25)))
         for v in (d.stress(ratio) for ratio in RATIOS)
     ]
-    low = LOW / MEAN
-    _statistics(bottom, found, ([1.0, 1.0, 1.0], [low, low, low]))
-    bottom.set(ylabel=rf"$\tau_\mathrm{{cr}}{OVER_MEAN}", ylim=(0.63, 1.03))
+    low = LOW / MEAN if setting.SUPPORT[0] > 0.0 else np.nan  # no limit without a bound
+    _statistics(bottom, table, ([1.0, 1.0, 1.0], [low, low, low]))
+    bottom.set(ylabel=rf"$\tau_\mathrm{{cr}}{OVER_MEAN}")
     bottom.axhline(low, color=GREY, lw=0.8, ls=":")
     places = np.log2(SIMULATED)
     raw = [mean(d.stress(ratio, "ruptures") / MEAN) for ratio in SIMULATED]
@@ -351,10 +380,10 @@ def figure_6(d: Data):
                        for r in SIMULATED], fmt="D", color=RED, mfc="none", ms=6, lw=0.8,
                       label=f"{d.size.ruptures} ruptures each")  # fmt: skip
     best = [dynamic_mean(d, ratio) * (1 / MEAN) for ratio in SIMULATED]
-    inset.plot(np.log2(RATIOS), [n[0].value for n in found], "-o", color=COLOURS[0], ms=4)
+    inset.plot(np.log2(RATIOS), [n[0].value for n in table], "-o", color=COLOURS[0], ms=4)
     inset.plot(places, [n.value for n in best], "x", color=RED, ms=7)
     common.ratio_axis(inset)
-    inset.set(xlabel="", ylabel="mean", xlim=(-2.4, 1.4))
+    inset.set(xlabel="", ylabel="mean", xlim=(_PLACES[1] - 0.4, _PLACES[-2] + 0.4))
     bottom.legend(*_chosen(bottom, 1), loc="lower left")
     common.letter(bottom, "b", x=-0.12)
     return figure
@@ -374,25 +403,27 @@ def figure_7(d: Data):
     for ratio in RATIOS:
         values = theory["correlation"].sel(correlation_ratio=ratio)
         axes[0, 0].plot(lag, values, **common.line(ratio), label=f"{ratio:g}")
-    axes[0, 0].set(xlim=(0, 0.12), xlabel=r"$\xi/L$", ylabel=r"$C(\xi)$")
+    axes[0, 0].set(xlim=(0, min(1.9 * RATIOS[-1] * H / L, 0.5)), xlabel=r"$\xi/L$",
+                   ylabel=r"$C(\xi)$")  # fmt: skip
     axes[0, 0].legend(title=XI)
     s = np.linspace(-1, 1, 200)
     axes[0, 1].plot(s, (0.925 - 0.308 * s**2) * np.sqrt(1 - s**2), color=COLOURS[0])
     axes[0, 1].set(xlabel="$s$", ylabel="$v_0(s)$", ylim=(0, None))
     ratio, value = theory["ratio"].values, theory["infinite"].values
     slope = value[0] / ratio[0]
-    for panel, (low, high) in ((axes[1, 0], (0, 8)), (axes[1, 1], (0, 1))):
-        near = (ratio <= high * 1.3) & (ratio >= low)
+    for panel, high in ((axes[1, 0], 8), (axes[1, 1], 1)):
+        near = ratio <= high * 1.3
         panel.plot(ratio[near], value[near], color=COLOURS[0], label="infinite interface")
         shown = theory["usable"].values
         panel.plot(shown[shown <= high], theory["periodic"].values[shown <= high], "--",
                    color=COLOURS[1], label="this interface")  # fmt: skip
         panel.plot([0, 1.0 / slope], [0, 1.0], ":", color=RED, label=rf"{slope:.2f} {XI}")
-        for one in RATIOS:
-            if one <= high:
-                spread = d.at("moments", "powers", one)
+        for sampled_ratio in RATIOS:
+            if sampled_ratio <= high:
+                spread = d.at("moments", "powers", sampled_ratio)
                 sampled = spread[:, 1].mean() - spread[:, 0].mean() ** 2
-                panel.plot(one, sampled * (MEAN / setting.DEVIATION) ** 2, "o", color=INK, ms=4)
+                share = sampled * (MEAN / setting.DEVIATION) ** 2
+                panel.plot(sampled_ratio, share, "o", color=INK, ms=4)
         panel.set(xlim=(0, high), xlabel=XI, ylim=(0, 1.02))
     axes[1, 0].set_ylabel(r"Var[$\tau_\mathrm{n}$]/Var[$\tau_\mathrm{p}$]")
     axes[1, 0].axhline(1.0, color=GREY, lw=0.8, ls="--")
