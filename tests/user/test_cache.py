@@ -20,7 +20,7 @@ def test_an_edited_kernel_is_another_folder_for_those_who_call_it(tmp_path, monk
     copy = tmp_path / "stiction"
     shutil.copytree(SOURCES / "stiction", copy)
     monkeypatch.setattr(folder, "__file__", str(copy / "base" / "jit" / "folder.py"))
-    monkeypatch.setattr(folder, "KEPT", "")
+    monkeypatch.setattr(folder, "CHOSEN", "")
     sources = folder._kernel_sources.__wrapped__
     monkeypatch.setattr(folder, "_kernel_sources", sources)
     find = folder.kernel_folder.__wrapped__
@@ -42,7 +42,7 @@ def test_an_edited_kernel_is_another_folder_for_those_who_call_it(tmp_path, monk
             ]
         )
     before, message, own, law = folders
-    assert before[0].parent == tmp_path / "cache" / "compiled"
+    assert before[0].parents[1] == tmp_path / "cache" / "compiled"
     assert message == before
     assert own[0] != before[0]
     assert own[1] == before[1]

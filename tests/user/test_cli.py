@@ -19,7 +19,6 @@ from small_study import lengths, small_study
 import stiction as st
 from stiction.base import files
 from stiction.base.errors import StoreError
-from stiction.base.files import private_folder
 from stiction.cli.commands import app
 from stiction.ensemble.store import Store
 from stiction.study import export
@@ -137,15 +136,6 @@ def test_escape_sequences_of_a_run_are_not_printed_raw(runs):
     for chunk in Path("run/chunks").iterdir():
         chunk.unlink()
     runs("report run", "no sample is stored yet", code=2)
-
-
-@pytest.mark.skipif(not hasattr(os, "getuid"), reason="Windows has other means")
-def test_a_cache_that_others_can_write_is_refused(tmp_path):
-    folder = tmp_path / "compiled" / "digest"
-    assert private_folder(folder).stat().st_mode & 0o077 == 0
-    folder.chmod(0o770)
-    with pytest.raises(st.InputError, match="digest can be written by others.*STICTION_CACHE"):
-        private_folder(folder)
 
 
 def test_a_disk_without_room_for_a_result_is_left_as_it_was(tmp_path, monkeypatch):

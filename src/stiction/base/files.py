@@ -4,15 +4,19 @@ Files may come from strangers. Every reader of the package takes its bytes from 
 from `content_of`, and looks at the size of its result before it takes memory.
 """
 
+import atexit
 import io
 import os
+import shutil
 import stat
 import struct
+import tempfile
 import uuid
 import zipfile
 import zlib
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +24,7 @@ import numpy as np
 import platformdirs
 from numpy.typing import NDArray
 
-from stiction.base.errors import InputError, StoreError
+from stiction.base.errors import InputError, StoreError, warn_user
 
 PART = ".part"
 MAX_FILE_BYTES = 2**30
@@ -154,20 +158,70 @@ def cache_folder() -> Path:
 
 
 def private_folder(folder: Path) -> Path:
-    """Return a folder, made if need be, in which nobody else can have put anything.
+    """Return a folder, made if need be, in which nobody else can have put or can put anything.
 
-    Compiled kernels are pickles: who can write one can run code as whoever loads it.
+    Compiled kernels are pickles: who can write or replace one can run code as whoever loads it.
+    If the folder is not private, a warning says why, and a temporary one of this process stands in.
+
+    1. Resolve links, as their owners could let them lead elsewhere.
+    2. Make all missing folders with mode 0700, whatever the umask.
+    3. Check all that lies in the folder, the folder, and all folders above it.
     """
+    if not folder.is_absolute():
+        return _stand_in(f"{folder} is not an absolute path", folder.name)
     try:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        found = folder.stat()
+        folder = folder.resolve()
+        for missing in [one for one in (*reversed(folder.parents), folder) if not one.exists()]:
+            missing.mkdir(mode=0o700, exist_ok=True)
+        weakness = _weakness(folder) if os.name == "posix" else ""
     except OSError:  # nothing can be kept there: kernels are compiled each time
         return folder
-    foreign = hasattr(os, "getuid") and found.st_uid not in (os.getuid(), 0)
-    if foreign or (os.name == "posix" and found.st_mode & 0o022):
-        problem = "belongs to another user" if foreign else "can be written by others"
-        raise InputError(
-            f"cache: {folder} {problem}, who could put compiled code there that runs as you;"
-            " set STICTION_CACHE_DIR (or NUMBA_CACHE_DIR) to a folder of your own"
-        )
+    return _stand_in(weakness, folder.name) if weakness else folder
+
+
+def _weakness(folder: Path) -> str:
+    """Return who but this user and root could have put something into a folder; '' if nobody."""
+    inside = {
+        Path(top) / name for top, *names in os.walk(folder) for name in (*names[0], *names[1])
+    }
+    closed = folder.stat().st_mode & 0o011 == 0  # what lies in it cannot be reached by others
+    for path in (*inside, folder, *folder.parents):
+        state, above = path.lstat(), path in folder.parents
+        if state.st_uid not in (os.geteuid(), 0):
+            return f"{path} belongs to another user"
+        shared = not stat.S_ISLNK(state.st_mode) and state.st_mode & 0o022 != 0
+        shared = shared and not (closed and path in inside)
+        if shared and not (above and state.st_mode & stat.S_ISVTX):
+            return f"{path} can be written by others"
+    return ""
+
+
+@cache
+def _stand_in(weakness: str, name: str) -> Path:
+    """Return a temporary folder of this process, and say why it is needed."""
+    _warn_of(weakness)
+    folder = _temporary_folder() / name
+    folder.mkdir(mode=0o700, exist_ok=True)
     return folder
+
+
+@cache
+def _warn_of(weakness: str) -> None:
+    warn_user(
+        f"cache: {weakness}, so that others could put compiled code there that runs as you; kernels"
+        " are compiled again in each process. Take write access from others (chmod go-w), or set"
+        " STICTION_CACHE_DIR to an absolute path of a folder of your own",
+        UserWarning,
+    )
+
+
+@cache
+def _temporary_folder() -> Path:
+    folder, process = tempfile.mkdtemp(prefix="stiction-"), os.getpid()
+
+    def remove() -> None:
+        if os.getpid() == process:  # not at the end of a fork
+            shutil.rmtree(folder, ignore_errors=True)
+
+    atexit.register(remove)
+    return Path(folder)

@@ -34,7 +34,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiction.base.arrays import one_blas_thread
 from stiction.base.errors import InputError, StoreError
-from stiction.base.files import UNREADABLE, cache_folder, read_arrays, write_arrays
+from stiction.base.files import (
+    UNREADABLE,
+    cache_folder,
+    private_folder,
+    read_arrays,
+    write_arrays,
+)
 
 Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
@@ -289,7 +295,8 @@ def kernel_sum(mode: str, eta: float, tolerance: float = 1e-6) -> ExponentialSum
     """Return the sum of `fit_exponentials`, from memory, from disk, or built now (about 1 s)."""
     eta = 1.0 if mode == "III" else float(eta)
     text = f"{_FORMAT} {mode} {eta.hex()} {float(tolerance).hex()} {T_MAX.hex()}"
-    path = cache_folder() / f"kernel-{hashlib.sha256(text.encode()).hexdigest()[:20]}.npz"
+    folder = private_folder(cache_folder() / "fitted")
+    path = folder / f"kernel-{hashlib.sha256(text.encode()).hexdigest()[:20]}.npz"
     with contextlib.suppress(
         *UNREADABLE
     ):  # not there, or damaged: it is built and written again

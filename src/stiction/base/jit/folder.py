@@ -1,16 +1,26 @@
-"""The folder in which the compiled kernels of a module are kept."""
+"""The folder in which the compiled kernels of a module are kept.
+
+Kernels are code. The package or the environment choose their folder, never a file where somebody
+stands: numba also reads `.numba_config.yaml` in the current folder, which may come from a stranger.
+"""
 
 import hashlib
+import os
 import re
 from functools import cache
 from pathlib import Path
 
-import numba
-
+from stiction.base.errors import warn_user
 from stiction.base.files import cache_folder, private_folder
 
-KEPT = numba.config.CACHE_DIR
-"""Folder that the user chose by NUMBA_CACHE_DIR, or ''."""
+CHOSEN = os.environ.get("NUMBA_CACHE_DIR", "")
+"""Folder that the user chose, or ''."""
+if os.path.lexists(".numba_config.yaml"):
+    warn_user(
+        ".numba_config.yaml: numba reads this file in the current folder; stiction does not take"
+        " the folder of its compiled kernels from it",
+        UserWarning,
+    )
 _IMPORT = re.compile(rb"^\s*(?:from|import) (stiction[\w.]*)(?: import (\w+))?", re.MULTILINE)
 
 
@@ -22,14 +32,14 @@ def _kernel_sources() -> dict[str, bytes]:
     message recompiles nothing.
     """
     package = Path(__file__).parents[2]
-    found = {}
+    sources = {}
     for path in sorted(package.rglob("*.py")):
         text = path.read_bytes()
-        own = b"stiction.base.jit import" in text or path.parent.name == "jit"
-        if own or b"InputError" not in text:
+        has_kernels = b"stiction.base.jit import" in text or path.parent.name == "jit"
+        if has_kernels or b"InputError" not in text:
             name = ".".join(path.relative_to(package.parent).with_suffix("").parts)
-            found[name.removesuffix(".__init__")] = text
-    return found
+            sources[name.removesuffix(".__init__")] = text
+    return sources
 
 
 @cache
@@ -54,4 +64,5 @@ def kernel_folder(module: str, compiler: str) -> Path:
             reached |= new
     state = compiler.encode() + b"".join(texts[name] for name in sorted(reached))
     digest = hashlib.sha256(state).hexdigest()[:16]
-    return private_folder((Path(KEPT) if KEPT else cache_folder() / "compiled") / digest)
+    kept = Path(CHOSEN) if CHOSEN else cache_folder() / "compiled"
+    return private_folder(kept / digest / module)

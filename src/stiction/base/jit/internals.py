@@ -32,7 +32,7 @@ class _Locator(_CacheLocator):
     """
 
     def __init__(self, function: Any, file: str) -> None:
-        self._path = kernel_folder(function.__module__, "own") / function.__module__
+        self._path = kernel_folder(function.__module__, "own")
         self._stamp = hashlib.sha256(Path(file).read_bytes()).hexdigest()
         self._line = function.__code__.co_firstlineno
 
