@@ -1,4 +1,29 @@
-"""Explicit predictor-corrector steps: second order, one fixed step, all in one compiled loop."""
+"""Explicit predictor-corrector steps: second order, one fixed step, all in one compiled loop.
+
+Problem
+-------
+Equations (1) and (2) of `state`, one step h further: slip d, slip rate V, stress tau at the nodes,
+and the memory variables y of `memory` at the modes. Let f_hat(d_hat, V_hat) be the stress that is
+transferred if a slip rate V_hat acts for the whole step and the slip at its end is d_hat:
+
+    f_hat = (G|k|/2) (S + V_hat Re sum_p w_p B) - K(k) d_hat,   S = Re sum_p w_p E B y.       (1)
+
+A node follows from the stress that it would carry at rest and from its strength s(d):
+
+    V = max(f + tau_0 p + tau_i - s(d), 0) / Z,   tau = f + tau_0 p + tau_i - Z V.            (2)
+
+Algorithm (Heun's method: K. Heun, Zeitschrift fuer Mathematik und Physik 45, 1900)
+----------------------------------------------------------------------------------
+1. Predict: the present rate V_0 acts for a step (`_transfer`); (2) gives V* at its end
+   (`_predict`).
+2. Correct: the mean (V_0 + V*)/2 acts for the step (`_transfer`). The slip grows by h times this
+   mean, and (2) gives the rate and the stress at the end (`_correct`).
+3. Advance the memory by the same mean (`memory.advance_memory`).
+4. Update what is known after a step (`diagnostics`), and return if the run ends here or if all
+   is so calm that implicit steps can take over (`_calm`).
+
+The step is stable below the limit of `medium.largest_step`. A node cannot slip backwards, by (2).
+"""
 
 from typing import Any
 
@@ -32,7 +57,7 @@ _CALM_STRESS = 1e-4  # Z V of waves that implicit steps may smear, in units of t
 
 @jit_inside
 def _transfer(grid: Grid, slip_hat: Array, memory_sum: Array, tables: ExplicitTables) -> None:
-    """Stress `tables.transfer` along the interface if the rate, in `rate_hat`, acts for a step."""
+    """Equation (1): the stress `tables.transfer` if `rate_hat` acts for a step."""
     rate_hat, response, shared = tables.rate_hat, tables.response, tables.shared
     offset, step = grid.offset, tables.step
     static, dynamic = grid.stiffness[0], grid.stiffness[1]
@@ -40,7 +65,7 @@ def _transfer(grid: Grid, slip_hat: Array, memory_sum: Array, tables: ExplicitTa
     for q in range(1, shared.size):
         o, rate = offset[q], rate_hat[q]
         g, b, c = static[q], response[q], dynamic[q]
-        slip = slip_hat[q] + step * rate
+        slip = slip_hat[q] + step * rate  # at its end
         real = c * (memory_sum[o] + b * rate.real) - g * slip.real
         imaginary = c * (memory_sum[o + ENTRIES] + b * rate.imag) - g * slip.imag
         shared[q] = complex(real, imaginary)
@@ -51,26 +76,26 @@ def _transfer(grid: Grid, slip_hat: Array, memory_sum: Array, tables: ExplicitTa
 def _predict(
     state: RuptureState, setting: Setting, tables: ExplicitTables, load: float, impedance: float
 ) -> None:
-    """Slip rate `tables.predicted` at the end of the step if the present one acted all along."""
+    """Step 1: the slip rate `tables.predicted` at the end if the present one acts all along."""
     nodes, law = setting.nodes, setting.law
     slip, rate, transfer, predicted = state.slip, state.rate, tables.transfer, tables.predicted
     strength, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
     profile, initial, step = nodes.profile, nodes.initial, tables.step
     for i in range(slip.size):
-        ahead = slip[i] + step * rate[i]
-        limit = strength_at(law, strength[i], residual[i], weakening[i], ahead)
-        stuck = transfer[i] + load * profile[i] + initial[i]
-        predicted[i] = max(stuck - limit, 0.0) / impedance
+        next_slip = slip[i] + step * rate[i]
+        limit = strength_at(law, strength[i], residual[i], weakening[i], next_slip)
+        at_rest = transfer[i] + load * profile[i] + initial[i]
+        predicted[i] = max(at_rest - limit, 0.0) / impedance
 
 
 @jit_inside
 def _correct(
     state: RuptureState, setting: Setting, tables: ExplicitTables, load: float, impedance: float
 ) -> Any:
-    """Slip, rate and stress after the step; return (work, sum of V).
+    """Step 2: slip, rate and stress after the step; return (work, sum of V).
 
-    `tables.transfer` then holds the strength, and `tables.predicted` what the mean of the rates
-    before and after slips.
+    `tables.transfer` then holds the strength. `tables.predicted` holds the slip by the mean of the
+    rates before and after the step, from which `finish_step` finds when a front arrived.
     """
     nodes, law, step = setting.nodes, setting.law, tables.step
     slip, rate, stress = state.slip, state.rate, state.stress
@@ -83,20 +108,20 @@ def _correct(
         increment = 0.5 * step * (rate[i] + predicted[i])
         next_slip = slip[i] + increment
         limit = strength_at(law, strength[i], residual[i], weakening[i], next_slip)
-        stuck = transfer[i] + load * profile[i] + initial[i]
-        v = max(stuck - limit, 0.0) / impedance
+        at_rest = transfer[i] + load * profile[i] + initial[i]
+        v = max(at_rest - limit, 0.0) / impedance
         work += increment * (mean_load * profile[i] + initial[i])
         predicted[i] = 0.5 * step * (rate[i] + v)
-        transfer[i], slip[i], rate[i], stress[i] = limit, next_slip, v, stuck - impedance * v
+        transfer[i], slip[i], rate[i], stress[i] = limit, next_slip, v, at_rest - impedance * v
         total += v
     return work, total
 
 
 @jit_inside
 def _calm(now: Any, thresholds: Thresholds, step: float, impedance: float, rise: float) -> Any:
-    """Count calm steps; return whether there were enough of them in a row.
+    """Step 4: count calm steps; return whether there were enough of them in a row.
 
-    Waves make slip rates come and go; creep is slow, or as fast as it was.
+    Waves make slip rates come and go. Creep is slow, or as fast as it was when the row began.
     """
     scale, before, top = now.scale, now.calm_rate, now.top_slip_rate
     quiet = top < _CALM_STRESS * scale / impedance + thresholds.calm_slip * rise / step
@@ -121,7 +146,7 @@ def explicit_steps(
 ) -> Any:
     """Take up to `count` explicit steps in place; return (steps taken, reason).
 
-    `state.memory` holds psi/B. `record` has at least `count` rows, or none to keep nothing.
+    `state.phase` is EXPLICIT. `record` has at least `count` rows, or none to keep nothing.
     """
     n, impedance, step = state.slip.size, grid.impedance, tables.step
     now, thresholds = state.diagnostics[0], setting.thresholds
@@ -130,9 +155,11 @@ def explicit_steps(
     while taken < count and reason == Reason.DONE:
         time = now.time + step
         load = value_at(setting.load, time)
+        # 1. Predict.
         forward(grid.transform, state.rate, rate_hat)
         _transfer(grid, slip_hat, state.memory_sum, tables)
         _predict(state, setting, tables, load, impedance)
+        # 2. Correct.
         forward(grid.transform, tables.predicted, tables.shared)
         for q in range(rate_hat.size):
             rate_hat[q] = 0.5 * (rate_hat[q] + tables.shared[q])
@@ -146,6 +173,7 @@ def explicit_steps(
             now.time = time
             reason = Reason.NOT_FINITE
             break
+        # 3. Advance slip and memory of the modes.
         for q in range(rate_hat.size):
             slip_hat[q] += step * rate_hat[q]
         pack(grid.offset, rate_hat, tables.packed)
@@ -153,10 +181,12 @@ def explicit_steps(
             state.memory, tables.table, tables.packed, state.memory_sum,
             grid.poles.size, grid.multiplicity,
         )  # fmt: skip
+        # 4. Diagnostics, and the end.
         rise, radiated = abs(load - now.load), impedance * total / n
         now.explicit_steps += 1
-        done, limit = TakenStep(time, step, load, work * grid.cell, radiated), tables.transfer
-        fall = finish_step(state, grid, setting, done, tables.predicted, limit, record, taken)
+        done = TakenStep(time, step, load, work * grid.cell, radiated)
+        slips, strength = tables.predicted, tables.transfer
+        fall = finish_step(state, grid, setting, done, slips, strength, record, taken)
         taken += 1
         calm = _calm(now, thresholds, step, impedance, rise)
         if now.weakened_nodes >= thresholds.slid_stop and (calm or not thresholds.held):

@@ -1,4 +1,37 @@
-"""Implicit steps of adaptive size while the interface creeps, in one compiled loop."""
+"""Implicit steps of adaptive size while the interface creeps, in one compiled loop.
+
+Problem
+-------
+Equations (1) and (2) of `state`, one step h further. Unknown are the slip increments u >= 0. With
+the mean slip rate u/h of this step, the mean rate V' of the step before it, of size h', and the
+ratio r = h/(h + h'), the slip rate at the end of the step is of second order,
+
+    V = u/h + r (u/h - V'),                                                                   (1)
+
+as in the two-step backward differences (C. F. Curtiss and J. O. Hirschfelder, Proceedings of the
+National Academy of Sciences 38, 1952). In the step the rate changes linearly, with the slope
+a = 2 r (u/h - V')/h. Without a step before it, r = 0: the step is of first order. The stress at
+the end is, mode by mode,
+
+    tau_0 p + tau_i - Z V - K (slip + u)
+        + (G|k|/2) (S + u/h Re sum_p w_p B + a Re sum_p w_p R),                               (2)
+
+with S, B and R as in `memory`. This is linear in u, so u solves the complementarity problem of
+`complementarity` with a circulant matrix.
+
+Algorithm
+---------
+1. Choose a size: the one asked for, smaller if the load would rise too much, or cut short at a
+   turning point of the load or at the end time (`_choose_size`).
+2. Assemble the matrix and the stress without slip in this step (`_assemble`).
+3. Solve for u (`complementarity.solve_increment`).
+4. Try half the size from 1 if no u is found (the patches are unstable at this size), a node
+   weakens too much (`_effect`), or the interface accelerates too much (`_accelerates`). If that
+   is below the smallest size, explicit steps take over.
+5. Take the step (`_accept`), and update what is known after it (`diagnostics`).
+6. Choose the next size from how much nodes weakened (`_next_size`). Sizes change by powers of
+   sqrt 2, so that tables are reused.
+"""
 
 from typing import Any, NamedTuple
 
@@ -28,32 +61,28 @@ from stiction.methods.dynamics.state import (
 from stiction.problem.friction.kernels import strength_at
 
 LARGEST_STEP = 1e20  # s
-_ROUND_OFF = 1e-14  # share of the largest stress: ten times the error of a few transforms
-# In units of the stress scale:
-_SOLVED = 1e-9  # stress at which a step counts as solved
-_SMALL_DROP = 0.1  # weakening below that is not resolved
-_NOTICED = 1e-7  # Z <V> from which its growth in a step is limited, and by which factor
-_GROWTH = 1.3
-_NEGLIGIBLE = 5e-7  # rise of the load in a step for which growth does not matter
+_ROUND_OFF_SHARE = 1e-14  # of the largest stress: ten times the error of a few transforms
+# Shares of the stress scale:
+_SOLVED_STRESS = 1e-9  # stress at which a step counts as solved
+_SMALL_DROP = 0.1  # weakening of a node below that is not resolved
+_FREE_LOAD_RISE = 5e-7  # rise of the load in a step in which acceleration does not matter
+_NOTICED_RADIATION = 1e-7  # Z <V> from which its growth in a step is limited
+_MAX_ACCELERATION = 1.3  # largest factor of that growth
 
 
 class _Attempt(NamedTuple):
-    """One step that is tried.
+    """One step that is tried."""
 
-    V at its end is mean + ratio (mean - past mean); in it, V rises at (mean - past mean) rise, a
-    second difference of slip.
-    """
-
-    size: float
-    time: float
-    load: float
-    ratio: float
-    rise: float
+    size: float  # h, s
+    time: float  # at its end, s
+    load: float  # at its end, Pa
+    ratio: float  # r of (1)
+    rise: float  # 2 r/h, 1/s: a over u/h - V'
 
 
 @jit_inside
 def _choose_size(now: Any, setting: Setting, step: float) -> Any:
-    """Return (size to try, size to go on with, whether cut short, whether the last one)."""
+    """Step 1: return (size to try, size to go on with, whether cut short, whether the last)."""
     thresholds, time, clipped, size = setting.thresholds, now.time, False, step
     smallest = thresholds.smallest_step
     small = thresholds.load_step * now.scale
@@ -80,7 +109,7 @@ def _choose_size(now: Any, setting: Setting, step: float) -> Any:
 def _assemble(
     state: RuptureState, grid: Grid, setting: Setting, tables: ImplicitTables, attempt: _Attempt
 ) -> Any:
-    """Matrix, stress if nothing slipped, and first guess; return the accuracy to ask for, Pa."""
+    """Step 2: matrix, stress without slip, and first guess; return the accuracy to ask for, Pa."""
     stiffness, entry, symbol = grid.stiffness, grid.entry, tables.symbol
     response, ramp, past_hat = tables.response, tables.ramp_response, tables.past_hat
     size, ratio, rise = attempt.size, attempt.ratio, attempt.rise
@@ -100,42 +129,45 @@ def _assemble(
     trial_hat, trial = tables.work, tables.trial_stress
     trial_hat[0] = impedance * ratio * past_hat[0]
     for q in range(1, trial_hat.size):
-        g, c, risen = stiffness[0, q], stiffness[1, q], rise * ramp[entry[q]]
+        g, c, ramp_gain = stiffness[0, q], stiffness[1, q], rise * ramp[entry[q]]
         past, memory, slip = past_hat[q], tables.memory_sum[q], state.slip_hat[q]
-        real = c * (memory.real - risen * past.real) - g * slip.real
-        imaginary = c * (memory.imag - risen * past.imag) - g * slip.imag
+        real = c * (memory.real - ramp_gain * past.real) - g * slip.real
+        imaginary = c * (memory.imag - ramp_gain * past.imag) - g * slip.imag
         trial_hat[q] = complex(
             real + impedance * ratio * past.real, imaginary + impedance * ratio * past.imag
         )
     backward(grid.transform, trial_hat, trial)
     profile, initial = setting.nodes.profile, setting.nodes.initial
-    level = 0.0
+    largest = 0.0
     for i in range(trial.size):
         trial[i] += attempt.load * profile[i] + initial[i]
-        level = max(level, abs(trial[i]))
+        largest = max(largest, abs(trial[i]))
         tables.increment[i] = state.past[i] * size
         tables.slipping[i] = 1 if state.rate[i] > 0.0 else 0
     # Round-off of the transforms limits the accuracy.
-    return max(_SOLVED * state.diagnostics[0].scale, _ROUND_OFF * level)
+    return max(_SOLVED_STRESS * state.diagnostics[0].scale, _ROUND_OFF_SHARE * largest)
 
 
 @jit_inside
 def _effect(
     state: RuptureState, setting: Setting, u: Array, impedance: float, attempt: _Attempt
 ) -> Any:
-    """Return (largest loss of strength of a node, total slip, Z <V>) of slip increments u."""
+    """Step 4: return (largest weakening of a node, total slip, Z <V>) by slip increments u.
+
+    Weakening is a share of tau_p - tau_r. Creep at the residual strength counts only if it is fast.
+    """
     nodes, law, slip, past = setting.nodes, setting.law, state.slip, state.past
     peak, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
     critical, size, ratio = nodes.critical, attempt.size, attempt.ratio
     scale = state.diagnostics[0].scale
     largest, total, radiated = 0.0, 0.0, 0.0
-    least, creep = _SMALL_DROP * scale, STEADY_STRESS * scale * size / impedance
+    smallest_drop, fast_slip = _SMALL_DROP * scale, STEADY_STRESS * scale * size / impedance
     for i in range(u.size):
         if slip[i] < critical[i] and u[i] > 0.0:
             lost = strength_at(law, peak[i], residual[i], weakening[i], slip[i])
             lost -= strength_at(law, peak[i], residual[i], weakening[i], slip[i] + u[i])
-            largest = max(largest, lost / max(peak[i] - residual[i], least))
-        elif u[i] > creep and critical[i] > 0.0:
+            largest = max(largest, lost / max(peak[i] - residual[i], smallest_drop))
+        elif u[i] > fast_slip and critical[i] > 0.0:
             largest = max(largest, u[i] / critical[i])
         total += u[i]
         radiated += max(u[i] / size * (1.0 + ratio) - ratio * past[i], 0.0)
@@ -146,11 +178,12 @@ def _effect(
 def _accelerates(
     now: Any, thresholds: Thresholds, attempt: _Attempt, largest: float, radiated: float
 ) -> Any:
-    """Return whether the interface accelerates too much for an accurate load at onset."""
+    """Step 4: return whether the interface accelerates too much for an accurate load at onset."""
     # A step that hardly raises the load cannot put the onset wrong.
-    matters = abs(attempt.load - now.load) > _NEGLIGIBLE * now.scale
-    noticed = _NOTICED * now.scale
-    growing = radiated > noticed and radiated > _GROWTH * max(now.previous_radiated, noticed)
+    matters = abs(attempt.load - now.load) > _FREE_LOAD_RISE * now.scale
+    noticed = _NOTICED_RADIATION * now.scale
+    allowed = _MAX_ACCELERATION * max(now.previous_radiated, noticed)
+    growing = radiated > noticed and radiated > allowed
     # At the smallest size, waves of an arrested event alone do not call for explicit steps.
     halved = 0.5 * attempt.size >= thresholds.smallest_step
     shorter = halved or largest > 0.1 * thresholds.slip_step
@@ -166,7 +199,7 @@ def _accept(
     attempt: _Attempt,
     radiated: float,
 ) -> Any:
-    """Take the step in place and return it; `tables.driving` then holds the strength."""
+    """Step 5: take the step in place and return it; `tables.driving` then holds the strength."""
     size, ratio, rise, load = attempt.size, attempt.ratio, attempt.rise, attempt.load
     law, nodes, u, transfer = setting.law, setting.nodes, tables.increment, tables.trial_stress
     rate_hat, past_hat, transfer_hat = tables.rate_hat, tables.past_hat, tables.work
@@ -204,7 +237,7 @@ def _accept(
 
 @jit_inside
 def _next_size(asked: float, size: float, largest: float, growing: bool) -> Any:
-    """Return the next size: it changes by powers of sqrt 2, so that tables are reused."""
+    """Step 6: return the next size; `asked` is the weakening of a node that is asked for."""
     root = np.sqrt(2.0)
     if largest > asked:
         return size / root
@@ -227,17 +260,13 @@ def implicit_steps(
 ) -> Any:
     """Take up to `count` accepted implicit steps in place; return (steps, next size, reason).
 
-    Parameters as in `explicit_steps`; `state.memory` holds psi itself, `step` is the first size to
-    try. Second order, as in the two-step backward differences: the slip rate at the end of a step
-    follows from the mean rates of this step and the one before (`past`), and changes linearly
-    in the memory. A step is repeated at half size if no slip increments are found (negative
-    rise: the patches are unstable at this size), a node weakens too much, or the interface
-    accelerates too much. Creep at the residual strength does not count.
+    Parameters as in `explicit_steps`; `state.phase` is IMPLICIT, `step` is the first size to try.
     """
     now, thresholds, u = state.diagnostics[0], setting.thresholds, tables.increment
     smallest = thresholds.smallest_step
     taken, reason = ZERO, Reason.DONE  # one way out: each costs as much to compile as the rest
     while taken < count:
+        # 1. Size, and what follows from it.
         size, step, clipped, last = _choose_size(now, setting, step)
         if size < smallest and not clipped:
             reason = Reason.TO_EXPLICIT
@@ -246,33 +275,36 @@ def implicit_steps(
         time = now.time + size
         load = value_at(setting.load, time)
         attempt = _Attempt(size, time, load, ratio, 2.0 * ratio / size)
+        # 2. and 3. Slip increments.
         accuracy = _assemble(state, grid, setting, tables, attempt)
-        near = accuracy if thresholds.curved else 0.0
-        found = solve_increment(grid.transform, setting, state.slip, tables, accuracy, near)
-        failed = not found
+        line_accuracy = accuracy if thresholds.curved else 0.0
+        solved = solve_increment(
+            grid.transform, setting, state.slip, tables, accuracy, line_accuracy
+        )
+        # 4. Is the step good enough?
         largest, total, radiated = 0.0, 0.0, 0.0
-        if not failed:
+        if solved:
             largest, total, radiated = _effect(state, setting, u, grid.impedance, attempt)
         if not np.isfinite(total):
             now.non_finite_node = 0
             reason = Reason.NOT_FINITE
             break
         too_much = largest > 2.0 * thresholds.slip_step
-        if failed or too_much or _accelerates(now, thresholds, attempt, largest, radiated):
+        if not solved or too_much or _accelerates(now, thresholds, attempt, largest, radiated):
             step = size / 2.0
             if step < smallest:
                 reason = Reason.TO_EXPLICIT
                 break
             continue
-        growing = (
-            radiated > _NOTICED * now.scale
-            and radiated > np.sqrt(_GROWTH) * now.previous_radiated
-        )
+        steady = np.sqrt(_MAX_ACCELERATION) * now.previous_radiated
+        growing = radiated > _NOTICED_RADIATION * now.scale and radiated > steady
+        # 5. Take it.
         done = _accept(state, grid, setting, tables, attempt, radiated)
         now.implicit_steps += 1
         now.two_step, now.previous_size, now.previous_radiated = 1, size, radiated
         fall = finish_step(state, grid, setting, done, u, tables.driving, record, taken)
         taken += 1
+        # 6. The next size, or the end.
         if not clipped:
             step = _next_size(thresholds.slip_step, size, largest, growing)
         if now.weakened_nodes >= thresholds.slid_stop:
