@@ -52,7 +52,7 @@ def stepped(
     method = with_step(method, problem, end / steps)
     run = run_of(problem, strength, method, accept=("overstress",))
     state = run.start(0.0, slip)
-    run.advance(state, steps)
+    run.take_steps(state, steps)
     return run, state
 
 

@@ -366,7 +366,7 @@ def last_events(problem, strength, method=None):
             event, moved = program.event(sample, path.last), np.inf
             while moved > 1e-4 * (event.waves.slip - before).max():
                 slip = event.waves.slip.copy()
-                event.advance(event.mesh.window, ends=False)
+                event.take_steps(event.mesh.window, ends=False)
                 moved = (event.waves.slip - slip).max()
             slip, arrival = event.waves.slip, event.waves.arrival
             came = arrival > 0.0  # elsewhere the front had come before

@@ -12,7 +12,7 @@ from specimens import crooked, rough
 import stiction as st
 from stiction.methods.dynamics.mesh import condensed, layer_matrix, make_mesh
 from stiction.methods.dynamics.specimens import RuptureProgram, begin
-from stiction.methods.dynamics.waves import FRICTION, SPEED, TRAVEL, at_rest, follow
+from stiction.methods.dynamics.waves import FRICTION, SPEED, TRAVEL, at_rest, wave_steps
 from stiction.methods.equilibrium.sample import LINEAR, sample_of
 from stiction.methods.equilibrium.solver import follow as path_of
 from stiction.methods.equilibrium.solver import make_program
@@ -44,7 +44,7 @@ def stepping(problem, mesh, waves):
     """A function that makes one step beside an interface that never slips."""
     nodes = problem.interface.size
     sample, far = of(problem, np.full(nodes, 1e12)), np.full(nodes, np.inf)
-    return lambda: follow(sample, np.zeros(nodes), far, mesh, waves, 1, True)
+    return lambda: wave_steps(sample, np.zeros(nodes), far, mesh, waves, 1, True)
 
 
 def whole_matrix(mesh, nodes):
@@ -146,7 +146,7 @@ def test_waves_along_the_interface_run_at_rayleighs_speed():
     phases, middle = [], slice(80, 176)  # three wavelengths
     given = np.full(256, sample.residual[0]), np.full(256, np.inf)
     for _ in range(int(0.022 / solid.dilatational_wave_speed / mesh.step)):
-        follow(sample, *given, mesh, waves, 1, True)
+        wave_steps(sample, *given, mesh, waves, 1, True)
         phases.append(np.angle(np.exp(-1j * k * x[middle]) @ waves.v[0, middle]))
     slope = np.polyfit(np.arange(len(phases)) * mesh.step, np.unwrap(phases), 1)[0]
     assert abs(slope) / k == pytest.approx(solid.rayleigh_wave_speed, rel=5e-3)
@@ -176,7 +176,7 @@ def test_energy_is_kept(drive, mode, attenuation):
 
     lost, worst, largest, before = 0.0, 0.0, 0.0, rates()
     for step in range(600):
-        more = event.advance(1)
+        more = event.take_steps(1)
         lost += attenuation * (mass * (0.5 * (before + rates())) ** 2).sum() * mesh.step
         before = rates()
         if more and step % 20:
@@ -204,7 +204,7 @@ def test_heavy_attenuation_comes_to_rest_where_an_overdamped_jump_does(drive):
         sample = of(problem, rough(problem, seed)[0])
         for before, after in path_of(program, sample).events[:3]:
             event = begin(sample, mesh, problem.blocks.stiffness, before, 0.5)
-            event.advance(60 * mesh.window)
+            event.take_steps(60 * mesh.window)
             moved = after.slip - before.slip
             if moved.max() < 0.1 * sample.critical.max():
                 continue  # to which the rise of the drive adds more
@@ -245,7 +245,7 @@ def test_far_from_ends_and_top_a_rupture_is_that_between_half_spaces(mode):
     end = 0.95 * (0.1 - 0.02) / speed  # from the patch to an end, and back to the front
     sample, mesh = of(block, strength), make_mesh(block)._replace(attenuation=0.0)
     waves, steps = at_rest(mesh, np.zeros(nodes)), int(end / mesh.step)
-    follow(sample, np.full(nodes, tau), 0.5 * sample.critical, mesh, waves, steps, True)
+    wave_steps(sample, np.full(nodes, tau), 0.5 * sample.critical, mesh, waves, steps, True)
     _, state = stepped(half, strength, tau, end, 2 * steps)
     ours, theirs = waves.arrival, state.arrival
     both = np.isfinite(ours) & np.isfinite(theirs)

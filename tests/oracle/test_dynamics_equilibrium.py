@@ -140,7 +140,7 @@ def test_slip_through_a_rupture_equals_that_of_the_full_history():
     run = run_of(problem, strength, method)
     state = run.start(run.first_slip())
     slip, rate = direct_convolution(run, state, 900)
-    run.advance(state, 900)
+    run.take_steps(state, 900)
     assert state.now["weakened_nodes"] > 100  # through the rupture
     # 1e-6 is asked for; errors of the kernel, up to 1e-6, have both signs and cancel.
     assert np.abs(state.slip - slip).max() < 2e-7 * slip.max()

@@ -89,7 +89,7 @@ def test_the_estimate_bounds_the_error_and_grows_towards_the_onset(monkeypatch):
     method = st.Rupture(loading_rate=2e7, stop="onset")
     tau_p, setting = profiles(0.5, 3), static_program(PROBLEM)
     rest = solve(tau_p, loading_rate=2e7, stop="onset", start="rest")["critical_stress"]
-    monkeypatch.setattr(module, "_TOLERANCE", 1.0)
+    monkeypatch.setattr(module, "_MAX_ERROR", 1.0)
     for strength, exact in zip(tau_p, rest, strict=True):
         estimates = []
         for crossings in (20.0, 5.0, 1.25, 0.4):
@@ -97,7 +97,7 @@ def test_the_estimate_bounds_the_error_and_grows_towards_the_onset(monkeypatch):
             run = run_of(PROBLEM, strength, method)
             state = slow_start(setting, run, PROBLEM.sample(strength), 0, 2e7)
             estimates.append(state.now["start_error"])
-            run.advance(state, 10_000)
+            run.take_steps(state, 10_000)
             error = abs(state.now["onset_stress"] - exact)
             assert error < max(estimates[-1], 3e-5 * state.now["scale"])
         assert np.all(np.diff(estimates) > 0.0)

@@ -63,12 +63,12 @@ def test_restart_at_any_step_is_the_uninterrupted_run(tmp_path, arrested):
     if arrested:
         total = 0
         while straight.now["arrested_events"] == 0 or straight.explicit:
-            total += run.advance(straight, 5)[0]
+            total += run.take_steps(straight, 5)[0]
             assert total < 20_000
         cuts = total // 3, total - 25, total
-        total += run.advance(straight, 3)[0]
+        total += run.take_steps(straight, 3)[0]
     else:
-        total, reason = run.advance(straight, 100_000)
+        total, reason = run.take_steps(straight, 100_000)
         implicit = int(straight.now["implicit_steps"])
         assert reason == Reason.ALL_SLID
         assert implicit > 10
@@ -76,9 +76,9 @@ def test_restart_at_any_step_is_the_uninterrupted_run(tmp_path, arrested):
         cuts = 1, 7, implicit - 1, implicit, implicit + 1, total - 20
     for cut in cuts:
         run, state = fresh_run(profile)
-        run.advance(state, cut)
+        run.take_steps(state, cut)
         state = through_file(tmp_path / "state.npz", run, state)
-        run.advance(state, total - cut)
+        run.take_steps(state, total - cut)
         assert_same(state._asdict(), straight._asdict())
 
 

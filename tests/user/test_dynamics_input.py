@@ -39,8 +39,8 @@ def test_a_run_that_blows_up_stops_and_says_where(monkeypatch):
 @pytest.mark.parametrize("every", [25, 40])
 def test_a_run_cut_short_goes_on_to_the_same_numbers(tmp_path, monkeypatch, every):
     """Wherever it was cut or ended; between frames far apart, steps are stored as well."""
-    monkeypatch.setattr(save_module, "FRAMES", 4)
-    monkeypatch.setattr(save_module, "_MOST_STEPS", 70)
+    monkeypatch.setattr(save_module, "FRAMES_PER_FILE", 4)
+    monkeypatch.setattr(save_module, "_MAX_STEPS_PER_FILE", 70)
     folder = tmp_path / "run"
     kept = st.Save(every=every, to=folder)
     whole = simulate(st.Save(every=every))
@@ -95,7 +95,7 @@ def test_what_is_no_run_of_this_kind(tmp_path):
 
 def test_full_disk_leaves_what_was_written_readable(tmp_path, monkeypatch):
     folder, left = tmp_path / "run", iter(range(3))
-    monkeypatch.setattr(save_module, "FRAMES", 8)
+    monkeypatch.setattr(save_module, "FRAMES_PER_FILE", 8)
     original = xr.Dataset.to_netcdf
 
     def to_netcdf(*arguments, **options):

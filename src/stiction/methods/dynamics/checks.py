@@ -10,8 +10,9 @@ from stiction.methods.dynamics.state import Reason, RuptureState, value_at
 from stiction.problem.problem import FEWEST_NODES, Problem
 from stiction.problem.sample import Sample
 
-# In units of the stress scale: load in one explicit step, and stress below minus the strength.
-_COARSE, _COARSEST, _REVERSED = 5e-3, 0.2, 1e-3
+# Shares of the stress scale:
+_COARSE_RISE, _MAX_RISE = 5e-3, 0.2  # of the load in one explicit step: warned of, and refused
+_MIN_REVERSE = 1e-3  # stress below minus the strength that is warned of
 
 
 def warn_if_coarse(problem: Problem, rows: Sample) -> None:
@@ -40,7 +41,7 @@ def warn_of_slip(run: Run, state: RuptureState) -> None:
             f"where the strength falls by up to {rates[steep].max():.3g} Pa/m, too steeply for this"
             " grid; take more nodes, or infinite strength for barriers that never break"
         )
-    if now["reverse_margin"] < -_REVERSED * now["scale"]:
+    if now["reverse_margin"] < -_MIN_REVERSE * now["scale"]:
         warn_accuracy(
             f"the stress fell below minus the strength, by {-now['reverse_margin']:.3g} Pa at "
             f"{interface.describe_node(int(now['reverse_node']))}: what would slip in reverse"
@@ -63,14 +64,14 @@ def at_first_slip(run: Run) -> RuptureState | None:
     if not scale > 0.0:
         raise InputError("initial_stress: too far from the strength; check the units of both")
     rise = run.slope(time) * step / scale
-    if rise > _COARSE:
-        courant = step / run.medium.largest_step * _COARSE / rise
+    if rise > _COARSE_RISE:
+        courant = step / run.medium.largest_step * _COARSE_RISE / rise
         text = (
             f"loading_rate: in one explicit step of {step:.3g} s the load rises by {rise:.2g} of "
             f"the stress scale, {scale:.3g} Pa; use courant={courant:.2g} or less, or load more"
             " slowly"
         )
-        if rise > _COARSEST:
+        if rise > _MAX_RISE:
             raise InputError(text)
         warn_accuracy(f"{text} (the onset is sampled coarsely)")
     return run.start(time)

@@ -1,4 +1,15 @@
-"""One run: explicit steps and implicit steps, the switch between them, and when it ends."""
+"""One run: explicit steps and implicit steps, the switch between them, and when it ends.
+
+A run goes through phases (`Run.take_steps`):
+
+1. It begins at rest or at an equilibrium, at the first slip (`Run.start`). Implicit steps come
+   first, unless the stress is above the strength by more than round-off.
+2. Implicit steps follow creep until their size falls below `Thresholds.smallest_step`. Then the
+   memory is rescaled and explicit steps go on (`_to_explicit`).
+3. Explicit steps follow waves until everything has been calm for a while. Then implicit steps go
+   on, the first of them of first order (`_to_implicit`).
+4. The run ends for one of the reasons of `Run.ending`.
+"""
 
 import dataclasses
 
@@ -31,16 +42,18 @@ from stiction.methods.dynamics.state import (
 )
 from stiction.problem.friction.kernels import strengths
 
-_OVERSTRESSED = 1e-6  # stress scales above the strength beyond which slip begins with waves
-_NO_SLIP = 1e-9  # Z V below which nothing slips, in units of the stress scale
-_STEPS = 1000  # between two looks at whether a run has ended
+# Shares of the stress scale:
+_OVERSTRESS = 1e-6  # stress above the strength from which slip begins with waves
+_RESTING_STRESS = 1e-9  # Z V up to which nothing slips
+_REACHED_SHARE = 1e-12  # of the strength: excess of a node that has just reached it
+_STEPS_BETWEEN_CHECKS = 1000  # of whether a run has ended
 
 _ENDINGS: dict[int, str] = {
     Reason.ALL_SLID: "sliding",
     Reason.DROPPED: "onset",
     Reason.AT_REST: "rest",
 }
-NOTHING = StepRecord(np.empty(0, DIAGNOSTICS), np.empty((0, 0), STATION))
+NO_RECORD = StepRecord(np.empty(0, DIAGNOSTICS), np.empty((0, 0), STATION))
 
 
 @dataclasses.dataclass(eq=False)
@@ -62,14 +75,14 @@ class Run:
         grid, nodes = self.medium.grid, self.setting.nodes
         interface = self.medium.interface
         stress_hat = (-grid.stiffness[0] * slip_hat).reshape(interface.wavenumbers.shape)
-        shared: Floats = interface.inverse_transform(stress_hat).ravel()
-        return shared + load * nodes.profile + nodes.initial
+        elastic: Floats = interface.inverse_transform(stress_hat).ravel()
+        return elastic + load * nodes.profile + nodes.initial
 
     def strength_after(self, slip: Floats) -> Floats:
         """Return the strength after a slip (m), Pa."""
         nodes, law = self.setting.nodes, self.setting.law
-        found: Floats = strengths(law, nodes.strength, nodes.residual, nodes.weakening, slip)
-        return found
+        strength: Floats = strengths(law, nodes.strength, nodes.residual, nodes.weakening, slip)
+        return strength
 
     def scale_at(self, load: float) -> float:
         """Stress scale of a load, Pa, at least that of the least that can run away."""
@@ -88,8 +101,8 @@ class Run:
             return 0.0
         last = int(np.argmax(values >= target)) or values.size - 1
         slope = (values[last] - values[last - 1]) / (times[last] - times[last - 1])
-        left = target - values[last - 1]
-        return float(times[last - 1] + left / slope) if slope > 0.0 else np.inf
+        missing = target - values[last - 1]
+        return float(times[last - 1] + missing / slope) if slope > 0.0 else np.inf
 
     def slope(self, time: float) -> float:
         """Return the size of the loading rate just after a time, Pa/s."""
@@ -104,8 +117,8 @@ class Run:
         """
         interface, impedance = self.medium.interface, self.medium.impedance
         setting, nodes, thresholds = self.setting, self.setting.nodes, self.setting.thresholds
-        given = np.zeros(interface.size) if slip is None else slip
-        delta = np.array(given, dtype=np.float64).ravel()
+        initial_slip = np.zeros(interface.size) if slip is None else slip
+        delta = np.array(initial_slip, dtype=np.float64).ravel()
         memory, memory_sum = empty_memory(self.medium.grid)
         load = float(value_at(self.setting.load, time))
         slip_hat = interface.transform(delta.reshape(interface.shape)).ravel()
@@ -114,7 +127,7 @@ class Run:
         excess = stress - limit
         rate = np.maximum(excess, 0.0) / impedance
         # A node that has just reached its strength has not begun to slip: drop round-off.
-        rate[rate * impedance < 1e-12 * nodes.strength] = 0.0
+        rate[rate * impedance < _REACHED_SHARE * nodes.strength] = 0.0
         stress = stress - impedance * rate
         diagnostics = np.zeros(1, DIAGNOSTICS)
         now = diagnostics[0]
@@ -128,8 +141,8 @@ class Run:
         now["onset_time"] = now["onset_load"] = np.nan
         times, values = setting.load
         lowest = min(load, values[times <= time].min()) if slip is None else load
-        left = stress + limit - (load - lowest) * nodes.profile  # at rest, at the lowest load
-        now["reverse_margin"], now["reverse_node"] = left.min(), int(np.argmin(left))
+        margin = stress + limit - (load - lowest) * nodes.profile  # at rest, at the lowest load
+        now["reverse_margin"], now["reverse_node"] = margin.min(), int(np.argmin(margin))
         now["top_slip_rate"], now["mean_slip"] = rate.max(), delta.mean()
         now["weakened_nodes"] = np.count_nonzero(delta >= nodes.critical)
         scale = max(0.0, self.scale_at(load))
@@ -138,7 +151,7 @@ class Run:
         arrival = np.where((delta > 0.0) & (delta >= front), time, np.nan)
         size, slope = thresholds.smallest_step, self.slope(time)
         first = 0.1 * thresholds.load_step * scale / slope if slope > 0.0 else size
-        explicit = thresholds.explicit_only or impedance * rate.max() > _OVERSTRESSED * scale
+        explicit = thresholds.explicit_only or impedance * rate.max() > _OVERSTRESS * scale
         now["phase"] = Phase.EXPLICIT if explicit else Phase.IMPLICIT
         now["next_size"] = min(max(size, first), LARGEST_STEP)
         return RuptureState(
@@ -155,8 +168,8 @@ class Run:
 
     def ended(self, state: RuptureState) -> bool:
         """Return whether the end time is reached, up to the rounding of a sum of many steps."""
-        left = self.setting.thresholds.end_time - state.now["time"]
-        return bool(left <= 1e-6 * self.medium.step)
+        remaining = self.setting.thresholds.end_time - state.now["time"]
+        return bool(remaining <= 1e-6 * self.medium.step)
 
     def ending(self, state: RuptureState, reason: int) -> str | None:
         """Return the reason why a run ends here, in a word; None if it goes on."""
@@ -171,23 +184,25 @@ class Run:
             not state.explicit
             and state.now["time"] >= times[-1]
             and values[-1] <= values[-2]
-            and self.medium.impedance * state.rate.max() <= _NO_SLIP * state.now["scale"]
+            and self.medium.impedance * state.rate.max() <= _RESTING_STRESS * state.now["scale"]
         )
         return "rest" if self.stop != "time" and resting else None
 
-    def follow(self, state: RuptureState, most: int) -> tuple[str | None, int]:
-        """Go on to the end of the run, or to `most` steps in all; return why it ended and the code.
+    def run_to_end(self, state: RuptureState, max_steps: int) -> tuple[str | None, int]:
+        """Go on to the end of the run, or to `max_steps` in all; return why it ended and the code.
 
         The reason is None if it has not ended; the code is then NOT_FINITE or DONE (all steps).
         """
-        word, reason = None, int(Reason.DONE)
-        while word is None and reason != Reason.NOT_FINITE and state.steps < most:
-            _, reason = self.advance(state, min(_STEPS, most - state.steps))
-            word = self.ending(state, reason)
-        return word, reason
+        ending, reason = None, int(Reason.DONE)
+        while ending is None and reason != Reason.NOT_FINITE and state.steps < max_steps:
+            _, reason = self.take_steps(
+                state, min(_STEPS_BETWEEN_CHECKS, max_steps - state.steps)
+            )
+            ending = self.ending(state, reason)
+        return ending, reason
 
-    def advance(
-        self, state: RuptureState, count: int, record: StepRecord = NOTHING
+    def take_steps(
+        self, state: RuptureState, count: int, record: StepRecord = NO_RECORD
     ) -> tuple[int, int]:
         """Take up to `count` steps in place; return (steps taken, why it returned).
 
@@ -196,10 +211,10 @@ class Run:
         """
         taken = 0
         while taken < count:
-            part = StepRecord(*(rows[taken:] for rows in record))
+            rest_of_record = StepRecord(*(rows[taken:] for rows in record))
             steps = self._explicit if state.explicit else self._implicit
-            more, reason = steps(state, count - taken, part)
-            taken += more
+            steps_taken, reason = steps(state, count - taken, rest_of_record)
+            taken += steps_taken
             if reason == Reason.TO_EXPLICIT:
                 self._to_explicit(state)
             elif reason == Reason.TO_IMPLICIT:
@@ -210,15 +225,15 @@ class Run:
 
     def _explicit(self, state: RuptureState, count: int, record: StepRecord) -> tuple[int, int]:
         medium, tables = self.medium, self._explicit_tables()
-        left = self.setting.thresholds.end_time - state.now["time"]
-        if left < count * medium.step:
-            count = min(count, max(1, int(np.ceil(left / medium.step - 1e-6))))
+        remaining = self.setting.thresholds.end_time - state.now["time"]
+        if remaining < count * medium.step:
+            count = min(count, max(1, int(np.ceil(remaining / medium.step - 1e-6))))
         return explicit_steps(count, state, medium.grid, self.setting, tables, record)
 
     def _implicit(self, state: RuptureState, count: int, record: StepRecord) -> tuple[int, int]:
         size, grid = float(state.now["next_size"]), self.medium.grid
         if not isinstance(self.tables, ImplicitTables):
-            self.tables = None  # release the others before these are made
+            self.tables = None  # release those of explicit steps before these are made
             self.tables = implicit_tables(grid)
         taken, state.now["next_size"], reason = implicit_steps(
             count, size, state, grid, self.setting, self.tables, record

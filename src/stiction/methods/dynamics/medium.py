@@ -1,4 +1,19 @@
-"""Data shared by all runs of one problem: stiffness, memory kernel, explicit time step."""
+"""Data shared by all runs of one problem: stiffness, memory kernel, explicit time step.
+
+Problem of the time step (`largest_step`)
+-----------------------------------------
+An interface that slides freely carries undamped Rayleigh waves, the shortest of which limit the
+explicit step h. With D = |k| slip, V/c_s and the memory variables of one mode as state, a step of
+`explicit` is a matrix that depends on kappa = |k| c_s h only (`amplification`). Wanted is the
+largest kappa up to which no eigenvalue of it is larger than 1.
+
+1. Raise kappa in steps of 0.1 until an eigenvalue is larger (`_largest_kappa`). If that is so in
+   the first step, the error of the memory kernel makes long waves grow, and no step is stable.
+2. Bisect between the last two.
+3. On a line the largest |k| is pi/dx. On a plane the shortest waves lie on the rim of the
+   rectangle |kx| <= pi/dx, |ky| <= pi/dy, and differ in length and in their share of mode II. The
+   waves on the axes and in the corner are the first to grow: take the smallest of their steps.
+"""
 
 import dataclasses
 import functools
@@ -17,7 +32,8 @@ from stiction.problem.problem import Problem
 LARGEST_RATIO = 7.15  # c_d over c_s: nu = 0.49 in plane strain
 SMALLEST_RATIO = 1.002  # nu = -0.99 in plane stress
 STEADY_TOLERANCE = 1e-4  # sums this good were stable for every Poisson's ratio
-_GROWTH = 1e-5  # growth of a wave in a step; a rupture takes thousands
+_MAX_WAVE_GROWTH = 1e-5  # in a step; a rupture takes thousands
+_KAPPA_STEP, _MAX_KAPPA, _BISECTIONS = 0.1, 6.0, 12
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -83,7 +99,7 @@ def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:
     entry, offset, multiplicity = offsets(k.shape)
     stiffness = problem.half_spaces.symbol(interface.shape)
     # Modes with entries in the tables: on a plane kx >= 0, on a line k > 0.
-    own = slice(0, interface.shape[0] // 2 + 1) if interface.is_plane else slice(1, None)
+    tabulated = slice(0, interface.shape[0] // 2 + 1) if interface.is_plane else slice(1, None)
     return Grid(
         transform=make_transform(interface.shape),
         impedance=solid.shear_modulus / (2.0 * solid.shear_wave_speed),
@@ -92,8 +108,8 @@ def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:
         entry=entry,
         offset=offset,
         multiplicity=multiplicity,
-        frequency=k[own].ravel() * solid.shear_wave_speed,
-        mode_two=share[own].ravel(),
+        frequency=k[tabulated].ravel() * solid.shear_wave_speed,
+        mode_two=share[tabulated].ravel(),
         poles=np.concatenate([kernel.poles for kernel in kernels]),
         weights=np.concatenate([kernel.weights for kernel in kernels]),
         split=kernels[0].poles.size,
@@ -106,22 +122,20 @@ def largest_step(
 ) -> float:
     """Return the largest stable c_s dt, m, of the explicit predictor-corrector.
 
-    The criterion is the shortest waves of the grid on an interface that slides freely, which
-    carries undamped Rayleigh waves: no eigenvalue of a step may grow. On a plane they lie on the
-    rim of the rectangle |kx| <= pi/dx, |ky| <= pi/dy, and differ in length and in their share of
-    mode II; those on the axes and in the corner are the first to grow. The limit is 0 where the
-    error of the kernel makes waves grow whatever the step.
+    It is 0 where the error of the kernel makes waves grow whatever the step.
     """
     kernels = [kernel_sum(mode, eta, tolerance) for mode in modes]
     static = static_stiffness(modes[0], eta)
     if len(modes) == 1:
-        return _largest(kernels[0], static) / np.pi * spacings[0]
-    limits = []
+        return _largest_kappa(kernels[0], static) / np.pi * spacings[0]
+    limits = []  # 3. The axes and the corner.
     for a, b in ((1.0, 0.0), (1.0, 1.0), (0.0, 1.0)):
         kx, ky = a * np.pi / spacings[0], b * np.pi / spacings[1]
         share = float(kx**2 / (kx**2 + ky**2))
         stiffness = share * static + 1.0 - share
-        limits.append(_largest(_mixed(kernels, share), stiffness) / float(np.hypot(kx, ky)))
+        limits.append(
+            _largest_kappa(_mixed(kernels, share), stiffness) / float(np.hypot(kx, ky))
+        )
     return min(limits)
 
 
@@ -146,17 +160,19 @@ def amplification(kappa: float, kernel: ExponentialSum, stiffness: float) -> Flo
 def _stable(kappa: float, kernel: ExponentialSum, stiffness: float) -> bool:
     matrix = amplification(kappa, kernel, stiffness)
     growth = np.abs(np.linalg.eigvals(matrix)).max() - 1.0
-    return bool(growth < _GROWTH)
+    return bool(growth < _MAX_WAVE_GROWTH)
 
 
-def _largest(kernel: ExponentialSum, stiffness: float) -> float:
+def _largest_kappa(kernel: ExponentialSum, stiffness: float) -> float:
     """Largest |k| c_s dt up to which no wave grows."""
-    low, high = 0.0, 0.1
-    while high < 6.0 and _stable(high, kernel, stiffness):
-        low, high = high, high + 0.1
+    # 1. Raise kappa.
+    low, high = 0.0, _KAPPA_STEP
+    while high < _MAX_KAPPA and _stable(high, kernel, stiffness):
+        low, high = high, high + _KAPPA_STEP
     if low == 0.0:  # long waves grow: that is the kernel, which no smaller step mends
         return 0.0
-    for _ in range(12):
+    # 2. Bisect.
+    for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if _stable(middle, kernel, stiffness) else (low, middle)
     return low
@@ -166,4 +182,6 @@ def _mixed(kernels: list[ExponentialSum], share: float) -> ExponentialSum:
     """The kernel of a wave vector on a plane, whose share of mode II is (kx/k)²."""
     weights = share * kernels[0].weights, (1.0 - share) * kernels[1].weights
     poles = np.concatenate([kernel.poles for kernel in kernels])
-    return ExponentialSum(poles, np.concatenate(weights), max(one.error for one in kernels))
+    return ExponentialSum(
+        poles, np.concatenate(weights), max(kernel.error for kernel in kernels)
+    )

@@ -1,12 +1,28 @@
 """A block in bilinear finite elements: 0 < x < L, 0 < y < H, with the nodes of its interface.
 
+Problem
+-------
+Elasticity of one block for waves (`waves`), on rows of nodes above the nodes of the interface, and
+its static response, which must agree with the closed form of `elasticity.blocks`.
+
+Grid
+----
 Columns lie at the nodes x = (i + 1/2) dx, so that each has a cell of the interface. Beyond the
-outer ones half a cell remains, in which s_xx and s_xy vanish: it is a strip that only resists to
+outer columns half a cell remains, in which s_xx and s_xy vanish: it is a strip that only resists to
 being stretched along y. Rows are dx apart at the interface and up to five times as much above.
 
+Elements (`_elements`)
+----------------------
 An element with the sides a and b has mean strains and two modes of an hourglass. Exact integration
 gives its energy as a b (s . e)/2 of the means, and (c_11 b/a + G a/b)/24 times the square of
 u_00 - u_10 - u_01 + u_11, likewise for v. In mode III there is only u: c_11 is G, all else zero.
+
+Steps (`make_mesh`)
+-------------------
+1. Place the rows, and find elements, masses and the stencils that move nodes.
+2. Condense the static response: eliminate the rows from the top downwards (`condensed`).
+3. Correct it: what K of the closed form has beyond K of the mesh acts on the slip of the interface.
+4. Find the stable step of mesh, viscosity and correction (`_limit`).
 """
 
 from __future__ import annotations
@@ -25,10 +41,10 @@ from stiction.problem.problem import Problem
 from stiction.problem.solid import Solid
 from stiction.problem.specimen import Blocks, Platen
 
-GROWTH, WIDEST = 1.08, 5.0
+ROW_RATIO, MAX_ROW_HEIGHT = 1.08, 5.0
 """Ratio of the heights of successive rows, and their largest height over dx."""
-VISCOSITY = 0.05
-"""Of the grid: oscillations of the shortest waves lose stress over dx/c_d times this."""
+GRID_VISCOSITY = 0.05
+"""Viscous time over dx/c_d: oscillations of the shortest waves lose stress in it."""
 
 
 class Mesh(NamedTuple):
@@ -74,6 +90,7 @@ def make_mesh(problem: Problem, courant: float = 0.9) -> Mesh:
 def _mesh(
     specimen: Blocks, interface: Interface, solid: Solid, mode: Mode, courant: float
 ) -> Mesh:
+    # 1. Rows, elements, masses and the drive.
     dx, n, drive = interface.spacing, interface.size, specimen.drive
     depth = specimen.thickness or 1.0
     heights = row_heights(specimen.height, dx)
@@ -99,14 +116,16 @@ def _mesh(
         drive_mass=drive.mass / depth,
         attenuation=np.pi * solid.shear_wave_speed / interface.extent / specimen.quality_factor,
     )
-    static, profile, own = condensed(mesh, n)
+    # 2. and 3. The static response, with the machine, and its correction.
+    static, profile, stiffness = condensed(mesh, n)
     if mesh.stiffness > 0.0:
-        relief = 0.5 * own / (1.0 + own / mesh.stiffness) / interface.extent
+        relief = 0.5 * stiffness / (1.0 + stiffness / mesh.stiffness) / interface.extent
         static = static + relief / n * np.outer(profile, profile)
     blocks = specimen.driven(interface.extent, n, solid, mode)
     correction = blocks.stiffness - static
+    # 4. The step.
     speed = solid.shear_wave_speed * (1.0 if mesh.anti_plane else solid.wave_speed_ratio)
-    viscous = VISCOSITY * dx / speed
+    viscous = GRID_VISCOSITY * dx / speed
     step = courant * _limit(speed, solid.shear_wave_speed, mesh, correction, viscous)
     longest = max(interface.extent, specimen.height)
     return mesh._replace(
@@ -119,7 +138,9 @@ def _mesh(
 
 def row_heights(height: float, spacing: float) -> Array:
     """Return the y of the rows, the first two `spacing` apart."""
-    steps = spacing * np.minimum(GROWTH ** np.arange(int(2.0 * height / spacing) + 2), WIDEST)
+    steps = spacing * np.minimum(
+        ROW_RATIO ** np.arange(int(2.0 * height / spacing) + 2), MAX_ROW_HEIGHT
+    )
     count = max(int(np.searchsorted(np.cumsum(steps), height * (1.0 - 1e-9))) + 1, 2)
     steps = steps[:count]
     steps[1:] *= (height - spacing) / steps[1:].sum()
@@ -131,13 +152,13 @@ def _elements(b: Array, a: float, solid: Solid, anti: bool) -> tuple[Array, Arra
     shear = solid.shear_modulus
     c11 = shear * (1.0 if anti else solid.wave_speed_ratio**2)
     sign, axes = np.array([-1.0, 1.0]), np.eye(2)
-    # What the corners (row, axis, column) give of a strain, and of an hourglass.
+    # Weights of the corners (row, axis, column) in a mean strain, and in an hourglass.
     along = [np.multiply.outer([0.5, 0.5], np.outer(axis, sign)) for axis in axes]
     up = [0.5 * np.multiply.outer(sign, np.outer(axis, [1.0, 1.0])) for axis in axes]
     twist = [np.multiply.outer(sign, np.outer(axis, sign)) for axis in axes]
 
-    def times(stiffness: Any, one: Array, other: Array) -> Array:
-        return np.multiply.outer(stiffness * np.ones_like(b), np.multiply.outer(one, other))
+    def times(stiffness: Any, left: Array, right: Array) -> Array:
+        return np.multiply.outer(stiffness * np.ones_like(b), np.multiply.outer(left, right))
 
     elements = times(c11 * b / a, along[0], along[0]) + times(shear * a / b, up[0], up[0])
     elements += times((c11 * b / a + shear * a / b) / 12.0, twist[0], twist[0])
@@ -146,31 +167,35 @@ def _elements(b: Array, a: float, solid: Solid, anti: bool) -> tuple[Array, Arra
         c12 = c11 - 2.0 * shear
         elements += times(c11 * a / b, up[1], up[1]) + times(shear * b / a, along[1], along[1])
         elements += times((c11 * a / b + shear * b / a) / 12.0, twist[1], twist[1])
-        for one, other, stiffness in ((along[0], up[1], c12), (up[0], along[1], shear)):
-            elements += times(stiffness, one, other) + times(stiffness, other, one)
+        for left, right, stiffness in ((along[0], up[1], c12), (up[0], along[1], shear)):
+            elements += times(stiffness, left, right) + times(stiffness, right, left)
         stretched = c11 - c12**2 / c11
     strips = 0.5 * a / b[:, None] * np.array([shear if anti else 0.0, stretched])
     return elements, strips
 
 
 def _stencils(elements: Array, strips: Array) -> Array:
-    """Return what moves a node: three coefficients each, of the rows below, here and above.
+    """Return the coefficients of the force on a node, (rows, axis, 5, 3).
 
-    Of the sum of both neighbours, of the node itself, and of the difference of both neighbours of
-    the other component; then at the left end, where there is one neighbour, of the node itself and
-    of its other component, which at the right end has the other sign.
+    The last index is the row below, of the node, and above. The five coefficients belong to
+
+    - the sum of both neighbours in the row, and the node itself,
+    - the difference of both neighbours in the other component,
+    - at the left end, where there is one neighbour, the node itself, and its other component. At
+      the right end the other component has the other sign.
     """
-    found = np.zeros((len(elements) + 1, 2, 5, 3))
+    stencils = np.zeros((len(elements) + 1, 2, 5, 3))
     for row, (element, strip) in enumerate(zip(elements, strips, strict=True)):
         for up in (0, 1):
             for axis in (0, 1):
-                own, other = element[up, axis, :, :, axis], element[up, axis, :, :, 1 - axis]
-                end = own[0, :, 0].copy()
+                same, cross = element[up, axis, :, :, axis], element[up, axis, :, :, 1 - axis]
+                end = same[0, :, 0].copy()
                 end += strip[axis] * np.where(np.arange(2) == up, 1.0, -1.0)
-                found[row + up, axis, :, 1 - up : 3 - up] -= [
-                    own[0, :, 1], own[0, :, 0] + own[1, :, 1], other[0, :, 1], end, other[0, :, 0],
+                stencils[row + up, axis, :, 1 - up : 3 - up] -= [
+                    same[0, :, 1], same[0, :, 0] + same[1, :, 1], cross[0, :, 1], end,
+                    cross[0, :, 0],
                 ]  # fmt: skip
-    return found.astype(np.float32)
+    return stencils.astype(np.float32)
 
 
 def _covered(heights: Array, middle: float, width: float) -> Array:
@@ -189,10 +214,10 @@ def _limit(
     """Return the largest stable step, s: that of the mesh, its viscosity and the correction."""
     thin = min(mesh.spacing, float(np.diff(mesh.heights).min()))
     squares = max(4.0 * speed**2, 8.0 / 3.0 * (speed**2 + shear_speed**2)) / thin**2
-    most = float(
+    stiffest = float(
         scipy.linalg.eigvalsh(correction, subset_by_index=[len(correction) - 1] * 2)[0]
     )
-    squares += 2.0 * max(most, 0.0) * mesh.spacing / mesh.mass[0]
+    squares += 2.0 * max(stiffest, 0.0) * mesh.spacing / mesh.mass[0]
     frequency = np.sqrt(squares)
     damped = 0.5 * viscous * frequency
     return float(2.0 / frequency * (np.sqrt(1.0 + damped**2) - damped))
@@ -202,20 +227,20 @@ def layer_matrix(mesh: Mesh, layer: int, nodes: int) -> sp.csr_matrix:
     """Return the stiffness of a row of elements: u, v of the lower nodes, then the upper ones."""
     left, right = np.eye(nodes, nodes - 1), np.eye(nodes, nodes - 1, -1)
     columns = [sp.csr_matrix(left), sp.csr_matrix(right)]
-    whole = sp.csr_matrix((4 * nodes, 4 * nodes))
-    for i, one in enumerate(columns):
-        for j, other in enumerate(columns):
+    stiffness = sp.csr_matrix((4 * nodes, 4 * nodes))
+    for i, to_column in enumerate(columns):
+        for j, from_column in enumerate(columns):
             corner = mesh.elements[layer][:, :, i, :, :, j].reshape(4, 4)
-            whole += sp.kron(corner, one @ other.T)
+            stiffness += sp.kron(corner, to_column @ from_column.T)
     ends = sp.csr_matrix((np.ones(2), ([0, nodes - 1],) * 2), shape=(nodes, nodes))
     strips = np.kron([[1.0, -1.0], [-1.0, 1.0]], np.diag(mesh.strips[layer]))
-    return (whole + sp.kron(strips, ends)).tocsr()
+    return (stiffness + sp.kron(strips, ends)).tocsr()
 
 
 def condensed(mesh: Mesh, nodes: int) -> tuple[Array, Array, float]:
     """Return K of the mesh under a given force (Pa/m), q, and C (Pa); see `elasticity.blocks`.
 
-    What is even about the middle of the block and what is odd do not see each other.
+    Motion that is even about the middle of the block and motion that is odd are independent.
     """
     static, force, compliance = np.zeros((nodes, nodes)), np.zeros(nodes), 0.0
     half = np.eye(nodes, nodes // 2)
@@ -237,7 +262,7 @@ def _condensed(mesh: Mesh, folds: list[Array]) -> tuple[Array, Array, float]:
     """
     nodes, size = folds[0].shape
     fold = sp.csr_matrix(scipy.linalg.block_diag(*folds, *folds))
-    own = size if mesh.anti_plane else 2 * size  # of a row: u, and v
+    unknowns = size if mesh.anti_plane else 2 * size  # of a row: u, and v
     ends = folds[0][[0, -1]].T
     kept, above, force = sp.eye(size).tocsr(), np.zeros((size, size)), np.zeros(size)
     if mesh.platen:  # it does not move where u is odd
@@ -250,20 +275,22 @@ def _condensed(mesh: Mesh, folds: list[Array]) -> tuple[Array, Array, float]:
         inverse = scipy.linalg.lapack.dpotri(factor, overwrite_c=True)[0]
         inverse = np.triu(inverse) + np.triu(inverse, 1).T
         moved = inverse @ force
-        less = between.T @ (between.T @ inverse).T
-        return -less, -(between.T @ moved), float(force @ moved)
+        condensed_part = between.T @ (between.T @ inverse).T
+        return -condensed_part, -(between.T @ moved), float(force @ moved)
 
     for row in range(mesh.heights.size - 1, 0, -1):
         layer = (fold.T @ layer_matrix(mesh, row - 1, nodes) @ fold).tocsc()
         up = slice(2 * size, 2 * size + kept.shape[0])
         force = force + kept[:size].T @ (ends @ mesh.push[row])
         inner = above + (kept.T @ layer[up, up] @ kept).toarray()
-        above, force, moved = eliminated(inner, kept.T @ layer[up, :own], force)
-        above += layer[:own, :own].toarray()
+        above, force, moved = eliminated(inner, kept.T @ layer[up, :unknowns], force)
+        above += layer[:unknowns, :unknowns].toarray()
         compliance += moved
-        kept = sp.eye(own).tocsr()
+        kept = sp.eye(unknowns).tocsr()
     if not mesh.anti_plane:  # v of the interface
-        less, added, moved = eliminated(above[size:, size:], above[size:, :size], force[size:])
-        above, force = above[:size, :size] + less, force[:size] + added
+        change, added, moved = eliminated(
+            above[size:, size:], above[size:, :size], force[size:]
+        )
+        above, force = above[:size, :size] + change, force[:size] + added
         compliance += moved
     return above, force, compliance

@@ -30,18 +30,17 @@ from stiction.problem.problem import Problem, refusals
 from stiction.problem.results import onset_variables
 from stiction.problem.sample import Sample, steepest_rate
 
-Fraction = Annotated[Real, Field(gt=0, le=1)]
+ShareUpToOne = Annotated[Real, Field(gt=0, le=1)]
 
-_SWITCH = 6.0  # explicit steps in the smallest implicit step
-_CALM_STEPS = 300
+_EXPLICIT_STEPS_IN_IMPLICIT = 6.0  # in the smallest implicit step
+_MIN_CALM_STEPS = 300
 # Z V that only an instability reaches, in units of the median of tau_p - tau_r: at least 0.106 in
 # those that were arrested, at most 0.054 in the waves after them (4 problems, 5e6 and 5e7 Pa/s).
 _UNSTABLE_STRESS = 0.075
 
 Start = Literal["equilibrium", "rest"]
 Stop = Literal["sliding", "onset", "rest", "time"]
-# Not known yet when a run stops at its onset.
-_LATER = (
+_UNKNOWN_AT_ONSET = (
     "kinetic_stress", "stress_drop", "seismic_moment", "radiated_energy", "fracture_energy",
     "arrested_events", "rupture_speed", "median_rupture_speed",
 )  # fmt: skip
@@ -66,7 +65,7 @@ def _load_history(load: Any) -> PiecewiseLinear | None:
 
 
 def _written(load: PiecewiseLinear | None) -> Any:
-    return None if load is None else [one.tolist() for one in load]
+    return None if load is None else [array.tolist() for array in load]
 
 
 LoadHistory = Annotated[Any, BeforeValidator(_load_history), PlainSerializer(_written)]
@@ -172,11 +171,11 @@ class Rupture:
     end_time: Positive | None = None
     load: LoadHistory = None
     kernel_tolerance: Positive = 1e-6
-    courant: Fraction = 0.9
-    slip_step: Fraction = 0.02
-    load_step: Fraction = 1e-3
+    courant: ShareUpToOne = 0.9
+    slip_step: ShareUpToOne = 0.02
+    load_step: ShareUpToOne = 1e-3
     implicit: Flag = True
-    arrival: Fraction = 0.5
+    arrival: ShareUpToOne = 0.5
     start: Start = "equilibrium"
     stop: Stop = "sliding"
     max_steps: Count = 5_000_000
@@ -258,14 +257,14 @@ class Rupture:
 
         def solve(rows: Sample) -> dict[str, NDArray[Any]]:
             checks.warn_if_coarse(problem, rows)
-            found = []
+            summaries = []
             for i in range(rows.samples):
                 run = make_run(self, medium, rows, i)
                 start = slow_start(static, run, rows, i, rate) if static and rate else None
-                found.append(self._one(run, start))
-            checks.warn_of_survival(self.stop, found)
+                summaries.append(self._summary_of(run, start))
+            checks.warn_of_survival(self.stop, summaries)
             names = self.variables(problem)
-            return {name: np.array([one[name] for one in found]) for name in names}
+            return {name: np.array([row[name] for row in summaries]) for name in names}
 
         return solve
 
@@ -275,13 +274,13 @@ class Rupture:
             raise InputError(reasons)
         return specimens.RuptureProgram(problem, self)
 
-    def _one(self, run: Run, state: RuptureState | None) -> dict[str, Any]:
+    def _summary_of(self, run: Run, state: RuptureState | None) -> dict[str, Any]:
         rest = checks.at_first_slip(run)
-        if rest is None:  # nothing slips: what it came to is at the end of the load
+        if rest is None:  # nothing slips: the state at the end of the load is the last
             state = run.start(min(run.setting.load.at[-1], run.setting.thresholds.end_time))
         else:
             state = rest if state is None else state
-            ended, reason = run.follow(state, self.max_steps)
+            ended, reason = run.run_to_end(state, self.max_steps)
             checks.check_finite(run, state, reason)
             if ended is None:
                 raise InputError(
@@ -290,11 +289,11 @@ class Rupture:
                     f" to stop={self.stop!r}; raise max_steps or the loading rate"
                 )
         checks.warn_of_slip(run, state)
-        found = summary(run, state)
+        values = summary(run, state)
         if self.stop == "onset":
-            later = [name for name in _LATER if name in found]
-            found |= {name: np.full(np.shape(found[name]), np.nan) for name in later}
-        return found
+            unknown = [name for name in _UNKNOWN_AT_ONSET if name in values]
+            values |= {name: np.full(np.shape(values[name]), np.nan) for name in unknown}
+        return values
 
 
 def make_run(
@@ -315,27 +314,27 @@ def make_run(
             f"friction: a weakening rate of {weakening.min():.3g} Pa/m takes infinitely much slip;"
             " check its unit"
         )
-    every = (strength, residual, weakening, critical, rows.load_profile, initial)
-    nodes = Nodes(*(np.array(values, dtype=np.float64).ravel() for values in every))
+    profiles = (strength, residual, weakening, critical, rows.load_profile, initial)
+    nodes = Nodes(*(np.array(values, dtype=np.float64).ravel() for values in profiles))
     steepest = steepest_rate(strength[None], residual[None], weakening[None])
     steepest *= friction.steepest_slope / friction.initial_slope
-    history = method.load
-    if history is None:
-        history = PiecewiseLinear(np.array([0.0, 1.0]), np.array([0.0, method.loading_rate]))
-    rising = np.sign(np.diff(history.values))
+    load = method.load
+    if load is None:
+        load = PiecewiseLinear(np.array([0.0, 1.0]), np.array([0.0, method.loading_rate]))
+    rising = np.sign(np.diff(load.values))
     setting = Setting(
         law=friction.parameters,
         nodes=nodes,
         mean_profile=float(nodes.profile.mean()),
         mean_initial=float(nodes.initial.mean()),
-        load=history,
-        turning_times=history.at[1:-1][rising[1:] != rising[:-1]],
+        load=load,
+        turning_times=load.at[1:-1][rising[1:] != rising[:-1]],
         scale=stress_scale(nodes),
-        thresholds=_thresholds(method, medium, nodes, history),
+        thresholds=_thresholds(method, medium, nodes, load),
         stations=np.empty(0, dtype=np.int64) if stations is None else stations,
     )
-    least = _least_load(medium, nodes, steepest)
-    return Run(medium, setting, method.stop, steepest, least)
+    least_load = _least_load(medium, nodes, steepest)
+    return Run(medium, setting, method.stop, steepest, least_load)
 
 
 def _least_load(medium: Medium, nodes: Nodes, steepest: float) -> float:
@@ -375,10 +374,10 @@ def _thresholds(
         end_time=np.inf if method.end_time is None else method.end_time,
         breakable=breakable,
         calm_slip=max(medium.interface.lengths) / medium.problem.effective_modulus,
-        calm_count=max(_CALM_STEPS, int(np.ceil(crossing))),
+        calm_count=max(_MIN_CALM_STEPS, int(np.ceil(crossing))),
         slip_step=method.slip_step,
         load_step=method.load_step,
-        smallest_step=_SWITCH * medium.step,
+        smallest_step=_EXPLICIT_STEPS_IN_IMPLICIT * medium.step,
         unstable_rate=_UNSTABLE_STRESS * typical / medium.impedance,
         arrival=float(arrival),
         curved=not friction.linear,

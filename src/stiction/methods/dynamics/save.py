@@ -30,15 +30,14 @@ from stiction.problem.results import along, coordinate, to_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
-FRAMES = 64
-"""Number of frames in a file of a folder."""
-_MOST_STEPS = 50_000  # recorded between frames that lie far apart, before they are written
-_CHECKPOINT, _SUMMARY, _CHUNKS = "checkpoint.npz", "summary.nc", "frames-*.nc"
+FRAMES_PER_FILE = 64
+_MAX_STEPS_PER_FILE = 50_000  # recorded between frames that lie far apart
+_CHECKPOINT, _SUMMARY, _FRAME_FILES = "checkpoint.npz", "summary.nc", "frames-*.nc"
 
 
-def _over(*dims: str, **about: tuple[str, str]) -> dict[str, Variable]:
+def _over(*dims: str, **meanings: tuple[str, str]) -> dict[str, Variable]:
     """Return variables with these dimensions, by name, from their units and meaning."""
-    return {name: Variable(*one, dims) for name, one in about.items()}
+    return {name: Variable(*meaning, dims) for name, meaning in meanings.items()}
 
 
 FIELDS = _over(
@@ -79,7 +78,7 @@ STATIONS = _over(  # as in STATION
     station_shear_stress=("Pa", "shear stress (traction) at a station after each step"),
 )
 TIME = Variable("s", "time from zero load", ("time",))
-_WATCHED = ("time", "load", "mean_stress", "work")
+_FROM_DIAGNOSTICS = ("time", "load", "mean_stress", "work")
 
 
 Place = Annotated[
@@ -130,14 +129,14 @@ class Save:
         """Return the numbers of the stations' nodes, flat; refuse those not on the interface."""
         lengths, numbers = interface.lengths, []
         for name, place in self.stations.items():
-            at = np.array(place)
-            if at.size != len(lengths) or not np.all((at >= 0.0) & (at <= lengths)):
+            x = np.array(place)
+            if x.size != len(lengths) or not np.all((x >= 0.0) & (x <= lengths)):
                 reach = " x ".join(f"{length:g}" for length in lengths)
                 raise InputError(
                     f"stations[{name!r}]: {place} is not on the interface of {reach} m; give"
                     f" {' and '.join(interface.dims)} in m, from the first node"
                 )
-            index = tuple(np.round(at / interface.spacings).astype(int) % interface.shape)
+            index = tuple(np.round(x / interface.spacings).astype(int) % interface.shape)
             numbers.append(np.ravel_multi_index(index, interface.shape))
         return np.array(numbers, dtype=np.int64)
 
@@ -148,7 +147,7 @@ class Recorder:
     def __init__(self, run: Run, save: Save, attributes: dict[str, Any]) -> None:
         self.run, self.save, self.attributes = run, save, attributes
         interface = run.medium.interface
-        self._others = repr([save.fields, save.stations])  # on which a folder depends, too
+        self._saved = repr([save.fields, save.stations])  # a folder depends on it, too
         rows, stations = save.every, len(save.stations)
         self._record = StepRecord(
             np.empty(rows, DIAGNOSTICS), np.empty((rows, stations), STATION)
@@ -158,21 +157,25 @@ class Recorder:
             self._columns[name] = self._record.stations[name.removeprefix("station_")]
         self._frames: list[dict[str, Any]] = []
         self._steps: list[dict[str, Floats]] = []
-        over = {name: along(interface, what) for name, what in FIELDS.items()}
-        over |= SCALARS | STEPS | STATIONS
-        self.variables = {name: per_area(interface, what) for name, what in over.items()}
+        variables = {name: along(interface, field) for name, field in FIELDS.items()}
+        variables |= SCALARS | STEPS | STATIONS
+        self.variables = {
+            name: per_area(interface, variable) for name, variable in variables.items()
+        }
 
-    def advance(self, state: RuptureState, count: int) -> tuple[int, int]:
+    def take_steps(self, state: RuptureState, count: int) -> tuple[int, int]:
         """Take up to `count` steps and record them; return (steps taken, why it returned)."""
-        rows = StepRecord(*(part[:count] for part in self._record))
-        taken, reason = self.run.advance(state, count, rows)
-        self._steps.append({name: one[:taken].copy() for name, one in self._columns.items()})
+        record = StepRecord(*(rows[:count] for rows in self._record))
+        taken, reason = self.run.take_steps(state, count, record)
+        self._steps.append(
+            {name: column[:taken].copy() for name, column in self._columns.items()}
+        )
         return taken, reason
 
     def add(self, state: RuptureState) -> None:
         """Keep a frame of the state as it is now."""
         run, now, medium = self.run, state.now, self.run.medium
-        frame: dict[str, Any] = {name: float(now[name]) for name in _WATCHED}
+        frame: dict[str, Any] = {name: float(now[name]) for name in _FROM_DIAGNOSTICS}
         frame |= {
             "mean_slip": float(state.slip.mean()),
             "top_slip_rate": float(state.rate.max()),
@@ -199,7 +202,7 @@ class Recorder:
         shape = len(self._frames), *interface.shape  # also if there are none
         data |= {name: data[name].reshape(shape) for name in save.fields}
         for name, column in self._columns.items():
-            data[name] = np.concatenate([column[:0], *(one[name] for one in self._steps)])
+            data[name] = np.concatenate([column[:0], *(steps[name] for steps in self._steps)])
         self._frames, self._steps = [], []
         coordinates = {"time": (data.pop("time"), TIME)}
         coordinates |= {dim: coordinate(interface, dim) for dim in interface.dims}
@@ -222,18 +225,18 @@ class Recorder:
             return False
         checkpoint = folder / _CHECKPOINT
         if not checkpoint.exists():
-            there = folder.iterdir() if folder.is_dir() else [folder] * folder.exists()
+            present = folder.iterdir() if folder.is_dir() else [folder] * folder.exists()
             # A run that was killed in its first write leaves a part of it.
-            if any(path.suffix != PART for path in there):
+            if any(path.suffix != PART for path in present):
                 raise InputError(
                     f"to: {str(folder)!r} is not empty and holds no rupture; give a new folder"
                 )
-            write_checkpoint(checkpoint, self.run, state, self._others)
+            write_checkpoint(checkpoint, self.run, state, self._saved)
             return False
-        read_checkpoint(checkpoint, self.run, state, self._others)
+        read_checkpoint(checkpoint, self.run, state, self._saved)
         if (folder / _SUMMARY).exists():
             return True
-        for path in folder.glob(_CHUNKS):
+        for path in folder.glob(_FRAME_FILES):
             if int(path.stem.removeprefix("frames-")) > state.steps:
                 path.unlink()
         return False
@@ -241,35 +244,36 @@ class Recorder:
     def flush(self, state: RuptureState, *, at_once: bool = False, last: bool = False) -> None:
         """Write what was gathered, if there is enough or at once, and the state to resume from.
 
-        That is not the last one: a run that goes on may have no frame where `max_steps` ended it.
+        The last state is not written: a run that goes on may have no frame where `max_steps` ended
+        it.
         """
-        folder, steps = self.save.to, sum(one["step_time"].size for one in self._steps)
-        full = len(self._frames) >= FRAMES or steps >= _MOST_STEPS
+        folder, steps = self.save.to, sum(rows["step_time"].size for rows in self._steps)
+        full = len(self._frames) >= FRAMES_PER_FILE or steps >= _MAX_STEPS_PER_FILE
         if folder is None or not (full or ((at_once or last) and self._frames)):
             return
         _write(folder / f"frames-{state.steps:012d}.nc", self.take())
         if not last:
-            write_checkpoint(folder / _CHECKPOINT, self.run, state, self._others)
+            write_checkpoint(folder / _CHECKPOINT, self.run, state, self._saved)
 
     def finish(self, dataset: xr.Dataset, stopped: str) -> None:
         """Write the variables of the whole run beside its frames, unless it can go on."""
         if self.save.to is not None and stopped != "max_steps":
-            whole = dataset.drop_dims(["time", "step"], errors="ignore")
-            _write(self.save.to / _SUMMARY, whole)
+            without_time = dataset.drop_dims(["time", "step"], errors="ignore")
+            _write(self.save.to / _SUMMARY, without_time)
 
 
 def _write(path: Path, dataset: xr.Dataset) -> None:
     write_whole(path, lambda aside: dataset.to_netcdf(aside, engine="netcdf4"))
 
 
-def _digest(run: Run, others: str) -> str:
+def _digest(run: Run, saved: str) -> str:
     """SHA-256 of all that a run depends on besides its state."""
     medium, setting = run.medium, run.setting
     grid = medium.grid
     slips = np.linspace(0.0, 5.0, 101)  # where laws are compared, in units of d_c
     law = np.concatenate([medium.problem.friction.fraction(slips), *map(np.ravel, setting.law)])
-    about = [medium.interface, float(medium.step), others, DIAGNOSTICS]
-    digest = hashlib.sha256(repr(about).encode())
+    texts = [medium.interface, float(medium.step), saved, DIAGNOSTICS]
+    digest = hashlib.sha256(repr(texts).encode())
     for values in (
         *setting.nodes, law, *setting.load, np.array(setting.thresholds, float),
         grid.impedance, grid.stiffness, grid.poles, grid.weights,
@@ -278,29 +282,27 @@ def _digest(run: Run, others: str) -> str:
     return digest.hexdigest()
 
 
-def write_checkpoint(path: Path, run: Run, state: RuptureState, others: str = "") -> None:
+def write_checkpoint(path: Path, run: Run, state: RuptureState, saved: str = "") -> None:
     """Save the state of a run and a digest of all that it depends on, whole or not at all."""
-    digest = np.frombuffer(_digest(run, others).encode(), np.uint8)
+    digest = np.frombuffer(_digest(run, saved).encode(), np.uint8)
     write_arrays(path, {"digest": digest} | state._asdict())
 
 
-def read_checkpoint(
-    path: Path, run: Run, state: RuptureState, others: str = ""
-) -> RuptureState:
+def read_checkpoint(path: Path, run: Run, state: RuptureState, saved: str = "") -> RuptureState:
     """Fill a state of this very run with the content of a checkpoint, and return it."""
     try:
         arrays = read_arrays(path)
         digest = arrays["digest"].tobytes().decode()
-        saved = [arrays[name] for name in state._fields]
+        stored = [arrays[name] for name in state._fields]
     except UNREADABLE as error:
         raise InputError(f"to: {str(path)!r} is not a readable checkpoint: {error}") from None
-    if digest != _digest(run, others):
+    if digest != _digest(run, saved):
         raise InputError(
             f"to: {str(path.parent)!r} holds another run: the problem, the profiles, the load, "
             "the method, or what is kept differs; give a new folder"
         )
-    for own, values in zip(state, saved, strict=True):
-        own[...] = values  # in place: the arrays lie where steps want them
+    for array, values in zip(state, stored, strict=True):
+        array[...] = values  # in place: the arrays lie where steps want them
     return state
 
 
@@ -327,16 +329,16 @@ def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset
     import xarray as xr
 
     parts = []
-    for path in sorted(folder.glob(_CHUNKS)):
+    for path in sorted(folder.glob(_FRAME_FILES)):
         with xr.open_dataset(path, engine="netcdf4") as data:
             unwanted = [] if fields is None else FIELDS.keys() - set(fields)
             parts.append(data.drop_vars(unwanted, errors="ignore").load())
     if not parts:
         raise InputError(f"folder: {str(folder)!r} holds no frames of a rupture")
 
-    def joined(dim: str, other: str) -> xr.Dataset:
+    def joined(dim: str, dropped: str) -> xr.Dataset:
         return xr.concat(
-            [part.drop_dims(other) for part in parts], dim=dim,
+            [part.drop_dims(dropped) for part in parts], dim=dim,
             data_vars="minimal", coords="minimal", compat="override", join="override",
         )  # fmt: skip
 

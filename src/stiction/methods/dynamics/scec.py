@@ -7,12 +7,12 @@ import numpy as np
 
 from stiction.base.errors import InputError
 
-SHOWN = {"slip": 1.0, "slip_rate": 1.0, "shear_stress": 1e6}
-"""Variables of a station and their units, in SI units."""
-NEVER = 1e9
-"""Rupture time of nodes that do not break, s."""
-COLUMNS = ("slip (m)", "slip rate (m/s)", "shear stress (MPa)")
-NAMES = "t h-slip h-slip-rate h-shear-stress v-slip v-slip-rate v-shear-stress n-stress"
+STATION_UNITS = {"slip": 1.0, "slip_rate": 1.0, "shear_stress": 1e6}
+"""Variables of a station, and the SI value of the unit in which a file has them."""
+UNBROKEN_TIME = 1e9
+"""Rupture time of nodes that do not break, s, in files of the comparison."""
+COLUMN_TITLES = ("slip (m)", "slip rate (m/s)", "shear stress (MPa)")
+COLUMN_NAMES = "t h-slip h-slip-rate h-shear-stress v-slip v-slip-rate v-shear-stress n-stress"
 
 
 def write_scec(
@@ -60,16 +60,21 @@ def write_scec(
     >>> files[-1].name
     'cplot.txt'
     """
-    lacking = [name for each in SHOWN for name in (each, f"station_{each}") if name not in run]
+    lacking = [
+        name
+        for variable in STATION_UNITS
+        for name in (variable, f"station_{variable}")
+        if name not in run
+    ]
     if lacking:
         raise InputError(
             f"run: lacks {', '.join(lacking)}; give simulate_rupture save=st.Save("
-            f"{list(SHOWN)}, stations=...)"
+            f"{list(STATION_UNITS)}, stations=...)"
         )
     dims = run.arrival_time.dims
     middle = dict(zip(dims, np.atleast_1d(origin).tolist(), strict=True))
     away = [run[dim].values - middle[dim] for dim in dims] + [np.zeros(1)] * (2 - len(dims))
-    size = " x ".join(f"{float(one[1] - one[0]):g}" for one in away[: len(dims)])
+    size = " x ".join(f"{float(axis[1] - axis[0]):g}" for axis in away[: len(dims)])
     about = f"# problem={benchmark}\n# code=stiction\n# element_size={size} m\n"
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
@@ -81,7 +86,8 @@ def write_scec(
         start = run.isel(time=0).sel(place, method="nearest")
         time = np.append(start.time, record.step_time)
         shown = [
-            np.append(start[n], record[f"station_{n}"]) / unit for n, unit in SHOWN.items()
+            np.append(start[n], record[f"station_{n}"]) / unit
+            for n, unit in STATION_UNITS.items()
         ]
         still = np.zeros_like(time)
         columns = [time, *shown, still, still, still, still + 1e-6 * normal_stress]
@@ -89,15 +95,18 @@ def write_scec(
             f"{about}# num_time_steps={time.size}\n# location={j:g} m along strike, {k:g} m"
         )
         header += " down-dip\n# Column #1 = time (s)\n"
-        each = [f"{way} {text}" for way in ("horizontal", "vertical") for text in COLUMNS]
-        each.append("normal stress (MPa), compression negative")
-        header += "".join(f"# Column #{i} = {text}\n" for i, text in enumerate(each, 2)) + NAMES
+        titles = [
+            f"{way} {text}" for way in ("horizontal", "vertical") for text in COLUMN_TITLES
+        ]
+        titles.append("normal stress (MPa), compression negative")
+        header += "".join(f"# Column #{i} = {text}\n" for i, text in enumerate(titles, 2))
+        header += COLUMN_NAMES
         paths.append(target / f"faultst{j / 100.0:03.0f}dp{k / 100.0:03.0f}.txt")
         np.savetxt(
             paths[-1], np.column_stack(columns), "%21.13e" + 7 * " %15.7e", header=header,
             comments="",
         )  # fmt: skip
-    times = np.nan_to_num(run.arrival_time.values, nan=NEVER).ravel()
+    times = np.nan_to_num(run.arrival_time.values, nan=UNBROKEN_TIME).ravel()
     places = [grid.ravel() for grid in np.meshgrid(*away, indexing="ij")]
     paths.append(target / "cplot.txt")
     header = (

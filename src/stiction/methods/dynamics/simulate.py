@@ -124,7 +124,7 @@ def simulate_rupture(
     if state.steps == 0:
         recorder.add(state)
     with Meter("rupture", show=progress, unit="steps") as meter:
-        stopped = _follow(run, state, recorder, method.max_steps, meter)
+        stopped = _record_to_end(run, state, recorder, method.max_steps, meter)
     recorder.attributes["stopped"] = stopped
     checks.warn_of_slip(run, state)
     recorder.flush(state, last=True)
@@ -137,14 +137,16 @@ def simulate_rupture(
     return with_gaps(problem, result, measured)
 
 
-def _follow(run: Run, state: RuptureState, recorder: Recorder, most: int, meter: Meter) -> str:
+def _record_to_end(
+    run: Run, state: RuptureState, recorder: Recorder, max_steps: int, meter: Meter
+) -> str:
     """Take steps and keep frames until the run ends; return the reason."""
     every = recorder.save.every
-    while state.steps < most:
+    while state.steps < max_steps:
         count = every if state.explicit else max(1, every // 10)
-        if state.steps + count >= most:
+        if state.steps + count >= max_steps:
             recorder.flush(state, at_once=True)
-        taken, reason = recorder.advance(state, min(count, most - state.steps))
+        taken, reason = recorder.take_steps(state, min(count, max_steps - state.steps))
         try:
             checks.check_finite(run, state, reason)
         except FloatingPointError as error:
@@ -171,12 +173,12 @@ def _complete(
     variables = {name: along(interface, variable) for name, variable in _ALONG.items()}
     for name, variable in method.variables(problem).items():
         variables[name] = replace(variable, dims=variable.dims[1:])  # without 'sample'
-    found: dict[str, Any] = {
+    values: dict[str, Any] = {
         "peak_strength": run.setting.nodes.strength.reshape(interface.shape),
         "arrival_time": state.arrival.reshape(interface.shape),
     }
     with np.errstate(over="ignore", invalid="ignore"):  # after a run that became non-finite
-        found |= summary(run, state)
+        values |= summary(run, state)
     # Energies and moment are already there over 'time'; their last value is the total.
-    new = {name: value for name, value in found.items() if name not in SCALARS}
-    return dataset.merge(to_dataset(new, variables, {}, {}, interface))
+    added = {name: value for name, value in values.items() if name not in SCALARS}
+    return dataset.merge(to_dataset(added, variables, {}, {}, interface))

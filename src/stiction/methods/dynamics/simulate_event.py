@@ -12,7 +12,7 @@ from stiction.base.variables import Variable, force_variables, forces
 from stiction.methods.dynamics.mesh import layer_matrix
 from stiction.methods.dynamics.save import FIELDS, SCALARS, TIME, Save
 from stiction.methods.dynamics.specimens import (
-    Event,
+    DynamicEvent,
     RuptureProgram,
     front_speeds,
     refuse_barriers,
@@ -30,8 +30,8 @@ from stiction.problem.sample import Sample
 if TYPE_CHECKING:
     import xarray as xr
 
-SHARES = (0.02, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95)
-"""Of the slip of an event, at which the whole block is kept."""
+PICTURE_SHARES = (0.02, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95)
+"""Shares of the slip of an event at which the velocities of the whole block are kept."""
 OVER_TIME: dict[str, Variable] = {
     name: SCALARS[name]
     for name in ("load", "mean_stress", "mean_slip", "top_slip_rate", "weakened_fraction")
@@ -48,13 +48,13 @@ OVER_TIME: dict[str, Variable] = {
         "J/m", "work less all of these: lost to attenuation", ("time",)
     ),
 }
-WHOLE: dict[str, Variable] = {
+OF_EVENT: dict[str, Variable] = {
     "critical_load": Variable("Pa", "drive of the event", ()),
     "critical_position": Variable("m", "position at which the front arrives first", ()),
     "onset_time": Variable("s", "time at which the front arrives first", ()),
-    **{name: Variable(one.units, one.long_name, ()) for name, one in SPEEDS.items()},
+    **{name: Variable(speed.units, speed.long_name, ()) for name, speed in SPEEDS.items()},
 }
-BLOCK = ("snapshot", "height", "x")
+BLOCK_DIMS = ("snapshot", "height", "x")
 
 
 def simulate_event(
@@ -84,23 +84,29 @@ def simulate_event(
         trial = program.event(sample, before)
         trial.run(method.max_steps)
         steps = trial.steps + (trial.mesh.window // 2 if trial.slides else 0)
-        record = Record(problem, rows, program.event(sample, before), save, trial)
+        record = EventRecord(problem, rows, program.event(sample, before), save, trial)
         record.add()
         for _ in range(0, steps, save.every):
-            record.event.advance(save.every, ends=False)
+            record.event.take_steps(save.every, ends=False)
             record.add()
     return record.dataset(method, "sliding" if trial.slides else "rest")
 
 
-class Record:
-    """What was kept so far of an event, which was tried before: how much slips is known."""
+class EventRecord:
+    """Frames of an event so far. A trial of it has shown how much slips, so that pictures of the
+    block can be spread evenly over the slip."""
 
     def __init__(
-        self, problem: Problem, rows: Sample, event: Event, save: Save, trial: Event
+        self,
+        problem: Problem,
+        rows: Sample,
+        event: DynamicEvent,
+        save: Save,
+        trial: DynamicEvent,
     ) -> None:
         self.problem, self.rows, self.event, self.save = problem, rows, event, save
         first, last = event.waves.slip.mean(), trial.waves.slip.mean()
-        self._due = [first + share * (last - first) for share in SHARES]
+        self._due = [first + share * (last - first) for share in PICTURE_SHARES]
         self.frames: list[dict[str, Any]] = []
         self.blocks: list[tuple[float, Any]] = []
         nodes, count = problem.interface.size, event.mesh.heights.size - 1
@@ -145,8 +151,8 @@ class Record:
         w = np.hstack([waves.u, waves.v]).astype(float) - lag * rates
         strain = 0.0
         for row, matrix in enumerate(self._layers):
-            both = np.concatenate([w[row], w[row + 1]])
-            strain += float(both @ (matrix @ both))
+            corners = np.concatenate([w[row], w[row + 1]])
+            strain += float(corners @ (matrix @ corners))
         added = waves.slip - self._begun - 0.5 * mesh.step * waves.slip_rate
         strain += 0.5 * mesh.spacing * float(added @ (mesh.correction @ added))
         speed = waves.now[SPEED]
@@ -164,7 +170,7 @@ class Record:
         }
 
     def dataset(self, method: Any, stopped: str) -> xr.Dataset:
-        """Return what was kept, labelled."""
+        """Return the frames and pictures as a dataset."""
         problem, interface = self.problem, self.problem.interface
         arrival = self.event.waves.arrival
         reached = bool(np.isfinite(arrival).any())
@@ -185,11 +191,13 @@ class Record:
             **front_speeds(problem, self.rows.steepest_rate, arrival),
         }
         variables = {name: along(interface, FIELDS[name]) for name in self.save.fields}
-        variables |= OVER_TIME | WHOLE
+        variables |= OVER_TIME | OF_EVENT
         variables |= {
             "peak_strength": Variable("Pa", "peak strength tau_p", ("x",)),
             "arrival_time": Variable("s", "arrival time of the front", ("x",)),
-            "block_velocity": Variable("m/s", "velocity along x in the upper block", BLOCK),
+            "block_velocity": Variable(
+                "m/s", "velocity along x in the upper block", BLOCK_DIMS
+            ),
         }
         if problem.area is not None:
             values |= forces(values, problem.area)

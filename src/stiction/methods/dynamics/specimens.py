@@ -1,8 +1,20 @@
 """Ruptures on specimens: the path of equilibria, whose instabilities run with inertia.
 
-An event is counted from the static state that becomes unstable. The drive is raised a little, as it
-goes on to rise, and slip has grown a little along the unstable direction; what follows is all by
-waves. A block is at rest when nothing slips any more while shear waves cross it and return.
+Problem
+-------
+A specimen is loaded slowly: its slip follows the equilibria of `methods.equilibrium` until one of
+them becomes unstable. From there on waves run through the blocks (`waves`), until all is at rest
+or the whole interface slides. Then the path goes on from the state that they left.
+
+Steps of an event
+-----------------
+1. Begin at the static state that becomes unstable. The drive is raised a little, as it goes on to
+   rise, and slip has grown a little along the unstable direction (`begin`).
+2. Follow the waves. The block is at rest when nothing slips any more while shear waves cross it and
+   return (`DynamicEvent.run`).
+3. Slip that is still under way once the waves have died out, and nodes that were carried beyond the
+   next equilibrium, come to rest in a static state: the path counts the latter as stopped
+   (`RuptureProgram.jump`).
 """
 
 from __future__ import annotations
@@ -19,7 +31,7 @@ from stiction.base.errors import InputError
 from stiction.base.variables import Variable
 from stiction.methods.dynamics.mesh import Mesh, make_mesh
 from stiction.methods.dynamics.summary import SPEEDS, front_speed
-from stiction.methods.dynamics.waves import Waves, at_rest, follow
+from stiction.methods.dynamics.waves import Waves, at_rest, wave_steps
 from stiction.methods.equilibrium.dense.cholesky import SlipState
 from stiction.methods.equilibrium.dense.jump import jump
 from stiction.methods.equilibrium.dense.program import DenseProgram
@@ -29,16 +41,16 @@ from stiction.methods.equilibrium.solver import OnsetSolver, Path
 from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
 
-TAKEN = ("courant", "arrival", "max_steps", "events")
+OPTIONS = ("courant", "arrival", "max_steps", "events")
 """Options of `Rupture` on specimens; the others are those of a load that rises in time."""
-RAISED = 1e-5
+LOAD_RISE = 1e-5
 """Rise of the drive in an event, as a share of the mean fall of strength over its profile."""
-GROWN = 1e-3
+INITIAL_GROWTH = 1e-3
 """Growth of the slip at the start, as a share of d_c where it is largest."""
-STILL = 1e-4
+RESTING_SLIP = 1e-4
 """Share of the largest slip of an event below which a node counts as resting."""
-LOOKS = 8
-"""How often it is seen whether all is at rest, while shear waves cross the block and return."""
+CHECKS_PER_WINDOW = 8
+"""How often rest is checked while shear waves cross the block and return."""
 
 
 def refusals(method: Any, problem: Problem) -> list[str]:
@@ -47,7 +59,7 @@ def refusals(method: Any, problem: Problem) -> list[str]:
     reasons = [
         f"{name}: means nothing on a specimen, which is loaded slowly between events; leave it out"
         for name, value in vars(method).items()
-        if name not in TAKEN and value != getattr(usual, name)
+        if name not in OPTIONS and value != getattr(usual, name)
     ]
     return reasons + refused(problem.friction)
 
@@ -58,7 +70,7 @@ def variables(method: Any, problem: Problem) -> dict[str, Variable]:
 
 
 @dataclass
-class Event:
+class DynamicEvent:
     """One instability on its way.
 
     Attributes
@@ -67,6 +79,12 @@ class Event:
         The equilibrium that became unstable.
     start : (n,) array
         Stress of the static state at the start, less the initial stress, Pa.
+    front : (n,) array
+        Slip with which the front arrives at a node, m; infinite where it was before the event.
+    slides : bool
+        Whether every node has slipped.
+    steps : int
+        Number of steps taken so far.
     """
 
     sample: StaticSample
@@ -78,21 +96,23 @@ class Event:
     slides: bool = False
     steps: int = 0
 
-    def advance(self, count: int, ends: bool = True) -> bool:
+    def take_steps(self, count: int, ends: bool = True) -> bool:
         """Take so many steps, or until all nodes have slipped; return whether they have not."""
-        taken = follow(self.sample, self.start, self.front, self.mesh, self.waves, count, ends)
+        taken = wave_steps(
+            self.sample, self.start, self.front, self.mesh, self.waves, count, ends
+        )
         self.steps += taken
         self.slides = bool((self.waves.slip > 0.0).all())
         return not self.slides
 
     def run(self, max_steps: int) -> None:
-        """Go on until all is at rest or all nodes have slipped."""
-        slips = deque([self.waves.slip.copy()], maxlen=LOOKS + 1)
-        while self.advance(-(-self.mesh.window // LOOKS)):
+        """Step 2: go on until all is at rest or all nodes have slipped."""
+        slips = deque([self.waves.slip.copy()], maxlen=CHECKS_PER_WINDOW + 1)
+        while self.take_steps(-(-self.mesh.window // CHECKS_PER_WINDOW)):
             slips.append(self.waves.slip.copy())
             added = float((slips[-1] - slips[0]).max())
-            most = float((slips[-1] - self.before.slip).max())
-            if len(slips) > LOOKS and added <= STILL * most:
+            largest = float((slips[-1] - self.before.slip).max())
+            if len(slips) > CHECKS_PER_WINDOW and added <= RESTING_SLIP * largest:
                 return
             if self.steps > max_steps:
                 raise InputError(
@@ -103,28 +123,28 @@ class Event:
 
 def begin(
     sample: StaticSample, mesh: Mesh, stiffness: Array, before: State, arrival: float
-) -> Event:
-    """Return an event that is about to run.
+) -> DynamicEvent:
+    """Step 1: return an event that is about to run.
 
     `arrival` is the slip over d_c with which a front arrives at a node.
     """
     fall = sample.excess - sample.residual
-    load = before.load + RAISED * float(fall.mean() / sample.profile.mean())
+    load = before.load + LOAD_RISE * float(fall.mean() / sample.profile.mean())
     z = before.direction
-    place = int(np.argmax(z))
-    grown = GROWN * sample.critical[place] / max(float(z[place]), 1e-300)
-    slip = before.slip + grown * z
+    fastest = int(np.argmax(z))
+    growth = INITIAL_GROWTH * sample.critical[fastest] / max(float(z[fastest]), 1e-300)
+    slip = before.slip + growth * z
     start = load * sample.profile - stiffness @ slip
     front = arrival * sample.critical
     front = np.where(before.slip < front, np.maximum(front, slip * (1.0 + 1e-12)), np.inf)
-    return Event(sample, mesh, before, start, at_rest(mesh, slip), front)
+    return DynamicEvent(sample, mesh, before, start, at_rest(mesh, slip), front)
 
 
 class RuptureProgram(DenseProgram):
     """Equilibria of a specimen between which waves run through the blocks.
 
     Between events loading is slow. Where a wave carried slip beyond the next equilibrium, nodes
-    rest below their strength afterwards: the path counts them as stopped.
+    rest below their strength afterwards.
 
     Parameters
     ----------
@@ -140,26 +160,32 @@ class RuptureProgram(DenseProgram):
         law = problem.friction
         self.arrival = min(law.slip_at(1.0 - method.arrival), law.reach) / law.reach
 
-    def event(self, sample: StaticSample, found: State) -> Event:
+    def event(self, sample: StaticSample, unstable: State) -> DynamicEvent:
         """Return an event that is about to run from an instability."""
-        return begin(sample, self.mesh, self.problem.blocks.stiffness, found, self.arrival)
+        return begin(sample, self.mesh, self.problem.blocks.stiffness, unstable, self.arrival)
 
-    def jump(self, sample: StaticSample, found: State) -> Jump:
-        """Let an unstable state run until it rests, or all of it slides."""
-        event = self.event(sample, found)
+    def jump(self, sample: StaticSample, unstable: State) -> Jump:
+        """Step 3: let an unstable state run until it rests, or all of it slides."""
+        event = self.event(sample, unstable)
         event.run(self.max_steps)
         slip = event.waves.slip
         stiff: Array = self.problem.blocks.stiffness @ slip
         outcome: int = Outcome.SLIDING
-        if not event.slides:  # what still moves once the waves have died away comes to rest
+        if not event.slides:  # slip still under way comes to rest
             elastic, true = self._workspaces
             slip_state = SlipState(sample, slip, stiff, elastic, self.may_stop)
-            outcome = jump(slip_state, found.load, np.inf, true)
+            outcome = jump(slip_state, unstable.load, np.inf, true)
         state = State(
-            found.load, slip, found.direction, stiff, by_events=True, jumped=True, stopped=True
+            unstable.load,
+            slip,
+            unstable.direction,
+            stiff,
+            by_events=True,
+            jumped=True,
+            stopped=True,
         )
-        arrested, known = outcome == Outcome.ARRESTED, outcome != Outcome.UNDECIDED
-        return Jump(arrested, known, state, arrival=event.waves.arrival)
+        arrested, is_known = outcome == Outcome.ARRESTED, outcome != Outcome.UNDECIDED
+        return Jump(arrested, is_known, state, arrival=event.waves.arrival)
 
 
 class RuptureSolver(OnsetSolver):
@@ -185,7 +211,7 @@ class RuptureSolver(OnsetSolver):
 
 
 def refuse_barriers(rows: Sample) -> None:
-    """Refuse what only half-spaces take: infinite strength, and stress above the strength."""
+    """Refuse profiles that only half-spaces take: infinite strength, stress above strength."""
     if not np.isfinite(rows.strength).all():
         raise InputError("strength: infinite strength is taken between half-spaces only")
     if np.any(rows.strength < rows.initial_stress):

@@ -15,11 +15,11 @@ SPEEDS: dict[str, Variable] = {
     "rupture_speed": Variable("m/s", "largest apparent speed of the front over 2 h_n"),
     "median_rupture_speed": Variable("m/s", "median apparent speed of the front over h_n/2"),
 }
-SPANS: dict[str, Any] = {
+SPEED_SPANS: dict[str, Any] = {
     "rupture_speed": (2.0, np.max),
     "median_rupture_speed": (0.5, np.median),
 }
-"""Lengths h_n over which speeds are means, and which of them counts."""
+"""Length, in h_n, over which a speed is a mean, and the statistic over all places."""
 _SCALARS: dict[str, Variable] = {
     "applied_load": Variable("Pa", "load factor applied at the onset"),
     "onset_time": Variable("s", "time from zero load to the onset"),
@@ -49,13 +49,14 @@ def per_area(interface: Interface, variable: Variable) -> Variable:
 def scalars(interface: Interface) -> dict[str, Variable]:
     """Return the additional variables of a run; on a plane, the median speeds along x and y.
 
-    The largest one is left out there: where a front arrives at an angle, it is above any of waves.
+    The largest speed is left out there: where a front arrives at an angle, it is above all waves.
     """
-    found = {name: per_area(interface, variable) for name, variable in _SCALARS.items()}
+    variables = {name: per_area(interface, variable) for name, variable in _SCALARS.items()}
     if interface.is_plane:
-        del found["rupture_speed"]
-    found["median_rupture_speed"] = position(interface, found["median_rupture_speed"])
-    return found
+        del variables["rupture_speed"]
+    median = "median_rupture_speed"
+    variables[median] = position(interface, variables[median])
+    return variables
 
 
 def seismic_moment(run: Run, state: RuptureState) -> float:
@@ -78,11 +79,11 @@ def energy_balance(run: Run, state: RuptureState) -> dict[str, float]:
     share[..., 0] = share[..., -1] = 1.0  # modes without a conjugate
     power = share.ravel()[1:] * grid.stiffness[0, 1:] * np.abs(state.slip_hat[1:]) ** 2
     strain = float(0.5 * np.sum(power) * grid.cell / np.prod(grid.transform.shape))
-    spent = float((fracture + nodes.residual * state.slip).sum()) * grid.cell
+    dissipated = float((fracture + nodes.residual * state.slip).sum()) * grid.cell
     return {
         "strain_energy": strain,
         "fracture_energy": float(fracture.sum()) * grid.cell,
-        "radiated_energy": float(state.now["work"]) - spent - strain,
+        "radiated_energy": float(state.now["work"]) - dissipated - strain,
     }
 
 
@@ -92,11 +93,11 @@ def _axis_speeds(run: Run, state: RuptureState, name: str) -> list[float]:
     nucleation = run.medium.problem.nucleation_lengths(run.steepest_rate)
     arrival = state.arrival.reshape(interface.shape)
     began = np.unravel_index(int(state.now["onset_node"]), interface.shape)
-    found = []
+    speeds = []
     for axis, length in enumerate(nucleation):
         through: Any = (*began[:axis], slice(None), *began[axis + 1 :])
-        found.append(front_speed(name, interface, axis, arrival[through], length))
-    return found
+        speeds.append(front_speed(name, interface, axis, arrival[through], length))
+    return speeds
 
 
 def _critical_load(run: Run, now: Any, stress: float) -> float:
@@ -111,15 +112,13 @@ def _critical_load(run: Run, now: Any, stress: float) -> float:
 def summary(run: Run, state: RuptureState) -> dict[str, Any]:
     """Return the scalars of a finished run; NaN is what did not happen."""
     interface, now = run.medium.interface, state.now
-    onset, first, kinetic = (
-        float(now[name]) if np.isfinite(now[name]) else np.nan
-        for name in ("onset_stress", "first_stress", "kinetic_stress")
-    )
+    stresses = ("onset_stress", "first_stress", "kinetic_stress")
+    onset, first, kinetic = (float(now[name]) for name in stresses)
     # A run that goes on until the interface slides, or to its end time, may see it survive.
     critical = np.nan if np.isnan(kinetic) and run.stop in ("sliding", "time") else onset
     node = np.unravel_index(int(now["onset_node"]), interface.shape)
-    spent = energy_balance(run, state)
-    found: dict[str, Any] = {
+    energies = energy_balance(run, state)
+    values: dict[str, Any] = {
         "critical_load": _critical_load(run, now, critical),
         "critical_stress": critical,
         "first_instability": first,
@@ -130,24 +129,24 @@ def summary(run: Run, state: RuptureState) -> dict[str, Any]:
         "seismic_moment": seismic_moment(run, state),
         "arrested_events": int(now["arrested_events"]),
         "median_rupture_speed": _axis_speeds(run, state, "median_rupture_speed"),
-        **{name: spent[name] for name in ("radiated_energy", "fracture_energy")},
+        **{name: energies[name] for name in ("radiated_energy", "fracture_energy")},
         **{name: float(now[name]) for name in ("onset_time", "start_load", "start_error")},
         **{name: int(now[name]) for name in ("implicit_steps", "explicit_steps")},
     }
     if not interface.is_plane:
-        found["rupture_speed"] = _axis_speeds(run, state, "rupture_speed")
-    for name in {"critical_position", "rupture_speed", "median_rupture_speed"} & found.keys():
+        values["rupture_speed"] = _axis_speeds(run, state, "rupture_speed")
+    for name in {"critical_position", "rupture_speed", "median_rupture_speed"} & values.keys():
         # A number on a line; one along x and one along y on a plane.
-        along = np.where(np.isnan(onset), np.nan, found[name])
-        found[name] = along if interface.is_plane else along[0]
-    return found
+        along = np.where(np.isnan(onset), np.nan, values[name])
+        values[name] = along if interface.is_plane else along[0]
+    return values
 
 
 def front_speed(
     name: str, interface: Interface, axis: int, arrival: Floats, nucleation: float
 ) -> float:
     """Return one of `SPEEDS` of a front along a line of nodes, m/s; nan where none ran."""
-    lengths, statistic = SPANS[name]
+    lengths, statistic = SPEED_SPANS[name]
     spacing = interface.spacings[axis]
     window = max(lengths * nucleation, 8.0 * spacing)
     window = min(window, 0.25 * interface.lengths[axis])

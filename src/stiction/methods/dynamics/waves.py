@@ -1,8 +1,26 @@
 """Waves in a block, with friction on its interface: central differences in time, row by row.
 
-Everything is counted from a static state. In the upper block u is half of the slip at y = 0; the
-lower one is its mirror image, so that no normal stress changes there. A node of the interface
-slips at the rate that its strength leaves, and rests where that would be negative.
+Problem
+-------
+The blocks of `mesh`, from a static state on, M u'' + M alpha u' + K (u + theta u') = forces, with
+the masses M, the attenuation alpha (`Mesh.attenuation`) and the viscous time theta of the grid
+(`Mesh.viscous_time`). All displacements are counted from the static state. In the upper block u is
+half of the slip at y = 0. The lower block is its mirror image, so that no normal stress changes.
+
+Algorithm (`wave_steps`)
+------------------------
+Leapfrog: velocities in the middle of steps of size h, displacements at their ends, attenuation
+half implicit. With a = alpha h/2 and w = u + theta u', each step is, row by row,
+
+1. forces F on the row from its elements (`_force`), by w alone, so that only w is kept;
+2. u' <- ((1 - a) u' + h F/M)/(1 + a) and w <- w + (h + theta) u' - theta (u' before) (`_move`).
+3. On the interface, the same with friction (`_slide`): the node slips at the rate that its strength
+   leaves, and rests where that would be negative. `Mesh.correction`, K of the closed form less
+   K of the mesh, acts on the slip of the interface.
+4. The top moves with its platen (`_move_platen`), or the pusher acts on the ends (`_move_pusher`).
+   The spring of the machine is half implicit; an infinitely stiff machine holds the drive.
+
+Row j + 1 needs row j as it was, so the force on a row is found before the row below it moves.
 """
 
 from typing import Any, NamedTuple
@@ -18,8 +36,7 @@ from stiction.methods.equilibrium.sample import StaticSample, strength_at
 class Waves(NamedTuple):
     """Where a block is, and how fast. Single precision is enough for differences.
 
-    The displacements u and v come with the viscous time times their rates: elements only need
-    this sum.
+    u and v are the sums w of displacement and viscous time times rate: elements only need these.
     """
 
     u: Array
@@ -40,8 +57,8 @@ class Waves(NamedTuple):
 
 
 NOW = ("time", "travel", "speed", "force", "friction")
-"""Time (s), travel (m) and speed of one drive, change of its force (N/m), and what friction took
-from one block (J/m)."""
+"""Time (s), travel (m) and speed of the drive of one block, change of its force (N/m), and the
+energy that friction took from one block (J/m)."""
 TIME, TRAVEL, SPEED, FORCE, FRICTION = range(5)
 
 
@@ -60,7 +77,7 @@ def at_rest(mesh: Mesh, slip: Array) -> Waves:
 def _force(
     stencil: Any, x0: Any, x1: Any, x2: Any, y0: Any, y1: Any, y2: Any, force: Any
 ) -> None:
-    """Write what acts on a row along an axis: by x of the rows around it, and by y across."""
+    """Step 1: the force on a row along an axis, by x of the rows around it, and by y across."""
     n = force.shape[0]
     a, b, c = stencil[0, 0], stencil[0, 1], stencil[0, 2]
     d, e, f = stencil[1, 0], stencil[1, 1], stencil[1, 2]
@@ -72,16 +89,16 @@ def _force(
             + (g * (y0[i + 2] - y0[i]) + h * (y1[i + 2] - y1[i]) + k * (y2[i + 2] - y2[i]))
         )
     for i, inner, sign in ((0, 1, np.float32(1.0)), (n - 1, n - 2, np.float32(-1.0))):
-        own = a * x0[inner] + b * x1[inner] + c * x2[inner]
-        own += stencil[3, 0] * x0[i] + stencil[3, 1] * x1[i] + stencil[3, 2] * x2[i]
-        other = g * y0[inner] + h * y1[inner] + k * y2[inner]
-        other += stencil[4, 0] * y0[i] + stencil[4, 1] * y1[i] + stencil[4, 2] * y2[i]
-        force[i] = own + sign * other
+        from_x = a * x0[inner] + b * x1[inner] + c * x2[inner]
+        from_x += stencil[3, 0] * x0[i] + stencil[3, 1] * x1[i] + stencil[3, 2] * x2[i]
+        from_y = g * y0[inner] + h * y1[inner] + k * y2[inner]
+        from_y += stencil[4, 0] * y0[i] + stencil[4, 1] * y1[i] + stencil[4, 2] * y2[i]
+        force[i] = from_x + sign * from_y
 
 
 @jit_inside
 def _move(w: Any, rate: Any, force: Any, keep: Any, gain: Any, step: Any, lag: Any) -> None:
-    """Move a row of nodes by one step."""
+    """Step 2: move a row of nodes by one step; `lag` is the viscous time."""
     for i in range(w.shape[0]):
         before = rate[i]
         after = keep * before + gain * force[i]
@@ -100,7 +117,7 @@ def _slide(
     keep: float,
     gain: float,
 ) -> int:
-    """Move the nodes of the interface; returns how many never slipped."""
+    """Step 3: move the nodes of the interface; return how many never slipped."""
     dx, step = mesh.spacing, mesh.step
     slip, rates, u, now = waves.slip, waves.u_rate[0], waves.u[0], waves.now
     never = 0
@@ -134,7 +151,7 @@ def _slide(
 
 @jit_inside
 def _move_platen(mesh: Mesh, waves: Waves, force: Any) -> None:
-    """Move the top with its platen, behind a spring that is half implicit, or hold it."""
+    """Step 4: move the top with its platen, behind its spring, or hold it."""
     now, top, step = waves.now, waves.u.shape[0] - 1, mesh.step
     total = 0.0
     for i in range(force.shape[0]):
@@ -143,9 +160,9 @@ def _move_platen(mesh: Mesh, waves: Waves, force: Any) -> None:
     if mesh.stiffness == np.inf:
         now[FORCE] = -total
         return
-    own = force.shape[0] * mesh.mass[top]
-    inert = (own + mesh.drive_mass) / step + 0.5 * mesh.stiffness * step
-    lost = 0.5 * mesh.attenuation * own
+    mass = force.shape[0] * mesh.mass[top]
+    inert = (mass + mesh.drive_mass) / step + 0.5 * mesh.stiffness * step
+    lost = 0.5 * mesh.attenuation * mass
     total -= mesh.stiffness * now[TRAVEL]
     after = ((inert - lost) * before + total) / (inert + lost)
     now[SPEED] = after
@@ -159,33 +176,36 @@ def _move_platen(mesh: Mesh, waves: Waves, force: Any) -> None:
 
 @jit_inside
 def _move_pusher(mesh: Mesh, waves: Waves, gains: Array) -> None:
-    """Let the pusher act on the block, behind a spring that is half implicit, or hold it."""
+    """Step 4: let the pusher act on the block, behind its spring, or hold it.
+
+    Its force F changes its speed from v to v + g F, with the mobility g of the pushed nodes.
+    """
     now, step, last = waves.now, mesh.step, waves.u.shape[1] - 1
-    ease = speed = 0.0
+    mobility = speed = 0.0
     for j in range(gains.shape[0]):
         for side, i in ((0, 0), (1, last)):
-            ease += mesh.push[j, side] ** 2 * gains[j]
+            mobility += mesh.push[j, side] ** 2 * gains[j]
             speed += mesh.push[j, side] * waves.u_rate[j, i]
     before = now[SPEED]
     if mesh.stiffness == np.inf:
-        force = -speed / ease
+        force = -speed / mobility
     else:
         a = 0.5 * mesh.stiffness * step + mesh.drive_mass / step
-        force = -(mesh.stiffness * now[TRAVEL] + a * (speed - before)) / (1.0 + a * ease)
-    now[SPEED] = speed + ease * force
+        force = -(mesh.stiffness * now[TRAVEL] + a * (speed - before)) / (1.0 + a * mobility)
+    now[SPEED] = speed + mobility * force
     now[TRAVEL] += step * now[SPEED]
     now[FORCE] = force if mesh.stiffness == np.inf else -mesh.stiffness * now[TRAVEL]
     if force == 0.0:
         return
     for j in range(gains.shape[0]):
         for side, i in ((0, 0), (1, last)):
-            more = mesh.push[j, side] * gains[j] * force
-            waves.u_rate[j, i] += np.float32(more)
-            waves.u[j, i] += np.float32((step + mesh.viscous_time) * more)
+            added = mesh.push[j, side] * gains[j] * force
+            waves.u_rate[j, i] += np.float32(added)
+            waves.u[j, i] += np.float32((step + mesh.viscous_time) * added)
 
 
 @jit_allocating
-def follow(
+def wave_steps(
     sample: StaticSample, start: Array, front: Array, mesh: Mesh, waves: Waves, steps: int,
     ends: bool,
 ) -> int:  # fmt: skip
@@ -207,14 +227,14 @@ def follow(
         never = n
         for j in range(rows + 1):
             if j < rows:  # stencils are zero beyond the interface and the top
-                low, up, on = max(j - 1, 0), min(j + 1, last), mesh.stencils[j]
-                _force(on[0], u[low], u[j], u[up], v[low], v[j], v[up], along[j % 2])
+                low, up, stencil = max(j - 1, 0), min(j + 1, last), mesh.stencils[j]
+                _force(stencil[0], u[low], u[j], u[up], v[low], v[j], v[up], along[j % 2])
                 if not mesh.anti_plane:
-                    _force(on[1], v[low], v[j], v[up], u[low], u[j], u[up], across[j % 2])
+                    _force(stencil[1], v[low], v[j], v[up], u[low], u[j], u[up], across[j % 2])
             i = j - 1
             if i < 0:
                 continue
-            force, gain = along[i % 2], np.float32(gains[i])  # the row above has felt this one
+            force, gain = along[i % 2], np.float32(gains[i])  # the row above has felt this row
             if i == 0:
                 never = _slide(sample, start, front, mesh, waves, force, keep, gains[0])
             elif i == last and mesh.platen:
