@@ -1,12 +1,17 @@
 """Equilibrium: closed forms, and the conditions of optimality checked with independent products."""
 
+from typing import NamedTuple
+
+import numba
 import numpy as np
 import pytest
+from numba.core.errors import TypingError
 from oracles import symbol_of, times
 from setups import beta_strength, exact_onset, make_problem, turns
 
 import stiction as st
 from stiction.elasticity.line import stiffness_column
+from stiction.elasticity.stiffness import entry
 from stiction.methods.equilibrium.dense.cholesky import make_workspace
 from stiction.methods.equilibrium.dense.linear_program import certificate
 from stiction.methods.equilibrium.dense.program import DenseProgram
@@ -42,6 +47,14 @@ def test_conditions_of_optimality(problem, make_strength):
         assert y.sum() == pytest.approx(1.0, rel=1e-13)
         assert y @ tau_p[sample] == pytest.approx(load, rel=1e-11)
         assert one.certificate_gap.item() < 1e-9 * load
+
+
+def test_stiffness_of_a_third_kind_is_refused():
+    class Entries(NamedTuple):
+        rows: np.ndarray
+
+    with pytest.raises(TypingError, match="give CircularEntries or DenseEntries"):
+        numba.njit(lambda entries: entry(entries, 0, 0))(Entries(np.ones(4)))
 
 
 def test_first_bound_is_a_bound(problem, make_strength):

@@ -13,8 +13,11 @@ from setups import EXACT, LOCAL, beta_strength, without
 from specimens import crooked, rough
 
 import stiction as st
+from stiction.elasticity.protocol import DenseEntries
+from stiction.methods.equilibrium.dense.cholesky import SlipState, make_workspace
 from stiction.methods.equilibrium.dense.program import DenseProgram
-from stiction.methods.equilibrium.sample import sample_of
+from stiction.methods.equilibrium.dense.stable_path import PathStatus, follow_stable_path
+from stiction.methods.equilibrium.sample import make_sample, pieces_of, sample_of
 from stiction.random.stresses import mean_in_stress, support_in_stress
 
 INF = float("inf")
@@ -143,6 +146,44 @@ def test_nodes_stop_rest_and_slip_again(name):
     assert min(brute.stops, brute.stops_in_jumps, states.jumps.sum(), states.rests) > 0
     assert brute.stops_at_corners > 0 or name != "two pieces, steeper"
     assert states.again > 0 or name == "two pieces"
+
+
+UNLOADING = np.array([[1.0, 0.35, 0.0], [0.35, 1.0, 0.0], [0.0, 0.0, 1.0]])
+"""Stiffness with which the first two of three nodes unload each other."""
+
+
+def slip_state(law, slip, relief=0.0, max_slipping=3):
+    """Three nodes, the last of which never slips; each weakens at a rate of 0.425 at first."""
+    strength, profile, rate = np.array([1.0, 1.1, 9.0]), np.ones(3), np.full(3, 0.425)
+    sample = make_sample(strength, np.zeros(3), profile, rate, pieces_of(law))
+    workspace = make_workspace(DenseEntries(UNLOADING.flatten(), 3, relief), 3, max_slipping)
+    return SlipState(sample, slip, UNLOADING @ slip, workspace, True)
+
+
+def test_a_node_that_rests_once_another_weakens_more_steeply_has_stopped():
+    """Both slip until the first is at its corner, from where it weakens twice as steeply."""
+    law = st.PiecewiseWeakening(
+        slip=(0.4, 1.0), strength=(0.75, 0.0), weakening_rate=1.0, residual_strength=0.0
+    )
+    corner = 0.4 * 0.625 / 0.425
+    first_alone = 0.1 / (1.0 - 0.35 / 0.575)  # rise of the load until the second slips, too
+    together = corner - first_alone / 0.575  # slip of either until the corner
+    load = 1.0 + first_alone + (0.575 + 0.35) * together
+    state = slip_state(law, np.zeros(3))
+    end = follow_stable_path(state, 1.0, load + 0.015, np.empty(3))
+    assert end.status == PathStatus.ENDED_STABLE
+    assert state.slip == pytest.approx([corner + 0.015 / 0.15, together, 0.0], rel=1e-9)
+    assert end.stopped
+
+
+def test_a_path_that_is_given_up_at_once_knows_the_largest_stress():
+    """Behind a machine it is the stress of the interface, which slip lowers, not the drive."""
+    law = st.LinearWeakening(weakening_rate=1.0, residual_strength=0.0)
+    slip = np.append(np.linalg.solve(UNLOADING[:2, :2] - 0.425 * np.eye(2), [0.4, 0.3]), 0.0)
+    state = slip_state(law, slip, relief=0.5, max_slipping=1)
+    end = follow_stable_path(state, 1.4, 1.5, np.empty(3))
+    assert end.status == PathStatus.GIVEN_UP
+    assert end.peak == pytest.approx(1.4 - 0.5 * slip.mean(), rel=1e-14)
 
 
 def test_windows_bound_the_onset_and_become_it():

@@ -1,10 +1,25 @@
 """Half-spaces that meet on a line: K on the nodes in closed form, and its critical windows.
 
-K is the circulant matrix of the symbol (G*/2)|k|. For an even number n of nodes it has
+Problem
+-------
+K is the circulant matrix of the symbol (G*/2)|k|, with modulus G* (Pa) and period L (m). Summing
+its Fourier series gives, for an even number n of nodes, the first column
 
-    K_0 = (G*/2)(2 pi/L) n/4,   K_j = -(G*/2)(2 pi/L)/(n sin^2(pi j/n)) for odd j,
+    K_0 = (G*/2)(2 pi/L) n/4,   K_j = -(G*/2)(2 pi/L)/(n sin^2(pi j/n)) for odd j,            (1)
 
-0 for even j > 0: nodes of one parity act on those of the other only, which halves products.
+and K_j = 0 for even j > 0. Nodes of one parity act on nodes of the other only, which halves
+products. A window is a run of nodes on which the smallest eigenvalue of the block of K is at most
+the weakening rate W: with all other nodes held, it is unstable. Its eigenvector bounds the load of
+the first instability (`protocol.Windows`), and the narrowest window gives the closest bound.
+
+Algorithm
+---------
+1. Find the widths for rates between two values (`widths_between`). At one rate W, start from the
+   width in the continuum, h_n = 2 lambda_0 G*/W (K. Uenishi and J. R. Rice, J. Geophys. Res. 108,
+   2003), and move to the narrowest unstable width. If rates vary, use a ladder of widths.
+2. Compute the smallest eigenvalue of each width with its eigenvector (`window_mode`): by a dense
+   matrix up to `MAX_DENSE_WIDTH` nodes, beyond by inverse iteration with a solver for Toeplitz
+   matrices. Both are cached, as all samples use them.
 """
 
 import bisect
@@ -24,12 +39,16 @@ from stiction.elasticity.protocol import (
     Windows,
 )
 
-GROWTH = 1.25
-"""Ratio of successive widths tried where the rate varies, as bounds there are rough anyway."""
-DENSE = 300
-"""Widest window whose eigenvector a dense matrix gives faster than inverse iteration."""
-WIDEST = 4096
-"""Widest window tried: beyond, its eigenvector takes longer than a solution without its bound."""
+WIDTH_RATIO = 1.25
+"""Ratio of successive widths if the rate varies. Bounds are rough then anyway."""
+MAX_DENSE_WIDTH = 300
+"""Nodes of the widest window for which a dense matrix is faster than inverse iteration."""
+MAX_WIDTH = 4096
+"""Nodes of the widest window. Beyond, its eigenvector takes longer than a solution without it."""
+MAX_INVERSE_ITERATIONS = 60
+"""Each divides the error by more than two, so that a double has no digit left to gain."""
+MODE_RTOL = 1e-14
+"""Change of an eigenvector in an iteration, as a share of its largest entry, that is round-off."""
 
 
 def stiffness_column(nodes: int, length: float, modulus: float) -> Array:
@@ -73,11 +92,14 @@ def line_of(half_spaces: HalfSpaces, nodes: int) -> Line:
 
 @functools.lru_cache(maxsize=512)
 def window_mode(nodes: int, width: int) -> tuple[float, Array]:
-    """Smallest eigenvalue of a block of K with (G*/2)(2 pi/L) = 1, and its positive eigenvector."""
-    first = stiffness_column(nodes, np.pi, 1.0)[:width]
-    if width <= DENSE:
+    """Step 2: smallest eigenvalue of a block of K with (G*/2)(2 pi/L) = 1, and its eigenvector.
+
+    The eigenvector is positive, with unit sum.
+    """
+    column = stiffness_column(nodes, np.pi, 1.0)[:width]
+    if width <= MAX_DENSE_WIDTH:
         values, vectors = scipy.linalg.eigh(
-            scipy.linalg.toeplitz(first), subset_by_index=[0, 0]
+            scipy.linalg.toeplitz(column), subset_by_index=[0, 0]
         )
         value, mode = float(values[0]), np.abs(vectors[:, 0])
         mode /= mode.sum()
@@ -85,21 +107,21 @@ def window_mode(nodes: int, width: int) -> tuple[float, Array]:
         # Inverse iteration; the next eigenvalue is more than twice as large.
         mode = np.sqrt(np.arange(1.0, width + 1.0) * np.arange(width, 0.0, -1.0))
         mode /= mode.sum()
-        for _ in range(60):
-            new = scipy.linalg.solve_toeplitz(first, mode)
-            value = 1.0 / float(new.sum())
-            new *= value
-            change = float(np.abs(new - mode).max())
-            mode = new
-            if change < 1e-14 * float(mode.max()):
+        for _ in range(MAX_INVERSE_ITERATIONS):
+            next_mode = scipy.linalg.solve_toeplitz(column, mode)
+            value = 1.0 / float(next_mode.sum())
+            next_mode *= value
+            change = float(np.abs(next_mode - mode).max())
+            mode = next_mode
+            if change < MODE_RTOL * float(mode.max()):
                 break
     mode.flags.writeable = False
     return value, mode
 
 
 def _narrowest(nodes: int, widths: Sequence[int], rate: float) -> int:
-    """Index of the first of rising widths that is unstable, their number if none is."""
-    # That of the continuum, h_n, is a node or so off, more if it is a fair part of the circle.
+    """Step 1: index of the first of rising widths that is unstable; their number if none is."""
+    # The width in the continuum is a node or so off, more if it is a fair part of the circle.
     i = min(bisect.bisect_left(widths, _continuous_width(nodes, rate)), len(widths) - 1)
     while i < len(widths) and window_mode(nodes, widths[i])[0] > rate:
         i += 1
@@ -115,17 +137,18 @@ def _continuous_width(nodes: int, rate: float) -> int:
 
 @functools.lru_cache(maxsize=64)
 def widths_between(nodes: int, lowest: float, highest: float) -> tuple[int, ...]:
-    """Widths for weakening rates from `lowest` to `highest`, the widest unstable at `lowest`.
+    """Step 1: widths for weakening rates from `lowest` to `highest`.
 
-    At one rate it is the narrowest of all, if that is not beyond `WIDEST`; else they are from a
-    ladder, the same for all samples.
+    They end with the first that is unstable at `lowest`. At one rate there is a single width, or
+    none if it would be much wider than `MAX_WIDTH`. Otherwise the widths are from a ladder, the
+    same for all samples.
     """
-    widest = min(nodes - 1, WIDEST)
+    widest = min(nodes - 1, MAX_WIDTH)
     widths: Sequence[int] = range(1, widest + 1)
     if lowest < highest:
         ladder = [1]
-        while ladder[-1] < min(nodes // 2, WIDEST):
-            ladder.append(max(ladder[-1] + 1, int(ladder[-1] * GROWTH)))
+        while ladder[-1] < min(nodes // 2, MAX_WIDTH):
+            ladder.append(max(ladder[-1] + 1, int(ladder[-1] * WIDTH_RATIO)))
         widths = ladder[:-1]
     elif _continuous_width(nodes, highest) > 1.2 * widest:
         return ()

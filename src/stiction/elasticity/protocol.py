@@ -99,7 +99,7 @@ class DenseEntries(NamedTuple):
     """
 
     rows: Array
-    nodes: int
+    n_nodes: int
     relief: float
 
 

@@ -1,14 +1,35 @@
-"""The stiffness K of a line or of two blocks inside kernels, which resolve it by its type.
+"""Products with the stiffness K of a line or of two blocks, is_slipping kernels.
 
-`entry`, `mean_relief`, `apply` and `apply_outside` are for kernels only: numba puts the overload
-for the type of K in their place, so that their Python bodies are never run.
+Problem
+-------
+K d for a slip d that is zero except at some nodes, and single entries K_ij (Pa/m), without knowing
+in the kernel what K is the stiffness of. numba compiles a kernel once for each type of entries
+(`CircularEntries` of a line, `DenseEntries` of blocks). `entry`, `mean_relief`, `apply` and
+`apply_outside` are placeholders whose Python bodies are never run: numba puts the overload for the
+type of entries in their place. A type without overloads is refused when a kernel is compiled.
+
+Algorithm
+---------
+`apply_circular` sums columns of K. On a line K_j = 0 for even j > 0 (`line`), so that nodes of even
+number act on nodes of odd number only, and the reverse.
+
+1. For each parity, take the slipping nodes of this parity. The nodes of the other parity at which
+   they act are n/2 targets.
+2. The entries of K from a node to its targets are n/2 consecutive numbers of `strip`, the odd
+   entries of the first column three times over. Add them, times the slip, for four nodes at once,
+   so that each target is read and written once for four nodes.
+3. Put the two halves together, and add the diagonal.
+
+`_apply_rows` does the same with rows of a dense matrix, which is symmetric.
 """
 
 # numba compares the names of arguments with their annotations, so functions by type have none.
 # mypy: disable-error-code="no-untyped-def"
 
+from collections.abc import Callable
 from typing import Any
 
+from numba.core.errors import TypingError
 from numba.extending import overload
 
 from stiction.base.arrays import Array
@@ -28,24 +49,27 @@ def mean_relief(entries: Any, profile: Array, slip: Array) -> float:
 
 
 def apply(
-    entries: Any, members: Array, size: int, values: Array, halves: Array, result: Array
+    entries: Any, nodes: Array, count: int, values: Array, halves: Array, product: Array
 ) -> None:
-    """`result` (n,) = K times a field that has `values` at the first `size` of the `members`."""
+    """`product` (n,) = K times a field that has `values` at the first `count` of the `nodes`.
+
+    `halves` (2, n/2) is a workspace.
+    """
     raise NotImplementedError
 
 
 def apply_outside(
     entries: Any,
-    members: Array,
-    size: int,
+    nodes: Array,
+    count: int,
     values: Array,
-    inside: Array,
+    is_slipping: Array,
     halves: Array,
-    result: Array,
+    product: Array,
 ) -> None:
-    """Multiply as `apply` does, at least at the nodes that are not inside, where K is dense.
+    """Multiply as `apply` does, where K is dense only at the nodes that do not slip.
 
-    On a line all of the product costs as much.
+    On a line, where one part of the product costs as much as all of it, it is written everywhere.
     """
     raise NotImplementedError
 
@@ -63,110 +87,120 @@ def add_four(
     c = strip[p2 : p2 + half]
     d = strip[p3 : p3 + half]
     for q in range(half):
-        more = multiply_add(z0, a[q], target[q])
-        more = multiply_add(z1, b[q], more)
-        more = multiply_add(z2, c[q], more)
-        target[q] = multiply_add(z3, d[q], more)
+        value = multiply_add(z0, a[q], target[q])
+        value = multiply_add(z1, b[q], value)
+        value = multiply_add(z2, c[q], value)
+        target[q] = multiply_add(z3, d[q], value)
 
 
 @jit
 def apply_circular(
     entries: CircularEntries,
-    members: Array,
-    size: int,
+    nodes: Array,
+    count: int,
     values: Array,
     halves: Array,
-    result: Array,
+    product: Array,
 ) -> None:
-    """`result` (n,) = K times a field that has `values` at the first `size` of the `members`.
-
-    Elsewhere the field is zero; `halves` (2, n/2) is a workspace.
-    """
+    """Multiply K of a line as `apply` does."""
     strip = entries.strip
     half = halves.shape[1]
     for parity in range(2):
-        # Sources of this parity act on targets of the other one.
+        # 1.
         target = halves[1 - parity]
         for q in range(half):
             target[q] = 0.0
-        held = 0
+        n_waiting = 0  # nodes p0, p1, ... with slip z0, z1, ... that wait until they are four
         p0 = p1 = p2 = p3 = ZERO
         z0 = z1 = z2 = z3 = 0.0
-        for t in range(size):
-            node = members[t]
+        for t in range(count):
+            node = nodes[t]
             if (node & 1) != parity or values[t] == 0.0:
                 continue
-            # Target q of the other parity lies at odd distance 2 (q - (node >> 1)) + 1 - 2 parity.
+            # 2. Target q lies at the odd distance 2 (q - (node >> 1)) + 1 - 2 parity.
             p0, p1, p2, p3 = half - (node >> 1) - parity, p0, p1, p2
             z0, z1, z2, z3 = values[t], z0, z1, z2
-            held += 1
-            if held == 4:
+            n_waiting += 1
+            if n_waiting == 4:
                 add_four(target, strip, (p0, p1, p2, p3), (z0, z1, z2, z3))
-                held = 0
+                n_waiting = 0
                 z0 = z1 = z2 = z3 = 0.0
-        if held > 0:
+        if n_waiting > 0:
             add_four(target, strip, (p0, p1, p2, p3), (z0, z1, z2, z3))
+    # 3.
     for q in range(half):
-        result[2 * q] = halves[0, q]
-        result[2 * q + 1] = halves[1, q]
-    for t in range(size):
-        result[members[t]] += entries.column[0] * values[t]
+        product[2 * q] = halves[0, q]
+        product[2 * q + 1] = halves[1, q]
+    for t in range(count):
+        product[nodes[t]] += entries.column[0] * values[t]
 
 
 @jit
 def _apply_rows(
     entries: DenseEntries,
-    members: Array,
-    size: int,
+    nodes: Array,
+    count: int,
     values: Array,
     start: int,
     target: Array,
 ) -> None:
-    """`target` = K times a field that has `values` at some members, from a node `start` on."""
-    n = entries.nodes
+    """`target` = K times a field that has `values` at `nodes`, from the node `start` on."""
+    n = entries.n_nodes
     for q in range(target.shape[0]):
         target[q] = 0.0
-    for first in range(ZERO, size, 4):
+    for first in range(ZERO, count, 4):
         p0 = p1 = p2 = p3 = ZERO
         z0 = z1 = z2 = z3 = 0.0
-        for t in range(first, min(first + 4, size)):
-            p0, p1, p2, p3 = members[t] * n + start, p0, p1, p2
+        for t in range(first, min(first + 4, count)):
+            p0, p1, p2, p3 = nodes[t] * n + start, p0, p1, p2
             z0, z1, z2, z3 = values[t], z0, z1, z2
         add_four(target, entries.rows, (p0, p1, p2, p3), (z0, z1, z2, z3))
 
 
 @jit
-def _apply_runs(
+def _apply_rows_outside(
     entries: DenseEntries,
-    members: Array,
-    size: int,
+    nodes: Array,
+    count: int,
     values: Array,
-    inside: Array,
-    result: Array,
+    is_slipping: Array,
+    product: Array,
 ) -> None:
-    """Multiply at each run of nodes that are not inside."""
+    """Multiply at each run of nodes that do not slip."""
     end = ZERO
-    while end < entries.nodes:
+    while end < entries.n_nodes:
         start = end
-        while end < entries.nodes and inside[end] == inside[start]:
+        while end < entries.n_nodes and is_slipping[end] == is_slipping[start]:
             end += 1
-        if not inside[start]:
-            _apply_rows(entries, members, size, values, start, result[start:end])
+        if not is_slipping[start]:
+            _apply_rows(entries, nodes, count, values, start, product[start:end])
+
+
+def _by_type(entries: Any, circular: Callable[..., Any], dense: Callable[..., Any]) -> Any:
+    """Return what numba compiles for a type of entries, or refuse it."""
+    kind = getattr(entries, "instance_class", None)
+    if kind is CircularEntries:
+        return circular
+    if kind is DenseEntries:
+        return dense
+    raise TypingError(
+        f"entries: have no stiffness in kernels if they are {entries}; give CircularEntries or"
+        " DenseEntries, or add a case to each overload of stiction.elasticity.stiffness"
+    )
 
 
 @overload(entry)
 def _entry(entries, i, j):
-    if entries.instance_class is CircularEntries:
-        return lambda entries, i, j: entries.column[abs(i - j)]
-    return lambda entries, i, j: entries.rows[i * entries.nodes + j]
+    return _by_type(
+        entries,
+        circular=lambda entries, i, j: entries.column[abs(i - j)],
+        dense=lambda entries, i, j: entries.rows[i * entries.n_nodes + j],
+    )
 
 
 @overload(mean_relief)
 def _mean_relief(entries, profile, slip):
-    if entries.instance_class is CircularEntries:
-        return lambda entries, profile, slip: 0.0
-
-    def mean(entries, profile, slip):
+    def dense(entries, profile, slip):
         if entries.relief == 0.0:
             return 0.0
         total = 0.0
@@ -174,26 +208,30 @@ def _mean_relief(entries, profile, slip):
             total += profile[i] * slip[i]
         return entries.relief * total / slip.shape[0]
 
-    return mean
+    return _by_type(entries, circular=lambda entries, profile, slip: 0.0, dense=dense)
 
 
 @overload(apply)
-def _apply(entries, members, size, values, halves, result):
-    if entries.instance_class is CircularEntries:
-        return lambda entries, members, size, values, halves, result: apply_circular(
-            entries, members, size, values, halves, result
-        )
-    return lambda entries, members, size, values, halves, result: _apply_rows(
-        entries, members, size, values, ZERO, result[: entries.nodes]
+def _apply(entries, nodes, count, values, halves, product):
+    return _by_type(
+        entries,
+        circular=lambda entries, nodes, count, values, halves, product: apply_circular(
+            entries, nodes, count, values, halves, product
+        ),
+        dense=lambda entries, nodes, count, values, halves, product: _apply_rows(
+            entries, nodes, count, values, ZERO, product[: entries.n_nodes]
+        ),
     )
 
 
 @overload(apply_outside)
-def _apply_outside(entries, members, size, values, inside, halves, result):
-    if entries.instance_class is CircularEntries:
-        return lambda entries, members, size, values, inside, halves, result: apply_circular(
-            entries, members, size, values, halves, result
-        )
-    return lambda entries, members, size, values, inside, halves, result: _apply_runs(
-        entries, members, size, values, inside, result
+def _apply_outside(entries, nodes, count, values, is_slipping, halves, product):
+    return _by_type(
+        entries,
+        circular=lambda entries, nodes, count, values, is_slipping, halves, product: (
+            apply_circular(entries, nodes, count, values, halves, product)
+        ),
+        dense=lambda entries, nodes, count, values, is_slipping, halves, product: (
+            _apply_rows_outside(entries, nodes, count, values, is_slipping, product)
+        ),
     )

@@ -1,12 +1,34 @@
-"""The lowest bound that critical windows give, of a line or of blocks, with the proof of it."""
+"""The lowest upper bound of the load that critical windows give, with its proof.
+
+Problem
+-------
+A window (`protocol.Windows`) is a run of nodes with weights y > 0 for which K y <= W y if all its
+nodes weaken at the rate W or faster. Then <s, y>/<p, y> bounds the load of the first instability
+from above, where s is the strength less initial stress (Pa) and p the load profile. Find the lowest
+of these bounds over all windows and all places.
+
+Algorithm
+---------
+1. Take the windows in turn, from the narrowest to the widest. Skip those that need a higher
+   weakening rate than any node has. Stop once a narrower window is unstable anywhere: wider ones
+   bound the load less closely.
+2. If the rate varies, count for each node how many nodes in a row weaken fast enough.
+3. A window with a fixed place (of blocks) has one bound. A window that may lie anywhere (of a line)
+   is tried at every sixteenth of its width, because a weighted mean hardly changes over this
+   distance, and then at all nodes around the best place. The lowest minimum may be missed. The
+   result is a bound nevertheless, as each place gives one.
+4. Compare with sliding of the whole interface: y = 1 everywhere.
+"""
 
 from stiction.base.arrays import Array
 from stiction.base.jit import jit, jit_inside
 from stiction.elasticity.operator import dot
 from stiction.elasticity.protocol import Windows
 
-STRIDES = 16
-"""Number of places in the width of a window at which it is tried first."""
+PLACES_PER_WIDTH = 16
+"""Number of places within the width of a window at which it is tried first."""
+NO_WINDOW = -1  # no window gives the bound
+NOWHERE = -1  # no place is better
 
 
 @jit_inside
@@ -18,7 +40,7 @@ def _window_sum(values: Array, mode: Array, width: int, start: int) -> float:
 
 @jit_inside
 def _count_fast(rate: Array, threshold: float, length: Array) -> None:
-    """Count the nodes in a row, from each on, that weaken at least as fast as a threshold."""
+    """Step 2: count the nodes in a row, from each node on, that weaken at least so fast."""
     n = rate.shape[0]
     run = 0.0
     for q in range(2 * n - 1, -1, -1):
@@ -31,15 +53,13 @@ def _count_fast(rate: Array, threshold: float, length: Array) -> None:
 def weakest_window(
     excess: Array, profile: Array, rate: Array, windows: Windows, bound: float, allowed: Array
 ) -> tuple[float, int, int]:
-    """Return the lowest <s, y>/<p, y> of windows that weaken throughout, Pa, the window, its start.
+    """Steps 1 to 3: return the lowest bound (Pa), its window and the first node of that.
 
-    It is `bound`, with -1 and 0, if none is below that. Windows that may lie anywhere: a weighted
-    mean hardly changes as the window moves by a sixteenth of its width, so only every such place is
-    tried, and then the nodes about the best one. Every window found gives a bound. `allowed` (n,)
-    is a workspace.
+    It is `bound`, with `NO_WINDOW` and 0, if no window gives a lower one. `allowed` (n,) is a
+    workspace.
     """
     n = rate.shape[0]
-    best, choice, start = bound, -1, 0
+    best, window, start = bound, NO_WINDOW, 0
     lowest, highest, counted = rate[0], rate[0], -1.0
     uniform = True
     for i in range(n):
@@ -47,45 +67,49 @@ def weakest_window(
         lowest = min(lowest, rate[i])
         highest = max(highest, rate[i])
     for c in range(windows.rates.shape[0]):
+        # 1.
         threshold = windows.rates[c]
         if threshold > highest:
             continue
         if c > 0 and threshold < windows.rates[c - 1] <= lowest:
-            break  # wider windows are unstable too, but bound less tightly
+            break
+        # 2.
         width, mode = windows.widths[c], windows.modes[c]
         everywhere = threshold <= lowest
         if not everywhere and threshold != counted:
             _count_fast(rate, threshold, allowed)
             counted = threshold
+        # 3. A fixed place.
         first = windows.starts[c]
         if first >= 0:
             if everywhere or allowed[first] >= width:
-                above = dot(excess[first:], mode, width)
-                below = dot(profile[first:], mode, width)
-                if above < best * below:
-                    best, choice, start = above / below, c, first
+                s_y = dot(excess[first:], mode, width)
+                p_y = dot(profile[first:], mode, width)
+                if s_y < best * p_y:
+                    best, window, start = s_y / p_y, c, first
             continue
-        low, high, stride = 0, n, max(1, width // STRIDES)
-        straight = _window_sum(profile, mode, width, 0) if uniform else 0.0
+        # 3. Any place: with a stride, and then around the best one.
+        low, high, stride = 0, n, max(1, width // PLACES_PER_WIDTH)
+        uniform_p_y = _window_sum(profile, mode, width, 0) if uniform else 0.0
         while True:
-            found = -1
+            place = NOWHERE
             for a in range(low, high, stride):
                 i = a % n
                 if everywhere or allowed[i] >= width:
-                    above = _window_sum(excess, mode, width, i)
-                    below = straight
+                    s_y = _window_sum(excess, mode, width, i)
+                    p_y = uniform_p_y
                     if not uniform or i + width > n:
-                        below = _window_sum(profile, mode, width, i)
-                    if above < best * below:
-                        best = above / below
-                        found = i
-            if found >= 0:
-                choice, start = c, found
-            if stride == 1 or found < 0:
+                        p_y = _window_sum(profile, mode, width, i)
+                    if s_y < best * p_y:
+                        best = s_y / p_y
+                        place = i
+            if place != NOWHERE:
+                window, start = c, place
+            if stride == 1 or place == NOWHERE:
                 break
-            low, high = found - stride + 1 + n, found + stride + n
+            low, high = place - stride + 1 + n, place + stride + n
             stride = 1
-    return best, choice, start
+    return best, window, start
 
 
 @jit
@@ -94,23 +118,25 @@ def window_bound(
 ) -> float:
     """Return the lowest bound of windows and of sliding as a whole, Pa, and write its multiplier.
 
-    The multiplier y (n,) has <p, y> = 1.
+    The multiplier y (n,) has <p, y> = 1. `allowed` (n,) is a workspace.
     """
     n = rate.shape[0]
-    above = below = 0.0
+    # 4.
+    total_s = total_p = 0.0
     for i in range(n):
-        above += excess[i]
-        below += profile[i]
-    best, choice, start = weakest_window(excess, profile, rate, windows, above / below, allowed)
+        total_s += excess[i]
+        total_p += profile[i]
+    bound = total_s / total_p
+    best, window, start = weakest_window(excess, profile, rate, windows, bound, allowed)
     for i in range(n):
-        y[i] = 1.0 if choice < 0 else 0.0
-    if choice >= 0:
-        for q in range(windows.widths[choice]):
+        y[i] = 1.0 if window == NO_WINDOW else 0.0
+    if window != NO_WINDOW:
+        for q in range(windows.widths[window]):
             i = start + q
-            y[i if i < n else i - n] = windows.modes[choice, q]
-    weight = 0.0
+            y[i if i < n else i - n] = windows.modes[window, q]
+    p_y = 0.0
     for i in range(n):
-        weight += y[i] * profile[i]
+        p_y += y[i] * profile[i]
     for i in range(n):
-        y[i] /= weight
+        y[i] /= p_y
     return best

@@ -63,7 +63,7 @@ from stiction.methods.equilibrium.dense.linear_program import (
     stress_tolerance,
 )
 from stiction.methods.equilibrium.dense.stable_path import (
-    AT_STRENGTH,
+    MAX_MARGIN_AT_STRENGTH,
     NEGATIVE_RATE_RTOL,
     all_slip,
 )
@@ -140,7 +140,7 @@ def _remove_unloaded(state: SlipState, n_slipping: int, tolerance: float) -> int
     for t in range(n_slipping):
         i = workspace.slipping[t]
         back = (state.slip[i] - workspace.solution[t]) * workspace.diagonal[i]  # Pa
-        if back > AT_STRENGTH * tolerance:
+        if back > MAX_MARGIN_AT_STRENGTH * tolerance:
             workspace.is_slipping[i] = False
             n_stay -= 1
     return n_stay
@@ -241,7 +241,7 @@ def _write_direction(
             n_reversed = ZERO
             if may_stop:
                 n_reversed = _leave_out_reversed(
-                    true_pieces, n_marked, AT_STRENGTH * tolerance, 0.0
+                    true_pieces, n_marked, MAX_MARGIN_AT_STRENGTH * tolerance, 0.0
                 )
         if n_reversed == 0:
             return longest
@@ -279,7 +279,7 @@ def _step_with_true_pieces(
         Kd[i] += workspace.K_resting[i]
         if workspace.is_slipping[i] and not true_pieces.is_slipping[i]:  # it was left out
             overload_i = load * sample.profile[i] - strength_at(sample, slip, i) - Kd[i]
-            at_rest = at_rest and overload_i <= AT_STRENGTH * tolerance
+            at_rest = at_rest and overload_i <= MAX_MARGIN_AT_STRENGTH * tolerance
     return Outcome.ARRESTED if at_rest else Outcome.UNDECIDED
 
 

@@ -43,7 +43,8 @@ Optimization, 2006, section 16.5).
    z = (-A_SS^-1 A_Sj, 1) of the failed node j. If z >= 0 nothing bounds slip along z: it jumps at
    constant load, and the path ends, unstable. Otherwise, for (3) only, v moves along z until a rate
    reaches zero. If a start failed, that node stops, and the start is tried again. If a corner or
-   the first factor failed, the nodes without a row in L leave S, and may start again.
+   the first factor failed, the nodes without a row in L leave S, and may start again. Those that
+   do not before the load rises have stopped.
 6. The path ends at the target, or when every node has slipped. It is given up if S outgrows L, or
    if nodes stop and start without end.
 
@@ -79,7 +80,7 @@ from stiction.methods.equilibrium.sample import piece_at, start_of, strength_at
 
 EVENTS_PER_REFRESH = 16
 """Slip is computed anew from L after so many events, so that round-off does not accumulate."""
-AT_STRENGTH = 1e3
+MAX_MARGIN_AT_STRENGTH = 1e3
 """Distance below its strength at which a node counts as at it, in units of `stress_tolerance`."""
 MAX_RESTARTS_PER_NODE = 16
 """How often a node may start again, on average, before the path is given up."""
@@ -135,7 +136,7 @@ def _find_slipping(
     sample, slip, Kd, workspace, may_stop = state
     n_slipping = ZERO
     some_rest = False
-    atol = AT_STRENGTH * stress_tolerance(sample, load)
+    atol = MAX_MARGIN_AT_STRENGTH * stress_tolerance(sample, load)
     for i in range(slip.shape[0]):
         piece[i] = piece_at(sample.pieces, sample.critical[i], slip[i])
         q[i] = start_of(sample, i, piece[i])
@@ -319,6 +320,15 @@ def _keep_factored(state: SlipState, n_factored: int, v_nodes: Array) -> None:
 
 
 @jit_inside
+def _some_rest(state: SlipState) -> bool:
+    """Whether a node rests that slipped before."""
+    for i in range(state.slip.shape[0]):
+        if state.slip[i] > 0.0 and not state.workspace.is_slipping[i]:
+            return True
+    return False
+
+
+@jit_inside
 def _pass_corner(
     state: SlipState, piece: NDArray[np.int64], q: Array, n_slipping: int, corner: int
 ) -> int:
@@ -403,10 +413,12 @@ def follow_stable_path(
     for i in range(n):
         workspace.K_resting[i] = 0.0
     n_slipping = factor_slipping(workspace)
+    some_left = False  # whether nodes left S for want of a row in L, since the load last rose
     if n_slipping < n_marked:
         if _move_along_z(state, n_slipping, v_nodes, direction) == NOBODY:
             return PathEnd(load, peak, stopped, PathStatus.UNSTABLE)
         _keep_factored(state, n_slipping, v_nodes)
+        some_left = True
     elif stopped:
         apply_stiffness_to_resting_slip(state)
     first_changed = ZERO
@@ -431,6 +443,10 @@ def follow_stable_path(
 
         # 3. On to the next event.
         event = _next_event(state, load, target, piece, n_slipping)
+        if some_left and event.step > MAX_MARGIN_AT_STRENGTH * stress_tolerance(sample, load):
+            # Nodes that left S and belong to it have started again: the others have stopped.
+            stopped = stopped or _some_rest(state)
+            some_left = False
         at_target = event.starting_node == NOBODY and event.corner_position == NOBODY
         load = target if at_target else load + event.step
         for t in range(n_slipping):
@@ -450,6 +466,7 @@ def follow_stable_path(
                     return PathEnd(load, peak, stopped, PathStatus.UNSTABLE)
                 n_slipping = n_factored
                 _keep_factored(state, n_slipping, v_nodes)
+                some_left = True
                 first_changed = ZERO
         else:
             if n_slipping == workspace.max_slipping:
