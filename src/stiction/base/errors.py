@@ -67,7 +67,9 @@ class WorkerError(RunError):
 def unknown(given: str, valid: Iterable[str]) -> str:
     """Return a text that refuses a name and offers the nearest valid one."""
     names = list(valid)
-    near = get_close_matches(given, names, n=1, cutoff=0.5) or [_SYMBOLS.get(given, "")]
+    by_case = {name.lower(): name for name in reversed(names)}
+    near = get_close_matches(given.lower(), by_case, n=1, cutoff=0.5)
+    near = [by_case[name] for name in near] or [_SYMBOLS.get(given, "")]
     shown = repr(given) if len(given) <= 60 else f"{given[:57]!r}..."
     hint = f"; did you mean {near[0]!r}?" if near[0] else ""
     return f"unknown {shown}{hint} (valid: {', '.join(names)})"

@@ -12,6 +12,7 @@ import stat
 import struct
 import tempfile
 import uuid
+import warnings
 import zipfile
 import zlib
 from collections.abc import Callable
@@ -157,6 +158,17 @@ def cache_folder() -> Path:
     return Path(given) if given else Path(platformdirs.user_cache_dir("stiction"))
 
 
+@cache
+def _warn_of_no_cache(folder: Path, reason: str) -> None:
+    """Warn once in a process, even where warnings are collected."""
+    warnings.warn(
+        f"cache: {folder} cannot be used ({reason}), so that kernels are compiled in every"
+        " process, which takes up to half a minute; set STICTION_CACHE_DIR to a folder of your own",
+        UserWarning,
+        stacklevel=2,
+    )
+
+
 def private_folder(folder: Path) -> Path:
     """Return a folder, made if need be, in which nobody else can have put or can put anything.
 
@@ -174,7 +186,8 @@ def private_folder(folder: Path) -> Path:
         for missing in [one for one in (*reversed(folder.parents), folder) if not one.exists()]:
             missing.mkdir(mode=0o700, exist_ok=True)
         weakness = _weakness(folder) if os.name == "posix" else ""
-    except OSError:  # nothing can be kept there: kernels are compiled each time
+    except OSError as error:  # nothing can be kept there
+        _warn_of_no_cache(folder.parent, error.strerror or str(error))
         return folder
     return _stand_in(weakness, folder.name) if weakness else folder
 

@@ -11,7 +11,7 @@ import pydantic
 from pydantic_core import CoreSchema, core_schema
 
 from stiction.base.errors import InputError, unknown
-from stiction.base.model import Mistakes, keys_of, mistakes, to_plain
+from stiction.base.model import Mistakes, mistakes, to_plain, valid_keys
 
 T = TypeVar("T", bound=type)
 _registered: dict[str, dict[str, Any]] = {}
@@ -143,7 +143,7 @@ def from_table(kinds: Kinds, given: Mapping[str, Any], context: Any = None) -> A
     try:
         return _adapter(kind).validate_python(rest, context=context)
     except pydantic.ValidationError as error:
-        raise Mistakes(mistakes(error, list(keys_of(kind)), False)) from None
+        raise Mistakes(mistakes(error, valid_keys(kind), False)) from None
 
 
 @lru_cache(maxsize=64)

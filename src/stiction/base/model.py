@@ -12,7 +12,7 @@ import operator
 import os
 import types
 import typing
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar, dataclass_transform
 
@@ -191,17 +191,18 @@ Count: TypeAlias = at_least(1)  # type: ignore[valid-type]  # a call makes it
 Number: TypeAlias = at_least(0)  # type: ignore[valid-type]
 Real: TypeAlias = Annotated[float, BeforeValidator(_real), Field(allow_inf_nan=False)]
 Positive: TypeAlias = Annotated[Real, Field(gt=0)]
-Numbers: TypeAlias = Annotated[Any, BeforeValidator(as_numbers)]
+Numbers: TypeAlias = Annotated[Any, BeforeValidator(as_numbers), "array"]
 """Real numbers of any shape, as a float64 array."""
 Profile: TypeAlias = Annotated[
     Any,
     BeforeValidator(_profile),
     PlainSerializer(_plain),
+    "float | array",
 ]
 OptionalProfile: Any = Profile | None
 """A number, or a read-only array of shape (nodes,); or None for 'not given'."""
 Flag: TypeAlias = Annotated[bool, BeforeValidator(_flag)]
-Progress: TypeAlias = Annotated[Show, BeforeValidator(_show)]
+Progress: TypeAlias = Annotated[Show, BeforeValidator(_show), "bool | Callable"]
 """True, False, or a function of (done, total)."""
 Text: TypeAlias = Annotated[str, Field(strict=True, min_length=0)]
 """Text in valid UTF-8; pydantic looks at it only if its length is limited."""
@@ -235,6 +236,11 @@ def keys_of(cls: Any) -> dict[str, str]:
     known = getattr(cls, "__pydantic_fields__", {})
     names = [field.name for field in dataclasses.fields(cls) if field.init]
     return {(name in known and known[name].alias) or name: name for name in names}
+
+
+def valid_keys(cls: Any) -> list[str]:
+    """Return all keys that a model takes, `instead_of_fields` included."""
+    return [*keys_of(cls), *getattr(cls, "instead_of_fields", ())]
 
 
 def mistakes(
@@ -298,7 +304,7 @@ def _explained(cls: Any, given: Any, handler: Callable[[Any], Any]) -> Any:
     try:
         return handler(given)
     except pydantic.ValidationError as error:
-        raise Mistakes(mistakes(error, list(keys_of(cls)), False)) from None
+        raise Mistakes(mistakes(error, valid_keys(cls), False)) from None
 
 
 @typing.overload
@@ -335,6 +341,9 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     init.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # pydantic's own marker
     wrapped.__init__, wrapped.__repr__ = init, brief
     wrapped.__eq__, wrapped.__hash__ = _equal, _hash
+    hints = typing.get_type_hints(cls, include_extras=True)
+    keys = {key: hints[name] for key, name in keys_of(wrapped).items()}
+    wrapped.__signature__ = plain_signature(wrapped, keys)
     return wrapped
 
 
@@ -417,6 +426,7 @@ def checked(function: Function) -> Function:
     )
     function.__annotations__ = written
     names = list(inspect.signature(function).parameters)
+    signature = plain_signature(function, hints)
 
     @functools.wraps(function)
     def call(*args: Any, **kwargs: Any) -> Any:
@@ -428,7 +438,53 @@ def checked(function: Function) -> Function:
                 f"{path or function.__name__}: {text}" for path, text in found
             ) from None
 
+    typing.cast(Any, call).__signature__ = signature
     return typing.cast(Function, call)
+
+
+class _Plain:
+    """An annotation that is shown as a name."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def __repr__(self) -> str:
+        return self.name
+
+
+def plain_name(hint: Any) -> str:
+    """Return what an annotation asks for in plain words: the text among its metadata, if any."""
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    metadata = getattr(hint, "__metadata__", ())
+    if metadata:
+        names = [entry for entry in metadata if isinstance(entry, str)]
+        return names[-1] if names else plain_name(arguments[0])
+    if origin is Literal:
+        return " | ".join(dict.fromkeys(type(value).__name__ for value in arguments))
+    if origin in (typing.Union, types.UnionType):
+        named = [plain_name(kind) for kind in arguments if kind is not type(None)]
+        return " | ".join(dict.fromkeys(named))
+    return str(getattr(origin or hint, "__name__", None) or hint).rpartition(".")[2]
+
+
+def plain_signature(owner: Any, hints: Mapping[str, Any]) -> inspect.Signature:
+    """Return the signature of a function or class with the plain names of annotations.
+
+    That None is allowed shows in the default.
+    """
+    signature = inspect.signature(owner)
+    parameters = [
+        parameter.replace(annotation=_Plain(plain_name(hints[name])))
+        if name in hints
+        else parameter
+        for name, parameter in signature.parameters.items()
+    ]
+    returned = signature.return_annotation
+    if isinstance(owner, type):
+        returned = inspect.Signature.empty
+    elif returned is not inspect.Signature.empty:
+        returned = _Plain(plain_name(returned))
+    return signature.replace(parameters=parameters, return_annotation=returned)
 
 
 def _instances(hint: Any) -> Any:

@@ -2,13 +2,14 @@
 
 import functools
 import inspect
+import io
 import logging
 import os
 import re
 import signal
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -28,7 +29,9 @@ RUPTURE = (
 )  # fmt: skip
 """What is printed of a rupture."""
 
-StudyFile = Annotated[Path, Argument(metavar="STUDY.toml", help="See examples/paper.toml.")]
+StudyFile = Annotated[
+    Path, Argument(metavar="STUDY.toml", help="`stiction example` writes one to start from.")
+]
 RunPath = Annotated[Path, Argument(metavar="RUN", help="Folder of a run.")]
 Workers = Annotated[int | None, Option(help="Threads; all cores by default.", min=1)]
 Scheduler = Annotated[
@@ -146,12 +149,13 @@ def run(
     """
     import pandas as pd
 
-    from stiction.cli.report import Page, add_tables
     from stiction.study.study import Study, open_run
 
     loaded = Study.from_toml(study)
     with _resumable(out), _executor(scheduler) as executor:
         result = loaded.run(out=out, workers=workers, executor=executor, part=part, pilot=pilot)
+    from stiction.cli.report import Page, add_tables  # matplotlib, once the samples are stored
+
     page = Page("")
     add_tables(page, result, loaded.axes)
     for table in page.parts:
@@ -241,11 +245,23 @@ def report(
 # -- what a study would do -----------------------------------------------------------------------
 
 
+def example() -> None:
+    """Print a study to start from."""
+    from importlib.resources import files
+
+    echo(files("stiction.cli").joinpath("example.toml").read_text("utf-8").rstrip("\n"))
+
+
 def check(study: StudyFile) -> None:
-    """Validate a study file and estimate its time and size, or list all errors."""
+    """Check a study file as `run` does, and estimate time and size.
+
+    All errors come at once, and the warnings of a run before its first sample.
+    """
+    from stiction.ensemble.monte_carlo import check_run
     from stiction.study.study import Study
 
     loaded = Study.from_toml(study)
+    check_run(loaded.experiments)
     echo(f"{study}: valid" + (f", {loaded.title!r}" if loaded.title else ""))
     for name, text in (description(loaded) | _cost(loaded)).items():
         echo(f"  {name:20s} {text}")
@@ -410,7 +426,9 @@ def rupture(
     out: Annotated[Path, Option(help="Folder of result and figures.")] = Path(
         "stiction-rupture"
     ),
-    sample: Annotated[int, Option(min=0, help="Sample of the study's strength.")] = 0,
+    sample: Annotated[
+        int | None, Option(min=0, help="Sample of the study's strength; 0 by default.")
+    ] = None,
     strength: Annotated[
         Path | None,
         Option(metavar="PROFILE", help="Peak strength, instead of a sample."),
@@ -434,11 +452,13 @@ def rupture(
 
     out.mkdir(parents=True, exist_ok=True)
     profiles: Any
+    if strength is not None and sample is not None:
+        raise InputError("--sample: has no effect beside --strength; leave one of them out")
     if strength is None:
         loaded = Study.from_toml(study)
         point, save = loaded.experiments[0], loaded.save
         problem, method = point.problem, point.method
-        profiles = point.profiles(point.draws(sample, 1))
+        profiles = point.profiles(point.draws(sample or 0, 1))
     else:
         setup = read_setup(study)
         problem, method, save = setup.problem, setup.method, setup.save
@@ -480,8 +500,12 @@ def reliability(
         Path | None,
         Option(metavar="RUN", help="Compute the curve; repetitions are stored in this folder."),
     ] = None,
-    smallest: Annotated[float, Option(help="Smallest probability of the curve.")] = 1e-9,
-    repetitions: Annotated[int, Option(help="Independent repetitions.", min=1)] = 8,
+    smallest: Annotated[
+        float | None, Option(help="Smallest probability of the curve; 1e-9 by default.")
+    ] = None,
+    repetitions: Annotated[
+        int | None, Option(help="Independent repetitions of the curve; 8 by default.", min=1)
+    ] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
     part: Part = None,
@@ -509,29 +533,41 @@ def reliability(
         "probability": probability,
     }  # fmt: skip
     asked = {name: one for name, one in options.items() if one is not None}
+    of_curve = {
+        "smallest": smallest, "repetitions": repetitions, "part": part, "scheduler": scheduler,
+    }  # fmt: skip
     if out is None:
-        if part or scheduler:
-            raise InputError("--part, --scheduler: share the work of a curve; give --out")
+        given = [name for name, value in of_curve.items() if value is not None]
+        if given:
+            raise InputError(
+                f"{_options_of(given)}: of a whole curve; give its folder by --out"
+            )
         _answer(loaded, asked, workers)
         return
     if asked:
-        raise InputError(f"--out: is for the whole curve; leave it or {', '.join(asked)} out")
+        raise InputError(f"--out: is for the whole curve; leave it or {_options_of(asked)} out")
     with _resumable(out), _executor(scheduler) as executor:
         curve = loaded.failure_curve(
-            out=out, repetitions=repetitions, smallest=smallest, workers=workers,
-            executor=executor, part=part,
+            out=out, workers=workers, executor=executor, part=part,
+            repetitions=8 if repetitions is None else repetitions,
+            smallest=1e-9 if smallest is None else smallest,
         )  # fmt: skip
     echo(table_of(curve).to_string(index=False, float_format="{:.7g}".format, max_rows=200))
     if "members" in curve:
         echo(
             f"probability: the mean over {curve.sizes['member']} equally likely interfaces, to"
-            " decide with; probability_low, _high: its sampling error, 95 %; band_low, _high: 90 %"
-            " of the interfaces"
+            " decide with; probability_low, _high: its 95 % interval; band_low, _high: 90 % of the"
+            " interfaces"
         )
     state = open_run(out).status()
     echo(
         f"part {part}: " * bool(part) + f"{state.done} of {state.samples} repetitions in {out}"
     )
+
+
+def _options_of(names: Iterable[str]) -> str:
+    """Return names of arguments as options of a command."""
+    return ", ".join(f"--{name.replace('_', '-')}" for name in names)
 
 
 def _answer(study: Any, asked: dict[str, float], workers: int | None) -> None:
@@ -604,8 +640,37 @@ def _command(function: Callable[..., None]) -> Callable[..., None]:
     return wrapped
 
 
-for _function in (run, check, status, export, report, onset, rupture, reliability):
-    app.command()(_command(_function))
+EXAMPLES: dict[Callable[..., None], tuple[str, ...]] = {
+    example: ("stiction example > study.toml",),
+    check: ("stiction check study.toml",),
+    run: (
+        "stiction run study.toml --out run",
+        "stiction run study.toml --out run --part 3/100",
+    ),
+    status: ("stiction status run",),
+    export: ("stiction export run result.nc", "stiction export run samples.csv --partial"),
+    report: ("stiction report run --out page.html",),
+    onset: (
+        "stiction onset study.toml --strength profile.csv --unit MPa --x-unit mm",
+        "stiction onset study.toml --strength scan.nc --method equilibrium --gaps fill",
+    ),
+    rupture: (
+        "stiction rupture study.toml --sample 3 --film",
+        "stiction rupture study.toml --strength profile.csv --out rupture",
+    ),
+    reliability: (
+        "stiction reliability study.toml --force 40e3",
+        "stiction reliability study.toml --probability 1e-3",
+        "stiction reliability study.toml --out curve --smallest 1e-6",
+    ),
+}
+"""Commands and calls that their help shows."""
+
+for _function, _calls in EXAMPLES.items():
+    app.command(
+        short_help=(_function.__doc__ or "").partition("\n\n")[0],
+        epilog="\b\nExamples:\n" + "\n".join(f"  {call}" for call in _calls),
+    )(_command(_function))
 
 
 def main() -> None:
@@ -613,6 +678,10 @@ def main() -> None:
 
     The exit code is 2 for invalid input and 1 for failures of the run.
     """
+    os.environ["MPLBACKEND"] = "Agg"  # figures are files, also in the shell of a notebook
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # an encoding may lack letters of a title
+            stream.reconfigure(errors="replace")
     logging.basicConfig(format="%(message)s", level=logging.WARNING, stream=sys.stderr)
     try:
         try:

@@ -55,6 +55,12 @@ def check_fields(points: Sequence[Experiment]) -> None:
             point.check_fields()
 
 
+def check_run(points: Sequence[Experiment]) -> None:
+    """Refuse, or warn of, what a run refuses or doubts before its first sample."""
+    check_fields(points)
+    points[0].prepare()  # here, not in a thread: it warns at the caller's line
+
+
 def _warn_if_long(points: Sequence[Experiment], missing: NDArray[Any], workers: int) -> None:
     """Say how long an ensemble takes that takes hours, before it begins."""
     each = zip(points, missing.sum(axis=1), strict=True)
@@ -126,8 +132,7 @@ def gather(
         store.resume(rows.add)
     missing = ~(others | rows.done)
     if missing.any():
-        check_fields(points)
-        points[0].prepare()  # here, not in a thread: it warns at the caller's line
+        check_run(points)
         if executor is None:
             _warn_if_long(points, missing, cores)
     label = " and ".join({one.method.label: None for one in distinct(points, "method")})

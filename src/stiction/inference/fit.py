@@ -78,9 +78,9 @@ def _factors(given: Any) -> tuple[str, ...]:
 
 
 DEFAULT_TOO = Field(validate_default=True)
-Marginals = Annotated[Any, BeforeValidator(_families), DEFAULT_TOO]
-Spectrum = Annotated[Any, BeforeValidator(spectrum_of), DEFAULT_TOO]
-Factors = Annotated[Any, BeforeValidator(_factors), DEFAULT_TOO]
+Marginals = Annotated[Any, BeforeValidator(_families), DEFAULT_TOO, "str | list"]
+Spectrum = Annotated[Any, BeforeValidator(spectrum_of), DEFAULT_TOO, "str | Spectrum"]
+Factors = Annotated[Any, BeforeValidator(_factors), DEFAULT_TOO, "str | list"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -137,7 +137,7 @@ def read_peaks(
     path: FilePath,
     *,
     unit: str | None = None,
-    missing: Missing = None,
+    missing: Missing | None = None,
     decimal: Literal[".", ","] | None = None,
     skip: Number = 0,
     sheet: Number | str = 0,

@@ -134,7 +134,7 @@ def as_method(value: Any) -> Any:
     return value
 
 
-MethodObject: TypeAlias = Annotated[Any, BeforeValidator(as_method)]
+MethodObject: TypeAlias = Annotated[Any, BeforeValidator(as_method), "Method"]
 """Annotation of an argument that is a method; see `stiction.base.model.checked`."""
 
 

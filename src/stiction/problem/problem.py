@@ -43,6 +43,8 @@ from stiction.problem.specimen import Blocks
 
 FEWEST_NODES = 4
 """Nodes in a nucleation length."""
+HARDLY_RESOLVED = 0.04
+"""Nodes in a nucleation length below which a unit is doubted: a hundred times more are needed."""
 HUGE = 1e8
 """Strength of a node over the median beyond which others are lost in round-off."""
 RIGIDITY = (1e-8, 1.0), (0.0, math.inf)
@@ -410,17 +412,24 @@ class Problem:
 
     def _check_resolution(self, highest_rate: float) -> None:
         resolution = self.nodes_in_nucleation_length(highest_rate)
-        if min(resolution) < FEWEST_NODES:
-            steepest = highest_rate * self.friction.steepening
-            length = self.nucleation_lengths(steepest)[int(np.argmin(resolution))]
+        if min(resolution) >= FEWEST_NODES:
+            return
+        steepest = highest_rate * self.friction.steepening
+        length = self.nucleation_lengths(steepest)[int(np.argmin(resolution))]
+        if min(resolution) < HARDLY_RESOLVED:
             raise InputError(
-                f"interface.nodes: the nucleation length {length:.3g} m spans"
-                f" {min(*resolution, FEWEST_NODES - 0.01):.3g} nodes; at least"
-                f" {FEWEST_NODES} are needed, that is"
-                f" interface.nodes >= {self._finer(resolution, FEWEST_NODES)}, got"
-                f" {' x '.join(map(str, self.interface.shape))}; if that is far off, check the"
-                " units of all lengths, moduli and strengths"
+                f"solid.shear_modulus, friction: the nucleation length is {length:.3g} m, that is"
+                f" {min(resolution):.1g} of the spacing of the nodes; check the units of the"
+                f" modulus, {self.solid.shear_modulus:g} Pa, of the weakening rate, {steepest:.3g}"
+                " Pa/m at its steepest, and of all lengths and strengths"
             )
+        raise InputError(
+            f"interface.nodes: the nucleation length {length:.3g} m spans"
+            f" {min(*resolution, FEWEST_NODES - 0.01):.3g} nodes; at least"
+            f" {FEWEST_NODES} are needed, that is"
+            f" interface.nodes >= {self._finer(resolution, FEWEST_NODES)}, got"
+            f" {' x '.join(map(str, self.interface.shape))}"
+        )
 
     def _finer(self, resolution: tuple[float, ...], wanted: int) -> str:
         """Return the nodes with which the nucleation length would span `wanted` of them."""

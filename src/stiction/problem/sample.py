@@ -147,6 +147,8 @@ def check_values(name: str, array: Array, interface: Interface, barriers: bool) 
         if bad.any():
             entry = tuple(np.argwhere(bad)[0].tolist())
             given = f"{array[entry]:g} (at most {LARGEST:g})"
+            if name == "strength" and array[entry] == np.inf:
+                given += "; st.Rupture() takes an infinite strength where nothing breaks"
             raise InputError(f"must be finite; entry {entry} is {given}")
     given = f"{least:g} {QUANTITIES[name].units}"
     if name in SCALES and least <= 0.0:

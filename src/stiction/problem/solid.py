@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -43,6 +43,7 @@ class Solid:
     poisson_ratio: Annotated[Real, Field(gt=-1, lt=0.5)]
     density: Positive
     plane: Literal["strain", "stress"] = "strain"
+    instead_of_fields: ClassVar = ("youngs_modulus",)
 
     if TYPE_CHECKING:  # with what the validator below takes besides
 

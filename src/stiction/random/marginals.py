@@ -327,5 +327,5 @@ def _of_scipy(name: str, given: Mapping[str, Any], first: tuple[Any, ...] = ()) 
     return ScipyMarginal(name, tuple(values.items()))
 
 
-AnyMarginal: TypeAlias = Annotated[Any, OneOf(MARGINALS, marginal_of)]
+AnyMarginal: TypeAlias = Annotated[Any, OneOf(MARGINALS, marginal_of), "Marginal"]
 """A `Beta`, `Lognormal`, ..., or any frozen continuous `scipy.stats` distribution."""

@@ -352,5 +352,5 @@ def spectrum_of(value: Any) -> SpectralDensity:
     )
 
 
-Spectrum: TypeAlias = Annotated[Any, OneOf(SPECTRA, spectrum_of)]
+Spectrum: TypeAlias = Annotated[Any, OneOf(SPECTRA, spectrum_of), "Spectrum"]
 """Any of the spectra above."""

@@ -62,6 +62,7 @@ AnyMethod: Any = Annotated[
     OneOf(
         METHODS, lambda given: NotImplemented if isinstance(given, dict) else as_method(given)
     ),
+    "Method",
 ]
 """Any registered method; in a study file ``type`` selects it."""
 _One: Any = Annotated[
@@ -73,6 +74,7 @@ _One: Any = Annotated[
 AnyRandom: Any = Annotated[
     Annotated[_One, Tag("one")] | Annotated[list[_One], Tag("several")],
     Discriminator(lambda given: "several" if isinstance(given, list | tuple) else "one"),
+    "RandomInterface | list",
 ]
 """A random interface, or several that are equally likely; a field alone becomes one."""
 

@@ -68,7 +68,7 @@ def _written(load: PiecewiseLinear | None) -> Any:
     return None if load is None else [array.tolist() for array in load]
 
 
-LoadHistory = Annotated[Any, BeforeValidator(_load_history), PlainSerializer(_written)]
+LoadHistory = Annotated[Any, BeforeValidator(_load_history), PlainSerializer(_written), "tuple"]
 
 
 @model(kw_only=True)

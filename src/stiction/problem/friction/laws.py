@@ -90,7 +90,10 @@ class FrictionLaw(ABC):
 
     @abstractmethod
     def slip_at(self, fraction: float) -> float:
-        """Return a u at which f has fallen to a fraction in [0, 1]; infinite if it never does."""
+        """Return a u at which f has fallen to a fraction in [0, 1]; infinite if it never does.
+
+        ``slip_at(0.0)`` is `math.inf` for a law with a tail.
+        """
 
     def fraction(self, u: Any) -> Array:
         """Return f(u) at slips u in units of d_c, any shape."""
@@ -393,7 +396,14 @@ def contradictions(law: FrictionLaw) -> list[str]:
     """Return what is wrong with a law of one's own: it rises, say, or contradicts its f."""
     if type(law).__module__.startswith("stiction."):
         return []
-    name, parameters, end = type(law).__name__, law.parameters, law.slip_at(0.0)
+    name, parameters = type(law).__name__, law.parameters
+    try:
+        end = float(law.slip_at(0.0))
+    except Exception as error:  # of any kind: the code is another's
+        return [
+            f"{name}: slip_at(0) fails ({type(error).__name__}: {error}); return the slip at which"
+            " strength is residual, math.inf if it never is"
+        ]
     if not all(hasattr(parameters, one) for one in ("_fields", "f", "initial_slope")):
         return [
             f"{name}: its parameters must be a NamedTuple with a field initial_slope, -f'(0), and"
@@ -446,5 +456,5 @@ def _law(value: Any) -> Any:
 if TYPE_CHECKING:
     Friction: TypeAlias = FrictionLaw
 else:
-    Friction = Annotated[Any, OneOf(LAWS, _law, default="linear")]
+    Friction = Annotated[Any, OneOf(LAWS, _law, default="linear"), "FrictionLaw"]
 """Any friction law; in a study file ``type`` selects it (default: linear)."""

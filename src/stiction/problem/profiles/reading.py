@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -86,7 +86,9 @@ TALL = 1e-3
 Column = str | int | None
 Spacing = Positive | tuple[Positive, Positive]
 Offset = Real | tuple[Real, Real]
-Missing = float | str | tuple[float | str, ...] | list[float | str] | None
+Missing = Annotated[
+    float | str | tuple[float | str, ...] | list[float | str], "float | str | list"
+]
 
 
 @checked
@@ -99,7 +101,7 @@ def read_profile(
     x_unit: str | None = None,
     quantity: str = "strength",
     strength: Callable[[Any], Any] | None = None,
-    missing: Missing = None,
+    missing: Missing | None = None,
     decimal: Literal[".", ","] | None = None,
     skip: Number = 0,
     sheet: Number | str = 0,
@@ -239,7 +241,7 @@ def read_profile(
 
 
 def reading_options(
-    missing: Missing,
+    missing: Missing | None,
     decimal: str | None = None,
     skip: int = 0,
     sheet: int | str = 0,

@@ -1,0 +1,165 @@
+"""What people read before anything is computed: help, examples, checks, suggestions, doubts."""
+
+from __future__ import annotations
+
+import inspect
+import os
+import re
+import tomllib
+
+import pytest
+import tomli_w
+from checks import python
+from refusals import refuses
+from setups import EXACT, make_problem
+from small_study import small_study
+
+import stiction as st
+from stiction.base import files
+from stiction.cli.commands import EXAMPLES
+from stiction.problem.friction import laws
+
+MAX_LETTERS = 450
+"""Of a signature; xarray's `concat` has 428."""
+
+
+@pytest.fixture(autouse=True)
+def inside(monkeypatch, tmp_path):
+    """Commands run in a folder of their own."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def altered(**values):
+    """The small study with other values by dotted key, as text."""
+    plain = small_study(256)
+    for key, value in values.items():
+        table = plain
+        *steps, last = key.split("__")
+        for step in steps:
+            table = table.setdefault(step, {})
+        table[last] = value
+    return tomli_w.dumps(plain)
+
+
+MARGINAL = "random__strength__marginal"
+STUDIES = {  # what is wrong, and the exit code of a run
+    "MPa": (altered(**{f"{MARGINAL}__low": 0.66, f"{MARGINAL}__high": 1.66}), 2),
+    "kPa": (altered(**{f"{MARGINAL}__low": 660.0, f"{MARGINAL}__high": 1660.0}), 0),
+    "uniform": (altered(random__strength__spectrum__correlation_length=0.5), 2),
+    "below the residual": (altered(problem__friction__residual_strength=1.2e6), 2),
+    "coarse": (altered(random__strength__spectrum__correlation_length=4e-4), 0),
+    "a law without scale": (altered(problem__friction={}), 2),
+}
+
+
+@pytest.mark.filterwarnings("always")
+@pytest.mark.parametrize("name", STUDIES)
+def test_check_says_what_a_run_says_before_its_first_sample(name, inside, runs):
+    text, code = STUDIES[name]
+    (inside / "study.toml").write_text(text)
+
+    def said(line):
+        marks = "error: ", "warning: "
+        lines = runs(line, code=code).splitlines()
+        return [line for line in lines if line.startswith(marks)]
+
+    checked = said("check study.toml")
+    assert checked
+    assert said("run study.toml --out run --no-pilot")[: len(checked)] == checked
+
+
+def test_a_doubt_of_a_unit_comes_instead_of_advice_that_follows_from_it():
+    """A modulus in MPa: no number of nodes would do."""
+    law, interface = st.LinearWeakening(weakening_rate=0.5e12), st.Interface(0.1, 1024)
+    for modulus, words in ((1e3, "check the units"), (1e8, "interface.nodes >= ")):
+        solid = st.Solid(shear_modulus=modulus, poisson_ratio=0.33, density=1170.0)
+        with pytest.raises(st.InputError) as caught:
+            st.Problem(solid, interface, law)
+        assert words in str(caught.value)
+        assert ("nodes >=" in str(caught.value)) == (modulus == 1e8)
+
+
+def test_names_are_found_in_any_case_and_among_all_valid_keys():
+    words = "did you mean 'youngs_modulus' ... valid: shear_modulus, "
+    refuses(words, lambda: st.Solid(young_modulus=3e9, poisson_ratio=0.3, density=1e3))
+    for key, value, meant in (
+        ("random__strength__marginal__type", "BETA", "'beta'"),
+        ("method__type", "LOCAL_CRITERION", "'local_criterion'"),
+        ("problem__solid__Density", 1e3, "'density'"),
+    ):
+        plain = tomllib.loads(altered(**{key: value}))
+        refuses(f"did you mean {meant}", lambda plain=plain: st.Study.from_dict(plain))
+
+
+def test_an_infinite_strength_names_the_method_that_takes_it():
+    strength = [float("inf")] + 255 * [1e6]
+    refuses(
+        "strength: must be finite ... st.Rupture()",
+        lambda: st.onset(make_problem(), strength, method=EXACT),
+    )
+
+
+def test_every_help_has_examples_and_no_text_is_cut(runs):
+    overview = runs("--help")
+    assert "..." not in overview.replace("[ARGS]...", "")
+    for command, calls in EXAMPLES.items():
+        assert re.search(rf"^  {command.__name__} ", overview, re.MULTILINE)
+        shown = runs(f"{command.__name__} --help")
+        for call in calls:
+            assert f"\n    {call}\n" in shown
+            assert call.startswith(f"stiction {command.__name__}")
+
+
+@pytest.mark.filterwarnings("always")
+def test_the_example_is_a_study_that_runs_without_a_doubt(inside, runs):
+    (inside / "study.toml").write_text(runs("example"))
+    for line in ("check study.toml", "run study.toml --out run", "report run"):
+        said = runs(line)
+        assert "warning" not in said, said
+    assert "P = " in runs("reliability study.toml --stress 0.7e6")
+
+
+@pytest.mark.parametrize(
+    ("line", "encoding"),
+    [("check study.toml", "cp1252"), ("run study.toml --out run", "utf-8")],
+)
+def test_commands_need_neither_a_backend_nor_all_letters(line, encoding, inside):
+    """In the shell of a notebook, and where the output is redirected on Windows."""
+    (inside / "study.toml").write_text(altered(title="τ"), encoding="utf-8")
+    said = python(
+        "-m", "stiction", *line.split(), cwd=inside, PYTHONIOENCODING=encoding,
+        MPLBACKEND="no_such_backend",
+        PYTHONPATH=os.pathsep.join([str(files.Path(st.__file__).parents[1])]),
+    )  # fmt: skip
+    assert ("valid, '?'" in said) == (encoding == "cp1252")
+
+
+def test_signatures_are_short_and_plain():
+    """As help() and the tooltips of notebooks show them."""
+    for name in st.__all__ if hasattr(st, "__all__") else dir(st):
+        thing = getattr(st, name)
+        if callable(thing) and not (isinstance(thing, type) and issubclass(thing, Exception)):
+            shown = str(inspect.signature(thing))
+            assert len(shown) <= MAX_LETTERS, name
+            assert not re.search("Annotated|Validator|FieldInfo|~", shown), (name, shown)
+    assert "method: Method" in str(inspect.signature(st.onset))
+    assert str(inspect.signature(st.Solid)).startswith("(shear_modulus: float,")
+
+
+def test_a_law_whose_inverse_fails_at_zero_is_refused_by_name():
+    class Bad(laws.ExponentialWeakening):
+        def slip_at(self, fraction):
+            return 1.0 / fraction - 1.0
+
+    words = "friction: Bad: slip_at(0) fails ... ZeroDivisionError ... math.inf"
+    refuses(words, lambda: make_problem(friction=Bad(critical_slip=1e-6)))
+
+
+def test_a_cache_that_cannot_be_used_is_said_once(inside):
+    (inside / "file").write_text("")
+    folder = inside / "file" / "compiled" / "digest"
+    files._warn_of_no_cache.cache_clear()
+    with pytest.warns(UserWarning, match="cache: .*cannot be used.*STICTION_CACHE_DIR") as seen:
+        assert {files.private_folder(folder) for _ in range(2)} == {folder}
+    assert len(seen) == 1
