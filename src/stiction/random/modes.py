@@ -14,8 +14,8 @@ from stiction.problem.interface import Interface
 from stiction.random.synthesis import synthesise
 
 MOST_MODES = 1 << 22
-HAIR = 1.0 + 1e-12
-"""Tolerance of the truncation: 2.5 lambda may fall exactly on a mode."""
+NEAREST_MODE = 1.0 + 1e-9
+"""Factor on the truncation, so that round-off keeps a mode exactly at it, such as 2.5/lambda."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +100,7 @@ def make_modes(
     cutoff = spectrum.cutoff(dimensions)
     units = 2.0 * math.pi / np.array(interface.lengths)
     units[1:] *= anisotropy
-    reach = cutoff / units * HAIR
+    reach = cutoff / units * NEAREST_MODE
     if reach.max() < 1.0 and not mean_mode:
         raise InputError(
             f"spectrum: no mode is left on an interface of {max(interface.lengths):g} m: the first"
@@ -109,7 +109,7 @@ def make_modes(
         )
     numbers = _numbers(interface, reach)
     wavenumbers = reduce(np.hypot, units[:, None] * numbers, np.zeros(1))
-    kept = np.flatnonzero(wavenumbers <= cutoff * HAIR)
+    kept = np.flatnonzero(wavenumbers <= cutoff * NEAREST_MODE)
     ranks, numbers = kept[1:], numbers[:, kept]
     power = np.zeros(kept.size)
     power[1:] = spectrum.density(wavenumbers[ranks], dimensions)

@@ -68,6 +68,8 @@ _SMALL_DROP = 0.1  # weakening of a node below that is not resolved
 _FREE_LOAD_RISE = 5e-7  # rise of the load in a step in which acceleration does not matter
 _NOTICED_RADIATION = 1e-7  # Z <V> from which its growth in a step is limited
 _MAX_ACCELERATION = 1.3  # largest factor of that growth
+# Sizes are powers of sqrt(2) times the smallest one, up to round-off, which must not decide.
+_JUST_BELOW, _JUST_ABOVE = 1.0 - 1e-9, 1.0 + 1e-9
 
 
 class _Attempt(NamedTuple):
@@ -88,7 +90,7 @@ def _choose_size(now: Any, setting: Setting, step: float) -> Any:
     small = thresholds.load_step * now.scale
     while True:
         rise = value_at(setting.load, time + size) - now.load
-        if size <= smallest or abs(rise) <= small:
+        if size <= _JUST_ABOVE * smallest or abs(rise) <= small:
             break
         size /= np.sqrt(2.0)
         step = size
@@ -185,7 +187,7 @@ def _accelerates(
     allowed = _MAX_ACCELERATION * max(now.previous_radiated, noticed)
     growing = radiated > noticed and radiated > allowed
     # At the smallest size, waves of an arrested event alone do not call for explicit steps.
-    halved = 0.5 * attempt.size >= thresholds.smallest_step
+    halved = 0.5 * attempt.size >= _JUST_BELOW * thresholds.smallest_step
     shorter = halved or largest > 0.1 * thresholds.slip_step
     return growing and matters and shorter and attempt.ratio > 0.0
 
@@ -263,7 +265,7 @@ def implicit_steps(
     Parameters as in `explicit_steps`; `state.phase` is IMPLICIT, `step` is the first size to try.
     """
     now, thresholds, u = state.diagnostics[0], setting.thresholds, tables.increment
-    smallest = thresholds.smallest_step
+    smallest = _JUST_BELOW * thresholds.smallest_step
     taken, reason = ZERO, Reason.DONE  # one way out: each costs as much to compile as the rest
     while taken < count:
         # 1. Size, and what follows from it.
