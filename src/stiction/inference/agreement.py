@@ -6,7 +6,8 @@ of either and where values are equal). The peaks of one campaign share the param
 posterior leaves open: each simulated campaign is drawn from one point of it.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ import xarray as xr
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Number, at_least, brief, checked
+from stiction.inference.curves import Curves, summary_of
 from stiction.inference.peaks import Peaks, factor_of, make_peaks
 from stiction.inference.posterior import Posterior
 from stiction.problem.load import NotNegative
@@ -27,6 +29,8 @@ BEYOND = 1e-3
 """Share of the predicted peaks on either side that does not count for this range: it may have
 heavy tails."""
 BAND = 0.9
+PRECURSORS = {"number": "number", "size": "largest", "first_load": "load of the first"}
+"""What is compared of precursors, in words."""
 
 
 class Predicted(NamedTuple):
@@ -53,6 +57,10 @@ class Agreement:
         Predicted distribution function of each kind of specimen.
     band : float
         Largest deviation that 90 % of campaigns do not exceed.
+    precursors : dict of str to (measured, predicted) arrays
+        If curves were compared: ``number`` of precursors of each test, ``size`` of the
+        largest (N or Pa, 0 without any), and ``first_load``, the force at the first (the peak
+        without any). `p_values` has these names too.
     """
 
     peaks: Peaks
@@ -61,13 +69,16 @@ class Agreement:
     p_values: dict[str, float]
     predicted: tuple[Predicted, ...]
     band: float
+    precursors: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        one, other = self.p_values.values()
-        return (
+        one, other, *_ = self.p_values.values()
+        text = (
             f"{self.peaks} against the prediction: p = {one:.3g} (Cramer-von Mises), {other:.3g}"
             " (largest deviation)"
         )
+        shown = [f"{self.p_values[name]:.3g} ({PRECURSORS[name]})" for name in self.precursors]
+        return text + f"; precursors: p = {', '.join(shown)}" * bool(shown)
 
     __repr__ = brief
 
@@ -92,8 +103,9 @@ def agreement(
     prediction : Dataset or Posterior
         From `stiction.monte_carlo`, or from `stiction.infer`, of whose parameters it takes the
         uncertainty into account; in either case with parameters not fitted to these peaks.
-    peaks : array, mapping of arrays, or Peaks
-        As in `stiction.infer`.
+    peaks : array, mapping of arrays, Peaks or Curves
+        As in `stiction.infer`. With `Curves` and a prediction that has events, as by
+        ``Equilibrium(events=20)``, precursors are compared too.
     unit : str
         Unit of the peaks and the load-cell error.
     load_cell_error : float
@@ -144,9 +156,49 @@ def agreement(
             raise InputError("load_cell_error: the posterior has its own; leave it out")
         return _with_posterior(prediction, measured, replicates, rng)
     values = _values(prediction, measured)
-    factor = 1.0 if isinstance(peaks, Peaks) else factor_of(unit)
+    factor = 1.0 if isinstance(peaks, Peaks | Curves) else factor_of(unit)
     values = values + factor * load_cell_error * rng.standard_normal(values.size)
-    return _with_sample(values, measured, replicates, rng)
+    result = _with_sample(values, measured, replicates, rng)
+    if isinstance(peaks, Curves) and "event" in prediction.dims:
+        precursors = _precursors(prediction, peaks)
+        for name, pair in precursors.items():
+            distances = _permuted(*pair, replicates, rng)
+            result.p_values[name] = _p_values(distances)[0]
+        result = replace(result, precursors=precursors)
+    return result
+
+
+def _precursors(prediction: xr.Dataset, curves: Curves) -> dict[str, tuple[Array, Array]]:
+    """Return number, largest size and first load of precursors, measured and predicted.
+
+    Both are found in the same way, in the force before and after each predicted event, with the
+    largest threshold of the tests: drops that a load cell does not tell from noise do not count.
+    """
+    names = {"N": ("event_force", "critical_force"), "Pa": ("event_stress", "critical_stress")}
+    event, peak = names.get(curves.unit, ("", ""))
+    if event not in prediction:
+        raise InputError(
+            f"prediction: has no events in {curves.unit}, in which the curves are; give curves of"
+            " force, and the thickness of the specimen"
+        )
+    if int(prediction["arrested_events"].max()) > prediction.sizes["event"]:
+        raise InputError(
+            f"prediction: keeps {prediction.sizes['event']} of up to"
+            f" {int(prediction['arrested_events'].max())} events; predict with at least so many"
+        )
+    high = prediction[event].transpose("sample", "event").values
+    low = high - prediction[f"{event}_drop"].transpose("sample", "event").values
+    peaks = prediction[peak].values
+    threshold = max(curve.threshold for curve in curves)
+    predicted = []
+    for row in np.flatnonzero(np.isfinite(peaks)):
+        force = np.stack([high[row], low[row]], axis=1).ravel()
+        force = np.append(force[np.isfinite(force)], peaks[row])
+        # The peak is where sliding begins, or an earlier event.
+        predicted.append(summary_of(force, threshold))
+    measured = [summary_of(curve.force, threshold) for curve in curves]
+    pairs = zip(np.transpose(measured), np.transpose(predicted), strict=True)
+    return dict(zip(PRECURSORS, pairs, strict=True))
 
 
 def _values(prediction: xr.Dataset, measured: Peaks) -> Array:
@@ -174,11 +226,18 @@ def _with_sample(values: Array, measured: Peaks, replicates: int, rng: Any) -> A
     """Permutation test: which of all values are the measured ones?"""
     (own,) = measured.values
     measured.refuse_far([values])
+    found = _permuted(own, values, replicates, rng)
+    at = np.unique(np.concatenate([own, values]))
+    share = np.searchsorted(np.sort(values), at, side="right") / values.size
+    return _summary(measured, found, (Predicted(at, share),))
+
+
+def _permuted(own: Array, values: Array, replicates: int, rng: Any) -> Array:
+    """Return both distances, (1 + replicates, 2), of which the first are the measured ones."""
     at, place, counts = np.unique(
         np.concatenate([own, values]), return_inverse=True, return_counts=True
     )
     share = counts / place.size
-    before = np.append(0.0, np.cumsum(np.bincount(place[own.size :], minlength=at.size)))
     found = np.empty((replicates + 1, 2))
     for row in range(replicates + 1):
         chosen = rng.choice(place.size, own.size, replace=False) if row else np.arange(own.size)
@@ -186,7 +245,7 @@ def _with_sample(values: Array, measured: Peaks, replicates: int, rng: Any) -> A
         # The others' share follows from that of all.
         away = (reached - np.cumsum(share)) * place.size / values.size
         found[row] = own.size * (share @ away**2), np.sqrt(own.size) * np.abs(away).max()
-    return _summary(measured, found, (Predicted(at, before[1:] / values.size),))
+    return found
 
 
 def _with_posterior(
@@ -245,17 +304,21 @@ def _distances(share: Array) -> tuple[Array, Array]:
     return squares, np.sqrt(size) * most
 
 
+def _p_values(found: Array) -> list[float]:
+    """Return the shares of replicates whose distances are at least those of the first row."""
+    as_far = np.sum(found[1:] >= found[0] * (1.0 - 1e-9), axis=0)
+    return ((1 + as_far) / len(found)).tolist()
+
+
 def _summary(measured: Peaks, found: Array, predicted: Any) -> Agreement:
     """Summarise distances (1 + replicates, 2), of which the first are the measured ones."""
     own, others = found[0], found[1:]
-    as_far = np.sum(others >= own * (1.0 - 1e-9), axis=0)
-    p_values = (1 + as_far) / (1 + len(others))
     names = ("cramer_von_mises", "largest_deviation")
     return Agreement(
         peaks=measured,
         cramer_von_mises=float(own[0]),
         largest_deviation=float(own[1]),
-        p_values=dict(zip(names, p_values.tolist(), strict=True)),
+        p_values=dict(zip(names, _p_values(found), strict=True)),
         predicted=predicted,
         band=float(np.quantile(others[:, 1], BAND, method="higher")),
     )

@@ -14,6 +14,7 @@ from stiction.base.model import Count, Progress, at_least, checked
 from stiction.base.progress import Meter
 from stiction.ensemble.limit_state import no_single_length
 from stiction.ensemble.pilot import compare, pilot_doubt
+from stiction.inference.curves import Curves
 from stiction.inference.grid import grid_of
 from stiction.inference.joined import join
 from stiction.inference.likelihood import (
@@ -183,7 +184,7 @@ def infer(
     True
     """
     measured = make_peaks(peaks, unit)
-    error = load_cell_error * (1.0 if isinstance(peaks, Peaks) else factor_of(unit))
+    error = load_cell_error * (1.0 if isinstance(peaks, Peaks | Curves) else factor_of(unit))
     if error > np.concatenate(measured.values).max():
         raise InputError(
             f"load_cell_error: {load_cell_error:g} {unit} is more than the largest peak; it is a"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -12,13 +12,14 @@ from stiction.base.errors import InputError, prefixed
 from stiction.base.model import FilePath, Number, Numbers, check, checked, describe, is_finite
 from stiction.base.quantities import magnitude
 from stiction.base.units import factor_to, is_in
+from stiction.inference.curves import Curves
 from stiction.problem.profiles.reading import (
     Missing,
     reading_options,
     with_stated_unit,
     without_missing,
 )
-from stiction.problem.profiles.tables import Options, read_table, table_of_frame
+from stiction.problem.profiles.tables import Options, column_of, read_table, table_of_frame
 
 FEWEST = 3
 """Fewest peaks in all: of two numbers, one may be a mistake."""
@@ -74,10 +75,18 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
     """Validate an array, or a mapping of arrays by length; `Peaks` are returned as they are."""
     if isinstance(peaks, Peaks):
         return peaks
+    if isinstance(peaks, Curves):
+        return make_peaks(peaks.peaks, peaks.unit)
     if hasattr(peaks, "columns") and hasattr(peaks, "to_xarray"):
         with prefixed("peaks"):
             return _of_table(table_of_frame(peaks), None, reading_options(None))
     groups: dict[Any, Any] = dict(peaks) if isinstance(peaks, Mapping) else {None: peaks}
+    if curves := [given for given in groups.values() if isinstance(given, Curves)]:
+        unit = curves[0].unit
+        groups = {
+            length: given.peaks if isinstance(given, Curves) else given
+            for length, given in groups.items()
+        }
     groups = {magnitude(length, "m"): values for length, values in groups.items()}
     if not all(key is None or (is_finite(key) and key > 0.0) for key in groups):
         raise InputError(
@@ -134,7 +143,7 @@ def _values(given: Any, unit: str) -> Array:
 
 @checked
 def read_peaks(
-    path: FilePath,
+    source: FilePath | Curves,
     *,
     unit: str | None = None,
     missing: Missing | None = None,
@@ -148,8 +157,9 @@ def read_peaks(
 
     Parameters
     ----------
-    path : path
-        A table, separated by commas, semicolons, tabs or blanks, one test a line, with a
+    source : path or Curves
+        Curves of `stiction.read_curve`, whose peaks are taken; or a table, separated by
+        commas, semicolons, tabs or blanks, one test a line, with a
         heading. One column is called peak, stress, strength, force or friction, with its
         unit: ``peak [MPa]``; a coefficient of friction has the unit 1 or -, a force N or
         kN. Without such a name, it is the only column in a unit of these. Another may be
@@ -180,13 +190,15 @@ def read_peaks(
     3 peaks
     """
     options = reading_options(missing, decimal, skip, sheet)
-    with prefixed(str(path)):
-        return _of_table(read_table(path, options), unit, options)
+    if isinstance(source, Curves):
+        return make_peaks(source)
+    with prefixed(str(source)):
+        return _of_table(read_table(source, options), unit, options)
 
 
 def _of_table(table: Any, unit: str | None, options: Options) -> Peaks:
     """Return the peaks in a table of tests."""
-    length, peak = _column(table, LENGTH), _column(table, PEAK, VARIABLES)
+    length, peak = column_of(table, LENGTH), column_of(table, PEAK, VARIABLES)
     if peak is None:
         names = ", ".join(map(str, table.data_vars))
         raise InputError(f"no column has a name like 'peak [MPa]'; found {names}")
@@ -213,19 +225,3 @@ def _of_table(table: Any, unit: str | None, options: Options) -> Peaks:
         )
     groups = {size: peak.values[kept][lengths == size] for size in np.unique(lengths)}
     return make_peaks(groups, stated)
-
-
-def _column(table: Any, kinds: tuple[str, ...], units: Iterable[str] = ()) -> Any:
-    """Return the one column whose name begins with one of some words, else the only in a unit."""
-    firsts = {name: name.lower().partition(" ")[0].strip("_:.") for name in table.data_vars}
-    found = [name for name, first in firsts.items() if first in kinds]
-    if len(found) > 1:
-        both = " and ".join(map(repr, found))
-        raise InputError(f"{both} may both be the {kinds[0]}; rename one")
-    fitting = [
-        name
-        for name, column in table.items()
-        if any(is_in(column.attrs.get("units"), one) for one in units)
-    ]
-    found = found or (fitting if len(fitting) == 1 else [])
-    return table[found[0]] if found else None

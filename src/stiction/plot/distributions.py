@@ -12,6 +12,7 @@ from stiction.base.errors import InputError
 from stiction.base.model import Positive, Real, checked
 from stiction.base.units import in_words, unit_for
 from stiction.base.variables import DIRECTION
+from stiction.inference.peaks import make_peaks
 from stiction.plot.axes import (
     add_friction_scale,
     add_scale,
@@ -36,7 +37,9 @@ TINY = 1e-300
 """Probability that stands for none on a logarithmic scale."""
 
 
-def monte_carlo(result: Any, *, quantity: str | None = None, ax: Axes | None = None) -> Axes:
+def monte_carlo(
+    result: Any, *, quantity: str | None = None, measured: Any = None, ax: Axes | None = None
+) -> Axes:
     """Draw the density of the onset of one or several ensembles, or along a sweep.
 
     Parameters
@@ -48,6 +51,8 @@ def monte_carlo(result: Any, *, quantity: str | None = None, ax: Axes | None = N
         A variable of the result; by default `critical_force` of a line or specimen whose
         area is known, else `friction_coefficient` if there is a pressure, else
         `critical_stress`. `critical_position` is drawn as a histogram.
+    measured : Peaks, Curves or array, optional
+        Peaks of tests, in SI or with a unit, marked one by one.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on; new ones by default.
 
@@ -84,16 +89,32 @@ def monte_carlo(result: Any, *, quantity: str | None = None, ax: Axes | None = N
             )
         curves += _steps(one[quantity], along[0]) if along else [(name, one[quantity])]
     single = isinstance(result, xr.Dataset) and not along
+    peaks = None if measured is None else _peaks_of(measured, quantity, curves[0][1])
     factor, unit, text = scaled(*(variable for _, variable in curves))
     with on_axes(ax) as axes:
         for number, (label, variable) in enumerate(curves, len(axes.lines) * single):
             _draw_values(axes, variable, factor, None if single else label, number)
+        if peaks is not None:
+            style: Any = {"linestyle": "none", "marker": "|", "markersize": 14.0, "color": INK}
+            label = f"{peaks.size} tests"
+            axes.plot(peaks * factor, np.zeros(peaks.size), label=label, clip_on=False, **style)
         axes.set_xlabel(text)
         axes.set_ylabel(f"density (1/{unit})" if unit else "density")
         axes.set_ylim(bottom=0.0)
         if axes.get_legend_handles_labels()[1]:
             axes.legend(title=scaled(one[along[0]])[2] if along else None)
     return axes
+
+
+def _peaks_of(measured: Any, quantity: str, variable: xr.DataArray) -> NDArray[np.float64]:
+    """Return measured peaks of the quantity that is drawn, in SI."""
+    peaks = make_peaks(measured, str(variable.attrs.get("units", "1")))
+    if peaks.unit != variable.attrs.get("units", "1"):
+        raise InputError(
+            f"measured: peaks are in {peaks.unit}, {quantity} in {variable.attrs.get('units')};"
+            f" draw quantity={peaks.variable!r}"
+        )
+    return np.concatenate(peaks.values)
 
 
 def _draw_values(

@@ -1,5 +1,6 @@
 """Figures of specimens: blocks and their drive, and the curve that a machine records."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,11 +10,13 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
+from stiction.base.errors import InputError
 from stiction.base.model import check
 from stiction.base.units import unit_for
+from stiction.inference.curves import Curves
 from stiction.plot.axes import need, new_figure, on_axes, problem_of, with_unit
 from stiction.plot.fields import rows_of
-from stiction.plot.style import ACCENT, COLUMN, PAGE, PALE, QUIET, paper_style, series
+from stiction.plot.style import ACCENT, COLUMN, INK, PAGE, PALE, QUIET, paper_style, series
 from stiction.problem.problem import Problem
 from stiction.problem.specimen import Pusher
 
@@ -115,13 +118,21 @@ def _draw_blocks(axes: Axes, problem: Problem, scale: float) -> None:
     axes.set(xlim=(-0.2 * length, 1.2 * length), ylim=(-1.3 * height, 1.3 * height))
 
 
-def force_travel(result: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def force_travel(
+    result: xr.Dataset | Sequence[xr.Dataset],
+    *,
+    measured: Curves | None = None,
+    ax: Axes | None = None,
+) -> Axes:
     """Draw the force over the travel of the drives, with its drops: the curve of a machine.
 
     Parameters
     ----------
-    result : Dataset
-        From `stiction.equilibrium_path` of a specimen, at many loads.
+    result : Dataset, or sequence of them
+        From `stiction.equilibrium_path` of a specimen, at many loads. Several, of samples of one
+        field, are drawn as a band that holds 90 % of them at each travel, with their median.
+    measured : Curves, optional
+        From `stiction.read_curve`: drawn over the prediction, with their precursors.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on; new ones by default.
 
@@ -134,19 +145,64 @@ def force_travel(result: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     --------
     As of `precursors`, which draws the events below it.
     """
-    travel, force, name, event = _curve(result)
-    start, high = result["event_travel"].values, result[event].values
-    length, length_unit = unit_for("m", travel)
-    factor, unit = unit_for(str(result[name].attrs["units"]), force)
+    results = [result] if isinstance(result, xr.Dataset) else list(result)
+    if not results:
+        raise InputError("result: is empty; give one path or several")
+    paths = [_curve(path) for path in results]
+    _, _, name, event = paths[0]
+    if any(path[2] != name for path in paths):
+        raise InputError("result: some paths are forces, others stresses; draw them apart")
+    units = str(results[0][name].attrs["units"])
+    if measured is not None and (measured.unit, measured[0].travel_unit) != (units, "m"):
+        raise InputError(
+            f"measured: curves are {measured.unit} over {measured[0].travel_unit}, the prediction"
+            f" is {units} over m; pass speed= to st.read_curve to turn time into travel"
+        )
+    length, length_unit = unit_for("m", np.concatenate([path[0] for path in paths]))
+    factor, unit = unit_for(units, np.concatenate([path[1] for path in paths]))
     with on_axes(ax) as axes:
-        axes.plot(travel * length, force * factor, **series(0))
-        if start.size:
-            places = start * length, high * factor
-            axes.plot(*places, "o", color=ACCENT, markersize=3.5, label="arrested events")
+        if len(paths) > 1:
+            _draw_band(axes, paths, length, factor)
+        else:
+            travel, force, _, _ = paths[0]
+            axes.plot(travel * length, force * factor, **series(0), label="predicted")
+            start, high = results[0]["event_travel"].values, results[0][event].values
+            if start.size:
+                places = start * length, high * factor
+                axes.plot(*places, "o", color=ACCENT, markersize=3.5, label="arrested events")
+        for number, test in enumerate(measured or ()):
+            label = f"{len(measured or ())} tests" if number == 0 else None
+            axes.plot(
+                test.travel * length, test.force * factor, color=INK, linewidth=0.7, label=label
+            )
+            label = "measured precursors" if number == 0 else None
+            axes.plot(
+                test.drops.travel * length, test.drops.force * factor, "v", color=INK,
+                markersize=3.0, label=label,
+            )  # fmt: skip
+        if axes.get_legend_handles_labels()[1][1:]:
             axes.legend()
         text = "force" if name == "force" else "mean stress"
         axes.set(xlabel=with_unit("travel", length_unit), ylabel=with_unit(text, unit))
     return axes
+
+
+def _draw_band(axes: Axes, paths: Sequence[Any], length: float, factor: float) -> None:
+    """Draw the range of 90 % of several curves at each travel, up to where half of them slide."""
+    known = [np.isfinite(travel) & np.isfinite(force) for travel, force, *_ in paths]
+    ends = [travel[there].max() for (travel, *_), there in zip(paths, known, strict=True)]
+    grid = np.linspace(0.0, float(np.median(ends)), 400)
+    rows = np.stack([
+        np.interp(grid, travel[there], force[there], right=np.nan)
+        for (travel, force, *_), there in zip(paths, known, strict=True)
+    ])  # fmt: skip
+    low, middle, high = np.nanquantile(rows, [0.05, 0.5, 0.95], axis=0) * factor
+    style = series(0)
+    axes.fill_between(
+        grid * length, low, high, color=style["color"], alpha=0.25, linewidth=0.0,
+        label=f"90 % of {len(paths)} predicted",
+    )  # fmt: skip
+    axes.plot(grid * length, middle, **style, label="median of predicted")
 
 
 def block(run: xr.Dataset, *, problem: Problem | None = None) -> Figure:
@@ -214,15 +270,23 @@ def _curve(result: xr.Dataset) -> tuple[Array, Array, str, str]:
     return travel, force, name, event
 
 
-def precursors(result: xr.Dataset, *, problem: Problem | None = None) -> Figure:
+def precursors(
+    result: xr.Dataset | Sequence[xr.Dataset],
+    *,
+    problem: Problem | None = None,
+    measured: Curves | None = None,
+) -> Figure:
     """Draw the curve of a machine, and where the interface slips in arrested events.
 
     Parameters
     ----------
-    result : Dataset
-        From `stiction.equilibrium_path` of a specimen, at many loads.
+    result : Dataset, or sequence of them
+        As in `force_travel`.
     problem : Problem, optional
         Needed only if the result does not hold it.
+    measured : Curves, optional
+        From `stiction.read_curve`: drawn over the prediction; below, lines mark where the
+        precursors of the tests begin.
 
     Returns
     -------
@@ -244,17 +308,22 @@ def precursors(result: xr.Dataset, *, problem: Problem | None = None) -> Figure:
     >>> st.plot.precursors(path).axes[1].get_ylabel()
     'position $x$ (mm)'
     """
-    interface = problem_of(result, problem).interface
-    length, _ = unit_for("m", _curve(result)[0])
+    results = [result] if isinstance(result, xr.Dataset) else list(result)
+    interface = problem_of(results[0], problem).interface
+    length, _ = unit_for("m", np.concatenate([_curve(path)[0] for path in results]))
     scale, unit = unit_for("m", interface.lengths)
-    start = result["event_start"].values * scale
-    end = start + result["event_length"].values * scale
     with paper_style():
         figure = new_figure(1.35 * COLUMN, 1.35 * COLUMN)
         above, below = figure.subplots(2, sharex=True, height_ratios=(1.3, 1.0))
-        force_travel(result, ax=above)
-        at = result["event_travel"].values * length
-        below.vlines(at, start, end, color=ACCENT, linewidth=2.0)
+        force_travel(results if len(results) > 1 else results[0], measured=measured, ax=above)
+        for path in results:
+            start = path["event_start"].values * scale
+            end = start + path["event_length"].values * scale
+            at = path["event_travel"].values * length
+            below.vlines(at, start, end, color=ACCENT, linewidth=2.0 / len(results) ** 0.5)
+        for test in measured or ():
+            for at in test.drops.travel * length:
+                below.axvline(at, color=INK, linewidth=0.5, linestyle=":")
     below.set(xlabel=above.get_xlabel(), ylabel=f"position $x$ ({unit})")
     below.set_ylim(0.0, interface.extent * scale)
     above.set_xlabel("")

@@ -470,7 +470,7 @@ def labelled(
     _check_positive(values, quantity, where, raw)
     if options.missing is None:
         _doubt_sentinels(raw, quantity, where)
-    array.attrs["blocks"] = data.attrs.get("blocks", 1)
+    array.attrs["blocks"] = np.size(np.unique(data.attrs.get("blocks", 0)))
     if quantity == "height" and not (unit or unit_of(array) or hasattr(array.data, "units")):
         _doubt_metres(values[np.isfinite(values)])
     for dim in {*dims} & {*array.coords}:

@@ -33,7 +33,7 @@ from stiction.base.errors import InputError
 from stiction.base.files import check_unpacked, content_of
 from stiction.base.model import describe
 from stiction.base.netcdf import read_netcdf
-from stiction.base.units import parse
+from stiction.base.units import is_in, parse
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -203,7 +203,7 @@ def read_table(path: Path, options: Options = Options()) -> xr.Dataset:  # noqa:
         table = _record(table, options.record)
     width = len(table.columns)
     attributes = {
-        "lines": table.lines, "blocks": int(table.blocks[-1] - table.blocks[0]) + 1,
+        "lines": table.lines, "blocks": table.blocks,
         "comments": grid.comments, "headed": any({*row.cells} - {"", "-"} for row in table.header),
     }  # fmt: skip
     return _labelled([*table.columns], _headings(table.header, width), table.texts, attributes)
@@ -623,6 +623,41 @@ def _split(line: str, separator: str, words: set[str]) -> list[str]:
     if all(_NUMBER.match(cell) or cell.casefold() in words for cell in cells):
         return cells
     return [cell.strip() for cell in _WORDS.findall(line)]
+
+
+def column_of(
+    table: Any, kinds: Sequence[str], units: Iterable[str] = (), wanted: int | str | None = None
+) -> Any:
+    """Return the column that is wanted, or whose name begins with one of some words.
+
+    Without such a name it is the only one in one of the units, or None.
+    """
+    if wanted is not None:
+        keys = ("name", "heading", "column")
+        chosen = [
+            c for c in table.values() if str(wanted) in [c.attrs.get(key) for key in keys]
+        ]
+        if len(chosen) != 1:
+            names = ", ".join(map(repr, table.data_vars))
+            raise InputError(
+                f"{wanted!r} is not one column of {names}; pass its number, from 0"
+            )
+        return chosen[0]
+    words = {
+        name: re.split(r"[\s_:.]", name.strip("_:. ").lower())[0] for name in table.data_vars
+    }
+    called = [name for name, word in words.items() if word in kinds]
+    if len(called) > 1:
+        raise InputError(
+            f"{' and '.join(map(repr, called))} may both be the {kinds[0]}; rename one"
+        )
+    fitting = [
+        name
+        for name, column in table.items()
+        if any(is_in(column.attrs.get("units"), si) for si in units)
+    ]
+    called = called or (fitting if len(fitting) == 1 else [])
+    return table[called[0]] if called else None
 
 
 # -- headings ------------------------------------------------------------------------------------

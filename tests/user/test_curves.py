@@ -1,0 +1,204 @@
+"""Measured curves: peak, precursors and plateau, by hand and back from predicted ones."""
+
+import astropy.units as u
+import numpy as np
+import pandas as pd
+import pytest
+from refusals import refuses
+
+import stiction as st
+from stiction.inference.curves import Curves, noise_of, summary_of, turning_points
+
+RNG = np.random.default_rng(0)
+TRAVEL = np.linspace(0.0, 1e-3, 2001)  # m
+
+
+def machine(travel=TRAVEL, noise=0.0, seed=0):
+    """200 N/mm; drops of 12, 5 and 30 N at 0.2, 0.35 and 0.6 mm; then sliding at 73 N."""
+    force = 2e5 * travel - 12.0 * (travel > 2e-4) - 5.0 * (travel > 3.5e-4)
+    force = np.where(travel > 6e-4, 73.0, force)
+    return force + noise * np.random.default_rng(seed).standard_normal(travel.size)
+
+
+def is_machine(curve, noise):
+    assert curve.peak == pytest.approx(103.0, abs=4.0 * noise + 0.11)
+    assert curve.peak_travel == pytest.approx(6e-4, abs=1e-6 + 2e-5 * (noise > 0.0))
+    np.testing.assert_allclose(curve.drops.travel, [2e-4, 3.5e-4], atol=1e-6 + 1e-5 * noise)
+    np.testing.assert_allclose(curve.drops.size, [12.0, 5.0], atol=0.11 + 5.0 * noise)
+    np.testing.assert_allclose(curve.drops.force, [40.0, 58.0], atol=0.11 + 4.0 * noise)
+    assert curve.plateau == pytest.approx(73.0, abs=0.1 * noise + 1e-9)
+    return True
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+def test_what_a_curve_says(noise):
+    force = machine(noise=noise)
+    (curve,) = st.read_curve((TRAVEL * 1e3 * u.mm, force * u.N))
+    assert is_machine(curve, noise)
+    assert curve.noise == pytest.approx(noise, rel=0.1, abs=1e-9)
+    assert "2 precursors from 40" in str(curve)
+    assert "plateau 73 N" in str(curve)
+    stress = st.read_curve((TRAVEL, force * 1e3), unit="Pa", travel_unit="m")
+    assert stress[0].drops.size == pytest.approx(curve.drops.size * 1e3)
+
+
+def test_noise_and_false_drops():
+    """A constant force has no drop in 19 of 20 records of 5,000 readings."""
+    white = RNG.standard_normal((200, 5000))
+    threshold = 2.0 * np.sqrt(2.0 * np.log(5000))
+    drops = [turning_points(row, threshold)[0].size for row in white]
+    assert np.mean(np.array(drops) > 0) < 0.1
+    assert np.mean([noise_of(row) for row in white]) == pytest.approx(1.0, rel=0.01)
+    steps = np.round(np.linspace(0.0, 50.0, 5000))  # in steps of 1
+    assert noise_of(steps) == pytest.approx(12.0**-0.5)
+    starts, ends = turning_points(np.array([0.0, 2.0, 1.0, 3.0, 1.0, 1.5, 0.5, 4.0]), 1.2)
+    assert (starts.tolist(), ends.tolist()) == ([3], [6])
+
+
+def test_files_of_testing_machines(tmp_path):
+    """Tests in a column, apart by empty lines, in a folder, over time, of a table of pandas."""
+    rows = [f"{x * 1e3:.5f};{f / 1e3:.6f}" for x, f in zip(TRAVEL, machine(), strict=True)]
+    head = "Weg (mm);Standardkraft (kN)"
+    folder = tmp_path / "tests"
+    folder.mkdir()
+    for name in ("a.csv", "b.txt"):
+        (folder / name).write_text(
+            "\n".join(["Prüfer;M. Muster", head, *rows]).replace(".", ",")
+        )
+    (folder / "remarks.md").write_text("ground with 400")
+    (tmp_path / "blocks.csv").write_text("\n".join([head, *rows, "", head, *rows]))
+    numbered = [f"{test};{row}" for test in (7, 9) for row in rows]
+    (tmp_path / "column.csv").write_text("\n".join([f"test;{head}", *numbered]))
+    for source, names in {
+        folder: ["a", "b"],
+        tmp_path / "blocks.csv": ["blocks, test 1", "blocks, test 2"],
+        tmp_path / "column.csv": ["column, test 7", "column, test 9"],
+    }.items():
+        curves = st.read_curve(source)
+        assert [curve.name for curve in curves] == names
+        assert all(is_machine(curve, 0.0) for curve in curves)
+    frame = pd.DataFrame({"time (s)": TRAVEL * 1e4, "load (N)": machine(), "F2 (N)": machine()})
+    over_time = st.read_curve(frame)
+    assert (over_time[0].travel_unit, over_time[0].peak_travel) == ("s", pytest.approx(6.0))
+    assert is_machine(st.read_curve(frame, speed=1e-4, force=2)[0], 0.0)
+    with pytest.warns(st.AccuracyWarning, match="negative"):
+        assert is_machine(
+            st.read_curve(frame.assign(**{"load (N)": -machine()}), speed=1e-4)[0], 0.0
+        )
+    with pytest.warns(st.AccuracyWarning, match="ends at its peak in test"):
+        st.read_curve(frame[:1000], speed=1e-4)
+    several = [
+        st.read_curve((TRAVEL, k * machine() * u.N), travel_unit="m")[0] for k in (1, 2, 3)
+    ]
+    peaks = st.read_peaks(Curves(tuple(several)))
+    assert (peaks.unit, peaks.values[0].tolist()) == ("N", [c.peak for c in several])
+
+
+def test_curves_that_are_refused(tmp_path):
+    frame = pd.DataFrame({"travel (mm)": TRAVEL * 1e3, "force (N)": machine()})
+    cycle = pd.concat([frame, frame])
+    for words, given, options in (
+        ("line ... goes back", cycle, {}),
+        ("unit of the force is not stated", frame.rename(columns={"force (N)": "force"}), {}),
+        (
+            "another unit 'mm'" if False else "travel is in kg",
+            frame.rename(columns={"travel (mm)": "travel (kg)"}),
+            {},
+        ),
+        ("'force' and 'load' may both", frame.assign(load=1.0), {}),
+        ("no column is clearly the travel", frame[["force (N)"]], {}),
+        ("unit: is 'kN'", frame, {"unit": "kN"}),
+        ("fewer than 8", frame[:5], {}),
+        ("must be a path", 3.0, {}),
+    ):
+        refuses(words, lambda g=given, o=options: st.read_curve(g, **o))
+    (tmp_path / "empty").mkdir()
+    refuses("holds no file", lambda: st.read_curve(tmp_path / "empty"))
+
+
+BLOCKS = st.Problem(
+    solid=st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress"),
+    interface=st.Interface(length=0.1, nodes=128),
+    friction=st.LinearWeakening(weakening_rate=0.2e12, residual_strength=0.2e6),
+    specimen=st.Blocks(
+        height=0.05, thickness=0.006, drive=st.Pusher(height=0.01, width=0.004, stiffness=2e7)
+    ),
+)
+FIELD = st.RandomField(
+    st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6), st.PowerLawSpectrum(4e-3)
+)
+
+
+@pytest.fixture(scope="module")
+def paths():
+    loads = np.linspace(0.0, 1.2e6, 400)
+    rows = FIELD.sample(BLOCKS.interface, samples=6, seed=1)
+    return [st.equilibrium_path(BLOCKS, row, loads) for row in rows]
+
+
+def curves_of(paths, noise=0.05):
+    """What a machine with a load cell of this noise (N) records of predicted paths."""
+    tests = []
+    for number, path in enumerate(paths):
+        travel, force, *_ = st.plot.specimens._curve(path)
+        known = np.isfinite(travel) & np.isfinite(force)
+        travel, force = travel[known], force[known]
+        after = np.linspace(travel[-1], 1.2 * travel[-1], 200)[1:]
+        at = np.r_[travel, after]
+        values = np.r_[force, np.full(after.size, 0.8 * force[-1])]
+        values = values + noise * np.random.default_rng(number).standard_normal(at.size)
+        tests.append(st.read_curve((at, values), unit="N", travel_unit="m", noise=noise)[0])
+    return Curves(tuple(tests))
+
+
+def test_predicted_curves_come_back_from_a_machine(paths):
+    for path, curve in zip(paths, curves_of(paths), strict=True):
+        high, drop = path.event_force.values, path.event_force_drop.values
+        exact = summary_of(np.stack([high, high - drop], axis=1).ravel(), 2.0)
+        # Seven times the noise; events between which the force rises by less than 2 N are one drop.
+        assert summary_of(curve.force, 2.0) == pytest.approx(exact, abs=0.35)
+        assert (
+            np.abs(curve.drops.travel[:, None] - path.event_travel.values)
+            .min(axis=1)
+            .max(initial=0.0)
+            < 1e-6
+        )
+    axes = st.plot.force_travel(paths, measured=curves_of(paths))
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert labels == [
+        "90 % of 6 predicted",
+        "median of predicted",
+        "6 tests",
+        "measured precursors",
+    ]
+    figure = st.plot.precursors(paths[0], measured=curves_of(paths))
+    assert len(figure.axes) == 2
+    seconds = st.read_curve((TRAVEL * u.s, machine() * u.N))
+    refuses("curves are N over s", lambda: st.plot.force_travel(paths, measured=seconds))
+
+
+def test_precursors_agree_with_their_own_prediction_and_not_with_another(paths):
+    def predicted(field):
+        method = st.Equilibrium(events=60)
+        return st.monte_carlo(BLOCKS, field, method=method, samples=60, seed=5, progress=False)
+
+    curves = curves_of(paths)
+    own = predicted(FIELD)
+    found = st.statistics.agreement(own, curves, replicates=400)
+    assert set(found.precursors) == {"number", "size", "first_load"}
+    assert min(found.p_values.values()) > 0.05
+    stronger = st.RandomField(
+        st.Beta(alpha=1.5, beta=3.0, low=0.9e6, high=1.9e6), FIELD.spectrum
+    )
+    wrong = st.statistics.agreement(predicted(stronger), curves, replicates=400)
+    assert wrong.p_values["first_load"] < 0.01
+    assert "precursors: p =" in str(wrong)
+    few = st.monte_carlo(
+        BLOCKS, FIELD, method=st.Equilibrium(events=1), samples=20, seed=5, progress=False
+    )
+    refuses("keeps 1 of", lambda: st.statistics.agreement(few, curves))
+    axes = st.plot.monte_carlo(own, measured=curves)
+    assert axes.lines[-1].get_xdata() == pytest.approx(curves.peaks)
+    assert axes.lines[-1].get_label() == "6 tests"
+    stress = np.array([1.0, 2.0, 3.0]) * u.Pa
+    refuses("are in Pa", lambda: st.plot.monte_carlo(own, measured=stress))
