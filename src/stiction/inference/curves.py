@@ -164,7 +164,7 @@ def read_curve(
     travel_unit: str | None = None,
     speed: Positive | None = None,
     noise: Positive | None = None,
-    missing: Missing = None,
+    missing: Missing | None = None,
     decimal: Literal[".", ","] | None = None,
     skip: Number = 0,
     sheet: Number | str = 0,
