@@ -90,9 +90,9 @@ def scrape_figure(block, block_vars, gallery_conf):
     return figure_rst([path], gallery_conf["src_dir"])
 
 
-# The how-tos that README.md lists, with a title each.
+# The how-tos that examples/README.md lists, with a title each.
 HOW_TOS = re.findall(
-    r"\[([^\]]+)\]\(examples/(\w+)\.py\)", (ROOT / "README.md").read_text("utf-8")
+    r"\[([^\]`]+)\]\((\w+)\.py\)", (ROOT / "examples" / "README.md").read_text("utf-8")
 )
 SCRIPTS = ROOT / "build" / "how-to"
 sphinx_gallery_conf = {

@@ -9,6 +9,7 @@ import io
 import itertools
 import re
 import sys
+import tomllib
 from concurrent.futures import Future
 from pathlib import Path
 
@@ -464,6 +465,17 @@ def test_samples_and_parameters_of_ones_own(tmp_path):
         assert part in text, part
     assert "Figure 14." not in text
     assert not re.search(r"\bnan\b|{{|{%", re.sub(r'data:image[^"]*', "", text))
+
+
+def test_the_parameters_of_the_documentation_are_taken(monkeypatch):
+    (text,) = re.findall(r"```toml\n(.*?)```", (ROOT / "docs/paper.md").read_text(), re.DOTALL)
+    for name in [name for name in sys.modules if name.startswith("reproduction")]:
+        monkeypatch.delitem(sys.modules, name)
+    importlib.import_module("reproduction").PARAMETERS.update(tomllib.loads(text))
+    setting = importlib.import_module("reproduction.setting")
+    assert setting.L == 1.0
+    assert setting.residual(5e6) == 2e6
+    assert (setting.LOW, setting.HIGH, setting.LOADING_RATE) == (4e6, 12e6, 6e7)
 
 
 @pytest.mark.parametrize(

@@ -87,8 +87,8 @@ def test_a_how_to(name, monkeypatch, tmp_path, capsys):
 
 
 def test_the_tables_list_every_how_to():
-    text = (ROOT / "README.md").read_text()
-    assert [name for name in HOW_TOS if f"examples/{name}.py" not in text] == []
+    text = (ROOT / "examples" / "README.md").read_text()
+    assert [name for name in HOW_TOS if f"]({name}.py)" not in text] == []
 
 
 # -- docs/rupture-benchmarks.md, coarser: the community's fault, and its line ----------------------
