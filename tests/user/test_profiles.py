@@ -211,3 +211,79 @@ def test_profiles_in_a_study_file(tmp_path):
     np.testing.assert_allclose(problem.load.normal_pressure, (5.0 + X) * 1e6, rtol=1e-11)
     np.testing.assert_allclose(problem.load.profile[: NODES - 4], 1.0 + X[:-4], rtol=1e-11)
     assert st.Study.from_dict(loaded.to_dict()) == loaded
+
+
+FREE = st.Problem(
+    solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.35, density=1180.0),
+    interface=st.Interface(length=0.15, nodes=64),
+    friction=st.LinearWeakening(weakening_rate=0.1e12),
+    specimen=st.Blocks(height=0.05, drive=st.Platen()),
+)
+
+
+def test_a_scan_is_placed_by_an_offset_or_its_centre():
+    """From 12.3 mm on, on a specimen of 150 mm; on a plane along both directions."""
+    x = FREE.interface.x
+    values = 1e6 + 1e6 * x
+    scan = labelled(values, x + 12.3e-3)
+    refuses("offset= ... 'centre'", lambda: st.read_profile(scan, interface=FREE.interface))
+    for offset in (-12.3e-3, "centre"):
+        given = st.read_profile(scan, interface=FREE.interface, offset=offset)
+        np.testing.assert_allclose(given, values, rtol=1e-14)
+    refuses("'centre' needs an interface", lambda: st.read_profile(scan, offset="centre"))
+    rows = 1e6 + np.arange(512.0).reshape(32, 16)
+    places = {dim: at + 7.7e-3 for dim, at in PLANE.coordinates.items()}
+    array = xr.DataArray(rows, places, ("x", "y"))
+    for offset in (-7.7e-3, (-7.7e-3, -7.7e-3), "centre"):
+        np.testing.assert_array_equal(
+            st.read_profile(array, interface=PLANE, offset=offset), rows
+        )
+
+
+def test_gaps_of_specimens_and_planes_are_interpolated_on_request():
+    """A linear profile comes back; patches that reach into a gap are marked."""
+    x = FREE.interface.x
+    values = 1e6 + 1e6 * x
+    holes = np.where(
+        (np.arange(64) > 20) & (np.arange(64) < 25) | (np.arange(64) == 63), np.nan, values
+    )
+    refuses("gaps='fill' ... given(profile)", lambda: st.onset(FREE, holes, method=LOCAL))
+    with pytest.warns(st.AccuracyWarning, match="straight lines"):
+        filled = st.read_profile(holes, interface=FREE.interface, gaps="fill")
+    np.testing.assert_allclose(filled[:63], values[:63], rtol=1e-14)
+    assert filled[63] == values[62]
+    weak = np.where(np.isnan(holes), np.nan, holes - 5e5 * (np.abs(x - x[19]) < 2e-3))
+    result = st.onset(FREE, weak, method=LOCAL, gaps="fill")
+    assert result.in_gap.values.tolist() == [True]
+    assert not st.onset(
+        FREE, weak[::-1].copy()[::-1] + 0.0, method=LOCAL, gaps="fill"
+    ).measured[22]
+    plane = st.Problem(
+        solid=FREE.solid, interface=st.Interface(length=(0.1, 0.05), nodes=(64, 32)),
+        friction=FREE.friction,
+    )  # fmt: skip
+    at = plane.interface.coordinates
+    tilt = 1e6 + 2e6 * at["x"][:, None] - 1e6 * at["y"]
+    hole = np.zeros(tilt.shape, dtype=bool)
+    hole[20:25, 10:13] = hole[40, 20] = True
+    with pytest.warns(st.AccuracyWarning, match="triangles"):
+        filled = st.read_profile(
+            np.where(hole, np.nan, tilt), interface=plane.interface, gaps="fill"
+        )
+    np.testing.assert_allclose(filled, tilt, rtol=1e-12)
+    corner = np.zeros(tilt.shape, dtype=bool)
+    corner[[0, -1]], corner[:, 0] = True, True
+    wave = 1e6 + 1e5 * np.cos(2.0 * np.pi * at["x"] / 0.1)[:, None] + 0.0 * at["y"]
+    filled = st.read_profile(
+        np.where(corner, np.nan, wave), interface=plane.interface, gaps="fill"
+    )
+    assert (
+        np.abs(filled - wave).max() < 2e3
+    )  # half the curvature times the square of two spacings
+    strength = tilt - 4e5 * (
+        (np.abs(at["x"][:, None] - 0.034) < 0.006) & (np.abs(at["y"] - 0.018) < 0.006)
+    )
+    result = st.onset(plane, np.where(hole, np.nan, strength), method=LOCAL, gaps="fill")
+    assert result.in_gap.dims == ("sample",)
+    assert result.in_gap.values.tolist() == [True]
+    assert result.measured.dims == ("x", "y")

@@ -2,7 +2,7 @@
 
 The nodes are x_i = i L/n in each direction, periodically: points may come in any order and begin
 anywhere. Those of a specimen are x_i = (i + 1/2) L/n, and nothing continues beyond its ends. What
-is missing is refused, stays NaN, or is filled on request, on lines that continue periodically.
+is missing is refused, stays NaN, or is interpolated on request.
 """
 
 from __future__ import annotations
@@ -85,8 +85,9 @@ def place(
         flat, at = steps[0], places["x"]
         if finer == 1 and not 0 <= flat.min() <= flat.max() < interface.size:
             raise InputError(
-                f"x reaches from {at.min():g} to {at.max():g} m, beyond the nodes of a specimen of"
-                f" {interface.extent:g} m; crop the record, or pass interpolate=True"
+                f"x reaches from {at.min():g} to {at.max():g} m, beyond the nodes of a specimen"
+                f" of {interface.extent:g} m; crop the record, place it with offset= or 'centre',"
+                " or pass interpolate=True"
             )
     else:
         flat = np.ravel_multi_index(steps, shape, mode="wrap")
@@ -224,46 +225,84 @@ def close_gaps(
         f"{f' of sample {row}' * (len(rows) > 1)}, the first at"
         f" {interface.describe_node(int(np.argmax(holes[row])))}"
     )
-    if interface.is_plane or interface.is_free:
-        if gaps != "skip":
-            raise InputError(f"{text}; give them: gaps are filled on periodic lines only")
-    elif gaps == "refuse":
+    if gaps == "refuse":
         raise InputError(
-            f"{text}; give them, make interface.length that of the record, or pass gaps='fill'"
-            " to st.onset or st.read_profile, which fills them with straight lines"
+            f"{text}; give them, make interface.length that of the record, or pass gaps='fill' to"
+            " st.onset or st.read_profile, which interpolates. RandomField.given(profile) draws"
+            " equally likely values there instead"
         )
-    elif gaps == "fill":
-        if holes.all(axis=-1).any():
+    if gaps == "fill":
+        if holes.all(axis=interface.axes).any():
             raise InputError("has no value at all")
-        x, length = interface.x, interface.extent
-        for one, hole in zip(rows := rows.copy(), holes, strict=True):
-            one[hole] = np.interp(x[hole], x[~hole], one[~hole], period=length)
-        values = rows.reshape(values.shape)
+        values = np.stack([
+            _filled(row, hole, interface) for row, hole in zip(rows, holes, strict=True)
+        ]).reshape(values.shape)  # fmt: skip
         doubt = "; check interface.length and the unit of x" if missing.mean() > 0.5 else ""
-        warn_accuracy(f"{text}; filled with straight lines{doubt}")
+        pieces = "triangles" if interface.is_plane else "straight lines"
+        warn_accuracy(f"{text}; filled with {pieces}{doubt}")
     return values, ~missing & measured
+
+
+def _filled(row: Array, hole: Mask, interface: Interface) -> Array:
+    """Return values (*shape) whose holes are interpolated linearly.
+
+    Free ends take the nearest value. On a plane, triangles span the nodes around each hole; a
+    period repeats on all sides.
+    """
+    if not hole.any():
+        return row
+    row = row.copy()
+    if not interface.is_plane:
+        x, period = interface.x, None if interface.is_free else interface.extent
+        row[hole] = np.interp(x[hole], x[~hole], row[~hole], period=period)
+        return row
+    from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+    from scipy.ndimage import binary_dilation
+
+    half = [(n // 2, n // 2) for n in interface.shape]
+    wide, values = np.pad(hole, half, mode="wrap"), np.pad(row, half, mode="wrap")
+    around = np.argwhere(binary_dilation(wide, np.ones((3, 3))) & ~wide)
+    at = np.argwhere(hole) + [before for before, _ in half]
+    spacings, known = np.array(interface.spacings), values[tuple(around.T)]
+    inside = LinearNDInterpolator(around * spacings, known)(at * spacings)
+    nearest = NearestNDInterpolator(around * spacings, known)(at * spacings)
+    row[hole] = np.where(np.isnan(inside), nearest, inside)
+    return row
 
 
 def with_gaps(problem: Any, result: xr.Dataset, measured: Any) -> xr.Dataset:
     """Return a result with the gaps of its profiles, and a mark of patches that reach into one."""
     interface, position = problem.interface, result["critical_position"]
-    if np.all(measured) or interface.is_plane or interface.is_free:  # nothing was filled
+    if np.all(measured):  # nothing was filled
         return result
-    rate, length, place = problem.uniform_rate, interface.extent, position.values.reshape(-1, 1)
-    patch = interface.spacing if rate is None else problem.nucleation_lengths(rate)[0]
-    apart = np.abs(np.mod(interface.x - place + 0.5 * length, length) - 0.5 * length)
-    near = apart < (1.0 - 1e-9) * max(0.5 * patch, interface.spacing)
-    found = (near & ~measured).any(axis=-1)
+    rate, places = problem.uniform_rate, position.values.reshape(-1, len(interface.dims))
+    lengths = interface.spacings if rate is None else problem.nucleation_lengths(rate)
+    near: Any = True
+    for axis, (dim, length) in enumerate(zip(interface.dims, interface.lengths, strict=True)):
+        apart = interface.coordinates[dim] - places[:, axis, np.newaxis]
+        if not interface.is_free:
+            apart = np.mod(apart + 0.5 * length, length) - 0.5 * length
+        close = np.abs(apart) < (1.0 - 1e-9) * max(
+            0.5 * lengths[axis], interface.spacings[axis]
+        )
+        others = [i for i in range(1, len(interface.dims) + 1) if i != axis + 1]
+        near = near & np.expand_dims(close, others)
+    found = (near & ~measured).any(axis=interface.axes)
     if found.any():
-        first = float(place[int(np.argmax(found)), 0])
+        first = ", ".join(
+            f"{dim} = {at:.6g} m"
+            for dim, at in zip(interface.dims, places[int(np.argmax(found))], strict=True)
+        )
         warn_accuracy(
-            f"the critical patch at x = {first:.6g} m reaches into a gap of the profile"
+            f"the critical patch at {first} reaches into a gap of the profile"
             f" ({found.sum()} of {found.size} samples): the strength there was filled in, not"
             " measured"
         )
     about = {"units": "1", "long_name": "whether the critical patch reaches into a gap"}
-    result[IN_GAP] = (position.dims, found.reshape(position.shape), about)
-    along = ("sample", "x") if len(measured) > 1 else ("x",)
+    dims = position.dims[: len(position.dims) - (len(interface.dims) > 1)]
+    shape = position.shape[: len(dims)]
+    result[IN_GAP] = (dims, found.reshape(shape), about)
+    along = ("sample", *interface.dims) if len(measured) > 1 else interface.dims
     known = measured if len(measured) > 1 else measured[0]
-    x = ("x", interface.x, {"units": "m"})
-    return result.assign_coords({"x": x, MEASURED: (along, known)})
+    units = {dim: (dim, x, {"units": "m"}) for dim, x in interface.coordinates.items()}
+    return result.assign_coords({**units, MEASURED: (along, known)})
