@@ -6,7 +6,6 @@ import os
 import threading
 import warnings
 from concurrent.futures import Executor, Future
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -118,13 +117,13 @@ def test_what_cannot_be_read_is_not_damaged(tmp_path, often, monkeypatch, number
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
     for victim in (run / "study.json", next((run / "chunks").glob("*.npz"))):
 
-        def fail(path, read=Path.read_bytes, victim=victim):
+        def fail(path, read=files.read_regular, victim=victim, **options):
             if path.name == victim.name:
                 raise OSError(number, os.strerror(number))
-            return read(path)
+            return read(path, **options)
 
         with monkeypatch.context() as patch:
-            patch.setattr(Path, "read_bytes", fail)
+            patch.setattr(store, "read_regular", fail)
             refuses("cannot be read", lambda: make_study().run(out=run), StoreError)
             refuses("cannot be read", lambda: st.open_run(run).status(), StoreError)
     assert {path: path.read_bytes() for path in run.rglob("*") if path.is_file()} == before

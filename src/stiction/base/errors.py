@@ -44,6 +44,13 @@ class InputError(ValueError):
         return type(self), (self.problems,)
 
 
+def printable(text: str) -> str:
+    """Return a text with escapes for all letters that could steer a terminal."""
+    return "".join(
+        char if char.isprintable() or char in "\n\t" else repr(char)[1:-1] for char in text
+    )
+
+
 class AccuracyWarning(UserWarning):
     """A result is valid but less accurate than it could be; the message gives the error."""
 

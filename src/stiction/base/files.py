@@ -87,11 +87,17 @@ def check_unpacked(size: int, content: bytes, least: int, times: int) -> None:
 def write_whole(path: Path, content: bytes | Callable[[Path], object]) -> None:
     """Write a file aside, sync it and rename it: an older one stays until the new one is whole.
 
-    The content is bytes, or a function that writes to the path that it is given. If it fails (a
-    `StoreError`), nothing is left behind.
+    The new file has the permissions of the older one from the first byte on. The content is
+    bytes, or a function that writes to the path that it is given. If it fails (a `StoreError`),
+    nothing is left behind.
     """
     aside = path.with_name(f"{path.name}.{uuid.uuid4().hex[:12]}{PART}")
     try:
+        with suppress(FileNotFoundError):
+            state = path.lstat()
+            if stat.S_ISREG(state.st_mode):
+                aside.touch(0o600, exist_ok=False)
+                aside.chmod(stat.S_IMODE(state.st_mode))
         if callable(content):
             content(aside)
         else:

@@ -21,7 +21,7 @@ from __future__ import annotations
 import io
 import math
 import zlib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -45,8 +45,11 @@ NOT_A_SCALE = "_nc4_non_coord_"
 """Begins the HDF5 name of a variable that has the name of a dimension, and is not along it."""
 
 
-def read_netcdf(content: bytes) -> xr.Dataset:
-    """Return the numeric variables of the root of a NetCDF file, or raise an `InputError`."""
+def read_netcdf(content: bytes, unwanted: Collection[str] = ()) -> xr.Dataset:
+    """Return the numeric variables of the root of a NetCDF file, or raise an `InputError`.
+
+    Those of `unwanted` names are left out.
+    """
     import xarray as xr
 
     options: Any = {"decode_times": False, "decode_timedelta": False}
@@ -55,7 +58,7 @@ def read_netcdf(content: bytes) -> xr.Dataset:
             with xr.open_dataset(io.BytesIO(content), engine="scipy", **options) as opened:
                 numeric = [name for name, one in opened.items() if one.dtype.kind in "fiu"]
                 return opened[numeric].load()
-        return xr.decode_cf(_from_hdf5(content), **options).load()
+        return xr.decode_cf(_from_hdf5(content, unwanted), **options).load()
     except InputError:
         raise
     except Exception as error:  # libraries let through whatever a broken file leads to
@@ -63,7 +66,7 @@ def read_netcdf(content: bytes) -> xr.Dataset:
         raise InputError(f"is not a NetCDF file of numbers: {text}") from None
 
 
-def _from_hdf5(content: bytes) -> xr.Dataset:
+def _from_hdf5(content: bytes, unwanted: Collection[str]) -> xr.Dataset:
     """Return the variables of an HDF5 file as they are stored."""
     import h5py
     import xarray as xr
@@ -92,7 +95,7 @@ def _from_hdf5(content: bytes) -> xr.Dataset:
                 {key: value for key, value in about.items() if key not in HIDDEN},
             )
             for name, (item, about) in at_root.items()
-            if item.dtype.kind in "fiu" and item.shape is not None
+            if name not in unwanted and item.dtype.kind in "fiu" and item.shape is not None
             if not str(about.get("NAME")).startswith(NO_VARIABLE)
         }
         return xr.Dataset(variables, attrs=_attributes(file, budget))

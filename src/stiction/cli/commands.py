@@ -19,7 +19,13 @@ from typer import Argument, Option
 from typer.models import OptionInfo
 
 from stiction import __version__
-from stiction.base.errors import InputError, RunError, collect_warnings, unknown_name
+from stiction.base.errors import (
+    InputError,
+    RunError,
+    collect_warnings,
+    printable,
+    unknown_name,
+)
 from stiction.base.progress import Meter, duration, interrupted
 
 SHOWN = 12
@@ -36,7 +42,11 @@ RunPath = Annotated[Path, Argument(metavar="RUN", help="Folder of a run.")]
 Workers = Annotated[int | None, Option(help="Threads; all cores by default.", min=1)]
 Scheduler = Annotated[
     str | None,
-    Option(metavar="ADDRESS", help="Address of a Dask scheduler, such as tcp://host:8786."),
+    Option(
+        metavar="ADDRESS",
+        help="Address of a Dask scheduler, such as tls://host:8786. Whoever controls it or its"
+        " workers can run code here.",
+    ),
 ]
 Part = Annotated[
     str | None, Option(metavar="K/N", help="Compute the K-th of N parts, into one folder RUN.")
@@ -50,10 +60,7 @@ LOADING_RATE = 2e7
 
 def echo(text: Any = "", *, err: bool = False) -> None:
     """Print what may come from a file, with escapes for all that could steer the terminal."""
-    safe = "".join(
-        char if char.isprintable() or char in "\n\t" else repr(char)[1:-1] for char in str(text)
-    )
-    typer.echo(safe, err=err)
+    typer.echo(printable(str(text)), err=err)
 
 
 def in_options(text: str, command: Callable[..., Any]) -> str:
@@ -80,6 +87,16 @@ def _show_some(texts: Sequence[Any], prefix: str, *, err: bool = False) -> None:
         echo(f"{prefix}{text}", err=err)
     if len(texts) > SHOWN:
         echo(f"{prefix}and {len(texts) - SHOWN} more", err=err)
+
+
+def _ignore_local_style() -> None:
+    """Leave out a matplotlibrc in the current folder, which may come from a stranger."""
+    import matplotlib
+
+    if Path(matplotlib.matplotlib_fname()).resolve().parent == Path.cwd():
+        matplotlib.rcdefaults()
+        matplotlib.use("agg")
+        warnings.warn("matplotlibrc: this file in the current folder is not used", stacklevel=1)
 
 
 def _save_figure(axes: Any, path: Path) -> None:
@@ -172,7 +189,8 @@ def run(
 def status(run: RunPath) -> None:
     """Show the completed, failed and damaged parts of a run.
 
-    Exit code 0: complete; 1: samples are missing, failed or damaged, or the run cannot be read.
+    Checksums find damage, not forgery. Exit code 0: complete; 1: samples are missing, failed or
+    damaged, or the run cannot be read; 2: links, pipes or folders lie in place of its files.
     """
     from stiction.study.study import open_run
 
@@ -191,7 +209,7 @@ def status(run: RunPath) -> None:
     if state.damaged:
         echo("  run the study again to repair this")
     else:
-        echo("  verified    all stored chunks match their checksums")
+        echo("  undamaged   all stored chunks match their checksums")
     if state.failures:
         echo(f"  failed      {len(state.failures)}; `stiction run` computes them again:")
         _show_some(state.failures, "    ")
@@ -229,6 +247,7 @@ def report(
 
     Exit code 0: complete; 1: samples are missing, and the page is of those that are there.
     """
+    _ignore_local_style()
     from stiction.cli.report import write_report
     from stiction.study.study import open_run
 
@@ -255,16 +274,23 @@ def example() -> None:
 def check(study: StudyFile) -> None:
     """Check a study file as `run` does, and estimate time and size.
 
-    All errors come at once, and the warnings of a run before its first sample.
+    All errors come at once, and the warnings of a run before its first sample. Files outside the
+    study's folder that it reads are listed: their numbers go into the run.
     """
     from stiction.ensemble.monte_carlo import check_run
-    from stiction.study.study import Study
+    from stiction.study.study import read_with_files
 
-    loaded = Study.from_toml(study)
-    check_run(loaded.experiments)
+    with Meter("checking the study"):
+        loaded, files = read_with_files(study)
+        check_run(loaded.experiments)
+        lines = description(loaded) | _cost(loaded)
     echo(f"{study}: valid" + (f", {loaded.title!r}" if loaded.title else ""))
-    for name, text in (description(loaded) | _cost(loaded)).items():
+    for name, text in lines.items():
         echo(f"  {name:20s} {text}")
+    folder = study.resolve().parent
+    outside = dict.fromkeys(one.resolve() for one in files)
+    for file in (one for one in outside if not one.is_relative_to(folder)):
+        echo(f"  {'file outside':20s} {file}")
 
 
 def description(study: Any) -> dict[str, str]:
@@ -443,6 +469,7 @@ def rupture(
     of the study's method `rupture`, else 2e7 Pa/s. On a specimen it is the event that slides,
     with a figure of the blocks.
     """
+    _ignore_local_style()
     from stiction import plot
     from stiction.methods.dynamics.method import Rupture
     from stiction.methods.dynamics.simulate import simulate_rupture

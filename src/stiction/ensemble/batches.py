@@ -24,6 +24,7 @@ from stiction.base.errors import (
     collect_warnings,
     merge_warnings,
     merged,
+    printable,
 )
 from stiction.ensemble.experiment import Experiment
 from stiction.random.synthesis import BLOCK, block_of
@@ -63,7 +64,7 @@ class Failure(NamedTuple):
         return f"sample {self.sample}{where} (seed {self.seed})"
 
     def __str__(self) -> str:
-        return f"{self.name}: {' / '.join(self.error.splitlines())}"
+        return printable(f"{self.name}: {' / '.join(self.error.splitlines())}")
 
 
 class Table(NamedTuple):

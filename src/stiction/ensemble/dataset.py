@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction.base.model import check_memory
-from stiction.base.variables import SAMPLE, Variable
+from stiction.base.model import check_memory, describe
+from stiction.base.variables import DIRECTION, SAMPLE, Variable
 from stiction.ensemble.batches import NUMBER, POINT, Failure, Table
 from stiction.ensemble.experiment import Ensemble, Experiment
 from stiction.problem.results import to_dataset
@@ -51,6 +51,11 @@ def over_axes(
     )
 
 
+def within(numbers: NDArray[Any], ends: Any) -> bool:
+    """Whether whole numbers lie from 0 to below their ends."""
+    return bool(np.all((numbers >= 0) & (numbers < ends)))
+
+
 class Gathered:
     """The results of all samples of one or several experiments, in memory.
 
@@ -72,6 +77,26 @@ class Gathered:
         self._failures: dict[tuple[int, int], Failure] = {}
         self._arrays: dict[str, NDArray[Any]] = {}  # floats, NaN where nothing is
         self._types: dict[str, np.dtype[Any]] = {}
+
+    def misfit(self, table: Table) -> str:
+        """Return why a table cannot hold samples of these points; '' if it can."""
+        failed = np.array([failure[:2] for failure in table.failures], dtype=object).reshape(
+            -1, 2
+        )
+        for points, samples in ((table.rows[POINT], table.rows[NUMBER]), failed.T):
+            if not within(points, len(self.points)) or np.any(samples < self.first):
+                return "a point or a sample is none of the study"
+        variables, interface = variables_in(self.points), self.points[0].problem.interface
+        sizes = dict(zip(interface.dims, interface.shape, strict=True))
+        sizes[DIRECTION] = len(interface.dims)
+        for name in {*(table.rows.dtype.names or ())} - {POINT, NUMBER}:
+            if name not in variables:
+                return f"{describe(name)} is no variable of the study"
+            dims, shape = variables[name].dims[1:], table.rows.dtype[name].shape
+            known = [sizes.get(dim, size) for dim, size in zip(dims, shape, strict=False)]
+            if len(shape) != len(dims) or [*shape] != known:
+                return f"{name} has shape {shape} for each sample"
+        return ""
 
     def add(self, table: Table) -> None:
         """Put the rows of a table in their places; those of other samples are left out."""

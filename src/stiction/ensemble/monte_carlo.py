@@ -129,7 +129,7 @@ def gather(
     """
     rows, cores = Gathered(points, ensemble), workers or usable_cores()
     if store:
-        store.resume(rows.add)
+        store.resume(rows)
     missing = ~(others | rows.done)
     if missing.any():
         check_run(points)

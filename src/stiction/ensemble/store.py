@@ -4,6 +4,10 @@
 of samples with a mark of their study; its name is a digest of its content. Chunks are
 written whole or not at all, they never change, and nothing lists them: any number of
 processes may write to a folder, a run may be killed at any moment, and damage is found.
+Digests find damage, not forgery: who can write to a folder can write numbers with a new digest.
+
+A folder may come from a stranger. Links, pipes, devices and folders in place of its files are an
+`InputError`; content that does not fit the study is damage, whatever its digest says.
 """
 
 from __future__ import annotations
@@ -11,20 +15,30 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import math
 import os
 import re
+import stat
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from stiction.base.errors import InputError, StoreError, warn_user
-from stiction.base.files import PART, cannot, write_whole
+from stiction.base.files import (
+    MAX_FILE_BYTES,
+    PART,
+    UNREADABLE,
+    arrays_in,
+    cannot,
+    read_regular,
+    write_whole,
+)
 from stiction.base.model import describe
-from stiction.ensemble.batches import Failure, Table, versions
+from stiction.ensemble.batches import NUMBER, POINT, Failure, Table, versions
 from stiction.ensemble.pilot import LOOKED_AT
 
 FORMAT = 5
@@ -33,17 +47,29 @@ NAME = re.compile(r"[0-9a-f]{32}\.npz")
 SAVE_SECONDS = 10.0
 """A chunk holds the samples of this time."""
 SAVE_BYTES = 32 * 2**20
+MAX_JSON_BYTES = 64 * 2**20
+"""Of the description of a study or of a pilot."""
 
 
 class Damaged(StoreError):
     """A stored file is missing or damaged; the message gives the defect."""
 
 
+class Rows(Protocol):
+    """Samples in memory, which a store fills."""
+
+    def misfit(self, table: Table) -> str:
+        """Return why a table cannot belong to this study; '' if it can."""
+
+    def add(self, table: Table) -> None:
+        """Take a table that fits."""
+
+
 class Store:
     """The folder of a run: samples of a study, given in plain form.
 
-    Of the chunks that were read, `damage` has the defects of damaged ones, by name;
-    `seconds` (of one core, for each) and `versions` are those of the others.
+    Once it was read, `damage` has the defects of damaged chunks, by name; `seconds` (of one core,
+    for each) and `versions` are those of the others.
     """
 
     def __init__(self, path: Path, study: Mapping[str, Any]) -> None:
@@ -60,11 +86,13 @@ class Store:
         """Open a folder for writing: a new one, or one that holds the same study."""
         try:
             path.mkdir(parents=True, exist_ok=True)
-            others = {name for name in os.listdir(path) if not name.endswith(PART)}
-            if others and not others & {STUDY, CHUNKS}:
-                some = ", ".join(sorted(others)[:3])
+            names = {name for name in os.listdir(path) if not name.endswith(PART)}
+            if names and not names & {STUDY, CHUNKS}:
+                some = ", ".join(sorted(names)[:3])
                 raise StoreError(f"{path}: holds other files ({some}); choose a new folder")
-            (path / CHUNKS).mkdir(exist_ok=True)
+            with suppress(FileExistsError):
+                (path / CHUNKS).mkdir()
+            _check_folder(path / CHUNKS)
         except OSError as error:
             raise cannot("written as a folder", path, error) from error
         store, before = cls(path, study), None
@@ -72,7 +100,7 @@ class Store:
             before = read_study(path)
             _refuse_another(path, study, before)
         except Damaged:
-            if list(store.chunks()) or STUDY in others:
+            if list(store._tables()) or STUDY in names:
                 store.warn(f"{STUDY} is damaged or missing; it is rebuilt from the given study")
         if before != study:
             if before and before["ensemble"]["samples"] < LOOKED_AT:  # a pilot of fewer samples
@@ -80,38 +108,48 @@ class Store:
             _write_json(path / STUDY, study)
         return store
 
-    def chunks(self) -> Iterator[Table]:
-        """Yield the undamaged chunks; the defects of the others are in `damage`.
+    def read_into(self, rows: Rows) -> None:
+        """Hand over the undamaged chunks; the defects of the others are in `damage`.
 
         A file that exists and cannot be read may be whole: it raises a `StoreError`.
         """
-        folder = self.path / CHUNKS
         self.damage, self.seconds, self.versions = {}, [], {}
+        for name, table in self._tables():
+            if misfit := rows.misfit(table):
+                self.damage[name] = f"does not fit the study: {misfit}"
+                continue
+            rows.add(table)
+            self.seconds.append(table.seconds)
+            self.versions[table.versions] = None
+
+    def _tables(self) -> Iterator[tuple[str, Table]]:
+        """Yield the chunks that are whole, with their names."""
+        folder = self.path / CHUNKS
         try:
+            _check_folder(folder)
             names = sorted(filter(NAME.fullmatch, os.listdir(folder)))
         except OSError as error:
             raise cannot("read", folder, error) from error
         for name in names:
             try:
-                data = _read(folder / name)
+                data = _read(folder / name, MAX_FILE_BYTES)
             except Damaged:  # it was damaged, and another process has deleted it
                 continue
             if name != f"{digest(data)}.npz":
                 self.damage[name] = "fails its checksum"
                 continue
-            with np.load(io.BytesIO(data), max_header_size=len(data)) as archive:
-                mark, made_by, seconds, failed = json.loads(archive["about"].tobytes())
-                if mark != self._mark:
-                    raise StoreError(f"{folder / name}: belongs to another study")
-                failures = tuple(Failure(*one) for one in failed)
-                self.seconds.append(seconds)
-                self.versions[made_by] = None
-                yield Table(archive["rows"], failures, seconds, made_by)
+            try:
+                mark, table = _table_in(data)
+            except (*UNREADABLE, TypeError, RecursionError):
+                self.damage[name] = "is no chunk, though its checksum is right"
+                continue
+            if mark != self._mark:
+                raise StoreError(f"{folder / name}: belongs to another study")
+            yield name, table
 
-    def resume(self, add: Callable[[Table], None]) -> None:
+    def resume(self, rows: Rows) -> None:
         """Hand over what is stored; warn of other versions, and delete what is damaged."""
-        for table in self.chunks():
-            add(table)
+        self.read_into(rows)
         for name, text in self.damage.items():
             self.warn(f"{CHUNKS}/{name}: {text}; its samples are computed again")
             (self.path / CHUNKS / name).unlink(missing_ok=True)
@@ -145,6 +183,7 @@ class Store:
 
     def save(self) -> None:
         """Store the tables that were taken, one chunk for each set of variables."""
+        _check_folder(self.path / CHUNKS)
         groups: dict[Any, list[Table]] = {}
         for table in self._taken:
             groups.setdefault((table.rows.dtype, table.versions), []).append(table)
@@ -164,10 +203,39 @@ def digest(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()[:32]
 
 
-def _read(file: Path) -> bytes:
+def _check_folder(folder: Path) -> None:
+    """Refuse a link in place of the folder of chunks: files would be written where it leads."""
+    if not stat.S_ISDIR(os.lstat(folder).st_mode):
+        raise InputError(f"{folder}: is not a folder; remove it, or choose another run")
+
+
+def _table_in(data: bytes) -> tuple[str, Table]:
+    """Return the mark and the table of a chunk, or raise one of several errors if it is none."""
+    arrays = arrays_in(data)
+    mark, made_by, seconds, failed = json.loads(arrays["about"].tobytes())
+    failures = tuple(Failure(*one) for one in failed)
+    texts = [mark, made_by, *(failure.error for failure in failures)]
+    numbers = [number for failure in failures for number in failure[:3]]
+    rows, long = arrays["rows"], np.dtype(np.int64)
+    fields: Any = rows.dtype.fields or {}
+    valid = (
+        all(isinstance(text, str) for text in texts)
+        and all(isinstance(number, int) for number in numbers)
+        and isinstance(seconds, int | float) and 0.0 <= seconds < math.inf
+        and rows.ndim == 1 and all(fields[name][0] == long for name in (POINT, NUMBER))
+        and all(field[0].base.kind in "fiub" for field in fields.values())
+    )  # fmt: skip
+    if not valid:
+        raise ValueError("it holds other values than a chunk")
+    return mark, Table(rows, failures, seconds, made_by)
+
+
+def _read(file: Path, max_bytes: int) -> bytes:
     """Return the content of a file; one that is there but cannot be read may be whole."""
     try:
-        return file.read_bytes()
+        return read_regular(file, max_bytes=max_bytes, follow_links=False)
+    except InputError as error:
+        raise InputError(f"{file}: {error}; remove it, or choose another run") from None
     except FileNotFoundError:
         what = "there is no run here"
         if file.name == STUDY and (file.parent / CHUNKS).is_dir():
@@ -187,27 +255,32 @@ def _write_json(file: Path, content: Mapping[str, Any]) -> None:
 def read_json(file: Path) -> dict[str, Any]:
     """Return what `_write_json` wrote, or raise a `StoreError`."""
     try:
-        body = json.loads(_read(file))
+        body = json.loads(_read(file, MAX_JSON_BYTES))
         if body.pop("digest") != digest(json.dumps(body, sort_keys=True).encode()):
             raise ValueError
         if body["format"] == FORMAT:
             return dict(body["content"])
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except InputError:
+        raise
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise Damaged(
             f"{file}: is damaged; run the study again into the folder to repair it"
         ) from None
-    raise StoreError(f"{file}: is of format {body['format']!r}; this version reads {FORMAT}")
+    raise StoreError(
+        f"{file}: is of format {describe(body['format'])}; this version reads {FORMAT}"
+    )
 
 
 def read_study(folder: Path) -> dict[str, Any]:
     """Return the study of a run, or raise a `StoreError`."""
-    found = read_json(folder / STUDY)
-    if "ensemble" not in found:
+    study = read_json(folder / STUDY)
+    ensemble = study.get("ensemble")
+    if not isinstance(ensemble, dict) or not isinstance(ensemble.get("samples"), int):
         raise Damaged(
             f"{folder / STUDY}: is damaged: it is another file of a run;"
             " run the study again to repair it"
         )
-    return found
+    return study
 
 
 def _identity(study: Mapping[str, Any]) -> dict[str, Any]:

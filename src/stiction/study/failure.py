@@ -33,7 +33,7 @@ from stiction.ensemble.batches import (
     usable_cores,
     versions,
 )
-from stiction.ensemble.dataset import GridAxes, over_axes
+from stiction.ensemble.dataset import GridAxes, over_axes, within
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import LimitState, weakest_first
 from stiction.ensemble.monte_carlo import check_fields, complete
@@ -127,6 +127,19 @@ class Repetitions:
         self.done = np.zeros((len(points), count), dtype=np.bool_)
         self._found: list[dict[int, Descent]] = [{} for _ in points]
 
+    def misfit(self, table: Table) -> str:
+        """Return why a table cannot hold repetitions of these points; '' if it can."""
+        rows = table.rows
+        if rows.dtype != ROW or table.failures or not rows.size:
+            return "it holds no repetitions"
+        members = [len(state.experiment.random.members) for state in self.states]
+        if not within(rows[POINT], len(self.states)) or rows[NUMBER].min() < 0:
+            return "a point or a repetition is none of the study"
+        inside = all(within(rows[name], rows["samples"]) for name in ("ancestor", "level"))
+        if not inside or not within(rows["member"], np.array(members)[rows[POINT]]):
+            return "a level, a sample or a member is none of the repetition"
+        return ""
+
     def add(self, table: Table) -> None:
         """Take the repetitions of a table; those beyond the number are left out."""
         for point, number, found in repetitions_in(table.rows):
@@ -180,7 +193,7 @@ def complete_curves(
     pilot: bool,
 ) -> None:
     """Compute what is not stored; `others`, (points, repetitions), another job computes."""
-    store.resume(rows.add)
+    store.resume(rows)
     missing, states, cores = ~(rows.done | others), rows.states, workers or usable_cores()
     with merge_warnings():
         if missing.any():

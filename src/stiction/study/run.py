@@ -159,8 +159,7 @@ class StoredRun:
 
     def _read(self, only: Sequence[str] | None) -> Any:
         rows = self._rows(only)
-        for table in self._store.chunks():
-            rows.add(table)
+        self._store.read_into(rows)
         return rows
 
     def export(self, path: str | Path, *, partial: bool = False) -> None:

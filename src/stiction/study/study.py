@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import re
 import tomllib
 from collections.abc import Mapping
 from concurrent.futures import Executor
@@ -16,7 +17,8 @@ import pydantic
 import tomli_w
 from pydantic import BeforeValidator, Discriminator, Tag, model_validator
 
-from stiction.base.errors import InputError, StoreError
+from stiction.base.errors import InputError, StoreError, prefixed
+from stiction.base.files import content_of
 from stiction.base.kinds import OneOf
 from stiction.base.model import (
     Count,
@@ -40,7 +42,7 @@ from stiction.ensemble.store import Store, read_study
 from stiction.methods.dynamics.save import Save
 from stiction.methods.protocol import METHODS, as_method
 from stiction.problem.problem import Problem
-from stiction.problem.profiles.reading import profile_in_file
+from stiction.problem.profiles.reading import ProfileFile, profile_in_file
 from stiction.random.dotted_keys import with_values
 from stiction.random.equally_likely import as_random
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
@@ -56,6 +58,10 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 CURVES = "failure_curve"
 """Key of the settings of failure curves beside the study of a run."""
+MAX_TOML_BYTES, MAX_TOML_WORDS, MAX_DOTS = 2**21, 2**18, 64
+"""Bytes of a study file, bytes of it that are not lists of numbers, and dots of a line of these."""
+_NUMBERS = re.compile(rb"(?:[^=#]{1,200}=)?([\s\d.,eE+_\[\]-]*)")
+"""A line that holds numbers, or a key and numbers."""
 
 AnyMethod: Any = Annotated[
     Any,
@@ -428,6 +434,8 @@ class Study(_Parts):
         It raises an `InputError` if a part exists in Python only or the file cannot be written.
         """
         text = tomli_w.dumps(self.to_dict())
+        with prefixed("path"):
+            _check_toml(text.encode())
         try:
             check("path", path, FilePath).write_text(text, encoding="utf-8")
         except OSError as error:
@@ -441,8 +449,8 @@ class Study(_Parts):
     @classmethod
     def from_toml(cls, path: str | Path) -> Study:
         """Read a study from a TOML file."""
-        file = check("path", path, FilePath)
-        return _read(cls, _read_toml(file), file.parent)
+        study: Study = read_with_files(check("path", path, FilePath))[0]
+        return study
 
     @classmethod
     def from_result(cls, result: xr.Dataset) -> Study:
@@ -471,22 +479,67 @@ def read_setup(path: Path) -> Setup:
     return _read(Setup, {key: one for key, one in given.items() if key in own}, path.parent)
 
 
+def _check_toml(content: bytes) -> None:
+    """Refuse what Python's parser would take long for, such as keys of a thousand parts."""
+    words = 0
+    for line in content.split(b"\n"):
+        match = _NUMBERS.fullmatch(line)
+        if match and match[1].count(b".") <= match[1].count(b",") + 1:
+            line = line[: match.start(1)]
+        words += len(line)
+        if line.count(b".") > MAX_DOTS and not line.lstrip().startswith(b"#"):
+            raise InputError(f"has a line with more than {MAX_DOTS} dots beside its numbers")
+    if words > MAX_TOML_WORDS or len(content) > MAX_TOML_BYTES:
+        raise InputError(
+            f"has more than {MAX_TOML_BYTES} bytes, or {MAX_TOML_WORDS} beside lists of numbers;"
+            " name profiles by files beside the study, such as strength.npy"
+        )
+
+
 def _read_toml(path: Path) -> dict[str, Any]:
+    with prefixed(str(path)):
+        content = content_of(path)
+        _check_toml(content)
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
+        return tomllib.loads(content.decode())
+    except UnicodeDecodeError as error:
         raise InputError(f"{path}: cannot be read: {error}") from None
-    except (RecursionError, tomllib.TOMLDecodeError) as error:
+    except (RecursionError, ValueError) as error:  # a ValueError for integers of many digits
         raise InputError(f"{path}: is not valid TOML: {error}") from None
 
 
-def _read(cls: type[T], given: dict[str, Any], folder: str | Path | None) -> T:
-    """Validate a study in plain form, or its `Setup`; its files are in `folder`."""
+def read_with_files(path: Path) -> tuple[Study, list[Path]]:
+    """Return the study in a TOML file, and the files of profiles that it names."""
+    named: list[Path] = []
+    return _read(Study, _read_toml(path), path.parent, named), named
+
+
+def _read(
+    cls: type[T],
+    given: dict[str, Any],
+    folder: str | Path | None,
+    named: list[Path] | None = None,
+) -> T:
+    """Validate a study in plain form, or its `Setup`; its files are in `folder`.
+
+    Files that it names are added to `named`.
+    """
     check("study", given, dict)
     context = {}
+    if folder is not None and "to" in (given.get("save") or ()):
+        raise InputError(
+            "save.to: is no option of a study file; give --out to stiction rupture"
+        )
     if folder is not None:
         place = check("folder", folder, FilePath)
-        context["read"] = lambda profile, name: profile_in_file(profile, name, place)
+
+        def read(profile: Any, name: str) -> Any:
+            file = profile_in_file(profile, name, place)
+            if named is not None and isinstance(file, ProfileFile):
+                named.append(file.path)
+            return file
+
+        context["read"] = read
     try:
         return pydantic.TypeAdapter(cls).validate_python(given, context=context)
     except pydantic.ValidationError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,9 +12,17 @@ import pydantic
 from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
-from stiction.base.errors import InputError, unknown_name
-from stiction.base.files import PART, UNREADABLE, read_arrays, write_arrays, write_whole
+from stiction.base.errors import InputError, prefixed, unknown_name
+from stiction.base.files import (
+    PART,
+    UNREADABLE,
+    content_of,
+    read_arrays,
+    write_arrays,
+    write_whole,
+)
 from stiction.base.model import Count, FilePath, Names, Real, Text, checked, model
+from stiction.base.netcdf import read_netcdf
 from stiction.base.variables import Variable
 from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.state import (
@@ -30,6 +39,8 @@ from stiction.problem.results import along, coordinate, to_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
+MAX_FRAME_BYTES = 2**36
+"""Of a file of frames."""
 FRAMES_PER_FILE = 64
 _MAX_STEPS_PER_FILE = 50_000  # recorded between frames that lie far apart
 _CHECKPOINT, _SUMMARY, _FRAME_FILES = "checkpoint.npz", "summary.nc", "frames-*.nc"
@@ -330,9 +341,7 @@ def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset
 
     parts = []
     for path in sorted(folder.glob(_FRAME_FILES)):
-        with xr.open_dataset(path, engine="netcdf4") as data:
-            unwanted = [] if fields is None else FIELDS.keys() - set(fields)
-            parts.append(data.drop_vars(unwanted, errors="ignore").load())
+        parts.append(_read(path, [] if fields is None else FIELDS.keys() - {*fields}))
     if not parts:
         raise InputError(f"folder: {str(folder)!r} holds no frames of a rupture")
 
@@ -345,7 +354,13 @@ def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset
     framed = joined("time", "step").merge(joined("step", "time"))
     framed.attrs = parts[-1].attrs
     if (folder / _SUMMARY).exists():
-        with xr.open_dataset(folder / _SUMMARY, engine="netcdf4") as whole:
-            framed = framed.merge(whole.load(), compat="override")
-            framed.attrs = dict(whole.attrs)
+        whole = _read(folder / _SUMMARY)
+        framed = framed.merge(whole, compat="override")
+        framed.attrs = whole.attrs
     return framed
+
+
+def _read(path: Path, unwanted: Collection[str] = ()) -> xr.Dataset:
+    """Return a file of a folder, which may come from a stranger."""
+    with prefixed(str(path)):
+        return read_netcdf(content_of(path, max_bytes=MAX_FRAME_BYTES), unwanted)
