@@ -1,6 +1,6 @@
 """What a package of your own needs to add a method, law, load, marginal or spectrum.
 
-`docs/architecture.md` has an example of each. These names stay where they are; the modules that
+`docs/plug-ins.md` has an example of each. These names stay where they are; the modules that
 they come from may move.
 """
 

@@ -63,7 +63,7 @@ def test_an_edited_message_compiles_no_kernel_anew():
 
 
 def worked_examples(language: str) -> list[str]:
-    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "plug-ins.md").read_text(encoding="utf-8")
     return re.findall(rf"```{language}\n(.*?)```", page, flags=re.DOTALL)
 
 
