@@ -254,6 +254,22 @@ def test_far_from_ends_and_top_a_rupture_is_that_between_half_spaces(mode):
     assert np.abs(ours - theirs)[both].max() < 5e-3 * end
 
 
+def test_an_event_that_has_come_to_rest_moves_no_further():
+    """Nor does it rest after waves have crossed the block once, if slip goes on."""
+    problem = crooked(nodes=64, drive=LOW, load=st.Load(), rate=0.09e12)
+    x = problem.interface.x
+    strength = 1e6 - 3.2e5 * np.cos(2.0 * np.pi * x / 0.083 * 2.5) ** 2 + 4e6 * x
+    program, sample = RuptureProgram(problem, st.Rupture()), of(problem, strength)
+    for before, _ in path_of(program, sample).events:
+        event = program.event(sample, before)
+        event.run(10**6)
+        slip = event.waves.slip.copy()
+        assert not event.slides
+        event.take_steps(event.mesh.window)
+        moved = (event.waves.slip - slip).max()
+        assert moved < 1e-3 * (slip - before.slip).max()
+
+
 @pytest.mark.slow
 def test_half_the_spacing_changes_an_event_by_two_per_cent():
     """Slip and length of the largest event of a smooth strength; without inertia it is 2.2 %."""

@@ -390,6 +390,49 @@ def test_fields_have_the_moments_and_bounds_that_were_given_and_files_hold_them(
     assert st.RandomField(table, SPECTRUM) == field
 
 
+@pytest.mark.parametrize(
+    ("marginal", "support"),
+    [
+        (st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6), (0.66e6, 1.66e6)),
+        (st.Lognormal(mean=1e6, cv=0.2, low=0.3e6), (0.3e6, np.inf)),
+        (st.Weibull(mean=1e6, cv=0.2, low=0.3e6), (0.3e6, np.inf)),
+        (st.Gamma(mean=1e6, cv=0.2, low=0.3e6), (0.3e6, np.inf)),
+        (st.TruncatedNormal(mean=1e6, cv=0.2), (0.0, np.inf)),
+        (st.TruncatedNormal(mean=1e6, cv=0.2, low=0.6e6), (0.6e6, np.inf)),
+        (st.TruncatedNormal(mean=1e6, cv=0.1, high=1.2e6), (0.0, 1.2e6)),
+        (st.TruncatedNormal(mean=1e6, cv=0.1, low=0.7e6, high=1.2e6), (0.7e6, 1.2e6)),
+    ],
+)
+def test_marginals_end_at_the_bounds_that_were_given(marginal, support):
+    frozen = marginal.distribution
+    # scipy keeps bounds in units of the scale, here about 1e6: 1e-9 is its round-off.
+    assert frozen.support() == pytest.approx(support, abs=1e-9)
+    low, high = from_normal(marginal, np.array([-30.0, 30.0]))
+    assert support[0] - 1e-9 <= low < high <= support[1] + 1e-9
+    if np.isfinite(support[1]):
+        assert high == pytest.approx(support[1], rel=1e-9)
+
+
+def test_bounds_themselves():
+    """Low equal to high, or to the mean, leaves no distribution; a cv of 10 is the largest."""
+    for wrong in (
+        lambda: st.Beta(alpha=1.5, beta=3.0, low=1e6, high=1e6),
+        lambda: st.Lognormal(mean=1e6, cv=0.2, low=1e6),
+        lambda: st.TruncatedNormal(mean=1e6, cv=0.2, low=1e6),
+        lambda: st.TruncatedNormal(mean=1e6, cv=0.2, high=1e6),
+        lambda: st.Lognormal(mean=1e6, cv=np.nextafter(10.0, 11.0)),
+        lambda: st.Weibull(mean=1e6, cv=10.0),
+        lambda: st.PowerLawSpectrum(1e-3, power_kept=1.0),
+        lambda: st.PowerLawSpectrum(1e-3, exponent=np.nextafter(0.6, 0.0)),
+    ):
+        with pytest.raises(st.InputError):
+            wrong()
+    with pytest.warns(st.UnitWarning):
+        assert st.Lognormal(mean=1e6, cv=10.0).cv == 10.0
+    for exponent in (0.6, 64.0):
+        assert st.PowerLawSpectrum(1e-3, exponent=exponent).exponent == exponent
+
+
 def test_against_the_textbook():
     """Lognormal: sigma^2 = ln(1 + cv^2); Weibull of shape 2: cv = sqrt(4/pi - 1)."""
     lognormal = st.Lognormal(mean=2.0, cv=0.3).distribution

@@ -155,7 +155,8 @@ def test_what_no_file_can_name_is_refused_before_anything_is_computed(tmp_path):
 
     refuses("Another: the type 'unregistered' is that of", lambda: register(Another))
     refuses("needs a field such as type", lambda: register(LoadShape))
-    Another.values = lambda self, interface: interface.x - 0.01
-    refuses("Another must be positive everywhere", lambda: Another().on(base.interface))
+    for least in (-0.01, 0.0):  # zero is not positive
+        Another.values = lambda self, interface, least=least: interface.x + least
+        refuses("Another must be positive everywhere", lambda: Another().on(base.interface))
     Another.__abstractmethods__ = frozenset({"values"})
     refuses("Another: lacks values", lambda: register(Another))

@@ -20,7 +20,7 @@ from stiction.base.model import (
 )
 from stiction.problem.interface import Interface
 
-Fraction = Annotated[Real, Field(ge=0.0, lt=1.0)]
+ShareBelowOne = Annotated[Real, Field(ge=0.0, lt=1.0)]
 NotNegative = Annotated[Real, Field(ge=0.0)]
 
 
@@ -76,8 +76,8 @@ class GradientLoad(LoadShape):
         Position of the maximum as a share of the length, in [0, 1).
     """
 
-    amplitude: Fraction
-    centre: Fraction = 0.0
+    amplitude: ShareBelowOne
+    centre: ShareBelowOne = 0.0
     type: Literal["gradient"] = "gradient"
 
     def values(self, interface: Interface) -> Array:
@@ -106,7 +106,7 @@ class EdgeLoad(LoadShape):
 
     excess: NotNegative
     decay: Positive
-    edge: Fraction = 0.0
+    edge: ShareBelowOne = 0.0
     type: Literal["edge"] = "edge"
 
     def values(self, interface: Interface) -> Array:

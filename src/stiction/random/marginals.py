@@ -61,7 +61,7 @@ class Beta(Marginal):
     low: Bound
     high: Bound
     type: Literal["beta"] = "beta"
-    of_scipy: ClassVar[Any] = scipy.stats.beta
+    scipy_family: ClassVar[Any] = scipy.stats.beta
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -78,12 +78,16 @@ class Beta(Marginal):
 
 @model(kw_only=True)
 class _ByMoments(Marginal):
-    """Families above a lower bound, given by mean and coefficient of variation."""
+    """Families above a lower bound, given by mean and coefficient of variation.
+
+    `scipy_family` is the family of scipy whose arguments are a shape, `low` and a scale. Its
+    marginals share the tables of `mapping`; None if there is no such family.
+    """
 
     mean: Annotated[Positive, Field(gt=1e-18, lt=1e18)]
     cv: Annotated[Positive, Field(gt=1e-9)]
     low: Bound = 0.0
-    of_scipy: ClassVar[Any] = None
+    scipy_family: ClassVar[Any] = None
 
     @model_validator(mode="after")
     def _has_a_distribution(self) -> Self:
@@ -97,7 +101,7 @@ class _ByMoments(Marginal):
         )
         if self.cv > 10.0:
             raise InputError(hint)
-        _ = self.distribution  # there may be none with these moments
+        _ = self.distribution  # which does not exist for all moments
         if self.cv > 1.0:
             warn_user(hint, UnitWarning)
         return self
@@ -110,7 +114,7 @@ class _ByMoments(Marginal):
     def distribution(self) -> Any:
         above = self.mean - self.low
         shape, mean_over_scale = self._shape(self.cv * self.mean / above)
-        return self.of_scipy(shape, self.low, above / mean_over_scale)
+        return self.scipy_family(shape, self.low, above / mean_over_scale)
 
 
 @register
@@ -133,7 +137,7 @@ class Lognormal(_ByMoments):
     """
 
     type: Literal["lognormal"] = "lognormal"
-    of_scipy: ClassVar[Any] = scipy.stats.lognorm
+    scipy_family: ClassVar[Any] = scipy.stats.lognorm
 
     def _shape(self, ratio: float) -> tuple[float, float]:
         return math.sqrt(math.log1p(ratio**2)), math.sqrt(1.0 + ratio**2)
@@ -151,7 +155,7 @@ class Weibull(_ByMoments):
     """Weibull distribution (of minima) above `low`; parameters as for `Lognormal`."""
 
     type: Literal["weibull"] = "weibull"
-    of_scipy: ClassVar[Any] = scipy.stats.weibull_min
+    scipy_family: ClassVar[Any] = scipy.stats.weibull_min
 
     def _shape(self, ratio: float) -> tuple[float, float]:
         if not 1e-3 < ratio < 10.0:
@@ -175,7 +179,7 @@ class Gamma(_ByMoments):
     """Gamma distribution above `low`; parameters as for `Lognormal`."""
 
     type: Literal["gamma"] = "gamma"
-    of_scipy: ClassVar[Any] = scipy.stats.gamma
+    scipy_family: ClassVar[Any] = scipy.stats.gamma
 
     def _shape(self, ratio: float) -> tuple[float, float]:
         return ratio**-2, ratio**-2
@@ -223,14 +227,14 @@ class TruncatedNormal(_ByMoments):
         # An exponential distribution, and between two bounds a uniform one, are the widest.
         excess = self.mean - self.low
         room = min(excess**2, excess * max(high - self.mean, 0.0) / 2.0)
-        found = root(moments, [0.0, 0.0], tol=1e-12) if deviation**2 < room else None
-        if found is None or not np.abs(moments(found.x)).max() < 1e-8:
+        solution = root(moments, [0.0, 0.0], tol=1e-12) if deviation**2 < room else None
+        if solution is None or not np.abs(moments(solution.x)).max() < 1e-8:
             raise InputError(
                 f"cv: no normal distribution truncated at low={self.low:g} and high={high:g} has"
                 f" mean={self.mean:g} and cv={self.cv:g}: the mean must lie between the bounds, and"
                 " these limit the scatter; lower cv, or take st.Lognormal"
             )
-        return scipy.stats.truncnorm(*parameters(found.x))
+        return scipy.stats.truncnorm(*parameters(solution.x))
 
 
 @dataclass(frozen=True)
@@ -273,8 +277,8 @@ def affine_parameters(marginal: Any) -> tuple[tuple[str, ...], float, float]:
     if isinstance(marginal, Beta):
         return ("low", "high"), marginal.low, marginal.high - marginal.low
     if isinstance(marginal, ScipyMarginal) and marginal.frozen is None:
-        own = dict(marginal.parameters)
-        return ("loc", "scale"), own.get("loc", 0.0), own.get("scale", 1.0)
+        parameters = dict(marginal.parameters)
+        return ("loc", "scale"), parameters.get("loc", 0.0), parameters.get("scale", 1.0)
     unbounded = isinstance(marginal, _ByMoments) and getattr(marginal, "high", None) is None
     if unbounded and marginal.low == 0.0:
         return ("mean",), 0.0, marginal.mean
@@ -323,7 +327,7 @@ def _of_scipy(name: str, given: Mapping[str, Any], first: tuple[Any, ...] = ()) 
     problems += [f"{name}.{key}: missing" for key in shapes if key not in parameters]
     if problems:
         raise InputError(problems)
-    values = {key: check(f"{name}.{key}", one, Real) for key, one in parameters.items()}
+    values = {key: check(f"{name}.{key}", value, Real) for key, value in parameters.items()}
     return ScipyMarginal(name, tuple(values.items()))
 
 
