@@ -308,7 +308,7 @@ class UnknownMean:
 
 
 def test_as_many_members_are_drawn_as_the_target_needs(monkeypatch):
-    monkeypatch.setattr(equally_likely, "FIRST", 100)
+    monkeypatch.setattr(equally_likely, "FIRST_MEMBERS", 100)
     source, options = UnknownMean(24e3), {"method": AtOnePlace(), "seed": 3, "progress": False}
     scale = math.hypot(24e3, 30e3)
     stress = 1.1e6 - 2.9 * scale
@@ -361,7 +361,7 @@ class Again(UnknownMean):
 
 
 def test_a_longer_list_without_others_is_not_computed(monkeypatch):
-    monkeypatch.setattr(equally_likely, "FIRST", 100)
+    monkeypatch.setattr(equally_likely, "FIRST_MEMBERS", 100)
     options = {"method": AtOnePlace(), "target_cv": 0.3, "progress": False}
     found = st.failure_probability(LINE, Again(40e3), 0.96e6, **options)
     assert found.members.size == 100

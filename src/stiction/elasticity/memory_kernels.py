@@ -1,26 +1,40 @@
 """The elastodynamic memory kernel of a half-space, as a quadrature over arcs and as a short sum.
 
-With T = |k| c_s t, the stress that a Fourier mode of slip D and slip rate V transfers along
-the interface between two identical half-spaces is (velocity form, Breitenfeld and Geubelle
-1998)
+Problem
+-------
+With T = |k| c_s t, the stress that a Fourier mode of slip D and slip rate V transfers along the
+interface between two identical half-spaces is (velocity form, M. S. Breitenfeld and
+P. H. Geubelle, International Journal of Fracture 93, 1998)
 
-    F(k, t) = -(G*|k|/2) D(k, t) + (G|k|/2) int_0^t C(|k| c_s t') V(k, t - t') dt'.
+    F(k, t) = -(G*|k|/2) D(k, t) + (G|k|/2) int_0^t C(|k| c_s t') V(k, t - t') dt'.           (1)
 
-Everything follows from the Laplace symbol D(s) of the traction per slip, in units of G|k|/2
-with s in units of |k| c_s (Geubelle and Rice 1995): in mode III sqrt(1 + s^2), in mode II
+The kernel C follows from the Laplace symbol D(s) of the traction per slip, in units of G|k|/2, with
+s in units of |k| c_s (P. H. Geubelle and J. R. Rice, Journal of the Mechanics and Physics of Solids
+43, 1995): its transform is (D(0) + s - D(s))/s, with D(s) = sqrt(1 + s^2) in mode III, in mode II
 
-    [(2 + s^2)^2 - 4 sqrt(1 + s^2) sqrt(1 + s^2/eta^2)] / (s^2 sqrt(1 + s^2)), eta = c_d/c_s.
+    [(2 + s^2)^2 - 4 sqrt(1 + s^2) sqrt(1 + s^2/eta^2)] / (s^2 sqrt(1 + s^2)), eta = c_d/c_s. (2)
 
-Its inverse transform is taken along arcs in Re s < 0 that join the branch points, where the
-integrand is smooth and decays, so that one set of nodes is accurate for every T. The closed
-forms by Bessel functions cancel badly beyond T of 7.
+Wanted are few pairs of poles s_p and weights w_p with C(T) = Re sum_p w_p exp(s_p T) to a tolerance
+on 0 <= T <= `T_MAX`: they turn the convolution with the whole history into one recursion a pair.
 
-A short sum C(T) ~ Re sum_p w_p exp(s_p T) turns the convolution with the whole history into one
-recursion a pair. The arc quadrature already is such a sum, of some 280 terms; balanced
-truncation shortens it (Moore 1981; its Gramians are Cauchy matrices, factorised to high
-relative accuracy as in Demmel 1999), variable projection polishes the poles (Golub and
-Pereyra 1973), and reweighting in the way of Lawson (1961) levels the error. A fit counts
-only if its error on another, denser set of times is below the tolerance.
+Steps (`fit_exponentials`)
+--------------------------
+1. Take the inverse transform along arcs in Re s < 0 that join the branch points -i a and i a, a = 1
+   and eta. The integrand is smooth there and decays, so that one set of tanh-sinh nodes
+   (H. Takahasi and M. Mori, 1974) is accurate for every T (`arc_quadrature`). The closed forms by
+   Bessel functions cancel badly beyond T of 7. This already is a sum of exponentials, of some 280
+   terms.
+2. Shorten it by balanced truncation (B. C. Moore, IEEE Transactions on Automatic Control 26, 1981).
+   Its Gramians are Cauchy matrices, factorised to high relative accuracy as in J. Demmel (1999).
+   All poles are damped by a common decay before, which is taken away again afterwards
+   (`balanced_truncation`).
+3. Polish the poles by variable projection: they move by Levenberg-Marquardt, and the weights
+   follow by linear least squares (G. H. Golub and V. Pereyra, SIAM Journal on Numerical Analysis
+   10, 1973).
+4. Level the error: raise the emphasis of times where it is large, in the way of C. L. Lawson
+   (1961), and polish again (`_attempt`).
+5. Accept the fit only if its error on another, denser set of times is below the tolerance, and
+   nothing in it cancels (`_acceptable`). Otherwise try another common decay, then a pair more.
 """
 
 import contextlib
@@ -45,21 +59,24 @@ from stiction.base.files import (
 Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
 
-_STEP = 0.025  # of the tanh-sinh rule; at 0.05 the kernel is off by 6e-11 at T = 1e5
-_RANGE = (
-    4.4  # the outermost node lies 1e-55 from the branch point: its weight underflows any sum
-)
-_CHUNK = 2048
+_RULE_STEP = 0.025  # of the tanh-sinh rule; at 0.05 the kernel is off by 6e-11 at T = 1e5
+# End of the rule: its outermost node lies 1e-55 from the branch point, and its weight underflows.
+_RULE_END = 4.4
+_TIMES_PER_CHUNK = 2048
 T_MAX = 1e5  # the error holds on 0 <= T <= T_MAX; beyond, the sum decays
 MAX_WEIGHT = 10.0  # larger ones cancel, and lose digits in the recursion
 MAX_PAIRS = 60  # enough for 1e-9 in mode II
-ROUNDS = 14  # of levelling; what is not level by then is tried with one pair more
-_DAMPING = 0.3  # that each pole has over T_MAX at least, so that sums decay beyond
-_FLOOR = _DAMPING / T_MAX  # every pole decays at least as fast
-# Decay over T_MAX for balanced truncation, in the order tried: found to be good starts
-# for polishing at loose and at tight tolerances.
-_LOOSE, _TIGHT = (10.0, 1.0), (1.0, 0.3)
-_FORMAT = 2  # raise when the fit or the file layout changes, so that old files are left alone
+MAX_LEVELLINGS = 14  # a fit that is not level by then is tried with one pair more
+_MIN_DECAY = (
+    0.3  # exponent that each pole has lost over T_MAX at least, so that sums decay beyond
+)
+_MIN_DECAY_RATE = _MIN_DECAY / T_MAX
+# Common decay over T_MAX for balanced truncation, in the order tried: good starts for polishing at
+# loose and at tight tolerances.
+_LOOSE_DECAYS, _TIGHT_DECAYS = (10.0, 1.0), (1.0, 0.3)
+_FILE_FORMAT = (
+    2  # raise when the fit or the file layout changes, so that old files are left alone
+)
 
 
 def static_stiffness(mode: str, eta: float) -> float:
@@ -68,26 +85,26 @@ def static_stiffness(mode: str, eta: float) -> float:
 
 
 def _half_arc() -> tuple[Floats, Floats]:
-    """Angles from the upper branch point and weights, tanh-sinh, of the upper half of an arc."""
-    t = np.arange(0.0, _RANGE, _STEP)
+    """Step 1: angles from the upper branch point, and weights, of the upper half of an arc."""
+    t = np.arange(0.0, _RULE_END, _RULE_STEP)
     angle = np.pi / (1.0 + np.exp(np.pi * np.sinh(t)))
-    weight = (np.pi**2 / 4.0) * _STEP * np.cosh(t) / np.cosh(0.5 * np.pi * np.sinh(t)) ** 2
+    weight = (np.pi**2 / 4.0) * _RULE_STEP * np.cosh(t) / np.cosh(0.5 * np.pi * np.sinh(t)) ** 2
     weight[0] *= 0.5
     return angle, weight
 
 
 def arc_quadrature(mode: str, eta: float) -> tuple[Complex, Complex]:
-    """Nodes s, Re s < 0, and weights w, some 140 an arc, with C(T) = Re sum w exp(s T), T >= 0.
+    """Step 1: nodes s, Re s < 0, and weights w, some 140 an arc: C(T) = Re sum w exp(s T).
 
-    The transform of C is (D(0) + s - D(s))/s; only its parts that are odd across the arc
-    |s| = 1 (the shear root) and |s| = eta (the dilatational root) contribute.
+    Only the parts of the transform contribute that are odd across the arc |s| = 1 (the shear root)
+    and |s| = eta (the dilatational root).
     """
     angle, weight = _half_arc()
-    turn = np.exp(1j * angle)
-    # sqrt(1 + s^2) at s = i turn, without cancellation beside the branch point.
+    rotation = np.exp(1j * angle)
+    # sqrt(1 + s^2) at s = i rotation, without cancellation beside the branch point.
     root = np.sqrt(2.0 * np.sin(angle)) * np.exp(1j * (0.5 * angle - 0.25 * np.pi))
-    factor = turn * weight * (2.0 / (np.pi * 1j))
-    s = 1j * turn
+    factor = rotation * weight * (2.0 / (np.pi * 1j))
+    s = 1j * rotation
     if mode == "III":
         nodes, weights = s, -root / s * factor
     else:
@@ -107,9 +124,9 @@ def exponential_sum(time: ArrayLike, nodes: Complex, weights: Complex) -> Floats
     """Re sum_p w_p exp(s_p T) at the dimensionless times T (any shape)."""
     t = np.asarray(time, dtype=np.float64)
     flat, result = t.ravel(), np.empty(t.size)
-    for start in range(0, t.size, _CHUNK):  # bounded memory for long lists of times
-        part = slice(start, start + _CHUNK)
-        result[part] = (np.exp(np.multiply.outer(flat[part], nodes)) @ weights).real
+    for start in range(0, t.size, _TIMES_PER_CHUNK):  # bounded memory for long lists of times
+        chunk = slice(start, start + _TIMES_PER_CHUNK)
+        result[chunk] = (np.exp(np.multiply.outer(flat[chunk], nodes)) @ weights).real
     return result.reshape(t.shape)
 
 
@@ -148,7 +165,7 @@ def _sample_times(per_decade: int, cluster: int, seed: int) -> Floats:
 
 
 def _cauchy_cholesky(s: Complex, b: Complex, stop: float) -> Complex:
-    """Pivoted Cholesky factor of b_i conj(b_j) / -(s_i + conj(s_j)), without subtractions."""
+    """Step 2: pivoted Cholesky factor of b_i conj(b_j) / -(s_i + conj(s_j)), by products only."""
     a, columns = b.copy(), []
     diagonal = np.abs(a) ** 2 / (-2.0 * s.real)
     largest = diagonal.max()
@@ -165,7 +182,7 @@ def _cauchy_cholesky(s: Complex, b: Complex, stop: float) -> Complex:
 
 
 def balanced_truncation(s: Complex, w: Complex, pairs: int) -> Complex:
-    """Poles of the best short model (in the Hankel sense) of sum w exp(s T), shape (pairs,)."""
+    """Step 2: poles of the best short model (in the Hankel sense) of sum w exp(s T), (pairs,)."""
     b = np.sqrt(w)
     factor = _cauchy_cholesky(s, b, 1e-24)
     left, sigma, right = np.linalg.svd(factor.T @ factor)
@@ -176,14 +193,14 @@ def balanced_truncation(s: Complex, w: Complex, pairs: int) -> Complex:
 
 
 class _Polish:
-    """Separable least squares: the poles move by Levenberg-Marquardt, the weights follow."""
+    """Step 3: separable least squares. Poles are -exp(a) - `_MIN_DECAY_RATE` + i b."""
 
     def __init__(self, times: Floats, values: Floats) -> None:
         self.times, self.values = times, values
 
     def poles(self, parameters: Floats) -> Complex:
         real, imaginary = np.split(parameters, 2)
-        return -np.exp(real) - _FLOOR + 1j * imaginary
+        return -np.exp(real) - _MIN_DECAY_RATE + 1j * imaginary
 
     def project(
         self, poles: Complex, emphasis: Floats
@@ -202,7 +219,7 @@ class _Polish:
 
     def run(self, poles: Complex, emphasis: Floats, iterations: int) -> tuple[Complex, Complex]:
         parameters = np.concatenate(
-            [np.log(np.maximum(-poles.real - _FLOOR, 1e-9)), poles.imag]
+            [np.log(np.maximum(-poles.real - _MIN_DECAY_RATE, 1e-9)), poles.imag]
         )
         modes, q, weights, residual = self.project(self.poles(parameters), emphasis)
         cost, damping = float(residual @ residual), 1e-3
@@ -231,7 +248,7 @@ class _Polish:
 
 
 def _acceptable(poles: Complex, weights: Complex) -> bool:
-    """Return whether no weight is large, no pole grows and no two terms nearly cancel."""
+    """Step 5: return whether no weight is large, no pole grows and no two terms nearly cancel."""
     if np.abs(weights).max() > MAX_WEIGHT or poles.real.max() >= 0.0:
         return False
     gap = np.abs(poles[:, None] - poles[None, :]) / np.abs(poles)[:, None]
@@ -242,13 +259,16 @@ def _acceptable(poles: Complex, weights: Complex) -> bool:
 def _attempt(
     arcs: tuple[Complex, Complex], pairs: int, fit: _Polish, tolerance: float, decay: float
 ) -> tuple[Complex, Complex]:
-    """Return the best fit with this number of pairs; polishing levels its error."""
-    shift = _FLOOR * decay / _DAMPING
+    """Steps 2 to 4: return the best fit with this number of pairs and this common decay."""
+    # 2. The first poles.
+    shift = _MIN_DECAY_RATE * decay / _MIN_DECAY
     poles = balanced_truncation(arcs[0] - shift, arcs[1], pairs) + shift
+    # 3. Polish them.
     emphasis = np.ones(fit.times.size)
     poles, weights = fit.run(poles, emphasis, 60)
     best, kept = np.inf, (poles, weights)
-    for _ in range(ROUNDS):
+    # 4. Level the error, and keep the best fit on the way.
+    for _ in range(MAX_LEVELLINGS):
         error = np.abs(fit.values - exponential_sum(fit.times, poles, weights))
         worst = error.max()
         if worst < best:
@@ -268,6 +288,7 @@ def fit_exponentials(mode: str, eta: float, tolerance: float) -> ExponentialSum:
     """
     if not 1e-9 <= tolerance <= 1e-2:
         raise InputError(f"kernel tolerance: must lie in [1e-09, 0.01], got {tolerance!r}")
+    # 1. The long sum, and times at which short ones are fitted and checked.
     arcs = arc_quadrature(mode, eta)
     fit_times = _sample_times(40 if tolerance > 3e-8 else 80, 8, seed=0)
     fit = _Polish(fit_times, exponential_sum(fit_times, *arcs))
@@ -276,10 +297,11 @@ def fit_exponentials(mode: str, eta: float, tolerance: float) -> ExponentialSum:
     # First number of pairs tried: found to be just below the need, for every Poisson's ratio.
     digits = -np.log10(tolerance)
     pairs = max(3, round(1.7 * digits - 2.0 if mode == "III" else 5.3 * digits - 9.7))
-    starts = _LOOSE if tolerance > 1e-7 else _TIGHT
+    starts = _LOOSE_DECAYS if tolerance > 1e-7 else _TIGHT_DECAYS
     with one_blas_thread():  # the matrices are small: more threads only wait for each other
         for count, decay in itertools.product(range(pairs, MAX_PAIRS + 1), starts):
             poles, weights = _attempt(arcs, count, fit, tolerance, decay)
+            # 5. Good enough?
             error = float(np.abs(check - exponential_sum(check_times, poles, weights)).max())
             if error < tolerance and _acceptable(poles, weights):
                 order = np.argsort(-poles.real)
@@ -294,7 +316,7 @@ def fit_exponentials(mode: str, eta: float, tolerance: float) -> ExponentialSum:
 def kernel_sum(mode: str, eta: float, tolerance: float = 1e-6) -> ExponentialSum:
     """Return the sum of `fit_exponentials`, from memory, from disk, or built now (about 1 s)."""
     eta = 1.0 if mode == "III" else float(eta)
-    text = f"{_FORMAT} {mode} {eta.hex()} {float(tolerance).hex()} {T_MAX.hex()}"
+    text = f"{_FILE_FORMAT} {mode} {eta.hex()} {float(tolerance).hex()} {T_MAX.hex()}"
     folder = private_folder(cache_folder() / "fitted")
     path = folder / f"kernel-{hashlib.sha256(text.encode()).hexdigest()[:20]}.npz"
     with contextlib.suppress(

@@ -27,7 +27,7 @@ from stiction.base.errors import (
     printable,
 )
 from stiction.ensemble.experiment import Experiment
-from stiction.random.synthesis import BLOCK, block_of
+from stiction.random.synthesis import SAMPLES_PER_BLOCK, block_of
 
 POINT: str = "_point"
 NUMBER: str = "_sample"
@@ -145,7 +145,7 @@ def piece_size(
 ) -> int:
     """Return how many samples go into the next piece of work, at a pace in s a sample."""
     block = block_of(len(experiment.problem.interface.shape))
-    size = int(SECONDS / max(pace, 1e-9)) if pace else min(experiment.batch, BLOCK)
+    size = int(SECONDS / max(pace, 1e-9)) if pace else min(experiment.batch, SAMPLES_PER_BLOCK)
     # A fair share of what is left, but at least a block, which is drawn as a whole.
     size = min(size, max(-(-left // (2 * workers)), block))
     size = max(1, min(size, int(MOST_BYTES / experiment.sample_bytes), span.samples))

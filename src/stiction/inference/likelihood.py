@@ -23,7 +23,7 @@ from stiction.methods.criterion.local import LocalCriterion
 from stiction.methods.protocol import optional_member
 from stiction.problem.problem import Problem
 from stiction.random.dotted_keys import full_key
-from stiction.random.synthesis import BLOCK
+from stiction.random.synthesis import SAMPLES_PER_BLOCK
 
 NODES = {0: 1, 1: 25, 2: 11, 3: 7, 4: 5}
 COARSE = {0: 1, 1: 5, 2: 4, 3: 3, 4: 2}
@@ -145,7 +145,7 @@ def simulate(
     jobs = [
         (number, start, count)
         for number, own in enumerate(experiments)
-        for start, count in own.batches(first, samples, max(BLOCK, own.batch))
+        for start, count in own.batches(first, samples, max(SAMPLES_PER_BLOCK, own.batch))
     ]
 
     def work(job: tuple[int, int, int]) -> None:

@@ -12,10 +12,10 @@ from stiction.base.model import describe, is_finite, keys_of
 from stiction.base.variables import PROFILES
 from stiction.random.marginals import Marginal, ScipyMarginal, marginal_of
 
-OF_INTERFACE = (*PROFILES, "correlation", "between")
-OF_FIELD = ("marginal", "spectrum", "anisotropy", "given")
+INTERFACE_KEYS = (*PROFILES, "correlation", "between")
+FIELD_KEYS = ("marginal", "spectrum", "anisotropy", "given")
 """Keys of a random interface, and of a field."""
-MARGINAL = ("mean", "cv", "low", "high", "scale", "alpha", "beta")
+MARGINAL_KEYS = ("mean", "cv", "low", "high", "scale", "alpha", "beta")
 """Parameters of a marginal, whose keys begin with its name."""
 
 
@@ -26,7 +26,7 @@ def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
     if a key does not exist (the nearest valid one is named) or a value does not fit.
     """
     if isinstance(owner, list):
-        return [with_values(one, values, path) for one in owner]
+        return [with_values(member, values, path) for member in owner]
     changes: dict[str, Any] = {}
     inside: dict[str, dict[str, Any]] = {}
     for key, value in values.items():
@@ -45,12 +45,13 @@ def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
     if unknown:
         raise InputError([unknown_name(path or "sweep", name, names) for name in unknown])
     for name, below in inside.items():
-        part = owner.get(name) if table else getattr(owner, names[name])
-        changes[name] = with_values({} if part is None else part, below, begin + name)
+        inner = owner.get(name) if table else getattr(owner, names[name])
+        changes[name] = with_values({} if inner is None else inner, below, begin + name)
     if table:
         return {**owner, **changes}
     try:
-        return dataclasses.replace(owner, **{names[key]: one for key, one in changes.items()})
+        fields = {names[key]: value for key, value in changes.items()}
+        return dataclasses.replace(owner, **fields)
     except InputError as error:
         kind = f"{type(owner).__name__}."
         texts = (text.removeprefix(kind) for text in error.problems)
@@ -62,11 +63,11 @@ def full_key(key: str) -> str:
     first = key.split(".")[0]
     if first in ("problem", "random"):
         return key
-    if first in OF_INTERFACE:
+    if first in INTERFACE_KEYS:
         return f"random.{key}"
-    if first in OF_FIELD:
+    if first in FIELD_KEYS:
         return f"random.strength.{key}"
-    if first in MARGINAL:
+    if first in MARGINAL_KEYS:
         raise InputError(f"unknown {key!r}; did you mean 'marginal.{key}'?")
     return f"random.strength.spectrum.{key}"
 
@@ -77,20 +78,20 @@ def distributions_of(given: Mapping[str, Any], begin: str = "") -> dict[str, Any
     Full keys must begin with `begin`.
     """
     problems: list[str] = []
-    found: dict[str, Any] = {}
+    distributions: dict[str, Any] = {}
     for key, value in given.items():
         try:
             full = full_key(str(key))
             if not full.startswith(begin):
                 problems.append(f"{full}: is not of what is random")
-            if full in map(full_key, found):
+            if full in map(full_key, distributions):
                 problems.append(f"{key} is given twice: it is the same parameter")
-            found[str(key)] = distribution_of(str(key), value)
+            distributions[str(key)] = distribution_of(str(key), value)
         except InputError as error:
             problems += error.problems
     if problems:
         raise InputError(problems)
-    return found
+    return distributions
 
 
 def distribution_of(key: str, value: Any) -> Any:

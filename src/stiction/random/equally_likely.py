@@ -14,14 +14,14 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.problem.interface import Interface
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface, layout
-from stiction.random.synthesis import BLOCK, Stream
+from stiction.random.synthesis import SAMPLES_PER_BLOCK, Stream
 
-WHICH = Stream(2000, BLOCK, np.arange(0), mean_mode=True)
+MEMBER_STREAM = Stream(2000, SAMPLES_PER_BLOCK, np.arange(0), mean_mode=True)
 """The draw that selects a member."""
-MODES = 1 << 40
-"""More than the number of draws of a stream."""
+MAX_DRAWS_OF_STREAM = 1 << 40
+"""More than any stream has."""
 
-FIRST, MOST = 1_000, 8_000
+FIRST_MEMBERS, MAX_MEMBERS = 1_000, 8_000
 """Members that are drawn from a source at first, and at most."""
 
 
@@ -60,13 +60,16 @@ class EquallyLikely:
             raise InputError(
                 "random: must hold at least one random interface, got an empty list"
             )
-        first, *others = ({k: f.of for k, f in one.properties.items()} for one in self.members)
-        for number, other in enumerate(others, start=1):
-            if other != first:
+        kinds = [
+            {name: field.of for name, field in member.properties.items()}
+            for member in self.members
+        ]
+        for number, kind in enumerate(kinds):
+            if kind != kinds[0]:
                 raise InputError(
                     "random: equally likely interfaces need the same random properties, all as"
-                    f" stresses or all as coefficients; [0] has {_named(first)} and [{number}]"
-                    f" {_named(other)}"
+                    f" stresses or all as coefficients; [0] has {_named(kinds[0])} and [{number}]"
+                    f" {_named(kind)}"
                 )
 
     @property
@@ -83,8 +86,11 @@ class EquallyLikely:
     def kinds(self) -> NDArray[np.int64]:
         """A number for each member, the same for those whose fields are equal, (members,)."""
         known: dict[Any, int] = {}
-        each = [known.setdefault(tuple(o.properties.items()), len(known)) for o in self.members]
-        return np.array(each, np.int64)
+        numbers = [
+            known.setdefault(tuple(member.properties.items()), len(known))
+            for member in self.members
+        ]
+        return np.array(numbers, np.int64)
 
     def larger(self, count: int, seed: int) -> Self:
         """Return as many members from the same source."""
@@ -103,24 +109,25 @@ class EquallyLikely:
 
     def draws(self, interface: Interface, samples: int, seed: int, first: int = 0) -> Array:
         """Draw samples `first`, `first` + 1, ..., (samples, dimension)."""
-        found = np.full((samples, self.dimension(interface)), np.nan)
-        found[:, :1] = WHICH.draw(seed, first, samples)
+        draws = np.full((samples, self.dimension(interface)), np.nan)
+        draws[:, :1] = MEMBER_STREAM.draw(seed, first, samples)
         columns = _columns(self, interface)
         for number in columns.covering:
-            own = columns.of[number]
-            found[:, own] = self.members[number].draws(interface, samples, seed, first)
-        return found
+            of_member = columns.of[number]
+            draws[:, of_member] = self.members[number].draws(interface, samples, seed, first)
+        return draws
 
     def from_draws(self, interface: Interface, draws: Array) -> dict[str, Array]:
         """Map draws (samples, dimension) to profiles by name, (samples, *shape) each."""
-        found = {name: np.empty((len(draws), *interface.shape)) for name in self.names}
+        profiles = {name: np.empty((len(draws), *interface.shape)) for name in self.names}
         selected, columns = self.member(draws), _columns(self, interface).of
         for number in np.unique(selected).tolist():
             rows = np.flatnonzero(selected == number)
-            own = draws[np.ix_(rows, columns[number])]
-            for name, profiles in self.members[number].from_draws(interface, own).items():
-                found[name][rows] = profiles
-        return found
+            of_member = draws[np.ix_(rows, columns[number])]
+            sampled = self.members[number].from_draws(interface, of_member)
+            for name, values in sampled.items():
+                profiles[name][rows] = values
+        return profiles
 
 
 class Columns(NamedTuple):
@@ -133,21 +140,22 @@ class Columns(NamedTuple):
 
 @lru_cache(maxsize=16)
 def _columns(random: EquallyLikely, interface: Interface) -> Columns:
-    keys = []
-    for one in random.members:
-        parts = []
-        for stream in layout(one, interface):
+    # A draw is known by its stream and its number there, joined in one key.
+    keys_of_members = []
+    for member in random.members:
+        keys = []
+        for stream in layout(member, interface):
             modes = 1 + 2 * stream.ranks[:, None] + np.arange(2)
-            own = np.concatenate([np.arange(int(stream.mean_mode)), modes.ravel()])
-            parts.append(stream.number * MODES + own)
-        keys.append(np.concatenate(parts))
-    every = np.unique(np.concatenate(keys))
-    columns = [1 + np.searchsorted(every, own) for own in keys]
-    drawn, covering = np.zeros(1 + every.size, np.bool_), []
-    for number, own in enumerate(columns):
-        if not drawn[own].all():
+            numbers = np.concatenate([np.arange(int(stream.mean_mode)), modes.ravel()])
+            keys.append(stream.number * MAX_DRAWS_OF_STREAM + numbers)
+        keys_of_members.append(np.concatenate(keys))
+    all_keys = np.unique(np.concatenate(keys_of_members))
+    columns = [1 + np.searchsorted(all_keys, keys) for keys in keys_of_members]
+    drawn, covering = np.zeros(1 + all_keys.size, np.bool_), []
+    for number, of_member in enumerate(columns):
+        if not drawn[of_member].all():
             covering.append(number)
-            drawn[own] = True
+            drawn[of_member] = True
     return Columns(columns, drawn.size, covering)
 
 
@@ -169,8 +177,8 @@ def as_random(
     if isinstance(given, EquallyLikely):
         return given
     if isinstance(given, Source):
-        return EquallyLikely(tuple(given.interfaces(FIRST, seed)), source=given)
+        return EquallyLikely(tuple(given.interfaces(FIRST_MEMBERS, seed)), source=given)
     if not isinstance(given, list | tuple):
         return as_random_interface(given)
-    found = EquallyLikely(tuple(map(as_random_interface, given)), complete=mixture)
-    return found if len(found.members) > 1 else found.members[0]
+    random = EquallyLikely(tuple(map(as_random_interface, given)), complete=mixture)
+    return random if len(random.members) > 1 else random.members[0]

@@ -39,15 +39,16 @@ from stiction.random.mapping import correlation_of_mapped, from_normal, hermite_
 from stiction.random.marginals import AnyMarginal
 from stiction.random.modes import Modes, make_modes
 from stiction.random.spectra import Share, Spectrum, lag_of_correlation
-from stiction.random.synthesis import BLOCK, Stream, block_of
+from stiction.random.synthesis import SAMPLES_PER_BLOCK, Stream, block_of
 
 NAMES = tuple(PROFILES)
-COEFFICIENTS = ("strength", "residual_strength", "initial_stress")  # or stresses
-BETWEEN = 1000  # number of the stream of draws of the first property's factor
-DEFINITE = 1e-12  # round-off of eigenvalues of a correlation matrix
-# Limits of warnings: shares of the variance that the grid or the mean mode would hold, and the
-# error of a correlation.
-LOST, WITHOUT_MEAN, UNCERTAIN = 0.01, 0.075, 0.01
+MAY_BE_COEFFICIENTS = ("strength", "residual_strength", "initial_stress")
+FIRST_FACTOR_STREAM = 1000  # number of the stream of draws of the first property's factor
+MIN_PIVOT = 1e-12  # round-off of eigenvalues of a correlation matrix
+# Limits of warnings
+MAX_UNRESOLVED = 0.01  # share of the variance that the grid does not resolve
+MAX_MEAN_SHARE = 0.075  # share of the variance that the mean mode would hold
+MAX_CORRELATION_ERROR = 0.01
 
 
 @model
@@ -151,8 +152,8 @@ class RandomField:
                 f"profile: is in the unit {stated}; one of friction coefficients conditions a field"
                 " with of='friction_coefficient', and no other does"
             )
-        known: Any = {"profile": profile, "noise": noise}
-        return dataclasses.replace(self, conditions=known)
+        conditions: Any = {"profile": profile, "noise": noise}
+        return dataclasses.replace(self, conditions=conditions)
 
     @checked
     def quantile(self, interface: Interface, probability: Share) -> Array:
@@ -161,8 +162,8 @@ class RandomField:
         if self.conditions is not None:
             grid = np.meshgrid(*interface.coordinates.values(), indexing="ij")
             phi = self.modes(interface).basis(np.array([row.ravel() for row in grid]))
-            [(_, known)] = _conditioned(self._alone, interface)
-            z = known.quantile_at(phi, probability)
+            [(_, conditioning)] = _conditioned(self._alone, interface)
+            z = conditioning.quantile_at(phi, probability)
         return from_normal(self.marginal, z).reshape(interface.shape)
 
     def sample(
@@ -189,20 +190,21 @@ class RandomField:
         """Warn if the grid is too coarse for the spectrum or the interface too short."""
         modes = self.modes(interface)
         lost = modes.unresolved
-        if lost > LOST:
+        if lost > MAX_UNRESOLVED:
             nodes = " x ".join(map(str, interface.shape))
-            enough = " x ".join(map(str, modes.nodes_for(LOST)))
+            enough = " x ".join(map(str, modes.nodes_for(MAX_UNRESOLVED)))
             warn_accuracy(
                 f"the grid of {nodes} nodes is coarser than the spectrum: values at the nodes"
                 f" are exact, but {100.0 * lost:.2g} % of the variance lies at wavelengths that the"
                 f" grid does not resolve; with interface.nodes >= {enough} it is less than"
-                f" {100.0 * LOST:g} %, or end the spectrum there with power_kept={1.0 - lost:.3g}"
+                f" {100.0 * MAX_UNRESOLVED:g} %, or end the spectrum there with"
+                f" power_kept={1.0 - lost:.3g}"
             )
         if self.mean_mode:
             return
         with_mean = make_modes(self.spectrum, True, self.anisotropy or 1.0, interface)
         share = float(with_mean.sigma[0] ** 2)
-        if share > WITHOUT_MEAN:
+        if share > MAX_MEAN_SHARE:
             warn_accuracy(
                 "the field has no mean mode, which on so short an interface would hold"
                 f" {100.0 * share:.2g} % of the variance: all samples have nearly the same mean;"
@@ -227,7 +229,7 @@ class RandomField:
         coefficients = hermite_coefficients(self.marginal)
         # The last coefficient stands for what the expansion leaves out.
         error = float(coefficients[-1] ** 2 / np.sum(coefficients[1:] ** 2))
-        if error > UNCERTAIN:
+        if error > MAX_CORRELATION_ERROR:
             warn_accuracy(
                 f"the correlation of the strength is uncertain by up to {error:.2g}: the tails of"
                 " its marginal are too heavy, or its jumps too sharp, for the expansion"
@@ -252,18 +254,18 @@ def _pairs(value: Any) -> Any:
     """{("a", "b"): rho} or {"a": {"b": rho}} as the latter, each pair once, in order of names."""
     if not isinstance(value, Mapping):
         return value
-    found: dict[str, dict[str, Any]] = {}
+    pairs: dict[str, dict[str, Any]] = {}
     for key, inner in value.items():
         nested = inner if isinstance(inner, Mapping) else {None: inner}
-        for other, rho in nested.items():
-            pair = key if other is None else (key, other)
+        for second_key, rho in nested.items():
+            pair = key if second_key is None else (key, second_key)
             if not isinstance(pair, tuple) or len({*pair}) != 2 or len(pair) != 2:
                 raise InputError(f"must name two different properties, got {describe(pair)}")
             first, second = sorted(map(str, pair), key=[*NAMES, *map(str, pair)].index)
-            if second in found.setdefault(first, {}):
+            if second in pairs.setdefault(first, {}):
                 raise InputError(f"{first}, {second}: given twice")
-            found[first][second] = rho
-    return found
+            pairs[first][second] = rho
+    return pairs
 
 
 Coefficient = Annotated[Real, Field(ge=-1.0, le=1.0)]
@@ -276,7 +278,7 @@ def lower_factor(matrix: Array) -> Array:
     factor = np.zeros_like(matrix)
     for j in range(size):
         pivot = matrix[j, j] - float(factor[j, :j] @ factor[j, :j])
-        if pivot <= DEFINITE:
+        if pivot <= MIN_PIVOT:
             continue  # property j follows from those before it
         root = factor[j, j] = np.sqrt(pivot)
         factor[j + 1 :, j] = (matrix[j + 1 :, j] - factor[j + 1 :, :j] @ factor[j, :j]) / root
@@ -352,7 +354,7 @@ class RandomInterface:
         problems = [
             f"{name}: of = 'friction_coefficient' is for stresses; leave it out"
             for name, field in self.properties.items()
-            if field.of is not None and name not in COEFFICIENTS
+            if field.of is not None and name not in MAY_BE_COEFFICIENTS
         ]
         scales = [name for name in SCALES if name in self.properties]
         if len(scales) > 1:
@@ -382,7 +384,7 @@ class RandomInterface:
                     f"between.{name}: a factor must be positive with mean 1, got mean {mean:g} and"
                     f" lower bound {low:g}"
                 )
-        if not problems and np.linalg.eigvalsh(self.matrix)[0] < -DEFINITE:
+        if not problems and np.linalg.eigvalsh(self.matrix)[0] < -MIN_PIVOT:
             problems.append(
                 "correlation: these coefficients contradict each other (their matrix is not"
                 " positive definite); bring them nearer to 0"
@@ -414,9 +416,9 @@ class RandomInterface:
     def matrix(self) -> Array:
         """Correlation matrix of the properties, in the order of `names`."""
         matrix = np.eye(len(self.names))
-        for one, others in (self.correlation or {}).items():
-            for other, rho in others.items():
-                i, j = self.names.index(one), self.names.index(other)
+        for first, coefficients in (self.correlation or {}).items():
+            for second, rho in coefficients.items():
+                i, j = self.names.index(first), self.names.index(second)
                 matrix[i, j] = matrix[j, i] = rho
         return matrix
 
@@ -439,10 +441,10 @@ class RandomInterface:
         (samples, dimension): each property in the order of `names`, then those of `between`.
         """
         streams = layout(self, interface)
-        each = streams[-1].columns.stop + len(self.names) * interface.size
-        check_memory("samples", 8.0 * min(samples, 2**62) * each)
-        parts = [stream.draw(seed, first, samples) for stream in streams]
-        return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
+        numbers_per_sample = streams[-1].columns.stop + len(self.names) * interface.size
+        check_memory("samples", 8.0 * min(samples, 2**62) * numbers_per_sample)
+        draws = [stream.draw(seed, first, samples) for stream in streams]
+        return draws[0] if len(draws) == 1 else np.concatenate(draws, axis=1)
 
     @checked
     def from_draws(self, interface: Interface, draws: Numbers) -> dict[str, Array]:
@@ -455,20 +457,24 @@ class RandomInterface:
             )
         if not np.isfinite(draws).all():
             raise InputError("draws: must be finite")
-        for columns, known in _conditioned(self, interface):
+        # Draws given what was measured; then of each property, with the draws of those before it.
+        for columns, conditioning in _conditioned(self, interface):
             draws = draws.copy()
-            draws[:, columns] = known.draws(draws[:, columns])
-        found: dict[str, Array] = {}
+            draws[:, columns] = conditioning.draws(draws[:, columns])
+        profiles: dict[str, Array] = {}
         independent = [draws[:, stream.columns] for stream in streams]
         rows = zip(self.properties.items(), streams, lower_factor(self.matrix), strict=False)
         for (name, field), stream, row in rows:
             mixed = reduce(np.add, (row[j] * independent[j] for j in np.flatnonzero(row)))
-            own = np.ascontiguousarray(mixed[:, stream.own])
-            found[name] = from_normal(field.marginal, field.modes(interface).gaussian(own))
-        factors = zip((self.between or {}).items(), independent[len(found) :], strict=True)
+            of_property = np.ascontiguousarray(mixed[:, stream.of_property])
+            z = field.modes(interface).gaussian(of_property)
+            profiles[name] = from_normal(field.marginal, z)
+        # A factor between specimens is one number a sample.
+        factors = zip((self.between or {}).items(), independent[len(profiles) :], strict=True)
         for (name, marginal), u in factors:
-            found[name] *= from_normal(marginal, u).reshape(-1, *(1 for _ in interface.shape))
-        return found
+            factor = from_normal(marginal, u)
+            profiles[name] *= factor.reshape(-1, *(1 for _ in interface.shape))
+        return profiles
 
     def profiles(
         self, interface: Interface, *, samples: int = 1, seed: int = 0, first: int = 0
@@ -511,48 +517,50 @@ class RandomInterface:
             laws = distributions_of(parameters, "random.")
             if not laws:
                 raise InputError("must map keys to distributions, got none")
-        rng, found = np.random.default_rng([seed, 6]), []
+        rng, interfaces = np.random.default_rng([seed, 6]), []
         cells = rng.permuted(np.tile(np.arange(count), (len(laws), 1)), axis=1)
         shares = (cells + rng.random(cells.shape)) / count
         rows = [law.ppf(share) for law, share in zip(laws.values(), shares, strict=True)]
-        own = [full_key(key).removeprefix("random.") for key in laws]
+        keys = [full_key(key).removeprefix("random.") for key in laws]
         for values in np.transpose(rows).tolist():
-            pairs = dict(zip(own, values, strict=True))
+            pairs = dict(zip(keys, values, strict=True))
             with prefixed(
                 "uncertain: at " + ", ".join(f"{k} = {v:.4g}" for k, v in pairs.items())
             ):
-                found.append(with_values(self, pairs))
-        return found
+                interfaces.append(with_values(self, pairs))
+        return interfaces
 
     def warn_if_inaccurate(self, interface: Interface) -> None:
         """Warn if the grid is too coarse or the interface too short for a field."""
         for field in self.properties.values():
             field.warn_if_inaccurate(interface)
-        for _, known in _conditioned(self, interface):
-            known.warn()
+        for _, conditioning in _conditioned(self, interface):
+            conditioning.warn()
 
 
 @lru_cache(maxsize=8192)
 def layout(random: RandomInterface, interface: Interface) -> list[Stream]:
     """Draws of each property, and of each factor between specimens."""
     fields = list(random.properties.values())
-    found, start, block = [], 0, block_of(len(interface.shape))
+    streams, start, block = [], 0, block_of(len(interface.shape))
     for name, field, row in zip(random.names, fields, random.linked, strict=True):
+        # Correlated properties draw the same modes: all that one of them has.
         group = [fields[j] for j in np.flatnonzero(row)]
-        ranks = reduce(np.union1d, [one.modes(interface).ranks for one in group])
-        mean_mode = any(one.mean_mode for one in group)
+        ranks = reduce(np.union1d, [linked.modes(interface).ranks for linked in group])
+        mean_mode = any(linked.mean_mode for linked in group)
         columns = slice(start, start + 2 * ranks.size + int(mean_mode))
         places = np.searchsorted(ranks, field.modes(interface).ranks)
         pairs = int(mean_mode) + 2 * places[:, None] + np.arange(2)
-        own: Any = np.concatenate((np.arange(int(field.mean_mode)), pairs.ravel()))
-        own = slice(None) if own.size == columns.stop - start else own
-        found.append(Stream(NAMES.index(name), block, ranks, mean_mode, columns, own))
+        numbers: Any = np.concatenate((np.arange(int(field.mean_mode)), pairs.ravel()))
+        numbers = slice(None) if numbers.size == columns.stop - start else numbers
+        streams.append(Stream(NAMES.index(name), block, ranks, mean_mode, columns, numbers))
         start = columns.stop
-    none = np.arange(0)
+    no_modes = np.arange(0)
     for column, name in enumerate(random.between or (), start):
-        number, columns = BETWEEN + NAMES.index(name), slice(column, column + 1)
-        found.append(Stream(number, BLOCK, none, True, columns, none))
-    return found
+        number = FIRST_FACTOR_STREAM + NAMES.index(name)
+        columns = slice(column, column + 1)
+        streams.append(Stream(number, SAMPLES_PER_BLOCK, no_modes, True, columns, no_modes))
+    return streams
 
 
 @lru_cache(maxsize=64)
@@ -565,7 +573,7 @@ def _conditioned(
         return []
     streams = layout(random, interface)
     columns = [np.r_[stream.columns] for stream in streams]
-    factor, found = lower_factor(random.matrix), []
+    factor, groups = lower_factor(random.matrix), []
     for group in np.unique(random.linked, axis=0):
         members, measured = np.flatnonzero(group), []
         of_group = np.concatenate([columns[j] for j in members])
@@ -576,14 +584,14 @@ def _conditioned(
             given.check(fields[i].marginal, interface)
             size = given.values.size * random.dimension(interface)
             check_memory(f"{name}.given.profile", 24.0 * size, "give fewer places")
-            own = fields[i].modes(interface).basis(given.places)
-            phi = np.zeros((len(own), random.dimension(interface)))
+            basis = fields[i].modes(interface).basis(given.places)
+            phi = np.zeros((len(basis), random.dimension(interface)))
             for j in np.flatnonzero(factor[i]):
-                phi[:, columns[j][streams[i].own]] = factor[i, j] * own
+                phi[:, columns[j][streams[i].of_property]] = factor[i, j] * basis
             measured.append(Measured(given, fields[i].marginal, phi[:, of_group]))
         if measured:
-            found.append((of_group, conditioned(measured)))
-    return found
+            groups.append((of_group, conditioned(measured)))
+    return groups
 
 
 def as_random_interface(given: Any) -> RandomInterface:

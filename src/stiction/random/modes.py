@@ -1,4 +1,21 @@
-"""The discrete spectrum of a field: the waves on an interface and their amplitudes."""
+"""The discrete spectrum of a field: the waves on an interface and their amplitudes.
+
+Problem
+-------
+On a periodic interface a field has the waves k = 2 pi (jx/Lx, jy/Ly). With the spectral density
+g(k) and its truncation K, their amplitudes have the standard deviations
+
+    sigma_j^2 = g(k_j) / sum_i g(k_i),   |k_j| <= K.                                          (1)
+
+Steps (`make_modes`)
+--------------------
+1. List the wave vectors among which the modes are, one of k and -k, in an order that depends on
+   the proportions of the interface only. The place of a mode in it is the number of its draws
+   (`_numbers`).
+2. Keep those up to the truncation.
+3. Find (1). The mean mode k = 0 stands for one wave vector, every other mode for k and -k: it has
+   half of g(0).
+"""
 
 import math
 from dataclasses import dataclass
@@ -13,9 +30,8 @@ from stiction.base.errors import InputError
 from stiction.problem.interface import Interface
 from stiction.random.synthesis import synthesise
 
-MOST_MODES = 1 << 22
-NEAREST_MODE = 1.0 + 1e-9
-"""Factor on the truncation, so that round-off keeps a mode exactly at it, such as 2.5/lambda."""
+MAX_MODES = 1 << 22
+CUTOFF_RTOL = 1e-9  # round-off keeps a mode exactly at the truncation, such as 2.5/lambda
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +40,9 @@ class Modes:
 
     interface: Interface
     sigma: Array  # standard deviations, (J + 1,), of unit sum of squares; 0 without a mean
-    numbers: NDArray[np.int64]  # wave vectors over 2 pi/length, (dimensions, J + 1); of +-k one
+    numbers: NDArray[
+        np.int64
+    ]  # wave vectors over 2 pi/length, (dimensions, J + 1), one of k and -k
     ranks: NDArray[np.int64]  # places of modes 1..J in the order of draws, rising, (J,)
     has_mean: bool
 
@@ -43,10 +61,11 @@ class Modes:
         """Return how many nodes leave at most this share unresolved, at the proportions given."""
         shape = np.array(self.interface.shape)
         halves = np.array(self.interface.embedding.shape) / 2.0
-        finer = (np.abs(self.numbers) / halves[:, None]).max(axis=0)  # than now, to resolve it
-        order = np.argsort(finer)
+        # How much finer the grid must be than now, to resolve a mode.
+        refinement = (np.abs(self.numbers) / halves[:, None]).max(axis=0)
+        order = np.argsort(refinement)
         last = np.searchsorted(np.cumsum(self.sigma[order] ** 2), 1.0 - share)
-        return [2 * math.ceil(n / 2 * finer[order][last] - 1e-9) for n in shape.tolist()]
+        return [2 * math.ceil(n / 2 * refinement[order][last] - 1e-9) for n in shape.tolist()]
 
     def gaussian(self, draws: Array) -> Array:
         """Compute z(x) = sum_m sigma_m (A_m cos k_m.x + B_m sin k_m.x), (samples, *shape).
@@ -60,19 +79,19 @@ class Modes:
             draws = self._from_first_node(draws)
         out = np.empty((draws.shape[0], math.prod(shape[:-1]), shape[-1]))
         synthesise(draws, self.sigma, numbers, self.has_mean, out)
-        found = out.reshape(-1, *shape)
+        fields = out.reshape(-1, *shape)
         if self.interface.is_free:
-            return np.ascontiguousarray(found[:, : self.interface.size])
-        return found
+            return np.ascontiguousarray(fields[:, : self.interface.size])
+        return fields
 
     def _from_first_node(self, draws: Array) -> Array:
         """Return the draws of the same waves counted from the first node, half a spacing on."""
-        turn = np.pi * self.interface.first * self.numbers[0, 1:] / self.interface.size
-        start, turned = int(self.has_mean), draws.copy()
+        phase = np.pi * self.interface.first * self.numbers[0, 1:] / self.interface.size
+        start, shifted = int(self.has_mean), draws.copy()
         a, b = draws[:, start::2], draws[:, start + 1 :: 2]
-        turned[:, start::2] = a * np.cos(turn) + b * np.sin(turn)
-        turned[:, start + 1 :: 2] = b * np.cos(turn) - a * np.sin(turn)
-        return turned
+        shifted[:, start::2] = a * np.cos(phase) + b * np.sin(phase)
+        shifted[:, start + 1 :: 2] = b * np.cos(phase) - a * np.sin(phase)
+        return shifted
 
     def basis(self, places: Array) -> Array:
         """Return phi, (points, dimension): z at places (dimensions, points) is phi @ draws."""
@@ -95,22 +114,24 @@ def make_modes(
     A field on a specimen is one of twice its length, cut: with that period its correlation
     along the specimen is that of an endless one.
     """
-    own, interface = interface, interface.embedding
+    placed_on, interface = interface, interface.embedding
     dimensions = len(interface.shape)
     cutoff = spectrum.cutoff(dimensions)
     units = 2.0 * math.pi / np.array(interface.lengths)
     units[1:] *= anisotropy
-    reach = cutoff / units * NEAREST_MODE
-    if reach.max() < 1.0 and not mean_mode:
+    largest = cutoff / units * (1.0 + CUTOFF_RTOL)
+    if largest.max() < 1.0 and not mean_mode:
         raise InputError(
             f"spectrum: no mode is left on an interface of {max(interface.lengths):g} m: the first"
             f" is at {units.min():.3g} rad/m, the spectrum is truncated at {cutoff:.3g} rad/m;"
             " shorten the correlation length, lengthen the interface or raise the truncation"
         )
-    numbers = _numbers(interface, reach)
+    # 1. and 2. Waves.
+    numbers = _numbers(interface, largest)
     wavenumbers = reduce(np.hypot, units[:, None] * numbers, np.zeros(1))
-    kept = np.flatnonzero(wavenumbers <= cutoff * NEAREST_MODE)
+    kept = np.flatnonzero(wavenumbers <= cutoff * (1.0 + CUTOFF_RTOL))
     ranks, numbers = kept[1:], numbers[:, kept]
+    # 3. Amplitudes.
     power = np.zeros(kept.size)
     power[1:] = spectrum.density(wavenumbers[ranks], dimensions)
     if mean_mode:
@@ -125,36 +146,37 @@ def make_modes(
     sigma = np.sqrt(power / total)
     for array in (sigma, numbers, ranks):
         array.flags.writeable = False
-    return Modes(own, sigma, numbers, ranks, mean_mode)
+    return Modes(placed_on, sigma, numbers, ranks, mean_mode)
 
 
-def _numbers(interface: Interface, reach: Array) -> NDArray[np.int64]:
+def _numbers(interface: Interface, largest: Array) -> NDArray[np.int64]:
     """Wave vectors over 2 pi/length among which the modes are, in the order of draws.
 
-    On a plane that is the order of growing rectangles of its proportions, so that a mode
-    has the same draws whatever the spectrum and the grid.
+    `largest` is the cutoff in these units, along each axis. On a plane the order is that of growing
+    rectangles of its proportions, so that a mode has the same draws whatever the spectrum and the
+    grid.
     """
-    if reach.size == 1:
-        _refuse_too_many(reach[0])
-        return np.arange(math.floor(reach[0]) + 1)[None, :]
+    if largest.size == 1:
+        _refuse_too_many(largest[0])
+        return np.arange(math.floor(largest[0]) + 1)[None, :]
     proportion = interface.lengths[0] / interface.lengths[1]
     along, across = max(1, round(proportion)), max(1, round(1.0 / proportion))
-    count = float(np.ceil(np.max(np.floor(reach) / [along, across])))
+    count = float(np.ceil(np.max(np.floor(largest) / [along, across])))
     rectangle = 2.0 * along * across * count * count
-    _refuse_too_many(max(0.5 * math.pi * float(np.prod(reach)), rectangle / 8.0))
+    _refuse_too_many(max(0.5 * math.pi * float(np.prod(largest)), rectangle / 8.0))
     shells = int(count)
     jx = np.arange(-along * shells, along * shells + 1)
     jy = np.arange(across * shells + 1)
-    x, y = (part.ravel() for part in np.meshgrid(jx, jy, indexing="ij"))
-    half = (y > 0) | (x >= 0)  # of k and -k one, and the constant
+    x, y = (grid.ravel() for grid in np.meshgrid(jx, jy, indexing="ij"))
+    half = (y > 0) | (x >= 0)  # one of k and -k, and the constant
     x, y = x[half], y[half]
     shell = np.maximum(-(-np.abs(x) // along), -(-y // across))
     return np.stack([x, y])[:, np.lexsort((x, y, shell))]
 
 
 def _refuse_too_many(modes: float) -> None:
-    if not modes <= MOST_MODES:
+    if not modes <= MAX_MODES:
         raise InputError(
-            f"spectrum: has {modes:.10g} modes on this interface, at most {MOST_MODES} are"
+            f"spectrum: has {modes:.10g} modes on this interface, at most {MAX_MODES} are"
             " allowed; truncate it earlier, or check the units of the lengths"
         )

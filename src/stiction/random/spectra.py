@@ -1,9 +1,17 @@
 """Power spectral densities of the underlying Gaussian field, on lines and on planes.
 
-On a plane the field is isotropic, and a line cut through it has the correlation of the
-field on a line: to the power of 1 + k^2 is added (D - 1)/2 in D dimensions, and a Gaussian
-keeps its form. Samples have the truncated spectrum, and so correlations and lengths are
-those of it. To add a spectrum, derive from `ScaledSpectrum` and `register` it.
+With a density g(k), the correlation of z on a line at the lag x is
+
+    rho(x) = int_0^K g(k) cos(k x) dk / int_0^K g(k) dk,                                      (1)
+
+K being the truncation. Samples have the truncated spectrum, and so correlations and lengths are
+those of it. (1) is integrated octave by octave (`_integrate`), because densities span decades, and
+by the rule of QUADPACK for a cosine (R. Piessens and others, 1983).
+
+On a plane the field is isotropic, and a line cut through it has the correlation of the field on a
+line: to the power of 1 + k^2 is added (D - 1)/2 in D dimensions, and a Gaussian keeps its form.
+
+To add a spectrum, derive from `ScaledSpectrum` and `register` it.
 """
 
 from __future__ import annotations
@@ -31,7 +39,7 @@ Share: TypeAlias = Annotated[Real, Field(gt=0, lt=1)]
 Magnitude: TypeAlias = Annotated[Positive, Field(gt=1e-15, lt=1e15)]
 """A length or wavenumber, or a ratio of two, of which powers neither underflow nor overflow."""
 Kept: TypeAlias = Annotated[Share, Field(gt=1e-6)]
-ACCURACY, LARGEST_ERROR = 1e-12, 1e-6  # errors of integrals: aimed at, and accepted
+INTEGRAL_RTOL, MAX_INTEGRAL_ERROR = 1e-12, 1e-6  # shares of integrals: aimed at, and accepted
 
 
 class SpectralDensity(ABC):
@@ -56,8 +64,8 @@ class SpectralDensity(ABC):
         """Return the correlation of z at `lag` (m), truncation included, on a line."""
         edges, power = _truncated(self)
         lags = np.abs(np.ravel(lag)).tolist()
-        found = [_integrate(self, edges, lag=one, power=power) for one in lags]
-        return np.reshape(found, np.shape(lag)) / power
+        integrals = [_integrate(self, edges, lag=lag, power=power) for lag in lags]
+        return np.reshape(integrals, np.shape(lag)) / power
 
     @property
     def efolding_length(self) -> float:
@@ -77,16 +85,21 @@ def _integrate(
     `power`, if known, decides which errors are small: 1e-12 of it, and of each piece otherwise.
     """
     options: dict[str, Any] = {"weight": "cos", "wvar": lag} if lag > 0.0 else {}
-    options |= {"epsabs": ACCURACY * power, "epsrel": ACCURACY, "limit": 200, "full_output": 1}
+    options |= {
+        "epsabs": INTEGRAL_RTOL * power,
+        "epsrel": INTEGRAL_RTOL,
+        "limit": 200,
+        "full_output": 1,
+    }
 
     def density(k: float) -> float:
         return float(spectrum.density(np.array([k]))[0]) * k**order
 
-    parts = [quad(density, a, b, **options)[:2] for a, b in itertools.pairwise(edges)]
-    found, errors = np.array(parts).T
-    if not errors.sum() <= LARGEST_ERROR * (power or np.abs(found).sum()):
+    pieces = [quad(density, a, b, **options)[:2] for a, b in itertools.pairwise(edges)]
+    integrals, errors = np.array(pieces).T
+    if not errors.sum() <= MAX_INTEGRAL_ERROR * (power or np.abs(integrals).sum()):
         raise InputError("function: its integral over wavenumbers does not converge")
-    return float(found.sum())
+    return float(integrals.sum())
 
 
 @lru_cache(maxsize=256)
@@ -101,6 +114,9 @@ def _truncated(spectrum: SpectralDensity) -> tuple[Array, float]:
 @lru_cache(maxsize=256)
 def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
     """Return the first lag at which the correlation of z on a line falls to `target`, m."""
+    # The correlation falls no faster than by the mean wavenumber, and is nearly straight between
+    # lags that are close against the root mean square of the wavelengths: march in such steps until
+    # it has fallen below the target, then search between the last two lags.
     edges, power = _truncated(spectrum)
     slope = _integrate(spectrum, edges, order=1) / power
     step = 0.25 * math.sqrt(power / _integrate(spectrum, edges, order=2))
@@ -111,8 +127,6 @@ def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
     before = lag = 0.0
     above = 1.0 - target
     while above > 0.0:
-        # The correlation falls no faster than by the mean wavenumber, and is nearly straight
-        # between lags that are close against the root mean square of the wavelengths.
         before, lag = lag, lag + max(above / slope, step)
         above = excess(lag)
         step *= 1.005  # for spectra whose power sits far below their truncation
@@ -191,8 +205,8 @@ class _PowerOfWavenumber(ScaledSpectrum):
 
     def quantile(self, share: float, dimensions: int = 1) -> float:
         # 1 - t of the incomplete beta function above, without cancellation where t is nearly 1.
-        rest = float(betaincinv(self.exponent - 0.5, 0.5 * dimensions, 1.0 - share))
-        return self.scale * math.sqrt((1.0 - rest) / rest)
+        complement = float(betaincinv(self.exponent - 0.5, 0.5 * dimensions, 1.0 - share))
+        return self.scale * math.sqrt((1.0 - complement) / complement)
 
 
 @register

@@ -12,10 +12,11 @@ from stiction.base.errors import InputError, warn_accuracy
 from stiction.problem.problem import Problem
 from stiction.random.fields import RandomInterface
 
-# Shares of the strength at or below the residual strength that give a warning, or an error.
-WORTH_SAYING, MOST = 1e-6, 0.5
-# Equally likely values of a random residual strength, and of a pressure or factor.
-QUANTILES, PRESSURES = 2000, 64
+# Shares of the strength at or below the residual strength: the largest without a warning, and the
+# largest that is accepted.
+MAX_SILENT_SHARE, MAX_SHARE = 1e-6, 0.5
+# Numbers of equally likely values of a random residual strength, and of a pressure or factor.
+RESIDUAL_QUANTILES, PRESSURE_QUANTILES = 2000, 64
 
 
 def coefficients_of(random: RandomInterface) -> list[str]:
@@ -40,10 +41,10 @@ def profiles_in_stress(
 
     A sampled pressure is multiplied by that of glued blocks over its mean.
     """
-    found, pressure = dict(profiles), problem.normal_pressure
-    if "normal_pressure" in found:
-        pressure = found["normal_pressure"] = found["normal_pressure"] * problem.pressing
-    return found | {name: found[name] * pressure for name in coefficients_of(random)}
+    stresses, pressure = dict(profiles), problem.normal_pressure
+    if "normal_pressure" in stresses:
+        pressure = stresses["normal_pressure"] = stresses["normal_pressure"] * problem.pressing
+    return stresses | {name: stresses[name] * pressure for name in coefficients_of(random)}
 
 
 def support_in_stress(
@@ -56,8 +57,8 @@ def support_in_stress(
     field, between = random.properties[name], random.between or {}
 
     def extremes(marginal: Any) -> Any:
-        known = marginal.distribution
-        return (known.ppf(chance), known.isf(chance)) if chance else known.support()
+        law = marginal.distribution
+        return (law.ppf(chance), law.isf(chance)) if chance else law.support()
 
     low, high = extremes(field.marginal)
     factors = [extremes(between[name])] if name in between else []
@@ -68,8 +69,8 @@ def support_in_stress(
     elif field.of is not None:
         pressure = problem.normal_pressure
         factors.append((np.min(pressure), np.max(pressure)))
-    for one in factors:  # positive; 0 times infinity is 0 here
-        ends = [a * b if a and b else 0.0 for a in (low, high) for b in one]
+    for factor in factors:  # positive; 0 times infinity is 0 here
+        ends = [a * b if a and b else 0.0 for a in (low, high) for b in factor]
         low, high = min(ends), max(ends)
     return float(low), float(high)
 
@@ -82,10 +83,14 @@ def _pressures(problem: Problem, random: RandomInterface) -> Array:
     """Pressures that a point may have, equally likely."""
     pressure = problem.normal_pressure
     if "normal_pressure" in random.names:
-        known = _equally_likely(random.properties["normal_pressure"].marginal, PRESSURES)
-        pressure = np.multiply.outer(known, problem.pressing)
+        levels = _equally_likely(
+            random.properties["normal_pressure"].marginal, PRESSURE_QUANTILES
+        )
+        pressure = np.multiply.outer(levels, problem.pressing)
     flat = np.sort(np.ravel(pressure))
-    return flat[np.linspace(0, flat.size - 1, min(flat.size, PRESSURES)).round().astype(int)]
+    return flat[
+        np.linspace(0, flat.size - 1, min(flat.size, PRESSURE_QUANTILES)).round().astype(int)
+    ]
 
 
 def mean_in_stress(problem: Problem, random: RandomInterface, name: str) -> float:
@@ -103,19 +108,21 @@ def share_below_residual(problem: Problem, random: RandomInterface) -> float:
     pressed = coefficients_of(random)
     residual = np.asarray(problem.friction.residual_strength)
     if "residual_strength" in fields:
-        residual = _equally_likely(fields["residual_strength"].marginal, QUANTILES)
+        residual = _equally_likely(fields["residual_strength"].marginal, RESIDUAL_QUANTILES)
     one_sided = ("strength" in pressed) != ("residual_strength" in pressed)
     for name, power in (("residual_strength", 1.0), ("strength", -1.0)):
         if name in between:
-            residual = np.outer(residual, _equally_likely(between[name], PRESSURES) ** power)
+            residual = np.outer(
+                residual, _equally_likely(between[name], PRESSURE_QUANTILES) ** power
+            )
         if one_sided and name in pressed:
             residual = np.outer(residual, _pressures(problem, random) ** power)
     below = fields["strength"].marginal.distribution.cdf(residual)
     rho = (random.correlation or {}).get("strength", {}).get("residual_strength", 0.0)
     if rho:  # given a residual strength, the strength's z is normal with mean rho z
-        z = ndtri((np.arange(QUANTILES) + 0.5) / QUANTILES)[:, None]
-        rest = math.sqrt(max(1.0 - rho**2, 1e-12))
-        below = ndtr((ndtri(below.reshape(QUANTILES, -1)) - rho * z) / rest)
+        z = ndtri((np.arange(RESIDUAL_QUANTILES) + 0.5) / RESIDUAL_QUANTILES)[:, None]
+        deviation = math.sqrt(max(1.0 - rho**2, 1e-12))
+        below = ndtr((ndtri(below.reshape(RESIDUAL_QUANTILES, -1)) - rho * z) / deviation)
     return float(np.mean(below))
 
 
@@ -125,16 +132,16 @@ def check_residual(problem: Problem, random: RandomInterface) -> None:
     There a node does not weaken; a share above a half is an `InputError`.
     """
     share = share_below_residual(problem, random)
-    if share <= WORTH_SAYING:
+    if share <= MAX_SILENT_SHARE:
         return
     low, high = support_in_stress(problem, random, "strength")
-    found = (
+    text = (
         f"strength: {100.0 * share:.3g} % of its marginal, which reaches from {low:g} to"
         f" {high:g} Pa, lies at or below the residual strength"
     )
-    if share > MOST:
+    if share > MAX_SHARE:
         raise InputError(
-            f"{found}: most of the interface would not weaken at all; raise the strength, lower"
+            f"{text}: most of the interface would not weaken at all; raise the strength, lower"
             " the residual strength, or check the unit of both (Pa)"
         )
-    warn_accuracy(f"{found}, where the interface does not weaken; lower that if it should")
+    warn_accuracy(f"{text}, where the interface does not weaken; lower that if it should")

@@ -1,9 +1,28 @@
 """From (seed, sample, mode) to standard normal draws, and from draws to the Gaussian field.
 
-A generator for each sample of a line would cost more than the sample, so samples come in
-blocks of 256, with one generator a block; inside a block the draws run mode after mode, so
-that a spectrum with more modes extends the same field. A sample of a plane has so many
-modes that it has a generator, a block of its own.
+Problem
+-------
+The spectral representation (M. Shinozuka and G. Deodatis, Applied Mechanics Reviews 44, 1991)
+
+    z(x) = sigma_0 A_0 + sum_j sigma_j (A_j cos k_j.x + B_j sin k_j.x),                       (1)
+
+with standard normal A_j and B_j. Sample i must depend on the seed and i only, and draw j of it on
+mode j only, whatever the batch, the number of workers, the spectrum and the grid.
+
+Draws (`Stream.draw`)
+---------------------
+1. Samples of a line come in blocks of 256, with one generator a block, because a generator for each
+   sample would cost more than the sample. A sample of a plane has so many modes that it has a
+   generator, a block of its own. The generator depends on seed, property and number of the block.
+2. Inside a block the draws run mode after mode, A_j before B_j, so that a spectrum with more modes
+   extends the same field. Draws of modes that are not in the spectrum are left out.
+
+Field (`synthesise`)
+--------------------
+3. Put mode (jx, jy) with amplitude (A - i B)/2 at k, and its conjugate at -k, into the half of the
+   wave vectors that a real transform holds. Fold modes that the grid does not resolve onto modes
+   that it does: values at the nodes are exact on any grid.
+4. Transform back, sample by sample, so that the numbers do not depend on the batch.
 """
 
 from typing import Any, NamedTuple
@@ -14,12 +33,12 @@ from numpy.typing import NDArray
 from stiction.base.arrays import Array
 from stiction.base.jit import jit_allocating
 
-BLOCK = 256
+SAMPLES_PER_BLOCK = 256
 
 
 def block_of(dimensions: int) -> int:
     """Return how many samples share a generator on a line (1) or a plane (2)."""
-    return BLOCK if dimensions == 1 else 1
+    return SAMPLES_PER_BLOCK if dimensions == 1 else 1
 
 
 class Stream(NamedTuple):
@@ -30,7 +49,7 @@ class Stream(NamedTuple):
     ranks: NDArray[np.int64]  # modes drawn, rising
     mean_mode: bool  # whether the mean mode is drawn
     columns: slice = slice(None)  # of the vector of all draws
-    own: Any = None  # of `columns`: modes of the property itself
+    of_property: Any = None  # which of `columns` are modes of the property itself
 
     def draw(self, seed: int, first: int, samples: int) -> Array:
         """Draw samples `first`, `first` + 1, ...: A, B of one mode after the other, A_0 first."""
@@ -41,14 +60,16 @@ class Stream(NamedTuple):
             kept = (2 * ranks[:, None] + np.arange(2)).ravel()
             kept = np.concatenate(([0], kept)) if self.mean_mode else kept
         draws = np.empty((samples, 2 * ranks.size + int(self.mean_mode)))
+        # 1. Block after block.
         done = 0
         while done < samples:
             number, offset = divmod(first + done, block)
             count = min(block - offset, samples - done)
-            place = (self.number, number, block)[: 2 if block == BLOCK else 3]
+            place = (self.number, number, block)[: 2 if block == SAMPLES_PER_BLOCK else 3]
             key = np.random.SeedSequence(entropy=seed, spawn_key=place)
             generator = np.random.Generator(np.random.PCG64DXSM(key))
-            rows = generator.standard_normal((2 * (modes + 1), block))  # A_j, B_j of all modes
+            # 2. A_j and B_j of all modes, of which those of the spectrum are kept.
+            rows = generator.standard_normal((2 * (modes + 1), block))
             draws[done : done + count] = rows[kept, offset : offset + count].T
             done += count
         return draws
@@ -58,18 +79,14 @@ class Stream(NamedTuple):
 def synthesise(
     draws: Array, sigma: Array, numbers: NDArray[np.int64], has_mean: bool, out: Array
 ) -> None:
-    """Fill `out`, (samples, rows, columns); a line is a plane of one row.
-
-    Mode (jx, jy) is e^(i k.x) with amplitude (A - i B)/2 and its conjugate at -k; those in
-    the half of wave vectors that a real transform holds are added. Modes that the grid does
-    not resolve are folded onto those that it does: values at the nodes are exact on any grid.
-    """
+    """Fill `out`, (samples, rows, columns), with fields (1); a line is a plane of one row."""
     samples, rows, columns = out.shape
     half = columns // 2
     scale = 0.5 * rows * columns
     start = 1 if has_mean else 0
     spectrum = np.empty((rows, half + 1), dtype=np.complex128)
     for i in range(samples):
+        # 3. Modes of the transform.
         spectrum.fill(0.0)
         if has_mean:
             spectrum[0, 0] = 2.0 * scale * (sigma[0] * draws[i, 0])
@@ -83,6 +100,7 @@ def synthesise(
                 spectrum[p, q] += complex(a, -b)
             if q == 0 or q >= half:
                 spectrum[-p % rows, -q % columns] += complex(a, b)
+        # 4. Back.
         if rows == 1:
             row = np.fft.irfft(spectrum[0], columns)
             for q in range(columns):  # a loop: slices of arrays take seconds to compile

@@ -24,7 +24,7 @@ from stiction.ensemble.limit_state import Event, LimitState, weakest_first
 from stiction.ensemble.monte_carlo import check_fields
 from stiction.methods.onset import exact_counterpart
 from stiction.methods.protocol import optional_member, seconds_per_sample
-from stiction.random.equally_likely import MOST as MOST_MEMBERS
+from stiction.random.equally_likely import MAX_MEMBERS
 from stiction.reliability.tail import Tail, two_levels_refused
 
 TargetCv: TypeAlias = Annotated[Real, Field(ge=1e-6, le=1)]
@@ -301,9 +301,9 @@ def wanted_members(random: Any, cv: float, target_cv: float) -> int:
     """Return how many members to draw from a source instead, 0 for no more."""
     least = cv / (LISTED * target_cv)
     count = len(random.members)
-    if getattr(random, "source", None) is None or least <= 1.0 or count >= MOST_MEMBERS:
+    if getattr(random, "source", None) is None or least <= 1.0 or count >= MAX_MEMBERS:
         return 0
-    return int(min(max(MORE * count * least * least, 2 * count), MOST_MEMBERS))
+    return int(min(max(MORE * count * least * least, 2 * count), MAX_MEMBERS))
 
 
 def few_members(random: Any, found: Answer | Estimate, target_cv: float) -> list[str]:

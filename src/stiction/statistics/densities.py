@@ -1,4 +1,15 @@
-"""Probability densities that keep to their bounds: a kernel reflected there."""
+"""Probability densities that keep to their bounds: a kernel reflected there.
+
+Steps (`density`), after B. W. Silverman, Density Estimation for Statistics and Data Analysis,
+1986:
+
+1. Choose the ends of a grid: the bounds, or half a spread beyond the sample.
+2. Count the values in its cells.
+3. Choose the bandwidth h by his Eq. 3.31, 0.9 min(standard deviation, interquartile range/1.34)
+   N^(-1/5), at least half a cell.
+4. Smooth the counts by a Gaussian kernel of that deviation, reflected at the ends.
+5. The sampling error follows from the integral of the kernel squared, 1/(2 sqrt(pi) h).
+"""
 
 import math
 from dataclasses import dataclass
@@ -12,9 +23,9 @@ from stiction.base.errors import InputError
 from stiction.base.model import Real, brief, checked
 from stiction.statistics.estimates import as_sample
 
-CELLS = 4096
-REACH = 8.0
-"""Of the kernel, in standard deviations."""
+GRID_CELLS = 4096
+KERNEL_END = 8.0
+"""Where the kernel is cut, in standard deviations."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,25 +76,27 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     True
     """
     sample = as_sample(values, 16)
+    # 1. and 2. Grid and counts.
     low, high = _ends(sample, bounds)
     width = high - low
     counts = np.bincount(
-        np.minimum(((sample - low) / width * CELLS).astype(int), CELLS - 1), minlength=CELLS
+        np.minimum(((sample - low) / width * GRID_CELLS).astype(int), GRID_CELLS - 1),
+        minlength=GRID_CELLS,
     )
-    # Below a cell's width the grid, not the sample, would be resolved.
-    bandwidth = max(_bandwidth(sample), 0.5 * width / CELLS)
+    # 3. Below a cell's width the grid, not the sample, would be resolved.
+    bandwidth = max(_bandwidth(sample), 0.5 * width / GRID_CELLS)
+    # 4. and 5. The smooth density and its error.
     smooth = gaussian_filter1d(
-        1.0 * counts, bandwidth / width * CELLS, mode="reflect", truncate=REACH
+        1.0 * counts, bandwidth / width * GRID_CELLS, mode="reflect", truncate=KERNEL_END
     )
-    x = low + (np.arange(CELLS) + 0.5) / CELLS * width
-    value = smooth / smooth.sum() * CELLS / width
-    # The integral of the kernel squared is 1/(2 sqrt(pi) bandwidth).
+    x = low + (np.arange(GRID_CELLS) + 0.5) / GRID_CELLS * width
+    value = smooth / smooth.sum() * GRID_CELLS / width
     error = np.sqrt(value / (2.0 * math.sqrt(math.pi) * bandwidth * sample.size))
     return Density(x, value, error, bandwidth)
 
 
 def _ends(sample: Array, bounds: tuple[float | None, float | None]) -> tuple[float, float]:
-    """Return the ends of the grid."""
+    """Step 1: return the ends of the grid."""
     smallest, largest = float(sample.min()), float(sample.max())
     spread = largest - smallest
     if spread == 0.0:
@@ -99,7 +112,7 @@ def _ends(sample: Array, bounds: tuple[float | None, float | None]) -> tuple[flo
 
 
 def _bandwidth(values: Array) -> float:
-    """Return the standard deviation of the kernel (Silverman, 1986, Eq. 3.31)."""
+    """Step 3: return the standard deviation of the kernel."""
     low, high = np.quantile(values, [0.25, 0.75])
     spread = min(float(values.std()), float(high - low) / 1.34) or float(values.std())
     return 0.9 * spread * float(values.size) ** -0.2

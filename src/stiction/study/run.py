@@ -17,7 +17,7 @@ from stiction.base.model import FilePath, brief, check
 from stiction.ensemble.batches import Failure
 from stiction.ensemble.dataset import Gathered
 from stiction.ensemble.store import Store
-from stiction.random.synthesis import BLOCK
+from stiction.random.synthesis import SAMPLES_PER_BLOCK
 from stiction.study.export import export
 from stiction.study.failure import Repetitions
 
@@ -45,7 +45,7 @@ AnyPart: TypeAlias = Annotated[Any, BeforeValidator(_part)]
 def samples_of_part(part: tuple[int, int], points: int, samples: int) -> NDArray[np.bool_]:
     """Return which samples a part has, (points, samples): blocks in turn."""
     (number, of), total = part, points * samples
-    block = min(BLOCK, max(1, total // (FEWEST_BLOCKS * of)))
+    block = min(SAMPLES_PER_BLOCK, max(1, total // (FEWEST_BLOCKS * of)))
     mine: NDArray[np.bool_] = np.arange(total) // block % of == number - 1
     return mine.reshape(points, samples)
 
