@@ -1,10 +1,13 @@
 """Progress of long work: what it shows and where, and when its time is over."""
 
 import io
+import re
 import sys
 import threading
 import time
 
+import numba
+import numpy as np
 import pytest
 from checks import python
 
@@ -60,7 +63,9 @@ def test_a_terminal_gets_a_bar_that_goes_away_with_warnings_above_it(hasty, monk
         print("a warning", file=sys.stderr)
         time.sleep(0.1)
     text = terminal.getvalue()
-    assert "by equilibrium [" in text
+    assert "by equilibrium \N{BOX DRAWINGS HEAVY HORIZONTAL}" in re.sub(
+        r"\x1b\[[\d;]*m", "", text
+    )
     assert "of 20 samples" in text
     assert any(line.endswith("a warning") for line in text.splitlines())
     assert text.rstrip("\n").endswith("\x1b[2K")  # the line is erased
@@ -79,3 +84,44 @@ def test_one_of_nested_meters_is_shown(hasty, capsys):
     assert threading.active_count() == before
     code = "from stiction.base.progress import Meter; Meter('left open').__enter__()"
     python("-c", code)
+
+
+def test_a_notebook_has_one_output_that_is_empty_at_the_end(hasty, monkeypatch):
+    """No widgets, and no line for each update in a saved notebook."""
+    shell = pytest.importorskip("IPython.display")
+    outputs = []
+
+    class Handle:
+        def update(self, data, raw):
+            outputs[-1].append(data)
+
+    def display(data, raw, display_id):
+        outputs.append([data])
+        return Handle()
+
+    monkeypatch.setitem(sys.modules, "ipykernel", object())
+    monkeypatch.setattr(shell, "display", display)
+    with Meter("outer"):
+        work(Meter("by equilibrium", 20))
+    ((first, *shown, last),) = outputs
+    assert first == last == {}
+    assert any("by equilibrium: " in data["text/plain"] for data in shown)
+
+
+def test_kernels_that_are_compiled_are_said(hasty, monkeypatch):
+    lines = []
+    monkeypatch.setattr(
+        progress, "_display", lambda: lambda meter, last: lines.append(meter.text)
+    )
+
+    def kernel(x):
+        for i in range(100):
+            x = np.sin(x) + i if i % 2 else np.cos(x) - i
+        return x
+
+    with Meter("onset", 2):
+        progress._listen()
+        numba.njit(kernel)(1.0)
+        time.sleep(0.1)
+    assert any("0 of 2 samples, compiling" in line for line in lines)
+    assert "compiling" not in lines[-1]

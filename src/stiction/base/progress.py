@@ -1,7 +1,7 @@
 """Progress of long work: one mechanism for everything that takes long.
 
-A terminal and a notebook show a line with a bar, a pipe has a line now and then; all of it on
-standard error, and only after two seconds. The code that works reports what is done (`advance`).
+A terminal has a bar (rich), a notebook one output that is updated, and a pipe a line now and then;
+all of it only after a second. The code that works reports what is done (`advance`).
 """
 
 from __future__ import annotations
@@ -11,18 +11,16 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from typing import TypeAlias
+from functools import cache
+from typing import Any, TypeAlias
 
 Show: TypeAlias = bool | Callable[[int, int], None]
 """True shows progress once work takes long; a callable gets (done, total); False is silent."""
 
-AFTER = 2.0
-"""Seconds of silence: who waits no longer than this needs no bar."""
+AFTER, TICK = 1.0, 0.25
+"""Seconds of silence, for work that needs no bar, and seconds between updates."""
 LONG = 10.0
 """Seconds between lines in a pipe, at least."""
-WIDTH = 100
-"""Letters of a line in a notebook."""
-TICK = 0.25
 
 interrupted = threading.Event()
 """Set by a signal that ends a run: the exception of its handler is lost if it comes in a finalizer
@@ -44,7 +42,6 @@ class Meter:
         self, what: str, total: int | None = None, show: Show = True, *, unit: str = "samples"
     ) -> None:
         self.unit, self._show = unit, show
-        self._watcher: threading.Thread | None = None
         self.stage(what, total)
         self._begun = time.monotonic()
 
@@ -73,7 +70,7 @@ class Meter:
         """Return the progress, the elapsed and the remaining time, in words."""
         of = f" of {self.total:,}" if self.total else ""
         parts = [f"{self.done:,}{of} {self.unit}" if self.done or of else "", self.note]
-        parts.append(duration(math.floor(self.elapsed)))
+        parts += ["compiling" * bool(_compiling), duration(math.floor(self.elapsed))]
         begin, before = self._first or (0.0, self.done)
         if self.total and self.done > before:
             pace = (time.monotonic() - begin) / (self.done - before)
@@ -85,19 +82,17 @@ class Meter:
     def __enter__(self) -> Meter:
         self._begun = time.monotonic()
         if self._show is True:
-            _live.append(self)
-            if _live[0] is self:
+            _running.append(self)
+            if _running[0] is self:
                 self._ended = threading.Event()
-                self._watcher = threading.Thread(
-                    target=_watch, args=(self._ended,), daemon=True
-                )
+                self._watcher = threading.Thread(target=_watch, args=[self._ended], daemon=True)
                 self._watcher.start()
         return self
 
     def __exit__(self, *error: object) -> None:
-        if self in _live:
-            _live.remove(self)
-        if self._watcher is not None:
+        if self in _running:
+            _running.remove(self)
+        if hasattr(self, "_watcher"):
             self._ended.set()
             self._watcher.join()
 
@@ -105,31 +100,49 @@ class Meter:
 SILENT = Meter("", show=False)
 """For work that nobody watches and nothing limits."""
 
-_live: list[Meter] = []
-"""Meters that run and are shown, the outermost first."""
+_running: list[Meter] = []
+"""Meters that are shown, the outermost first."""
+_compiling: list[Any] = []
+"""Kernels that numba compiles at the moment."""
 
 
 def _watch(ended: threading.Event) -> None:
     """Show one of the meters that run until the outermost has ended."""
-    shown = show = None
+    display = shown = None
     while not ended.wait(TICK):
-        old = [meter for meter in tuple(_live) if meter.elapsed >= AFTER]
+        if "numba" in sys.modules:
+            _listen()
+        old = [meter for meter in tuple(_running) if meter.elapsed >= AFTER]
         if old:  # the outermost whose total is known, else the innermost
             shown = next((meter for meter in old if meter.total), old[-1])
-            show = show or _display()
-            show(shown, False)
-    if shown is not None and show is not None:
-        show(shown, True)
+            display = display or _display()
+            display(shown, False)
+    if display is not None and shown is not None:
+        display(shown, True)
+
+
+@cache
+def _listen() -> None:
+    """Let numba say when it compiles."""
+    from numba.core import event
+
+    class Listener(event.Listener):
+        def on_start(self, begun: Any) -> None:
+            _compiling.append(begun)
+
+        def on_end(self, ended: Any) -> None:
+            del _compiling[-1:]
+
+    event.register("numba:compile", Listener())
 
 
 def _display() -> Callable[[Meter, bool], None]:
     """Return a function that shows a meter, with a flag at its last call."""
-    stream = sys.stderr
+    stream, soon = sys.stderr, LONG
     if stream is not None and stream.isatty():
-        return _terminal()
+        return _in_terminal()
     if "ipykernel" in sys.modules:
-        return _notebook
-    soon = LONG
+        return _in_notebook()
 
     def write_line(meter: Meter, last: bool) -> None:  # few lines, however long it takes
         nonlocal soon
@@ -140,33 +153,36 @@ def _display() -> Callable[[Meter, bool], None]:
     return write_line
 
 
-def _with_bar(meter: Meter) -> str:
-    full = round(30 * min(1.0, meter.done / meter.total)) if meter.total else 0
-    bar = f"[{'#' * full:.<30}] " if meter.total else ""
-    return f"{meter.what} {bar}{meter.text}"
-
-
-def _terminal() -> Callable[[Meter, bool], None]:
-    """Return a function that shows a bar, which goes away at the end; warnings appear above it."""
+def _in_terminal() -> Callable[[Meter, bool], None]:
+    """Show a bar, which goes away at the end; what is printed meanwhile appears above it."""
     from rich.console import Console
-    from rich.live import Live
-    from rich.text import Text
+    from rich.progress import BarColumn, Progress
 
-    live = Live(
-        console=Console(stderr=True), auto_refresh=False, transient=True, redirect_stdout=False
-    )
+    columns = "{task.description}", BarColumn(30), "{task.fields[text]}"
+    options: Any = {"transient": True, "auto_refresh": False, "redirect_stdout": False}
+    bar = Progress(*columns, console=Console(stderr=True), **options)
+    task = bar.add_task("", text="")
 
     def show(meter: Meter, last: bool) -> None:
         if last:
-            live.stop()
+            bar.stop()
         else:
-            live.start()
-            live.update(Text(_with_bar(meter), no_wrap=True, overflow="ellipsis"), refresh=True)
+            bar.start()
+            options: Any = {"total": meter.total, "completed": meter.done, "text": meter.text}
+            bar.update(task, description=meter.what, refresh=True, **options)
 
     return show
 
 
-def _notebook(meter: Meter, last: bool) -> None:
-    """Show a line that is rewritten, and goes away at the end; rich would need ipywidgets."""
-    line = "" if last else _with_bar(meter)
-    print(f"\r{line:{WIDTH}}\r", end="", file=sys.stderr, flush=True)
+def _in_notebook() -> Callable[[Meter, bool], None]:
+    """Show one output, which is updated, and empty at the end; rich would need ipywidgets."""
+    from IPython.display import display
+
+    handle = display({}, raw=True, display_id=True)
+
+    def show(meter: Meter, last: bool) -> None:
+        share = f"{meter.done / meter.total:.0%}, " if meter.total else ""
+        text = {"text/plain": f"{meter.what}: {share}{meter.text}"}
+        handle.update({} if last else text, raw=True)
+
+    return show

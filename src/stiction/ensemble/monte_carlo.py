@@ -199,7 +199,7 @@ def monte_carlo(
     executor : concurrent.futures.Executor, optional
         Any object with `submit` instead of threads, such as a process pool or a Dask executor.
     progress : bool or callable
-        True shows progress on standard error after two seconds; a callable gets (done, total).
+        True shows progress on standard error after a second; a callable gets (done, total).
     pilot : bool
         With the local criterion, check the first samples (32 on a line, 8 on a plane), and the
         weakest of the first thousand. Where a quick test leaves a doubt, they are also solved by

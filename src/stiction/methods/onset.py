@@ -96,7 +96,7 @@ def onset(
     gaps : {"refuse", "fill"}
         Whether to refuse missing values (NaN) or fill them as `stiction.read_profile` does.
     progress : bool or callable
-        True shows progress on standard error after two seconds; a callable gets (done, total).
+        True shows progress on standard error after a second; a callable gets (done, total).
 
     Returns
     -------

@@ -61,7 +61,7 @@ def simulate_rupture(
     event : int, optional
         On specimens, the number of the event in its order, from 0; by default the one that slides.
     progress : bool or callable
-        True shows progress on standard error after two seconds; a callable gets the steps taken
+        True shows progress on standard error after a second; a callable gets the steps taken
         and 0.
 
     Returns
