@@ -1,16 +1,35 @@
 """Files from strangers and shared machines: no code, no other file, no wait, little memory."""
 
+import io
+import json
 import os
 import shutil
 import stat
 import warnings
+import zipfile
+import zlib
 from pathlib import Path
 
+import h5py
+import matplotlib
+import numpy as np
+import openpyxl
 import pytest
+import tomli_w
+import xarray as xr
 from checks import python
+from numpy.lib.recfunctions import rename_fields
+from refusals import refuses
+from small_study import small_study
 
+import stiction as st
 from stiction.base import files
 from stiction.base.files import private_folder
+from stiction.base.netcdf import read_netcdf
+from stiction.ensemble import batches, store
+from stiction.methods.dynamics.save import open_rupture
+from stiction.problem.profiles.tables import IMAGES, NETCDF, TEXT
+from stiction.study.study import read_setup
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="Windows has other means")
 SOURCES = Path(__file__).parents[2] / "src"
@@ -93,3 +112,325 @@ def test_the_current_folder_chooses_no_folder_of_kernels(tmp_path, monkeypatch):
         assert tmp_path not in Path(place).parents
         assert "not an absolute path" in warning
     assert not (tmp_path / "planted").exists()
+
+
+# -- files of every kind, to every reader --------------------------------------------------------
+
+STUDY = small_study(64)
+READERS = {
+    **{f"p{ending}": st.read_profile for ending in (*TEXT, *NETCDF, *IMAGES, ".xlsx", ".npy")},
+    "peaks.csv": st.read_peaks,
+    "study.toml": st.Study.from_toml,
+    "setup.toml": read_setup,
+    "study.json": lambda path: st.open_run(path.parent),
+    "pilot.json": lambda path: st.open_run(path.parent).dataset(),
+    f"chunks/{'0' * 32}.npz": lambda path: st.open_run(path.parents[1]).status(),
+    "frames-1.nc": lambda path: open_rupture(path.parent),
+    "fitted.npz": files.read_arrays,
+}
+
+
+def zipped(content):
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as packed:
+        packed.writestr("rows.npy", content)
+    return archive.getvalue()
+
+
+KINDS = {
+    "pipe": os.mkfifo,
+    "device": lambda path: path.symlink_to("/dev/zero"),
+    "unending": lambda path: path.symlink_to("/proc/self/environ"),
+    "folder": Path.mkdir,
+    "lost link": lambda path: path.symlink_to("nowhere"),
+    "empty": lambda path: path.write_bytes(b""),
+    "huge": lambda path: os.truncate(path.touch() or path, 2**40),
+    "nested": lambda path: path.write_text("a=" + "[" * 10**6),
+    "digits": lambda path: path.write_text("a=" + "9" * 10**6),
+    "dots": lambda path: path.write_text("a" + ".a" * 10**6 + "=1"),
+    "brackets": lambda path: path.write_text("a " + "(" * 10**6 + "\n1 2\n"),
+    "blanks": lambda path: path.write_text("a (" + " " * 10**6 + "x,y\n1,2\n"),
+    "columns": lambda path: path.write_text("1.0," * 10**6),
+    "quotes": lambda path: path.write_text('x,"' + "y," * 10**6 + "\n1,2\n"),
+    "compressed": lambda path: path.write_bytes(zipped(bytes(2**26))),
+}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """A run with one chunk and a pilot."""
+    folder = tmp_path_factory.mktemp("strangers") / "run"
+    st.Study.from_dict(STUDY).run(out=folder, workers=1, progress=False)
+    return folder
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.filterwarnings("ignore")
+def test_no_reader_takes_such_a_file(tmp_path, run, kind):
+    """A pipe would wait for ever, the others would take all memory, or hours."""
+    for name, read in READERS.items():
+        folder = tmp_path / name.replace("/", " ")
+        shutil.copytree(run, folder)
+        path = folder / name
+        path.unlink(missing_ok=True)
+        KINDS[kind](path)
+        try:
+            found = read(path)
+            said = name == "pilot.json" or found.damaged  # a pilot may be lost
+        except (st.InputError, st.RunError, *files.UNREADABLE) as error:
+            said = str(error).strip()
+            said = len(said) < 1000 and said
+        assert said, name
+
+
+@pytest.mark.parametrize(
+    "name", ["study.json", "pilot.json", f"chunks/{'0' * 32}.npz", "chunks"]
+)
+def test_a_run_folder_holds_no_links(tmp_path, run, name, command):
+    """Neither to be read nor to be written to: what they lead to stays as it is."""
+    folder, elsewhere = tmp_path / "run", tmp_path / "elsewhere"
+    shutil.copytree(run, folder)
+    whole = folder / name if (folder / name).exists() else next((folder / "chunks").iterdir())
+    whole.rename(elsewhere)
+    if elsewhere.is_dir():
+        (elsewhere / f"{'c' * 32}.npz").write_bytes(b"theirs")
+    (folder / name).symlink_to(elsewhere)
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    (tmp_path / "study.toml").write_text(tomli_w.dumps(STUDY))
+    words = "study.json" if name == "pilot.json" else name
+    for line in (("report", folder), ("run", tmp_path / "study.toml", "--out", folder)):
+        code, _, errors = command(*line)
+        assert (code, errors.count("error:")) == (2, 1), errors
+        assert Path(words).name in errors or "pilot" in errors
+    (tmp_path / "study.toml").unlink()
+    assert before == {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+
+
+def resealed(folder, **changes):
+    """Replace the chunk of a run by one with other content under a right digest."""
+    (path,) = (folder / "chunks").iterdir()
+    arrays = files.read_arrays(path) | {}
+    for name, change in changes.items():
+        arrays[name] = change(arrays[name])
+    packed = io.BytesIO()
+    np.savez(packed, **arrays)
+    path.unlink()
+    (path.parent / f"{store.digest(packed.getvalue())}.npz").write_bytes(packed.getvalue())
+
+
+def about(change):
+    def changed(text):
+        parts = json.loads(text.tobytes())
+        return np.frombuffer(json.dumps(change(parts)).encode(), np.uint8)
+
+    return changed
+
+
+def column(name, value):
+    def changed(rows):
+        rows = rows.copy()
+        rows[name] = value
+        return rows
+
+    return changed
+
+
+def retyped(name, kind):
+    return lambda rows: rows.astype(
+        [(one, kind if one == name else rows.dtype[one]) for one in rows.dtype.names]
+    )
+
+
+FORGED = {
+    "a point of -1": {"rows": column("_point", -1)},
+    "a point too many": {"rows": column("_point", 1)},
+    "a sample of -1": {"rows": column("_sample", -1)},
+    "another type of numbers": {"rows": retyped("_sample", "f8")},
+    "texts": {"rows": retyped("critical_stress", "U4")},
+    "another shape": {"rows": retyped("critical_stress", ("f8", (2**10,)))},
+    "an unknown variable": {"rows": lambda rows: rename_fields(rows, {"critical_stress": "x"})},
+    "no columns": {"rows": lambda rows: np.zeros(3)},
+    "no list": {"about": about(lambda parts: 3)},
+    "a failure of another kind": {"about": about(lambda parts: [*parts[:3], [["x"] * 5]])},
+    "a failure elsewhere": {"about": about(lambda parts: [*parts[:3], [[7, 0, 0, "", False]]])},
+    "no time": {"about": about(lambda parts: [*parts[:2], "x", []])},
+    "no json": {"about": lambda text: np.frombuffer(b"[" * 10**5, np.uint8)},
+}
+
+
+@pytest.mark.parametrize("forged", FORGED)
+def test_wrong_content_under_a_right_digest_is_damage(tmp_path, run, forged):
+    folder = tmp_path / "run"
+    shutil.copytree(run, folder)
+    whole = st.open_run(run).dataset()
+    resealed(folder, **FORGED[forged])
+    (damage,) = st.open_run(folder).status().damaged
+    assert "fit the study" in damage or "no chunk" in damage
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        again = st.Study.from_dict(STUDY).run(out=folder, workers=1, progress=False)
+    assert again.identical(whole)
+
+
+# -- NetCDF --------------------------------------------------------------------------------------
+
+
+def hdf5(path, **datasets):
+    """A file with a variable that holds what each is given, or is made as a function has it."""
+    with h5py.File(path, "w") as file:
+        for name, given in datasets.items():
+            made = given(file) if callable(given) else file.create_dataset(name, data=given)
+            if made is not None:
+                made.attrs["units"] = "MPa"
+
+
+def outside(file):
+    return file.create_dataset("strength", (8,), "u1", external=[("secret", 0, 8)])
+
+
+def virtual(file):
+    layout = h5py.VirtualLayout((8,), "u1")
+    layout[:] = h5py.VirtualSource("other.nc", "strength", (8,))
+    return file.create_virtual_dataset("strength", layout)
+
+
+def link(kind, *place):
+    def made(file):
+        file.create_group("deep")[f"{kind.__name__}"] = kind(*place)
+        file["strength"] = kind(*place)
+
+    return made
+
+
+def inflating(file):
+    """A chunk of eight values that unpacks to 64 MB."""
+    made = file.create_dataset("strength", (8,), "f8", chunks=(8,), compression="gzip")
+    made.id.write_direct_chunk((0,), zlib.compress(bytes(2**26), 9))
+    return made
+
+
+def texts(file):
+    made = file.create_dataset("strength", data=np.ones(8))
+    made.attrs["list"] = ["long" * 2**10] * 100
+    return made
+
+
+NETCDF_ATTACKS = {
+    "external storage": ("another file", outside),
+    "virtual": ("another file", virtual),
+    "external link": ("is a link", link(h5py.ExternalLink, "other.nc", "strength")),
+    "soft link": ("is a link", link(h5py.SoftLink, "/elsewhere")),
+    "many values": ("more than the limit", lambda file: file.create_dataset(
+        "strength", (2**40,), "f8", chunks=(2**20,), compression="gzip")),
+    "large chunks": ("more than the limit", lambda file: file.create_dataset(
+        "strength", (8,), "f8", maxshape=(None,), chunks=(2**26,), compression="gzip")),
+    "large values of a small chunk": ("another size than its chunks", inflating),
+    "another filter": ("unusual way", lambda file: file.create_dataset(
+        "strength", (8,), "f8", compression="lzf")),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("attack", NETCDF_ATTACKS)
+def test_a_profile_holds_its_own_numbers(tmp_path, attack, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("secret").write_bytes(b"not for you")
+    hdf5("other.nc", strength=np.arange(1.0, 9.0))
+    assert st.read_profile("other.nc").values.tolist() == [1e6 * i for i in range(1, 9)]
+    words, made = NETCDF_ATTACKS[attack]
+    hdf5("p.nc", strength=made)
+    refuses(words, lambda: st.read_profile("p.nc"))
+
+
+def test_lists_of_texts_in_netcdf_are_not_read(tmp_path):
+    """They may name one long text many times."""
+    hdf5(tmp_path / "p.nc", strength=texts)
+    assert "list" not in read_netcdf((tmp_path / "p.nc").read_bytes()).strength.attrs
+
+
+def test_netcdf_is_read_as_by_its_own_library(tmp_path):
+    """Dimensions, packed and missing values, groups, classic files."""
+    chance = np.random.default_rng(0)
+    data = xr.Dataset(
+        {"a": (("x", "y"), chance.random((9, 4)), {"units": "MPa"}), "n": ("x", np.arange(9))},
+        {"x": chance.random(9), "y": np.arange(4.0), "t": ("x", chance.random(9))},
+        {"title": "µ", "number": 3, "list": [1.0, 2.0]},
+    )
+    data["a"][3, 1] = np.nan
+    packed = {"dtype": "i2", "scale_factor": 1e-4, "_FillValue": -1}
+    zipped_ = {"zlib": True, "shuffle": True, "chunksizes": (4, 3)}
+    for number, options in enumerate([
+        {}, {"encoding": {"a": packed | zipped_}}, {"format": "NETCDF3_64BIT"},
+        {"encoding": {"a": zipped_ | {"fletcher32": True}}, "unlimited_dims": ["x"]},
+    ]):  # fmt: skip
+        path = tmp_path / f"{number}.nc"
+        data.to_netcdf(path, engine="netcdf4", **options)
+        with xr.open_dataset(path, engine="netcdf4") as expected:
+            xr.testing.assert_identical(read_netcdf(path.read_bytes()), expected.load())
+
+
+# -- the rest ------------------------------------------------------------------------------------
+
+
+def test_a_workbook_is_looked_at_before_its_cells_are_kept(tmp_path):
+    book = openpyxl.Workbook()
+    book.active["A1"], book.active["XFD1048576"] = 1, 1
+    book.save(tmp_path / "far.xlsx")
+    refuses("cells for its size", lambda: st.read_profile(tmp_path / "far.xlsx"))
+    parts = {
+        "xl/worksheets/sheet1.xml": b"<row><c><v>1</v></c></row>" * 2**20,
+        "xl/styles.xml": b"<xf/>" * 2**20,
+    }
+    for name, content in parts.items():
+        with zipfile.ZipFile(tmp_path / "p.xlsx", "w", zipfile.ZIP_DEFLATED) as packed:
+            packed.writestr(name, content)
+        refuses("would unpack", lambda: st.read_profile(tmp_path / "p.xlsx"))
+
+
+def test_a_file_that_is_written_again_keeps_its_permissions(tmp_path):
+    path = tmp_path / "result.csv"
+    path.write_text("")
+    for mode in (0o600, 0o644):
+        path.chmod(mode)
+        files.write_whole(path, lambda aside, mode=mode: _noted(aside, mode))
+        assert stat.S_IMODE(path.stat().st_mode) == mode
+
+
+def _noted(aside, mode):
+    assert stat.S_IMODE(aside.stat().st_mode) == mode
+    aside.write_text("new")
+
+
+def test_a_failure_is_printed_without_escapes():
+    assert "\x1b" not in str(batches.Failure(0, 1, 2, "\x1b[2Jnice"))
+
+
+def test_a_study_names_no_folder_to_write_to(tmp_path):
+    (tmp_path / "study.toml").write_text(tomli_w.dumps(STUDY | {"save": {"to": "/tmp/x"}}))
+    for read in (st.Study.from_toml, read_setup):
+        refuses("save.to", lambda read=read: read(tmp_path / "study.toml"))
+
+
+def test_check_lists_files_outside(tmp_path, command):
+    (tmp_path / "inside").mkdir()
+    study = small_study(64)
+    study["problem"]["load"] = {"profile": "../p.npy", "initial_stress": "q.npy"}
+    np.save(tmp_path / "p.npy", np.ones(64))
+    np.save(tmp_path / "inside" / "q.npy", np.zeros(64))
+    (tmp_path / "inside" / "study.toml").write_text(tomli_w.dumps(study))
+    code, said, errors = command("check", tmp_path / "inside" / "study.toml")
+    assert code == 0, errors
+    assert [line.split()[-1] for line in said.splitlines() if "file outside" in line] == [
+        str(tmp_path / "p.npy")
+    ]
+
+
+def test_the_current_folder_has_no_style_of_figures(tmp_path, run, monkeypatch, command):
+    (tmp_path / "matplotlibrc").write_text("text.usetex: True\nbackend: module://nothing\n")
+    monkeypatch.chdir(tmp_path)
+    with matplotlib.rc_context(fname="matplotlibrc"):
+        monkeypatch.setattr(
+            matplotlib, "matplotlib_fname", lambda: str(tmp_path / "matplotlibrc")
+        )
+        code, _, errors = command("report", run, "--out", tmp_path / "report.html")
+    assert code == 0, errors
+    assert "matplotlibrc: this file" in errors

@@ -169,8 +169,9 @@ def _values(dataset: Any) -> Any:
             if filters[number] == DEFLATE:
                 data = zlib.decompressobj().decompress(data, size + 5)
             elif filters[number] == SHUFFLE:
-                bytewise = np.frombuffer(data, np.uint8)
-                data = bytewise.reshape(dataset.dtype.itemsize, -1).T.tobytes()
+                end = len(data) // dataset.dtype.itemsize * dataset.dtype.itemsize
+                bytewise = np.frombuffer(data[:end], np.uint8)
+                data = bytewise.reshape(dataset.dtype.itemsize, -1).T.tobytes() + data[end:]
             else:  # the checksum, of four bytes, is for HDF5 itself
                 data = data[:-4]
         if len(data) != size:

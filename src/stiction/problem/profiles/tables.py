@@ -164,9 +164,13 @@ def _read_image(path: Path) -> Array:
     """Return the grey values of an image, (nx, ny); y rises from its lowest line."""
     from PIL import Image
 
+    content = content_of(path)
     try:
-        with Image.open(io.BytesIO(content_of(path)), formats=("PNG", "TIFF")) as image:
+        with Image.open(io.BytesIO(content), formats=("PNG", "TIFF")) as image:
+            check_unpacked(image.width * image.height, content, MAX_CELLS, 1)
             grey = np.asarray(image)
+    except InputError:
+        raise
     except Exception as error:  # the library lets through whatever a broken file leads to
         raise InputError(f"is not an image: {error}") from None
     if grey.ndim != 2 or grey.dtype.kind not in "fiu":
