@@ -127,7 +127,7 @@ def assert_pushed(length, height, nu, plane, low, high, atol):
         assert response.drive_stiffness * travel == pytest.approx(1.0, rel=1e-6)
         np.testing.assert_allclose(response.shear, profile / profile.mean(), atol=atol)
         assert response.shear.min() > 0.0
-        assert response.error < 1e-12
+        assert response.error < 1e-8
 
 
 PUSHES = {
@@ -138,7 +138,13 @@ PUSHES = {
 }
 
 
-@pytest.mark.parametrize("name", PUSHES)
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    "name",
+    [*list(PUSHES)[:2], *(pytest.param(name, marks=SLOW) for name in list(PUSHES)[2:])],
+)
 def test_a_pusher(name):
     height, nu, plane, low, high, atol = PUSHES[name]
     assert_pushed(1.0, height, nu, plane, low * height, high * height, atol)
@@ -182,7 +188,11 @@ def assert_glued(length, height, nu, plane):
 
 @pytest.mark.parametrize(
     ("height", "nu", "plane"),
-    [(0.5, 0.35, "stress"), (1.7, 0.0, "strain"), (0.2, 0.45, "strain")],
+    [
+        (0.5, 0.35, "stress"),
+        pytest.param(1.7, 0.0, "strain", marks=SLOW),
+        pytest.param(0.2, 0.45, "strain", marks=SLOW),
+    ],
 )
 def test_a_glued_top(height, nu, plane):
     assert_glued(1.0, height, nu, plane)

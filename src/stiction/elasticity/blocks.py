@@ -25,7 +25,7 @@ Algorithm
        K = K_rollers + A G^-1 A'/2,    q = A G^-1 1 L/C,    C = 1' G^-1 1
 
    for a platen that is held; take off the stress of its motion at a given force (`_glued`).
-5. Do steps 2 to 4 with less resolution, too: the largest change is the `error`.
+5. Repeat steps 2 to 4 with a coarser resolution. The largest change is the `error`.
 
 Mode III has closed forms throughout.
 """
@@ -50,13 +50,12 @@ class Resolution(NamedTuple):
     """How finely the response is computed."""
 
     max_decay: float  # harmonics beyond exp(-max_decay) are left out
-    step: float  # of the points of a glued top
+    step: float  # between the points of a glued top
+    quadrature_rtol: float  # of the compliance below a pusher
 
 
-FINE, COARSE = Resolution(40.0, 0.28), Resolution(26.0, 0.42)
-"""Resolution of the response, and another one to measure the error."""
-QUADRATURE_RTOL = 1e-11
-"""Relative error of the compliance below a pusher."""
+RESOLUTION, COARSER_RESOLUTION = Resolution(40.0, 0.28, 1e-11), Resolution(26.0, 0.42, 1e-6)
+"""Resolution of the response, and a coarser one to measure the error."""
 LATTICE_CORRECTION = 1.0 / 12.0
 """Half of the 1/6 with which the symbol would be right to fourth order.
 
@@ -109,12 +108,13 @@ def block_response(
     rollers (in mode III it is free).
     """
     with one_blas_thread():
-        if kappa is None:
-            return _anti_plane(length, nodes, height, modulus, pushes)
         response, coarse = (
-            _in_plane(length, nodes, height, modulus, kappa, pushes, resolution)
-            for resolution in (FINE, COARSE)
+            _anti_plane(length, nodes, height, modulus, pushes, resolution)
+            if kappa is None
+            else _in_plane(length, nodes, height, modulus, kappa, pushes, resolution)
+            for resolution in (RESOLUTION, COARSER_RESOLUTION)
         )
+    # Step 5.
     changes = (
         (response.stiffness - coarse.stiffness) / response.stiffness.diagonal().min(),
         response.shear - coarse.shear,
@@ -135,15 +135,15 @@ def _in_plane(
     spacing = length / nodes
     harmonics = Harmonics(length, height, resolution.max_decay)
     effective = 4.0 * modulus / (kappa + 1.0)
-    stiffness = stiffness_between_ends(nodes, spacing, effective)
-    stiffness += spacing * _rollers_correction(harmonics, effective, nodes)
-    if pushes is None:
+    stiffness = stiffness_between_ends(nodes, spacing, effective)  # step 1
+    stiffness += spacing * _rollers_correction(harmonics, effective, nodes)  # step 2
+    if pushes is not None:  # step 3
+        shear, compliance = _pushed(harmonics, pushes, nodes, resolution)
+        drive = 2.0 * effective / compliance
+    else:  # step 4
         top = GluedTop(harmonics, modulus, kappa, resolution.step)
         addition, shear, drive = _glued(top, nodes)
         stiffness += addition
-    else:
-        shear, compliance = _pushed(harmonics, pushes, nodes)
-        drive = 2.0 * effective / compliance
     # The discretised stress of a uniform slip, 1e-7 of the diagonal.
     stiffness[np.diag_indices(nodes)] -= stiffness.sum(axis=1)
     return BlockResponse(stiffness, shear / shear.mean(), drive)
@@ -184,7 +184,9 @@ def _glued(top: GluedTop, nodes: int) -> tuple[Array, Array, float]:
     return 0.5 * (addition + addition.T), shear, float(top.step * tractions[:, 0].sum())
 
 
-def _pushed(harmonics: Harmonics, pushes: Pushes, nodes: int) -> tuple[Array, float]:
+def _pushed(
+    harmonics: Harmonics, pushes: Pushes, nodes: int, resolution: Resolution
+) -> tuple[Array, float]:
     """Return the shear stress of a force of 1 N/m and 2 G* times the travel, of a pushed block.
 
     The push has the harmonics 2/H `mean_sine`, and phi = mean_sine 2/H/k² at the clamp.
@@ -199,13 +201,13 @@ def _pushed(harmonics: Harmonics, pushes: Pushes, nodes: int) -> tuple[Array, fl
     stress = 2.0 / height * (x * ends.real / (high - low) - waves)
     at_ends = harmonics.solutions(THIRD, np.array([0.0, length]))
     share = 2.0 * mean_sine**2 / k
-    near = 4.0 * _mean_logarithm(harmonics, low, high)
+    near = 4.0 * _mean_logarithm(harmonics, low, high, resolution.quadrature_rtol)
     near += float(np.einsum("mi,mi,m->", at_ends[:, 0], remainder, share))
     far = float(np.einsum("mi,mi,m->", at_ends[:, 1], harmonics.raised, share))
     return _of_sides(pushes, stress, near / height, far / height)
 
 
-def _mean_logarithm(harmonics: Harmonics, low: float, high: float) -> float:
+def _mean_logarithm(harmonics: Harmonics, low: float, high: float, rtol: float) -> float:
     """Return the sum over k of the squared mean of sin(k y) over low < y < high, over k.
 
     It is a double integral of logarithms of y - y' and of y + y', hence a single one of each.
@@ -217,9 +219,7 @@ def _mean_logarithm(harmonics: Harmonics, low: float, high: float) -> float:
         logarithms = harmonics.sums(1j * angles).inverse.real
         return float((width - apart) * (logarithms @ [1.0, -0.5, -0.5]))
 
-    integral, _ = scipy.integrate.quad(
-        integrand, 0.0, width, epsabs=0.0, epsrel=QUADRATURE_RTOL
-    )
+    integral, _ = scipy.integrate.quad(integrand, 0.0, width, epsabs=0.0, epsrel=rtol)
     return float(integral) / width**2
 
 
@@ -241,8 +241,8 @@ def glued_pressure(length: float, nodes: int, height: float, kappa: float) -> Ar
     takes the shear traction, without a resultant, that takes this back.
     """
     with one_blas_thread():
-        harmonics = Harmonics(length, height, FINE.max_decay, pressed=True)
-        top = GluedTop(harmonics, 1.0, kappa, FINE.step)
+        harmonics = Harmonics(length, height, RESOLUTION.max_decay, pressed=True)
+        top = GluedTop(harmonics, 1.0, kappa, RESOLUTION.step)
         wider = (3.0 - kappa) / 16.0 * (top.x - top.to_right)
         shifted, narrowed = top.solve(np.column_stack([np.ones(top.x.size), -wider])).T
         traction = narrowed - narrowed.sum() / shifted.sum() * shifted
@@ -254,12 +254,17 @@ def glued_pressure(length: float, nodes: int, height: float, kappa: float) -> Ar
 
 
 def _anti_plane(
-    length: float, nodes: int, height: float, modulus: float, pushes: Pushes | None
+    length: float,
+    nodes: int,
+    height: float,
+    modulus: float,
+    pushes: Pushes | None,
+    resolution: Resolution,
 ) -> BlockResponse:
     """Return the response in mode III: cosines on the interface, sines on the sides.
 
-    K has the symbol (G/2) k coth(k H) below a platen, which is free of k = 0 under a given force,
-    and (G/2) k tanh(k H) below a free top.
+    K has the symbol (G/2) k coth(k H) below a platen, without k = 0 at a given force, and
+    (G/2) k tanh(k H) below a free top. The harmonics of a push are those of mode II on rollers.
     """
     spacing = length / nodes
     k = np.pi / length * np.arange(1, nodes)
@@ -269,7 +274,7 @@ def _anti_plane(
     stiffness = (cosines * (0.5 * modulus * symbol)) @ cosines.T
     if pushes is None:
         return BlockResponse(stiffness, np.ones(nodes), modulus * length / height)
-    harmonics = Harmonics(length, height, FINE.max_decay)
+    harmonics = Harmonics(length, height, resolution.max_decay)
     k, x = harmonics.k, (np.arange(nodes) + 0.5) * spacing
     low, high = pushes.edges(height)
     mean_sine = (np.cos(k * low) - np.cos(k * high)) / (k * (high - low))
@@ -279,9 +284,8 @@ def _anti_plane(
     waves = np.exp(-np.outer(2.0 * length + x, k)) + np.exp(-np.outer(2.0 * length - x, k))
     stress = 2.0 / height * (ends.real / (high - low) + waves @ (mean_sine / once))
     share = mean_sine**2 / (k * once)
-    near = _mean_logarithm(harmonics, low, high) + 2.0 * float(
-        share @ np.exp(-2.0 * k * length)
-    )
+    near = _mean_logarithm(harmonics, low, high, resolution.quadrature_rtol)
+    near += 2.0 * float(share @ np.exp(-2.0 * k * length))
     far = 2.0 * float(share @ np.exp(-k * length))
     shear, travel = _of_sides(pushes, stress, 2.0 / height * near, 2.0 / height * far)
     return BlockResponse(stiffness, shear / shear.mean(), modulus / travel)
@@ -302,7 +306,7 @@ def lattice_symbol(angle: Array) -> Array:
 def lattice_entries(count: int) -> Array:
     """Return the entries of `lattice_symbol` at distances 0, ..., count - 1 on an endless line.
 
-    Those of 2 s are -1/(pi (j² - 1/4)); s² is -1/4, 1/2, -1/4.
+    2 s has the entries -1/(pi (j² - 1/4)), and s² has 1/2 at distance 0 and -1/4 at distance 1.
     """
     j = np.arange(-1.0, count + 1.0)
     entries = -1.0 / (np.pi * (j * j - 0.25))

@@ -1,12 +1,12 @@
 """Two blocks behind the machine that drives them: stiffness, shear profile, travel and force.
 
-Per block, drive and machine are springs in series. With F the force per unit depth, U the travel
-of the drive, X that of the machine's far end and k the machine's stiffness,
+The block with its drive and the machine are springs in series. With the force F per unit depth, the
+travel U of the drive, the travel X of the machine's far end and the stiffness k of the machine,
 
-    F = k (X - U),    U = F/C + (dx/2L) <q, d>,
+    F = k (X - U),    U = F/C + (dx/2L) <q, d>.
 
-the second by reciprocity: C is the block's stiffness against its drive where nothing slips, and
-slip d at the interface moves the drive by its average with q. Eliminating U,
+The second equation is Betti's theorem: C is the stiffness of the block against its drive if nothing
+slips, and slip d at the interface moves the drive by its average with q. Without U they read
 
     tau = D q - K d,   D = k C X/((k + C) L),   K = K_dead + h/n q q^T,   F/L = D - h <q, d>/n,
 
@@ -24,8 +24,8 @@ from stiction.base.arrays import Array
 from stiction.elasticity.blocks import Pushes, block_response, glued_pressure
 from stiction.elasticity.protocol import DenseEntries, HalfSpaces, Windows
 
-FINEST = 32
-"""Windows that begin within the length of one, at most: weighted means change little between."""
+MAX_WINDOWS_PER_WIDTH = 32
+"""Windows that begin within the width of a window: weighted means change little between them."""
 POSITIVE_RTOL = 1e-12
 """Share of the diagonal up to which a positive entry of K beside it is round-off."""
 MIN_SHEAR = 1e-9
@@ -38,8 +38,8 @@ class Driven:
 
     stiffness: Array  # (n, n): K, Pa/m
     shear: Array  # (n,): q, of mean one
-    pressure: Array  # (n,): that of the normal load over its mean
-    relief: float  # h, Pa/m: how much stress the mean of q d takes off the drive
+    pressure: Array  # (n,): pressure of the normal load over its mean
+    relief: float  # h, Pa/m: stress that the mean of q d takes off the drive
     drive_stiffness: float  # C, Pa
     error: float  # to which the entries of K are known, Pa/m
     half_spaces: ClassVar[HalfSpaces | None] = None
@@ -51,21 +51,18 @@ class Driven:
 
     @cached_property
     def positive(self) -> float:
-        """Largest positive entry of K off its diagonal, as a share of the diagonal; 0 for none.
-
-        None, if it is within the error.
-        """
+        """Largest positive entry of K off its diagonal, over the diagonal; 0 within the error."""
         off = self.stiffness - np.diag(np.diag(self.stiffness))
         diagonal, most = float(np.diag(self.stiffness).min()), float(off.max())
         return most / diagonal if most > max(self.error, POSITIVE_RTOL * diagonal) else 0.0
 
     def mean_relief(self, slip: Array) -> Array:
-        """Return h <q, d>/n: by how much slip (..., n) lowers the mean stress, Pa."""
+        """Return h <q, d>/n, the stress that slip (..., n) takes off the mean stress, Pa."""
         mean: Array = self.relief * (slip * self.shear).mean(axis=-1)
         return mean
 
     def windows(self, low: float, high: float) -> Windows:
-        """Return the windows at the lowest of weakening rates, Pa/m; each has its place."""
+        """Return the windows at the lowest of the weakening rates, Pa/m, with their places."""
         return _windows_at(self, low)
 
     def travel(self, force: Any, slip: Array) -> Any:
@@ -83,8 +80,8 @@ def _unstable(matrix: Array, rate: float, begin: int, end: int) -> bool:
 def shortest_runs(matrix: Array, rate: float) -> list[tuple[int, int]]:
     """Return first node and end of the shortest unstable runs of K (n, n) at a rate, Pa/m.
 
-    Blocks of K inside others have larger eigenvalues: the shortest run that begins at a node ends
-    the further on the later it begins.
+    The least eigenvalue of a block of K rises if the block shrinks. The later a shortest run
+    begins, the later it ends, so that one pass over the nodes finds all of them.
     """
     n, runs = len(matrix), []
     begin, end, step = 0, 1, 1
@@ -98,7 +95,7 @@ def shortest_runs(matrix: Array, rate: float) -> list[tuple[int, int]]:
             break
         if unstable:
             runs.append((begin, end))
-            step = max(1, (end - begin) // FINEST)
+            step = max(1, (end - begin) // MAX_WINDOWS_PER_WIDTH)
             begin, end = begin + step, end + step
         else:  # the last run ends with the specimen
             begin, end, step = begin - step + 1, n, 1
@@ -132,9 +129,9 @@ def driven(
     glued: bool,
     machine: float,
 ) -> Driven:
-    """Return the response of blocks behind a machine; `block_response` explains what it takes.
+    """Return the response of blocks behind a machine, with the arguments of `block_response`.
 
-    The pressure is not uniform if they are pressed `glued`; `machine` is the stiffness of the
+    The pressure is not uniform if the blocks are pressed `glued`. `machine` is the stiffness of the
     machine per unit depth, Pa, as one block sees it.
     """
     kind = None if anti_plane else kappa

@@ -40,11 +40,11 @@ class Platen:
     Parameters
     ----------
     stiffness : float
-        Of the machine, N/m between the grips of the two blocks: 0 is dead load (the force is
-        controlled), ``float("inf")`` a rigid machine (the travel is controlled).
+        Stiffness of the machine between the grips of the two blocks, N/m. 0 is dead load (the force
+        is controlled), ``float("inf")`` a rigid machine (the travel is controlled).
     mass : float
-        Of what moves with one block, the platen and its grip, kg. It counts in ruptures with
-        inertia only; 0, the default, leaves it out.
+        Mass of the platen and the grip that move with one block, kg. It counts in ruptures with
+        inertia only. The default, 0, leaves it out.
     """
 
     stiffness: Stiffness = 0.0
@@ -59,16 +59,17 @@ class Pusher:
     Parameters
     ----------
     height : float
-        Of the middle of the pusher above the interface, m.
+        Height of the middle of the pusher above the interface, m. The pusher may be anywhere on the
+        side, up to the top and down to the interface.
     width : float
-        Over which it pushes, m.
+        Extent of the pusher along the side, m.
     side : {"left", "right", "both"}
-        The trailing side, from which slip is driven. On both sides, each takes half: the shear of a
-        lap joint, whose bending and change of pressure are not modelled.
+        The trailing side, from which slip is driven. Pushers on both sides take half of the force
+        each: the shear of a lap joint, whose bending and change of pressure are not modelled.
     stiffness : float
-        Of the machine, N/m between the grips of the two blocks; see `Platen`.
+        Stiffness of the machine between the grips of the two blocks, N/m (see `Platen`).
     mass : float
-        Of what moves with the pushers of one block, kg; see `Platen`.
+        Mass that moves with the pushers of one block, kg (see `Platen`).
     """
 
     height: Positive
@@ -95,7 +96,7 @@ class Blocks:
     Parameters
     ----------
     height : float
-        Of each block, m; its length is that of the interface.
+        Height of each block, m. Its length is the length of the interface.
     thickness : float, optional
         Depth, m: turns stresses into forces, N. A machine of finite stiffness needs it.
     drive : Platen or Pusher
