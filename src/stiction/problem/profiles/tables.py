@@ -210,7 +210,15 @@ def read_table(path: Path, options: Options = Options()) -> xr.Dataset:  # noqa:
         "lines": table.lines, "blocks": table.blocks,
         "comments": grid.comments, "headed": any({*row.cells} - {"", "-"} for row in table.header),
     }  # fmt: skip
-    return _labelled([*table.columns], _headings(table.header, width), table.texts, attributes)
+    headings = _headings(table.header, width)
+    for number, (_, about) in enumerate(headings[1:], 1):  # the first may be an index
+        unnamed = attributes["headed"] and not about["heading"]
+        if unnamed and not np.isnan(table.columns[number]).all():
+            raise InputError(
+                f"column {number} has numbers, such as in line {table.lines[0]}, but no heading; if"
+                " commas mark thousands, separate columns with ';'"
+            )
+    return _labelled([*table.columns], headings, table.texts, attributes)
 
 
 def table_of_frame(frame: Any) -> xr.Dataset:

@@ -1,0 +1,150 @@
+"""One table in many dialects: read to the same numbers, or refused, but never to other numbers."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as strategies
+
+import stiction as st
+from stiction.problem.profiles import tables
+
+LENGTHS = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "um": 1e-6, "microns": 1e-6, "Millimeter": 1e-3}
+STRESSES = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "N/mm²": 1e6, "Megapascal": 1e6, "bar": 1e5}
+HEADINGS = {  # of a name and a unit, if there is one
+    "brackets": lambda name, unit: f"{name} [{unit}]",
+    "round": lambda name, unit: f"{name} ({unit})",
+    "slash": lambda name, unit: f"{name} / {unit}",
+    "in": lambda name, unit: f"{name} in {unit}",
+    "below": lambda name, unit: name,
+}
+GAPS = ("", "-", "NaN", "n/a", "***", "#N/A")
+BEFORE = ([], ["Scan 7"], ["Operator: A. Muster", ""], ["# made by a machine"], [""])
+NAMES = (("x", "strength"), ("Position", "tau_p"), ("pos", "peak_strength"))
+
+
+@strategies.composite
+def dialects(draw):
+    """How a table is written, all that may differ between two laboratories."""
+    choose = lambda *options: draw(strategies.sampled_from(options))  # noqa: E731
+    return {
+        "separator": choose(";", "\t", ",", " ", "   "),
+        "mark": choose(".", ","),
+        "thousands": choose("", "", "", ".", ",", "'", " ", "\N{NARROW NO-BREAK SPACE}"),
+        "digits": choose(0, 1, 3, 6),
+        "encoding": choose("utf-8", "utf-8-sig", "cp1252", "utf-16"),
+        "heading": choose(*HEADINGS),
+        "names": choose(*NAMES),
+        "units": (choose(*LENGTHS), choose(*STRESSES)),
+        "order": choose("rising", "falling", "shuffled"),
+        "gap": choose(None, *GAPS),
+        "before": choose(*BEFORE),
+        "index": choose(False, False, True),
+        "end": choose("\n", "\r\n"),
+        "trailing": choose(0, 0, 2),
+        "blank": choose(False, True),
+        "exponent": choose(False, False, True),
+    }
+
+
+def number_in(value, dialect):
+    """Return a number as this laboratory writes it, and what it then is."""
+    text = f"{value:.{dialect['digits']}e}" if dialect["exponent"] else (
+        f"{value:,.{dialect['digits']}f}"
+    )  # fmt: skip
+    known = float(text.replace(",", ""))
+    text = text.replace(",", "\0").replace(".", dialect["mark"])
+    return text.replace("\0", dialect["thousands"]), known
+
+
+def written(dialect, x, values):
+    """Return the text of a table, and what is in it in SI: x, values."""
+    separator, (x_unit, unit) = dialect["separator"], dialect["units"]
+    scales = LENGTHS[x_unit], STRESSES[unit]
+    shuffled = np.random.default_rng(0).permutation(x.size)
+    rising = np.arange(x.size)
+    order = {"rising": rising, "falling": rising[::-1], "shuffled": shuffled}[dialect["order"]]
+    head = [
+        HEADINGS[dialect["heading"]](name, text)
+        for name, text in zip(dialect["names"], dialect["units"], strict=True)
+    ]
+    rows, known = [], []
+    for place, i in enumerate(order):
+        cells, numbers = [], []
+        for value, scale in zip((x[i], values[i]), scales, strict=True):
+            text, number = number_in(value / scale, dialect)
+            cells.append(text)
+            numbers.append(number * scale)
+        if dialect["gap"] is not None and place == 3:
+            cells[1], numbers[1] = dialect["gap"], np.nan
+        known.append(numbers)
+        rows.append(([str(place)] if dialect["index"] else []) + cells)
+    index = [""] * dialect["index"]
+    lines = [index + head]
+    if dialect["heading"] == "below":
+        lines.append(index + list(dialect["units"]))
+    if dialect["blank"]:
+        lines.append([""] * len(rows[0]))
+    text = [separator.join(cells) + separator * dialect["trailing"] for cells in lines + rows]
+    return dialect["end"].join([*dialect["before"], *text, ""]), np.array(known)
+
+
+def is_same_or_refused(path, dialect, x, values, **options):
+    """Whether a file was read: to the numbers that were written, or not at all."""
+    text, known = written(dialect, x, values)
+    try:
+        content = text.encode(dialect["encoding"])
+    except UnicodeEncodeError:
+        return None
+    path.write_bytes(content)
+    try:
+        profile = st.read_profile(path, **options)
+    except st.InputError:
+        return False
+    known = known[np.argsort(known[:, 0], kind="stable")]
+    np.testing.assert_allclose(profile.x, known[:, 0], rtol=1e-12, err_msg=text[:300])
+    np.testing.assert_allclose(profile.values, known[:, 1], rtol=1e-12, err_msg=text[:300])
+    return True
+
+
+X = np.linspace(0.0, 0.0317, 9)
+VALUES = np.array([0.98, 1.0205, 1.5, 2.25, 1.234, 1.111, 1.0, 0.999, 3.1]) * 1e6
+
+
+@settings(max_examples=400, deadline=None)
+@given(dialect=dialects())
+def test_a_table_in_any_dialect(tmp_path_factory, dialect):
+    """Numbers are the same, or the file is refused: also where a mark may be one of thousands."""
+    path = tmp_path_factory.getbasetemp() / "dialect.csv"
+    for values in (VALUES, np.round(VALUES, -3)):
+        is_same_or_refused(path, dialect, X, values)
+
+
+@pytest.mark.parametrize(
+    ("separator", "mark", "heading"),
+    [
+        (separator, mark, heading)
+        for separator, mark in [(";", ","), ("\t", ","), (",", "."), (" ", ".")]
+        for heading in HEADINGS
+        if separator != " " or heading not in ("slash", "in")  # where blanks separate all words
+    ],
+)
+def test_usual_dialects_are_read(tmp_path, heading, separator, mark, monkeypatch):
+    """None of these may be refused; the same by the reader of large files."""
+    plain = {
+        "separator": separator, "mark": mark, "thousands": "", "digits": 6, "encoding": "utf-8",
+        "heading": heading, "names": NAMES[0], "units": ("mm", "MPa"), "order": "rising",
+        "gap": None, "before": [], "index": False, "end": "\n", "trailing": 0, "blank": False,
+        "exponent": False,
+    }  # fmt: skip
+    variants = [
+        {}, {"order": "shuffled"}, {"before": ["Scan 7"]}, {"encoding": "utf-16"}, {"end": "\r\n"},
+        {"encoding": "cp1252", "units": ("µm", "N/mm²")}, {"gap": "n/a"}, {"exponent": True},
+    ]  # fmt: skip
+    if separator != " ":
+        variants += [{"gap": ""}, {"index": True}, {"trailing": 2}, {"blank": True}]
+    for variant in variants:
+        assert is_same_or_refused(tmp_path / "t.csv", plain | variant, X, VALUES), variant
+    monkeypatch.setattr(tables, "LARGE", 0)
+    monkeypatch.setattr(tables, "HEAD", 120)
+    for variant in variants:
+        assert is_same_or_refused(tmp_path / "t.csv", plain | variant, X, VALUES), variant
