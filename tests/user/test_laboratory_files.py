@@ -1,9 +1,13 @@
 """Files as instruments and spreadsheets write them: the same numbers, or a refusal that helps."""
 
+import struct
+import sys
+
 import numpy as np
 import openpyxl
 import pandas as pd
 import pytest
+from PIL import Image
 from refusals import refuses
 
 import stiction as st
@@ -184,3 +188,47 @@ def test_files_that_cannot_be_read(tmp_path):
         refuses(words, lambda text=text: read(tmp_path, text))
     (tmp_path / "folder.csv").mkdir()
     refuses("is not a regular file", lambda: st.read_profile(tmp_path / "folder.csv"))
+
+
+def test_binary_files_of_instruments(tmp_path, monkeypatch):
+    """ISO 25178-71 (.sdf), written byte by byte, and objects of SurfaceTopography."""
+    surfaces = pytest.importorskip("SurfaceTopography")
+    heights = (
+        np.random.default_rng(0).normal(size=(6, 4)) * 1e-6
+    )  # lines along y, points along x
+    head = struct.pack(
+        "<8s10s12s12sHHddddBBB", b"bISO-1.0", b"test", b"010120260000", b"010120260000",
+        4, 6, 5e-7, 2.5e-7, 1.0, -1.0, 0, 7, 0,
+    )  # fmt: skip
+    path = tmp_path / "scan.sdf"
+    path.write_bytes(head + heights.astype("<f8").tobytes())
+    profile = st.read_profile(path, quantity="height")
+    np.testing.assert_allclose(profile, heights.T, rtol=1e-12)
+    np.testing.assert_allclose(profile.x, 5e-7 * np.arange(4), rtol=1e-12)
+    np.testing.assert_allclose(profile.y, 2.5e-7 * np.arange(6), rtol=1e-12)
+    refuses("holds heights ... strength=", lambda: st.read_profile(path))
+    strength = st.read_profile(path, strength=lambda h: 1e6 + 1e11 * h)
+    np.testing.assert_allclose(strength, 1e6 + 1e11 * heights.T, rtol=1e-12)
+    refuses("one strength for each", lambda: st.read_profile(path, strength=lambda h: h[0]))
+    refuses("must be positive", lambda: st.read_profile(path, strength=lambda h: h))
+    line = surfaces.UniformLineScan(heights[0] * 1e6, 2.0, unit="µm")
+    read_line = st.read_profile(line, quantity="height")
+    np.testing.assert_allclose(read_line, heights[0], rtol=1e-12)
+    np.testing.assert_allclose(read_line.x, 5e-7 * np.arange(4), rtol=1e-12)
+    path.with_suffix(".sur").write_bytes(b"no surface")
+    refuses("is damaged", lambda: st.read_profile(path.with_suffix(".sur"), quantity="height"))
+    monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
+    refuses("stiction[instruments]", lambda: st.read_profile(path, quantity="height"))
+
+
+def test_images_need_a_scale_and_a_map(tmp_path):
+    grey = np.arange(12, dtype=np.uint8).reshape(3, 4)  # lines along y
+    path = tmp_path / "contact.png"
+    Image.fromarray(grey).save(path)
+    refuses("grey values ... strength=", lambda: st.read_profile(path, spacing=1e-6))
+    profile = st.read_profile(path, spacing=(1e-6, 2e-6), strength=lambda g: 1e6 + 1e4 * g)
+    assert profile.sel(x=2e-6, y=4e-6) == 1e6 + 1e4 * grey[2, 2]
+    heights = st.read_profile(path, spacing=1e-6, quantity="height", unit="nm")
+    np.testing.assert_allclose(heights, grey.T * 1e-9, rtol=1e-12)
+    Image.fromarray(np.zeros((3, 4, 3), np.uint8)).save(path)
+    refuses("grey image", lambda: st.read_profile(path, spacing=1e-6, quantity="height"))

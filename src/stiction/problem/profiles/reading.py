@@ -42,7 +42,9 @@ from stiction.problem.interface import Interface
 from stiction.problem.profiles.placing import MEASURED, OF_A_PLANE, Gaps, close_gaps, place
 from stiction.problem.profiles.tables import (
     IMAGES,
+    INSTRUMENTS,
     Options,
+    heights_of,
     load,
     name_and_unit,
     sizes_of,
@@ -122,8 +124,8 @@ def read_profile(
         ``.npy``: shape (nodes,) or (nx, ny). ``.csv``, ``.txt``, ``.dat``, ``.tsv``,
         ``.xlsx``: columns, with or without a line of names such as ``x (mm); strength
         (MPa)``. ``.nc``: variables with `units`, and x as a coordinate. A map is over 'x'
-        and 'y': a table with both as columns, a matrix without headings, or a grey image
-        (``.png``, ``.tif``).
+        and 'y': a table with both as columns, a matrix without headings, a grey image
+        (``.png``, ``.tif``), or a binary file or object that SurfaceTopography reads.
     x, value : str or int, optional
         Name, heading or number (from 0) of the column, coordinate or variable. By default the one
         with such a name (``x``, ``position``; ``strength``, ``tau_p``), the only one in a unit of
@@ -335,6 +337,8 @@ def simplified(value: Any, quantity: str) -> Any:
         return value if whole else in_si(value, quantity, si)
     if hasattr(value, "to_xarray") and hasattr(value, "index"):
         return of_pandas(value)
+    if hasattr(value, "positions_and_heights"):
+        return heights_of(value)
     return plain(value, (si,))[0]
 
 
@@ -436,9 +440,15 @@ def labelled(
     """
     is_file = isinstance(source, str | Path)
     data: Any = load(Path(source), options) if is_file else simplified(source, quantity)
+    is_surface = hasattr(source, "positions_and_heights")
+    if quantity != "height" and (is_surface or (is_file and _ending(source) in INSTRUMENTS)):
+        raise InputError(
+            "holds heights; pass strength= with a map from heights (m) to strengths (Pa), or read"
+            " quantity='height'"
+        )
     if not is_labelled(data):
         data = _of_array(data, source, quantity)
-    if is_file and Path(source).suffix.lower() in IMAGES and not unit:
+    if is_file and _ending(source) in IMAGES and not unit:
         if quantity != "height":
             raise InputError("holds grey values; pass strength= with a map to strengths (Pa)")
         unit = "m"  # the map takes grey values as they are
@@ -481,6 +491,10 @@ def labelled(
             raise InputError(f"{dim} must be finite; entry {entry}{line} is not")
         array = array.assign_coords({dim: (array[dim].dims, place)})
     return array.copy(data=values)
+
+
+def _ending(path: str | Path) -> str:
+    return Path(path).suffix.lower()
 
 
 def _of_array(values: Any, source: Any, quantity: str) -> Any:

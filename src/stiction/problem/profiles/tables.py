@@ -40,6 +40,12 @@ if TYPE_CHECKING:
 
 TEXT, EXCEL, NETCDF = (".csv", ".txt", ".dat", ".tsv", ".asc", ".xyz"), ".xlsx", (".nc", ".nc4")
 IMAGES = (".png", ".tif", ".tiff")
+INSTRUMENTS = (
+    ".sur", ".al3d", ".plu", ".plux", ".opd", ".opdx", ".x3p", ".sdf", ".vk3", ".vk4", ".vk6",
+    ".vk7", ".gwy", ".os3d", ".lext", ".nms", ".zon", ".datx", ".mnt", ".oir", ".frt", ".spm",
+    ".ibw", ".nid",
+)  # fmt: skip
+"""Binary files of profilometers and microscopes, which SurfaceTopography reads."""
 LARGE = 2**19
 """Bytes of a text from which on pandas reads the lines behind the first of them."""
 END = 20
@@ -131,8 +137,10 @@ def load(path: Path, options: Options = Options()) -> xr.Dataset | xr.DataArray:
     if ending == ".npy" or ending in IMAGES:
         array = _read_npy(path) if ending == ".npy" else _read_image(path)
         return xr.DataArray(array, dims=("x", "y")[: array.ndim])
+    if ending in INSTRUMENTS:
+        return _read_instrument(path)
     if ending not in NETCDF:
-        endings = ", ".join((".npy", *TEXT, EXCEL, *NETCDF, *IMAGES))
+        endings = ", ".join((".npy", *TEXT, EXCEL, *NETCDF, *IMAGES, *INSTRUMENTS))
         raise InputError(
             f"must end in {endings}, got {path.name!r}; export text from the instrument"
         )
@@ -160,8 +168,46 @@ def _read_npy(path: Path) -> Array:
     return array
 
 
+def _read_instrument(path: Path) -> xr.DataArray:
+    """Return the heights in a binary file of an instrument."""
+    content = content_of(path)
+    try:
+        from SurfaceTopography import read_topography
+    except ImportError:
+        raise InputError(
+            "needs SurfaceTopography (pip install 'stiction[instruments]'), or export text from the"
+            " instrument"
+        ) from None
+    try:
+        surface = read_topography(io.BytesIO(content))
+    except Exception:  # the library lets through whatever a broken file leads to
+        raise InputError(
+            "is damaged, or of a kind that SurfaceTopography does not read; export text from the"
+            " instrument"
+        ) from None
+    return heights_of(surface)
+
+
+def heights_of(surface: Any) -> xr.DataArray:
+    """Return the heights of an object of SurfaceTopography over x, and y of a map."""
+    import xarray as xr
+
+    *places, heights = surface.positions_and_heights()
+    unit = surface.unit or ""
+    if unit not in ("", None) and parse(unit) is None:
+        with suppress(UnicodeError):  # UTF-8 that the library read as Latin-1
+            unit = unit.encode("latin-1").decode("utf-8")
+    values = np.ma.filled(np.ma.asarray(heights, dtype=np.float64), np.nan)
+    dims = ("x", "y")[: values.ndim]
+    first: Any = [(slice(None), 0), (0, slice(None))] if values.ndim == 2 else [slice(None)]
+    along = [np.asarray(at)[index] for at, index in zip(places, first, strict=True)]
+    attributes = {"units": unit} if unit else {}
+    coords = {dim: (dim, at, attributes) for dim, at in zip(dims, along, strict=True)}
+    return xr.DataArray(values, coords, dims, "height", attributes)
+
+
 def _read_image(path: Path) -> Array:
-    """Return the grey values of an image, (nx, ny); y rises from its lowest line."""
+    """Return the grey values of an image, (nx, ny); its first line is at y = 0."""
     from PIL import Image
 
     content = content_of(path)
@@ -175,7 +221,7 @@ def _read_image(path: Path) -> Array:
         raise InputError(f"is not an image: {error}") from None
     if grey.ndim != 2 or grey.dtype.kind not in "fiu":
         raise InputError(f"must be a grey image, got shape {grey.shape} of {grey.dtype}")
-    return grey[::-1].T.astype(np.float64)
+    return grey.T.astype(np.float64)
 
 
 # -- tables --------------------------------------------------------------------------------------
