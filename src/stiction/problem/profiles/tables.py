@@ -48,6 +48,8 @@ INSTRUMENTS = (
 """Binary files of profilometers and microscopes, which SurfaceTopography reads."""
 LARGE = 2**19
 """Bytes of a text from which on pandas reads the lines behind the first of them."""
+MAX_UNEVEN_BYTES = 2**22
+"""Bytes of a text that pandas cannot read: its cells take a hundred times this memory."""
 END = 20
 """Lines at the end of a text that show what separates its columns."""
 HEAD = 2**16
@@ -243,8 +245,16 @@ def read_table(path: Path, options: Options = Options()) -> xr.Dataset:  # noqa:
         table = _parsed(grid, options)
     else:
         content = content_of(path)
+        if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+            content = _text(content).encode()
         large = _large(content, options) if len(content) > LARGE else None
         if large is None:
+            if len(content) > MAX_UNEVEN_BYTES:
+                raise InputError(
+                    f"has {len(content)} bytes, and its lines are not all of the same kind; files"
+                    f" of more than {MAX_UNEVEN_BYTES} hold no comments, blank lines or remarks"
+                    " between or below the numbers, and the same number of cells in each line"
+                )
             grid = _lines(_text(content), options)
             table = _parsed(grid, options)
         else:
@@ -552,7 +562,7 @@ def _large(content: bytes, options: Options) -> tuple[Grid, Table] | None:
     import pandas as pd
 
     end = content.find(b"\n", HEAD) + 1
-    if content.startswith((b"\xff\xfe", b"\xfe\xff")) or options.decimal or end == 0:
+    if end == 0:
         return None
     with suppress(InputError, UnicodeDecodeError, ValueError):
         grid = _lines(_text(content[:end]), options)
@@ -566,16 +576,19 @@ def _large(content: bytes, options: Options) -> tuple[Grid, Table] | None:
         # From pandas 3 on numbers are read to the last digit without being asked to.
         exact: Any = {"float_precision": "round_trip"} if pd.__version__ < "3" else {}
         words = [w for word in options.words for w in (word, word.upper(), word.title())]
-        if table.mark and not table.texts and even and b"#" not in body and b'"' not in body:
+        whole_numbers = b"." not in body and (separator == "," or b"," not in body)
+        if (table.mark or whole_numbers) and even and b"#" not in body:
+            numeric = [column for column in range(width) if column not in table.texts]
             frame = pd.read_csv(
-                io.BytesIO(body), sep=separator, header=None, decimal=table.mark,
+                io.BytesIO(body), sep=separator, header=None, decimal=table.mark or ".",
                 names=range(width + trailing), index_col=False, keep_default_na=False,
-                na_values=words, skip_blank_lines=False,
+                na_values=words, skip_blank_lines=False, usecols=numeric,
                 encoding="utf-8",
                 **exact,
-            ).iloc[:, :width]  # fmt: skip
+            ).reindex(columns=range(width))  # fmt: skip
             whole = all(kind.kind in "fiu" for kind in frame.dtypes) and len(frame) == lines
-            if whole and not (separator == r"\s+" and frame.isna().to_numpy().any()):
+            blank = separator == r"\s+" and frame[numeric].isna().to_numpy().any()
+            if whole and not blank:
                 first = table.lines[-1] + 1
                 return grid, table._replace(
                     columns=np.hstack([table.columns, frame.to_numpy(np.float64).T]),
