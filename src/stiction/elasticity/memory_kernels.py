@@ -2,39 +2,42 @@
 
 Problem
 -------
-With T = |k| c_s t, the stress that a Fourier mode of slip D and slip rate V transfers along the
-interface between two identical half-spaces is (velocity form, M. S. Breitenfeld and
-P. H. Geubelle, International Journal of Fracture 93, 1998)
+With T = |k| c_s t, the stress that a Fourier mode of slip D and slip rate V transfers along
+the interface between two identical half-spaces is (velocity form, M. S. Breitenfeld and P.
+H. Geubelle, International Journal of Fracture 93, 1998)
 
     F(k, t) = -(G*|k|/2) D(k, t) + (G|k|/2) int_0^t C(|k| c_s t') V(k, t - t') dt'.           (1)
 
-The kernel C follows from the Laplace symbol D(s) of the traction per slip, in units of G|k|/2, with
-s in units of |k| c_s (P. H. Geubelle and J. R. Rice, Journal of the Mechanics and Physics of Solids
-43, 1995): its transform is (D(0) + s - D(s))/s, with D(s) = sqrt(1 + s^2) in mode III, in mode II
+The kernel C follows from the Laplace symbol D(s) of the traction per slip, in units of
+G|k|/2, with s in units of |k| c_s (P. H. Geubelle and J. R. Rice, Journal of the Mechanics
+and Physics of Solids 43, 1995): its transform is (D(0) + s - D(s))/s, with D(s) = sqrt(1 +
+s^2) in mode III, in mode II
 
     [(2 + s^2)^2 - 4 sqrt(1 + s^2) sqrt(1 + s^2/eta^2)] / (s^2 sqrt(1 + s^2)), eta = c_d/c_s. (2)
 
-Wanted are few pairs of poles s_p and weights w_p with C(T) = Re sum_p w_p exp(s_p T) to a tolerance
-on 0 <= T <= `T_MAX`: they turn the convolution with the whole history into one recursion a pair.
+Wanted are few pairs of poles s_p and weights w_p with C(T) = Re sum_p w_p exp(s_p T) to a
+tolerance on 0 <= T <= `T_MAX`: they turn the convolution with the whole history into one
+recursion a pair.
 
 Steps (`fit_exponentials`)
 --------------------------
-1. Take the inverse transform along arcs in Re s < 0 that join the branch points -i a and i a, a = 1
-   and eta. The integrand is smooth there and decays, so that one set of tanh-sinh nodes
-   (H. Takahasi and M. Mori, 1974) is accurate for every T (`arc_quadrature`). The closed forms by
-   Bessel functions cancel badly beyond T of 7. This already is a sum of exponentials, of some 280
-   terms.
-2. Shorten it by balanced truncation (B. C. Moore, IEEE Transactions on Automatic Control 26, 1981).
-   Its Gramians are Cauchy matrices, factorised to high relative accuracy as in J. Demmel (1999).
-   All poles are damped by a common decay before, which is taken away again afterwards
-   (`balanced_truncation`).
-3. Polish the poles by variable projection: they move by Levenberg-Marquardt, and the weights
-   follow by linear least squares (G. H. Golub and V. Pereyra, SIAM Journal on Numerical Analysis
-   10, 1973).
-4. Level the error: raise the emphasis of times where it is large, in the way of C. L. Lawson
-   (1961), and polish again (`_attempt`).
-5. Accept the fit only if its error on another, denser set of times is below the tolerance, and
-   nothing in it cancels (`_acceptable`). Otherwise try another common decay, then a pair more.
+1. Take the inverse transform along arcs in Re s < 0 that join the branch points -i a and i
+   a, a = 1 and eta. The integrand is smooth there and decays, so that one set of tanh-sinh
+   nodes (H. Takahasi and M. Mori, 1974) is accurate for every T (`arc_quadrature`). The
+   closed forms by Bessel functions cancel badly beyond T of 7. This already is a sum of
+   exponentials, of some 280 terms.
+2. Shorten it by balanced truncation (B. C. Moore, IEEE Transactions on Automatic Control
+   26, 1981). Its Gramians are Cauchy matrices, factorised to high relative accuracy as in
+   J. Demmel (1999). All poles are damped by a common decay before, which is taken away
+   again afterwards (`balanced_truncation`).
+3. Polish the poles by variable projection: they move by Levenberg-Marquardt, and the
+   weights follow by linear least squares (G. H. Golub and V. Pereyra, SIAM Journal on
+   Numerical Analysis 10, 1973).
+4. Level the error: raise the emphasis of times where it is large, in the way of C. L.
+   Lawson (1961), and polish again (`_attempt`).
+5. Accept the fit only if its error on another, denser set of times is below the tolerance,
+   and nothing in it cancels (`_acceptable`). Otherwise try another common decay, then a
+   pair more.
 """
 
 import contextlib
@@ -96,8 +99,8 @@ def _half_arc() -> tuple[Floats, Floats]:
 def arc_quadrature(mode: str, eta: float) -> tuple[Complex, Complex]:
     """Step 1: nodes s, Re s < 0, and weights w, some 140 an arc: C(T) = Re sum w exp(s T).
 
-    Only the parts of the transform contribute that are odd across the arc |s| = 1 (the shear root)
-    and |s| = eta (the dilatational root).
+    Only the parts of the transform contribute that are odd across the arc |s| = 1 (the
+    shear root) and |s| = eta (the dilatational root).
     """
     angle, weight = _half_arc()
     rotation = np.exp(1j * angle)

@@ -2,45 +2,47 @@
 
 Problem
 -------
-A Gaussian field is a linear function of its draws, z(x) = phi(x)'a with standard normal a, and the
-property itself is v(x) = F^-1(Phi(z(x))) with its marginal F. Values v_k were measured at places
-x_k with normal errors of the standard deviation `noise`. With phi_k = phi(x_k), the posterior of
-the draws has a density proportional to
+A Gaussian field is a linear function of its draws, z(x) = phi(x)'a with standard normal a,
+and the property itself is v(x) = F^-1(Phi(z(x))) with its marginal F. Values v_k were
+measured at places x_k with normal errors of the standard deviation `noise`. With phi_k =
+phi(x_k), the posterior of the draws has a density proportional to
 
     N(a) prod_k l_k(phi_k'a),   log l_k(z) = -(v_k - F^-1(Phi(z)))^2 / (2 noise^2).           (1)
 
-If every l_k is replaced by a Gaussian exp(b_k z - p_k z^2/2), whose precision p_k may be negative,
-this is a linear regression. The posterior of the draws is then normal, with
+If every l_k is replaced by a Gaussian exp(b_k z - p_k z^2/2), whose precision p_k may be
+negative, this is a linear regression. The posterior of the draws is then normal, with
 
     covariance P = (1 + sum_k p_k phi_k phi_k')^-1,   mean mu = P sum_k b_k phi_k.            (2)
 
 mu + P^(1/2) a with the symmetric root turns the usual draws into conditioned ones, of the
-distribution that Matheron's rule gives (A. G. Journel and C. J. Huijbregts, Mining Geostatistics,
-1978; A. Doucet, 2010). So nothing changes for a caller but the draws.
+distribution that Matheron's rule gives (A. G. Journel and C. J. Huijbregts, Mining
+Geostatistics, 1978; A. Doucet, 2010). So nothing changes for a caller but the draws.
 
 Algorithm (`conditioned`)
 -------------------------
-Expectation propagation (T. P. Minka, Uncertainty in Artificial Intelligence 17, 2001), then a map
-for the skewness that Gaussians miss:
+Expectation propagation (T. P. Minka, Uncertainty in Artificial Intelligence 17, 2001), then
+a map for the skewness that Gaussians miss:
 
 1. Begin with z ~ N(0, 1) at every place, as if nothing else had been measured.
-2. Replace each l_k by the Gaussian with which the product of l_k and the normal distribution of z_k
-   given all other values keeps its mean and variance (`Measured.gaussian`, by quadrature).
-3. Find the regression (2) from a singular value decomposition (`_regression`). With the rows
-   |p_k|^(1/2) phi_k' = U s V' and positive p_k, P^(1/2) = 1 + V ((1 + s^2)^(-1/2) - 1) V' is well
-   conditioned however densely a smooth field was measured. Where some p_k are negative, V is turned
-   so that P is diagonal in it, and s^2 stands for the eigenvalues of P^-1 - 1, which may be below
-   zero.
+2. Replace each l_k by the Gaussian with which the product of l_k and the normal
+   distribution of z_k given all other values keeps its mean and variance
+   (`Measured.gaussian`, by quadrature).
+3. Find the regression (2) from a singular value decomposition (`_regression`). With the
+   rows |p_k|^(1/2) phi_k' = U s V' and positive p_k, P^(1/2) = 1 + V ((1 + s^2)^(-1/2) - 1)
+   V' is well conditioned however densely a smooth field was measured. Where some p_k are
+   negative, V is turned so that P is diagonal in it, and s^2 stands for the eigenvalues of
+   P^-1 - 1, which may be below zero.
 4. Take the Gaussian of each place out of the posterior again: z_k given all other values
    (`_from_others`).
 5. Repeat from 2 until these means stay, or for `MAX_UPDATES`.
-6. Map draws before the regression, so that they have the density (1) instead of its Gaussian
-   approximation (`stiction.random.transport`, which also estimates the remaining error).
+6. Map draws before the regression, so that they have the density (1) instead of its
+   Gaussian approximation (`stiction.random.transport`, which also estimates the remaining
+   error).
 7. Compare the misfit of values and draws at the mean with chi-square, for a warning.
 
-Departures from Minka: all places are updated at once; Gaussians that have no posterior (P not
-positive definite) are tempered, b and p by the same factor, and the precision that is left for a
-place in step 4 is at least half of that before any measurement.
+Departures from Minka: all places are updated at once; Gaussians that have no posterior (P
+not positive definite) are tempered, b and p by the same factor, and the precision that is
+left for a place in step 4 is at least half of that before any measurement.
 """
 
 from collections.abc import Sequence

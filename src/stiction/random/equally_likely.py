@@ -46,8 +46,9 @@ AnyRandom: TypeAlias = (
 class EquallyLikely:
     """Random interfaces of which one holds, nobody knows which; it has the protocol of one.
 
-    The first draw of a sample selects its member. The others are those of the members, which share
-    a draw where it has the same property and mode: a sample that changes its member keeps its form.
+    The first draw of a sample selects its member. The others are those of the members,
+    which share a draw where it has the same property and mode: a sample that changes its
+    member keeps its form.
     """
 
     members: tuple[RandomInterface, ...]

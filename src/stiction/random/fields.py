@@ -77,8 +77,9 @@ class RandomField:
     Notes
     -----
     On a plane, a line along x has the correlation of the field on a line, except that
-    truncation removes slightly more power. Translation process after Grigoriu (1995), spectral
-    representation after Shinozuka and Deodatis (1991); Albertini et al. (2020), Eqs. 2 to 7.
+    truncation removes slightly more power. Translation process after Grigoriu (1995),
+    spectral representation after Shinozuka and Deodatis (1991); Albertini et al. (2020),
+    Eqs. 2 to 7.
 
     Examples
     --------
@@ -239,7 +240,8 @@ class RandomField:
     def efolding_length(self) -> float:
         """Return the distance (m) at which the correlation of the field first falls to 1/e.
 
-        It is that on a line, on a plane along x; the one of z is `spectrum.efolding_length`.
+        It is that on a line, on a plane along x; the one of z is
+        `spectrum.efolding_length`.
         """
         coefficients = self._map_coefficients()
 
@@ -292,8 +294,9 @@ class RandomInterface:
     Parameters
     ----------
     strength : RandomField
-        Peak strength, Pa; or friction coefficients, with ``of="friction_coefficient"``, which
-        are multiplied by the normal pressure. The other stresses may be coefficients too.
+        Peak strength, Pa; or friction coefficients, with ``of="friction_coefficient"``,
+        which are multiplied by the normal pressure. The other stresses may be coefficients
+        too.
     residual_strength, initial_stress, normal_pressure : RandomField, optional
         Pa. What is random here is left out of the problem.
     weakening_rate, critical_slip, fracture_energy : RandomField, optional
@@ -437,8 +440,9 @@ class RandomInterface:
     ) -> Array:
         """Draw the independent standard normal numbers of samples `first`, `first` + 1, ....
 
-        Draw j of a property of sample i depends on (seed, property, i, j) only. Returned are
-        (samples, dimension): each property in the order of `names`, then those of `between`.
+        Draw j of a property of sample i depends on (seed, property, i, j) only. Returned
+        are (samples, dimension): each property in the order of `names`, then those of
+        `between`.
         """
         streams = layout(self, interface)
         numbers_per_sample = streams[-1].columns.stop + len(self.names) * interface.size
@@ -488,8 +492,9 @@ class RandomInterface:
     ) -> list[RandomInterface]:
         """Return equally likely random interfaces, whose parameters have these distributions.
 
-        For a failure probability under all of them. The parameters are independent; each has one
-        value in every interval of probability 1/count (Latin hypercube; McKay and others, 1979).
+        For a failure probability under all of them. The parameters are independent; each
+        has one value in every interval of probability 1/count (Latin hypercube; McKay and
+        others, 1979).
 
         Parameters
         ----------

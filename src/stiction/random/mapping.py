@@ -3,7 +3,8 @@ correlation.
 
 Problem
 -------
-A translation field (M. Grigoriu, Applied Non-Gaussian Processes, 1995) is v(x) = g(z(x)) with
+A translation field (M. Grigoriu, Applied Non-Gaussian Processes, 1995) is v(x) = g(z(x))
+with
 
     g(z) = F^-1(Phi(z)),                                                                      (1)
 
@@ -16,20 +17,23 @@ with the orthonormal Hermite polynomials h_m of a standard normal Z.
 
 Steps of the map (`from_normal`)
 --------------------------------
-1. Reduce the marginal to its family at scale 1, so that all multiples share a table (`_standard`).
+1. Reduce the marginal to its family at scale 1, so that all multiples share a table
+   (`_standard`).
 2. Tabulate (1) as cubic Hermite pieces on a uniform grid of [-4, 4], with slopes by central
    differences of fourth order. Check every piece at three points and mark those that miss
    `TABLE_RTOL`, at a kink of the density, say (`quantile_table`).
-3. Interpolate (`interpolate`). z that the table does not serve go to a second table, of [-8, 8],
-   and z that this does not serve either go to scipy.
+3. Interpolate (`interpolate`). z that the table does not serve go to a second table, of
+   [-8, 8], and z that this does not serve either go to scipy.
 
-So the result is accurate everywhere: to 1e-9 of the value, or of a millionth of the standard
-deviation where the value is smaller than that.
+So the result is accurate everywhere: to 1e-9 of the value, or of a millionth of the
+standard deviation where the value is smaller than that.
 
 Steps of the correlation (`hermite_coefficients`)
 -------------------------------------------------
-4. Sum (2) by the trapezoidal rule on [-8, 8], polynomial after polynomial by their recursion.
-5. Stop after at least `MIN_TERMS`, once the rest of the variance is less than a share of it.
+4. Sum (2) by the trapezoidal rule on [-8, 8], polynomial after polynomial by their
+   recursion.
+5. Stop after at least `MIN_TERMS`, once the rest of the variance is less than a share of
+   it.
 6. One last coefficient stands for that rest, so that the correlation is 1 at zero lag.
 """
 
@@ -97,8 +101,8 @@ def interpolate(z: Array, table: Array, out: Array) -> int:
 def quantile_table(marginal: Any, end: float = TABLE_END) -> Array:
     """Step 2: return values of the map and slopes times the step, (nodes, 2).
 
-    Slopes are NaN where a piece is not accurate enough. Most tables have 32 KiB: as many are kept
-    as a long list of equally likely interfaces has.
+    Slopes are NaN where a piece is not accurate enough. Most tables have 32 KiB: as many
+    are kept as a long list of equally likely interfaces has.
     """
     distribution = marginal.distribution
     step, pieces = 1.0 / PIECES_PER_UNIT, round(2.0 * end * PIECES_PER_UNIT)
@@ -161,8 +165,9 @@ class Standard(NamedTuple):
 def _standard(marginal: Any) -> tuple[Any, float, float]:
     """Step 1: return a marginal that this one is a multiple of, its lower bound and scale.
 
-    Shapes are rounded to 12 digits: those of multiples are equal but for round-off. Below zero a
-    relative error of the multiple would be a larger one of the value: it keeps its own table.
+    Shapes are rounded to 12 digits: those of multiples are equal but for round-off. Below
+    zero a relative error of the multiple would be a larger one of the value: it keeps its
+    own table.
     """
     family = getattr(marginal, "scipy_family", None)
     if family is None or marginal.low < 0.0:
@@ -177,9 +182,9 @@ def hermite_coefficients(
 ) -> Array:
     """Return c_m = E[F^-1(Phi(Z)) h_m(Z)], h_m the orthonormal Hermite polynomials, m = 0, 1, ...
 
-    c_0 is the mean, and the sum of the squares of all others is the variance (Grigoriu, 1995).
-    Fine steps are accurate where the map has kinks, too. The last coefficient stands for the rest
-    of the variance. An `InputError` if scipy's quantile and moments disagree.
+    c_0 is the mean, and the sum of the squares of all others is the variance (Grigoriu,
+    1995). Fine steps are accurate where the map has kinks, too. The last coefficient stands
+    for the rest of the variance. An `InputError` if scipy's quantile and moments disagree.
     """
     distribution, half = marginal.distribution, round(TABLE_END / step)
     z = np.arange(-half, half + 1) * step

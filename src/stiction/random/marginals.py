@@ -80,8 +80,8 @@ class Beta(Marginal):
 class _ByMoments(Marginal):
     """Families above a lower bound, given by mean and coefficient of variation.
 
-    `scipy_family` is the family of scipy whose arguments are a shape, `low` and a scale. Its
-    marginals share the tables of `mapping`; None if there is no such family.
+    `scipy_family` is the family of scipy whose arguments are a shape, `low` and a scale.
+    Its marginals share the tables of `mapping`; None if there is no such family.
     """
 
     mean: Annotated[Positive, Field(gt=1e-18, lt=1e18)]
@@ -193,8 +193,9 @@ class TruncatedNormal(_ByMoments):
     Parameters
     ----------
     mean, cv : float
-        Mean of the field and its standard deviation over the mean, both after truncation. It
-        scatters less than an exponential distribution, between two bounds than a uniform one.
+        Mean of the field and its standard deviation over the mean, both after truncation.
+        It scatters less than an exponential distribution, between two bounds than a uniform
+        one.
     low, high : float, optional
         0 and no upper bound if left out.
 
@@ -241,7 +242,8 @@ class TruncatedNormal(_ByMoments):
 class ScipyMarginal(Marginal):
     """A continuous `scipy.stats` distribution by its name and parameters.
 
-    One without a name in scipy is kept `frozen`: it exists in Python only and equals only itself.
+    One without a name in scipy is kept `frozen`: it exists in Python only and equals only
+    itself.
     """
 
     type: str

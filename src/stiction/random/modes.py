@@ -2,19 +2,19 @@
 
 Problem
 -------
-On a periodic interface a field has the waves k = 2 pi (jx/Lx, jy/Ly). With the spectral density
-g(k) and its truncation K, their amplitudes have the standard deviations
+On a periodic interface a field has the waves k = 2 pi (jx/Lx, jy/Ly). With the spectral
+density g(k) and its truncation K, their amplitudes have the standard deviations
 
     sigma_j^2 = g(k_j) / sum_i g(k_i),   |k_j| <= K.                                          (1)
 
 Steps (`make_modes`)
 --------------------
-1. List the wave vectors among which the modes are, one of k and -k, in an order that depends on
-   the proportions of the interface only. The place of a mode in it is the number of its draws
-   (`_numbers`).
+1. List the wave vectors among which the modes are, one of k and -k, in an order that
+   depends on the proportions of the interface only. The place of a mode in it is the number
+   of its draws (`_numbers`).
 2. Keep those up to the truncation.
-3. Find (1). The mean mode k = 0 stands for one wave vector, every other mode for k and -k: it has
-   half of g(0).
+3. Find (1). The mean mode k = 0 stands for one wave vector, every other mode for k and -k:
+   it has half of g(0).
 """
 
 import math
@@ -152,9 +152,9 @@ def make_modes(
 def _numbers(interface: Interface, largest: Array) -> NDArray[np.int64]:
     """Wave vectors over 2 pi/length among which the modes are, in the order of draws.
 
-    `largest` is the cutoff in these units, along each axis. On a plane the order is that of growing
-    rectangles of its proportions, so that a mode has the same draws whatever the spectrum and the
-    grid.
+    `largest` is the cutoff in these units, along each axis. On a plane the order is that of
+    growing rectangles of its proportions, so that a mode has the same draws whatever the
+    spectrum and the grid.
     """
     if largest.size == 1:
         _refuse_too_many(largest[0])

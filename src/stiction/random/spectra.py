@@ -4,12 +4,13 @@ With a density g(k), the correlation of z on a line at the lag x is
 
     rho(x) = int_0^K g(k) cos(k x) dk / int_0^K g(k) dk,                                      (1)
 
-K being the truncation. Samples have the truncated spectrum, and so correlations and lengths are
-those of it. (1) is integrated octave by octave (`_integrate`), because densities span decades, and
-by the rule of QUADPACK for a cosine (R. Piessens and others, 1983).
+K being the truncation. Samples have the truncated spectrum, and so correlations and lengths
+are those of it. (1) is integrated octave by octave (`_integrate`), because densities span
+decades, and by the rule of QUADPACK for a cosine (R. Piessens and others, 1983).
 
-On a plane the field is isotropic, and a line cut through it has the correlation of the field on a
-line: to the power of 1 + k^2 is added (D - 1)/2 in D dimensions, and a Gaussian keeps its form.
+On a plane the field is isotropic, and a line cut through it has the correlation of the
+field on a line: to the power of 1 + k^2 is added (D - 1)/2 in D dimensions, and a Gaussian
+keeps its form.
 
 To add a spectrum, derive from `ScaledSpectrum` and `register` it.
 """
@@ -82,7 +83,8 @@ def _integrate(
 ) -> float:
     """Integrate g(k) k^order cos(k lag) over all pieces (QUADPACK's QAWO).
 
-    `power`, if known, decides which errors are small: 1e-12 of it, and of each piece otherwise.
+    `power`, if known, decides which errors are small: 1e-12 of it, and of each piece
+    otherwise.
     """
     options: dict[str, Any] = {"weight": "cos", "wvar": lag} if lag > 0.0 else {}
     options |= {

@@ -52,7 +52,8 @@ def support_in_stress(
 ) -> tuple[float, float]:
     """Return the values between which a property lies, Pa, with its factor between specimens.
 
-    With a `chance`, each of its random parts may lie outside with this probability on either side.
+    With a `chance`, each of its random parts may lie outside with this probability on
+    either side.
     """
     field, between = random.properties[name], random.between or {}
 

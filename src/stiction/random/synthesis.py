@@ -2,26 +2,29 @@
 
 Problem
 -------
-The spectral representation (M. Shinozuka and G. Deodatis, Applied Mechanics Reviews 44, 1991)
+The spectral representation (M. Shinozuka and G. Deodatis, Applied Mechanics Reviews 44,
+1991)
 
     z(x) = sigma_0 A_0 + sum_j sigma_j (A_j cos k_j.x + B_j sin k_j.x),                       (1)
 
-with standard normal A_j and B_j. Sample i must depend on the seed and i only, and draw j of it on
-mode j only, whatever the batch, the number of workers, the spectrum and the grid.
+with standard normal A_j and B_j. Sample i must depend on the seed and i only, and draw j of
+it on mode j only, whatever the batch, the number of workers, the spectrum and the grid.
 
 Draws (`Stream.draw`)
 ---------------------
-1. Samples of a line come in blocks of 256, with one generator a block, because a generator for each
-   sample would cost more than the sample. A sample of a plane has so many modes that it has a
-   generator, a block of its own. The generator depends on seed, property and number of the block.
-2. Inside a block the draws run mode after mode, A_j before B_j, so that a spectrum with more modes
-   extends the same field. Draws of modes that are not in the spectrum are left out.
+1. Samples of a line come in blocks of 256, with one generator a block, because a generator
+   for each sample would cost more than the sample. A sample of a plane has so many modes
+   that it has a generator, a block of its own. The generator depends on seed, property and
+   number of the block.
+2. Inside a block the draws run mode after mode, A_j before B_j, so that a spectrum with
+   more modes extends the same field. Draws of modes that are not in the spectrum are left
+   out.
 
 Field (`synthesise`)
 --------------------
-3. Put mode (jx, jy) with amplitude (A - i B)/2 at k, and its conjugate at -k, into the half of the
-   wave vectors that a real transform holds. Fold modes that the grid does not resolve onto modes
-   that it does: values at the nodes are exact on any grid.
+3. Put mode (jx, jy) with amplitude (A - i B)/2 at k, and its conjugate at -k, into the half
+   of the wave vectors that a real transform holds. Fold modes that the grid does not
+   resolve onto modes that it does: values at the nodes are exact on any grid.
 4. Transform back, sample by sample, so that the numbers do not depend on the batch.
 """
 

@@ -2,9 +2,9 @@
 
 Problem
 -------
-A regression has replaced the likelihood of each measured value by a Gaussian. In the Gaussian
-posterior that follows, the field at place k is z_k = m_k + a_k'w with standard normal w. The exact
-posterior of w has a density proportional to
+A regression has replaced the likelihood of each measured value by a Gaussian. In the
+Gaussian posterior that follows, the field at place k is z_k = m_k + a_k'w with standard
+normal w. The exact posterior of w has a density proportional to
 
     N(w) prod_k r_k(z_k),                                                                     (1)
 
@@ -12,37 +12,38 @@ where r_k is the likelihood of value k divided by the Gaussian that replaced it.
 
 Algorithm
 ---------
-A triangular map along orthonormal directions u_1, u_2, ... (M. Rosenblatt, Annals of Mathematical
-Statistics 23, 1952). The coordinate u_j'w is moved, quantile by quantile, from the standard normal
-distribution to that of a coordinate e_j with the density, up to a constant,
+A triangular map along orthonormal directions u_1, u_2, ... (M. Rosenblatt, Annals of
+Mathematical Statistics 23, 1952). The coordinate u_j'w is moved, quantile by quantile, from
+the standard normal distribution to that of a coordinate e_j with the density, up to a
+constant,
 
     p(e_j | e_1, ..., e_j-1) = N(e_j) prod_k E[r_k(z_k) | e_1, ..., e_j].                     (2)
 
-Here e_1, ..., e_j-1 are moved already, and the mean is over w orthogonal to u_1, ..., u_j. Equation
-(2) treats places as independent given e_1 to e_j (B. Cseke and T. Heskes, Journal of Machine
-Learning Research 12, 2011). It is exact for one place, for independent places each of which has a
-direction, and for many places that measure one number.
+Here e_1, ..., e_j-1 are moved already, and the mean is over w orthogonal to u_1, ..., u_j.
+Equation (2) treats places as independent given e_1 to e_j (B. Cseke and T. Heskes, Journal
+of Machine Learning Research 12, 2011). It is exact for one place, for independent places
+each of which has a direction, and for many places that measure one number.
 
 Preparation (`make_transport`):
 
-1. Expand log r_k in Hermite polynomials of the standardised z_k. The norm of the coefficients says
-   how far the posterior at a place is from the Gaussian. Ignore the places with the smallest norms,
-   which together stay below `IGNORED_TOTAL`.
-2. Choose the directions greedily. The candidates are the a_k of the places that differ most from
-   the Gaussian, made orthogonal to the directions chosen before. The next direction is the one on
-   which the expansions of all places together have the largest projection.
-3. Tabulate the factors of (2) along each direction. A place that depends noticeably on earlier
-   coordinates has a table of its own, over its mean given e_1 to e_j. The other places share a
-   table over e_j, with earlier coordinates at zero.
-4. Estimate the error that is left: map samples, weight them by (1) divided by the density that they
-   have, and compare weighted and plain moments of z.
+1. Expand log r_k in Hermite polynomials of the standardised z_k. The norm of the
+   coefficients says how far the posterior at a place is from the Gaussian. Ignore the
+   places with the smallest norms, which together stay below `IGNORED_TOTAL`.
+2. Choose the directions greedily. The candidates are the a_k of the places that differ most
+   from the Gaussian, made orthogonal to the directions chosen before. The next direction is
+   the one on which the expansions of all places together have the largest projection.
+3. Tabulate the factors of (2) along each direction. A place that depends noticeably on
+   earlier coordinates has a table of its own, over its mean given e_1 to e_j. The other
+   places share a table over e_j, with earlier coordinates at zero.
+4. Estimate the error that is left: map samples, weight them by (1) divided by the density
+   that they have, and compare weighted and plain moments of z.
 
 Map of one draw (`transport`), for each direction in turn:
 
 5. Add up the tables on a grid of e_j, which gives the logarithm of (2).
 6. Integrate the density over each cell, taking its logarithm as linear there.
-7. Find the quantile, starting from the nearer end so that tails keep their digits, and move w along
-   u_j by the difference.
+7. Find the quantile, starting from the nearer end so that tails keep their digits, and move
+   w along u_j by the difference.
 """
 
 import math
@@ -88,8 +89,9 @@ LogRatio = Callable[[NDArray[np.int64], Array], Array]
 class Transport(NamedTuple):
     """Directions, and tables of the logarithm of (2) along them, without its factor N(e_j).
 
-    The fields are the first arguments of `transport`, in this order. The caller may express `basis`
-    in other coordinates of the draws: `conditioning` does, since its draws are not whitened.
+    The fields are the first arguments of `transport`, in this order. The caller may express
+    `basis` in other coordinates of the draws: `conditioning` does, since its draws are not
+    whitened.
     """
 
     basis: Array  # (directions, dimension): u_j
@@ -217,9 +219,9 @@ def _tabulate(
         own_tables[j, :n] = _log_mean_ratio(log_ratio, places, z, unexplained[places])
 
         # All other places that e_j moves, with earlier coordinates at zero.
-        others = np.flatnonzero(np.abs(e_slopes[:, j]) > MIN_SLOPE * np.sqrt(variance))
-        others = np.setdiff1d(others, places)
-        for block in np.array_split(others, 1 + others.size // PLACES_PER_BLOCK):
+        sharing = np.flatnonzero(np.abs(e_slopes[:, j]) > MIN_SLOPE * np.sqrt(variance))
+        sharing = np.setdiff1d(sharing, places)
+        for block in np.array_split(sharing, 1 + sharing.size // PLACES_PER_BLOCK):
             z = mean[block, None] + e_slopes[block, j, None] * e
             log_mean = _log_mean_ratio(log_ratio, block, z, unexplained[block])
             shared_table[j] += log_mean.sum(axis=0)
@@ -262,7 +264,8 @@ def transport(
 ) -> None:
     """Map each row of `draws` (rows, dimension) in place.
 
-    The log density of the coordinates e, less a constant, is added to `log_density` (rows,).
+    The log density of the coordinates e, less a constant, is added to `log_density`
+    (rows,).
     """
     n_directions, dimension = basis.shape
     n_cells, n_table = shared_table.shape[1] - 1, own_tables.shape[2] - 1

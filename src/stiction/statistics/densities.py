@@ -1,12 +1,12 @@
 """Probability densities that keep to their bounds: a kernel reflected there.
 
-Steps (`density`), after B. W. Silverman, Density Estimation for Statistics and Data Analysis,
-1986:
+Steps (`density`), after B. W. Silverman, Density Estimation for Statistics and Data
+Analysis, 1986:
 
 1. Choose the ends of a grid: the bounds, or half a spread beyond the sample.
 2. Count the values in its cells.
-3. Choose the bandwidth h by his Eq. 3.31, 0.9 min(standard deviation, interquartile range/1.34)
-   N^(-1/5), at least half a cell.
+3. Choose the bandwidth h by his Eq. 3.31, 0.9 min(standard deviation, interquartile
+   range/1.34) N^(-1/5), at least half a cell.
 4. Smooth the counts by a Gaussian kernel of that deviation, reflected at the ends.
 5. The sampling error follows from the integral of the kernel squared, 1/(2 sqrt(pi) h).
 """
@@ -63,9 +63,9 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
 
     Notes
     -----
-    A Gaussian kernel on a fine grid, reflected at the bounds, of the bandwidth of Silverman (1986,
-    Eq. 3.31): two peaks are smoothed more than they need, and at a bound the slope is zero.
-    Without a bound, the grid extends beyond the sample.
+    A Gaussian kernel on a fine grid, reflected at the bounds, of the bandwidth of Silverman
+    (1986, Eq. 3.31): two peaks are smoothed more than they need, and at a bound the slope
+    is zero. Without a bound, the grid extends beyond the sample.
 
     Examples
     --------

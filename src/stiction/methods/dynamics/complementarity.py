@@ -6,28 +6,29 @@ Find the increments u >= 0 of slip (m) of a step, such that at every node
 
     stress g - M u <= strength after the slip,   and equality where u > 0.                    (1)
 
-g is the stress at the end of the step if nothing slipped in it (`tables.trial_stress`), and M a
-circulant matrix with positive eigenvalues (`tables.symbol`, Pa/m): elasticity, memory and
-radiation. The strength of a node follows straight lines, b - w u, whose line may change with u; w
-is the rate at which it weakens (`tables.falling`), g - b its `tables.driving`.
+g is the stress at the end of the step if nothing slipped in it (`tables.trial_stress`), and
+M a circulant matrix with positive eigenvalues (`tables.symbol`, Pa/m): elasticity, memory
+and radiation. The strength of a node follows straight lines, b - w u, whose line may change
+with u; w is the rate at which it weakens (`tables.falling`), g - b its `tables.driving`.
 
 Algorithm (`solve_increment`)
 -----------------------------
-A semismooth Newton iteration, in the form of a primal-dual active set (M. Hintermueller, K. Ito and
-K. Kunisch, SIAM Journal on Optimization 13, 2002):
+A semismooth Newton iteration, in the form of a primal-dual active set (M. Hintermueller, K.
+Ito and K. Kunisch, SIAM Journal on Optimization 13, 2002):
 
-1. Begin with the nodes that slip already and those whose trial stress is above their strength, on
-   the straight lines that belong to the first guess.
-2. On the slipping set S solve (M - W) u = g - b, W = diag(w), with u = 0 elsewhere (`_solve`): the
-   preconditioned conjugate gradients of M. R. Hestenes and E. Stiefel (1952), with the inverse
-   circulant, cut to S, as preconditioner. Letters are theirs: residual r, direction p, z = M^-1 r.
-3. Nodes outside S whose stress is above their strength join it, and nodes with u < 0 leave it.
-   Every node takes the straight line that belongs to its u.
+1. Begin with the nodes that slip already and those whose trial stress is above their
+   strength, on the straight lines that belong to the first guess.
+2. On the slipping set S solve (M - W) u = g - b, W = diag(w), with u = 0 elsewhere
+   (`_solve`): the preconditioned conjugate gradients of M. R. Hestenes and E. Stiefel
+   (1952), with the inverse circulant, cut to S, as preconditioner. Letters are theirs:
+   residual r, direction p, z = M^-1 r.
+3. Nodes outside S whose stress is above their strength join it, and nodes with u < 0 leave
+   it. Every node takes the straight line that belongs to its u.
 4. Repeat from 2 until no node has changed.
 
-Departures: a direction of negative curvature (an unstable patch, at this size of the step) ends the
-search without a result, as do too many iterations. Laws that are not made of straight lines have
-changed only if the stress on the lines differs by more than a bound.
+Departures: a direction of negative curvature (an unstable patch, at this size of the step)
+ends the search without a result, as do too many iterations. Laws that are not made of
+straight lines have changed only if the stress on the lines differs by more than a bound.
 """
 
 from typing import Any
@@ -102,9 +103,9 @@ def solve_increment(
 ) -> Any:
     """Find the slip increments of one implicit step; return whether they were found.
 
-    `tables.increment` and `tables.slipping` hold the first guess, and then the solution. The
-    stress is met to `accuracy` (Pa); the strength may be as far as `line_accuracy` (Pa) from the
-    straight line that stands for it.
+    `tables.increment` and `tables.slipping` hold the first guess, and then the solution.
+    The stress is met to `accuracy` (Pa); the strength may be as far as `line_accuracy` (Pa)
+    from the straight line that stands for it.
     """
     law, nodes = setting.law, setting.nodes
     peak, residual, weakening = nodes.strength, nodes.residual, nodes.weakening

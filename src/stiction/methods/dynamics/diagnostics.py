@@ -2,34 +2,37 @@
 
 Problem
 -------
-Waves carry the stress that has lost its balance, so that the mean stress of the interface is
+Waves carry the stress that has lost its balance, so that the mean stress of the interface
+is
 
     <tau> = tau_0 <p> + <tau_i> - Z <V>.                                                      (1)
 
-An instability is slip that the load does not drive: after a maximum of <tau>, waves lower it by
-`EVENT_DROP` of the stress scale (`docs/theory.md`). It began at that maximum. A fall of the load
-lowers <tau>, too, but is no instability. So the fall that counts is
+An instability is slip that the load does not drive: after a maximum of <tau>, waves lower
+it by `EVENT_DROP` of the stress scale (`docs/theory.md`). It began at that maximum. A fall
+of the load lowers <tau>, too, but is no instability. So the fall that counts is
 
     fall = min(max <tau> - <tau>, Z <V> - Z <V> at the maximum).                              (2)
 
 Steps, after each step of a run (`observe`)
 -------------------------------------------
 1. Compute the fall (2).
-2. While <tau> is practically at its maximum, the fastest node is the place of the maximum. At slow
-   loading all creeping patches are about equally slow at the maximum itself, and only just after
-   it the one that becomes unstable is faster.
-3. If an instability has begun, it ends when <tau> rises above the maximum at which it began. It
-   was arrested if a node slipped faster than `Thresholds.unstable_rate`, which the waves of an
-   earlier one do not reach. The present <tau> is the next maximum. (Explicit steps also end it
-   when everything is calm, see `explicit`.)
+2. While <tau> is practically at its maximum, the fastest node is the place of the maximum.
+   At slow loading all creeping patches are about equally slow at the maximum itself, and
+   only just after it the one that becomes unstable is faster.
+3. If an instability has begun, it ends when <tau> rises above the maximum at which it
+   began. It was arrested if a node slipped faster than `Thresholds.unstable_rate`, which
+   the waves of an earlier one do not reach. The present <tau> is the next maximum.
+   (Explicit steps also end it when everything is calm, see `explicit`.)
 4. If none has begun, a higher <tau> is the next maximum, and a fall by `EVENT_DROP` is the
    beginning of an instability. The highest one so far is the onset.
-5. Note <tau> once all nodes that can break are at their residual strength. Nothing becomes unstable
-   from then on. That alone is no instability: the last nodes beside a barrier may creep there.
+5. Note <tau> once all nodes that can break are at their residual strength. Nothing becomes
+   unstable from then on. That alone is no instability: the last nodes beside a barrier may
+   creep there.
 
-Two consequences: a maximum that no such fall follows, such as the largest load or the stress that
-returns when slip dies, is no instability; and where the stress is above the strength at the start,
-the maximum is the mean stress before anything slips, with which a run begins (`Run.start`).
+Two consequences: a maximum that no such fall follows, such as the largest load or the
+stress that returns when slip dies, is no instability; and where the stress is above the
+strength at the start, the maximum is the mean stress before anything slips, with which a
+run begins (`Run.start`).
 """
 
 from typing import Any, NamedTuple
@@ -71,11 +74,11 @@ def stress_scale(nodes: Nodes) -> PiecewiseLinear:
 
     It is the mean over nodes of
 
-        min(tau_p - tau_r, MAX_DROP_RATIO (tau_0 p + tau_i - tau_r)), or 0 if that is negative.
+        max(0, min(tau_p - tau_r, MAX_DROP_RATIO (tau_0 p + tau_i - tau_r))).
 
-    The second term is the drop that the load provides. Where strengths are alike the scale is the
-    mean of tau_p - tau_r. Barriers that the load is far from breaking, infinite ones among them,
-    do not raise it, and it grows with the load that comes to break them.
+    The second term is the drop that the load provides. Where strengths are alike the scale
+    is the mean of tau_p - tau_r. Barriers that the load is far from breaking, infinite ones
+    among them, do not raise it, and it grows with the load that comes to break them.
     """
     strength, residual = nodes.strength, nodes.residual
     profile, initial = nodes.profile, nodes.initial
@@ -161,7 +164,8 @@ def finish_step(
 ) -> Any:
     """Update diagnostics, arrivals, and the record if there is one; return the fall of the stress.
 
-    `increments` is the slip in the step (m), `strength` the strength after it (Pa), at the nodes.
+    `increments` is the slip in the step (m), `strength` the strength after it (Pa), at the
+    nodes.
     """
     now, slip, rate, stress = state.diagnostics[0], state.slip, state.rate, state.stress
     critical, arrival, share = setting.nodes.critical, state.arrival, setting.thresholds.arrival

@@ -2,9 +2,10 @@
 
 Problem
 -------
-Equations (1) and (2) of `state`, one step h further: slip d, slip rate V, stress tau at the nodes,
-and the memory variables y of `memory` at the modes. Let f_hat(d_hat, V_hat) be the stress that is
-transferred if a slip rate V_hat acts for the whole step and the slip at its end is d_hat:
+Equations (1) and (2) of `state`, one step h further: slip d, slip rate V, stress tau at the
+nodes, and the memory variables y of `memory` at the modes. Let f_hat(d_hat, V_hat) be the
+stress that is transferred if a slip rate V_hat acts for the whole step and the slip at its
+end is d_hat:
 
     f_hat = (G|k|/2) (S + V_hat Re sum_p w_p B) - K(k) d_hat,   S = Re sum_p w_p E B y.       (1)
 
@@ -16,13 +17,14 @@ Algorithm (Heun's method: K. Heun, Zeitschrift fuer Mathematik und Physik 45, 19
 ----------------------------------------------------------------------------------
 1. Predict: the present rate V_0 acts for a step (`_transfer`); (2) gives V* at its end
    (`_predict`).
-2. Correct: the mean (V_0 + V*)/2 acts for the step (`_transfer`). The slip grows by h times this
-   mean, and (2) gives the rate and the stress at the end (`_correct`).
+2. Correct: the mean (V_0 + V*)/2 acts for the step (`_transfer`). The slip grows by h times
+   this mean, and (2) gives the rate and the stress at the end (`_correct`).
 3. Advance the memory by the same mean (`memory.advance_memory`).
-4. Update what is known after a step (`diagnostics`), and return if the run ends here or if all
-   is so calm that implicit steps can take over (`_calm`).
+4. Update what is known after a step (`diagnostics`), and return if the run ends here or if
+   all is so calm that implicit steps can take over (`_calm`).
 
-The step is stable below the limit of `medium.largest_step`. A node cannot slip backwards, by (2).
+The step is stable below the limit of `medium.largest_step`. A node cannot slip backwards,
+by (2).
 """
 
 from typing import Any
@@ -94,8 +96,9 @@ def _correct(
 ) -> Any:
     """Step 2: slip, rate and stress after the step; return (work, sum of V).
 
-    `tables.transfer` then holds the strength. `tables.predicted` holds the slip by the mean of the
-    rates before and after the step, from which `finish_step` finds when a front arrived.
+    `tables.transfer` then holds the strength. `tables.predicted` holds the slip by the mean
+    of the rates before and after the step, from which `finish_step` finds when a front
+    arrived.
     """
     nodes, law, step = setting.nodes, setting.law, tables.step
     slip, rate, stress = state.slip, state.rate, state.stress
@@ -121,7 +124,8 @@ def _correct(
 def _calm(now: Any, thresholds: Thresholds, step: float, impedance: float, rise: float) -> Any:
     """Step 4: count calm steps; return whether there were enough of them in a row.
 
-    Waves make slip rates come and go. Creep is slow, or as fast as it was when the row began.
+    Waves make slip rates come and go. Creep is slow, or as fast as it was when the row
+    began.
     """
     scale, before, top = now.scale, now.calm_rate, now.top_slip_rate
     quiet = top < _CALM_STRESS * scale / impedance + thresholds.calm_slip * rise / step

@@ -2,35 +2,35 @@
 
 Problem
 -------
-Equations (1) and (2) of `state`, one step h further. Unknown are the slip increments u >= 0. With
-the mean slip rate u/h of this step, the mean rate V' of the step before it, of size h', and the
-ratio r = h/(h + h'), the slip rate at the end of the step is of second order,
+Equations (1) and (2) of `state`, one step h further. Unknown are the slip increments u >=
+0. With the mean slip rate u/h of this step, the mean rate V' of the step before it, of size
+h', and the ratio r = h/(h + h'), the slip rate at the end of the step is of second order,
 
     V = u/h + r (u/h - V'),                                                                   (1)
 
-as in the two-step backward differences (C. F. Curtiss and J. O. Hirschfelder, Proceedings of the
-National Academy of Sciences 38, 1952). In the step the rate changes linearly, with the slope
-a = 2 r (u/h - V')/h. Without a step before it, r = 0: the step is of first order. The stress at
-the end is, mode by mode,
+as in the two-step backward differences (C. F. Curtiss and J. O. Hirschfelder, Proceedings
+of the National Academy of Sciences 38, 1952). In the step the rate changes linearly, with
+the slope a = 2 r (u/h - V')/h. Without a step before it, r = 0: the step is of first order.
+The stress at the end is, mode by mode,
 
     tau_0 p + tau_i - Z V - K (slip + u)
         + (G|k|/2) (S + u/h Re sum_p w_p B + a Re sum_p w_p R),                               (2)
 
-with S, B and R as in `memory`. This is linear in u, so u solves the complementarity problem of
-`complementarity` with a circulant matrix.
+with S, B and R as in `memory`. This is linear in u, so u solves the complementarity problem
+of `complementarity` with a circulant matrix.
 
 Algorithm
 ---------
-1. Choose a size: the one asked for, smaller if the load would rise too much, or cut short at a
-   turning point of the load or at the end time (`_choose_size`).
+1. Choose a size: the one asked for, smaller if the load would rise too much, or cut short
+   at a turning point of the load or at the end time (`_choose_size`).
 2. Assemble the matrix and the stress without slip in this step (`_assemble`).
 3. Solve for u (`complementarity.solve_increment`).
 4. Try half the size from 1 if no u is found (the patches are unstable at this size), a node
-   weakens too much (`_effect`), or the interface accelerates too much (`_accelerates`). If that
-   is below the smallest size, explicit steps take over.
+   weakens too much (`_effect`), or the interface accelerates too much (`_accelerates`). If
+   that is below the smallest size, explicit steps take over.
 5. Take the step (`_accept`), and update what is known after it (`diagnostics`).
-6. Choose the next size from how much nodes weakened (`_next_size`). Sizes change by powers of
-   sqrt 2, so that tables are reused.
+6. Choose the next size from how much nodes weakened (`_next_size`). Sizes change by powers
+   of sqrt 2, so that tables are reused.
 """
 
 from typing import Any, NamedTuple
@@ -156,7 +156,8 @@ def _effect(
 ) -> Any:
     """Step 4: return (largest weakening of a node, total slip, Z <V>) by slip increments u.
 
-    Weakening is a share of tau_p - tau_r. Creep at the residual strength counts only if it is fast.
+    Weakening is a share of tau_p - tau_r. Creep at the residual strength counts only if it
+    is fast.
     """
     nodes, law, slip, past = setting.nodes, setting.law, state.slip, state.past
     peak, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
@@ -262,7 +263,8 @@ def implicit_steps(
 ) -> Any:
     """Take up to `count` accepted implicit steps in place; return (steps, next size, reason).
 
-    Parameters as in `explicit_steps`; `state.phase` is IMPLICIT, `step` is the first size to try.
+    Parameters as in `explicit_steps`; `state.phase` is IMPLICIT, `step` is the first size
+    to try.
     """
     now, thresholds, u = state.diagnostics[0], setting.thresholds, tables.increment
     smallest = _JUST_BELOW * thresholds.smallest_step

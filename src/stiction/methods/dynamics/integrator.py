@@ -2,12 +2,12 @@
 
 A run goes through phases (`Run.take_steps`):
 
-1. It begins at rest or at an equilibrium, at the first slip (`Run.start`). Implicit steps come
-   first, unless the stress is above the strength by more than round-off.
-2. Implicit steps follow creep until their size falls below `Thresholds.smallest_step`. Then the
-   memory is rescaled and explicit steps go on (`_to_explicit`).
-3. Explicit steps follow waves until everything has been calm for a while. Then implicit steps go
-   on, the first of them of first order (`_to_implicit`).
+1. It begins at rest or at an equilibrium, at the first slip (`Run.start`). Implicit steps
+   come first, unless the stress is above the strength by more than round-off.
+2. Implicit steps follow creep until their size falls below `Thresholds.smallest_step`. Then
+   the memory is rescaled and explicit steps go on (`_to_explicit`).
+3. Explicit steps follow waves until everything has been calm for a while. Then implicit
+   steps go on, the first of them of first order (`_to_implicit`).
 4. The run ends for one of the reasons of `Run.ending`.
 """
 
@@ -113,7 +113,8 @@ class Run:
     def start(self, time: float, slip: Floats | None = None) -> RuptureState:
         """Return the state of rest, or of an equilibrium with a slip, with an empty memory.
 
-        Where the stress is above the strength by more than round-off, explicit steps come first.
+        Where the stress is above the strength by more than round-off, explicit steps come
+        first.
         """
         interface, impedance = self.medium.interface, self.medium.impedance
         setting, nodes, thresholds = self.setting, self.setting.nodes, self.setting.thresholds
@@ -191,7 +192,8 @@ class Run:
     def run_to_end(self, state: RuptureState, max_steps: int) -> tuple[str | None, int]:
         """Go on to the end of the run, or to `max_steps` in all; return why it ended and the code.
 
-        The reason is None if it has not ended; the code is then NOT_FINITE or DONE (all steps).
+        The reason is None if it has not ended; the code is then NOT_FINITE or DONE (all
+        steps).
         """
         ending, reason = None, int(Reason.DONE)
         while ending is None and reason != Reason.NOT_FINITE and state.steps < max_steps:
@@ -206,8 +208,8 @@ class Run:
     ) -> tuple[int, int]:
         """Take up to `count` steps in place; return (steps taken, why it returned).
 
-        The reason is DONE after `count` steps or at the end time, else ALL_SLID, DROPPED, AT_REST
-        or NOT_FINITE. Rows of `record` are filled, one a step.
+        The reason is DONE after `count` steps or at the end time, else ALL_SLID, DROPPED,
+        AT_REST or NOT_FINITE. Rows of `record` are filled, one a step.
         """
         taken = 0
         while taken < count:

@@ -2,17 +2,19 @@
 
 Problem of the time step (`largest_step`)
 -----------------------------------------
-An interface that slides freely carries undamped Rayleigh waves, the shortest of which limit the
-explicit step h. With D = |k| slip, V/c_s and the memory variables of one mode as state, a step of
-`explicit` is a matrix that depends on kappa = |k| c_s h only (`amplification`). Wanted is the
-largest kappa up to which no eigenvalue of it is larger than 1.
+An interface that slides freely carries undamped Rayleigh waves, the shortest of which limit
+the explicit step h. With D = |k| slip, V/c_s and the memory variables of one mode as state,
+a step of `explicit` is a matrix that depends on kappa = |k| c_s h only (`amplification`).
+Wanted is the largest kappa up to which no eigenvalue of it is larger than 1.
 
-1. Raise kappa in steps of 0.1 until an eigenvalue is larger (`_largest_kappa`). If that is so in
-   the first step, the error of the memory kernel makes long waves grow, and no step is stable.
+1. Raise kappa in steps of 0.1 until an eigenvalue is larger (`_largest_kappa`). If that is
+   so in the first step, the error of the memory kernel makes long waves grow, and no step
+   is stable.
 2. Bisect between the last two.
 3. On a line the largest |k| is pi/dx. On a plane the shortest waves lie on the rim of the
-   rectangle |kx| <= pi/dx, |ky| <= pi/dy, and differ in length and in their share of mode II. The
-   waves on the axes and in the corner are the first to grow: take the smallest of their steps.
+   rectangle |kx| <= pi/dx, |ky| <= pi/dy, and differ in length and in their share of mode
+   II. The waves on the axes and in the corner are the first to grow: take the smallest of
+   their steps.
 """
 
 import dataclasses
@@ -91,8 +93,8 @@ def prepare_medium(problem: Problem, tolerance: float, courant: float) -> Medium
 def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:
     """Stiffness and memory on the modes of the interface.
 
-    On a plane a wave vector has a = (kx/k)² of mode II and b = 1 - a of mode III (Geubelle and Rice
-    1995), as K has, and the memory is (G k/2)[a C_II + b C_III] * V.
+    On a plane a wave vector has a = (kx/k)² of mode II and b = 1 - a of mode III (Geubelle
+    and Rice 1995), as K has, and the memory is (G k/2)[a C_II + b C_III] * V.
     """
     solid, interface = problem.solid, problem.interface
     k, share = interface.wavenumbers, interface.in_plane_share

@@ -10,41 +10,42 @@ So it is enough to know one memory variable for each pair (s_p, w_p) and mode,
 
     psi_p(t) = int_0^t exp(s_p |k| c_s t') V(t - t') dt',   S = Re sum_p w_p psi_p.           (2)
 
-V has a real and an imaginary part, and each is a real signal with a complex psi_p of its own. On a
-plane the pairs before `Grid.split` have the weight (kx/k)² w_p and those of mode III, which follow,
-the weight (1 - (kx/k)²) w_p.
+V has a real and an imaginary part, and each is a real signal with a complex psi_p of its
+own. On a plane the pairs before `Grid.split` have the weight (kx/k)² w_p and those of mode
+III, which follow, the weight (1 - (kx/k)²) w_p.
 
 Algorithm
 ---------
-Exponential time differencing (S. M. Cox and P. C. Matthews, Journal of Computational Physics 176,
-2002): psi' = z/h psi + V is integrated exactly for a slip rate that is a polynomial in a step h.
-With z = s_p |k| c_s h, E = exp(z), and phi(z) = (exp(z) - 1)/z:
+Exponential time differencing (S. M. Cox and P. C. Matthews, Journal of Computational
+Physics 176, 2002): psi' = z/h psi + V is integrated exactly for a slip rate that is a
+polynomial in a step h. With z = s_p |k| c_s h, E = exp(z), and phi(z) = (exp(z) - 1)/z:
 
-1. Explicit step, constant slip rate V. psi <- E psi + B V, with B = h phi(z). The variables are
-   kept as y = psi/B, so that the pass has one multiplication less:
+1. Explicit step, constant slip rate V. psi <- E psi + B V, with B = h phi(z). The variables
+   are kept as y = psi/B, so that the pass has one multiplication less:
 
        y <- E y + V,   and for the next step at once   Re sum_p w_p E B y                     (3)
 
-   (`advance_memory`). The sum is the part of S at the end of the next step that is known before
-   it. The current slip rate adds V Re sum_p w_p B (`response` of `step_table`).
+   (`advance_memory`). The sum is the part of S at the end of the next step that is known
+   before it. The current slip rate adds V Re sum_p w_p B (`response` of `step_table`).
 2. Implicit step, slip rate V + a (t - h/2) for 0 < t < h. The variables are psi itself:
 
        psi <- E psi + B V + R a,   R = int_0^h exp(s_p |k| c_s (h - t)) (t - h/2) dt          (4)
 
    (`advance_with_ramp`, with the tables of `tabulate`), after `fading_memory` has summed
    Re sum_p w_p E psi, the part of S at the end of the step that is known before it.
-3. Between the two kinds `to_explicit` divides by B and `to_implicit` multiplies by it. They set
-   `Phase`, which says in which of both forms `RuptureState.memory` is.
+3. Between the two kinds `to_explicit` divides by B and `to_implicit` multiplies by it. They
+   set `Phase`, which says in which of both forms `RuptureState.memory` is.
 
 Layout
 ------
-Variables lie in blocks of 64 modes, so that one pass stays in registers. Tables have an entry for
-each wave vector that differs in what waves do: on a line k > 0, on a plane kx >= 0 and ky >= 0,
-because (kx, ky) and (-kx, ky) share |k| and the share of mode II. Such an entry has multiplicity 2.
-Entries are padded to whole blocks. Tables are packed as [block][pair][row][64], Fourier arrays as
-[block][copy][real, imaginary][64] and memory variables as [block][copy][pair][4][64]. The four
-rows are the real and imaginary part of the memory of the real signal, then of the imaginary signal.
-The constant row length lets the compiler vectorise without run-time checks of overlap.
+Variables lie in blocks of 64 modes, so that one pass stays in registers. Tables have an
+entry for each wave vector that differs in what waves do: on a line k > 0, on a plane kx >=
+0 and ky >= 0, because (kx, ky) and (-kx, ky) share |k| and the share of mode II. Such an
+entry has multiplicity 2. Entries are padded to whole blocks. Tables are packed as
+[block][pair][row][64], Fourier arrays as [block][copy][real, imaginary][64] and memory
+variables as [block][copy][pair][4][64]. The four rows are the real and imaginary part of
+the memory of the real signal, then of the imaginary signal. The constant row length lets
+the compiler vectorise without run-time checks of overlap.
 """
 
 from typing import Any
@@ -114,8 +115,9 @@ def zeros(size: int, kind: type = float) -> NDArray[Any]:
 def work_arrays(count: int, size: int, kind: type) -> list[NDArray[Any]]:
     """Arrays to work in, whose distance is no multiple of a page: stores then hold up no loads.
 
-    (If two addresses are equal modulo 4096 bytes, processors take a load from one to depend on the
-    store to the other before it. With grids of powers of two that would cost half a step.)
+    (If two addresses are equal modulo 4096 bytes, processors take a load from one to depend
+    on the store to the other before it. With grids of powers of two that would cost half a
+    step.)
     """
     distance = -(-size // 8) * 8 + 80
     buffer = zeros(count * distance, kind)
@@ -274,10 +276,10 @@ def implicit_tables(grid: Grid) -> ImplicitTables:
 def tabulate(grid: Grid, step: float, tables: ImplicitTables) -> None:
     """Step 2: E, B and R of (4) for a step h, and their weighted sums.
 
-    `table`, [block][pair][4][64], gets E and B, `ramp`, [block][pair][2][64], gets R. `response`
-    and `ramp_response` get Re sum w B and Re sum w R. On a line |k| c_s is j + 1 times the lowest,
-    so that the exponentials of a pole are powers of one number. That takes a product each, with a
-    relative error of 1e-16 j.
+    `table`, [block][pair][4][64], gets E and B, `ramp`, [block][pair][2][64], gets R.
+    `response` and `ramp_response` get Re sum w B and Re sum w R. On a line |k| c_s is j + 1
+    times the lowest, so that the exponentials of a pole are powers of one number. That
+    takes a product each, with a relative error of 1e-16 j.
     """
     table, ramp = tables.table, tables.ramp
     response, ramp_response = tables.response, tables.ramp_response

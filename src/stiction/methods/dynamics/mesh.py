@@ -2,26 +2,30 @@
 
 Problem
 -------
-Elasticity of one block for waves (`waves`), on rows of nodes above the nodes of the interface, and
-its static response, which must agree with the closed form of `elasticity.blocks`.
+Elasticity of one block for waves (`waves`), on rows of nodes above the nodes of the
+interface, and its static response, which must agree with the closed form of
+`elasticity.blocks`.
 
 Grid
 ----
-Columns lie at the nodes x = (i + 1/2) dx, so that each has a cell of the interface. Beyond the
-outer columns half a cell remains, in which s_xx and s_xy vanish: it is a strip that only resists to
-being stretched along y. Rows are dx apart at the interface and up to five times as much above.
+Columns lie at the nodes x = (i + 1/2) dx, so that each has a cell of the interface. Beyond
+the outer columns half a cell remains, in which s_xx and s_xy vanish: it is a strip that
+only resists to being stretched along y. Rows are dx apart at the interface and up to five
+times as much above.
 
 Elements (`_elements`)
 ----------------------
-An element with the sides a and b has mean strains and two modes of an hourglass. Exact integration
-gives its energy as a b (s . e)/2 of the means, and (c_11 b/a + G a/b)/24 times the square of
-u_00 - u_10 - u_01 + u_11, likewise for v. In mode III there is only u: c_11 is G, all else zero.
+An element with the sides a and b has mean strains and two modes of an hourglass. Exact
+integration gives its energy as a b (s . e)/2 of the means, and (c_11 b/a + G a/b)/24 times
+the square of u_00 - u_10 - u_01 + u_11, likewise for v. In mode III there is only u: c_11
+is G, all else zero.
 
 Steps (`make_mesh`)
 -------------------
 1. Place the rows, and find elements, masses and the stencils that move nodes.
 2. Condense the static response: eliminate the rows from the top downwards (`condensed`).
-3. Correct it: what K of the closed form has beyond K of the mesh acts on the slip of the interface.
+3. Correct it: what K of the closed form has beyond K of the mesh acts on the slip of the
+   interface.
 4. Find the stable step of mesh, viscosity and correction (`_limit`).
 """
 
@@ -181,8 +185,8 @@ def _stencils(elements: Array, strips: Array) -> Array:
 
     - the sum of both neighbours in the row, and the node itself,
     - the difference of both neighbours in the other component,
-    - at the left end, where there is one neighbour, the node itself, and its other component. At
-      the right end the other component has the other sign.
+    - at the left end, where there is one neighbour, the node itself, and its other
+      component. At the right end the other component has the other sign.
     """
     stencils = np.zeros((len(elements) + 1, 2, 5, 3))
     for row, (element, strip) in enumerate(zip(elements, strips, strict=True)):
@@ -240,7 +244,8 @@ def layer_matrix(mesh: Mesh, layer: int, nodes: int) -> sp.csr_matrix:
 def condensed(mesh: Mesh, nodes: int) -> tuple[Array, Array, float]:
     """Return K of the mesh under a given force (Pa/m), q, and C (Pa); see `elasticity.blocks`.
 
-    Motion that is even about the middle of the block and motion that is odd are independent.
+    Motion that is even about the middle of the block and motion that is odd are
+    independent.
     """
     static, force, compliance = np.zeros((nodes, nodes)), np.zeros(nodes), 0.0
     half = np.eye(nodes, nodes // 2)

@@ -75,18 +75,19 @@ LoadHistory = Annotated[Any, BeforeValidator(_load_history), PlainSerializer(_wr
 class Rupture:
     """Onset from an elastodynamic simulation under a slowly rising load.
 
-    Adaptive implicit steps follow the creeping interface, explicit steps its rupture. Strength
-    may be infinite where nothing ever breaks, and the initial stress may be above the
-    strength: such a patch breaks at once, at zero load.
+    Adaptive implicit steps follow the creeping interface, explicit steps its rupture.
+    Strength may be infinite where nothing ever breaks, and the initial stress may be above
+    the strength: such a patch breaks at once, at zero load.
 
     Parameters
     ----------
     loading_rate : float, optional
         d tau_0/dt, Pa/s, positive. Between half-spaces either this or `load` must be given.
     kernel_tolerance : float
-        Allowed error (1) of the memory kernel, a sum of exponentials. The sum is fitted once
-        for each solid and stored on disk, in 1 s at 1e-6 (22 pairs) or half a minute at 1e-8
-        (35). From about 1e-3 on, waves may grow at any time step, which raises an error.
+        Allowed error (1) of the memory kernel, a sum of exponentials. The sum is fitted
+        once for each solid and stored on disk, in 1 s at 1e-6 (22 pairs) or half a minute
+        at 1e-8 (35). From about 1e-3 on, waves may grow at any time step, which raises an
+        error.
     courant : float
         Explicit time step in units of the stability limit, in (0, 1].
     slip_step : float
@@ -96,10 +97,10 @@ class Rupture:
     start : {"equilibrium", "rest"}
         "rest": at the first slip. "equilibrium": on the quasi-static path, as close below
         the first instability as the estimated error allows; `start_load` is the load there,
-        and `start_error` (Pa) the estimate. The run still begins at the first slip with `load`,
-        if the loading rate is too high, if a node loses half of its strength before, on
-        planes, with laws that are not piecewise linear, and with barriers or stress above the
-        strength.
+        and `start_error` (Pa) the estimate. The run still begins at the first slip with
+        `load`, if the loading rate is too high, if a node loses half of its strength
+        before, on planes, with laws that are not piecewise linear, and with barriers or
+        stress above the strength.
     end_time : float, optional
         Time at which a run ends at the latest, s, but for a part of the last explicit step.
     load : (times, values), optional
@@ -111,10 +112,10 @@ class Rupture:
     stop : {"sliding", "onset", "rest", "time"}
         When to end (see Notes), unless nothing slips and the load has stopped rising:
         "sliding": every node that can break is at its residual strength and, if barriers of
-        infinite strength hold the interface, has come to rest. "onset": the first instability
-        has begun. "rest": nothing slips after an instability any more, except as the load
-        drives it; an interface that slides and is never unloaded ends there. "time": at
-        `end_time`; an interface that slides takes explicit steps until then.
+        infinite strength hold the interface, has come to rest. "onset": the first
+        instability has begun. "rest": nothing slips after an instability any more, except
+        as the load drives it; an interface that slides and is never unloaded ends there.
+        "time": at `end_time`; an interface that slides takes explicit steps until then.
     implicit : bool
         False takes explicit steps only (slow loading then costs a million steps).
     max_steps : int
@@ -129,37 +130,40 @@ class Rupture:
 
     Notes
     -----
-    On specimens loading is slow: the path is that of `Equilibrium` up to each instability, from
-    which waves run through the blocks until they are at rest, and the path goes on from there.
-    Of the options `courant`, `arrival`, `max_steps` and `events` count, and the attenuation and
-    masses of the specimen (`Blocks.quality_factor`, `Platen.mass`, `Pusher.mass`). Results are
-    those of `Equilibrium`, and `rupture_speed` and `median_rupture_speed` of the event that slides.
+    On specimens loading is slow: the path is that of `Equilibrium` up to each instability,
+    from which waves run through the blocks until they are at rest, and the path goes on
+    from there. Of the options `courant`, `arrival`, `max_steps` and `events` count, and the
+    attenuation and masses of the specimen (`Blocks.quality_factor`, `Platen.mass`,
+    `Pusher.mass`). Results are those of `Equilibrium`, and `rupture_speed` and
+    `median_rupture_speed` of the event that slides.
 
     Between half-spaces, an instability is slip that the load does not drive. It begins at a
-    maximum of the mean shear stress after which waves lower it by 1e-4 of the stress scale, not
-    counting any fall of the load itself; at the start where the stress is above the strength.
-    `first_instability` is the mean stress at which the first one begins. The highest one has
-    `onset_time`, `critical_position`, `applied_load` (the load factor then) and, if the
-    interface slides, `critical_stress` and `critical_load`, the load factor that carries that
-    stress statically; what waves radiate is the difference. NaN is what did not happen, with a
-    warning, and an overstressed start has no `critical_load`.
+    maximum of the mean shear stress after which waves lower it by 1e-4 of the stress scale,
+    not counting any fall of the load itself; at the start where the stress is above the
+    strength. `first_instability` is the mean stress at which the first one begins. The
+    highest one has `onset_time`, `critical_position`, `applied_load` (the load factor then)
+    and, if the interface slides, `critical_stress` and `critical_load`, the load factor
+    that carries that stress statically; what waves radiate is the difference. NaN is what
+    did not happen, with a warning, and an overstressed start has no `critical_load`.
 
-    `arrested_events` counts instabilities in which a node slips so fast that Z V exceeds 7.5 %
-    of the median of tau_p - tau_r before the mean stress is as high again or all is calm.
-    `Equilibrium` also counts jumps too small for that. The stress scale is the mean over nodes
-    of tau_p - tau_r, or of three times the drop tau_0 p + tau_i - tau_r at the largest load so
-    far where that is less, so that unbroken barriers do not count. `kinetic_stress` is the
-    mean stress after the first step in which every node that can break is at its residual
-    strength. Energies and moment are those of the end of the run. If that is this step, as in an
-    interface that slides, radiated energy and moment grow by about 2 % in it.
+    `arrested_events` counts instabilities in which a node slips so fast that Z V exceeds
+    7.5 % of the median of tau_p - tau_r before the mean stress is as high again or all is
+    calm. `Equilibrium` also counts jumps too small for that. The stress scale is the mean
+    over nodes of tau_p - tau_r, or of three times the drop tau_0 p + tau_i - tau_r at the
+    largest load so far where that is less, so that unbroken barriers do not count.
+    `kinetic_stress` is the mean stress after the first step in which every node that can
+    break is at its residual strength. Energies and moment are those of the end of the run.
+    If that is this step, as in an interface that slides, radiated energy and moment grow by
+    about 2 % in it.
 
-    The last nodes beside a barrier may creep to their residual strength under a load that goes on
-    to rise. That is no instability, and `critical_stress` stays the mean stress at the highest
-    instability before. It is NaN if everything that can break did so without an instability.
+    The last nodes beside a barrier may creep to their residual strength under a load that
+    goes on to rise. That is no instability, and `critical_stress` stays the mean stress at
+    the highest instability before. It is NaN if everything that can break did so without an
+    instability.
 
-    With "onset" and "rest", critical values are those of the highest instability, which need
-    not end in sliding, and with "onset" what is not final is NaN: kinetic stress, stress drop,
-    moment, energies, rupture speeds and arrested events.
+    With "onset" and "rest", critical values are those of the highest instability, which
+    need not end in sliding, and with "onset" what is not final is NaN: kinetic stress,
+    stress drop, moment, energies, rupture speeds and arrested events.
 
     Slip never reverses: a node whose slip rate would become negative sticks, keeps its
     weakened strength, and slips again only when the stress reaches it; a warning gives the
@@ -229,8 +233,8 @@ class Rupture:
     def bounded_by_strength(self, problem: Problem, event: str) -> tuple[bool, bool]:
         """Return whether strength bounds the stress of an event from below and from above.
 
-        A rupture begins at a largest mean stress, however the load moves: none is below the stress
-        of the first slip. Specimens are in equilibrium up to each event.
+        A rupture begins at a largest mean stress, however the load moves: none is below the
+        stress of the first slip. Specimens are in equilibrium up to each event.
         """
         if problem.specimen is None:
             return True, False
@@ -353,8 +357,9 @@ def _thresholds(
 ) -> Thresholds:
     """When steps change or end.
 
-    Calm: for as long as shear waves need to cross the interface, nothing slips faster than a crack
-    of half its length does when the load alone drives it, or nothing faster than before.
+    Calm: for as long as shear waves need to cross the interface, nothing slips faster than
+    a crack of half its length does when the load alone drives it, or nothing faster than
+    before.
     """
     friction, finite = medium.problem.friction, np.isfinite(nodes.strength)
     held = not finite.all()

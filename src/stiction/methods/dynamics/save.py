@@ -106,17 +106,17 @@ class Save:
     fields : sequence of {"slip", "slip_rate", "shear_stress", "strength"}
         Fields to keep in frames.
     every : int
-        Explicit steps between frames; while the interface creeps, a tenth as many implicit steps
-        (at least one). Steps shorten as it accelerates, so that frames are dense in time around
-        the onset.
+        Explicit steps between frames; while the interface creeps, a tenth as many implicit
+        steps (at least one). Steps shorten as it accelerates, so that frames are dense in
+        time around the onset.
     stations : mapping of str to float or (float, float)
         Names and places x, on a plane (x, y), in m, where slip, slip rate and shear stress
         (traction) are recorded after every step. The node nearest to a place is taken.
     to : path, optional
         Folder to write to during the run. Memory then stays bounded and the result holds no
-        fields; `stiction.methods.dynamics.save.open_rupture` reads them. If the folder holds the
-        same run, interrupted, it resumes from the last state written, and every number is
-        the same, to the bit, as without the interruption. A finished run is read.
+        fields; `stiction.methods.dynamics.save.open_rupture` reads them. If the folder
+        holds the same run, interrupted, it resumes from the last state written, and every
+        number is the same, to the bit, as without the interruption. A finished run is read.
 
     Examples
     --------
@@ -255,8 +255,8 @@ class Recorder:
     def flush(self, state: RuptureState, *, at_once: bool = False, last: bool = False) -> None:
         """Write what was gathered, if there is enough or at once, and the state to resume from.
 
-        The last state is not written: a run that goes on may have no frame where `max_steps` ended
-        it.
+        The last state is not written: a run that goes on may have no frame where
+        `max_steps` ended it.
         """
         folder, steps = self.save.to, sum(rows["step_time"].size for rows in self._steps)
         full = len(self._frames) >= FRAMES_PER_FILE or steps >= _MAX_STEPS_PER_FILE
@@ -325,7 +325,8 @@ def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset
     ----------
     folder : path
     fields : sequence of str, optional
-        Fields over ('time', 'x'), or ('time', 'x', 'y'), to load; all that were kept if left out.
+        Fields over ('time', 'x'), or ('time', 'x', 'y'), to load; all that were kept if
+        left out.
 
     Returns
     -------

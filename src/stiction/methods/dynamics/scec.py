@@ -20,8 +20,8 @@ def write_scec(
 ) -> list[Path]:
     """Write the stations and rupture times of a run as SCEC collects them (Harris et al., 2009).
 
-    Along strike is x, the direction of slip, and down-dip is y; on lines y is 0. Slip has no
-    vertical component.
+    Along strike is x, the direction of slip, and down-dip is y; on lines y is 0. Slip has
+    no vertical component.
 
     Parameters
     ----------
@@ -38,8 +38,9 @@ def write_scec(
     Returns
     -------
     list of pathlib.Path
-        ``faultst075dp045.txt`` of a station 7.5 km along strike and 4.5 km down-dip, ..., and
-        ``cplot.txt`` with the distances j and k (m) and the rupture time t (s), 1e9 for never.
+        ``faultst075dp045.txt`` of a station 7.5 km along strike and 4.5 km down-dip, ...,
+        and ``cplot.txt`` with the distances j and k (m) and the rupture time t (s), 1e9 for
+        never.
 
     Raises
     ------

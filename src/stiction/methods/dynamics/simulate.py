@@ -49,9 +49,9 @@ def simulate_rupture(
     ----------
     problem : Problem
     profiles : array, mapping of arrays, xarray.Dataset or Sample
-        Peak strength (Pa) of one sample, infinite where nothing ever breaks, or several profiles
-        by name, as in `onset`. Where the initial stress is above the strength, slip begins at
-        once.
+        Peak strength (Pa) of one sample, infinite where nothing ever breaks, or several
+        profiles by name, as in `onset`. Where the initial stress is above the strength,
+        slip begins at once.
     method : Rupture
         Load, numerical options and end of the run. The run begins at the first slip,
         regardless of `start`, and keeps its results if `max_steps` ends it.
@@ -59,7 +59,8 @@ def simulate_rupture(
         Results to keep and where to store them: by default slip, slip rate and shear stress
         every ten explicit steps, in memory.
     event : int, optional
-        On specimens, the number of the event in its order, from 0; by default the one that slides.
+        On specimens, the number of the event in its order, from 0; by default the one that
+        slides.
     progress : bool or callable
         True shows progress on standard error after a second; a callable gets the steps taken
         and 0.
@@ -68,16 +69,18 @@ def simulate_rupture(
     -------
     xarray.Dataset
         Over ('time', 'x') the fields; over 'time' `load`, `mean_stress`, `mean_slip`,
-        `top_slip_rate`, `weakened_fraction`, `seismic_moment`, `work` and energies; over 'step'
-        some of these at every step, with `step_time`; over ('step', 'station') `station_slip`,
-        `station_slip_rate` and `station_shear_stress`, and `station_x` (and `station_y`), where
-        their nodes are; over 'x' `peak_strength` and `arrival_time`; and the scalars of
-        `Rupture` for the run so far. The attribute `stopped` is the reason why it ended.
+        `top_slip_rate`, `weakened_fraction`, `seismic_moment`, `work` and energies; over
+        'step' some of these at every step, with `step_time`; over ('step', 'station')
+        `station_slip`, `station_slip_rate` and `station_shear_stress`, and `station_x` (and
+        `station_y`), where their nodes are; over 'x' `peak_strength` and `arrival_time`;
+        and the scalars of `Rupture` for the run so far. The attribute `stopped` is the
+        reason why it ended.
 
-        On a specimen, over 'time' also `machine_stress` (with a thickness `machine_force`, N),
-        `drive_travel` and energies of their own, from the stress at which the event began; and
-        `block_velocity` over ('snapshot', 'height', 'x'), m/s along x in the upper block at a few
-        times. The lower block is its mirror image and moves the other way. There is no 'step'.
+        On a specimen, over 'time' also `machine_stress` (with a thickness `machine_force`,
+        N), `drive_travel` and energies of their own, from the stress at which the event
+        began; and `block_velocity` over ('snapshot', 'height', 'x'), m/s along x in the
+        upper block at a few times. The lower block is its mirror image and moves the other
+        way. There is no 'step'.
 
     Raises
     ------
@@ -141,9 +144,9 @@ def _record_to_end(
     run: Run, state: RuptureState, recorder: Recorder, max_steps: int, meter: Meter
 ) -> str:
     """Take steps and keep frames until the run ends; return the reason."""
-    every = recorder.save.every
+    interval = recorder.save.every
     while state.steps < max_steps:
-        count = every if state.explicit else max(1, every // 10)
+        count = interval if state.explicit else max(1, interval // 10)
         if state.steps + count >= max_steps:
             recorder.flush(state, at_once=True)
         taken, reason = recorder.take_steps(state, min(count, max_steps - state.steps))

@@ -2,28 +2,29 @@
 
 Problem
 -------
-While the load tau_0 rises slowly at the rate R, slip follows the equilibria d(tau_0). Wanted is the
-state of the run at a load tau_c - D, a distance D below the onset tau_c, without the steps that
-lead there: slip, slip rate and memory variables. A run from it should have the same onset.
+While the load tau_0 rises slowly at the rate R, slip follows the equilibria d(tau_0).
+Wanted is the state of the run at a load tau_c - D, a distance D below the onset tau_c,
+without the steps that lead there: slip, slip rate and memory variables. A run from it
+should have the same onset.
 
 Algorithm
 ---------
-Asymptotics of a fold: near the onset, the distance of slip from its limit falls as
-(tau_c - tau_0)^(1/2), so that the slip rate V = R dd/dtau_0 grows as exp(a t) with a = R/(2 D).
+Asymptotics of a fold: near the onset, the distance of slip from its limit falls as (tau_c -
+tau_0)^(1/2), so that the slip rate V = R dd/dtau_0 grows as exp(a t) with a = R/(2 D).
 
 1. Find the onset tau_c by equilibrium. Begin with a distance in which shear waves cross the
    nucleation length `_CROSSINGS` times.
-2. At the distance D: find the equilibria at tau_c - D and a little before; their difference gives
-   the mean slip rate, and its growth the slip rate V at tau_c - D (`_state_at`).
+2. At the distance D: find the equilibria at tau_c - D and a little before; their difference
+   gives the mean slip rate, and its growth the slip rate V at tau_c - D (`_state_at`).
 3. Slip that grows as exp(a t) leaves in each memory variable, psi' = z psi + V with
    z = s_p |k| c_s, a permanent part psi = V/(a - z) (`memory.grown_memory`).
-4. The load is raised by what the mean slip rate radiates, Z <V>/<p>. Then stress that follows V
-   without delay needs no further force, and the remaining stress is inertia (the kernel is even in
-   a but for the radiation of the mean).
-5. The stress by which the state misses the strength where it slips estimates the error. It is the
-   error of the state and, as a stress, the amount by which the onset can be misplaced. If it is
-   more than `_MAX_ERROR` of the stress scale, try again from 2 further away: V falls as D^(-1/2),
-   its second derivative as D^(-5/2).
+4. The load is raised by what the mean slip rate radiates, Z <V>/<p>. Then stress that
+   follows V without delay needs no further force, and the remaining stress is inertia (the
+   kernel is even in a but for the radiation of the mean).
+5. The stress by which the state misses the strength where it slips estimates the error. It
+   is the error of the state and, as a stress, the amount by which the onset can be
+   misplaced. If it is more than `_MAX_ERROR` of the stress scale, try again from 2 further
+   away: V falls as D^(-1/2), its second derivative as D^(-5/2).
 6. Give up, and begin at rest, after `_MAX_TRIALS` or where no state is known well enough.
 """
 
@@ -92,8 +93,9 @@ def _state_at(
 ) -> RuptureState | None:
     """Steps 2 to 5: the state at a distance (Pa) below the onset; None where it is not known.
 
-    It is not known well enough where a node is beyond the first piece of its law, so that the
-    linear programme does not hold, or where a front has arrived at a time that would be unknown.
+    It is not known well enough where a node is beyond the first piece of its law, so that
+    the linear programme does not hold, or where a front has arrived at a time that would be
+    unknown.
     """
     nodes, grid = run.setting.nodes, run.medium.grid
     # 2. Two equilibria, and the slip rate between them.

@@ -2,19 +2,20 @@
 
 Problem
 -------
-A specimen is loaded slowly: its slip follows the equilibria of `methods.equilibrium` until one of
-them becomes unstable. From there on waves run through the blocks (`waves`), until all is at rest
-or the whole interface slides. Then the path goes on from the state that they left.
+A specimen is loaded slowly: its slip follows the equilibria of `methods.equilibrium` until
+one of them becomes unstable. From there on waves run through the blocks (`waves`), until
+all is at rest or the whole interface slides. Then the path goes on from the state that they
+left.
 
 Steps of an event
 -----------------
-1. Begin at the static state that becomes unstable. The drive is raised a little, as it goes on to
-   rise, and slip has grown a little along the unstable direction (`begin`).
-2. Follow the waves. The block is at rest when nothing slips any more while shear waves cross it and
-   return (`DynamicEvent.run`).
-3. Slip that is still under way once the waves have died out, and nodes that were carried beyond the
-   next equilibrium, come to rest in a static state: the path counts the latter as stopped
-   (`RuptureProgram.jump`).
+1. Begin at the static state that becomes unstable. The drive is raised a little, as it goes
+   on to rise, and slip has grown a little along the unstable direction (`begin`).
+2. Follow the waves. The block is at rest when nothing slips any more while shear waves
+   cross it and return (`DynamicEvent.run`).
+3. Slip that is still under way once the waves have died out, and nodes that were carried
+   beyond the next equilibrium, come to rest in a static state: the path counts the latter
+   as stopped (`RuptureProgram.jump`).
 """
 
 from __future__ import annotations
@@ -80,7 +81,8 @@ class DynamicEvent:
     start : (n,) array
         Stress of the static state at the start, less the initial stress, Pa.
     front : (n,) array
-        Slip with which the front arrives at a node, m; infinite where it was before the event.
+        Slip with which the front arrives at a node, m; infinite where it was before the
+        event.
     slides : bool
         Whether every node has slipped.
     steps : int
@@ -143,8 +145,8 @@ def begin(
 class RuptureProgram(DenseProgram):
     """Equilibria of a specimen between which waves run through the blocks.
 
-    Between events loading is slow. Where a wave carried slip beyond the next equilibrium, nodes
-    rest below their strength afterwards.
+    Between events loading is slow. Where a wave carried slip beyond the next equilibrium,
+    nodes rest below their strength afterwards.
 
     Parameters
     ----------

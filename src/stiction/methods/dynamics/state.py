@@ -1,18 +1,20 @@
 """The state of a rupture: constants of a run, variables, and diagnostics of every step.
 
-A run takes steps of two kinds. Implicit steps of adaptive size follow an interface that creeps
-(`implicit`), explicit steps of one size follow its waves (`explicit`); `RuptureState.phase` says
-which kind comes next. Both solve, at every node,
+A run takes steps of two kinds. Implicit steps of adaptive size follow an interface that
+creeps (`implicit`), explicit steps of one size follow its waves (`explicit`);
+`RuptureState.phase` says which kind comes next. Both solve, at every node,
 
     tau = tau_0 p + tau_i + f - Z V,   V = 0 or tau = strength(slip),   V >= 0.              (1)
 
-tau_0 p is the load, tau_i the initial stress, Z = G/(2 c_s) the impedance and f the stress that
-slip elsewhere transfers, mode by mode with the memory kernel C of `elasticity.memory_kernels`:
+tau_0 p is the load, tau_i the initial stress, Z = G/(2 c_s) the impedance and f the stress
+that slip elsewhere transfers, mode by mode with the memory kernel C of
+`elasticity.memory_kernels`:
 
     f(k, t) = -K(k) slip(k, t) + (G|k|/2) int_0^t C(|k| c_s t') V(k, t - t') dt'.            (2)
 
-Fields of the interface and their transforms are flat, whatever its shape; `Grid.transform` knows
-the shape. Modes q = 0, 1, ... are those of the real transform in its order, q = 0 the mean.
+Fields of the interface and their transforms are flat, whatever its shape; `Grid.transform`
+knows the shape. Modes q = 0, 1, ... are those of the real transform in its order, q = 0 the
+mean.
 """
 
 from enum import IntEnum

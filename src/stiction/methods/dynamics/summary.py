@@ -49,7 +49,8 @@ def per_area(interface: Interface, variable: Variable) -> Variable:
 def scalars(interface: Interface) -> dict[str, Variable]:
     """Return the additional variables of a run; on a plane, the median speeds along x and y.
 
-    The largest speed is left out there: where a front arrives at an angle, it is above all waves.
+    The largest speed is left out there: where a front arrives at an angle, it is above all
+    waves.
     """
     variables = {name: per_area(interface, variable) for name, variable in _SCALARS.items()}
     if interface.is_plane:
@@ -68,9 +69,9 @@ def seismic_moment(run: Run, state: RuptureState) -> float:
 def energy_balance(run: Run, state: RuptureState) -> dict[str, float]:
     """Return strain, fracture and radiated energy, J/m; on a plane J.
 
-    The static strain energy is the sum over modes of K(k)|delta_k|²/2. Waves carry away the work
-    less friction less strain energy. The stress equals the strength wherever there is slip rate, so
-    that the work of friction follows from the slip alone.
+    The static strain energy is the sum over modes of K(k)|delta_k|²/2. Waves carry away the
+    work less friction less strain energy. The stress equals the strength wherever there is
+    slip rate, so that the work of friction follows from the slip alone.
     """
     nodes, grid, friction = run.setting.nodes, run.medium.grid, run.medium.problem.friction
     drop = np.where(np.isfinite(nodes.strength), nodes.strength - nodes.residual, 0.0)
@@ -160,9 +161,9 @@ def front_speed(
 def rupture_speed(arrival: Floats, spacing: float, window: float) -> Floats:
     """Return the apparent speed of the front at each node of a line, m/s; nan where none passed.
 
-    `arrival` (s) is periodic and nan where the front never came. The speed is a mean over `window`
-    (m), where the arrival is strictly monotone over the window: the birth of patches and the
-    meeting of fronts do not count.
+    `arrival` (s) is periodic and nan where the front never came. The speed is a mean over
+    `window` (m), where the arrival is strictly monotone over the window: the birth of
+    patches and the meeting of fronts do not count.
     """
     half = max(1, round(0.5 * window / spacing))
     if 2 * half >= arrival.size:

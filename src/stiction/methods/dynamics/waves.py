@@ -2,25 +2,30 @@
 
 Problem
 -------
-The blocks of `mesh`, from a static state on, M u'' + M alpha u' + K (u + theta u') = forces, with
-the masses M, the attenuation alpha (`Mesh.attenuation`) and the viscous time theta of the grid
-(`Mesh.viscous_time`). All displacements are counted from the static state. In the upper block u is
-half of the slip at y = 0. The lower block is its mirror image, so that no normal stress changes.
+The blocks of `mesh`, from a static state on, M u'' + M alpha u' + K (u + theta u') =
+forces, with the masses M, the attenuation alpha (`Mesh.attenuation`) and the viscous time
+theta of the grid (`Mesh.viscous_time`). All displacements are counted from the static
+state. In the upper block u is half of the slip at y = 0. The lower block is its mirror
+image, so that no normal stress changes.
 
 Algorithm (`wave_steps`)
 ------------------------
-Leapfrog: velocities in the middle of steps of size h, displacements at their ends, attenuation
-half implicit. With a = alpha h/2 and w = u + theta u', each step is, row by row,
+Leapfrog: velocities in the middle of steps of size h, displacements at their ends,
+attenuation half implicit. With a = alpha h/2 and w = u + theta u', each step is, row by
+row,
 
 1. forces F on the row from its elements (`_force`), by w alone, so that only w is kept;
-2. u' <- ((1 - a) u' + h F/M)/(1 + a) and w <- w + (h + theta) u' - theta (u' before) (`_move`).
-3. On the interface, the same with friction (`_slide`): the node slips at the rate that its strength
-   leaves, and rests where that would be negative. `Mesh.correction`, K of the closed form less
-   K of the mesh, acts on the slip of the interface.
-4. The top moves with its platen (`_move_platen`), or the pusher acts on the ends (`_move_pusher`).
-   The spring of the machine is half implicit; an infinitely stiff machine holds the drive.
+2. u' <- ((1 - a) u' + h F/M)/(1 + a) and w <- w + (h + theta) u' - theta (u' before)
+   (`_move`).
+3. On the interface, the same with friction (`_slide`): the node slips at the rate that its
+   strength leaves, and rests where that would be negative. `Mesh.correction`, K of the
+   closed form less K of the mesh, acts on the slip of the interface.
+4. The top moves with its platen (`_move_platen`), or the pusher acts on the ends
+   (`_move_pusher`). The spring of the machine is half implicit; an infinitely stiff machine
+   holds the drive.
 
-Row j + 1 needs row j as it was, so the force on a row is found before the row below it moves.
+Row j + 1 needs row j as it was, so the force on a row is found before the row below it
+moves.
 """
 
 from typing import Any, NamedTuple
@@ -36,7 +41,8 @@ from stiction.methods.equilibrium.sample import StaticSample, strength_at
 class Waves(NamedTuple):
     """Where a block is, and how fast. Single precision is enough for differences.
 
-    u and v are the sums w of displacement and viscous time times rate: elements only need these.
+    u and v are the sums w of displacement and viscous time times rate: elements only need
+    these.
     """
 
     u: Array
@@ -178,7 +184,8 @@ def _move_platen(mesh: Mesh, waves: Waves, force: Any) -> None:
 def _move_pusher(mesh: Mesh, waves: Waves, gains: Array) -> None:
     """Step 4: let the pusher act on the block, behind its spring, or hold it.
 
-    Its force F changes its speed from v to v + g F, with the mobility g of the pushed nodes.
+    Its force F changes its speed from v to v + g F, with the mobility g of the pushed
+    nodes.
     """
     now, step, last = waves.now, mesh.step, waves.u.shape[1] - 1
     mobility = speed = 0.0
@@ -211,8 +218,8 @@ def wave_steps(
 ) -> int:  # fmt: skip
     """Take so many steps, or `ends` once all nodes have slipped; returns how many were taken.
 
-    `start` (Pa) is the stress of the static state less the initial stress; `front` (m) is the
-    slip with which the front arrives at a node.
+    `start` (Pa) is the stress of the static state less the initial stress; `front` (m) is
+    the slip with which the front arrives at a node.
     """
     rows, n = waves.u.shape
     step, lag = np.float32(mesh.step), np.float32(mesh.viscous_time)
