@@ -9,6 +9,8 @@ from scipy.special import ndtri
 from scipy.stats import norm
 
 import stiction as st
+from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.limit_state import LimitState
 from stiction.inference.density import REACH, tabulate
 from stiction.inference.specimens import (
     MEAN,
@@ -18,6 +20,8 @@ from stiction.inference.specimens import (
     Tables,
     grid_of_profiles,
 )
+from stiction.random.equally_likely import EquallyLikely
+from stiction.reliability.factors import solve
 
 sys.path.append(str(Path(__file__).parents[2] / "validation"))
 import design_force_closed as closed
@@ -64,3 +68,67 @@ def test_posterior_is_that_of_the_closed_form(levels):
     drawn = grid.described(grid.draws(40_000, np.random.default_rng(1)))
     assert drawn[MEAN].mean() == pytest.approx(mean, abs=4.0 * deviation / 200.0)
     assert drawn[SCATTER].mean() == pytest.approx(scatter, rel=0.02)  # four errors
+
+
+LINE = st.Problem(
+    st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
+    st.Interface(0.05, 64),
+    st.LinearWeakening(weakening_rate=0.25e12),
+)
+LOCAL = {"method": st.LocalCriterion(), "progress": False}
+
+
+def scattering(mean, cv, of_factor):
+    """A field that scatters by `cv` within, and a log-normal factor between specimens."""
+    field = st.RandomField(
+        st.Gamma(mean=mean, cv=cv), st.PowerLawSpectrum(4e-3), mean_mode=True
+    )
+    factor = st.Lognormal(mean=1.0, cv=of_factor)
+    return st.RandomInterface(strength=field, between={"strength": factor})
+
+
+def test_specimens_of_each_solved_sample_are_those_of_its_draws():
+    """Also of other interfaces of the same field: onsets of their draws are as counted."""
+    several = [scattering(1e6, 0.2, cv) for cv in (0.05, 0.1)] + [scattering(9e5, 0.1, 0.08)]
+    random = EquallyLikely(tuple(several), fields=(0, 0, 1))
+    state = LimitState(Experiment(LINE, random, LOCAL["method"], seed=4))
+    counts = solve(state, 0, 20)
+    assert counts.values.shape == (20, 128)
+    group = np.where(counts.members == 2, 1, 0)
+    assert np.all(np.ptp(group, axis=1) == 0)
+    assert {*counts.members.ravel().tolist()} == {0, 1, 2}
+    picks = np.arange(0, 20 * 128, 37)
+    draws = counts.draws(picks)
+    np.testing.assert_allclose(state(draws), counts.values.ravel()[picks], rtol=1e-9)
+    np.testing.assert_array_equal(state.member(draws), counts.members.ravel()[picks])
+    stress = np.quantile(counts.values, 0.1)
+    assert np.all(state(counts.failing(stress, 20)) < stress)
+    _, lowest = counts.lowest(stress, 50)
+    assert 0.25 < np.mean(lowest < stress) < 0.75
+
+
+@pytest.mark.parametrize("probability", [1e-2, 1e-4])
+def test_a_design_by_specimens_of_solved_samples_is_that_of_an_integral(probability):
+    """The integral over the factor is done by hand, over 20,000 onsets of the field within."""
+    random = scattering(1e6, 0.15, 0.12)
+    inner = st.monte_carlo(LINE, random.strength, samples=20_000, seed=9, pilot=False, **LOCAL)
+    law = random.between["strength"].distribution
+    found = st.design_stress(LINE, random, probability=probability, seed=2, **LOCAL)
+    exact = np.mean(law.cdf(found.stress / inner.critical_stress.values))
+    assert found.algorithm == "plain"
+    assert found.evaluations < 0.2 / (probability * 0.1**2)
+    assert np.log(exact / probability) == pytest.approx(0.0, abs=4.0 * found.cv)
+    demand = st.failure_probability(LINE, random, found.stress, seed=3, **LOCAL)
+    assert np.log(demand.probability / exact) == pytest.approx(0.0, abs=4.0 * demand.cv)
+    assert np.all(demand.failing_profiles.critical_stress < found.stress)
+
+
+def test_a_design_by_draws_is_a_quantile_of_the_predictive_distribution():
+    peaks = 0.8e6 * PEAKS
+    posterior = st.infer(LINE, scattering(1e6, 0.2, 0.1), peaks, samples=2000, **LOCAL)
+    wanted = np.array([1e-2, 1e-3])
+    exact = posterior.likelihood.quantile(posterior.grid, wanted)
+    for probability, own in zip(wanted, exact, strict=True):
+        design = st.design_stress(LINE, posterior, probability=probability, seed=1, **LOCAL)
+        low, high = design.interval
+        assert low < own < high

@@ -80,7 +80,7 @@ def test_five_strengths_give_what_proportion_gives(monkeypatch):
     """The longer way, on a problem where both are possible; onsets by samples of the same draws."""
     given = LOCAL | {"samples": 200}
     short = st.infer(PROBLEM, ROUGH, 0.8 * PEAKS, **given)
-    monkeypatch.setattr(joining, "may_scale", lambda *_: False)
+    monkeypatch.setattr(joining, "scales_with_strength", lambda *_: False)
     long = st.infer(PROBLEM, ROUGH, 0.8 * PEAKS, **given)
     assert long.likelihood.onsets[0].ratios.shape == (1, 5, 200)
     for name in ("strength.mean", "between.strength"):

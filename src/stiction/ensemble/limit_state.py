@@ -191,6 +191,21 @@ def weakest_first(state: LimitState) -> LimitState:
     return replace(state, experiment=replace(experiment, random=order))
 
 
+def scales_with_strength(problem: Any, random: Any, method: Any) -> bool:
+    """Return whether the onset is in proportion to the strength, see `inference.scaling`."""
+    friction, initial = problem.friction, np.asarray(problem.load.initial_stress)
+    scaling = optional_member(method, "scaling")
+    zero = scaling == "stretch"  # neither residual strength nor initial stress scales
+    return bool(
+        scaling != "none"
+        and len(random.names) == 1
+        and friction.weakening_rate is not None
+        and np.ptp(initial) == 0.0
+        and not (np.any(initial) and np.ptp(problem.load_profile))
+        and not (zero and (np.any(np.asarray(friction.residual_strength)) or np.any(initial)))
+    )
+
+
 def no_single_length(problem: Problem, random: Any) -> str | None:
     """Return the reason why the local criterion does not hold, or None if it does."""
     rate = problem.uniform_rate

@@ -187,6 +187,10 @@ class FieldFit:
         >>> min(means) < fit.field.mean < max(means)
         True
         """
+        return self.grouped(count, seed)[0]
+
+    def grouped(self, count: int, seed: int) -> tuple[list[RandomInterface], list[int]]:
+        """Return equally likely interfaces, and the number of the field within each."""
         if self.quantity not in ("strength", "friction_coefficient"):
             raise InputError(
                 f"interfaces: need a strength, and the fit is of {self.quantity}; fit one of"
@@ -194,12 +198,12 @@ class FieldFit:
                 " into random interfaces of your own"
             )
         chosen = self._chosen(count, seed)
-        if not self._families:
-            return [RandomInterface(strength=field) for field in chosen]
         place = {own: number for number, own in enumerate(self._every)}
+        numbers = [place[field] for field in chosen]
+        if not self._families:
+            return [RandomInterface(strength=field) for field in chosen], numbers
         rng = np.random.default_rng([seed, 6])
-        drawn = self._posterior.draws(count, rng, [place[field] for field in chosen])
-        return [self._posterior.interface(one) for one in drawn]
+        return self._posterior.grouped(self._posterior.draws(count, rng, numbers))
 
     def _chosen(self, count: int, seed: int) -> list[RandomField]:
         """Return likely fields, of each family in proportion to its weight."""

@@ -17,6 +17,7 @@ from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Count, Number, checked
 from stiction.base.progress import Meter
 from stiction.ensemble.batches import in_threads, usable_cores
+from stiction.ensemble.limit_state import scales_with_strength
 from stiction.inference.agreement import Agreement, agreement
 from stiction.inference.density import tabulate
 from stiction.inference.fit import FieldFit
@@ -31,7 +32,6 @@ from stiction.inference.likelihood import (
 from stiction.inference.peaks import Peaks
 from stiction.inference.posterior import DRAWS, Posterior
 from stiction.inference.prior import refuse_conditioned
-from stiction.inference.scaling import may_scale
 from stiction.inference.specimens import (
     MEAN,
     SCATTER,
@@ -102,8 +102,11 @@ class SpecimenPosterior(Posterior):
         seed : int
             Not negative.
         """
-        drawn = self.grid.draws(count, np.random.default_rng([seed, 4]))
-        return [self.grid.interface(one) for one in drawn]
+        return self.grouped(count, seed)[0]
+
+    def grouped(self, count: int, seed: int) -> tuple[list[RandomInterface], list[int]]:
+        """Return equally likely interfaces, and the number of the field within each."""
+        return self.grid.grouped(self.grid.draws(count, np.random.default_rng([seed, 4])))
 
     def prior_transform(self, u: Any) -> Array:
         """Raise an `InputError`: fields within a specimen are no parameters."""
@@ -240,7 +243,7 @@ def _simulated(
         return found, tabulate(found, np.maximum(bounds, 0.0))
 
     at, fields = np.zeros(1), len(profiles.fields)
-    if not may_scale(problem, profiles.fields[0], method):
+    if not scales_with_strength(problem, profiles.fields[0], method):
         ratios, known = onsets(0, at)
         low, high, _ = Onsets(at, ratios[None], (known,), area).ranges(peaks, error)
         at = np.linspace(low - MARGIN, high + MARGIN, STEPS)

@@ -26,6 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stiction.base.arrays import Array
+from stiction.ensemble.limit_state import scales_with_strength
 from stiction.inference.prior import Prior
 from stiction.methods.protocol import optional_member
 from stiction.random.dotted_keys import full_key
@@ -56,7 +57,7 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
     problem, random = prior.at(middle)
     none = Scaling((), middle, np.zeros((0, 2)))
     field, full = random.strength, [full_key(name) for name in prior.names]
-    if not may_scale(problem, random, method) or PRESSURE & {*full}:
+    if not scales_with_strength(problem, random, method) or PRESSURE & {*full}:
         return none
     of_area = [
         key for key in full if key.startswith(("problem.interface.", "problem.specimen."))
@@ -79,18 +80,3 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
     mean = 1.0 if pressure is None else float(np.mean(pressure))
     slopes[:, 0] *= mean ** ((field.of is not None) - (variable == "friction_coefficient"))
     return Scaling(tuple(places), middle, slopes)
-
-
-def may_scale(problem: Any, random: Any, method: Any) -> bool:
-    """Whether the onset scales with the strength if this keeps its distribution."""
-    friction, initial = problem.friction, np.asarray(problem.load.initial_stress)
-    scaling = optional_member(method, "scaling")
-    zero = scaling == "stretch"  # neither residual strength nor initial stress scales
-    return bool(
-        scaling != "none"
-        and len(random.names) == 1
-        and friction.weakening_rate is not None
-        and np.ptp(initial) == 0.0
-        and not (np.any(initial) and np.ptp(problem.load_profile))
-        and not (zero and (np.any(np.asarray(friction.residual_strength)) or np.any(initial)))
-    )

@@ -34,6 +34,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 import scipy.stats
+from scipy.optimize import brentq
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, unknown_name
@@ -59,12 +60,16 @@ CELLS, MEANS, STEPS = 40, 48, 5
 depends on c."""
 BEYOND = 1.0
 """Range of log m beyond that of x at first."""
+LOWEST, PREDICTED = 3.0, 1_000
+"""Range of x below that of log m, and points of x, of a predictive distribution."""
 NEGLIGIBLE = 1e-6
 """Mass on either side of log m that is left out."""
 ZOOMS = 4
 FINE, MOST_POINTS = 4.0, 2_000
 """Points of x for the least deviation of a number, and at most in all. Cells of x add a twelfth of
 their square to a variance: 0.5 % of the least one."""
+LOWEST_FACTOR, TABULATED = 6.0, 2_401
+"""Range of log b on either side of zero, and values at which its distribution is tabulated."""
 REACH = 6.0
 """Standard deviations to which the likelihood of a number is tabulated."""
 LEAST_DEVIATION = 1e-3
@@ -184,13 +189,20 @@ def points_between(ranges: Sequence[tuple[float, float, float]]) -> Array:
     return np.linspace(low, high, count)
 
 
+@lru_cache(maxsize=1024)
+def _tabulated(family: str, cv: float) -> tuple[Array, Array]:
+    """Return values of log b, close where it is likely, and the probability below each."""
+    end = math.asinh(LOWEST_FACTOR / cv)
+    logs = cv * np.sinh(np.linspace(-end, end, TABULATED))
+    with np.errstate(over="ignore"):  # a power of what is far above
+        return logs, factor_of_family(family, cv).distribution.cdf(np.exp(logs))
+
+
 def masses(family: str, cv: float, means: Array, x: Array) -> Array:
     """Return the probability that x lies in the cell of each point, (means, points)."""
     half = 0.5 * (x[1] - x[0])
     ends = np.append(x - half, x[-1] + half)
-    with np.errstate(over="ignore"):  # a power of what is far above
-        below = factor_of_family(family, cv).distribution.cdf(np.exp(ends - means[:, None]))
-    return np.diff(below, axis=1)
+    return np.diff(np.interp(ends - means[:, None], *_tabulated(family, cv)), axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,6 +241,10 @@ class Grid:
         own = self.profiles
         factor = factor_of_family(own.families[int(drawn[1])], float(drawn[2]))
         return of_mean(own.fields[int(drawn[0])], own.reference * math.exp(drawn[3]), factor)
+
+    def grouped(self, drawn: Array) -> tuple[list[RandomInterface], list[int]]:
+        """Return the interfaces of draws (draws, 4), and the numbers of their fields."""
+        return [self.interface(row) for row in drawn], drawn[:, 0].astype(np.int64).tolist()
 
     def described(self, drawn: Array) -> dict[str, Array]:
         """Return draws (draws, 4) as columns of parameters."""
@@ -377,6 +393,41 @@ class Tables:
             [np.interp(at, known.at, own) for at, own in zip(x, ratios, strict=True)]
         )
         return known.area * np.exp(x) * ratio + self.error * rng.standard_normal(len(u))
+
+    def quantile(self, grid: Grid, probabilities: Array, kind: int = 0) -> Array:
+        """Return the peaks below which another one lies with these probabilities.
+
+        The predictive distribution: the mean over field, onset and grid, without draws.
+        """
+        profiles, known = self.profiles, self.onsets[kind]
+        x = np.linspace(grid.means[0] - LOWEST, grid.means[-1] + BEYOND, PREDICTED)
+        below = np.zeros((len(profiles.fields), x.size))
+        for family, name in enumerate(profiles.families):
+            for cell, cv in enumerate(profiles.prior.cells()):
+                below += grid.mass[:, family, cell] @ masses(name, cv, grid.means, x)
+        below = np.cumsum(below, axis=1)
+        # T(c) rises with c: where it is t, for every field and sample
+        logs = np.log(known.area * known.ratios) + known.at[:, None]
+        samples = logs.shape[2]
+
+        def chance(log_peak: float) -> float:
+            if known.at.size == 1:
+                at = log_peak - logs[:, 0]
+            else:
+                at = np.array(
+                    [[np.interp(log_peak, one, known.at) for one in f.T] for f in logs]
+                )
+            pairs = zip(at, below, strict=True)
+            return (
+                float(sum(np.interp(own, x, row, left=0.0).sum() for own, row in pairs))
+                / samples
+            )
+
+        found = []
+        for probability in probabilities:
+            low, high = x[0] + logs.min() - known.at[0], x[-1] + logs.max() - known.at[-1]
+            found.append(brentq(lambda at, p=probability: chance(at) - p, low, high, xtol=1e-6))
+        return np.exp(found)
 
 
 def _laws(profiles: Profiles, u: Array) -> list[tuple[str, float, Any]]:

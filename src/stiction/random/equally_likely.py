@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Annotated, Any, NamedTuple, Protocol, Self, TypeAlias, runtime_checkable
+from typing import Annotated, Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import InstanceOf
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
@@ -55,6 +55,7 @@ class EquallyLikely:
     order: tuple[int, ...] = ()  # of the members along the first draw; empty: as they are
     source: Source | None = None  # that they were drawn from
     complete: bool = False  # they are all there are, and no sample of more
+    fields: tuple[int, ...] = ()  # number of each member's field within, all of one mean
 
     def __post_init__(self) -> None:
         if not self.members:
@@ -93,10 +94,43 @@ class EquallyLikely:
         ]
         return np.array(numbers, np.int64)
 
-    def larger(self, count: int, seed: int) -> Self:
+    @cached_property
+    def groups(self) -> NDArray[np.int64]:
+        """A number for each member, the same for those whose strengths are in proportion."""
+        known: dict[Any, int] = {}
+        strengths = [member.strength for member in self.members]
+        return np.array(self.fields or [known.setdefault(s, len(known)) for s in strengths])
+
+    @cached_property
+    def means(self) -> Array:
+        """Mean strength of each member."""
+        return np.array([member.strength.mean for member in self.members])
+
+    @cached_property
+    def factor_laws(self) -> tuple[list[Any], NDArray[np.int64]]:
+        """Laws of the factor of the strength, and the number of the law of each member."""
+        known: dict[Any, int] = {}
+        laws = [(member.between or {}).get("strength") for member in self.members]
+        numbers = [known.setdefault(law, len(known)) for law in laws]
+        return list(known), np.array(numbers)
+
+    def factor_column(self, interface: Interface) -> int | None:
+        """Return the number of the draw of the factor of the strength; None if one has none."""
+        if None in self.factor_laws[0]:
+            return None
+        own = self.members[0].factor_column(interface)
+        return int(_columns(self, interface).of[0][own])
+
+    def select(self, draws: Array, rows: NDArray[np.int64], members: NDArray[np.int64]) -> None:
+        """Make rows of draws samples of given members."""
+        count = len(self.members)
+        place = np.argsort(self.order) if self.order else np.arange(count)
+        draws[rows, 0] = ndtri((place[members] + 0.5) / count)
+
+    def larger(self, count: int, seed: int) -> "EquallyLikely":
         """Return as many members from the same source."""
         assert self.source is not None
-        return type(self)(tuple(self.source.interfaces(count, seed)), source=self.source)
+        return drawn_from(self.source, count, seed)
 
     def member(self, draws: Array) -> NDArray[np.int64]:
         """Return the number of the member of each sample."""
@@ -164,6 +198,13 @@ def _named(kinds: Mapping[str, Any]) -> str:
     return " and ".join(f"{name} ({of})" if of else name for name, of in kinds.items())
 
 
+def drawn_from(source: Source, count: int, seed: int) -> EquallyLikely:
+    """Return so many equally likely interfaces from a source, grouped by field if it knows."""
+    grouped = getattr(source, "grouped", None)
+    members, fields = grouped(count, seed) if grouped else (source.interfaces(count, seed), ())
+    return EquallyLikely(tuple(members), source=source, fields=tuple(fields))
+
+
 def as_random(
     given: Any, seed: int = 0, mixture: bool = False
 ) -> RandomInterface | EquallyLikely:
@@ -178,7 +219,7 @@ def as_random(
     if isinstance(given, EquallyLikely):
         return given
     if isinstance(given, Source):
-        return EquallyLikely(tuple(given.interfaces(FIRST_MEMBERS, seed)), source=given)
+        return drawn_from(given, FIRST_MEMBERS, seed)
     if not isinstance(given, list | tuple):
         return as_random_interface(given)
     random = EquallyLikely(tuple(map(as_random_interface, given)), complete=mixture)

@@ -410,6 +410,26 @@ class RandomInterface:
         """Return the number of the member of each sample: 0."""
         return np.zeros(len(draws), np.int64)
 
+    groups = np.zeros(1, np.int64)
+    means = np.ones(1)
+
+    @property
+    def factor_laws(self) -> tuple[list[Any], NDArray[np.int64]]:
+        """Laws of the factor of the strength, and the number of the law of each member."""
+        return [(self.between or {}).get("strength")], np.zeros(1, np.int64)
+
+    def factor_column(self, interface: Interface) -> int | None:
+        """Return the number of the draw of the factor of the strength; None without a factor."""
+        if "strength" not in (self.between or {}):
+            return None
+        streams = layout(self, interface)[len(self.names) :]
+        return int(
+            dict(zip(self.between or {}, streams, strict=True))["strength"].columns.start
+        )
+
+    def select(self, draws: Array, rows: NDArray[np.int64], members: NDArray[np.int64]) -> None:
+        """Make rows of draws samples of given members: there is one only."""
+
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the random properties."""

@@ -62,7 +62,8 @@ def support_in_stress(
         return (law.ppf(chance), law.isf(chance)) if chance else law.support()
 
     low, high = extremes(field.marginal)
-    factors = [extremes(between[name])] if name in between else []
+    # Rounding may put the lower end of a factor just below zero.
+    factors = [np.maximum(extremes(between[name]), 0.0)] if name in between else []
     if name == "normal_pressure":
         factors.append((np.min(problem.pressing), np.max(problem.pressing)))
     if field.of is not None and "normal_pressure" in random.names:

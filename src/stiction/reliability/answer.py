@@ -20,7 +20,7 @@ from stiction.base.progress import Meter
 from stiction.base.units import in_words
 from stiction.ensemble.batches import usable_cores
 from stiction.ensemble.experiment import Experiment
-from stiction.ensemble.limit_state import Event, LimitState, weakest_first
+from stiction.ensemble.limit_state import Event, LimitState
 from stiction.ensemble.monte_carlo import check_fields
 from stiction.methods.onset import exact_counterpart
 from stiction.methods.protocol import optional_member, seconds_per_sample
@@ -272,10 +272,7 @@ def prepare(
     if problems:
         raise InputError(problems)
     check_fields([experiment])
-    slow = too_slow(experiment, max_evaluations)
-    if not (algorithm == "plain" or slow):
-        state = weakest_first(state)
-    seconds = SECONDS if slow else PATIENCE
+    seconds = SECONDS if too_slow(experiment, max_evaluations) else PATIENCE
     return state, max_evaluations or int(min(MOST, max(FEWEST, seconds / experiment.seconds)))
 
 

@@ -15,7 +15,7 @@ from stiction.base.progress import Meter, Show
 from stiction.base.units import Doubt, doubt_units, in_words
 from stiction.base.variables import ONSET_VARIABLES, PROFILES, Variable
 from stiction.ensemble.experiment import Experiment
-from stiction.ensemble.limit_state import Event, LimitState
+from stiction.ensemble.limit_state import Event, LimitState, weakest_first
 from stiction.methods.protocol import MethodObject, label
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset
@@ -37,6 +37,7 @@ from stiction.reliability.answer import (
     wanted_members,
 )
 from stiction.reliability.counting import count_failures
+from stiction.reliability.factors import Counts, count_tail
 from stiction.reliability.tail import Goal, Tail, sample_curve, sample_tail
 from stiction.reliability.uncertainty import binomial_interval, generator, lognormal_interval
 
@@ -263,6 +264,10 @@ def _probability(
     if algorithm == "auto" and (slow := too_slow(state.experiment, allowed)):
         algorithm, reason = "plain", slow
     elif algorithm == "auto":
+        aim = Goal(target_cv * (SAMPLED if state.is_sample else 1.0), stress)
+        if counted := count_tail(state, aim, budget):
+            return _by_tail(Estimate(state, counted[1], stress), aim.cv, counted[0])
+        state = weakest_first(state)
         draws = state.draws(state.experiment.seed, 0, least)
         pilot = draws, state(draws)
         failures = int(np.sum(pilot[1] < stress))
@@ -274,6 +279,8 @@ def _probability(
     if algorithm == "plain":
         begun = 0 if pilot is None else least
         return _by_counting(state, stress, target_cv, budget, least, begun, reason)
+    if algorithm != "auto":
+        state = weakest_first(state)
     tail = sample_tail(
         state, Goal(target_cv, stress), algorithm=algorithm, budget=budget, reason=reason,
         pilot=pilot,
@@ -344,7 +351,7 @@ def _by_counting(
     )  # fmt: skip
 
 
-def _by_tail(found: Estimate, target_cv: float) -> Answer:
+def _by_tail(found: Estimate, target_cv: float, counts: Counts | None = None) -> Answer:
     state, tail, stress = found.state, found.tail, found.stress
     probability, last = found.probability, tail.repetitions[-1]
     interval = lognormal_interval(probability, found.cv)
@@ -361,15 +368,20 @@ def _by_tail(found: Estimate, target_cv: float) -> Answer:
                 f"the local criterion misses {1.0 - covered:.0%} of the failures: the estimate may"
                 " be low; compare with algorithm='subset'"
             )
+    elif counts:
+        doubts += exact_doubts(state, counts.lowest(stress, 2 * CHECKED), stress, probability)
     elif tail.complete:
         doubts += exact_doubts(state, last.around(stress), stress, probability)
     else:
         there = tail.probability(tail.reached), tail.cv(tail.reached)
         interval = 0.0, lognormal_interval(*there)[1]
         doubts = [f"{tail.short_of(f'{stress:.7g} Pa')}; the interval ends there"]
-    draws, stresses = last.failing(stress)
-    chosen = different(stresses, SHOWN, generator(state.experiment.seed, 2))
-    profiles = _profiles(state, draws[chosen])
+    if counts:
+        draws = counts.failing(stress, SHOWN)
+    else:
+        draws, stresses = last.failing(stress)
+        draws = draws[different(stresses, SHOWN, generator(state.experiment.seed, 2))]
+    profiles = _profiles(state, draws)
     return Answer.of(found, doubts, interval=interval, failing_profiles=profiles)
 
 
@@ -452,12 +464,18 @@ def design_stress(
 
 
 def _quantile(state: LimitState, probability: float, target_cv: float, budget: int) -> Answer:
-    often, lowest = probability >= FREQUENT, state.bounds[0]
+    lowest = state.bounds[0]
     target_cv *= SAMPLED if state.is_sample else 1.0
-    tail = sample_tail(
-        state, Goal(target_cv, probability=probability), budget=budget,
-        algorithm="subset" if often else "auto", reason="frequent" if often else "rare",
-    )  # fmt: skip
+    goal = Goal(target_cv, probability=probability)
+    counted = count_tail(state, goal, budget)
+    if counted:
+        tail = counted[1]
+    else:
+        often = probability >= FREQUENT
+        tail = sample_tail(
+            weakest_first(state), goal, budget=budget, algorithm="subset" if often else "auto",
+            reason="frequent" if often else "rare",
+        )  # fmt: skip
     asked: dict[str, Any] = {"probability": probability, "of_stress": True}
     if not tail.complete:  # the tail ends at its lowest sample
         found = Estimate(state, tail, tail.extent[0])
@@ -479,8 +497,10 @@ def _quantile(state: LimitState, probability: float, target_cv: float, budget: i
             f" {probability:g} is the bound itself"
         )
     doubts += imprecise(found.sampling_cv, target_cv, tail.spent)
-    if tail.algorithm == "subset":
+    if tail.algorithm != "two_level":
         near = tail.repetitions[-1].around(found.stress)
+        if counted:
+            near = counted[0].lowest(found.stress, 2 * CHECKED)
         doubts += exact_doubts(state, near, found.stress, probability)
     interval = tail.stress_interval(probability, found.cv, lowest)
     return Answer.of(found, doubts, interval=interval, **asked)
@@ -548,6 +568,7 @@ def failure_curve(
 
         def solve(own: Experiment, meter: Meter) -> Estimate:
             state, budget = prepare(own, event, workers, meter, max_evaluations)
+            state = weakest_first(state)
             aim = target_cv * (SAMPLED if state.is_sample else 1.0)
             tail = sample_curve(state, Goal(aim, probability=smallest), budget)
             reached = tail.quantile(smallest) if tail.complete else tail.reached

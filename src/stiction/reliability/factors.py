@@ -1,0 +1,173 @@
+"""Counting with many specimens for each solved field.
+
+Problem. Estimate the lower tail of the onset T of specimens whose strength is m b f(x): a mean m,
+a factor b between specimens and a field f within. A handful of parameters (m and the law of b)
+differs between equally likely interfaces of one field, and T is m b R(f) if the onset is in
+proportion to the strength. The solver is needed for R only.
+
+Source. Conditional Monte Carlo (Hammersley, 1956; Asmussen and Glynn, Stochastic Simulation,
+2007, section V.4), by stratified sampling in place of the integral over b.
+
+Steps:
+
+1. Draw plain samples, as `stiction.monte_carlo` does, and solve them.
+2. Divide each onset by the factor and the mean of its own sample.
+3. Multiply it by the means of other interfaces of the same field, evenly spread over these, and by
+   factors at stratified shares of their laws: `FACTORS` specimens in all.
+4. Specimens of one solved sample are one family, from whose shares among the failures the error
+   follows (`uncertainty.ancestral_variance`), as in subset simulation.
+5. Solve more samples until the error is small enough.
+
+Where the onset is not in proportion to the strength there is one specimen for each sample, and
+this is plain counting.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from stiction.base.arrays import Array
+from stiction.ensemble.limit_state import LimitState, scales_with_strength
+from stiction.random.mapping import from_normal
+from stiction.reliability.subset import Descent, Population
+from stiction.reliability.tail import Goal, Tail
+from stiction.reliability.uncertainty import generator
+
+FACTORS = 128
+"""Specimens for each solved sample."""
+FIRST, MOST_STEP = 500, 8_000
+"""Samples that are solved at first, and most that are solved in one step."""
+MARGIN = 1.1
+"""Factor on the number of samples, as the error so far is itself an estimate."""
+SUBSET_EVALUATIONS = 50.0
+"""Evaluations of subset simulation for a coefficient of variation of 1, over log10(P)^2: fitted to
+the table of docs/reliability.md."""
+LIST_COST = 5.0
+"""Cost of an evaluation along chains over a list of interfaces, in evaluations that count."""
+
+
+class Counts(NamedTuple):
+    """Specimens by solved sample: onsets, interfaces and shares of the law of their factor."""
+
+    state: LimitState
+    values: Array  # (samples, specimens), Pa
+    members: NDArray[np.int64]
+    shares: Array  # NaN where the sample has its own factor
+
+    @property
+    def tail(self) -> Tail:
+        """The lower tail, of which each solved sample is one ancestor."""
+        samples, each = self.values.shape
+        ancestors = np.repeat(np.arange(samples), each)
+        level = Population(
+            math.inf,
+            0.0,
+            self.values.ravel(),
+            ancestors,
+            self.members.ravel(),
+            np.empty((0, 0)),
+        )
+        descent = Descent(samples, [level], -math.inf, samples, complete=True)
+        reason = f"counting takes fewer evaluations: {each} specimens of each sample"
+        return Tail([descent], "plain", reason, samples)
+
+    def draws(self, picks: NDArray[np.int64]) -> Array:
+        """Return the draws of some specimens, by their numbers."""
+        state, each = self.state, self.values.shape[1]
+        random, seed = state.experiment.random, state.experiment.seed
+        rows = [state.draws(seed, int(pick) // each, 1) for pick in picks]
+        found = np.concatenate([np.empty((0, state.dimension)), *rows])
+        shares = self.shares.ravel()[picks]
+        new = np.isfinite(shares)
+        if new.any():
+            column = random.factor_column(state.experiment.problem.interface)
+            found[new, column] = ndtri(shares[new])
+            random.select(found, np.where(new)[0], self.members.ravel()[picks][new])
+        return found
+
+    def lowest(self, stress: float, count: int) -> tuple[Array, Array]:
+        """Return draws and onsets of some of the lowest specimens, half of them below a stress."""
+        values = self.values.ravel()
+        below = int(np.sum(values < stress))
+        order = np.argpartition(values, min(2 * below, values.size - 1))[: 2 * below]
+        picks = np.random.default_rng(0).permutation(order)[:count]
+        return self.draws(picks), values[picks]
+
+    def failing(self, stress: float, count: int) -> Array:
+        """Return the draws of some specimens below a stress."""
+        failed = np.flatnonzero(self.values.ravel() < stress)
+        return self.draws(np.random.default_rng(1).permutation(failed)[:count])
+
+
+def _expands(state: LimitState) -> bool:
+    """Return whether each solved sample stands for many specimens."""
+    experiment = state.experiment
+    problem, random = experiment.problem, experiment.random
+    return random.factor_column(problem.interface) is not None and scales_with_strength(
+        problem, random.members[0], experiment.method
+    )
+
+
+def solve(state: LimitState, first: int, samples: int) -> Counts:
+    """Solve samples `first`, ... and return the specimens of each (steps 1 to 3)."""
+    experiment = state.experiment
+    random, interface = experiment.random, experiment.problem.interface
+    draws = state.draws(experiment.seed, first, samples)
+    onsets, members = state(draws), state.member(draws)
+    column = random.factor_column(interface)
+    if not _expands(state):
+        return Counts(state, onsets[:, None], members[:, None], np.full((samples, 1), np.nan))
+    laws, law = random.factor_laws
+    # 2. onsets of a factor of 1 and a mean of 1
+    ratios = onsets / random.means[members]
+    for number in np.unique(law[members]):
+        rows = np.flatnonzero(law[members] == number)
+        ratios[rows] /= from_normal(laws[number], draws[rows, column])
+    # 3. other interfaces of the same field, and their factors
+    rng = generator(experiment.seed, 5, first)
+    steps = (np.arange(FACTORS) + rng.random((samples, FACTORS))) / FACTORS
+    chosen = np.empty((samples, FACTORS), np.int64)
+    group = random.groups[members]
+    for number in np.unique(group):
+        alike, rows = np.flatnonzero(random.groups == number), np.flatnonzero(group == number)
+        chosen[rows] = alike[(steps[rows] * alike.size).astype(np.int64)]
+    shares = rng.permuted(
+        (np.arange(FACTORS) + rng.random((samples, FACTORS))) / FACTORS, axis=1
+    )
+    factors = np.empty(shares.shape)
+    for number in np.unique(law[chosen]):
+        own = law[chosen] == number
+        factors[own] = laws[number].distribution.ppf(shares[own])
+    return Counts(state, ratios[:, None] * random.means[chosen] * factors, chosen, shares)
+
+
+def count_tail(state: LimitState, goal: Goal, budget: int) -> tuple[Counts, Tail] | None:
+    """Count until the goal is reached (steps 4 and 5); None if subset simulation costs less."""
+    several = state.several
+    if state.may_survive or not (several or _expands(state)):
+        return None
+    counts = solve(state, 0, min(FIRST, budget))
+    while True:
+        tail, samples = counts.tail, len(counts.values)
+        stress = tail.quantile(goal.probability) if goal.probability else goal.stress
+        chance, cv = goal.probability or tail.probability(stress), tail.cv(stress)
+        if counts.values.shape[1] == 1 and goal.probability:  # of counting itself
+            cv = max(cv, math.sqrt((1.0 - chance) / (chance * samples)))
+        state.meter.note = f"c.o.v. {cv:.2g} (target {goal.cv:g})"
+        if cv <= goal.cv or samples >= budget:
+            return counts, tail
+        wanted = MARGIN * samples * (cv / goal.cv) ** 2 if math.isfinite(cv) else math.inf
+        decades = max(-math.log10(chance), 1.0) if chance else math.inf
+        price = SUBSET_EVALUATIONS * (decades / goal.cv) ** 2 * (LIST_COST if several else 1.0)
+        if wanted > min(price, budget):
+            return None
+        size = int(min(max(wanted - samples, FIRST), budget - samples, MOST_STEP))
+        if size <= 0:
+            return counts, tail
+        more = solve(state, samples, size)
+        counts = Counts(
+            state, *(np.concatenate(pair) for pair in zip(counts[1:], more[1:], strict=True))
+        )
