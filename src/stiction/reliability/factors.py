@@ -45,8 +45,9 @@ MARGIN = 1.1
 SUBSET_EVALUATIONS = 50.0
 """Evaluations of subset simulation for a coefficient of variation of 1, over log10(P)^2: fitted to
 the table of docs/reliability.md."""
-LIST_COST = 5.0
-"""Cost of an evaluation along chains over a list of interfaces, in evaluations that count."""
+LONG_LIST, LIST_COST = 100, 5.0
+"""Interfaces from which on a list is long, and the cost of an evaluation along chains over a long
+list, in evaluations that count."""
 
 
 class Counts(NamedTuple):
@@ -146,8 +147,8 @@ def solve(state: LimitState, first: int, samples: int) -> Counts:
 
 def count_tail(state: LimitState, goal: Goal, budget: int) -> tuple[Counts, Tail] | None:
     """Count until the goal is reached (steps 4 and 5); None if subset simulation costs less."""
-    several = state.several
-    if state.may_survive or not (several or _expands(state)):
+    long_list = len(state.experiment.random.members) > LONG_LIST
+    if state.may_survive or not (long_list or _expands(state)):
         return None
     counts = solve(state, 0, min(FIRST, budget))
     while True:
@@ -161,7 +162,9 @@ def count_tail(state: LimitState, goal: Goal, budget: int) -> tuple[Counts, Tail
             return counts, tail
         wanted = MARGIN * samples * (cv / goal.cv) ** 2 if math.isfinite(cv) else math.inf
         decades = max(-math.log10(chance), 1.0) if chance else math.inf
-        price = SUBSET_EVALUATIONS * (decades / goal.cv) ** 2 * (LIST_COST if several else 1.0)
+        price = (
+            SUBSET_EVALUATIONS * (decades / goal.cv) ** 2 * (LIST_COST if long_list else 1.0)
+        )
         if wanted > min(price, budget):
             return None
         size = int(min(max(wanted - samples, FIRST), budget - samples, MOST_STEP))
