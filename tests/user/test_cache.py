@@ -50,8 +50,10 @@ def test_an_edited_kernel_is_another_folder_for_those_who_call_it(tmp_path, monk
 
 
 LAWS = """
+import math
 from typing import NamedTuple
 import numpy as np, stiction as st
+from helper import doubled
 from stiction.problem.friction import kernels
 
 class OwnParameters(NamedTuple):
@@ -59,28 +61,52 @@ class OwnParameters(NamedTuple):
     initial_slope: float = 1.0
 
     def f(law, u):
-        return law.scale * 1.0, 1.0
+        return doubled(law.scale) * math.sqrt(1.0), 1.0
 
 ones = np.ones(3)
 linear = st.LinearWeakening(weakening_rate=1.0).parameters
 for law in (OwnParameters(2.0), linear):
     print(kernels.strengths(law, ones, 0.0 * ones, ones, 0.5 * ones))
 """
+HELPER = """
+import numba
+
+@numba.njit
+def doubled(x):
+    return FACTOR * x
+
+FACTOR = 2.0
+"""
 
 
 @pytest.mark.parametrize("start", ["", WITHOUT], ids=["internals", "plain"])
-def test_a_law_from_elsewhere_leaves_nothing_in_the_cache(tmp_path, monkeypatch, start):
-    """Its module may be missing in the next process, or changed; numba would notice neither."""
+def test_kernels_of_a_law_from_elsewhere_are_kept_by_its_state(tmp_path, monkeypatch, start):
+    """Its module, or one that it calls, may change or be missing; numba would not notice."""
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     cache = tmp_path / "cache"
     places = {"cwd": tmp_path, "PYTHONPATH": SOURCES, "STICTION_CACHE_DIR": cache}
-    for factor, found in ((1.0, "[2. 2. 2.]"), (3.0, "[6. 6. 6.]")):
-        edited = LAWS.replace("law.scale * 1.0", f"law.scale * {factor}")
-        (tmp_path / "own_module.py").write_text(start + edited)
-        said = python("-B", "-c", "import own_module", **places)
-        assert said.splitlines() == [found, "[0.5 0.5 0.5]"]
-    assert list(cache.rglob("*.nbc"))
-    assert b"own_module" not in b"".join(path.read_bytes() for path in cache.rglob("*.nbi"))
+
+    def kernels(laws, helper):
+        """What a process prints, and the files that are in the cache afterwards."""
+        (tmp_path / "own_module.py").write_text(start + laws)
+        (tmp_path / "helper.py").write_text(helper)
+        printed = python("-B", "-c", "import own_module", **places).splitlines()
+        assert printed[1] == "[0.5 0.5 0.5]"
+        return printed[0], {path: path.stat().st_mtime_ns for path in cache.rglob("*.nbc")}
+
+    first, files = kernels(LAWS, HELPER)
+    assert first == "[4. 4. 4.]"
+    again = kernels(LAWS, HELPER)
+    assert again == (first, files)  # nothing is compiled again
+    assert kernels(LAWS.replace("sqrt(1.0)", "sqrt(4.0)"), HELPER)[0] == "[8. 8. 8.]"
+    assert kernels(LAWS, HELPER.replace("2.0", "3.0"))[0] == "[6. 6. 6.]"
+    # A list may change while a process runs: nothing is kept.
+    listed = kernels(LAWS, HELPER.replace("FACTOR *", "FACTOR[0] *").replace("2.0", "(5.0,)"))
+    assert listed[0] == "[10. 10. 10.]"
+    own = {path.parent for path in cache.rglob("*.nbi") if b"own_module" in path.read_bytes()}
+    others = {path.parent for path in cache.rglob("*.nbi")} - own
+    assert others
+    assert bool(own) is (start == "")
 
 
 BITS = """

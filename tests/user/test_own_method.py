@@ -3,9 +3,13 @@
 import numpy as np
 import pytest
 from refusals import refuses
+from setups import beta_strength, make_problem
 
 import stiction as st
 from stiction.base.variables import Variable
+from stiction.inference.prior import make_prior
+from stiction.inference.scaling import find_scaling
+from stiction.methods.protocol import optional_member
 from stiction.problem.results import onset_variables
 
 
@@ -53,3 +57,30 @@ def test_a_time_that_is_none_is_refused(seconds):
     words = "method: seconds_per_sample of broken must return a number of seconds"
     refuses(words, lambda: st.onset(problem, np.full((3, 256), 1e6), method=method))
     refuses(words, lambda: st.failure_probability(problem, strength, 0.7e6, method=method))
+
+
+class Described(Broken):
+    """A method whose author says how its onsets follow the strength."""
+
+    scaling = "affine"
+
+    def __init__(self):
+        super().__init__({})
+
+    def bounded_by_strength(self, problem, event):
+        return True, event == "critical_stress"
+
+
+@pytest.mark.parametrize("method", [Broken({}), Described()])
+def test_bounds_and_scaling_hold_only_if_a_method_says_so(method):
+    problem, strength = make_problem(256), beta_strength(7e-3)
+    described = isinstance(method, Described)
+    bounds = [
+        st.external.limit_state(problem, strength, method, event=event).bounds
+        for event in ("critical_stress", "first_instability")
+    ]
+    known = [(0.66e6, 1.66e6), (0.66e6, np.inf)]
+    assert np.allclose(bounds, known if described else [(-np.inf, np.inf)] * 2)
+    prior = make_prior(problem, strength, {"marginal.low": (0.5e6, 0.7e6)})
+    assert len(find_scaling(prior, method, "critical_stress").keys) == described
+    assert optional_member(method, "counted_only") is False

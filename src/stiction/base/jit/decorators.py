@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import logging
+import math
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from itertools import chain
+from types import FunctionType
 from typing import Any, TypeVar
 
 import numba
@@ -29,47 +33,96 @@ _one_at_a_time = threading.Lock()
 _announced: set[str] = set()
 
 
-def _is_own(kind: Any) -> bool:
-    """Whether a numba type, or a tuple of them, names no class from outside the package."""
-    if isinstance(kind, tuple | list):
-        return all(map(_is_own, kind))
+def _foreign_classes(kind: Any) -> set[Any]:
+    """Return the classes from outside the package that numba types name."""
+    kinds = kind if isinstance(kind, tuple | list) else getattr(kind, "types", ())
+    classes: set[Any] = set().union(*map(_foreign_classes, kinds))
     named = getattr(kind, "instance_class", None)
     if named is not None and not named.__module__.startswith("stiction."):
-        return False
-    return _is_own(getattr(kind, "types", ()))
+        classes.add(named)
+    return classes
+
+
+def _parts(value: Any) -> Iterator[str]:
+    """Yield what a compiled function depends on, with the functions and constants that it names.
+
+    A TypeError says that it names something else, which may change without being noticed.
+    """
+    value = getattr(value, "py_func", value)
+    if isinstance(value, tuple):
+        yield from chain.from_iterable(map(_parts, value))
+    elif isinstance(value, FunctionType):
+        code = value.__code__
+        named = (value.__globals__.get(name) for name in code.co_names)
+        cells = (cell.cell_contents for cell in value.__closure__ or ())
+        yield from (code.co_code.hex(), *code.co_names)
+        yield from _parts((code.co_consts, value.__defaults__, *named, *cells))
+    elif value is math or value is np:
+        yield value.__name__
+    elif isinstance(value, int | float | str | None):
+        yield repr(value)
+    else:
+        raise TypeError(type(value))
+
+
+def _state_of(classes: Iterable[Any]) -> str | None:
+    """Return a digest of friction laws from elsewhere; None if they may change unnoticed."""
+    state = hashlib.sha256()
+    for law in sorted(classes, key=str):
+        try:
+            parts = (law.__module__, law.__qualname__, *_parts(law.f))
+        except (AttributeError, RecursionError, TypeError, ValueError):
+            return None
+        if "<locals>" in law.__qualname__:  # another process could not find it
+            return None
+        state.update("\n".join(parts).encode())
+    return state.hexdigest()
 
 
 class _Guard:
-    """A cache that keeps only what is compiled for types of this package.
+    """A cache that keeps what is compiled for a friction law from elsewhere by the law's state.
 
-    A friction law from elsewhere is part of the kernels that are compiled for it. numba would not
-    notice that the law was edited, and could not read its index where the law's module is missing.
+    Such a law is part of the kernels that are compiled for it. numba would not notice that the law
+    was edited, and could not read its index where the law's module is missing.
     """
 
     def __init__(self, cache: Any, function: Callable[..., Any]) -> None:
-        self._cache, self._load, self._save = cache, cache.load_overload, cache.save_overload
+        self._cache, self._function = cache, function
         self._part = function.__module__.split(".")[-2:-1]
+        self._of_laws: dict[str, Any] = {}
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._cache, name)
 
+    def _cache_of(self, signature: Any) -> Any:
+        """Return the cache for types of arguments; None if nothing may be kept for them."""
+        foreign = _foreign_classes(signature)
+        if not foreign:
+            return self._cache
+        state = _state_of(foreign) if internals else None
+        if state is None:
+            return None
+        if state not in self._of_laws:
+            self._of_laws[state] = internals.Cache(self._function, state)
+        return self._of_laws[state]
+
     def load_overload(self, signature: Any, target: Any) -> Any:
         """Return the compiled form for types of arguments; None if none is kept."""
-        own = _is_own(signature)
-        found = self._load(signature, target) if own else None
-        if found is None:
-            _announce(self._part, own)
-        return found
+        cache = self._cache_of(signature)
+        compiled = cache.load_overload(signature, target) if cache else None
+        if compiled is None:
+            _announce(self._part, cache is not None)
+        return compiled
 
     def save_overload(self, signature: Any, data: Any) -> None:
         """Keep a compiled form."""
-        if _is_own(signature):
-            self._save(signature, data)
+        if cache := self._cache_of(signature):
+            cache.save_overload(signature, data)
 
 
-def _announce(part: list[str], own: bool) -> None:
+def _announce(part: list[str], kept: bool) -> None:
     """State once for each part of the package that its kernels are being compiled."""
-    when = "on first use only, then cached" if own else "for your friction law; not cached"
+    when = "on first use only, then cached" if kept else "for your friction law; not cached"
     for text in {f"{name} ({when})" for name in part} - _announced:
         _announced.add(text)
         logger.warning("compiling kernels: %s", text)

@@ -12,7 +12,12 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numba
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
+from numba.core.caching import (
+    CompileResultCacheImpl,
+    FunctionCache,
+    IndexDataCacheFile,
+    _CacheLocator,
+)
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, Flags
 
@@ -60,9 +65,20 @@ class _Format(CompileResultCacheImpl):
 
 
 class Cache(FunctionCache):
-    """Compiled forms of a function on disk, with what drafts leave to those that call them."""
+    """Compiled forms of a function on disk, with what drafts leave to those that call them.
+
+    Forms for a friction law from elsewhere have a folder for each state of that law.
+    """
 
     _impl_class = _Format
+
+    def __init__(self, function: Any, law: str = "") -> None:
+        super().__init__(function)
+        if law:
+            self._cache_path = str(kernel_folder(function.__module__, f"own {law}"))
+            stamp = self._impl.locator.get_source_stamp()
+            base = self._impl.filename_base
+            self._cache_file = IndexDataCacheFile(self._cache_path, base, stamp)
 
     def save_overload(self, signature: Any, data: Any) -> None:
         for env in data._find_referenced_environments():  # its own, and those of drafts
