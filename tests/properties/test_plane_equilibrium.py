@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from oracles import by_relaxation
 from planes import WAVENUMBERS, moduli, plane_sample
 from setups import LENGTH, RATE, exact_onset, make_problem, smooth_noise
 
@@ -9,7 +10,6 @@ import stiction as st
 from stiction.elasticity.operator import make_operator
 from stiction.methods.criterion.average import _between_nodes
 from stiction.methods.equilibrium.sample import Outcome
-from stiction.methods.equilibrium.transforms import growing_patch, relaxation
 from stiction.methods.equilibrium.transforms import plane as program
 from stiction.methods.equilibrium.transforms.plane import plane_onset
 from stiction.methods.equilibrium.transforms.relaxation import least_equilibrium
@@ -127,52 +127,30 @@ def walled(seed, shape=SHAPE):
     return plane_sample(strength, 3e5 * rng.uniform(0.5, 1.0), RATE)
 
 
-@pytest.mark.parametrize(("seed", "times"), [(13, 1), (4, 2), (1, 3)])
-def test_a_growing_patch_stops_at_a_barrier_and_meets_others(monkeypatch, seed, times):
-    """As with steps that solve for the least equilibrium of bounds; not if nothing is checked.
+def test_a_patch_that_jumps_stops_at_a_barrier_and_meets_others():
+    """As by relaxation node by node, at rising loads until all of it slides."""
+    sample, lattice = walled(13), PLANES["lattice"]
+    symbol = lattice.symbol(SHAPE)
+    operator = make_operator(symbol, RATE, SHAPE)
+    fields = (sample.excess, sample.residual, sample.critical)
+    strength, residual, critical = (field.reshape(SHAPE) for field in fields)
 
-    On large planes some steps are made in windows, which the patch comes to fill.
-    """
-    shape = (times * SHAPE[0], times * SHAPE[1])
-    sample = walled(seed, shape)
-    lattice = PLANES["lattice"]
-    lengths = tuple(times * length for length in lattice.lengths)
-    operator = make_operator(lattice._replace(lengths=lengths).symbol(shape), RATE, shape)
-    loads = sample.excess.min() * np.linspace(1.1, 3.0, 12)
+    def present(slip):
+        return np.maximum(strength - RATE * slip, residual)
 
-    def course():
-        slips = [np.zeros(sample.excess.size)]
-        for load in loads:
-            found = least_equilibrium(operator, sample, load, slips[-1])
-            if found.status != Outcome.ARRESTED:
-                break
-            slips.append(found.slip)
-        return np.array(slips)
-
-    def apart(first, second):
-        return np.abs(first - second).max() / sample.critical.max()
-
-    around, windows = growing_patch.window_around, []
-
-    def counted(*given):
-        windows.append(around(*given))
-        return windows[-1]
-
-    monkeypatch.setattr(growing_patch, "window_around", counted)
-    ours = course()
-    assert 5 < len(ours) < len(loads)
-    sizes = {window.operator.rate.size for window in windows}
-    assert (min(sizes) < sample.excess.size) == (times > 1)
-    assert max(sizes) == sample.excess.size
-    with monkeypatch.context() as patch:
-        patch.setattr(relaxation, "ENDS", np.inf)  # no patch is followed as it grows
-        exact = course()
-    assert len(exact) == len(ours)
-    # Residuals of 1e-7 of the strength, over the lowest eigenvalue.
-    assert apart(ours, exact) < 1e-5
-    monkeypatch.setattr(growing_patch, "longest_step", lambda *_: 1.5)
-    passed = course()
-    assert len(passed) < len(ours) or apart(passed[: len(ours)], ours) > 1e-2
+    slip, jumps = np.zeros(sample.excess.size), 0
+    for load in sample.excess.min() * np.linspace(1.1, 3.0, 12):
+        found = least_equilibrium(operator, sample, load, slip)
+        exact = by_relaxation(symbol, load * ONE, present, critical)
+        assert (found.status == Outcome.ARRESTED) == (exact is not None)
+        if exact is None:
+            break
+        jumps += np.sum((slip == 0.0) & (found.slip >= sample.critical)) > 20
+        slip = found.slip
+        # Residuals of 1e-7 of the strength, over the lowest eigenvalue.
+        assert np.abs(slip - exact.ravel()).max() < 1e-5 * critical.max()
+    assert exact is None
+    assert jumps > 0
 
 
 def test_tiny_and_negative_loads_close_as_well():

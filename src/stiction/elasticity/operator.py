@@ -1,14 +1,42 @@
 """K - W of an interface by fast Fourier transform: products, conjugate gradients, eigenvectors.
 
-K is given by its symbol (`protocol`). Kernels take flat arrays, so that the same code serves lines
-and planes.
+Problem
+-------
+K is given by its symbol (`protocol`), W >= 0 is the weakening rate of each node (Pa/m), and
+A = K - diag(W). `inside` marks a set S of nodes; x is zero outside. Two problems are solved, with
+no matrix in memory:
 
-The slip of given nodes solves A d = drive with A = K - W cut to them. A spring may hold a
-patch: A + spring phi phi^T is positive definite also where A has one direction phi of
-negative curvature, so that states on and beyond the turning point of the load can be solved
-for. The preconditioner is 1/(K(k) + W/2), cut too. Close to a turning point A has one eigenvalue
-that is much smaller than all others; a direction y close to its eigenvector, with y^T A y = 1, adds
-y y^T to the preconditioner, so that it costs no iterations.
+    (A + spring phi phi')_SS x_S = right_S,                                                   (1)
+    A_SS y_S = lambda y_S  for the smallest lambda, |y| = 1.                                  (2)
+
+In (1) a spring (stiffness in Pa/m) may hold a patch phi (|phi| = 1). With a stiff spring the matrix
+is positive definite also if A has one direction of negative curvature, close to phi. So states on
+and beyond the turning point of the load can be computed (`turning_point`). Kernels take flat
+arrays, so that the same code serves lines and planes.
+
+Algorithm for (1), `solve_inside`
+---------------------------------
+Preconditioned conjugate gradients (J. Nocedal and S. Wright, Numerical Optimization, 2006,
+algorithm 5.3) with the textbook's r, alpha, beta; z is the preconditioned residual.
+
+1. Precondition the residual: z = M r, cut to S, with M = 1/(K(k) + W/2) on Fourier modes and the
+   mean W. If a soft mode y is given, with y'Ay about 1, add y y' to M. Close to a turning point A
+   has one eigenvalue that is much smaller than the others; with its eigenvector as y it costs no
+   iterations.
+2. Take the direction z + beta times the former direction, and multiply it by the matrix.
+3. If the curvature along the direction is not positive, stop: A is not positive definite on S.
+4. Step to the minimum along the direction. Stop once no residual exceeds the tolerance.
+
+Departure: the residual is measured by its largest entry, which is a stress.
+
+Algorithm for (2), `lowest_eigenvector`
+---------------------------------------
+LOBPCG with a single vector (A. Knyazev, SIAM Journal on Scientific Computing 23, 2001).
+
+1. The vector x has the Rayleigh quotient lambda = x'Ax. Stop if |A x - lambda x| is small.
+2. Make x, the preconditioned residual and the last direction orthonormal.
+3. Solve the eigenproblem in the space of these three; the combination with the smallest lambda is
+   the next x, and its part without x the next direction.
 """
 
 import math
@@ -23,11 +51,13 @@ from stiction.base.jit import jit, jit_allocating, jit_inside
 from stiction.base.lanes import LANES, add, load, multiply_add, total, zeros
 
 SOLVED = 0
-NEGATIVE = 1
+NEGATIVE_CURVATURE = 1
 EXHAUSTED = 2
 
-ITERATIONS = 3000
-"""Largest number of iterations of conjugate gradients, or for one equilibrium."""
+MAX_ITERATIONS = 3000
+"""Iterations of conjugate gradients for one solution, or for one equilibrium."""
+MIN_NORM = 1e-14
+"""Norm of a unit vector, less its parts along others, below which it depends on these."""
 
 Mask = NDArray[np.bool_]
 
@@ -37,9 +67,9 @@ class Transform(NamedTuple):
 
     shape: tuple[int, int]  # of a profile; (1, nodes) on a line: one kernel serves both
     half: tuple[int, int]  # of its real transform
-    every: NDArray[np.int64]  # axes that are transformed; of a line counted on flat arrays
-    first: NDArray[np.int64]  # all but the last of them
-    last: NDArray[np.int64]
+    all_axes: NDArray[np.int64]  # that are transformed, counted on flat arrays for a line
+    first_axes: NDArray[np.int64]  # all but the last
+    last_axis: NDArray[np.int64]
 
 
 def make_transform(shape: tuple[int, ...]) -> Transform:
@@ -52,22 +82,29 @@ def make_transform(shape: tuple[int, ...]) -> Transform:
 @jit_inside
 def forward(transform: Transform, field: Array, spectrum: Array) -> None:
     """`spectrum` = the unscaled transform of a field; both flat."""
-    if transform.first.size == 0:  # rows of one are a fifth slower than flat arrays
-        r2c(field, spectrum, transform.every, True, 1.0, 1)
+    if transform.first_axes.size == 0:  # rows of one are a fifth slower than flat arrays
+        r2c(field, spectrum, transform.all_axes, True, 1.0, 1)
     else:
         modes = spectrum.reshape(transform.half)
-        r2c(field.reshape(transform.shape), modes, transform.every, True, 1.0, 1)
+        r2c(field.reshape(transform.shape), modes, transform.all_axes, True, 1.0, 1)
 
 
 @jit_inside
 def backward(transform: Transform, spectrum: Array, field: Array) -> None:
     """`field` = the inverse transform of a spectrum, which is overwritten; both flat."""
-    if transform.first.size == 0:
-        c2r(spectrum, field, transform.last, False, 1.0 / field.size, 1)
+    if transform.first_axes.size == 0:
+        c2r(spectrum, field, transform.last_axis, False, 1.0 / field.size, 1)
     else:
         modes = spectrum.reshape(transform.half)
-        c2c(modes, modes, transform.first, False, 1.0, 1)
-        c2r(modes, field.reshape(transform.shape), transform.last, False, 1.0 / field.size, 1)
+        c2c(modes, modes, transform.first_axes, False, 1.0, 1)
+        c2r(
+            modes,
+            field.reshape(transform.shape),
+            transform.last_axis,
+            False,
+            1.0 / field.size,
+            1,
+        )
 
 
 @jit_inside
@@ -89,22 +126,12 @@ class Operator(NamedTuple):
     inverse: Array  # (modes,): 1/(K(k) + W/2) with the mean W
     rate: Array  # (nodes,): W, Pa/m, zero where the residual strength is reached
     spectrum: NDArray[np.complex128]  # (modes,): overwritten by each transform
-    preconditioned: Array  # (nodes,): overwritten by conjugate gradients, as are the next two
+    z: Array  # (nodes,): overwritten by conjugate gradients, as are the next two
     direction: Array  # in which curvature is negative, if they meet one
-    image: Array
-    slow: Array  # (nodes,): y with y^T (K - W) y about 1 that the inverse lacks, or empty
+    image: Array  # A times the direction
+    soft_mode: Array  # (nodes,): y with y'Ay about 1 that `inverse` lacks, or empty
     spring: float  # stiffness of a spring that holds a patch, Pa/m; 0 for none
-    held: Array  # (nodes,): phi, the patch that it holds, of unit norm
-
-
-def operator_of(shape: tuple[int, ...], symbol: Array, inverse: Array, rate: Array) -> Operator:
-    """Return the operator of a symbol, an inverse (modes,) and a weakening rate (nodes,)."""
-    spectrum, none = np.empty(symbol.size, dtype=np.complex128), np.empty(0)
-    z, direction, image = np.empty((3, rate.size))
-    return Operator(
-        make_transform(shape), symbol, inverse, rate, spectrum, z, direction, image,
-        slow=none, spring=0.0, held=none,
-    )  # fmt: skip
+    phi: Array  # (nodes,): the patch that it holds, of unit norm
 
 
 def make_operator(symbol: Array, rate: Array | float, shape: tuple[int, ...]) -> Operator:
@@ -112,7 +139,12 @@ def make_operator(symbol: Array, rate: Array | float, shape: tuple[int, ...]) ->
     rates = np.broadcast_to(np.asarray(rate, dtype=np.float64), shape).flatten()
     typical = float(rates[rates > 0.0].mean()) if (rates > 0.0).any() else float(symbol.max())
     flat = symbol.flatten()
-    return operator_of(shape, flat, 1.0 / (flat + 0.5 * typical), rates)
+    spectrum, no_field = np.empty(flat.size, dtype=np.complex128), np.empty(0)
+    z, direction, image = np.empty((3, rates.size))
+    return Operator(
+        make_transform(shape), flat, 1.0 / (flat + 0.5 * typical), rates, spectrum, z,
+        direction, image, soft_mode=no_field, spring=0.0, phi=no_field,
+    )  # fmt: skip
 
 
 @jit
@@ -151,11 +183,11 @@ def dot(first: Array, second: Array, count: int) -> float:
     if t + LANES <= count:
         c = multiply_add(load(first, t), load(second, t), c)
         t += LANES
-    rest = 0.0
+    remainder = 0.0
     while t < count:
-        rest = multiply_add(first[t], second[t], rest)
+        remainder = multiply_add(first[t], second[t], remainder)
         t += 1
-    return total(add(add(a, b), add(c, d))) + rest
+    return total(add(add(a, b), add(c, d))) + remainder
 
 
 @jit
@@ -189,21 +221,21 @@ def restrict(field: Array, inside: Mask) -> None:
 @jit
 def largest_inside(field: Array, inside: Mask) -> float:
     """Largest absolute value of a field on a set of nodes."""
-    most = 0.0
+    largest = 0.0
     for i in range(field.size):
         if inside[i]:
-            most = max(most, abs(field[i]))
-    return most
+            largest = max(largest, abs(field[i]))
+    return largest
 
 
 @jit
 def residual_of(operator: Operator, right: Array, x: Array, out: Array) -> None:
-    """`out` = right - (A + spring phi phi^T) x at every node."""
+    """`out` = right - (A + spring phi phi') x at every node."""
     product(operator, x, out)
     for i in range(out.size):
         out[i] = right[i] - out[i]
     if operator.spring > 0.0:
-        add_scaled(out, -operator.spring * inner(operator.held, x), operator.held)
+        add_scaled(out, -operator.spring * inner(operator.phi, x), operator.phi)
 
 
 @jit
@@ -214,43 +246,47 @@ def solve_inside(
     residual: Array,
     tolerance: float,
 ) -> tuple[int, int]:
-    """Conjugate gradients for (A + spring phi phi^T) x = right on the nodes `inside`.
+    """Solve (1) by conjugate gradients.
 
     x is a guess, then the solution, with its residual, as from `residual_of`; both are zero
-    outside. Returns SOLVED (no residual above the tolerance, Pa), NEGATIVE (curvature, along
+    outside. Returns SOLVED (no residual above the tolerance, Pa), NEGATIVE_CURVATURE (along
     `operator.direction`) or EXHAUSTED, and the number of iterations.
     """
-    z, direction, image = operator.preconditioned, operator.direction, operator.image
+    z, direction, image = operator.z, operator.direction, operator.image
     restrict(residual, inside)
-    slow = operator.slow
+    soft_mode = operator.soft_mode
     largest = largest_inside(residual, inside)
-    previous = 0.0
-    for iteration in range(ITERATIONS):
+    r_z_before = 0.0
+    for iteration in range(MAX_ITERATIONS):
         if largest <= tolerance:
             return SOLVED, iteration
+        # 1.
         filtered(operator, operator.inverse, residual, z)
-        if slow.size > 0:
-            add_scaled(z, inner(slow, residual), slow)
-        now = inner(residual, z)
-        ratio = now / previous if previous > 0.0 else 0.0
-        previous = now
+        if soft_mode.size > 0:
+            add_scaled(z, inner(soft_mode, residual), soft_mode)
+        # 2.
+        r_z = inner(residual, z)
+        beta = r_z / r_z_before if r_z_before > 0.0 else 0.0
+        r_z_before = r_z
         for i in range(direction.size):
-            kept = ratio * direction[i] if ratio > 0.0 else 0.0
-            direction[i] = z[i] + kept if inside[i] else 0.0
+            former = beta * direction[i] if beta > 0.0 else 0.0
+            direction[i] = z[i] + former if inside[i] else 0.0
         product(operator, direction, image)
         if operator.spring > 0.0:
-            add_scaled(image, operator.spring * inner(operator.held, direction), operator.held)
+            add_scaled(image, operator.spring * inner(operator.phi, direction), operator.phi)
+        # 3.
         curvature = inner(direction, image)
         if curvature <= 0.0:
-            return NEGATIVE, iteration + 1
-        step = now / curvature
+            return NEGATIVE_CURVATURE, iteration + 1
+        # 4.
+        alpha = r_z / curvature
         largest = 0.0
         for i in range(direction.size):
             if inside[i]:
-                x[i] += step * direction[i]
-                residual[i] -= step * image[i]
+                x[i] += alpha * direction[i]
+                residual[i] -= alpha * image[i]
                 largest = max(largest, abs(residual[i]))
-    return EXHAUSTED, ITERATIONS
+    return EXHAUSTED, MAX_ITERATIONS
 
 
 @jit
@@ -268,16 +304,15 @@ def _combine(basis: Array, weights: Array, count: int, out: Array) -> None:
 def lowest_eigenvector(
     operator: Operator, inside: Mask, vector: Array, tolerance: float, iterations: int
 ) -> tuple[float, int]:
-    """Smallest eigenvalue of A on the nodes `inside`, by single-vector LOBPCG (Knyazev 2001).
+    """Solve (2): return the smallest eigenvalue of A on the nodes `inside` (Pa/m), and iterations.
 
-    The vector is a guess, then the eigenvector: unit norm, positive sum, zero outside. It
-    stops where the norm of A y - lambda y is below the tolerance. Returns lambda (Pa/m) and
-    iterations.
+    The vector is a guess, then the eigenvector: unit norm, positive sum, zero outside. The search
+    stops once the norm of A y - lambda y is below the tolerance.
     """
     nodes = vector.size
-    basis = np.empty((3, nodes))  # the vector, the preconditioned residual, the last direction
-    images = np.empty((3, nodes))
-    moved = np.empty(nodes)
+    basis = np.empty((3, nodes))  # x, the preconditioned residual, the last direction
+    images = np.empty((3, nodes))  # A times these
+    work = np.empty(nodes)
     # A guess may be so small that its norm underflows: a power of two changes no digit.
     exponent = math.frexp(largest_inside(vector, inside))[1]
     set_scaled(basis[0], math.ldexp(1.0, min(-exponent, 1000)), vector)
@@ -289,38 +324,41 @@ def lowest_eigenvector(
     count = 2
     taken = 0
     while taken < iterations:
-        set_scaled(moved, 1.0, images[0])
-        add_scaled(moved, -value, basis[0])
-        if np.sqrt(inner(moved, moved)) <= tolerance:
+        # 1.
+        set_scaled(work, 1.0, images[0])
+        add_scaled(work, -value, basis[0])
+        if np.sqrt(inner(work, work)) <= tolerance:
             break
         taken += 1
-        filtered(operator, operator.inverse, moved, basis[1])
+        # 2.
+        filtered(operator, operator.inverse, work, basis[1])
         restrict(basis[1], inside)
         product(operator, basis[1], images[1])
         restrict(images[1], inside)
-        for k in range(1, count):  # orthonormal, so that the small problem is a plain one
-            for _ in range(2):
+        for k in range(1, count):
+            for _ in range(2):  # twice, against round-off
                 for m in range(k):
                     overlap = inner(basis[k], basis[m])
                     add_scaled(basis[k], -overlap, basis[m])
                     add_scaled(images[k], -overlap, images[m])
             norm = np.sqrt(inner(basis[k], basis[k]))
-            if norm < 1e-14:
+            if norm < MIN_NORM:
                 count = k
                 break
             set_scaled(basis[k], 1.0 / norm, basis[k])
             set_scaled(images[k], 1.0 / norm, images[k])
         if count < 2:
             break
+        # 3.
         small = np.empty((count, count))
         for k in range(count):
             for m in range(k + 1):
-                both = inner(basis[k], images[m]) + inner(basis[m], images[k])
-                small[k, m] = small[m, k] = 0.5 * both
+                twice = inner(basis[k], images[m]) + inner(basis[m], images[k])
+                small[k, m] = small[m, k] = 0.5 * twice
         values, vectors = np.linalg.eigh(small)
         value, weights = values[0], vectors[:, 0]
-        _combine(basis, weights, count, moved)
-        _combine(images, weights, count, moved)
+        _combine(basis, weights, count, work)
+        _combine(images, weights, count, work)
         scale = 1.0 / np.sqrt(inner(basis[2], basis[2]))
         set_scaled(basis[2], scale, basis[2])
         set_scaled(images[2], scale, images[2])

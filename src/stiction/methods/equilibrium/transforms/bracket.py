@@ -13,7 +13,7 @@ import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.elasticity.operator import (
-    NEGATIVE,
+    NEGATIVE_CURVATURE,
     SOLVED,
     Operator,
     filtered,
@@ -148,7 +148,7 @@ def bisect(bracket: Bracket, gap: float, accuracy: float) -> Array:
             bracket.raise_slip(slip)
             continue
         high = load
-        if status != NEGATIVE:
+        if status != NEGATIVE_CURVATURE:
             continue
         vector = np.abs(operator.direction)
         value, _ = lowest_eigenvector(

@@ -14,7 +14,7 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.elasticity.operator import SOLVED, Mask, Operator, inner, product, solve_inside
 from stiction.methods.equilibrium.sample import StaticSample, present_pieces
-from stiction.methods.equilibrium.transforms.relaxation import residual_tolerance, slip_under
+from stiction.methods.equilibrium.transforms.relaxation import residual_tolerance, solve_pieces
 
 EVENTS = 300
 """Most events of a path to its turn, which is begun a step of the load before."""
@@ -53,7 +53,7 @@ def _balanced(
     for _ in range(ROUNDS):
         now = present_pieces(sample, slip)
         drive = load * sample.profile - now.strength
-        status, slip = slip_under(operator, drive, now.rate, slip, tolerance)
+        status, slip = solve_pieces(operator, drive, now.rate, slip, tolerance)
         if status != SOLVED:
             break
         if np.array_equal(now.piece, present_pieces(sample, slip).piece):

@@ -11,8 +11,8 @@ from stiction.base.arrays import Array
 from stiction.base.jit import jit, jit_inside
 from stiction.elasticity.operator import (
     EXHAUSTED,
-    ITERATIONS,
-    NEGATIVE,
+    MAX_ITERATIONS,
+    NEGATIVE_CURVATURE,
     SOLVED,
     Mask,
     Operator,
@@ -60,11 +60,11 @@ def equilibrate(
     residual_of(operator, right, slip, residual)
     _revise(inside, slip, residual, tolerance)
     used = 0
-    while used < ITERATIONS:
+    while used < MAX_ITERATIONS:
         goal = max(LOOSE * largest_inside(residual, inside), tolerance)
         status, taken = solve_inside(operator, inside, slip, residual, goal)
         used += taken + 1
-        if status == NEGATIVE:
+        if status == NEGATIVE_CURVATURE:
             return status, used
         residual_of(operator, right, slip, residual)
         joined, left = _revise(inside, slip, residual, tolerance)

@@ -249,7 +249,7 @@ class PlaneProgram:
             growth = there - slip
             work = step * inner(sample.profile, growth)
             if work > 0.0:  # A times the growth is about the step of the load
-                operator = operator._replace(slow=growth / np.sqrt(work))
+                operator = operator._replace(soft_mode=growth / np.sqrt(work))
             load, slip, step = beyond, there, LONGER * step
             passed = [*passed[-3:], (load, slip)]
 

@@ -1,8 +1,46 @@
-"""Equilibria at a fixed load, by transforms: each node stuck or on a piece of its friction law.
+"""Equilibria of a plane at a fixed load, while nodes pass corners of their friction law.
 
-From an equilibrium at a lower load either the path to this load is certainly stable
-(`stable_equilibrium`), or an overdamped interface moves to the least equilibrium that is not below
-it, or slides (`least_equilibrium`, as `jump` with dense factors).
+Problem
+-------
+K is the stiffness (Pa/m), d >= 0 the slip (m), p the load profile. On its present piece the
+strength of node i, less its initial stress, is q_i - W_i d_i. A node is overloaded if load p - K d
+is above its strength. An equilibrium at a load (Pa) satisfies
+
+    load p - K d <= q - W d,  with '=' where d > 0.                                           (1)
+
+For given pieces this is linear, and `held_equilibrium` solves it with A = K - diag(W) by conjugate
+gradients, which also meet a direction of negative curvature if A is not positive definite. The
+pieces depend on the slip. Two questions are answered:
+
+(a) Does a stable path lead from an equilibrium at a lower load to one at this load
+    (`stable_equilibrium`)?
+(b) At which least equilibrium, not below a given slip, does an overdamped interface come to rest,
+    or does it slide (`least_equilibrium`)? `dense.jump` answers this for lines.
+
+Algorithm for (a): Newton's method
+----------------------------------
+1. Solve (1) for the pieces of the present slip. Repeat with the pieces of the solution until they
+   do not change. Until then solve to a rough residual only.
+2. Look for negative curvature of K less the steepest weakening of each node on the way, on the
+   nodes that slip at the end. If there is none, A is positive definite in every state on the way.
+   So the path is stable, and there is no other equilibrium.
+
+Algorithm for (b): our own, steps that do not pass the least equilibrium
+------------------------------------------------------------------------
+1. If the load exceeds the mean strength, the interface slides: stiffness adds nothing to the mean.
+2. Step with bounds (`_bound`). Let nodes weaken by a share of their present rate only, and no
+   further than to their next corner. As this strength is nowhere below the true one, the solution
+   of (1) with it is below the least equilibrium. The share is 1 - `omitted`. The larger it is, the
+   longer is the step.
+3. If the share is 1 and all nodes are on the pieces that were assumed, the solution is the least
+   equilibrium, and the interface is arrested.
+4. If the step has a solution, slip moves to it. If hardly any node moves, the next step has the
+   share 1, as only this share can end at the equilibrium.
+5. If a step has negative curvature with the share 1, or if the slip is at an instability, move with
+   the true pieces to the first corner (`_step_to_corner`). Otherwise omit twice as much of the
+   weakening. A step that omits all of it has a solution unless the interface slides.
+
+K of a plane has small positive entries off its diagonal. The bounds in (b) are strict without them.
 """
 
 from typing import NamedTuple
@@ -12,8 +50,8 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.elasticity.operator import (
     EXHAUSTED,
-    ITERATIONS,
-    NEGATIVE,
+    MAX_ITERATIONS,
+    NEGATIVE_CURVATURE,
     SOLVED,
     Operator,
     inner,
@@ -30,63 +68,66 @@ from stiction.methods.equilibrium.sample import (
     residual_nodes,
     step_to_corner,
 )
-from stiction.methods.equilibrium.transforms.growing_patch import ENDS, SMALL, grown
 from stiction.methods.equilibrium.transforms.held_equilibrium import equilibrate
 
 # Halved or doubled none of these changes a result by more than the gap, or the time by much more
 # than a tenth (planes of 64 and 96 squared, with and without arrests).
-NEWTON = 100
-"""Bound of a loop that ends by itself, as pieces are revised."""
-STEPS = 2000
-"""Bound of a jump that creeps along in ever smaller steps."""
-LOOSE = 0.03
-"""Factor by which a residual is reduced before the pieces of the law are revised."""
-CHECKED = 0.1
-"""Factor by which a residual is reduced where a matrix is looked through for negative curvature."""
-RELEVANT = 1e-5
-"""Share of the largest value below which a node of an unstable direction is round-off of it."""
+MAX_REVISIONS = 100
+"""Revisions of the pieces in Newton's method, which ends by itself."""
+MAX_STEPS = 2000
+"""Steps of a jump, which may creep along in ever smaller steps."""
+LOOSE_RESIDUAL = 0.03
+"""Factor by which a residual is reduced before the pieces are revised."""
+CURVATURE_RESIDUAL = 0.1
+"""Factor by which a residual is reduced in the search for negative curvature."""
+DIRECTION_RTOL = 1e-5
+"""Share of the largest entry below which an entry of an unstable direction is round-off."""
 DRAG = 1e-3
-"""Stiffness added to steps that leave out all weakening, as a share of the largest W: without, a
-plane that slides as a whole has no bound."""
-ROUGH = 0.05
-"""Largest residual stress of a step, as a share of the weakening left out in the step before."""
+"""Stiffness that is added in place of the omitted weakening, as a share of the largest W. Without
+it a step of a plane that slides as a whole would have no solution."""
+STEP_RESIDUAL = 0.05
+"""Largest residual stress of a step, as a share of the weakening omitted in the step before."""
+MIN_OMITTED = 0.02
+"""Share of the weakening that is omitted first."""
+CREEP = 0.02
+"""Growth in a step, as a share of d_c, up to which slip hardly moves."""
 
 
 def residual_tolerance(sample: StaticSample, load: float, accuracy: float) -> float:
-    """Residual stress that is allowed, Pa, from its share of the mean strength or load.
+    """Return the largest residual stress, Pa, for an accuracy relative to the strength or load.
 
-    Strength beyond the load, such as that of barriers, does not count.
+    Strength beyond the load, such as the strength of barriers, does not count.
     """
     applied = abs(load) * sample.profile
     mean = np.minimum(np.abs(sample.excess), applied).mean() + applied.mean()
     return accuracy * float(mean)
 
 
-def slip_under(
-    operator: Operator, drive: Array, rate: Array, slip: Array, tolerance: float
+def solve_pieces(
+    operator: Operator, drive: Array, rate: Array, guess: Array, tolerance: float
 ) -> tuple[int, Array]:
-    """Equilibrium for given strengths at zero slip and rates; status and slip."""
-    new = slip.copy()
-    inside = (slip > 0.0) | (drive > 0.0)
+    """Solve (1) for given pieces, with drive = load p - q; return the status and the slip."""
+    slip = guess.copy()
+    inside = (guess > 0.0) | (drive > 0.0)
     operator = operator._replace(rate=rate)
-    status, _ = equilibrate(operator, drive, inside, new, np.empty_like(slip), tolerance)
-    return status, new
+    status, _ = equilibrate(operator, drive, inside, slip, np.empty_like(slip), tolerance)
+    return status, slip
 
 
-def _definite(operator: Operator, rate: Array, growth: Array, slip: Array) -> bool:
-    """Whether K - `rate` on the nodes that slip shows no negative curvature.
+def _is_definite(operator: Operator, rate: Array, growth: Array, slip: Array) -> bool:
+    """(a) 2: whether K - `rate` on the nodes that slip shows no negative curvature.
 
-    It is looked for in the growth, which is close to the direction of a loss of stability,
-    and as the matrix is solved with.
+    The search begins with the growth, which is close to the direction in which stability is lost,
+    and goes on in the directions of conjugate gradients.
     """
-    x, image = np.zeros_like(slip), np.empty_like(slip)
     operator, inside = operator._replace(rate=rate), slip > 0.0
+    solution, image = np.zeros_like(slip), np.empty_like(slip)
     product(operator, growth, image)
     curvature = inner(growth, image)
     if not curvature > 0.0:
         return False
-    operator, residual = operator._replace(slow=growth / np.sqrt(curvature)), 1.0 * inside
-    status, _ = solve_inside(operator, inside, x, residual, CHECKED)
+    operator, residual = operator._replace(soft_mode=growth / np.sqrt(curvature)), 1.0 * inside
+    status, _ = solve_inside(operator, inside, solution, residual, CURVATURE_RESIDUAL)
     return status == SOLVED
 
 
@@ -98,39 +139,46 @@ def stable_equilibrium(
     accuracy: float,
     guess: Array,
 ) -> Array | None:
-    """Return the equilibrium at a load to which a stable path leads from one at a lower load.
+    """Return the slip at a load to which a stable path certainly leads, otherwise None.
 
-    The guess is a slip there. None if that is not certain. It is if A is positive definite, on the
-    nodes that slip at the end, with the steepest weakening that each passes on the way: then it is
-    at each state on the way, and there is no other equilibrium. Newton's method finds the pieces at
-    the end; until it knows them its solutions are rough.
+    The path begins at an equilibrium with less slip at a lower load; the guess is a slip at its
+    end. The accuracy is the largest residual stress as a share of the mean strength or load.
     """
     tolerance = residual_tolerance(sample, load, accuracy)
-    pieces, first = sample.pieces, present_pieces(sample, slip)
-    before, residual = first.piece, np.empty_like(slip)
-    new, rough = np.maximum(guess, slip), np.inf
-    for _ in range(NEWTON):
-        now = present_pieces(sample, new)
-        if rough <= tolerance and np.array_equal(before, now.piece):
+    pieces, start = sample.pieces, present_pieces(sample, slip)
+    assumed, residual = start.piece, np.empty_like(slip)
+    end, allowed = np.maximum(guess, slip), np.inf
+    # 1.
+    for _ in range(MAX_REVISIONS):
+        present = present_pieces(sample, end)
+        if allowed <= tolerance and np.array_equal(assumed, present.piece):
             break
-        drive, before = load * sample.profile - now.strength, now.piece
-        if rough > tolerance:
-            present = operator._replace(rate=now.rate)
-            residual_of(present, drive, new, residual)
-            largest = np.where(new > 0.0, np.abs(residual), residual).max()
-            rough = max(tolerance, LOOSE * float(largest))
-        status, found = slip_under(operator, drive, now.rate, new, rough)
+        drive, assumed = load * sample.profile - present.strength, present.piece
+        if allowed > tolerance:
+            residual_of(operator._replace(rate=present.rate), drive, end, residual)
+            largest = np.where(end > 0.0, np.abs(residual), residual).max()
+            allowed = max(tolerance, LOOSE_RESIDUAL * float(largest))
+        status, solution = solve_pieces(operator, drive, present.rate, end, allowed)
         if status != SOLVED:
             return None
-        new = np.maximum(found, slip)
+        end = np.maximum(solution, slip)
     else:
         return None
-    steepest = first.rate
+    # 2.
+    steepest = start.rate
     if pieces.steepens:
         piece = np.arange(pieces.slopes.size)[:, None]
-        passed = (first.piece <= piece) & (piece <= now.piece)
+        passed = (start.piece <= piece) & (piece <= present.piece)
         steepest = np.where(passed, pieces.slopes[:, None], 0.0).max(axis=0) * sample.rate
-    return new if _definite(operator, steepest, new - slip, new) else None
+    return end if _is_definite(operator, steepest, end - slip, end) else None
+
+
+class Bound(NamedTuple):
+    """A step of (b) 2."""
+
+    status: int
+    slip: Array
+    is_equilibrium: bool  # whether the assumed strengths are the true ones
 
 
 def _bound(
@@ -138,61 +186,61 @@ def _bound(
     sample: StaticSample,
     load: float,
     slip: Array,
-    now: Present,
-    share: float,
+    present: Present,
+    omitted: float,
     tolerance: float,
-) -> tuple[int, Array, bool]:
-    """Equilibrium if nodes weaken by a share of what they do, and no further than to their corner.
+) -> Bound:
+    """(b) 2: slip if nodes omit a share of their weakening, and stop weakening at their corner.
 
-    Their strength is nowhere below the true one, so that the slip is a lower bound of the least
-    equilibrium: as the drive is lowered by the residual allowed, a rough one too. Newton's method;
-    the strength is the larger of two lines. Returns the status, the slip, and whether the
-    strengths are the true ones.
+    The assumed strength is the larger of two lines, and Newton's method finds on which of them each
+    node is. The drive is lowered by the residual allowed, so that a rough slip is a bound, too.
     """
-    rate = share * now.rate - (1.0 - share) * DRAG * float(sample.rate.max())
-    start = now.strength - (now.rate - rate) * slip
-    corner = np.append(sample.pieces.ends, 1e300)[now.piece] * sample.critical
-    level = np.where(now.rate > 0.0, now.strength - now.rate * corner, -np.inf)
-    flat = np.zeros(slip.size, dtype=np.bool_)
-    new, spared = slip, tolerance if share < 1.0 else 0.0
-    for _ in range(NEWTON):
-        strength, slope = np.where(flat, level, start), np.where(flat, 0.0, rate)
-        drive = load * sample.profile - strength - spared
-        status, new = slip_under(operator, drive, slope, new, tolerance)
+    rate = (1.0 - omitted) * present.rate - omitted * DRAG * float(sample.rate.max())
+    start = present.strength - (present.rate - rate) * slip
+    corner = np.append(sample.pieces.ends, 1e300)[present.piece] * sample.critical
+    level = np.where(present.rate > 0.0, present.strength - present.rate * corner, -np.inf)
+    is_level = np.zeros(slip.size, dtype=np.bool_)
+    end, lowered = slip, tolerance if omitted > 0.0 else 0.0
+    for _ in range(MAX_REVISIONS):
+        strength, slope = np.where(is_level, level, start), np.where(is_level, 0.0, rate)
+        drive = load * sample.profile - strength - lowered
+        status, end = solve_pieces(operator, drive, slope, end, tolerance)
         if status != SOLVED:
-            return status, slip, False
-        beyond = start - rate * new < level
-        if np.array_equal(beyond, flat):
-            passed = present_pieces(sample, new).piece > now.piece
-            onto_other = passed & (now.piece < sample.pieces.ends.size - 1)
-            return SOLVED, np.maximum(new, slip), share == 1.0 and not onto_other.any()
-        flat = beyond
-    return EXHAUSTED, slip, False
+            return Bound(status, slip, False)
+        is_beyond = start - rate * end < level
+        if np.array_equal(is_beyond, is_level):
+            passed = present_pieces(sample, end).piece > present.piece
+            # Beyond its last corner the strength of a node is level in truth.
+            falls_on = passed & (present.piece < sample.pieces.ends.size - 1)
+            is_equilibrium = omitted == 0.0 and not falls_on.any()
+            return Bound(SOLVED, np.maximum(end, slip), is_equilibrium)
+        is_level = is_beyond
+    return Bound(EXHAUSTED, slip, False)
 
 
-def _weakening_step(
+def _step_to_corner(
     operator: Operator, sample: StaticSample, load: float, slip: Array, tolerance: float
 ) -> Array:
-    """Slip moved with the true states until the first node reaches a corner.
+    """(b) 5: move slip with the true pieces until the first node reaches a corner.
 
-    Only the nodes that slip or are overloaded move: towards their equilibrium or, if they
-    have none, along y >= 0 with A y = lambda y, lambda < 0. Both keep every node that moves driven
-    forward or balanced, so the next equilibrium is not passed.
+    Only the nodes that slip or are overloaded move: towards their equilibrium or, if they have
+    none, along y >= 0 with A y = lambda y, lambda < 0. Both keep every node that moves overloaded
+    or balanced, so that the next equilibrium is not passed.
     """
-    now = present_pieces(sample, slip)
-    operator = operator._replace(rate=now.rate)
-    drive = load * sample.profile - now.strength
-    rest, new = np.empty_like(slip), slip.copy()
-    residual_of(operator, drive, slip, rest)
-    inside = (slip > 0.0) | (rest > 0.0)
-    status, _ = solve_inside(operator, inside, new, rest, tolerance)
-    direction = np.where(inside, np.maximum(new - slip, 0.0), 0.0)
+    present = present_pieces(sample, slip)
+    operator = operator._replace(rate=present.rate)
+    drive = load * sample.profile - present.strength
+    overload, end = np.empty_like(slip), slip.copy()
+    residual_of(operator, drive, slip, overload)
+    inside = (slip > 0.0) | (overload > 0.0)
+    status, _ = solve_inside(operator, inside, end, overload, tolerance)
+    direction = np.where(inside, np.maximum(end - slip, 0.0), 0.0)
     longest = 1.0
-    if status == NEGATIVE:
+    if status == NEGATIVE_CURVATURE:
         direction = np.abs(operator.direction)
-        largest = float(sample.rate.max())
-        lowest_eigenvector(operator, inside, direction, 1e-6 * largest, ITERATIONS)
-        direction = np.where(direction > RELEVANT * direction.max(), direction, 0.0)
+        largest_rate = float(sample.rate.max())
+        lowest_eigenvector(operator, inside, direction, 1e-6 * largest_rate, MAX_ITERATIONS)
+        direction = np.where(direction > DIRECTION_RTOL * direction.max(), direction, 0.0)
         longest = np.inf
     moved = slip.copy()
     step_to_corner(sample, moved, direction, longest)
@@ -212,51 +260,45 @@ def least_equilibrium(
     load: float,
     slip: Array,
     accuracy: float = 1e-7,
-    unstable: bool = False,
+    is_unstable: bool = False,
 ) -> Relaxed:
-    """Return the least equilibrium at a load that is not below a given slip.
+    """Return the least equilibrium at a load that is not below a given slip; see (b).
 
-    The slip is zero, or an equilibrium at a lower load, or beyond it along an unstable direction;
-    the accuracy is the largest residual stress as a share of the mean strength or load. Steps with
-    a share of the weakening do not pass it, and are the longer the larger the share; with the whole
-    of it they end there, or A is not positive definite, and slip moves in the unstable direction:
-    at once if the slip is `unstable`, that of an instability.
-
-    The interface slides once the load exceeds the average strength that is left: stiffness adds
-    nothing to the mean. If K has no positive entry off its diagonal, the result is exact up to
-    `accuracy`. On planes K has small positive entries there.
+    The slip is zero, or an equilibrium at a lower load, or beyond it along an unstable direction,
+    or (`is_unstable`) at an instability. The accuracy is the largest residual stress as a share of
+    the mean strength or load.
     """
     tolerance = residual_tolerance(sample, load, accuracy)
     slip, weakens = np.maximum(slip, 0.0), sample.critical > 0.0
-    spared = resumed = fall = 0.0  # share of the weakening left out; that after a true step; Pa
-    for _ in range(STEPS):
-        now = present_pieces(sample, slip)
-        drive = load * sample.profile - now.strength
-        if float((drive + now.rate * slip).sum()) > tolerance * slip.size:
+    omitted = 0.0  # share of the weakening that is omitted
+    omitted_before = 0.0  # the same, before a step with the share 1 was tried
+    fall = 0.0  # largest fall of strength in the step before, Pa
+    for _ in range(MAX_STEPS):
+        # 1.
+        present = present_pieces(sample, slip)
+        drive = load * sample.profile - present.strength
+        if float((drive + present.rate * slip).sum()) > tolerance * slip.size:
             return Relaxed(Outcome.SLIDING, slip)
-        status = NEGATIVE
-        if not unstable:
-            allowed = max(tolerance, ROUGH * spared * fall)
-            share = 1.0 - spared
-            status, new, true = _bound(operator, sample, load, slip, now, share, allowed)
-        unstable = False
-        if status == SOLVED:
-            if true:
-                return Relaxed(Outcome.ARRESTED, new)
-            growth = np.where(~residual_nodes(sample, new) & weakens, new - slip, 0.0)
-            fall, slip = float((now.rate * growth).max()), new
-            if not (growth > SMALL * sample.critical).any():  # it creeps along
-                spared, resumed = 0.0, spared
-        elif status == NEGATIVE and spared < 1.0:
-            if spared == 0.0:
-                moved = _weakening_step(operator, sample, load, slip, tolerance)
-                growth, slip = moved - slip, moved
-                largest = float((growth[weakens] / sample.critical[weakens]).max(initial=0.0))
-                if largest > ENDS and not sample.pieces.steepens:
-                    growth *= min(1.0, SMALL / largest)
-                    slip = grown(operator, sample, load, slip, growth, tolerance)
-                    continue
-            spared, resumed = min(max(2.0 * spared, resumed, SMALL), 1.0), 0.0
+        # 2.
+        if is_unstable:
+            bound = Bound(NEGATIVE_CURVATURE, slip, False)
+            is_unstable = False
+        else:
+            allowed = max(tolerance, STEP_RESIDUAL * omitted * fall)
+            bound = _bound(operator, sample, load, slip, present, omitted, allowed)
+        if bound.is_equilibrium:  # 3.
+            return Relaxed(Outcome.ARRESTED, bound.slip)
+        if bound.status == SOLVED:  # 4.
+            still_weakens = ~residual_nodes(sample, bound.slip) & weakens
+            growth = np.where(still_weakens, bound.slip - slip, 0.0)
+            fall, slip = float((present.rate * growth).max()), bound.slip
+            if not (growth > CREEP * sample.critical).any():
+                omitted, omitted_before = 0.0, omitted
+        elif bound.status == NEGATIVE_CURVATURE and omitted < 1.0:  # 5.
+            if omitted == 0.0:
+                slip = _step_to_corner(operator, sample, load, slip, tolerance)
+            omitted = min(max(2.0 * omitted, omitted_before, MIN_OMITTED), 1.0)
+            omitted_before = 0.0
         else:
             break
     return Relaxed(Outcome.UNDECIDED, slip)

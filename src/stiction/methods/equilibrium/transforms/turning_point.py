@@ -71,7 +71,7 @@ def _hold(bracket: Bracket, held: Array, guess: Held, accuracy: float) -> Held |
         guess.amplitude,
     )
     stiffness = 2.0 * float(bracket.operator.rate.max())  # no curvature is below -W
-    operator = bracket.operator._replace(spring=stiffness, held=held)
+    operator = bracket.operator._replace(spring=stiffness, phi=held)
     slip = guess.slip.copy()
     inside = bracket.inside
     inside[:] = (slip > 0.0) | (excess < load * profile)
