@@ -87,7 +87,7 @@ def test_sensitivity_is_the_gradient_of_the_mean_stress(name):
 def test_a_coarse_grid_only_says_where_the_path_is_begun(monkeypatch):
     problem, strength = crooked("residual"), strength_of(3)
     quick = exact_onset(problem, strength)
-    monkeypatch.setattr(program, "FEWEST", 100)
+    monkeypatch.setattr(program, "MIN_COARSE_NODES", 100)
     slow = exact_onset(problem, strength)
     assert quick["arrested_events"].item() == slow["arrested_events"].item()
     for name in ("first_instability", "critical_load"):

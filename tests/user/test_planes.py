@@ -38,7 +38,11 @@ def test_a_path_that_is_lost_is_warned_of(monkeypatch):
         return Jump(True, True, state)
 
     for owner, name, lost in (
-        (program, "least_equilibrium", lambda *given: Relaxed(Outcome.UNDECIDED, given[3])),
+        (
+            program,
+            "least_equilibrium",
+            lambda *given, **_: Relaxed(Outcome.UNDECIDED, given[3]),
+        ),
         (program.PlaneProgram, "next", path_lost),
         (program.PlaneProgram, "jump", at_rest),
     ):

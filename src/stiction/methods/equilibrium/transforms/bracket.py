@@ -1,12 +1,27 @@
 """Bracket of the onset load by transforms: stable loads from below, eigenvectors from above.
 
-For A = K - W, strength less initial stress s and load profile p, the onset is
+Problem
+-------
+With A = K - diag(W) (Pa/m), slip d >= 0 (m), strength less initial stress s (Pa) and load profile
+p > 0, the onset without corners is
 
-    max {tau_0 : d >= 0, A d + s - tau_0 p >= 0} = min {<s, y>/<p, y> : y >= 0, A y <= 0}.
+    max {load : d >= 0, A d + s - load p >= 0} = min {<s, y>/<p, y> : y >= 0, A y <= 0}.      (1)
 
-Any d >= 0 bounds it from below and any y from above, whatever they were computed with: A need not
-be a Z-matrix. Bisection is robust, and its steps are proportional to the number of digits: it
-starts `turning_point`, which closes the bracket, and takes over where that fails.
+Any d >= 0 bounds it from below, by min (A d + s)/p. Any y >= 0 bounds it from above, after a
+multiple of a field z > 0 with A z < 0 has been added to make A y <= 0. This holds whatever d and y
+were computed with, and whatever the signs of the entries of K.
+
+Algorithm
+---------
+`bisect` halves the interval between a stable and an unstable load. Each digit costs the same number
+of steps, so it only starts `turning_point`, which closes the bracket, and takes over if that fails.
+
+1. Solve for the equilibrium at the middle of the interval, starting from the slip of the last
+   stable load (`held_equilibrium`).
+2. If there is one, it gives a lower bound.
+3. If a direction of negative curvature was met, the load is too high. The direction is the guess
+   for the lowest eigenvector of A on the slipping nodes. If the eigenvalue is not positive, the
+   eigenvector gives an upper bound, and lowers the upper end of the interval to it.
 """
 
 import numpy as np
@@ -24,12 +39,15 @@ from stiction.elasticity.operator import (
 )
 from stiction.methods.equilibrium.transforms.held_equilibrium import equilibrate
 
-STEPS = 60
-"""Most halvings: more than a double has digits."""
-NEAR_ZERO = 1e-2
-"""Share of the mean ratio of strength to load below which gaps do not refer to the load itself."""
-LIFTED = 0.4
+MAX_HALVINGS = 60
+"""More than a double has digits."""
+MIN_MAGNITUDE = 1e-2
+"""Least load to which gaps refer, as a share of the mean ratio of strength to load."""
+LIFTING_SHARE = 0.4
 """Share of g in the lifting field, below one half: then A z < 0 for any W."""
+EIGENVALUE_RTOL = 1e-4
+"""Residual of the lowest eigenvector, as a share of the largest W."""
+MAX_EIGENVECTOR_ITERATIONS = 200
 
 
 def _lifting_field(operator: Operator) -> tuple[Array, Array]:
@@ -42,10 +60,10 @@ def _lifting_field(operator: Operator) -> tuple[Array, Array]:
     lifting = np.ones(operator.rate.shape)
     free = operator.rate <= 0.0
     if free.any() and not free.all():
-        least = float(operator.rate[~free].min())
-        pushed = np.empty_like(lifting)
-        filtered(operator, least / (operator.symbol + least), free.astype(np.float64), pushed)
-        lifting -= LIFTED * pushed
+        w = float(operator.rate[~free].min())
+        g = np.empty_like(lifting)
+        filtered(operator, w / (operator.symbol + w), free.astype(np.float64), g)
+        lifting -= LIFTING_SHARE * g
     image = np.empty_like(lifting)
     product(operator, lifting, image)
     return lifting, -image
@@ -81,7 +99,7 @@ class Bracket:
         """Load to which relative gaps refer: the onset, unless it is close to zero."""
         return max(
             abs(self.upper),
-            NEAR_ZERO * float(np.abs(self.excess).mean() / self.profile.mean()),
+            MIN_MAGNITUDE * float(np.abs(self.excess).mean() / self.profile.mean()),
         )
 
     def closed(self, gap: float) -> bool:
@@ -109,17 +127,17 @@ class Bracket:
         trial = np.maximum(y, 0.0)
         product(self.operator, trial, self.residual)
         lifting, lifted = self.lifting
-        high, liftable = self.residual > 0.0, lifted > 0.0
-        if (high & ~liftable).any():
+        infeasible, liftable = self.residual > 0.0, lifted > 0.0
+        if (infeasible & ~liftable).any():
             return np.inf
-        if high.any():
-            trial += float((self.residual[high] / lifted[high]).max()) * lifting
-        weight = inner(self.profile, trial)
-        if not weight > 0.0:
+        if infeasible.any():
+            trial += float((self.residual[infeasible] / lifted[infeasible]).max()) * lifting
+        p_y = inner(self.profile, trial)
+        if not p_y > 0.0:
             return np.inf
-        load = inner(self.excess, trial) / weight
+        load = inner(self.excess, trial) / p_y
         if load < self.upper:
-            self.upper, self.multiplier = load, trial / weight
+            self.upper, self.multiplier = load, trial / p_y
         return load
 
 
@@ -132,9 +150,10 @@ def bisect(bracket: Bracket, gap: float, accuracy: float) -> Array:
     direction = bracket.multiplier / np.sqrt((bracket.multiplier**2).sum())
     low, high = bracket.lower, bracket.upper
     stable = bracket.slip.copy()
-    for _ in range(STEPS):
+    for _ in range(MAX_HALVINGS):
         if high - low <= gap * bracket.magnitude:
             break
+        # 1.
         load = 0.5 * (low + high)
         slip = stable.copy()
         inside = bracket.inside
@@ -143,16 +162,21 @@ def bisect(bracket: Bracket, gap: float, accuracy: float) -> Array:
             operator, load * profile - excess, inside, slip, bracket.residual,
             accuracy * bracket.scale,
         )  # fmt: skip
-        if status == SOLVED:
+        if status == SOLVED:  # 2.
             low, stable = load, slip
             bracket.raise_slip(slip)
             continue
+        # 3.
         high = load
         if status != NEGATIVE_CURVATURE:
             continue
         vector = np.abs(operator.direction)
         value, _ = lowest_eigenvector(
-            operator, inside, vector, 1e-4 * float(operator.rate.max()), 200
+            operator,
+            inside,
+            vector,
+            EIGENVALUE_RTOL * float(operator.rate.max()),
+            MAX_EIGENVECTOR_ITERATIONS,
         )
         if value <= 0.0:
             direction = np.maximum(vector, 0.0)

@@ -1,10 +1,25 @@
 """The end of a stable path on a plane, followed from event to event: where it turns, and how.
 
-Between events, a node that begins to slip or reaches a corner of its law, slip is linear in the
-load, and A = K - W is positive definite on the slipping nodes. An event adds one node to A or
-changes one W, so one solve shows whether A stays definite: it does if y^T A y > 0 for y that is 1
-at the new node and balanced on the others, or if 1 + (W before - W after) y > 0 at the corner,
-for A y = 1 there and 0 elsewhere. If not, the path turns, in the direction y.
+Problem
+-------
+K is the stiffness (Pa/m), W the present weakening rates (Pa/m), A = K - diag(W), S the slipping
+nodes, p the load profile. Between events slip d grows with the load at the rate v, A_SS v = p_S,
+and A_SS is positive definite. An event is a node that begins to slip, or that reaches a corner of
+its law. The path turns at the first event after which A_SS is no longer positive definite. Find
+its load, and the direction y in which slip jumps.
+
+Algorithm
+---------
+As `dense.stable_path`, with solutions by conjugate gradients (`solve_inside`) instead of a factor.
+
+1. Solve for the slip at the first load, revising the pieces of the nodes, and for the rates v.
+2. Find the smallest rise of the load to an event, and go there. If the target comes first, end.
+3. At a corner of node j, solve A_SS y = e_j, the unit vector of j. The change c of W_j by its next
+   piece, W before less W after, adds c to one diagonal entry, so that A_SS stays positive definite
+   if 1 + c y_j > 0, and v becomes v - c v_j/(1 + c y_j) y (the formula of Sherman and Morrison).
+4. If node j starts, solve for y with y_j = 1 and (A y)_S = 0 on the other slipping nodes. A stays
+   positive definite if y'Ay = (A y)_j > 0. With c_j = p_j - (K v)_j, v becomes v + c_j/(y'Ay) y.
+5. If it does not stay positive definite, the path turns in the direction y. Otherwise go to 2.
 """
 
 from typing import NamedTuple
@@ -16,14 +31,14 @@ from stiction.elasticity.operator import SOLVED, Mask, Operator, inner, product,
 from stiction.methods.equilibrium.sample import StaticSample, present_pieces
 from stiction.methods.equilibrium.transforms.relaxation import residual_tolerance, solve_pieces
 
-EVENTS = 300
-"""Most events of a path to its turn, which is begun a step of the load before."""
-PRECISE = 1e-11
+MAX_EVENTS = 300
+"""Events of a path to its turn, which is begun a step of the load before."""
+SLIP_RTOL = 1e-11
 """Residual stress of the slip, as a share of the mean strength or load."""
-RESIDUAL = 1e-9
-"""Residual of other solutions, as a share of their largest drive."""
-ROUNDS = 20
-"""Most revisions of the pieces of a rough slip."""
+SOLUTION_RTOL = 1e-9
+"""Residual of other solutions, as a share of their largest right side."""
+MAX_PIECE_REVISIONS = 20
+"""Revisions of the pieces of a rough slip."""
 
 
 class Turn(NamedTuple):
@@ -40,23 +55,23 @@ class Turn(NamedTuple):
 def _solution(operator: Operator, inside: Mask, right: Array) -> Array | None:
     """Solution of A x = right on the nodes inside, None if A is not positive definite there."""
     x, residual = np.zeros(right.size), np.where(inside, right, 0.0)
-    tolerance = RESIDUAL * float(np.abs(residual).max())
+    tolerance = SOLUTION_RTOL * float(np.abs(residual).max())
     status, _ = solve_inside(operator, inside, x, residual, tolerance)
     return x if status == SOLVED else None
 
 
-def _balanced(
+def _equilibrium_near(
     operator: Operator, sample: StaticSample, load: float, slip: Array
 ) -> Array | None:
-    """Slip at a load from a rough one; None if there is none."""
-    tolerance = residual_tolerance(sample, load, PRECISE)
-    for _ in range(ROUNDS):
-        now = present_pieces(sample, slip)
-        drive = load * sample.profile - now.strength
-        status, slip = solve_pieces(operator, drive, now.rate, slip, tolerance)
+    """Step 1: slip at a load from a rough one; None if there is none."""
+    tolerance = residual_tolerance(sample, load, SLIP_RTOL)
+    for _ in range(MAX_PIECE_REVISIONS):
+        present = present_pieces(sample, slip)
+        drive = load * sample.profile - present.strength
+        status, slip = solve_pieces(operator, drive, present.rate, slip, tolerance)
         if status != SOLVED:
             break
-        if np.array_equal(now.piece, present_pieces(sample, slip).piece):
+        if np.array_equal(present.piece, present_pieces(sample, slip).piece):
             return slip
     return None
 
@@ -68,52 +83,54 @@ def follow_to_turn(
 
     It ends at a turn before. None if it is not stable at the first load, or after too many events.
     """
-    found = _balanced(operator, sample, load, slip)
-    if found is None:
+    # 1.
+    start = _equilibrium_near(operator, sample, load, slip)
+    if start is None:
         return None
-    slip, inside, pieces = found, found > 0.0, sample.pieces
+    slip, inside, pieces = start, start > 0.0, sample.pieces
     piece, strength, rate = present_pieces(sample, slip)
     operator = operator._replace(rate=rate)  # `rate` is changed in place below
-    speed, image = _solution(operator, inside, sample.profile), np.empty_like(slip)
-    for _ in range(EVENTS):
-        if speed is None:
+    v, image = _solution(operator, inside, sample.profile), np.empty_like(slip)
+    for _ in range(MAX_EVENTS):
+        if v is None:
             break
+        # 2. At nodes at rest A and K are the same but for W d = W v = 0.
         product(operator, slip, image)
         margin = np.maximum(strength + image - load * sample.profile, 0.0)
-        product(operator, speed, image)
+        product(operator, v, image)
         closing = sample.profile - image
         corner = np.append(pieces.ends, 1e300)[piece] * sample.critical
-        wait = np.full(slip.size, np.inf)
+        rise = np.full(slip.size, np.inf)  # of the load until the event of each node
         starts = ~inside & (closing > 0.0)
-        wait[starts] = margin[starts] / closing[starts]
-        weakens = inside & (speed > 0.0) & (piece < pieces.ends.size)
-        wait[weakens] = np.maximum(corner[weakens] - slip[weakens], 0.0) / speed[weakens]
-        node = int(np.argmin(wait))
-        step = min(float(wait[node]), target - load)
-        load, slip = load + step, slip + step * speed
+        rise[starts] = margin[starts] / closing[starts]
+        weakens = inside & (v > 0.0) & (piece < pieces.ends.size)
+        rise[weakens] = np.maximum(corner[weakens] - slip[weakens], 0.0) / v[weakens]
+        node = int(np.argmin(rise))
+        step = min(float(rise[node]), target - load)
+        load, slip = load + step, slip + step * v
         if load >= target:
             return Turn(load, slip, np.zeros_like(slip))
         unit = np.zeros_like(slip)
         unit[node] = 1.0
-        if inside[node]:
+        if inside[node]:  # 3.
             y = _solution(operator, inside, unit)
             if y is None:
                 break
             piece[node] += 1
             share = pieces.starts[piece[node]]
             strength[node] = share * sample.excess[node] + (1.0 - share) * sample.residual[node]
-            before, slip[node] = rate[node], corner[node]
+            W_before, slip[node] = rate[node], corner[node]
             rate[node] = pieces.slopes[piece[node]] * sample.rate[node]
-            change = before - rate[node]
-            stays, push = 1.0 + change * y[node], -change * speed[node]
-        else:
+            change = W_before - rate[node]
+            pivot, push = 1.0 + change * y[node], -change * v[node]
+        else:  # 4.
             product(operator, unit, image)
             y = _solution(operator, inside, -image)
             if y is None:
                 break
             y[node], inside[node] = 1.0, True
-            stays, push = inner(image, y), closing[node]
-        if stays <= 0.0:
+            pivot, push = inner(image, y), closing[node]
+        if pivot <= 0.0:  # 5.
             return Turn(load, slip, y / inner(sample.profile, y))
-        speed += push / stays * y
+        v += push / pivot * y
     return None

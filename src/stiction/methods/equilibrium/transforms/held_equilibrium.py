@@ -1,10 +1,30 @@
 """Equilibrium at a fixed load, by conjugate gradients, optionally with a patch held by a spring.
 
-Find d >= 0 with A d + s - tau_0 p - mu phi >= 0, equal to zero where d > 0, and
-mu = spring (alpha - <phi, d>). Nodes join where they carry more than their strength and leave where
-they would slip backwards, until neither happens. Without a spring and for a Z-matrix A nodes only
-join, and the result is the least equilibrium at this load. With the spring, equilibria are found on
-both sides of the turning point, and mu gives the load to which each belongs.
+Problem
+-------
+A = K - diag(W) (`elasticity.operator`), d >= 0 is the slip (m), s the strength less initial stress
+at zero slip (Pa), p the load profile, phi (|phi| = 1) the shape of a patch. Find
+
+    d >= 0,  r = load p - s + mu phi - A d <= 0,  with r = 0 where d > 0,                     (1)
+    mu = spring (alpha - <phi, d>),
+
+the stress mu of the spring being zero if the spring holds nothing. Without a spring, and if K has
+no positive entry off its diagonal, the solution is the least equilibrium at this load. With a
+spring there are solutions on both sides of the turning point. They are equilibria of the interface
+itself where mu = 0.
+
+Algorithm
+---------
+Active set with conjugate gradients inside, as in a projected method (J. Nocedal and S. Wright,
+Numerical Optimization, 2006, section 16.7), but with whole sets instead of a line search.
+
+1. Revise the set of the slipping nodes: overloaded nodes (r > 0) join, and nodes with d < 0 leave.
+2. Reduce the residual on the set by `LOOSE_RESIDUAL`, or to the tolerance (`solve_inside`). If the
+   curvature along a direction is negative, there is no stable solution: stop.
+3. Compute r at all nodes and go to 1, until no node joins or leaves and r is small on the set.
+
+Without a spring and positive entries off the diagonal nodes only join, so that this ends. Otherwise
+only the number of iterations ends it.
 """
 
 from stiction.base.arrays import Array
@@ -22,13 +42,13 @@ from stiction.elasticity.operator import (
     solve_inside,
 )
 
-LOOSE = 0.05
+LOOSE_RESIDUAL = 0.05
 """Factor by which a residual is reduced before the set of slipping nodes is revised."""
 
 
 @jit_inside
 def _revise(inside: Mask, slip: Array, residual: Array, tolerance: float) -> tuple[int, int]:
-    """Let overloaded nodes join and those with negative slip leave; return how many of each."""
+    """Step 1: return how many nodes joined and how many left."""
     joined, left = 0, 0
     for i in range(slip.size):
         if inside[i]:
@@ -51,25 +71,27 @@ def equilibrate(
     residual: Array,
     tolerance: float,
 ) -> tuple[int, int]:
-    """Slip under the drive `right` = tau_0 p - s + spring alpha phi; status and iterations.
+    """Solve (1) for right = load p - s + spring alpha phi; return the status and iterations.
 
-    The nodes `inside` that slip, and their slip, are a guess, then the solution. The residual
-    right - A d - spring phi <phi, d> is nowhere above `tolerance` (Pa) if it is solved.
+    The nodes `inside`, and their slip, are a guess, then the solution. If it is solved, the
+    residual r is nowhere above the tolerance (Pa), and on the set within twice the tolerance.
     """
     restrict(slip, inside)
     residual_of(operator, right, slip, residual)
     _revise(inside, slip, residual, tolerance)
-    used = 0
-    while used < MAX_ITERATIONS:
-        goal = max(LOOSE * largest_inside(residual, inside), tolerance)
+    iterations = 0
+    while iterations < MAX_ITERATIONS:
+        # 2.
+        goal = max(LOOSE_RESIDUAL * largest_inside(residual, inside), tolerance)
         status, taken = solve_inside(operator, inside, slip, residual, goal)
-        used += taken + 1
+        iterations += taken + 1
         if status == NEGATIVE_CURVATURE:
-            return status, used
+            return status, iterations
+        # 3. and 1.
         residual_of(operator, right, slip, residual)
         joined, left = _revise(inside, slip, residual, tolerance)
         if joined == 0 and left == 0 and largest_inside(residual, inside) <= 2.0 * tolerance:
-            return SOLVED, used
+            return SOLVED, iterations
         if left > 0:
             residual_of(operator, right, slip, residual)
-    return EXHAUSTED, used
+    return EXHAUSTED, iterations

@@ -1,10 +1,23 @@
-"""The programme of planes, with transforms: a coarse grid first, then the turning point.
+"""Equilibria of a plane, with transforms: which algorithm is used when.
 
-`plane_onset` also serves long lines.
+`plane_onset` finds the onset without corners, also of long lines:
 
-Between jumps the next instability is a linear programme with the present pieces of the friction
-law, as long as no node reaches a corner before it. Where one does, and after a jump, the path is
-followed in steps of the load.
+1. Make coarser grids, each with half the nodes, as long as they resolve the nucleation length.
+2. On the coarsest grid, bisect the trivial bounds until Newton's method on the turning point
+   succeeds (`_narrow`).
+3. On each finer grid start Newton's method (`turning_point.close`) from the slip and the multiplier
+   of the grid before; if it fails, go on as in step 2.
+
+`PlaneProgram` follows a sample from instability to instability:
+
+4. From rest, the next instability is the onset without corners, if no node reaches a corner of its
+   law before. A coarse grid shows most often whether one does.
+5. Otherwise, and after a jump, the path is followed in steps of the load, each of which is proved
+   to be stable (`relaxation.stable_equilibrium`). A step that is not is shortened, until it is as
+   short as the gap that was asked for.
+6. The end of the path is then followed event by event (`fold`), to see whether it turns, and how.
+7. A jump goes to the least equilibrium a little above the load of the turn
+   (`relaxation.least_equilibrium`).
 """
 
 from dataclasses import replace
@@ -26,7 +39,7 @@ from stiction.methods.equilibrium.sample import (
     pieces_of,
 )
 from stiction.methods.equilibrium.transforms.bracket import Bracket, bisect
-from stiction.methods.equilibrium.transforms.fold import follow_to_turn
+from stiction.methods.equilibrium.transforms.fold import Turn, follow_to_turn
 from stiction.methods.equilibrium.transforms.relaxation import (
     least_equilibrium,
     stable_equilibrium,
@@ -34,35 +47,37 @@ from stiction.methods.equilibrium.transforms.relaxation import (
 from stiction.methods.equilibrium.transforms.turning_point import close
 from stiction.problem.problem import Problem
 
-COARSEST = 8.0
+MIN_STIFFNESS_RATIO = 8.0
 """Least ratio of the largest K(k) to W on a coarse grid: about six nodes in h_n."""
-FEWEST = 8
+MIN_COARSE_NODES = 8
 """Least nodes along x and y on a coarse grid: below, none is faster than the next one."""
-ROUGH = 1e-4
+COARSE_GAP = 1e-4
 """Relative gap on coarse grids, whose own error is larger."""
-RETREATS = (0.0, 1e-5, 1e-4)
+START_RETREATS = (0.0, 1e-5, 1e-4)
 """Shares of the load below its lower bound from which a path is followed to its turn: the slip
 that proves the bound may be beyond it."""
-FIRST_STEP = 1e-4
+FIRST_LOAD_STEP = 1e-4
 """Step of the load where the path is followed in steps, as a share of the load; it adapts."""
-AHEAD = 0.9
-"""Share of the way to the onset that would be without corners that is tried at once: the rest is
-what corners take off, mostly less than a tenth."""
-SHORTER, LONGER = 0.3, 1.5
-"""Change of a step that failed, and of the next after one that did not."""
-REACH = 3.0
-"""Most steps ahead to which slip is extrapolated as a guess."""
-ROUGHNESS = 0.1
+FIRST_SHARE_OF_ONSET = 0.9
+"""Share of the way to the onset without corners that is tried at once. Corners mostly take off less
+than a tenth."""
+STEP_FACTOR_IF_FAILED, STEP_FACTOR = 0.3, 1.5
+"""Change of a step that failed, and of the next step after one that did not."""
+MAX_EXTRAPOLATION = 3.0
+"""Steps ahead to which slip is extrapolated as a guess."""
+STEP_RESIDUAL = 0.1
 """Largest residual stress after a step, as a share of the step."""
-ROUGHEST = 1e-5
+MAX_STEP_RESIDUAL = 1e-5
 """The same, as a share of the mean strength or load: a rougher slip may miss an event."""
 AT_CORNER = 1.0 - 1e-9
-"""Share of the slip at a corner above which a node counts as beyond it, given `ACCURACY`."""
-ACCURACY = 1e-7
+"""Share of the slip at a corner above which a node counts as beyond it, given `SLIP_RTOL`."""
+SLIP_RTOL = 1e-7
 """Largest residual stress of the slip at a given load, as a share of the mean strength."""
-BISECTED, FINER = 5e-3, 0.2
-"""Relative gap to which a trivial bracket is bisected before Newton's method is tried, and how much
-finer each time that fails."""
+BISECTED_GAP, BISECTED_GAP_FACTOR = 5e-3, 0.2
+"""Relative gap to which a trivial bracket is bisected before Newton's method is tried, and its
+change each time that fails."""
+BISECTED_RESIDUAL = 0.05
+"""Residual stress of bisection, as a share of that gap, or of `COARSE_GAP` if it is smaller."""
 
 
 def halved(fine: Array) -> Array:
@@ -97,18 +112,19 @@ class PlaneOnset(NamedTuple):
 
 
 def _narrow(bracket: Bracket, gap: float) -> float:
-    """Close a bracket from its trivial bounds: bisection until Newton's method succeeds.
+    """Step 2: close a bracket from its trivial bounds.
 
     Returns the curvature found. The bounds of a stiffness that is no Z-matrix may not meet.
     """
-    share, finest = BISECTED, 0.1 * gap
+    share, finest = BISECTED_GAP, 0.1 * gap
     bend = 0.0
     while not bracket.closed(gap):
-        direction = bisect(bracket, share, 0.05 * min(share, 1e-4))
+        residual = BISECTED_RESIDUAL * min(share, COARSE_GAP)
+        direction = bisect(bracket, share, residual)
         _, bend = close(bracket, direction, bracket.lower, bracket.slip, gap)
         if share <= finest:
             break
-        share = max(FINER * share, finest)
+        share = max(BISECTED_GAP_FACTOR * share, finest)
     return bend
 
 
@@ -128,34 +144,37 @@ def plane_onset(
     lower load to start from instead of coarse grids. The bounds are closed to a relative gap.
     The onset of a coarse grid is returned if a node there slips beyond its corner (m; 0 for none).
     """
-    fields = (excess, profile, rate, np.zeros_like(excess) if corner is None else corner)
-    levels = [tuple(np.asarray(given, dtype=np.float64) for given in fields)]
+    # 1.
+    corners = np.zeros_like(excess) if corner is None else corner
+    fields = (excess, profile, rate, corners)
+    grids = [tuple(np.asarray(field, dtype=np.float64) for field in fields)]
     while slip is None:
-        shape = levels[-1][0].shape
-        stiffest, weakest = float(half_spaces.symbol(shape).max()), float(levels[-1][2].max())
+        shape = grids[-1][0].shape
+        stiffest, steepest = float(half_spaces.symbol(shape).max()), float(grids[-1][2].max())
         odd = any(nodes % 2 for nodes in shape)
-        if odd or min(shape) < 2 * FEWEST or 0.5 * stiffest < COARSEST * weakest:
+        resolved = 0.5 * stiffest >= MIN_STIFFNESS_RATIO * steepest
+        if odd or min(shape) < 2 * MIN_COARSE_NODES or not resolved:
             break
-        levels.append(tuple(map(halved, levels[-1])))
-    coarse: Bracket | None = None
+        grids.append(tuple(map(halved, grids[-1])))
+    coarser: Bracket | None = None
     bend = 0.0
-    for number in range(len(levels) - 1, -1, -1):
-        goal = gap if number == 0 else max(ROUGH, gap)
-        strength, load_profile, weakening, end = levels.pop()
+    for number in range(len(grids) - 1, -1, -1):
+        goal = gap if number == 0 else max(COARSE_GAP, gap)
+        strength, load_profile, weakening, end = grids.pop()
         symbol = half_spaces.symbol(strength.shape)
         bracket = Bracket(symbol, weakening, strength, load_profile)
         if slip is not None:
             bracket.raise_slip(slip.flatten())
         closed = False
-        if coarse is not None:
-            below = tuple(nodes // 2 for nodes in strength.shape)
-            guess = doubled(coarse.slip.reshape(below)).flatten()
-            held = doubled(coarse.multiplier.reshape(below)).flatten()
-            held *= 1.0 / np.sqrt((held**2).sum())
-            closed, bend = close(bracket, held, coarse.lower, guess, goal, bend)
-        if not closed:
+        if coarser is not None:  # 3.
+            coarse_shape = tuple(nodes // 2 for nodes in strength.shape)
+            guess = doubled(coarser.slip.reshape(coarse_shape)).flatten()
+            phi = doubled(coarser.multiplier.reshape(coarse_shape)).flatten()
+            phi *= 1.0 / np.sqrt((phi**2).sum())
+            closed, bend = close(bracket, phi, coarser.lower, guess, goal, bend)
+        if not closed:  # 2.
             bend = _narrow(bracket, goal)
-        coarse = bracket
+        coarser = bracket
         end = end.reshape(-1)
         if number > 0 and ((bracket.slip > end) & (end > 0.0)).any():
             break
@@ -187,105 +206,123 @@ class PlaneProgram:
         return plane_onset(self.elastic, excess, profile, rate, self.requested, corner=corner)
 
     def next(self, sample: StaticSample, state: State | None = None) -> State:
-        """Return the next instability on the path from a stable state or from rest.
+        """Return the next instability on the path from a stable state or from rest (4 to 6).
 
-        From rest it is the onset without corners, if no node reaches its corner before. A coarse
-        grid shows most often whether one does; then the path is followed, and if it turns before
-        any node does, the onset is computed after all, with its certificate.
+        If the path was followed because of a coarse grid, and turns before any node reaches a
+        corner, the onset is computed after all, with its certificate.
         """
         if state is not None:
-            return self._step_on(sample, state, FIRST_STEP * state.load)
-        found = self._onset(sample, self.pieces.ends[0] * sample.critical)
-        if found.slip.size < sample.excess.size:
-            reached = self._from_rest(sample, found)
-            if exceeds(sample, reached.slip):
-                return reached
-            found = self._onset(sample, np.zeros_like(sample.excess))
-        slip, multiplier = found.slip.reshape(-1), found.multiplier.reshape(-1)
+            return self._follow_in_steps(sample, state, FIRST_LOAD_STEP * state.load)
+        onset = self._onset(sample, self.pieces.ends[0] * sample.critical)
+        if onset.slip.size < sample.excess.size:
+            turn = self._follow_from_rest(sample, onset)
+            if exceeds(sample, turn.slip):
+                return turn
+            onset = self._onset(sample, np.zeros_like(sample.excess))
+        slip, multiplier = onset.slip.reshape(-1), onset.multiplier.reshape(-1)
         if exceeds(sample, slip):
-            return self._from_rest(sample, found)
-        return State(found.lower, slip, multiplier, gap=found.upper - found.lower)
+            return self._follow_from_rest(sample, onset)
+        return State(onset.lower, slip, multiplier, gap=onset.upper - onset.lower)
 
-    def _from_rest(self, sample: StaticSample, found: PlaneOnset) -> State:
+    def _follow_from_rest(self, sample: StaticSample, onset: PlaneOnset) -> State:
         """Follow the path from rest, at first most of the way to the onset without corners."""
         rest = at_rest(sample)
-        step = max(AHEAD * (found.lower - rest.load), FIRST_STEP * rest.load)
-        return self._step_on(sample, rest, step)
+        step = max(
+            FIRST_SHARE_OF_ONSET * (onset.lower - rest.load), FIRST_LOAD_STEP * rest.load
+        )
+        return self._follow_in_steps(sample, rest, step)
 
-    def _step_on(self, sample: StaticSample, state: State, step: float) -> State:
-        """Follow the stable path in steps of the load.
+    def _follow_in_steps(self, sample: StaticSample, state: State, step: float) -> State:
+        """Steps 5 and 6: follow the stable path in steps of the load to its end.
 
-        A step is shortened if it may be unstable, which a long one may only because nodes begin to
-        slip in it before others reach their corners.
+        A long step may look unstable only because nodes begin to slip in it before others reach
+        their corners.
         """
         load, slip, gap = state.load, state.slip, self.requested
         operator = self._operator(sample)
         passed = [(load, slip)]
         while True:
-            accuracy = max(0.1 * gap, min(ROUGHNESS * step / abs(load), ROUGHEST))
+            accuracy = max(0.1 * gap, min(STEP_RESIDUAL * step / abs(load), MAX_STEP_RESIDUAL))
             guess = slip
             if len(passed) > 1:
-                below, less = passed[-2]
-                guess = slip + min(step / (load - below), REACH) * (slip - less)
-            there = stable_equilibrium(operator, sample, load + step, slip, accuracy, guess)
-            if there is None and step > gap * load:
-                step = max(SHORTER * step, 0.7 * gap * load)  # the last one is below the gap
+                load_before, slip_before = passed[-2]
+                steps_ahead = min(step / (load - load_before), MAX_EXTRAPOLATION)
+                guess = slip + steps_ahead * (slip - slip_before)
+            end = stable_equilibrium(operator, sample, load + step, slip, accuracy, guess)
+            if end is None and step > gap * load:
+                # The last step is below the gap.
+                step = max(STEP_FACTOR_IF_FAILED * step, 0.7 * gap * load)
                 continue
-            beyond = load + step
-            if there is None:
-                # A rough slip may be beyond the turn: then from one step before, and so on.
-                starts = reversed(passed)
-                turns = (follow_to_turn(operator, sample, a, beyond, d) for a, d in starts)
-                turn = next((one for one in turns if one is not None), None)
+            load_beyond = load + step
+            if end is None:  # 6.
+                turn = self._turn(operator, sample, passed, load_beyond)
                 if turn is None:
                     direction = slip - passed[0][1]
                     return State(load, slip, direction, gap=step, certified=False)
                 if turn.direction.any():
                     return State(
-                        turn.load, turn.slip, turn.direction, gap=beyond - turn.load,
+                        turn.load, turn.slip, turn.direction, gap=load_beyond - turn.load,
                         certified=False, multiplier=turn.direction,
                     )  # fmt: skip
-                there = turn.slip
-            growth = there - slip
+                end = turn.slip
+            growth = end - slip
             work = step * inner(sample.profile, growth)
             if work > 0.0:  # A times the growth is about the step of the load
                 operator = operator._replace(soft_mode=growth / np.sqrt(work))
-            load, slip, step = beyond, there, LONGER * step
+            load, slip, step = load_beyond, end, STEP_FACTOR * step
             passed = [*passed[-3:], (load, slip)]
+
+    def _turn(
+        self,
+        operator: Operator,
+        sample: StaticSample,
+        passed: list[tuple[float, Array]],
+        load_beyond: float,
+    ) -> Turn | None:
+        """Step 6: follow the end of the path event by event; None if it is not found.
+
+        A rough slip may be beyond the turn: then start from one step before, and so on.
+        """
+        for load, slip in reversed(passed):
+            turn = follow_to_turn(operator, sample, load, load_beyond, slip)
+            if turn is not None:
+                return turn
+        return None
 
     def gradient(self, sample: StaticSample, state: State) -> Array:
         """Find the direction in which the path turns; NaN if that is not found."""
         if state.multiplier is not None or state.gap == 0.0:
             return multiplier_of(sample, state)
-        operator, beyond = self._operator(sample), state.load + 2.0 * state.gap
+        operator, load_beyond = self._operator(sample), state.load + 2.0 * state.gap
         slip = state.slip
-        for retreat in RETREATS if state.certified else ():
+        for retreat in START_RETREATS if state.certified else ():
             load = state.load - retreat * abs(state.load)
-            turn = follow_to_turn(operator, sample, load, beyond, slip)
+            turn = follow_to_turn(operator, sample, load, load_beyond, slip)
             if turn is not None and turn.direction.any():
                 return turn.direction
             slip = np.zeros(slip.size)  # that which proves the bound may be beyond the turn
         return np.full(slip.size, np.nan)
 
-    def jump(self, sample: StaticSample, found: State) -> Jump:
-        beyond = found.load + found.gap
-        beyond += self.requested * abs(beyond)
-        ahead = least_equilibrium(
-            self._operator(sample), sample, beyond, found.slip, 0.1 * self.requested, True
-        )
-        arrested = ahead.status == Outcome.ARRESTED
+    def jump(self, sample: StaticSample, instability: State) -> Jump:
+        load_beyond = instability.load + instability.gap
+        load_beyond += self.requested * abs(load_beyond)
+        end = least_equilibrium(
+            self._operator(sample), sample, load_beyond, instability.slip,
+            accuracy=0.1 * self.requested, is_unstable=True,
+        )  # fmt: skip
+        arrested = end.status == Outcome.ARRESTED
         # Where no turn was found, and the rest is in order, a stable path was only hard to follow.
-        counts = not arrested or found.multiplier is not None
-        after = State(beyond, ahead.slip, found.direction, jumped=True)
-        return Jump(arrested, ahead.status != Outcome.UNDECIDED, after, counts)
+        counts = not arrested or instability.multiplier is not None
+        after = State(load_beyond, end.slip, instability.direction, jumped=True)
+        return Jump(arrested, end.status != Outcome.UNDECIDED, after, counts)
 
     def at(self, sample: StaticSample, state: State, load: float) -> State | None:
         if load <= state.load:
             return state
-        found = least_equilibrium(self._operator(sample), sample, load, state.slip, ACCURACY)
-        if found.status != Outcome.ARRESTED:
+        end = least_equilibrium(self._operator(sample), sample, load, state.slip, SLIP_RTOL)
+        if end.status != Outcome.ARRESTED:
             return None
-        return replace(state, load=load, slip=found.slip, unstable=False)
+        return replace(state, load=load, slip=end.slip, unstable=False)
 
     def stress_released(self, state: State) -> Array:
         symbol = self.elastic.symbol(self.shape)

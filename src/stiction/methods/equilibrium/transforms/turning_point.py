@@ -1,13 +1,37 @@
 """The turning point of the load, where the stable and the unstable equilibria of a patch meet.
 
-With the patch held by a spring along phi (`held_equilibrium`), equilibria exist on both sides
-of it. Let a = <phi, d> and mu the force of the spring. On the slipping nodes A d = tau_0 p - s +
-mu phi, and the slope d' = dd/da at fixed load satisfies A d' = mu' phi. At the turning point
-mu = mu' = 0: Newton's method in a (with the slope of mu' by secant) and tau_0.
+Problem
+-------
+Close the bracket (1) of `bracket`. With A = K - diag(W), slip d, strength less initial stress s and
+load profile p, a spring holds a patch phi (|phi| = 1) at the amplitude a = <phi, d>, with a force
+mu (`held_equilibrium`). On the slipping nodes
 
-Bounds: d is feasible at tau_0 if mu >= 0. The combination y of two slopes, one with mu' > 0 and one
-with mu' < 0, for which A y = 0 where both slip, is a multiplier; nodes that slip in one state only
-have A y <= 0 and hardly slip at the turning point, so the error of its bound is of second order.
+    A d = load p - s + mu phi,   A d' = mu' phi,  <phi, d'> = 1,                              (1)
+
+where a dash is the derivative by a at a fixed load. The interface itself is in equilibrium where
+mu = 0, and its load turns where mu' = 0, too. Find (load, a) with mu = mu' = 0.
+
+Bounds: d is feasible at a load with mu >= 0, and bounds the onset from below. Let y combine two
+slopes d', of a state with mu' > 0 and one with mu' < 0, so that A y = 0 where both slip. It is a
+multiplier, and bounds the onset from above. A node that slips in one state only has A y <= 0 and
+hardly slips at the turning point, so that the error of this bound is of second order.
+
+Algorithm
+---------
+Our own: Newton's method for two equations, of which mu' falls in steps, as nodes join.
+
+1. Hold the patch at the guess (load, a), solve (1) for d and d' (`_hold`), and take both bounds.
+2. If conjugate gradients meet negative curvature although the patch is held, another patch became
+   unstable. Hold this one instead, at a lower load.
+3. As long as mu' had only one sign, step in a by Newton's method with the slope of mu' by secant, a
+   little beyond the zero, to change its sign (`_step_across`).
+4. With states of both signs, guess a between them, alternately as if mu' were linear in a and as if
+   it had one step (`_amplitude_between`).
+5. The next load is the one at which the spring would have no force at the next a (`_load_at`), and
+   below the upper bound.
+6. End once the bounds are close enough, or if states in a row hardly narrow them.
+
+If it fails, `bracket.bisect` takes over, so that no result rests on the constants below.
 """
 
 from typing import NamedTuple
@@ -25,25 +49,27 @@ from stiction.elasticity.operator import (
 from stiction.methods.equilibrium.transforms.bracket import Bracket
 from stiction.methods.equilibrium.transforms.held_equilibrium import equilibrate
 
-# Where Newton's method fails, bisection takes over: no result rests on these.
-STEPS = 40
-"""Most states that are tried."""
-SWITCHES = 4
-"""Largest number of patches that are held one after the other."""
-PATIENCE, PROGRESS = 8, 0.95
-"""States in a row that leave more than this share of the gap, after which the search ends."""
-RETREAT = 2e-3
+MAX_STATES = 40
+MAX_PATCH_CHANGES = 4
+"""How often another patch may be held instead."""
+MAX_IDLE_STATES = 8
+"""States in a row that hardly narrow the gap, after which the search ends."""
+IDLE_GAP_SHARE = 0.95
+"""Share of the gap that must remain for a state to count as idle."""
+PATCH_CHANGE_RETREAT = 2e-3
 """Share by which the load is lowered when another patch is held, twice as much each time."""
-LONGEST = 0.3
+MAX_STEP = 0.3
 """Longest step, as a share of the amplitude: a patch twice as large is another one."""
-BEYOND = 1.2
-"""Step over Newton's: mu' falls in steps, as nodes join, so that its own falls short."""
-STALLED = 0.7
-"""Share of mu' that must be left for a step to be doubled instead."""
-PRECISE = 0.05
-"""Residual stress over the gap that is asked for: what is left of it must not open the bounds."""
-BELOW = 0.3
-"""Distance of the load from the upper bound, over that gap: a state there closes the bracket."""
+NEWTON_FACTOR = 1.2
+"""Length of a step as a multiple of Newton's, which falls short because mu' falls in steps."""
+STALLED_SHARE = 0.7
+"""Share of mu' that must remain after a step for the next step to be twice as long instead."""
+RESIDUAL_SHARE_OF_GAP = 0.05
+"""Residual stress, as a share of the gap that is asked for, so that it does not open the bounds."""
+LOAD_BELOW_BOUND = 0.3
+"""Distance of the load below the upper bound, as a share of that gap: such a state closes it."""
+PATCH_EIGENVALUE_RTOL, MAX_PATCH_ITERATIONS = 1e-3, 12
+"""Residual of the eigenvector of another patch, as a share of the largest W, and iterations."""
 
 
 class Held(NamedTuple):
@@ -58,43 +84,39 @@ class Held(NamedTuple):
     force_by_load: float = 0.0  # d mu/d tau_0 at fixed a
 
 
-def _hold(bracket: Bracket, held: Array, guess: Held, accuracy: float) -> Held | None:
-    """Equilibrium with a patch phi held; None if another patch is unstable.
+def _hold(bracket: Bracket, phi: Array, guess: Held, accuracy: float) -> Held | None:
+    """Step 1: equilibrium with a patch phi held; None if another patch is unstable.
 
     The guess gives the amplitude at which the spring has no force; the accuracy is the largest
     residual stress as a share of the mean strength.
     """
-    excess, profile, load, amplitude = (
-        bracket.excess,
-        bracket.profile,
-        guess.load,
-        guess.amplitude,
-    )
+    excess, profile = bracket.excess, bracket.profile
+    load, amplitude = guess.load, guess.amplitude
     stiffness = 2.0 * float(bracket.operator.rate.max())  # no curvature is below -W
-    operator = bracket.operator._replace(spring=stiffness, phi=held)
+    operator = bracket.operator._replace(spring=stiffness, phi=phi)
     slip = guess.slip.copy()
     inside = bracket.inside
     inside[:] = (slip > 0.0) | (excess < load * profile)
-    right = load * profile - excess + (stiffness * amplitude) * held
+    right = load * profile - excess + (stiffness * amplitude) * phi
     status, _ = equilibrate(
         operator, right, inside, slip, bracket.residual, accuracy * bracket.scale
     )
     if status != SOLVED:
         return None
     slope = np.where(inside, guess.slope, 0.0)
-    share = inner(held, slope)
-    if not share > 0.0:  # none of the patch slips any more
+    share = inner(phi, slope)
+    if not share > 0.0:  # no node of the patch slips any more
         return None
     slope *= 1.0 / (stiffness * share)
-    residual_of(operator, held, slope, bracket.residual)
+    residual_of(operator, phi, slope, bracket.residual)
     # A lift of y by epsilon costs epsilon <s - tau_0 p, 1>/<p, y>.
     cost = float(np.abs(excess - load * profile).sum())
     tolerance = accuracy * stiffness * bracket.magnitude * inner(profile, slope) / cost
     status, _ = solve_inside(operator, inside, slope, bracket.residual, tolerance)
     if status != SOLVED:
         return None
-    share = inner(held, slope)
-    reached = inner(held, slip)
+    share = inner(phi, slope)
+    reached = inner(phi, slip)
     return Held(
         load, reached, slip, slope / share, stiffness * (amplitude - reached),
         1.0 / share - stiffness, -inner(profile, slope) / share,
@@ -102,57 +124,64 @@ def _hold(bracket: Bracket, held: Array, guess: Held, accuracy: float) -> Held |
 
 
 def _other_patch(bracket: Bracket) -> Array | None:
-    """The patch that became unstable beside the one that was held, unit norm; None if none did."""
+    """Step 2: the patch that became unstable beside the held one, unit norm; None without one."""
     vector = np.where(bracket.inside, np.abs(bracket.operator.direction), 0.0)
     if not vector.any():
         return None
     value, _ = lowest_eigenvector(
-        bracket.operator, bracket.inside, vector, 1e-3 * float(bracket.operator.rate.max()), 12
+        bracket.operator,
+        bracket.inside,
+        vector,
+        PATCH_EIGENVALUE_RTOL * float(bracket.operator.rate.max()),
+        MAX_PATCH_ITERATIONS,
     )
     if value <= 0.0:
         bracket.raise_multiplier(vector)
-    held: Array = np.maximum(vector, 0.0)
-    return held / np.sqrt(inner(held, held))
+    phi: Array = np.maximum(vector, 0.0)
+    return phi / np.sqrt(inner(phi, phi))
 
 
 def _load_at(state: Held, amplitude: float, curvature: float = 0.0) -> float:
-    """Load at which the spring has no force at an amplitude, extrapolated from a state, Pa."""
+    """Step 5: load (Pa) at which the spring has no force at an amplitude, from a state near it."""
     step = amplitude - state.amplitude
     force = state.force + (state.slope_of_force + 0.5 * curvature * step) * step
     return state.load - force / state.force_by_load
 
 
 def _amplitude_between(below: Held, above: Held, turn: int) -> float:
-    """Guess of the turning point between a state with mu' > 0 and one with mu' < 0."""
+    """Step 4: guess of the turning point between a state with mu' > 0 and one with mu' < 0."""
     if turn % 2 == 0:  # mu' is linear in a, as where many nodes join one after the other
         share = below.slope_of_force / (below.slope_of_force - above.slope_of_force)
     else:  # mu' has one step, as where a single node joins: where the two `_load_at` agree
-        here, there = _load_at(below, below.amplitude), _load_at(above, below.amplitude)
+        load_below = _load_at(below, below.amplitude)
+        load_above = _load_at(above, below.amplitude)
         rise = below.slope_of_force / -below.force_by_load
         fall = above.slope_of_force / -above.force_by_load
-        share = (there - here) / ((rise - fall) * (above.amplitude - below.amplitude))
+        share = (load_above - load_below) / (
+            (rise - fall) * (above.amplitude - below.amplitude)
+        )
         share = min(max(share, 0.0), 1.0)
     return below.amplitude + share * (above.amplitude - below.amplitude)
 
 
 def _step_across(state: Held, step: float, last: float, curvature: float, moved: bool) -> float:
-    """Step of the amplitude that is likely to change the sign of mu'.
+    """Step 3: a step of the amplitude that is likely to change the sign of mu'.
 
     `step` and `last` are the step before and mu' before it. Since mu' falls in steps, as nodes
     join, it goes a little beyond Newton's, and twice as far as before if mu' hardly changed.
     """
-    longest = LONGEST * state.amplitude
+    longest = MAX_STEP * state.amplitude
     if curvature >= 0.0:
         return float(np.copysign(longest / 3.0, state.slope_of_force))
-    newton = -BEYOND * state.slope_of_force / curvature
-    stalled = moved and state.slope_of_force / last > STALLED
+    newton = -NEWTON_FACTOR * state.slope_of_force / curvature
+    stalled = moved and state.slope_of_force / last > STALLED_SHARE
     step = 2.0 * step if stalled and abs(newton) < 2.0 * abs(step) else newton
     return min(max(step, -longest), longest)
 
 
 def close(
     bracket: Bracket,
-    held: Array,
+    phi: Array,
     load: float,
     slip: Array,
     gap: float,
@@ -166,33 +195,33 @@ def close(
     """
     if bracket.closed(gap):
         return True, bend
-    if (
-        not slip.any() and not (bracket.excess < load * bracket.profile).any()
-    ):  # nothing to hold
+    some_slip = slip.any() or (bracket.excess < load * bracket.profile).any()
+    if not some_slip:  # no patch to hold
         load = 0.5 * (bracket.lower + bracket.upper)
-    accuracy = PRECISE * gap
+    accuracy = RESIDUAL_SHARE_OF_GAP * gap
     first: Held | None = None
-    below: Held | None = None  # mu' > 0, the one with the largest a
-    above: Held | None = None
-    guess = Held(load, inner(held, slip), slip, held)
-    step = last = 0.0
-    switches = idle = 0
-    for turn in range(STEPS):
-        state = _hold(bracket, held, guess, accuracy)
-        if state is None:
-            switches += 1
-            other = _other_patch(bracket)
-            if switches > SWITCHES or other is None:
+    below: Held | None = None  # the last state with mu' > 0
+    above: Held | None = None  # the last state with mu' <= 0
+    guess = Held(load, inner(phi, slip), slip, phi)
+    step = last_slope = 0.0
+    patch_changes = idle_states = 0
+    for turn in range(MAX_STATES):
+        # 1.
+        state = _hold(bracket, phi, guess, accuracy)
+        if state is None:  # 2.
+            patch_changes += 1
+            other_patch = _other_patch(bracket)
+            if patch_changes > MAX_PATCH_CHANGES or other_patch is None:
                 break
-            held = other
+            phi = other_patch
             load = min(guess.load, bracket.upper)
-            load -= RETREAT * 2.0 ** (switches - 1) * bracket.magnitude
+            load -= PATCH_CHANGE_RETREAT * 2.0 ** (patch_changes - 1) * bracket.magnitude
             slip = slip if first is None else first.slip
-            guess = Held(load, inner(held, slip), slip, held)
+            guess = Held(load, inner(phi, slip), slip, phi)
             first = below = above = None
             step = bend = 0.0
             continue
-        before = bracket.gap
+        gap_before = bracket.gap
         bracket.raise_slip(state.slip)
         stable = state.slope_of_force > 0.0
         if stable:
@@ -205,8 +234,9 @@ def close(
             bracket.raise_multiplier(below.slope * fall + above.slope * below.slope_of_force)
         if bracket.closed(gap):
             return True, bend
-        idle = idle + 1 if bracket.gap > PROGRESS * before else 0
-        if idle > PATIENCE:
+        # 6.
+        idle_states = idle_states + 1 if bracket.gap > IDLE_GAP_SHARE * gap_before else 0
+        if idle_states > MAX_IDLE_STATES:
             break
         first = first or state
         moved = state.amplitude - first.amplitude
@@ -216,14 +246,17 @@ def close(
         if curvature < 0.0:
             bend = curvature * state.amplitude
         if below is not None and above is not None and below.amplitude < above.amplitude:
+            # 4.
             amplitude = _amplitude_between(below, above, turn)
             step = amplitude - state.amplitude
             load = min(_load_at(below, amplitude), _load_at(above, amplitude))
         else:
-            step = _step_across(state, step, last, curvature, bool(moved))
+            # 3.
+            step = _step_across(state, step, last_slope, curvature, bool(moved))
             load = _load_at(state, state.amplitude + step, min(curvature, 0.0))
-        last = state.slope_of_force
-        load = min(load, bracket.upper - BELOW * gap * bracket.magnitude)
+        last_slope = state.slope_of_force
+        # 5.
+        load = min(load, bracket.upper - LOAD_BELOW_BOUND * gap * bracket.magnitude)
         slip_there = np.maximum(state.slip + step * state.slope, 0.0)
         guess = Held(load, state.amplitude + step, slip_there, state.slope)
     return False, bend
