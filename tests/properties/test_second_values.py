@@ -11,9 +11,11 @@ import dataclasses
 from functools import partial
 from typing import Any
 
+import matplotlib.colors
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+import xarray as xr
 from crooked import LINE, PLANE, PLANE_STRENGTH, TWO
 from setups import EXACT, LOCAL, beta_strength, ensemble, make_problem
 from small_study import small_study
@@ -28,9 +30,9 @@ JOINT_STRENGTH = rough(JOINT, 1, samples=2)
 PLANES = np.stack([PLANE_STRENGTH, 1.03 * np.roll(PLANE_STRENGTH, (5, 3), (0, 1))])
 
 
-def drawn(figure: Any) -> list[Any]:
-    """All that a figure draws: points of lines, patches, maps and marks, and its texts."""
-    figure = getattr(figure, "figure", figure)
+def drawn(panels: Any) -> list[Any]:
+    """All that the figure of these axes draws: points of lines, patches, maps, marks and texts."""
+    figure = np.ravel(panels)[0].figure
     parts: list[Any] = []
     for axes in figure.axes:
         parts += [np.asarray(line.get_xydata(), dtype=float) for line in axes.lines]
@@ -68,6 +70,71 @@ def test_a_plot_of_sample_1_is_the_plot_of_its_row_alone(kind):
     second, first = drawn(draw(both, strength, sample=1)), drawn(draw(both, strength))
     assert same(second, drawn(draw(alone, strength[1:])))
     assert not same(second, first)
+
+
+def contrast(colour, background):
+    def luminance(value):
+        rgb = np.array(matplotlib.colors.to_rgb(value))
+        linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+        return linear @ (0.2126, 0.7152, 0.0722) + 0.05
+
+    low, high = sorted((luminance(colour), luminance(background)))
+    return high / low
+
+
+SWEPT = {
+    name: xr.Dataset(
+        {"critical_stress": (("length", "sample"), values, {"units": "Pa"})},
+        {"length": ("length", [0.1, 0.2, 0.4], {"units": "m"})},
+    )
+    for name, values in (
+        ("a", 7e5 + 1e4 * np.sin(np.arange(90.0)).reshape(3, 30)),
+        ("b", 8e5 + 2e4 * np.cos(np.arange(90.0)).reshape(3, 30)),
+    )
+}
+TOGETHER = {name: result.isel(length=0) for name, result in SWEPT.items()}
+
+
+@pytest.mark.parametrize("style", ["default", "dark_background"])
+def test_figures_are_of_pyplot_once_and_readable_in_every_style(style):
+    onset = st.onset(LINE, TWO, method=LOCAL)
+    calls = {
+        "onset": lambda ax: st.plot.onset(onset, TWO, problem=LINE, ax=ax),
+        "monte_carlo": lambda ax: st.plot.monte_carlo(TOGETHER, ax=ax),
+        "quantiles": lambda ax: st.plot.quantiles(SWEPT, ax=ax),
+        "field": lambda ax: st.plot.field(LINE, TWO[1], ax=ax),
+    }
+    with plt.style.context(style):
+        for name, call in calls.items():
+            plt.close("all")
+            axes = call(None)
+            assert plt.get_fignums() == [axes.figure.number], name
+            assert matplotlib.colors.to_hex(axes.figure.get_facecolor()) == "#ffffff"
+            figure, given = plt.subplots()
+            assert call(given) is given
+            drawn_on = [*given.lines, *given.texts]
+            assert drawn_on
+            for artist in drawn_on:
+                assert contrast(artist.get_color(), given.get_facecolor()) >= 4.5, (
+                    name,
+                    artist,
+                )
+            plt.close(figure)
+        plt.close("all")
+        panels = st.plot.specimen(JOINT)
+        assert len(plt.get_fignums()) == 1
+        assert panels.shape == (2,)
+        plt.close("all")
+
+
+def test_results_by_name_are_compared_along_one_sweep():
+    axes = st.plot.quantiles(SWEPT)
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert labels == ["a", "b"]
+    plt.close(axes.figure)
+    shifted = SWEPT | {"c": SWEPT["b"].assign_coords(length=[0.1, 0.2, 0.5])}
+    with pytest.raises(st.InputError, match="same sweep.*'c'"):
+        st.plot.quantiles(shifted)
 
 
 @pytest.mark.parametrize("method", [LOCAL, EXACT, st.Rupture(loading_rate=6e8)])

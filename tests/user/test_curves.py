@@ -171,8 +171,8 @@ def test_predicted_curves_come_back_from_a_machine(paths):
         "6 tests",
         "measured precursors",
     ]
-    figure = st.plot.precursors(paths[0], measured=curves_of(paths))
-    assert len(figure.axes) == 2
+    panels = st.plot.precursors(paths[0], measured=curves_of(paths))
+    assert panels.shape == (2,)
     seconds = st.read_curve((TRAVEL * u.s, machine() * u.N))
     refuses("curves are N over s", lambda: st.plot.force_travel(paths, measured=seconds))
 

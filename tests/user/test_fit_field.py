@@ -108,9 +108,7 @@ def test_a_picture_of_a_fit_is_of_all_records():
         row[40 * number : 40 * number + 9] = np.nan
     records = [labelled(row) for row in rows]
     fit = fitted(records)
-    panels, reversed_panels = (
-        st.plot.fit(each).axes[2:] for each in (fit, fitted(records[::-1]))
-    )
+    panels, reversed_panels = (st.plot.fit(each)[2:] for each in (fit, fitted(records[::-1])))
     for panel, other in zip(panels, reversed_panels, strict=True):
         points, swapped = (axes.lines[1].get_xydata() for axes in (panel, other))
         np.testing.assert_allclose(points, swapped, rtol=1e-9)  # sums in another order

@@ -16,4 +16,4 @@ record = xr.DataArray(
     truth.sample(line, seed=4)[0][:1800], dims="x", coords={"x": line.x[:1800]}
 ).assign_attrs(units="Pa")
 found = st.fit_field(record, marginal=["weibull", "lognormal"], bootstrap=50, seed=0)
-figure = st.plot.fit(found)
+panels = st.plot.fit(found)

@@ -498,7 +498,7 @@ def rupture(
     with Meter("drawing the figures"):
         _save_figure(plot.rupture(result, problem=problem), out / "rupture")
         if problem.specimen is not None:
-            _save_figure(plot.block(result, problem=problem), out / "block")
+            _save_figure(plot.block(result, problem=problem).flat[0], out / "block")
     if film:
         echo(f"film: {plot.film(result, out / 'rupture.gif')}")
     echo(f"written to {out}")

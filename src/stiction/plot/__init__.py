@@ -1,8 +1,9 @@
 """Plots of results.
 
 A plot of one panel draws on `ax`, or on new axes, and returns the axes. A plot of several
-panels (`block`, `fit`, `precursors`, `specimen`) returns a figure. `film` writes a file and
-returns its path.
+panels (`block`, `fit`, `precursors`, `specimen`) makes a new figure and returns an array of axes.
+New figures have the style of a printed page, whatever style is set. On axes of the user, lines and
+texts keep a contrast of 4.5 to 1 to the background. `film` writes a file and returns its path.
 
 Units follow the size of what is drawn: mm and µs, or km and s. Where the problem has a normal
 pressure, friction coefficients are drawn too. `axes` and `style` are what all files share;

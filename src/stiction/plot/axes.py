@@ -15,7 +15,7 @@ from stiction.base.errors import InputError
 from stiction.base.model import check
 from stiction.base.units import unit_for
 from stiction.base.variables import DIRECTION, FRICTION_COEFFICIENT
-from stiction.plot.style import COLUMN, paper_style
+from stiction.plot.style import COLUMN, keep_contrast, paper_style
 from stiction.problem.problem import Problem
 
 
@@ -25,10 +25,15 @@ def with_unit(name: str, unit: str) -> str:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Return a figure that notebooks and galleries show; sizes in inches."""
+    """Return a figure that notebooks and galleries show; sizes in inches.
+
+    It is made outside `paper_style`, because a backend that is loaded here sets parameters too.
+    """
     import matplotlib.pyplot as plt
 
-    return plt.figure(figsize=(width, height), layout="constrained")
+    figure = plt.figure(figsize=(width, height), layout="constrained")
+    figure.set_facecolor("white")
+    return figure
 
 
 @contextmanager
@@ -41,9 +46,10 @@ def on_axes(
             raise InputError(
                 f"ax: must be matplotlib axes, got {type(ax).__name__}; of several, choose one"
             )
+        given = set(ax.get_children())
         yield ax
+        keep_contrast(ax, given)
         return
-    # Made outside the style: a backend that it loads sets parameters too.
     figure = new_figure(width, height)
     with paper_style():
         yield figure.subplots()

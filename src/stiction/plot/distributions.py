@@ -134,7 +134,7 @@ def _draw_values(
 
 
 def quantiles(
-    result: xr.Dataset,
+    result: Any,
     *,
     quantity: str | None = None,
     along: str | None = None,
@@ -144,8 +144,9 @@ def quantiles(
 
     Parameters
     ----------
-    result : Dataset
-        From `Study.run` with a sweep over one parameter or two; the second makes curves.
+    result : Dataset, or list or mapping of Dataset
+        From `Study.run` with a sweep over one parameter or two; the second makes curves. Several
+        results, as a list or by name, are compared along the same sweep over one parameter.
     quantity : str, optional
         As in `monte_carlo`.
     along : str, optional
@@ -164,17 +165,25 @@ def quantiles(
     InputError
         If the result has no sweep, or a sweep over more than two parameters.
     """
-    variable = result[shown_quantity(result, quantity)]
-    dims = sorted(_swept(variable), key=lambda dim: -variable.sizes[dim])
-    if not 1 <= len(dims) <= 2 or (along is not None and along not in dims):
-        raise InputError(
-            f"result: quantiles are drawn along a sweep over one or two parameters, got"
-            f" {', '.join(dims) or 'none'}" + (f" and along={along!r}" if along else "")
+    if isinstance(result, xr.Dataset):
+        variable = result[shown_quantity(result, quantity)]
+        dims = sorted(_swept(variable), key=lambda dim: -variable.sizes[dim])
+        if not 1 <= len(dims) <= 2 or (along is not None and along not in dims):
+            raise InputError(
+                f"result: quantiles are drawn along a sweep over one or two parameters, got"
+                f" {', '.join(dims) or 'none'}" + (f" and along={along!r}" if along else "")
+            )
+        along = along or dims[0]
+        within = next((dim for dim in dims if dim != along), None)
+        curves: list[tuple[str | None, xr.DataArray]] = (
+            [(None, variable)] if within is None else _steps(variable, within)
         )
-    along = along or dims[0]
-    within = next((dim for dim in dims if dim != along), None)
-    curves = [(None, variable)] if within is None else _steps(variable, within)
-    factor, _, text = scaled(variable)
+        title = None if within is None else scaled(variable[within])[2]
+    else:
+        curves, title = _compared(named(result), quantity), None
+        variable = curves[0][1]
+        (along,) = _swept(variable)
+    factor, _, text = scaled(*(part for _, part in curves))
     scale, _, name = scaled(variable[along])
     place = variable[along].values
     by_name = place.dtype.kind not in "if" or np.unique(place).size < place.size
@@ -196,9 +205,28 @@ def quantiles(
         if by_name or place.size <= 8:  # powers of ten would not name the steps
             axes.set_xticks(place, _step_texts(variable[along]))
             axes.minorticks_off()
-        if within is not None:
-            axes.legend(title=scaled(variable[within])[2])
+        if len(curves) > 1:
+            axes.legend(title=title)
     return axes
+
+
+def _compared(
+    results: dict[str, xr.Dataset], quantity: str | None
+) -> list[tuple[str | None, xr.DataArray]]:
+    """Return the same sweep of several results, by their names."""
+    quantity = shown_quantity(next(iter(results.values())), quantity)
+    curves: list[tuple[str | None, xr.DataArray]] = []
+    for name, result in results.items():
+        need(result, quantity)
+        swept = _swept(result[quantity])
+        first = curves[0][1] if curves else result[quantity]
+        if len(swept) != 1 or not first[swept[0]].equals(result[swept[0]]):
+            raise InputError(
+                "result: several results are compared along the same sweep over one parameter;"
+                f" {name!r} is swept over {', '.join(swept) or 'none'}"
+            )
+        curves.append((name, result[quantity]))
+    return curves
 
 
 def _swept(variable: xr.DataArray) -> list[str]:

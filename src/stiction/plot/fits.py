@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy import fft
 
@@ -13,7 +12,7 @@ from stiction.base.variables import QUANTITIES
 from stiction.inference.agreement import Agreement
 from stiction.inference.fit import FieldFit
 from stiction.inference.whittle import Observed, observe
-from stiction.plot.axes import on_axes, with_unit
+from stiction.plot.axes import new_figure, on_axes, with_unit
 from stiction.plot.style import (
     ACCENT,
     INK,
@@ -35,7 +34,7 @@ PER_OCTAVE = 4
 """Bands of wavenumbers in an octave."""
 
 
-def fit(found: FieldFit) -> Figure:
+def fit(found: FieldFit) -> NDArray[Any]:
     """Draw a fitted random field beside the records.
 
     Parameters
@@ -45,7 +44,7 @@ def fit(found: FieldFit) -> Figure:
 
     Returns
     -------
-    matplotlib.figure.Figure
+    (4,) array of matplotlib.axes.Axes
         (a) Values and the fitted marginal; (b) quantiles of the data against those of the
         fit; (c) correlation, with the effect of the window; (d) spectrum. Shaded in (a) and
         (b): 90 % of the fits to records simulated from the fitted field; in (c) and (d): 90
@@ -55,16 +54,16 @@ def fit(found: FieldFit) -> Figure:
     windows = estimate.setting.windows
     observed = observe(found._rows, windows)
     simulated = [observe(estimate.simulate(rng), windows) for _ in range(SHOWN)]
+    figure = new_figure(PAGE, 5.4)
     with paper_style():
-        figure = Figure(figsize=(PAGE, 5.4))
-        panels = figure.subplots(2, 2).ravel()
+        panels: NDArray[Any] = figure.subplots(2, 2).ravel()
         _histogram(panels[0], found)
         _quantiles(panels[1], found)
         _correlation(panels[2], found, observed, simulated)
         _spectrum(panels[3], found, observed, simulated)
         for letter, axes in zip("abcd", panels, strict=True):
             panel(axes, letter)
-    return figure
+    return panels
 
 
 def _histogram(axes: Axes, found: FieldFit) -> None:

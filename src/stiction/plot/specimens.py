@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
@@ -29,7 +28,7 @@ def specimen(
     result: xr.Dataset | None = None,
     *,
     sample: int = 0,
-) -> Figure:
+) -> NDArray[Any]:
     """Draw the blocks with their drive, and the shear and pressure that it causes.
 
     Parameters
@@ -45,7 +44,8 @@ def specimen(
 
     Returns
     -------
-    matplotlib.figure.Figure
+    (2,) array of matplotlib.axes.Axes
+        The blocks, and below them the profiles along the interface.
 
     Examples
     --------
@@ -56,7 +56,7 @@ def specimen(
     ...     friction=st.LinearWeakening(weakening_rate=0.2e12),
     ...     specimen=st.Blocks(height=0.05, drive=st.Pusher(height=0.01, width=0.005)),
     ... )
-    >>> len(st.plot.specimen(problem).axes)
+    >>> len(st.plot.specimen(problem))
     2
     """
     check("problem", problem, Problem)
@@ -84,7 +84,7 @@ def specimen(
     below.set(xlabel=f"position $x$ ({unit})", ylabel="over the mean", ylim=(0.0, None))
     with paper_style():
         figure.legend(loc="outside lower center", ncols=2)
-    return figure
+    return np.array([top, below])
 
 
 def _draw_blocks(axes: Axes, problem: Problem, scale: float) -> None:
@@ -205,7 +205,7 @@ def _draw_band(axes: Axes, paths: Sequence[Any], length: float, factor: float) -
     axes.plot(grid * length, middle, **style, label="median of predicted")
 
 
-def block(run: xr.Dataset, *, problem: Problem | None = None) -> Figure:
+def block(run: xr.Dataset, *, problem: Problem | None = None) -> NDArray[Any]:
     """Draw how fast both blocks move while an event runs, at some times.
 
     Parameters
@@ -217,7 +217,7 @@ def block(run: xr.Dataset, *, problem: Problem | None = None) -> Figure:
 
     Returns
     -------
-    matplotlib.figure.Figure
+    (rows, columns) array of matplotlib.axes.Axes
         Velocity along the interface, in one scale of colours whose ends are passed by one
         value in a hundred, when 2 to 95 % of the slip have happened. Time counts from the
         first arrival of the front.
@@ -234,9 +234,11 @@ def block(run: xr.Dataset, *, problem: Problem | None = None) -> Figure:
     columns = 4 if 2.0 * height[-1] > 0.6 * x[-1] else 2
     rows = -(-len(since) // columns)
     high = PAGE / columns * 2.0 * height[-1] / x[-1]
+    figure = new_figure(PAGE * 1.1, rows * (high + 0.3) + 0.3)
     with paper_style():
-        figure = new_figure(PAGE * 1.1, rows * (high + 0.3) + 0.3)
-        panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+        panels: NDArray[Any] = figure.subplots(
+            rows, columns, sharex=True, sharey=True, squeeze=False
+        )
         for axes, time, upper in zip(panels.flat, since, velocity, strict=False):
             field = np.concatenate([-upper[:0:-1], upper])
             mesh = axes.pcolormesh(
@@ -250,7 +252,7 @@ def block(run: xr.Dataset, *, problem: Problem | None = None) -> Figure:
         figure.supxlabel(f"position $x$ ({unit}); times count from the onset")
         figure.supylabel(f"height ({unit})")
         figure.colorbar(mesh, ax=panels, extend="both", label="velocity along $x$ (m/s)")
-    return figure
+    return panels
 
 
 def _curve(result: xr.Dataset) -> tuple[Array, Array, str, str]:
@@ -275,7 +277,7 @@ def precursors(
     *,
     problem: Problem | None = None,
     measured: Curves | None = None,
-) -> Figure:
+) -> NDArray[Any]:
     """Draw the curve of a machine, and where the interface slips in arrested events.
 
     Parameters
@@ -290,7 +292,7 @@ def precursors(
 
     Returns
     -------
-    matplotlib.figure.Figure
+    (2,) array of matplotlib.axes.Axes
         Above as by `force_travel`; below, at its travel, the extent of each event.
 
     Examples
@@ -305,15 +307,15 @@ def precursors(
     ... )
     >>> strength = 1e6 + 3e8 * (problem.interface.x - 0.02) ** 2
     >>> path = st.equilibrium_path(problem, strength, np.linspace(0.0, 1.3e6, 50))
-    >>> st.plot.precursors(path).axes[1].get_ylabel()
+    >>> st.plot.precursors(path)[1].get_ylabel()
     'position $x$ (mm)'
     """
     results = [result] if isinstance(result, xr.Dataset) else list(result)
     interface = problem_of(results[0], problem).interface
     length, _ = unit_for("m", np.concatenate([_curve(path)[0] for path in results]))
     scale, unit = unit_for("m", interface.lengths)
+    figure = new_figure(1.35 * COLUMN, 1.35 * COLUMN)
     with paper_style():
-        figure = new_figure(1.35 * COLUMN, 1.35 * COLUMN)
         above, below = figure.subplots(2, sharex=True, height_ratios=(1.3, 1.0))
         force_travel(results if len(results) > 1 else results[0], measured=measured, ax=above)
         for path in results:
@@ -327,4 +329,4 @@ def precursors(
     below.set(xlabel=above.get_xlabel(), ylabel=f"position $x$ ({unit})")
     below.set_ylim(0.0, interface.extent * scale)
     above.set_xlabel("")
-    return figure
+    return np.array([above, below])

@@ -4,12 +4,20 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import matplotlib
+import matplotlib.colors
+import matplotlib.style
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
 
 COLUMN = 3.375
 PAGE = 6.75
 """Widths of one column and of a page, inches."""
+
+MIN_CONTRAST = 4.5
+MID_LUMINANCE = 0.18
+"""Luminance at which black and white have the same contrast."""
 
 INK = "#1a1a1a"
 QUIET = "#7a7a7a"
@@ -54,9 +62,43 @@ _RC: dict[str, Any] = {
 
 @contextmanager
 def paper_style() -> Iterator[None]:
-    """Set fonts, widths and ticks of a printed page for the figures drawn inside."""
-    with matplotlib.rc_context(_RC):
+    """Set fonts, widths and ticks of a printed page for the figures drawn inside.
+
+    A style that the user has set, such as a dark one, does not act inside.
+    """
+    with matplotlib.style.context(["default", _RC]):
         yield
+
+
+def readable(color: Any, background: Any) -> Any:
+    """Return a colour of the same hue with a contrast of at least 4.5 to 1 to a background.
+
+    The contrast is that of the Web Content Accessibility Guidelines 2.1, 1.4.3.
+    """
+
+    def luminance(colour: Any) -> float:
+        rgb = np.array(matplotlib.colors.to_rgb(colour))
+        linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+        return float(linear @ (0.2126, 0.7152, 0.0722))
+
+    behind = luminance(background)
+    target = 1.0 if behind < MID_LUMINANCE else 0.0
+    for share in np.linspace(0.0, 1.0, 21):  # towards white or black
+        rgb = (1.0 - share) * np.array(matplotlib.colors.to_rgb(color)) + share * target
+        high, low = sorted((luminance(rgb), behind), reverse=True)
+        if (high + 0.05) / (low + 0.05) >= MIN_CONTRAST:
+            break
+    return tuple(rgb)
+
+
+def keep_contrast(axes: Axes, given: set[Any]) -> None:
+    """Make lines and texts on a user's axes readable, but for the artists that were there."""
+    background = axes.get_facecolor()
+    if background[3] == 0.0:
+        background = axes.figure.get_facecolor()
+    for artist in set(axes.get_children()) - given:
+        if isinstance(artist, Line2D | Text) and artist.get_alpha() in (None, 1.0):
+            artist.set_color(readable(artist.get_color(), background))
 
 
 def series(index: int, *, marker: bool = False) -> dict[str, Any]:
