@@ -163,3 +163,23 @@ def test_a_cache_that_cannot_be_used_is_said_once(inside):
     with pytest.warns(UserWarning, match="cache: .*cannot be used.*STICTION_CACHE_DIR") as seen:
         assert {files.private_folder(folder) for _ in range(2)} == {folder}
     assert len(seen) == 1
+
+
+def test_files_that_are_no_study_get_one_line_that_says_what_to_do(inside, runs):
+    text = altered(title="Größe")
+    contents = {
+        "utf16.toml": (text.encode("utf-16"), "save it as UTF-8"),
+        "latin.toml": (text.encode("latin-1"), "save it as UTF-8"),
+        "json.toml": (b'{"problem": 1}', "`stiction example` prints a study"),
+        "other.toml": (b"[tool.poetry]\n", "`stiction example` prints a study to start from"),
+        "case.toml": (text.replace("[ensemble]", "[Ensemble]").encode(), "mean 'ensemble'"),
+    }
+    for name, (content, words) in contents.items():
+        (inside / name).write_bytes(content)
+        (line,) = runs(f"check {name}", words, code=2).splitlines()
+        assert line.startswith("error: ")
+    (inside / "mark.toml").write_bytes(text.encode("utf-8-sig"))
+    runs("check mark.toml", "valid")
+    (line,) = runs("check Mark.toml", "mean 'mark.toml'", code=2).splitlines()
+    for folder, code in (("none", 1), ("mark.toml", 2)):
+        assert len(runs(f"status {folder}", "give the folder", code=code).splitlines()) == 1

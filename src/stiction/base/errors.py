@@ -74,12 +74,17 @@ class WorkerError(RunError):
 def unknown(given: str, valid: Iterable[str]) -> str:
     """Return a text that refuses a name and offers the nearest valid one."""
     names = list(valid)
-    by_case = {name.lower(): name for name in reversed(names)}
-    near = get_close_matches(given.lower(), by_case, n=1, cutoff=0.5)
-    near = [by_case[name] for name in near] or [_SYMBOLS.get(given, "")]
     shown = repr(given) if len(given) <= 60 else f"{given[:57]!r}..."
-    hint = f"; did you mean {near[0]!r}?" if near[0] else ""
+    near = nearest(given, names)
+    hint = f"; did you mean {near!r}?" if near else ""
     return f"unknown {shown}{hint} (valid: {', '.join(names)})"
+
+
+def nearest(given: str, valid: Sequence[str]) -> str:
+    """Return the valid name that is most like a given name, in any case; '' if none is."""
+    by_case = {name.lower(): name for name in reversed(valid)}
+    near = get_close_matches(given.lower(), by_case, n=1, cutoff=0.5)
+    return by_case[near[0]] if near else _SYMBOLS.get(given, "")
 
 
 def unknown_name(what: str, given: str, valid: Iterable[str]) -> str:
@@ -137,10 +142,10 @@ def collect_warnings() -> Iterator[list[Warned]]:
 
     `warnings.catch_warnings` changes the whole process: two threads would take each other's.
     """
-    found: list[Warned] = []
-    token = _collected.set(found)
+    warned: list[Warned] = []
+    token = _collected.set(warned)
     try:
-        yield found
+        yield warned
     finally:
         _collected.reset(token)
 
@@ -153,8 +158,8 @@ def merge_warnings() -> Iterator[list[Warned]]:
         with collect_warnings() as caught:
             yield caught
     finally:
-        for one in merged(caught):
-            issue(one)
+        for warning in merged(caught):
+            issue(warning)
 
 
 def merged(caught: Iterable[Warned]) -> list[Warned]:
@@ -163,9 +168,9 @@ def merged(caught: Iterable[Warned]) -> list[Warned]:
     Those of samples are one that counts the samples of all.
     """
     groups: dict[tuple[str, type[Warning], bool], list[Warned]] = {}
-    for one in caught:
-        key = one.text if one.total else _NUMBER.sub("0", one.text)
-        groups.setdefault((key, one.category, one.total > 0), []).append(one)
+    for warning in caught:
+        key = warning.text if warning.total else _NUMBER.sub("0", warning.text)
+        groups.setdefault((key, warning.category, warning.total > 0), []).append(warning)
     return [
         Warned(
             group[0].text if of_samples else _with_ranges([one.text for one in group]),
@@ -186,15 +191,15 @@ def texts_of(caught: Iterable[Warned]) -> list[str]:
 
 def _with_ranges(texts: Sequence[str]) -> str:
     """Return texts that differ only in numbers as one: '3 to 5 m' for '3 m' and '5 m'."""
-    between, found = _NUMBER.split(texts[0]), ""
+    between, text = _NUMBER.split(texts[0]), ""
     for start, *numbers in zip(between, *map(_NUMBER.findall, texts), strict=False):
         ends = sorted(
-            {end for one in numbers for end in one.split(" to ")},
+            {end for number in numbers for end in number.split(" to ")},
             key=lambda end: float(end.replace(",", "")),
         )
         same = len({*numbers}) == 1
-        found += start + (numbers[0] if same else f"{ends[0]} to {ends[-1]}")
-    return found + between[-1]
+        text += start + (numbers[0] if same else f"{ends[0]} to {ends[-1]}")
+    return text + between[-1]
 
 
 def warn_of_samples(text: str, which: Any, sizes: Any = ()) -> None:
@@ -211,13 +216,13 @@ def warn_of_samples(text: str, which: Any, sizes: Any = ()) -> None:
     sizes : array, optional
         Of the error of each sample.
     """
-    each = [bool(one) for one in which]
-    numbers = [number for number, one in enumerate(each) if one]
+    affected = [bool(flag) for flag in which]
+    numbers = [number for number, flag in enumerate(affected) if flag]
     worst = (
         max((float(sizes[number]) for number in numbers), default=0.0) if len(sizes) else 0.0
     )
-    some = tuple(numbers[:LISTED])
-    issue(Warned(text, AccuracyWarning, len(each), len(numbers), some, worst))
+    first = tuple(numbers[:LISTED])
+    issue(Warned(text, AccuracyWarning, len(affected), len(numbers), first, worst))
 
 
 def warn_user(message: str, category: type[Warning]) -> None:
@@ -225,17 +230,17 @@ def warn_user(message: str, category: type[Warning]) -> None:
     issue(Warned(message, category))
 
 
-def issue(one: Warned) -> None:
+def issue(warning: Warned) -> None:
     """Issue a warning at the caller's own line, or collect it."""
     collected = _collected.get()
     if collected is not None:
-        collected.append(one)
+        collected.append(warning)
         return
-    if one.total and not one.affected:
+    if warning.total and not warning.affected:
         return
     level = 1
     frame = sys._getframe(1)
     # Objects are validated by pydantic, whose frames lie between ours.
     while frame.f_back and frame.f_globals.get("__name__", "").split(".")[0] in _OURS:
         frame, level = frame.f_back, level + 1
-    warnings.warn(str(one), one.category, stacklevel=level + 1)
+    warnings.warn(str(warning), warning.category, stacklevel=level + 1)

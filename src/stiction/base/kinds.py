@@ -31,47 +31,47 @@ def register(kind: T) -> T:
     if missing := getattr(kind, "__abstractmethods__", ()):
         raise InputError(f"{kind.__name__}: lacks {', '.join(sorted(missing))}")
     known = _registered.setdefault(getattr(kind, "family", "methods"), {})
-    other = known.setdefault(name, kind)
-    if (other.__module__, other.__qualname__) != (kind.__module__, kind.__qualname__):
-        raise InputError(f"{kind.__name__}: the type {name!r} is that of {other}; rename it")
+    holder = known.setdefault(name, kind)
+    if (holder.__module__, holder.__qualname__) != (kind.__module__, kind.__qualname__):
+        raise InputError(f"{kind.__name__}: the type {name!r} is that of {holder}; rename it")
     known[name] = kind
     return kind
 
 
 class Kinds(Mapping[str, Any]):
-    """The classes of a family by their `type`: our own, those registered, those of entry points.
+    """The classes of a family by their `type`: of the package, registered, and of entry points.
 
-    `own` are places ("module:name") of classes that are imported when they are named, as those of
-    entry points are.
+    `places` ("module:name") are of classes of the package, which are imported when they are named,
+    as classes of entry points are.
     """
 
-    def __init__(self, family: str, own: Mapping[str, str] | None = None) -> None:
-        self._group, self._own = f"stiction.{family}", own or {}
+    def __init__(self, family: str, places: Mapping[str, str] | None = None) -> None:
+        self._group, self._places = f"stiction.{family}", places or {}
         self._registered = _registered.setdefault(family, {})
 
     @cached_property
     def _offered(self) -> dict[str, list[EntryPoint]]:
-        found: dict[str, list[EntryPoint]] = {}
+        points: dict[str, list[EntryPoint]] = {}
         for point in entry_points(group=self._group):
-            found.setdefault(point.name, []).append(point)
-        return found
+            points.setdefault(point.name, []).append(point)
+        return points
 
     def __iter__(self) -> Iterator[str]:
-        return iter(dict.fromkeys((*self._own, *self._registered, *self._offered)))
+        return iter(dict.fromkeys((*self._places, *self._registered, *self._offered)))
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
 
     def __getitem__(self, name: str) -> Any:
-        if name in self._own:
-            module, attribute = self._own[name].split(":")
+        if name in self._places:
+            module, attribute = self._places[name].split(":")
             return getattr(import_module(f"stiction.{module}"), attribute)
         if name not in self._registered:
             self._load(name, self._offered[name])
         return self._registered[name]
 
     def __contains__(self, name: object) -> bool:
-        return name in self._own or name in self._registered or name in self._offered
+        return name in self._places or name in self._registered or name in self._offered
 
     def _load(self, name: str, points: Sequence[EntryPoint]) -> None:
         try:
@@ -105,17 +105,17 @@ class OneOf:
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
         def read(value: Any, inner: Any, info: Any) -> Any:
-            found = self.convert(value)
-            if found is not NotImplemented:
-                return found
+            converted = self.convert(value)
+            if converted is not NotImplemented:
+                return converted
             if not isinstance(value, Mapping) or (self.untyped and "type" not in value):
                 return inner(value)
             table = {"type": self.default, **value} if self.default else value
             return self.convert(from_table(self.kinds, table, info.context))
 
-        own = handler(source)
-        plain = core_schema.wrap_serializer_function_ser_schema(self._written, schema=own)
-        return core_schema.with_info_wrap_validator_function(read, own, serialization=plain)
+        schema = handler(source)
+        plain = core_schema.wrap_serializer_function_ser_schema(self._written, schema=schema)
+        return core_schema.with_info_wrap_validator_function(read, schema, serialization=plain)
 
     def _written(self, value: Any, handler: Any) -> Any:
         if hasattr(value, "plain"):

@@ -29,7 +29,7 @@ from pydantic import (
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError, unknown
+from stiction.base.errors import InputError, nearest, unknown
 from stiction.base.progress import Show
 from stiction.base.quantities import is_quantity, magnitude_in_one_of, units_of_argument
 
@@ -215,12 +215,16 @@ Mode: TypeAlias = Literal["II", "III"]
 # -- mistakes ------------------------------------------------------------------------------------
 
 
+MISSING = "missing"
+"""What is said of a key that is not there, unless it is misspelt."""
+
+
 class Mistakes(InputError):
     """Mistakes inside a model, as pairs of a path and a text."""
 
-    def __init__(self, found: list[tuple[str, str]]) -> None:
-        super().__init__(_joined(path, text, by=": ") for path, text in found)
-        self.found = found
+    def __init__(self, places: list[tuple[str, str]]) -> None:
+        super().__init__(_joined(path, text, by=": ") for path, text in places)
+        self.places = places
 
 
 def describe(value: Any) -> str:
@@ -251,38 +255,41 @@ def mistakes(
     `valid` are the names of its keys or arguments. What lies inside another model was explained
     there. Pydantic adds the members of a union to the path of a `call`; they are left out.
     """
-    found: dict[tuple[str, str, str], list[str]] = {}  # a union has an item for each member
+    texts: dict[tuple[str, str, str], list[str]] = {}  # a union has an item for each member
     shown = [name for name in valid if name != "self"]
+    misspelt: set[str] = set()
     for item in error.errors():
         kind, given = item["type"], f", got {describe(item.get('input'))}"
         context, steps = item.get("ctx") or {}, list(item["loc"])
-        wrong = context.get("error")
+        cause = context.get("error")
         if steps and isinstance(steps[0], int) and steps[0] < len(valid):
             steps[0] = valid[steps[0]]
-        if call or isinstance(wrong, Mistakes):
+        if call or isinstance(cause, Mistakes):
             named = steps[: bool(valid)]
             steps = named + [step for step in steps[len(named) :] if isinstance(step, int)]
         path = ".".join(map(str, steps))
-        if isinstance(wrong, InputError):
-            pairs = [("", text) for text in wrong.problems]
-            for inner, text in wrong.found if isinstance(wrong, Mistakes) else pairs:
-                found[_joined(path, inner), text, ""] = [""]
+        if isinstance(cause, InputError):
+            without_path = [("", text) for text in cause.problems]
+            for inner, text in getattr(cause, "places", without_path):
+                texts[_joined(path, inner), text, ""] = [""]
             continue
-        text, member = str(wrong), ""
+        text, member = str(cause), ""
         if kind == "unexpected_positional_argument":
             return [("", f"give the arguments by name (valid: {', '.join(shown)})")]
         if kind.startswith("missing"):
-            text, given = "missing", ""
+            text, given = MISSING, ""
         elif kind in ("unexpected_keyword_argument", "extra_forbidden"):
+            misspelt.add(nearest(path, shown))
             path, text, given = "", unknown(path, shown), ""
-        elif wrong is None:
+        elif cause is None:
             name = str(context.get("class_name") or context.get("class") or "")
             text, member = "must be ", item["msg"].removeprefix("Input should be ")
             member = f"{'an' if name[0] in 'AEIO' else 'a'} {name}" if name else member
-        found.setdefault((path, text, given), []).append(member)
+        texts.setdefault((path, text, given), []).append(member)
     return [
         (path, text + " or ".join(dict.fromkeys(members)) + given)
-        for (path, text, given), members in found.items()
+        for (path, text, given), members in texts.items()
+        if text != MISSING or path not in misspelt
     ]
 
 
@@ -292,8 +299,8 @@ def _joined(*steps: str, by: str = ".") -> str:
 
 def explain(error: pydantic.ValidationError, root: str = "") -> list[str]:
     """List the mistakes that pydantic found, one text each, with its path below `root`."""
-    found = mistakes(error, (), True)
-    return [_joined(_joined(root, path), text, by=": ") for path, text in found]
+    places = mistakes(error, (), True)
+    return [_joined(_joined(root, path), text, by=": ") for path, text in places]
 
 
 # -- objects and functions -----------------------------------------------------------------------
@@ -361,7 +368,7 @@ def _comparable(value: Any) -> Any:
 
 
 def _fields(self: Any) -> tuple[Any, ...]:
-    return tuple(_comparable(getattr(self, one.name)) for one in dataclasses.fields(self))
+    return tuple(_comparable(getattr(self, field.name)) for field in dataclasses.fields(self))
 
 
 def _equal(self: Any, other: Any) -> bool:
@@ -418,7 +425,9 @@ def checked(function: Function) -> Function:
     is wrong comes as one `InputError`.
     """
     written = function.__annotations__
-    function.__annotations__ = {name: one for name, one in written.items() if name != "return"}
+    function.__annotations__ = {
+        name: hint for name, hint in written.items() if name != "return"
+    }
     hints = typing.get_type_hints(function, include_extras=True)
     function.__annotations__ = {name: _instances(hint) for name, hint in hints.items()}
     validated = pydantic.validate_call(config=ConfigDict(arbitrary_types_allowed=True))(
@@ -433,9 +442,9 @@ def checked(function: Function) -> Function:
         try:
             return validated(*args, **kwargs)
         except pydantic.ValidationError as error:
-            found = mistakes(error, names, True)
+            places = mistakes(error, names, True)
             raise InputError(
-                f"{path or function.__name__}: {text}" for path, text in found
+                f"{path or function.__name__}: {text}" for path, text in places
             ) from None
 
     typing.cast(Any, call).__signature__ = signature
@@ -491,8 +500,8 @@ def _instances(hint: Any) -> Any:
     """Return the annotation, with model classes that take instances only."""
     if isinstance(hint, types.UnionType) or typing.get_origin(hint) is typing.Union:
         return functools.reduce(operator.or_, map(_instances, typing.get_args(hint)))
-    own = dataclasses.is_dataclass(hint)
-    return Annotated[hint, InstanceOf()] if own else hint  # type: ignore[type-arg]
+    is_model = dataclasses.is_dataclass(hint)
+    return Annotated[hint, InstanceOf()] if is_model else hint  # type: ignore[type-arg]
 
 
 def check(name: str, value: Any, annotation: Any) -> Any:

@@ -151,7 +151,7 @@ def doubt_units(doubts: Iterable[Doubt]) -> bool:
 
     If one is not possible, all that are not usual are an `InputError`.
     """
-    unusual = [one for one in doubts if not one.usual[0] <= one.ratio <= one.usual[1]]
+    unusual = [doubt for doubt in doubts if not doubt.usual[0] <= doubt.ratio <= doubt.usual[1]]
     if any(not one.possible[0] <= one.ratio <= one.possible[1] for one in unusual):
         raise InputError(one.text for one in unusual)
     if unusual:

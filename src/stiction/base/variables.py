@@ -96,8 +96,8 @@ FORCES: dict[str, tuple[str, str]] = {
 
 def force_variables(variables: Mapping[str, Variable]) -> dict[str, Variable]:
     """Return the forces, N, of the stresses among some variables."""
-    found = [(FORCES[name], one.dims) for name, one in variables.items() if name in FORCES]
-    return {name: Variable("N", text, dims) for (name, text), dims in found}
+    dims = {name: known.dims for name, known in variables.items() if name in FORCES}
+    return {FORCES[name][0]: Variable("N", FORCES[name][1], dims[name]) for name in dims}
 
 
 def forces(values: Mapping[str, Any], area: float) -> dict[str, Any]:

@@ -196,14 +196,14 @@ def status(run: RunPath) -> None:
 
     stored = open_run(run)
     state, points = stored.status(), stored.study.points
-    each = state.samples // len(points)
+    samples = state.samples // len(points)
     echo(f"{run}: {' '.join(stored.study.title.split())}".removesuffix(": "))
     share = 100.0 * state.done / state.samples
     echo(f"  {stored.counted:11s} {state.done} of {state.samples} ({share:.1f} %)")
     echo(f"  chunks      {state.chunks}")
     echo(f"  computed    {duration(state.seconds)} of one core")
     counts = zip(points, state.done_by_point, strict=True)
-    behind = [f"{one}: {done} of {each}" for one, done in counts if done < each]
+    behind = [f"{point}: {done} of {samples}" for point, done in counts if done < samples]
     _show_some(behind if len(points) > 1 else [], "  ")
     _show_some(state.damaged, "  damaged     ")
     if state.damaged:
@@ -303,8 +303,8 @@ def description(study: Any) -> dict[str, str]:
     samples = f"{ensemble.samples} (seed {ensemble.seed})"
     if study.sweep:
         samples += f" at each of {len(points)} points: {len(points) * ensemble.samples} in all"
-    some = distinct(points, "problem", "random", "method")
-    methods = ", ".join(dict.fromkeys(point.method.label for point in some))
+    different = distinct(points, "problem", "random", "method")
+    methods = ", ".join(dict.fromkeys(point.method.label for point in different))
     lines = {"method": methods, "samples": samples}
     if study.uncertain:
         keys = ", ".join(key for key in study.uncertain if key != "count")
@@ -316,10 +316,14 @@ def description(study: Any) -> dict[str, str]:
         text = f"{keys}: {len(values)} values, {values[0]} to {values[-1]}{unit}"
         lines[f"axis {number}"] = text
     numbers = pd.DataFrame(
-        [_numbers(one.problem, member) for one in some for member in one.random.members]
+        [
+            _numbers(point.problem, member)
+            for point in different
+            for member in point.random.members
+        ]
     )
-    for (title, unit), each in numbers.items():
-        ends = dict.fromkeys(f"{value:.5g}" for value in (each.min(), each.max()))
+    for (title, unit), column in numbers.items():
+        ends = dict.fromkeys(f"{value:.5g}" for value in (column.min(), column.max()))
         lines[title] = f"{' to '.join(ends)} {unit}".rstrip()
     return lines
 
@@ -328,16 +332,16 @@ def _numbers(problem: Any, random: Any) -> dict[tuple[str, str], float]:
     """Return key numbers of a point and what is random there, by title and unit."""
     field = random.strength
     unit = "Pa" if field.of is None else "(friction coefficient)"
-    found = {
+    numbers = {
         ("mean strength", unit): field.mean,
         ("standard deviation", unit): field.standard_deviation,
         ("correlation length", "m (to 1/e)"): field.efolding_length(),
     }
     if problem.uniform_rate is None:  # the nucleation length varies along the interface
-        return found
-    found["nucleation length", "m"] = problem.nucleation_length
-    found["nodes in h_n", ""] = min(problem.nodes_in_nucleation_length(problem.uniform_rate))
-    return found
+        return numbers
+    numbers["nucleation length", "m"] = problem.nucleation_length
+    numbers["nodes in h_n", ""] = min(problem.nodes_in_nucleation_length(problem.uniform_rate))
+    return numbers
 
 
 def _cost(study: Any) -> dict[str, str]:
@@ -345,9 +349,9 @@ def _cost(study: Any) -> dict[str, str]:
     from stiction.ensemble.batches import usable_cores
 
     points, samples, cores = study.experiments, study.ensemble.samples, usable_cores()
-    each = [point.seconds for point in points]
-    seconds, size = sum(each) * samples, sum(point.sample_bytes for point in points) * samples
-    ends = " to ".join(dict.fromkeys((duration(min(each)), duration(max(each)))))
+    costs = [point.seconds for point in points]
+    seconds, size = sum(costs) * samples, sum(point.sample_bytes for point in points) * samples
+    ends = " to ".join(dict.fromkeys((duration(min(costs)), duration(max(costs)))))
     return {
         "time": f"about {duration(seconds)} on one core, {duration(seconds / cores)} on the {cores}"
         f" here ({ends} a sample), to a factor of three",
@@ -403,7 +407,7 @@ def onset(
     from stiction.study.study import read_setup
 
     setup = read_setup(study)
-    problem, own = setup.problem, setup.method
+    problem, of_study = setup.problem, setup.method
     if unknown := [name for name in method or () if name not in METHODS]:
         raise InputError([unknown_name("--method", name, METHODS) for name in unknown])
     profile = read_profile(
@@ -423,10 +427,12 @@ def onset(
         timed = name == "rupture" and problem.specimen is None
         options = {"loading_rate": LOADING_RATE} if timed else {}
         try:
-            one = own if own is not None and own.type == name else METHODS[name](**options)
-            result = find(problem, profile, method=one)
-            found = table_of(result[[key for key in printed if key in result]])
-            rows[name] = {key: v[0] for key, v in found.items() if key.startswith(printed)}
+            given = of_study is not None and of_study.type == name
+            result = find(
+                problem, profile, method=of_study if given else METHODS[name](**options)
+            )
+            table = table_of(result[[key for key in printed if key in result]])
+            rows[name] = {key: v[0] for key, v in table.items() if key.startswith(printed)}
         except (InputError, TypeError) as error:  # TypeError: it has options without defaults
             refused.append(f"{name} does not apply: {error}")
     if rows:
@@ -507,7 +513,7 @@ def rupture(
 def _summary(result: Any) -> str:
     """Return the numbers of a rupture, one a line, without those that are NaN."""
     lines = []
-    for name in (one for one in RUPTURE if one in result):
+    for name in filter(result.__contains__, RUPTURE):
         numbers = [f"{number:.5g}" for number in result[name].values.reshape(-1)]
         if numbers != ["nan"]:
             about = result[name].attrs

@@ -2,6 +2,7 @@
 
 import base64
 import io
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -122,9 +123,9 @@ def add_curves(page: Page, run: StoredRun) -> None:
             plot.failure_curve(curve, ax=figure.subplots())
             page.figure(figure, f"Probability of an onset below a stress{where}.")
         same = "stress_above_bound" if not bounded(curve.attrs["lower_bound"]) else ""
-        own = [v for name, v in curve.items() if v.dims == ("point",) and name != same]
-        factors, _, labels = zip(*map(scaled, own), strict=True)
-        rows = np.transpose(own) * factors
+        columns = [v for name, v in curve.items() if v.dims == ("point",) and name != same]
+        factors, _, labels = zip(*map(scaled, columns), strict=True)
+        rows = np.transpose(columns) * factors
         mean = ""
         if "members" in curve:
             count = curve.sizes["member"]
@@ -194,14 +195,15 @@ def densities(result: xr.Dataset, along: str | None) -> Figure:
 
 def add_tables(page: Page, result: xr.Dataset, axes: GridAxes) -> None:
     """Add mean, spread and quantiles of the onset at every point, with errors."""
-    dims, keys = list(axes), [name for own in axes.values() for name in own]
+    dims, keys = list(axes), [name for coordinates in axes.values() for name in coordinates]
     flat = result.stack(point=dims) if dims else result.expand_dims("point")
     scales = [scaled(result[key]) for key in keys]
     swept = [*(label for _, _, label in scales), "samples"]
     values = [flat[key].values for key in keys]
     pairs = zip(values, scales, strict=True)
-    places = [each * scale[0] if each.dtype.kind == "f" else each for each, scale in pairs]
-    labels = [[each[i] for each in places] for i in range(min(flat.sizes["point"], MOST_ROWS))]
+    places = [key * scale[0] if key.dtype.kind == "f" else key for key, scale in pairs]
+    count = min(flat.sizes["point"], MOST_ROWS)
+    labels = list(itertools.islice(zip(*places, strict=True), count)) if keys else [()]
     quantities = [f"{what} \N{PLUS-MINUS SIGN} standard error" for what in SPREAD]
     quantities += [f"{100 * level:g} % quantile" for level in LEVELS]
     if flat["first_instability"].equals(flat["critical_stress"]):  # of the local criterion
@@ -210,21 +212,21 @@ def add_tables(page: Page, result: xr.Dataset, axes: GridAxes) -> None:
         if name in flat:
             factor, unit, _ = scaled(flat[name])
             columns = [*swept, *(with_unit(quantity, unit) for quantity in quantities)]
-            found = flat[name].transpose("point", ...).values * factor
-            rows = [[*at, *_estimates(row)] for at, row in zip(labels, found, strict=False)]
+            samples = flat[name].transpose("point", ...).values * factor
+            rows = [[*at, *_estimates(row)] for at, row in zip(labels, samples, strict=False)]
             page.table(flat[name].attrs["long_name"].capitalize(), columns, rows)
 
 
-def _estimates(found: Any) -> list[Any]:
+def _estimates(samples: Any) -> list[Any]:
     """Return number, mean, standard deviation and quantiles of samples as texts."""
-    values = found[np.isfinite(found)]
+    values = samples[np.isfinite(samples)]
     if values.size < 4:
         return [values.size, *[None] * (2 + len(LEVELS))]
     levels = quantiles(values, LEVELS)
     errors = 0.25 * (levels.upper - levels.lower)  # 95 % lie within two
     estimates = [
-        f"{rounded(one.value, one.error)} \N{PLUS-MINUS SIGN} {rounded(one.error, one.error)}"
-        for one in (mean(values), standard_deviation(values))
+        f"{rounded(part.value, part.error)} \N{PLUS-MINUS SIGN} {rounded(part.error, part.error)}"
+        for part in (mean(values), standard_deviation(values))
     ]
     return [values.size, *estimates, *map(rounded, levels.value, errors)]
 

@@ -237,7 +237,7 @@ def _read(file: Path, max_bytes: int) -> bytes:
     except InputError as error:
         raise InputError(f"{file}: {error}; remove it, or choose another run") from None
     except FileNotFoundError:
-        what = "there is no run here"
+        what = "there is no run here; give the folder of `stiction run --out`"
         if file.name == STUDY and (file.parent / CHUNKS).is_dir():
             what = f"{STUDY} is missing; run the study again into the folder to restore it"
         raise Damaged(f"{file.parent}: {what}") from None
@@ -264,10 +264,12 @@ def read_json(file: Path) -> dict[str, Any]:
         raise
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise Damaged(
-            f"{file}: is damaged; run the study again into the folder to repair it"
+            f"{file}: is damaged, or of another program; run the study again into the folder to"
+            " repair it"
         ) from None
     raise StoreError(
-        f"{file}: is of format {describe(body['format'])}; this version reads {FORMAT}"
+        f"{file}: is of format {describe(body['format'])}; this version reads {FORMAT}:"
+        " install the version of stiction that wrote it"
     )
 
 

@@ -56,11 +56,12 @@ def table_of(result: xr.Dataset) -> pd.DataFrame:
     of equally likely interfaces are left out, their band is not.
     """
     result = result.drop_dims("member", errors="ignore")  # their band stays
-    dims = {name: list(map(str, one.dims)) for name, one in result.data_vars.items()}
-    inner = {
-        n: each[each.index("sample") + 1 :] for n, each in dims.items() if "sample" in each
-    }
-    wide = sorted(str(name) for name, each in inner.items() if {*each} - {DIRECTION})
+    wide = sorted(
+        str(name)
+        for name, values in result.data_vars.items()
+        if "sample" in values.dims
+        and {*values.dims[values.dims.index("sample") + 1 :]} - {DIRECTION}
+    )
     if wide:
         warn_accuracy(
             f"{', '.join(wide)}: more than one number a sample does not fit into a table with one"

@@ -71,17 +71,18 @@ def solve_repetition(smallest: float, state: LimitState, span: Span) -> Table:
     """Return the repetition that is the first of a span, as a table of a store."""
     begin, (point, number, _) = time.perf_counter(), span
     with collect_warnings() as warned:
-        found = repetition_of(state, smallest, number)
+        descent = repetition_of(state, smallest, number)
     parts = []
-    for level, one in enumerate(found.populations):
-        rows = np.empty(one.values.size, ROW)
+    for level, population in enumerate(descent.populations):
+        rows = np.empty(population.values.size, ROW)
         rows[POINT], rows[NUMBER], rows["level"] = point, number, level
         for name in OF_ALL:
-            rows[name] = getattr(found, name)
+            rows[name] = getattr(descent, name)
         for name in OF_LEVEL:
-            rows[name] = getattr(one, name)
-        for name, own in zip(OF_SAMPLE, (one.values, one.ancestors, one.members), strict=True):
-            rows[name] = own
+            rows[name] = getattr(population, name)
+        columns = population.values, population.ancestors, population.members
+        for name, column in zip(OF_SAMPLE, columns, strict=True):
+            rows[name] = column
         parts.append(rows)
     seconds = time.perf_counter() - begin
     return Table(np.concatenate(parts), (), seconds, versions(), tuple(merged(warned)))
@@ -89,19 +90,18 @@ def solve_repetition(smallest: float, state: LimitState, span: Span) -> Table:
 
 def repetitions_in(rows: NDArray[Any]) -> Iterator[tuple[int, int, Descent]]:
     """Yield point, number and content of the repetitions in a table, without draws."""
-    for (point, number), own in pd.DataFrame(rows).groupby([POINT, NUMBER]):
+    for (point, number), table in pd.DataFrame(rows).groupby([POINT, NUMBER]):
         populations = []
-        for _, level in own.groupby("level"):
+        for _, level in table.groupby("level"):
             ceiling, chance = (level[name].iloc[0].item() for name in OF_LEVEL)
             values, ancestors, members = (level[name].to_numpy() for name in OF_SAMPLE)
             populations.append(
                 Population(ceiling, chance, values, ancestors, members, np.empty((0, 0)))
             )
         samples, threshold, evaluations, complete = (
-            own[name].iloc[0].item() for name in OF_ALL
+            table[name].iloc[0].item() for name in OF_ALL
         )
-        found = Descent(samples, populations, threshold, evaluations, complete)
-        yield point, number, found
+        yield point, number, Descent(samples, populations, threshold, evaluations, complete)
 
 
 class Repetitions:
@@ -125,7 +125,7 @@ class Repetitions:
         self.smallest, self._only = settings["smallest"], only
         self.states = [LimitState(point, settings["event"]) for point in points]
         self.done = np.zeros((len(points), count), dtype=np.bool_)
-        self._found: list[dict[int, Descent]] = [{} for _ in points]
+        self._descents: list[dict[int, Descent]] = [{} for _ in points]
 
     def misfit(self, table: Table) -> str:
         """Return why a table cannot hold repetitions of these points; '' if it can."""
@@ -142,42 +142,43 @@ class Repetitions:
 
     def add(self, table: Table) -> None:
         """Take the repetitions of a table; those beyond the number are left out."""
-        for point, number, found in repetitions_in(table.rows):
+        for point, number, descent in repetitions_in(table.rows):
             if number < self.done.shape[1]:
-                self._found[point][number] = found
+                self._descents[point][number] = descent
                 self.done[point, number] = True
 
     def tail(self, point: int) -> Tail | None:
         """Return the tail of a point from all of its repetitions; None without any."""
-        found = [one for _, one in sorted(self._found[point].items())]
-        return Tail(found, spent=sum(one.evaluations for one in found)) if found else None
+        descents = [descent for _, descent in sorted(self._descents[point].items())]
+        spent = sum(descent.evaluations for descent in descents)
+        return Tail(descents, spent=spent) if descents else None
 
     def curves(self, attributes: Mapping[str, Any]) -> list[xr.Dataset]:
         """Return the curve of each point of the sweep, NaN without a repetition."""
         wanted = chances(self.smallest)
         tails = [self.tail(point) for point in range(len(self.states))]
-        found = [
+        curves = [
             curve_of(tail, state, wanted, attributes) if tail else None
             for tail, state in zip(tails, self.states, strict=True)
         ]
-        some = next((one for one in found if one is not None), None)
-        if some is None:
+        known = next((curve for curve in curves if curve is not None), None)
+        if known is None:
             raise InputError("run: no repetition is stored yet")
-        empty = some.where(False).assign_attrs(lower_bound=np.nan)
-        return [empty if one is None else one for one in found]
+        empty = known.where(False).assign_attrs(lower_bound=np.nan)
+        return [empty if curve is None else curve for curve in curves]
 
     def dataset(self, attributes: Mapping[str, Any], axes: GridAxes) -> xr.Dataset:
         """Return curves as `stiction.failure_curve`, over the axes of a sweep too."""
-        found = self.curves(attributes)
-        result = found[0]
+        curves = self.curves(attributes)
+        result = curves[0]
         if axes:
             shared = {
-                name: one
-                for name, one in result.attrs.items()
-                if all(other.attrs[name] == one for other in found)
+                name: value
+                for name, value in result.attrs.items()
+                if all(curve.attrs[name] == value for curve in curves)
             }
-            values = {str(name): np.stack([one[name] for one in found]) for name in result}
-            values["lower_bound"] = np.array([one.attrs["lower_bound"] for one in found])
+            values = {str(name): np.stack([curve[name] for curve in curves]) for name in result}
+            values["lower_bound"] = np.array([curve.attrs["lower_bound"] for curve in curves])
             result = to_dataset(*over_axes(values, VARIABLES, axes), shared)
         return result[list(self._only)] if self._only else result
 

@@ -29,8 +29,8 @@ FEWEST_BLOCKS = 8
 
 
 def _part(value: Any) -> tuple[int, int]:
-    found = re.fullmatch(r"(\d+)/(\d+)", value, re.ASCII) if isinstance(value, str) else None
-    number, of = map(int, found.groups()) if found else (0, 0)
+    match = re.fullmatch(r"(\d+)/(\d+)", value, re.ASCII) if isinstance(value, str) else None
+    number, of = map(int, match.groups()) if match else (0, 0)
     if not 1 <= number <= of:
         raise ValueError(
             "must be K/N with K from 1 to N, such as '3/100' for the third of 100 parts"
@@ -86,8 +86,8 @@ class StoredRun:
         self.path, self.study, self.settings, self._store = store.path, study, settings, store
 
     def __repr__(self) -> str:
-        points, each = len(self.study.experiments), self.study.ensemble.samples
-        what = f"{points} x {each} {self.counted} by {self.methods}"
+        points, samples = len(self.study.experiments), self.study.ensemble.samples
+        what = f"{points} x {samples} {self.counted} by {self.methods}"
         return f"{type(self).__name__}({str(self.path)!r}, {what})"
 
     @property
@@ -98,7 +98,7 @@ class StoredRun:
     @property
     def methods(self) -> str:
         """Labels of the methods of the study."""
-        return " and ".join({one.method.label: None for one in self.study.experiments})
+        return " and ".join({point.method.label: None for point in self.study.experiments})
 
     def status(self) -> Status:
         """Return the state of the run; all chunks are compared with their checksums.
@@ -143,13 +143,13 @@ class StoredRun:
         attributes = self.study.attributes
         if not self.settings:
             attributes |= self._store.pilot or {}
-        found: xr.Dataset = rows.dataset(attributes, self.study.axes)
-        return found
+        result: xr.Dataset = rows.dataset(attributes, self.study.axes)
+        return result
 
     def curves(self) -> list[xr.Dataset]:
         """Return the failure curve of each point of the sweep, NaN without a repetition."""
-        found: list[xr.Dataset] = self._read(None).curves(self.study.attributes)
-        return found
+        curves: list[xr.Dataset] = self._read(None).curves(self.study.attributes)
+        return curves
 
     def _rows(self, only: Sequence[str] | None) -> Any:
         points, ensemble = self.study.experiments, self.study.ensemble

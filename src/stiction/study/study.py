@@ -31,6 +31,7 @@ from stiction.base.model import (
     check,
     checked,
     explain,
+    keys_of,
     model,
     to_plain,
 )
@@ -107,7 +108,7 @@ class Question:
 
     @model_validator(mode="after")
     def _one(self) -> Question:
-        given = [name for name, one in vars(self).items() if one is not None]
+        given = [name for name, value in vars(self).items() if value is not None]
         asked = [name for name in given if name != "target_cv"]
         if len(asked) != 1:
             raise InputError(
@@ -119,7 +120,7 @@ class Question:
     def answer(self, experiment: Experiment, workers: int | None = None) -> Answer:
         """Answer it for one point of a study."""
         options: dict[str, Any] = {
-            name: one for name, one in vars(self).items() if one is not None
+            name: value for name, value in vars(self).items() if value is not None
         }
         options |= {"method": experiment.method, "seed": experiment.seed, "workers": workers}
         options["mixture"] = getattr(experiment.random, "complete", False)
@@ -137,7 +138,7 @@ class _Parts:
     ensemble: Ensemble
 
 
-_PARTS = tuple(_Parts.__dataclass_fields__)
+PARTS = tuple(_Parts.__dataclass_fields__)
 
 
 @model(kw_only=True)
@@ -205,7 +206,8 @@ class Study(_Parts):
     @model_validator(mode="after")
     def _fits_together(self) -> Study:
         points = self.experiments
-        wide = [name for name, one in variables_in(points).items() if {"x", "y"} & {*one.dims}]
+        variables = variables_in(points)
+        wide = [name for name in variables if {"x", "y"} & {*variables[name].dims}]
         if wide and len({point.problem.interface for point in points}) > 1:
             raise InputError(
                 f"sweep: {', '.join(wide)} cannot be kept along an interface that is swept; make a"
@@ -219,8 +221,8 @@ class Study(_Parts):
         keys = [key for axis in self.sweep for key in axis]
         steps = itertools.product(*(zip(*axis.values(), strict=True) for axis in self.sweep))
         return [
-            Point(number, dict(zip(keys, itertools.chain(*one), strict=True)))
-            for number, one in enumerate(steps)
+            Point(number, dict(zip(keys, itertools.chain(*values), strict=True)))
+            for number, values in enumerate(steps)
         ]
 
     @cached_property
@@ -229,21 +231,21 @@ class Study(_Parts):
 
         A mistake is reported once, with the first point where it is.
         """
-        base = _Parts(**{name: getattr(self, name) for name in _PARTS})
+        base = _Parts(**{name: getattr(self, name) for name in PARTS})
         made: dict[Any, Any] = {}
 
         def part(name: str, values: Mapping[str, Any]) -> Any:
-            own = {key: one for key, one in values.items() if key.split(".")[0] == name}
-            key = name, *map(id, own.values())
+            inside = {key: values[key] for key in values if key.split(".")[0] == name}
+            key = name, *map(id, inside.values())
             if key not in made:
-                made[key] = getattr(with_values(base, own), name)
+                made[key] = getattr(with_values(base, inside), name)
             return made[key]
 
-        found: list[Experiment] = []
+        experiments: list[Experiment] = []
         problems: dict[str, str] = {}
         for point in self.points:
             try:
-                problem, random, method, ensemble = (part(n, point.values) for n in _PARTS)
+                problem, random, method, ensemble = (part(n, point.values) for n in PARTS)
                 if self.uncertain:
                     likely = "uncertain", id(random)
                     made[likely] = made.get(likely) or self._likely(random)
@@ -255,14 +257,14 @@ class Study(_Parts):
                 key = id(problem), id(random), id(method)
                 if key not in made:
                     made[key] = Experiment(problem, random, method, self.ensemble.keep)
-                found.append(made[key].with_seed(ensemble.seed))
+                experiments.append(made[key].with_seed(ensemble.seed))
             except InputError as error:
                 where = f", at {point} of the sweep" if point.values else ""
                 for text in error.problems:
                     problems.setdefault(text, text + where)
         if problems:
             raise InputError(problems.values())
-        return found
+        return experiments
 
     def _mixture(self, random: Any) -> Any:
         """Return a list of interfaces as all that there are."""
@@ -276,7 +278,7 @@ class Study(_Parts):
         count = parameters.pop("count")
         axes = [key for axis in self.sweep for key in axis]
         swept = [
-            key for key in parameters if any(f"{key}.".startswith(f"{one}.") for one in axes)
+            key for key in parameters if any(f"{key}.".startswith(f"{axis}.") for axis in axes)
         ]
         if swept or isinstance(random, list):
             raise InputError(
@@ -284,8 +286,8 @@ class Study(_Parts):
                 if swept
                 else "uncertain: random is a list of equally likely interfaces already"
             )
-        found: list[RandomInterface] = random.uncertain(parameters, count, self.ensemble.seed)
-        return found
+        likely: list[RandomInterface] = random.uncertain(parameters, count, self.ensemble.seed)
+        return likely
 
     @property
     def axes(self) -> GridAxes:
@@ -299,11 +301,11 @@ class Study(_Parts):
     def attributes(self) -> dict[str, Any]:
         """Attributes of a result, from which the study can be run again."""
         try:
-            found: dict[str, Any] = {"study": self.to_dict()}
+            attributes: dict[str, Any] = {"study": self.to_dict()}
         except InputError as error:  # a function of the user's: the result states it
-            found = {"study_incomplete": str(error)}
+            attributes = {"study_incomplete": str(error)}
         title = {"title": self.title} if self.title else {}
-        return found | {"seed": self.ensemble.seed} | title
+        return attributes | {"seed": self.ensemble.seed} | title
 
     @checked
     def run(
@@ -475,8 +477,8 @@ class Setup:
 
 def read_setup(path: Path) -> Setup:
     """Read one interface from a study file, which need not have the other tables."""
-    own, given = Setup.__dataclass_fields__, _read_toml(path)
-    return _read(Setup, {key: one for key, one in given.items() if key in own}, path.parent)
+    keys, given = Setup.__dataclass_fields__, _read_toml(path)
+    return _read(Setup, {key: given[key] for key in given if key in keys}, path.parent)
 
 
 def _check_toml(content: bytes) -> None:
@@ -501,11 +503,15 @@ def _read_toml(path: Path) -> dict[str, Any]:
         content = content_of(path)
         _check_toml(content)
     try:
-        return tomllib.loads(content.decode())
+        return tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: cannot be read: {error}") from None
+        raise InputError(
+            f"{path}: is not text in UTF-8 (byte {error.start}); save it as UTF-8"
+        ) from None
     except (RecursionError, ValueError) as error:  # a ValueError for integers of many digits
-        raise InputError(f"{path}: is not valid TOML: {error}") from None
+        raise InputError(
+            f"{path}: is not valid TOML: {error} (`stiction example` prints a study)"
+        ) from None
 
 
 def read_with_files(path: Path) -> tuple[Study, list[Path]]:
@@ -526,6 +532,11 @@ def _read(
     """
     check("study", given, dict)
     context = {}
+    if given and not {*keys_of(cls)} & {*given}:
+        raise InputError(
+            f"study: has none of the tables {', '.join(PARTS)}, but {', '.join(map(repr, given))};"
+            " `stiction example` prints a study to start from"
+        )
     if folder is not None and "to" in (given.get("save") or ()):
         raise InputError(
             "save.to: is no option of a study file; give --out to stiction rupture"
@@ -568,11 +579,15 @@ def open_run(path: Any) -> StoredRun:
         somebody else that it names.
     """
     place = check("path", path, FilePath)
+    if place.is_file():
+        raise InputError(f"path: {place} is a file; give the folder of the run")
     plain = read_study(place)
     store, settings = Store(place, plain), plain.pop(CURVES, None)
     try:
-        found = Study.from_dict(plain)
+        study = Study.from_dict(plain)
     except InputError as error:
-        texts = [f"{place}: its study cannot be read by this installation:", *error.problems]
-        raise StoreError("\n  ".join(texts)) from None
-    return StoredRun(store, found, settings)
+        raise StoreError(
+            f"{place}: its study cannot be read by this installation: {'; '.join(error.problems)};"
+            " install the version, or the package with the class, that wrote it"
+        ) from None
+    return StoredRun(store, study, settings)

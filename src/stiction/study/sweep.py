@@ -89,7 +89,7 @@ def read_axes(given: Any) -> list[Axis]:
     problems: dict[str, None] = {}
     for key in keys:
         table = key.split(".")[0]
-        inside = [other for other in keys if f"{other}.".startswith(f"{key}.")]
+        inside = [longer for longer in keys if f"{longer}.".startswith(f"{key}.")]
         if key in _FIXED:
             problems[f"{key}: cannot be swept"] = None
         elif table not in _TABLES:
@@ -105,10 +105,10 @@ def read_axes(given: Any) -> list[Axis]:
 
 
 def _plain_axes(axes: Sequence[Axis]) -> list[Axis]:
-    def plain(one: Any) -> Any:
-        if dataclasses.is_dataclass(one):
-            return to_plain(one)
-        return "inf" if one == math.inf else one
+    def plain(value: Any) -> Any:
+        if dataclasses.is_dataclass(value):
+            return to_plain(value)
+        return "inf" if value == math.inf else value
 
     return [{key: list(map(plain, values)) for key, values in axis.items()} for axis in axes]
 
@@ -130,21 +130,22 @@ def _read_uncertain(given: Any) -> dict[str, Any] | None:
             f"must be a table of keys and their distributions, got {describe(given)}"
         )
     rest = dict(given)
-    found: dict[str, Any] = {"count": check("count", rest.pop("count", INTERFACES), Count)}
+    uncertain: dict[str, Any] = {"count": check("count", rest.pop("count", INTERFACES), Count)}
     flat = _flat(rest)
-    for key, one in distributions_of(flat).items():
+    for key, distribution in distributions_of(flat).items():
         try:
             given = flat[key]
             table = isinstance(given, Marginal) or (
                 isinstance(given, Mapping) and "type" in given
             )
-            plain = marginal_of(given if table else one)
-            found[full_key(key)] = plain.plain() if hasattr(plain, "plain") else to_plain(plain)
+            plain = marginal_of(given if table else distribution)
+            written = plain.plain() if hasattr(plain, "plain") else to_plain(plain)
+            uncertain[full_key(key)] = written
         except ValueError as error:
             raise InputError(f"{key}: {error}") from None
-    if len(found) == 1:
+    if len(uncertain) == 1:
         raise InputError("names no parameter; give its dotted key and a distribution")
-    return found
+    return uncertain
 
 
 Uncertain: TypeAlias = Annotated[Any, BeforeValidator(_read_uncertain)]
@@ -184,14 +185,14 @@ def grid_axes(
     result: dict[str, Coordinates] = {}
     for axis in axes:
         dim = names[next(iter(axis))]
-        own = result[dim] = {}
+        coordinates = result[dim] = {}
         for key, values in axis.items():
             labels = _labels(values)
             number = labels.dtype.kind in "if"
             unit = _unit(key.split("."), coefficients) if number else "1"
             if unit != "1":  # to be shown in other units
                 labels = labels.astype(float)
-            own[names[key]] = (labels, Variable(unit, key, (dim,)))
+            coordinates[names[key]] = (labels, Variable(unit, key, (dim,)))
     return result
 
 
