@@ -140,7 +140,7 @@ def curves_of(paths, noise=0.05):
     """What a machine with a load cell of this noise (N) records of predicted paths."""
     tests = []
     for number, path in enumerate(paths):
-        travel, force, *_ = st.plot.specimens._curve(path)
+        travel, force, *_ = st.plot.specimens.curve_of(path)
         known = np.isfinite(travel) & np.isfinite(force)
         travel, force = travel[known], force[known]
         after = np.linspace(travel[-1], 1.2 * travel[-1], 200)[1:]

@@ -74,6 +74,17 @@ def of_peaks(found):
     assert found["found"].p_values["cramer_von_mises"] > 0.05
 
 
+def of_friction_test(found):
+    assert [curve.drops.size.size for curve in found["tests"]] == [7, 7, 6, 8, 5, 7, 7, 6]
+    assert found["scan"].x.values[[0, -1]] == pytest.approx([12.495e-3, 112.105e-3], abs=1e-6)
+    assert min(found["agreement"].p_values.values()) > 0.01
+    assert set(found["agreement"].precursors) == {"number", "size", "first_load"}
+    script = runpy.run_path(str(DATA / "make_friction_test.py"))
+    assert script["PROBLEM"] == found["problem"]
+    written = (DATA / "friction_test" / "strength.csv").read_text("utf-8").splitlines()
+    assert script["scan"]() == written
+
+
 def of_decisions(found):
     assert found["fit"].parameters["marginal.mean"] == pytest.approx(0.2, rel=0.1)
     assert 30e3 < found["design"].force < 50e3
@@ -88,6 +99,12 @@ SHOWN = {
         "bootstrap=200": "bootstrap=20",
         "joint, fit, ": "joint, fit.interfaces(4), ",
         r"exact, seed=1\)": "exact, seed=1, target_cv=0.3)",
+    }),
+    "docs/tutorials/friction-test.md": (of_friction_test, {
+        "bootstrap=60": "bootstrap=20",
+        "samples=20": "samples=4",
+        "samples=100": "samples=40",
+        r"moving = .*\n.*\nrun = .*\n.*\n.*": "",  # ruptures: minutes on a small machine
     }),
     "docs/reliability.md": (of_reliability, {}),
     "docs/what-do-twenty-five-tests-tell-me.md": (of_peaks, {}),

@@ -148,7 +148,7 @@ def force_travel(
     results = [result] if isinstance(result, xr.Dataset) else list(result)
     if not results:
         raise InputError("result: is empty; give one path or several")
-    paths = [_curve(path) for path in results]
+    paths = [curve_of(path) for path in results]
     _, _, name, event = paths[0]
     if any(path[2] != name for path in paths):
         raise InputError("result: some paths are forces, others stresses; draw them apart")
@@ -173,7 +173,12 @@ def force_travel(
         for number, test in enumerate(measured or ()):
             label = f"{len(measured or ())} tests" if number == 0 else None
             axes.plot(
-                test.travel * length, test.force * factor, color=INK, linewidth=0.7, label=label
+                test.travel * length,
+                test.force * factor,
+                color=INK,
+                linewidth=0.5,
+                alpha=0.7,
+                label=label,
             )
             label = "measured precursors" if number == 0 else None
             axes.plot(
@@ -255,7 +260,7 @@ def block(run: xr.Dataset, *, problem: Problem | None = None) -> NDArray[Any]:
     return panels
 
 
-def _curve(result: xr.Dataset) -> tuple[Array, Array, str, str]:
+def curve_of(result: xr.Dataset) -> tuple[Array, Array, str, str]:
     """Return travel (m) and force (N) of a machine, its name, and that at events.
 
     The mean stress (Pa) where no thickness is known.
@@ -287,8 +292,8 @@ def precursors(
     problem : Problem, optional
         Needed only if the result does not hold it.
     measured : Curves, optional
-        From `stiction.read_curve`: drawn over the prediction; below, lines mark where the
-        precursors of the tests begin.
+        From `stiction.read_curve`: drawn over the prediction; marks at the upper edge of the
+        extents show where the precursors of the tests begin.
 
     Returns
     -------
@@ -312,7 +317,7 @@ def precursors(
     """
     results = [result] if isinstance(result, xr.Dataset) else list(result)
     interface = problem_of(results[0], problem).interface
-    length, _ = unit_for("m", np.concatenate([_curve(path)[0] for path in results]))
+    length, _ = unit_for("m", np.concatenate([curve_of(path)[0] for path in results]))
     scale, unit = unit_for("m", interface.lengths)
     figure = new_figure(1.35 * COLUMN, 1.35 * COLUMN)
     with paper_style():
@@ -324,8 +329,10 @@ def precursors(
             at = path["event_travel"].values * length
             below.vlines(at, start, end, color=ACCENT, linewidth=2.0 / len(results) ** 0.5)
         for test in measured or ():
-            for at in test.drops.travel * length:
-                below.axvline(at, color=INK, linewidth=0.5, linestyle=":")
+            edge = np.full(test.drops.travel.size, interface.extent * scale)
+            below.plot(
+                test.drops.travel * length, edge, "|", color=INK, markersize=5.0, clip_on=False
+            )
     below.set(xlabel=above.get_xlabel(), ylabel=f"position $x$ ({unit})")
     below.set_ylim(0.0, interface.extent * scale)
     above.set_xlabel("")
