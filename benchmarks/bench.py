@@ -378,15 +378,20 @@ def store():
 
 @case
 def first_use():
-    """The first call on an empty cache of compiled kernels, beside the second."""
+    """The first call on an empty cache of compiled kernels, beside the second and plain numba."""
+    plain = "import numba, numpy; numba.njit(lambda x: x.sum())(numpy.ones(3))"
     begin = "import stiction as st; p = st.paper.problem(nodes=256);"
     field = "t = st.paper.strength(p).sample(p.interface);"
     calls = {
+        "numba and a sum": plain,
         "Problem": begin,
         "local criterion": begin + field + "st.onset(p, t, method=st.LocalCriterion())",
+        "lines of the README": begin + "st.monte_carlo(p, st.paper.strength(p,"
+        " correlation_ratio=0.5), method=st.LocalCriterion(), samples=10_000, progress=False)",
         "equilibrium": begin + field + "st.onset(p, t, method=st.Equilibrium())",
         "rupture": begin + field + "st.onset(p, t, method=st.Rupture(loading_rate=2e7))",
     }
+    sum_alone = None
     for name, code in calls.items():
         with tempfile.TemporaryDirectory() as folder:
             environment = {**os.environ, "STICTION_CACHE_DIR": folder, "OMP_NUM_THREADS": "1"}
@@ -400,7 +405,8 @@ def first_use():
                     after.children_user + after.children_system
                     - before.children_user - before.children_system
                 )  # fmt: skip
-        row(name, spent[0], [("second use", spent[1])])
+        sum_alone = sum_alone or spent[0]
+        row(name, spent[0], [("second use", spent[1]), ("numba and a sum", sum_alone)])
 
 
 def main(names):

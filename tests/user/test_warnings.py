@@ -28,7 +28,9 @@ def joint(samples, **options):
 def test_one_warning_for_all_batches_threads_and_processes(monkeypatch):
     (whole,) = joint(16)
     monkeypatch.setattr("stiction.ensemble.experiment.Experiment.batch", 7)
-    monkeypatch.setattr("stiction.ensemble.batches.SECONDS", 1e-3)  # pieces as small as can be
+    monkeypatch.setattr(
+        "stiction.ensemble.batches.PIECE_SECONDS", 1e-3
+    )  # pieces as small as can be
     assert " of 16 samples (" in whole
     assert joint(16) == [whole] == joint(16, workers=2)
     with ProcessPoolExecutor(1) as pool:

@@ -100,8 +100,8 @@ def totals(typing_context: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
         low, high = halved(*values[:2]), halved(*values[2:])
         sums = builder.fadd(chosen(low, high, [0, 1, 4, 5]), chosen(low, high, [2, 3, 6, 7]))
         place = ir.IntType(32)
-        each = [builder.extract_element(sums, place(lane)) for lane in range(LANES)]
-        return context.make_tuple(builder, signature.return_type, each)
+        sums_of_lanes = [builder.extract_element(sums, place(lane)) for lane in range(LANES)]
+        return context.make_tuple(builder, signature.return_type, sums_of_lanes)
 
     return types.UniTuple(types.float64, 4)(a, b, c, d), generate
 

@@ -32,11 +32,11 @@ from stiction.random.synthesis import SAMPLES_PER_BLOCK, block_of
 POINT: str = "_point"
 NUMBER: str = "_sample"
 """Names of the columns that hold the numbers of the point and of the sample."""
-SECONDS = 0.5
+PIECE_SECONDS = 0.5
 """Duration of a piece of work."""
-MOST_BYTES = 16 * 2**20
+MAX_PIECE_BYTES = 16 * 2**20
 """Largest size of the values of a piece of work."""
-TICK = 1.0
+WORKER_COUNT_SECONDS = 1.0
 """Seconds between counts of the workers; on Windows nothing interrupts a longer wait."""
 
 
@@ -102,9 +102,9 @@ def in_threads(function: Callable[[Any], Any], jobs: Sequence[Any], workers: int
     """Return results for all jobs; warnings come once, at the caller's line."""
     with merge_warnings() as caught, ThreadPoolExecutor(workers) as pool:
         contexts = [copy_context() for _ in jobs]
-        found = list(pool.map(Context.run, contexts, repeat(function), jobs))
+        results = list(pool.map(Context.run, contexts, repeat(function), jobs))
         caught[:] = map(Warned.unnumbered, caught)
-    return found
+    return results
 
 
 @cache
@@ -134,7 +134,7 @@ def solve_span(experiment: Experiment, span: Span) -> Table:
             text = str(error) if known else f"{type(error).__name__}: {error}"
             failures.append(Failure(span.point, first, experiment.seed, text, known))
             continue
-        warned += (one.after(first) for one in caught)
+        warned += (warning.after(first) for warning in caught)
     rows = np.concatenate(parts or [_rows(span.point, 0, {})])
     seconds = time.perf_counter() - begin
     return Table(rows, tuple(failures), seconds, versions(), tuple(merged(warned)))
@@ -145,10 +145,14 @@ def piece_size(
 ) -> int:
     """Return how many samples go into the next piece of work, at a pace in s a sample."""
     block = block_of(len(experiment.problem.interface.shape))
-    size = int(SECONDS / max(pace, 1e-9)) if pace else min(experiment.batch, SAMPLES_PER_BLOCK)
+    size = (
+        int(PIECE_SECONDS / max(pace, 1e-9))
+        if pace
+        else min(experiment.batch, SAMPLES_PER_BLOCK)
+    )
     # A fair share of what is left, but at least a block, which is drawn as a whole.
     size = min(size, max(-(-left // (2 * workers)), block))
-    size = max(1, min(size, int(MOST_BYTES / experiment.sample_bytes), span.samples))
+    size = max(1, min(size, int(MAX_PIECE_BYTES / experiment.sample_bytes), span.samples))
     end = span.first + size
     if size > block and size < span.samples:  # draws come in blocks: do not cut one in two
         end -= end % block
@@ -163,7 +167,7 @@ def _workers_of(executor: Executor, workers: int) -> int:
     return int(getattr(executor, "_max_workers", 0) or workers)
 
 
-class Here(Executor):
+class SerialExecutor(Executor):
     """Runs what is submitted at once, in the thread that submits it."""
 
     def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
@@ -185,7 +189,14 @@ def solve_spans(
 
     At most two pieces of work a worker are under way, so that memory stays bounded. Closing
     the generator cancels what has not begun. A worker that is lost, or has other versions,
-    is a `WorkerError`. Only experiments can have spans of more than one item.
+    is a `WorkerError`. Only experiments can have spans of more than one item. Steps:
+
+    1. While a worker is free, cut a piece off the first waiting span, about half a second of work
+       at the pace of the latest piece (`piece_size`).
+    2. Submit it. An executor that runs it at once returns a future that is done: hand its table
+       over before the next piece begins.
+    3. Wait for the first futures, at most a second, as workers come and go.
+    4. Yield each table, and take its pace.
     """
     waiting = deque(spans)
     left = sum(span.samples for span in spans)
@@ -197,6 +208,7 @@ def solve_spans(
             executor = stack.enter_context(ThreadPoolExecutor(workers))
         try:
             while waiting or running:
+                # 1.
                 slots = _workers_of(executor, workers)
                 while waiting and len(running) < 2 * slots:
                     point, first, samples = whole = waiting.popleft()
@@ -206,12 +218,17 @@ def solve_spans(
                     if size < samples:
                         waiting.appendleft(Span(point, first + size, samples - size))
                     left -= size
+                    # 2.
                     span = Span(point, first, size)
                     future = executor.submit(solve, points[point], span)
                     running[future] = span
                     if future.done():
                         break
-                done, _ = wait(running, timeout=TICK, return_when=FIRST_COMPLETED)
+                # 3.
+                done, _ = wait(
+                    running, timeout=WORKER_COUNT_SECONDS, return_when=FIRST_COMPLETED
+                )
+                # 4.
                 for future in done:
                     span = running.pop(future)
                     table = _result(future, span)
@@ -243,8 +260,8 @@ def _result(future: Future[Table], span: Span) -> Table:
 
 def spans_of(missing: NDArray[np.bool_], first: int) -> list[Span]:
     """Return the stretches of samples that are missing, (points, samples)."""
-    found = []
+    spans = []
     for point, row in enumerate(missing):
         edges = np.flatnonzero(np.diff(row, prepend=False, append=False)).reshape(-1, 2)
-        found += [Span(point, first + start, stop - start) for start, stop in edges.tolist()]
-    return found
+        spans += [Span(point, first + start, stop - start) for start, stop in edges.tolist()]
+    return spans

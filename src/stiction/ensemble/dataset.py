@@ -27,16 +27,16 @@ GridAxes: TypeAlias = Mapping[str, Coordinates]
 
 def distinct(points: Sequence[Experiment], *parts: str) -> list[Experiment]:
     """Return one of the experiments for each combination of these parts."""
-    found: dict[Any, Experiment] = {}
-    for one in points:
-        found.setdefault(tuple(id(getattr(one, part)) for part in parts), one)
-    return list(found.values())
+    first: dict[Any, Experiment] = {}
+    for point in points:
+        first.setdefault(tuple(id(getattr(point, part)) for part in parts), point)
+    return list(first.values())
 
 
 def variables_in(points: Sequence[Experiment]) -> dict[str, Variable]:
     """Return all variables of any point, in the order of the methods."""
     some = distinct(points, "problem", "random", "method")
-    return {name: variable for one in some for name, variable in one.variables.items()}
+    return {name: variable for point in some for name, variable in point.variables.items()}
 
 
 def over_axes(
@@ -46,8 +46,15 @@ def over_axes(
     dims, shape = tuple(axes), tuple(len(axes[dim][dim][0]) for dim in axes)
     return (
         {name: array.reshape(shape + array.shape[1:]) for name, array in values.items()},
-        {name: replace(one, dims=dims + one.dims) for name, one in variables.items()},
-        {name: one for own in axes.values() for name, one in own.items()},
+        {
+            name: replace(variable, dims=dims + variable.dims)
+            for name, variable in variables.items()
+        },
+        {
+            name: variable
+            for coordinates in axes.values()
+            for name, variable in coordinates.items()
+        },
     )
 
 
@@ -70,7 +77,7 @@ class Gathered:
         only: Sequence[str] | None = None,
     ) -> None:
         if only is None:
-            largest = max(one.sample_bytes for one in distinct(points, "problem", "method"))
+            largest = max(point.sample_bytes for point in distinct(points, "problem", "method"))
             check_memory("samples", largest * len(points) * ensemble.samples)
         self.points, self.first, self._only = points, ensemble.first, only
         self.done = np.zeros((len(points), ensemble.samples), dtype=np.bool_)

@@ -58,19 +58,19 @@ class Experiment:
 
     def __post_init__(self) -> None:
         random = as_random(self.random, self.seed)
-        found: dict[str, None] = {}  # equally likely interfaces have the same mistakes
-        for one in random.members:
-            found |= dict.fromkeys(self.problem.given_twice(one.names, "random"))
+        mistakes: dict[str, None] = {}  # equally likely interfaces share them
+        for member in random.members:
+            mistakes |= dict.fromkeys(self.problem.given_twice(member.names, "random"))
             try:
-                check_pressure(self.problem, one)
+                check_pressure(self.problem, member)
             except InputError as error:
-                found |= dict.fromkeys(error.problems)
-            for name, field in one.properties.items():
+                mistakes |= dict.fromkeys(error.problems)
+            for name, field in member.properties.items():
                 try:
                     field.modes(self.problem.interface)
                 except InputError as error:
-                    found |= dict.fromkeys(f"{name}: {text}" for text in error.problems)
-        problems = list(found)
+                    mistakes |= dict.fromkeys(f"{name}: {text}" for text in error.problems)
+        problems = list(mistakes)
         problems += refusals(self.problem, self.method)
         unknown = [name for name in self.keep if name not in random.names]
         problems += [unknown_name("keep", name, random.names) for name in unknown]
@@ -84,9 +84,9 @@ class Experiment:
 
     def with_seed(self, seed: int) -> Experiment:
         """Return the same experiment with another seed; nothing is checked again."""
-        found = copy.copy(self)
-        object.__setattr__(found, "seed", seed)
-        return found
+        copied = copy.copy(self)
+        object.__setattr__(copied, "seed", seed)
+        return copied
 
     @property
     def given(self) -> Any:
@@ -110,7 +110,7 @@ class Experiment:
     def sample_bytes(self) -> float:
         """Size of `results` for one sample, in bytes."""
         nodes = self.problem.interface.size
-        return 8.0 * sum(nodes if one.wide else 1 for one in self.variables.values())
+        return 8.0 * sum(nodes if variable.wide else 1 for variable in self.variables.values())
 
     @property
     def seconds(self) -> float:
@@ -121,22 +121,26 @@ class Experiment:
     def pressure(self) -> float:
         """Mean normal pressure, Pa; NaN if there is none."""
         if "normal_pressure" in self.random.names:
-            each = [one.properties["normal_pressure"].mean for one in self.random.members]
-            return float(np.mean(each))
+            pressures = [
+                member.properties["normal_pressure"].mean for member in self.random.members
+            ]
+            return float(np.mean(pressures))
         given = self.problem.given_pressure
         return float("nan") if given is None else float(np.mean(given))
 
     @property
     def mean_strength(self) -> float:
         """Mean strength, Pa."""
-        each = [mean_in_stress(self.problem, one, "strength") for one in self.random.members]
-        return float(np.mean(each))
+        strengths = [
+            mean_in_stress(self.problem, member, "strength") for member in self.random.members
+        ]
+        return float(np.mean(strengths))
 
     def check_fields(self) -> None:
         """Warn of fields that do not suit the grid, the interface, or their units."""
-        for one in self.random.members:
-            one.warn_if_inaccurate(self.problem.interface)
-            for name, field in one.properties.items():
+        for member in self.random.members:
+            member.warn_if_inaccurate(self.problem.interface)
+            for name, field in member.properties.items():
                 if not field.modes(self.problem.interface).ranks.size:
                     warn_user(
                         f"{name}: its correlation length is so long for this interface that each"
@@ -144,8 +148,8 @@ class Experiment:
                         " as between= of st.RandomInterface",
                         UnitWarning,
                     )
-            check_residual(self.problem, one)
-            means = {name: mean_in_stress(self.problem, one, name) for name in one.names}
+            check_residual(self.problem, member)
+            means = {name: mean_in_stress(self.problem, member, name) for name in member.names}
             friction = self.problem.friction
             residual = float(friction.residual(np.array(means["strength"])).mean())
             scales = {name: means[name] for name in SCALES if name in means}
@@ -159,8 +163,8 @@ class Experiment:
 
     def profiles(self, draws: Array) -> dict[str, Array]:
         """Return the profiles of draws by name, (samples, *shape) each, in SI."""
-        found = self.random.from_draws(self.problem.interface, draws)
-        return profiles_in_stress(self.problem, self.random, found)
+        profiles = self.random.from_draws(self.problem.interface, draws)
+        return profiles_in_stress(self.problem, self.random, profiles)
 
     def onset(self, profiles: Mapping[str, Array]) -> Values:
         """Solve profiles by name, (samples, *shape) each."""

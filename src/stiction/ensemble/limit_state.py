@@ -24,14 +24,15 @@ from stiction.random.equally_likely import AnyRandom
 from stiction.random.fields import RandomInterface
 from stiction.random.stresses import support_in_stress
 
-Event = Literal["critical_stress", "first_instability"]
+StressName = Literal["critical_stress", "first_instability"]
+"""Which of the stresses of a method counts as failure."""
 
-RANKED, RANKINGS, LOW = 32, 4_000, 3.0
+MAX_RANKED, RANKINGS, LOW_QUANTILE_SIGMAS = 32, 4_000, 3.0
 """Samples of each of equally likely interfaces, at most, and of all, about, that order them by the
 mean less so many standard deviations."""
-FACTORS = 8
+MAX_FACTORS = 8
 """Random factors of the strength at a node, at most, that share what is negligible."""
-SHORTEST = 2e-3
+MIN_THREAD_SECONDS = 2e-3
 """Seconds of work that justify a thread."""
 
 
@@ -44,7 +45,7 @@ class LimitState:
     """
 
     experiment: Experiment
-    event: Event = "critical_stress"  # which of the method's stresses
+    event: StressName = "critical_stress"  # which of the method's stresses
     per_pressure: bool = False
     workers: int = 1  # threads; the numbers do not depend on this
     meter: Meter = SILENT  # counts the samples
@@ -73,8 +74,8 @@ class LimitState:
 
     def member(self, draws: Array) -> NDArray[np.int64]:
         """Return which of equally likely interfaces each sample is of, (samples,)."""
-        found: NDArray[np.int64] = self.experiment.random.member(draws)
-        return found
+        members: NDArray[np.int64] = self.experiment.random.member(draws)
+        return members
 
     def profiles(self, draws: Array) -> dict[str, Array]:
         """Return sampled profiles by name, each of shape (samples, *shape)."""
@@ -93,25 +94,25 @@ class LimitState:
         if not np.isfinite(given).all():
             raise InputError("draws: must be finite")
         rows = np.atleast_2d(given)
-        size = max(int(SHORTEST / experiment.seconds), -(-len(rows) // self.workers))
+        size = max(int(MIN_THREAD_SECONDS / experiment.seconds), -(-len(rows) // self.workers))
         size = max(1, min(size, experiment.batch))
         parts = np.split(rows, range(size, len(rows), size))
         if len(parts) == 1:
-            found = self._stress(rows)
+            stress = self._stress(rows)
         else:
-            found = np.concatenate(in_threads(self._stress, parts, self.workers))
-        found = np.where(np.isnan(found), np.inf, found)
-        found = np.maximum(found, self.bounds[0])  # rounding may be slightly below
-        return found if given.ndim == 2 else found[0]
+            stress = np.concatenate(in_threads(self._stress, parts, self.workers))
+        stress = np.where(np.isnan(stress), np.inf, stress)
+        stress = np.maximum(stress, self.bounds[0])  # rounding may be slightly below
+        return stress if given.ndim == 2 else stress[0]
 
     def _stress(self, draws: Array) -> Array:
         profiles = self.profiles(draws)
-        found: Array = self.experiment.onset(profiles)[self.event]
+        stress: Array = self.experiment.onset(profiles)[self.event]
         if self._random_pressure:
             pressure = profiles["normal_pressure"].reshape(draws.shape[0], -1).mean(axis=1)
-            found = found * self.experiment.pressure / pressure
+            stress = stress * self.experiment.pressure / pressure
         self.meter.advance(draws.shape[0])
-        return found
+        return stress
 
     @property
     def several(self) -> bool:
@@ -141,13 +142,13 @@ class LimitState:
     def bounds_of_members(self, negligible: float = 0.0) -> list[tuple[float, float]]:
         """Return the same for each of equally likely interfaces."""
         members = self.experiment.random.members
-        return [self._bounds_of(one, negligible) for one in members]
+        return [self._bounds_of(member, negligible) for member in members]
 
     def _bounds_of(self, random: RandomInterface, negligible: float) -> tuple[float, float]:
         problem = self.experiment.problem
         if any(field.conditions is not None for field in random.properties.values()):
             negligible = 0.0  # what was measured may be rarer
-        chance = negligible / (FACTORS * problem.interface.size)
+        chance = negligible / (MAX_FACTORS * problem.interface.size)
         low, high = support_in_stress(problem, random, "strength", chance)
         profile = np.broadcast_to(problem.load_profile, problem.interface.shape)
         least: Any = problem.load.initial_stress
@@ -180,13 +181,13 @@ def weakest_first(state: LimitState) -> LimitState:
     first_stage = optional_member(experiment.method, "first_stage")
     apt = first_stage and not no_single_length(experiment.problem, random)
     by = state.by(METHODS[first_stage]()) if apt else state
-    ranked = int(np.clip(RANKINGS // count, 4, RANKED))
+    ranked = int(np.clip(RANKINGS // count, 4, MAX_RANKED))
     draws = np.repeat(state.draws(0, 0, ranked), count, axis=0)
     draws[:, 0] = np.tile(ndtri((np.arange(count) + 0.5) / count), ranked)
     onset = by(draws).reshape(ranked, count)
     onset = np.minimum(onset, onset.max(where=np.isfinite(onset), initial=0.0))
     lowest = np.array(state.bounds_of_members())[:, 0]
-    weak = np.maximum(onset.mean(axis=0) - LOW * onset.std(axis=0), lowest)
+    weak = np.maximum(onset.mean(axis=0) - LOW_QUANTILE_SIGMAS * onset.std(axis=0), lowest)
     order = replace(random, order=tuple(np.argsort(weak, kind="stable").tolist()))
     return replace(state, experiment=replace(experiment, random=order))
 
@@ -229,7 +230,7 @@ def limit_state(
     random: AnyRandom,
     method: MethodObject,
     *,
-    event: Event = "critical_stress",
+    event: StressName = "critical_stress",
     workers: Count | None = None,
 ) -> LimitState:
     """Return the stress at onset as a function of standard normal draws.

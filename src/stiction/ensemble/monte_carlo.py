@@ -40,11 +40,11 @@ from stiction.random.equally_likely import AnyRandom
 if TYPE_CHECKING:
     import xarray as xr
 
-SHOWN = 3
+MAX_SHOWN_FAILURES = 3
 """Number of failures that are reported one by one."""
-LONG = 3600.0
+LONG_RUN_SECONDS = 3600.0
 """Estimated seconds from which a run says so before it begins."""
-HOPELESS = 16
+MAX_FAILED_FROM_START = 16
 """Failed items, with none solved, after which the whole run is given up."""
 
 
@@ -63,9 +63,9 @@ def check_run(points: Sequence[Experiment]) -> None:
 
 def _warn_if_long(points: Sequence[Experiment], missing: NDArray[Any], workers: int) -> None:
     """Say how long an ensemble takes that takes hours, before it begins."""
-    each = zip(points, missing.sum(axis=1), strict=True)
-    seconds = sum(one.seconds * count for one, count in each) / workers
-    if seconds > LONG:
+    counts = missing.sum(axis=1)
+    seconds = sum(p.seconds * n for p, n in zip(points, counts, strict=True)) / workers
+    if seconds > LONG_RUN_SECONDS:
         warn_user(
             f"samples: {int(missing.sum()):,} samples take about {duration(seconds)} on {workers}"
             f" core{'s' * (workers > 1)}",
@@ -103,7 +103,7 @@ def complete(
             warned += table.warned if len(points) == 1 else map(Warned.unnumbered, table.warned)
             meter.advance(span.samples)
             lost += len(table.failures)
-            if lost >= min(HOPELESS, total) and not items.done.any():
+            if lost >= min(MAX_FAILED_FROM_START, total) and not items.done.any():
                 failure = table.failures[0]
                 texts = [f"{failure.name}: {text}" for text in failure.error.splitlines()]
                 raise InputError(texts) if failure.input else RunError("\n".join(texts))
@@ -135,7 +135,7 @@ def gather(
         check_run(points)
         if executor is None:
             _warn_if_long(points, missing, cores)
-    label = " and ".join({one.method.label: None for one in distinct(points, "method")})
+    label = " and ".join({point.method.label: None for point in distinct(points, "method")})
     complete(
         rows,
         points,
@@ -146,18 +146,24 @@ def gather(
         executor=executor,
         workers=cores,
     )
-    found = store.pilot if store else None
-    if found is None and pilot:
-        found = compare(points, ensemble.first, ensemble.samples, progress is True, workers)
+    comparison = store.pilot if store else None
+    if comparison is None and pilot:
+        comparison = compare(
+            points, ensemble.first, ensemble.samples, progress is True, workers
+        )
         where = " at the worst point of the sweep" if len(points) > 1 else ""
-        if text := pilot_doubt(points[0], found, where):
+        if text := pilot_doubt(points[0], comparison, where):
             warn_accuracy(text)
         if store:
-            store.note_pilot(found)
-    result = rows.dataset({**attributes, **(found or {})}, axes)
+            store.note_pilot(comparison)
+    result = rows.dataset({**attributes, **(comparison or {})}, axes)
     if failed := rows.failed:
-        some = "; ".join(str(failure) for failure in failed[:SHOWN])
-        more = f"; and {len(failed) - SHOWN} more" if len(failed) > SHOWN else ""
+        some = "; ".join(str(failure) for failure in failed[:MAX_SHOWN_FAILURES])
+        more = (
+            f"; and {len(failed) - MAX_SHOWN_FAILURES} more"
+            if len(failed) > MAX_SHOWN_FAILURES
+            else ""
+        )
         warn_accuracy(
             f"{len(failed)} of {rows.done.size} samples could not be solved and are NaN (the"
             f" attribute 'failed_samples' lists them): {some}{more}"

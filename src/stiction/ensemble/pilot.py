@@ -13,20 +13,20 @@ from stiction.ensemble.experiment import Experiment
 from stiction.methods.onset import doubt, exact_counterpart, relative_differences
 from stiction.methods.protocol import optional_member
 
-ON_A_LINE, ON_A_PLANE = 32, 8
+SAMPLES_ON_LINE, SAMPLES_ON_PLANE = 32, 8
 """Numbers of first samples of a pilot, and of the weakest ones."""
-LOOKED_AT, SECONDS = 1000, 1.0
+MAX_RANKED_SAMPLES, RANKING_SECONDS = 1000, 1.0
 """First samples among which the weakest are, and seconds on one core for these."""
-BATCH = 64
+BATCH_SAMPLES = 64
 """Samples that the inexpensive method solves at once."""
-MOST_POINTS = 8
+MAX_PILOT_POINTS = 8
 """Number of points of a sweep that have a pilot."""
 
 
 def compare(
     points: Sequence[Experiment],
     first: int = 0,
-    most: int = ON_A_LINE,
+    most: int = SAMPLES_ON_LINE,
     show: bool = False,
     workers: int | None = None,
 ) -> dict[str, Any]:
@@ -36,7 +36,7 @@ def compare(
     points with the largest, for the first samples and for the weakest among more of them;
     nothing if there is no exact counterpart, or no doubt at any point.
     """
-    chosen = np.unique(np.linspace(0, len(points) - 1, MOST_POINTS).round().astype(int))
+    chosen = np.unique(np.linspace(0, len(points) - 1, MAX_PILOT_POINTS).round().astype(int))
     parts: dict[str, list[Array]] = {}
     with Meter("comparing with the exact onset", len(chosen), show, unit="points") as meter:
         for number in chosen.tolist():
@@ -46,12 +46,12 @@ def compare(
                 if relative.size > 1:
                     parts.setdefault(name, []).append(relative)
             meter.advance()
-    found: dict[str, Any] = {}
-    for name, each in parts.items():
-        found[f"{name}_samples"] = each[0].size
-        found[f"{name}_bias"] = float(max((one.mean() for one in each), key=abs))
-        found[f"{name}_scatter"] = float(max(one.std(ddof=1) for one in each))
-    return found
+    attributes: dict[str, Any] = {}
+    for name, differences in parts.items():
+        attributes[f"{name}_samples"] = differences[0].size
+        attributes[f"{name}_bias"] = float(max((part.mean() for part in differences), key=abs))
+        attributes[f"{name}_scatter"] = float(max(part.std(ddof=1) for part in differences))
+    return attributes
 
 
 def _differences(
@@ -65,11 +65,13 @@ def _differences(
     exact = exact_counterpart(problem, method)
     if exact is None:
         return {}
-    size = ON_A_PLANE if problem.interface.is_plane else ON_A_LINE
+    size = SAMPLES_ON_PLANE if problem.interface.is_plane else SAMPLES_ON_LINE
     with collect_warnings():  # the ensemble itself warns
-        looked_at = max(size, min(LOOKED_AT, int(SECONDS / experiment.seconds)))
+        looked_at = max(
+            size, min(MAX_RANKED_SAMPLES, int(RANKING_SECONDS / experiment.seconds))
+        )
         draws = experiment.draws(first, min(looked_at, most))
-        stress = _onsets(experiment, draws, BATCH, workers)
+        stress = _onsets(experiment, draws, BATCH_SAMPLES, workers)
         chosen = {"pilot": np.arange(min(size, most))}
         if most > size:
             chosen["pilot_weakest"] = np.argsort(stress)[:size]
@@ -95,25 +97,25 @@ def _onsets(experiment: Experiment, draws: Array, batch: int, workers: int) -> A
 
     def solve(rows: Array) -> Array:
         try:
-            found: Array = experiment.onset(experiment.profiles(rows))["critical_stress"]
+            stress: Array = experiment.onset(experiment.profiles(rows))["critical_stress"]
         except (InputError, RuntimeError, ArithmeticError):
             alone = len(rows) == 1
             return np.full(1, np.nan) if alone else _onsets(experiment, rows, 1, 1)
-        return found
+        return stress
 
     parts = np.split(draws, range(batch, len(draws), batch))
     return np.concatenate(in_threads(solve, parts, workers))
 
 
 def pilot_doubt(
-    experiment: Experiment, found: Mapping[str, Any], where: str = ""
+    experiment: Experiment, comparison: Mapping[str, Any], where: str = ""
 ) -> str | None:
     """Return the text of a warning if a difference is beyond 1 %."""
     differences = {
-        f"the {found[f'{name}_samples']} {text}{where}": (
-            found[f"{name}_bias"], found[f"{name}_scatter"]
+        f"the {comparison[f'{name}_samples']} {text}{where}": (
+            comparison[f"{name}_bias"], comparison[f"{name}_scatter"]
         )
         for name, text in (("pilot", "first samples"), ("pilot_weakest", "weakest of more"))
-        if f"{name}_bias" in found
+        if f"{name}_bias" in comparison
     }  # fmt: skip
     return doubt(experiment.method, differences)

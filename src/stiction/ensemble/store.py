@@ -39,7 +39,7 @@ from stiction.base.files import (
 )
 from stiction.base.model import describe
 from stiction.ensemble.batches import NUMBER, POINT, Failure, Table, versions
-from stiction.ensemble.pilot import LOOKED_AT
+from stiction.ensemble.pilot import MAX_RANKED_SAMPLES
 
 FORMAT = 5
 STUDY, PILOT, CHUNKS = "study.json", "pilot.json", "chunks"
@@ -103,7 +103,9 @@ class Store:
             if list(store._tables()) or STUDY in names:
                 store.warn(f"{STUDY} is damaged or missing; it is rebuilt from the given study")
         if before != study:
-            if before and before["ensemble"]["samples"] < LOOKED_AT:  # a pilot of fewer samples
+            if (
+                before and before["ensemble"]["samples"] < MAX_RANKED_SAMPLES
+            ):  # a pilot of fewer samples
                 (path / PILOT).unlink(missing_ok=True)
             _write_json(path / STUDY, study)
         return store

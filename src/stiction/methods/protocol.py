@@ -147,7 +147,7 @@ def prepared(problem: Problem, method: Method) -> Solver:
         raise InputError(f"method: the variables of {method.label} lack {', '.join(lacking)}")
 
     def solve(sample: Sample) -> Values:
-        values = {name: np.asarray(found) for name, found in solver(sample).items()}
+        values = {name: np.asarray(value) for name, value in solver(sample).items()}
         _check_values(method.label, values, variables, sample)
         pressure = sample.normal_pressure.mean(axis=sample.axes)
         if not np.isnan(pressure).all():
@@ -167,12 +167,12 @@ def _check_values(
         )
     sizes = dict(zip(("x", "y"), sample.shape, strict=False))
     sizes |= {"sample": sample.samples, DIRECTION: 2}
-    for one, variable in variables.items():
+    for key, variable in variables.items():
         shape = tuple(sizes.get(dim) for dim in variable.dims)
-        if values[one].shape != shape and None not in shape:
+        if values[key].shape != shape and None not in shape:
             raise InputError(
-                f"method: the solver of {name} must return {one!r} of shape {shape} over"
-                f" ({', '.join(variable.dims)}), got {values[one].shape}"
+                f"method: the solver of {name} must return {key!r} of shape {shape} over"
+                f" ({', '.join(variable.dims)}), got {values[key].shape}"
             )
 
 

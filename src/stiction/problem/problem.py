@@ -41,22 +41,22 @@ from stiction.problem.sample import (
 from stiction.problem.solid import Solid
 from stiction.problem.specimen import Blocks
 
-FEWEST_NODES = 4
+MIN_NODES_IN_NUCLEATION = 4
 """Nodes in a nucleation length."""
 HARDLY_RESOLVED = 0.04
 """Nodes in a nucleation length below which a unit is doubted: a hundred times more are needed."""
-HUGE = 1e8
+MAX_STRENGTH_RATIO = 1e8
 """Strength of a node over the median beyond which others are lost in round-off."""
 RIGIDITY = (1e-8, 1.0), (0.0, math.inf)
 """Strength over shear modulus that is usual, and what is possible; steel (8e10 Pa) under 10 kPa at
 a coefficient of 0.1 has 1e-8."""
 SLIP = (1e-8, math.inf), (1e-10, math.inf)
 """Slip over which strength falls, m; an atom measures 1e-10 m."""
-SHORT = 4.0
+MIN_LENGTHS_IN_LINE = 4.0
 """Nucleation lengths: on shorter lines free ends change the mean onset by more than about 1 %."""
-SOFTEST = 1e-4
+MIN_MACHINE_RATIO = 1e-4
 """Stiffness of a machine over that of its blocks below which it is probably in another unit."""
-FLATTEST, HIGHEST = 0.025, 10.0
+MIN_HEIGHT_RATIO, MAX_HEIGHT_RATIO = 0.025, 10.0
 """Height of blocks over their length between which their response takes seconds and below 1 GB."""
 AT_END = {"II": 0.445 / 1.158, "III": 0.5}
 """Nucleation length at a free end as a share of that in the middle."""
@@ -171,10 +171,11 @@ class Problem:
                 f" {interface.spacing:.3g} m; take more nodes"
             )
         high = specimen.height / interface.extent
-        if self.mode == "II" and not FLATTEST <= high <= HIGHEST:
+        if self.mode == "II" and not MIN_HEIGHT_RATIO <= high <= MAX_HEIGHT_RATIO:
             problems.append(
-                f"specimen.height: must be {FLATTEST:g} to {HIGHEST:g} times the length in mode II,"
-                f" is {high:.3g} times; check the units, or take a shorter piece of flat blocks"
+                f"specimen.height: must be {MIN_HEIGHT_RATIO:g} to {MAX_HEIGHT_RATIO:g} times the"
+                f" length in mode II, is {high:.3g} times; check the units, or take a"
+                " shorter piece of flat blocks"
             )
         return problems
 
@@ -189,13 +190,15 @@ class Problem:
             )
         assert self.specimen is not None  # else there is no drive
         machine, depth = self.specimen.drive.stiffness, self.specimen.thickness or 1.0
-        own = 0.5 * depth * self.blocks.drive_stiffness  # of both blocks, in series
+        blocks = 0.5 * depth * self.blocks.drive_stiffness  # of both, in series
         if machine > 0.0:
             text = (
-                f"specimen.drive.stiffness: {machine:.3g} N/m is {machine / own:.1g} of that of the"
-                f" blocks, {own:.3g} N/m: as good as dead load, 0; check its unit (N/m)"
+                f"specimen.drive.stiffness: {machine:.3g} N/m is {machine / blocks:.1g} of that of"
+                f" the blocks, {blocks:.3g} N/m: as good as dead load, 0; check its unit (N/m)"
             )
-            doubt_units([Doubt(text, machine / own, (SOFTEST, math.inf), (0.0, math.inf))])
+            doubt_units(
+                [Doubt(text, machine / blocks, (MIN_MACHINE_RATIO, math.inf), (0.0, math.inf))]
+            )
 
     def _place_profiles(self) -> list[str]:
         """Put profiles with coordinates of their own on the nodes; return what does not fit."""
@@ -231,7 +234,11 @@ class Problem:
                 " modulus and weakening rate",
                 UnitWarning,
             )
-        elif length < SHORT * patch and not self.interface.is_plane and self.specimen is None:
+        elif (
+            length < MIN_LENGTHS_IN_LINE * patch
+            and not self.interface.is_plane
+            and self.specimen is None
+        ):
             warn_accuracy(
                 f"the interface is {length / patch:.2g} nucleation lengths long and continues"
                 " periodically: under a uniform antiplane load, free ends would lower its onset by"
@@ -290,8 +297,8 @@ class Problem:
         if doubt_units(doubts):
             return
         given = friction.scale if friction.weakening_rate is None else None
-        own = {} if given is None else dict([given])
-        for scale, value in (scales or own).items():
+        fixed = {} if given is None else dict([given])
+        for scale, value in (scales or fixed).items():
             fall = np.array(strength - residual)
             steep = max(float(friction.rate(fall, scale, np.median(value))), 1e-300)
             self._warn_if_short(steep)
@@ -412,7 +419,7 @@ class Problem:
 
     def _check_resolution(self, highest_rate: float) -> None:
         resolution = self.nodes_in_nucleation_length(highest_rate)
-        if min(resolution) >= FEWEST_NODES:
+        if min(resolution) >= MIN_NODES_IN_NUCLEATION:
             return
         steepest = highest_rate * self.friction.steepening
         length = self.nucleation_lengths(steepest)[int(np.argmin(resolution))]
@@ -425,9 +432,9 @@ class Problem:
             )
         raise InputError(
             f"interface.nodes: the nucleation length {length:.3g} m spans"
-            f" {min(*resolution, FEWEST_NODES - 0.01):.3g} nodes; at least"
-            f" {FEWEST_NODES} are needed, that is"
-            f" interface.nodes >= {self._finer(resolution, FEWEST_NODES)}, got"
+            f" {min(*resolution, MIN_NODES_IN_NUCLEATION - 0.01):.3g} nodes; at least"
+            f" {MIN_NODES_IN_NUCLEATION} are needed, that is"
+            f" interface.nodes >= {self._finer(resolution, MIN_NODES_IN_NUCLEATION)}, got"
             f" {' x '.join(map(str, self.interface.shape))}"
         )
 
@@ -657,16 +664,19 @@ class Problem:
                 f" {self.interface.describe_node(node)}: {least:g} against {most:g} Pa"
                 f"{f', and in {others} more samples' * (others > 0)}; st.Rupture() accepts this"
             )
-        if np.max(strength, where=np.isfinite(strength), initial=0.0) > HUGE * strength.min():
+        if (
+            np.max(strength, where=np.isfinite(strength), initial=0.0)
+            > MAX_STRENGTH_RATIO * strength.min()
+        ):
             middle = np.median(strength, axis=along, keepdims=True)
-            huge = np.isfinite(strength) & (strength > HUGE * middle)
+            huge = np.isfinite(strength) & (strength > MAX_STRENGTH_RATIO * middle)
             if huge.any():
                 number, node = np.argwhere(huge.reshape(len(strength), -1))[0].tolist()
                 problems.append(
                     f"strength: {strength[number].flat[node]:g} Pa at"
                     f" {self.interface.describe_node(node)} of sample {number} is more than"
-                    f" {HUGE:g} times the median, {middle[number].item():g} Pa, which is lost"
-                    " beside it in round-off; less is as good where nothing breaks"
+                    f" {MAX_STRENGTH_RATIO:g} times the median, {middle[number].item():g} Pa,"
+                    " which is lost beside it in round-off; less is as good where nothing breaks"
                 )
         nowhere = ~((strength > residual) & np.isfinite(strength)).any(axis=along)
         if nowhere.any():
@@ -685,8 +695,8 @@ class Problem:
         barriers = np.isinf(strength)
         if barriers.any() and scale != "weakening_rate":  # any rate will do: nothing weakens
             along = self.interface.axes
-            own = np.where(barriers, 0.0, rates).max(axis=along, keepdims=True)
-            rates = np.where(barriers, own, rates)
+            fastest = np.where(barriers, 0.0, rates).max(axis=along, keepdims=True)
+            rates = np.where(barriers, fastest, rates)
         return rates
 
 

@@ -85,8 +85,10 @@ class Sample(NamedTuple):
 
     def part(self, some: slice) -> Sample:
         """Return some samples of the batch."""
-        own = {name: rows[some] for name, rows in self._asdict().items() if name in PROFILES}
-        return self._replace(**own)
+        rows_of_part = {
+            name: rows[some] for name, rows in self._asdict().items() if name in PROFILES
+        }
+        return self._replace(**rows_of_part)
 
     @property
     def uniform_weakening(self) -> bool:

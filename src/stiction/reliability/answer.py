@@ -20,7 +20,7 @@ from stiction.base.progress import Meter
 from stiction.base.units import in_words
 from stiction.ensemble.batches import usable_cores
 from stiction.ensemble.experiment import Experiment
-from stiction.ensemble.limit_state import Event, LimitState
+from stiction.ensemble.limit_state import LimitState, StressName
 from stiction.ensemble.monte_carlo import check_fields
 from stiction.methods.onset import exact_counterpart
 from stiction.methods.protocol import optional_member, seconds_per_sample
@@ -249,7 +249,7 @@ def band_of(members: Array) -> tuple[float, float]:
 
 def prepare(
     experiment: Experiment,
-    event: Event,
+    event: StressName,
     workers: int | None,
     meter: Meter,
     max_evaluations: int | None,

@@ -15,7 +15,7 @@ from stiction.base.progress import Meter, Show
 from stiction.base.units import Doubt, doubt_units, in_words
 from stiction.base.variables import ONSET_VARIABLES, PROFILES, Variable
 from stiction.ensemble.experiment import Experiment
-from stiction.ensemble.limit_state import Event, LimitState, weakest_first
+from stiction.ensemble.limit_state import LimitState, StressName, weakest_first
 from stiction.methods.protocol import MethodObject, label
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset
@@ -101,7 +101,7 @@ def failure_probability(
     target_cv: TargetCv = 0.1,
     seed: Number = 0,
     max_evaluations: Budget | None = None,
-    event: Event = "critical_stress",
+    event: StressName = "critical_stress",
     mixture: Flag = False,
     workers: Count | None = None,
     progress: Progress = True,
@@ -407,7 +407,7 @@ def design_stress(
     target_cv: TargetCv = 0.1,
     seed: Number = 0,
     max_evaluations: Budget | None = None,
-    event: Event = "critical_stress",
+    event: StressName = "critical_stress",
     mixture: Flag = False,
     workers: Count | None = None,
     progress: Progress = True,
@@ -516,7 +516,7 @@ def failure_curve(
     target_cv: TargetCv = CURVE_CV,
     seed: Number = 0,
     max_evaluations: Budget | None = None,
-    event: Event = "critical_stress",
+    event: StressName = "critical_stress",
     mixture: Flag = False,
     workers: Count | None = None,
     progress: Progress = True,

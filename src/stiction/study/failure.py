@@ -27,7 +27,7 @@ from stiction.base.variables import Variable
 from stiction.ensemble.batches import (
     NUMBER,
     POINT,
-    Here,
+    SerialExecutor,
     Span,
     Table,
     usable_cores,
@@ -208,7 +208,7 @@ def complete_curves(
             partial(solve_repetition, rows.smallest),
             Meter("failure curve", int(missing.sum()), progress, unit="repetitions"),
             store=store,
-            executor=executor or Here(),
+            executor=executor or SerialExecutor(),
             workers=cores,
         )
         if store.pilot is None and pilot:

@@ -37,7 +37,7 @@ from stiction.base.model import (
 )
 from stiction.ensemble.dataset import GridAxes, variables_in
 from stiction.ensemble.experiment import Ensemble, Experiment
-from stiction.ensemble.limit_state import Event
+from stiction.ensemble.limit_state import StressName
 from stiction.ensemble.monte_carlo import gather
 from stiction.ensemble.store import Store, read_study
 from stiction.methods.dynamics.save import Save
@@ -370,7 +370,7 @@ class Study(_Parts):
         out: FilePath,
         repetitions: Count = 8,
         smallest: Probability = 1e-9,
-        event: Event = "critical_stress",
+        event: StressName = "critical_stress",
         workers: Count | None = None,
         executor: Executor | None = None,
         progress: Progress = True,

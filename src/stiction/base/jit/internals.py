@@ -44,11 +44,11 @@ class _Locator(_CacheLocator):
     @classmethod
     def from_function(cls, function: Any, file: str) -> _Locator | None:
         try:
-            found = cls(function, file)
-            found.ensure_cache_path()
+            locator = cls(function, file)
+            locator.ensure_cache_path()
         except (OSError, TypeError):  # a folder that is read-only; a function of no module
             return None
-        return found
+        return locator
 
     def get_cache_path(self) -> str:
         return str(self._path)

@@ -7,7 +7,7 @@ import numpy as np
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.state import Reason, RuptureState, value_at
-from stiction.problem.problem import FEWEST_NODES, Problem
+from stiction.problem.problem import MIN_NODES_IN_NUCLEATION, Problem
 from stiction.problem.sample import Sample
 
 # Shares of the stress scale:
@@ -32,7 +32,7 @@ def warn_if_coarse(problem: Problem, rows: Sample) -> None:
 def warn_of_slip(run: Run, state: RuptureState) -> None:
     """Warn of nodes that weaken too steeply for the grid, such as barriers, and of reversal."""
     rates, interface, now = run.setting.nodes.weakening, run.medium.interface, state.now
-    shortest = FEWEST_NODES * interface.spacing
+    shortest = MIN_NODES_IN_NUCLEATION * interface.spacing
     steepest = run.medium.problem.nucleation_lengths(1.0)[-1] / shortest
     steep = np.flatnonzero((state.slip > 0.0) & (rates > steepest))
     if steep.size:
