@@ -1,6 +1,7 @@
 """The statistics of static friction: at which load, and where, does this interface let go?"""
 
 import re
+from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,9 @@ __all__ = ["__version__", *_HOMES]
 
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
-        raise AttributeError(f"module 'stiction' has no attribute {name!r}")
+        near = get_close_matches(name, _HOMES, n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise AttributeError(f"module 'stiction' has no attribute {name!r}{hint}")
     home = _HOMES[name]
     if home == __name__:
         return import_module(f"{home}.{name}")

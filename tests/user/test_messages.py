@@ -11,7 +11,7 @@ import pytest
 import tomli_w
 from checks import python
 from refusals import refuses
-from setups import EXACT, make_problem
+from setups import EXACT, beta_strength, make_problem
 from small_study import small_study
 
 import stiction as st
@@ -98,6 +98,22 @@ def test_an_infinite_strength_names_the_method_that_takes_it():
         "strength: must be finite ... st.Rupture()",
         lambda: st.onset(make_problem(), strength, method=EXACT),
     )
+
+
+def test_what_stands_in_the_place_of_a_random_field_gets_one_line():
+    """An array was refused number by number; a field that goes into the wrong call is led on."""
+    problem, field = make_problem(), beta_strength(4e-3)
+    given = {"method": EXACT, "samples": 2, "progress": False}
+    for wrong in (field.sample(problem.interface)[0], 256 * [1e6], "strength", [field, 1.0]):
+        with pytest.raises(st.InputError, match="a profile goes into st.onset") as caught:
+            st.monte_carlo(problem, wrong, **given)
+        assert len(caught.value.problems) == 1
+        assert caught.value.problems[0].startswith("random: ")
+    refuses(
+        "got a RandomField ... st.monte_carlo", lambda: st.onset(problem, field, method=EXACT)
+    )
+    with pytest.raises(AttributeError, match="did you mean 'monte_carlo'"):
+        st.montecarlo  # noqa: B018
 
 
 def test_every_help_has_examples_and_no_text_is_cut(runs):

@@ -425,10 +425,10 @@ class Problem:
         length = self.nucleation_lengths(steepest)[int(np.argmin(resolution))]
         if min(resolution) < HARDLY_RESOLVED:
             raise InputError(
-                f"solid.shear_modulus, friction: the nucleation length is {length:.3g} m, that is"
-                f" {min(resolution):.1g} of the spacing of the nodes; check the units of the"
-                f" modulus, {self.solid.shear_modulus:g} Pa, of the weakening rate, {steepest:.3g}"
-                " Pa/m at its steepest, and of all lengths and strengths"
+                f"solid.shear_modulus, interface.length, friction: the nucleation length is"
+                f" {length:.3g} m, and the nodes are {self.interface.spacing:.3g} m apart; check"
+                f" the units of the modulus, {self.solid.shear_modulus:g} Pa, of the lengths, of"
+                f" the weakening rate, {steepest:.3g} Pa/m at its steepest, and of strengths"
             )
         raise InputError(
             f"interface.nodes: the nucleation length {length:.3g} m spans"

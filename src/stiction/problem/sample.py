@@ -183,6 +183,11 @@ def named_profiles(given: Any) -> dict[str, Any]:
 
     The strength may be given as friction coefficients: by this name, or by the unit that it states.
     """
+    if hasattr(given, "marginal") or hasattr(given, "members"):
+        raise InputError(
+            f"profiles: must be numbers, got a {type(given).__name__}; pass its sample(interface),"
+            " or call st.monte_carlo"
+        )
     if not isinstance(given, Mapping):  # a Dataset is one too
         return {"friction_coefficient" if is_coefficient(given) else "strength": given}
     known = (*PROFILES, "friction_coefficient")

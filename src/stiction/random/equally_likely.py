@@ -3,15 +3,24 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Annotated, Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    NamedTuple,
+    Protocol,
+    TypeAlias,
+    runtime_checkable,
+)
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import InstanceOf
+from pydantic import BeforeValidator
 from scipy.special import ndtr, ndtri
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
+from stiction.base.model import describe
 from stiction.problem.interface import Interface
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface, layout
 from stiction.random.synthesis import SAMPLES_PER_BLOCK, Stream
@@ -33,12 +42,27 @@ class Source(Protocol):
         """Return so many of them."""
 
 
-AnyRandom: TypeAlias = (
-    RandomInterface
-    | RandomField
-    | Annotated[Source, InstanceOf()]
-    | list[Annotated[RandomInterface, InstanceOf()] | Annotated[RandomField, InstanceOf()]]
-)
+def _known(given: Any) -> Any:
+    """Return what is random as it is, or name the first entry that is nothing of the kind."""
+    if isinstance(given, RandomInterface | RandomField | Source):
+        return given
+    several = isinstance(given, list | tuple)
+    for number, entry in enumerate(given if several else [given]):
+        if not isinstance(entry, RandomInterface | RandomField):
+            raise InputError(
+                f"{f'[{number}] ' * several}must be a RandomInterface or a RandomField, got"
+                f" {describe(entry)}; a profile goes into st.onset, and st.fit_field fits a field"
+                " to it"
+            )
+    return given
+
+
+if TYPE_CHECKING:
+    AnyRandom: TypeAlias = (
+        RandomInterface | RandomField | Source | list[RandomInterface] | list[RandomField]
+    )
+else:
+    AnyRandom = Annotated[Any, BeforeValidator(_known), "RandomInterface | RandomField | list"]
 """A random interface, a field that becomes one, or several equally likely ones or their source."""
 
 

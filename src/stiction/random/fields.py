@@ -47,6 +47,7 @@ FIRST_FACTOR_STREAM = 1000  # number of the stream of draws of the first propert
 MIN_PIVOT = 1e-12  # round-off of eigenvalues of a correlation matrix
 # Limits of warnings
 MAX_UNRESOLVED = 0.01  # share of the variance that the grid does not resolve
+DOUBTFUL_UNRESOLVED = 0.5  # the same share, above which a unit is doubted
 MAX_MEAN_SHARE = 0.075  # share of the variance that the mean mode would hold
 MAX_CORRELATION_ERROR = 0.01
 
@@ -194,10 +195,13 @@ class RandomField:
         if lost > MAX_UNRESOLVED:
             nodes = " x ".join(map(str, interface.shape))
             enough = " x ".join(map(str, modes.nodes_for(MAX_UNRESOLVED)))
+            doubt = "check the unit of the correlation length (m): " * (
+                lost > DOUBTFUL_UNRESOLVED
+            )
             warn_accuracy(
-                f"the grid of {nodes} nodes is coarser than the spectrum: values at the nodes"
-                f" are exact, but {100.0 * lost:.2g} % of the variance lies at wavelengths that the"
-                f" grid does not resolve; with interface.nodes >= {enough} it is less than"
+                f"{doubt}the grid of {nodes} nodes is coarser than the spectrum: values at the"
+                f" nodes are exact, but {100.0 * lost:.2g} % of the variance lies at wavelengths"
+                f" that the grid does not resolve; with interface.nodes >= {enough} it is less than"
                 f" {100.0 * MAX_UNRESOLVED:g} %, or end the spectrum there with"
                 f" power_kept={1.0 - lost:.3g}"
             )

@@ -124,7 +124,8 @@ def make_modes(
         raise InputError(
             f"spectrum: no mode is left on an interface of {max(interface.lengths):g} m: the first"
             f" is at {units.min():.3g} rad/m, the spectrum is truncated at {cutoff:.3g} rad/m;"
-            " shorten the correlation length, lengthen the interface or raise the truncation"
+            " check the unit of the correlation length (m), shorten it, lengthen the interface or"
+            " raise the truncation"
         )
     # 1. and 2. Waves.
     numbers = _numbers(interface, largest)
