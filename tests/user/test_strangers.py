@@ -23,7 +23,7 @@ from refusals import refuses
 from small_study import small_study
 
 import stiction as st
-from stiction.base import files
+from stiction.base import files, netcdf
 from stiction.base.files import private_folder
 from stiction.base.netcdf import read_netcdf
 from stiction.ensemble import batches, store
@@ -434,3 +434,20 @@ def test_the_current_folder_has_no_style_of_figures(tmp_path, run, monkeypatch, 
         code, _, errors = command("report", run, "--out", tmp_path / "report.html")
     assert code == 0, errors
     assert "matplotlibrc: this file" in errors
+
+
+def test_many_names_of_one_long_text_of_a_netcdf_file_are_no_memory():
+    """HDF5 may name one text many times: a thousand times a megabyte, from a file of one."""
+
+    class Texts:
+        shape = (1000,)
+        read = 0
+
+        def __getitem__(self, number):
+            self.read += 1
+            return b"a" * 10**6
+
+    texts = Texts()
+    with pytest.raises(st.InputError, match="larger than the file"):
+        netcdf._texts(texts, [2 * 10**6])
+    assert texts.read == 3

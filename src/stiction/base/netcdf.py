@@ -6,9 +6,9 @@ links, virtual datasets) while it reads, and unpacks whatever a filter says. The
 1. The bytes of the file were read already, so that nobody changes it between a look and a use.
 2. Walk through all groups. Links must be hard; data must lie in the file, have few values for its
    size, and be packed by zlib, once, if at all.
-3. Read the attributes of the root and of its variables, which are no larger together than the
-   file, and the numeric variables. Chunks are inflated here, within the size that their shape
-   states: HDF5 inflates until it has no memory.
+3. Read the attributes of the root and of its variables, and lists of texts, which are no larger
+   together than the file, and the numeric variables. Chunks are inflated here, within the size that
+   their shape states: HDF5 inflates until it has no memory.
 4. Name the dimensions as NetCDF does.
 5. Decode them as xarray does: missing values, scale and offset, but no times.
 
@@ -46,7 +46,7 @@ NOT_A_SCALE = "_nc4_non_coord_"
 
 
 def read_netcdf(content: bytes, unwanted: Collection[str] = ()) -> xr.Dataset:
-    """Return the numeric variables of the root of a NetCDF file, or raise an `InputError`.
+    """Return the numbers and texts of the root of a NetCDF file, or raise an `InputError`.
 
     Those of `unwanted` names are left out.
     """
@@ -91,11 +91,13 @@ def _from_hdf5(content: bytes, unwanted: Collection[str]) -> xr.Dataset:
         variables = {
             name.removeprefix(NOT_A_SCALE): (
                 _dims(item, name, about, scales),
-                _values(item),
+                _values(item) if item.dtype.kind in "fiu" else _texts(item, budget),
                 {key: value for key, value in about.items() if key not in HIDDEN},
             )
             for name, (item, about) in at_root.items()
-            if name not in unwanted and item.dtype.kind in "fiu" and item.shape is not None
+            if name not in unwanted and item.shape is not None
+            if item.dtype.kind in "fiu"
+            or (h5py.check_string_dtype(item.dtype) and item.ndim == 1)
             if not str(about.get("NAME")).startswith(NO_VARIABLE)
         }
         return xr.Dataset(variables, attrs=_attributes(file, budget))
@@ -181,6 +183,21 @@ def _values(dataset: Any) -> Any:
         part = values[tuple(room)]
         part[...] = block[tuple(slice(0, n) for n in part.shape)]
     return dataset[()] if CHECKSUM in filters else values
+
+
+def _texts(dataset: Any, budget: list[int]) -> Any:
+    """Return a list of texts, such as names of stations, within the budget of the attributes.
+
+    They are read one by one, because many of them may name the same long text of the file.
+    """
+    texts: list[str] = []
+    for number in range(dataset.shape[0]):
+        text = dataset[number]
+        texts.append(text.decode(errors="replace") if isinstance(text, bytes) else str(text))
+        budget[0] -= max(len(texts[-1]), 1)
+        if budget[0] < 0:
+            raise InputError("its texts are larger than the file")
+    return np.array(texts, dtype=str)
 
 
 def _dims(
