@@ -1,4 +1,24 @@
-"""The average of strength over load with the weights of critical patches, and where it is least."""
+"""The moving average of strength divided by load, over critical windows, and where it is least.
+
+Problem
+-------
+s is the strength less initial stress (Pa), p the load profile, and y the weights of a window
+(`windows`). The window centred at x becomes unstable by itself at the load <s, y>_x/<p, y>_x. Find
+the least load over all x and all windows. On a line x lies between the nodes, too. On a plane the
+load is that of a node, which is exact for the discrete problem, and only the place lies between.
+
+Algorithm
+---------
+1. Averages at all nodes by Fourier transform (`averages`).
+2. On a plane, take the lowest node. A parabola through its neighbours gives the place.
+3. On a line, estimate by a parabola through each local minimum of the nodes how low the function
+   falls there, and by how much the parabola may be wrong (`_estimates`).
+4. In the lowest of them, and in any other that may be lower, take the minimum of polynomials
+   through `STENCIL` nodes on either side of the node (`_minimum_near`).
+
+Rounding and the polynomials, which ring where the strength jumps, must not pass bounds that hold
+for the exact average. So values are cut at these bounds.
+"""
 
 from collections.abc import Iterator, Sequence
 
@@ -11,7 +31,12 @@ from stiction.elasticity.operator import Transform, convolve, make_transform
 from stiction.methods.criterion.windows import Window
 from stiction.problem.interface import Interface
 
-STENCIL = 10
+STENCIL = 10  # nodes of a polynomial
+PARABOLA_ERROR = 0.065  # largest difference of a cubic to its parabola, in third differences
+MAX_NEWTON_STEPS = 50
+PLACE_ATOL = 1e-11  # change of the place, in nodes, that is round-off
+NO_NODE = -1
+
 # Coefficients of the polynomial through ten nodes, in powers of the distance from their middle.
 _FIT = np.linalg.inv(np.vander(np.arange(STENCIL) - 0.5 * (STENCIL - 1), increasing=True))
 
@@ -24,11 +49,11 @@ def averages(
     Strength less initial stress s (Pa) is of shape (samples, *shape), the load profile p (*shape).
     """
     load = interface.transform(profile)
-    scales = [interface.inverse_transform(load * (one.spectrum / one.total)) for one in windows]
+    p_y = [interface.inverse_transform(load * (y.spectrum / y.total)) for y in windows]
     for strength in excess:
         waves = interface.transform(strength)
-        each = zip(windows, scales, strict=True)
-        yield (interface.inverse_transform(waves * y.spectrum) / scale for y, scale in each)
+        pairs = zip(windows, p_y, strict=True)
+        yield (interface.inverse_transform(waves * y.spectrum) / scale for y, scale in pairs)
 
 
 def least_average(
@@ -48,9 +73,9 @@ def least_average(
         _minimum_of_rows(transform, excess, profile, multiplier, reach, load, place)
         return load, place, chosen
     place = np.zeros((count, 2))
-    for i, each in enumerate(averages(interface, windows, excess, profile)):
+    for i, fields in enumerate(averages(interface, windows, excess, profile)):
         bound = np.min(excess[i] / profile)  # the rounding of the transforms may not keep to it
-        for window, average in enumerate(each):
+        for window, average in enumerate(fields):
             least = max(average.min(), bound)
             if least < load[i]:
                 load[i], place[i], chosen[i] = least, _between_nodes(average), window
@@ -58,7 +83,7 @@ def least_average(
 
 
 def _between_nodes(average: Array) -> Array:
-    """Return where a parabola through the nodes around the lowest has its minimum, in nodes.
+    """Step 2: return where a parabola around the lowest node has its minimum, in nodes.
 
     Places at nodes would show as stripes in a histogram.
     """
@@ -66,8 +91,8 @@ def _between_nodes(average: Array) -> Array:
     place = np.array(node, dtype=np.float64)
     for axis in (0, 1):
         line = np.take(average, node[1 - axis], axis=1 - axis)
-        before, here, after = (line[(node[axis] + s) % line.size] for s in (-1, 0, 1))
-        bend = before - 2.0 * here + after
+        before, middle, after = (line[(node[axis] + s) % line.size] for s in (-1, 0, 1))
+        bend = before - 2.0 * middle + after
         if bend > 0.0:
             place[axis] += 0.5 * (before - after) / bend
     return np.mod(place, average.shape)
@@ -75,9 +100,9 @@ def _between_nodes(average: Array) -> Array:
 
 @jit
 def _estimates(values: Array, i: int) -> tuple[float, float]:
-    """Minimum near a node by a parabola, and how much lower it may be; infinite without one.
+    """Step 3: minimum near a node by a parabola, and how much lower it may be.
 
-    A cubic through four nodes differs from the parabola by at most 0.065 third differences.
+    The minimum is infinite if the node is no local minimum.
     """
     n = values.size
     left, middle, right = values[i - 1], values[i], values[i + 1 - n]
@@ -86,7 +111,7 @@ def _estimates(values: Array, i: int) -> tuple[float, float]:
     shift = 0.5 * (left - right) / (left - 2.0 * middle + right)
     before = abs(right - 3.0 * middle + 3.0 * left - values[i - 2])
     after = abs(values[i + 2 - n] - 3.0 * right + 3.0 * middle - left)
-    return middle - 0.25 * (left - right) * shift, 0.065 * max(before, after)
+    return middle - 0.25 * (left - right) * shift, PARABOLA_ERROR * max(before, after)
 
 
 @jit
@@ -103,7 +128,7 @@ def _slope(power: Array, u: float) -> tuple[float, float]:
 def _minimum_near(
     values: Array, strength: Array, profile: Array, reach: int, node: int, power: Array
 ) -> tuple[float, float]:
-    """Minimum between a node and the next on either side, and its place, by local polynomials.
+    """Step 4: minimum between a node and the next on either side, and its place.
 
     By Newton's method on the slope, kept between the points where the slope is known to change
     sign; it bisects where the function is not convex. The polynomial rings where the strength
@@ -128,27 +153,27 @@ def _minimum_near(
         if side * _slope(power, u)[0] >= 0.0:  # it rises from the node
             continue
         low, high = -0.5, 0.5
-        for _ in range(50):
+        for _ in range(MAX_NEWTON_STEPS):
             slope, curvature = _slope(power, u)
             if slope > 0.0:
                 high = u
             else:
                 low = u
             move = -slope / curvature if curvature > 0.0 else np.inf
-            if abs(move) < 1e-11:
+            if abs(move) < PLACE_ATOL:
                 break
             u = u + move if low < u + move < high else 0.5 * (low + high)
         value = 0.0
         for p in range(STENCIL - 1, -1, -1):
             value = value * u + power[p]
         value = max(values[cell] + value, least)
-        here, beside = values[node], values[(node + side) % n]
-        before, rise = here - values[(node - side) % n], beside - here
+        at_node, beside = values[node], values[(node + side) % n]
+        before, rise = at_node - values[(node - side) % n], beside - at_node
         after = values[(node + 2 * side) % n] - beside
         if before <= rise <= after:
-            bound = here
+            bound = at_node
             if before < after:
-                bound = here + before * (after - rise) / (after - before)
+                bound = at_node + before * (after - rise) / (after - before)
             value = max(value, bound)
         if value < lowest:
             lowest, place = value, node + 0.5 * side + u
@@ -160,12 +185,7 @@ def _minimum_of_rows(
     transform: Transform, excess: Array, profile: Array, multiplier: Array, reach: int,
     minimum: Array, place: Array,
 ) -> None:  # fmt: skip
-    """Minimum over a line of <s, y>/<p, y> for every row, and its place in units of nodes.
-
-    A parabola through each local minimum of the nodes estimates how low the
-    function falls there; polynomials through ten nodes take the lowest, and any other that might be
-    lower.
-    """
+    """Steps 1, 3 and 4: lowest average over a line of every row, and its place in nodes."""
     nodes = profile.size
     values, power = np.empty(nodes), np.empty(STENCIL)
     scale, spectrum = np.empty(nodes), np.empty(multiplier.size, np.complex128)
@@ -179,20 +199,22 @@ def _minimum_of_rows(
             least = min(least, multiplier[0] * strength[i] / profile[i])
         for i in range(nodes):
             values[i] = max(values[i] / scale[i], least)
-        best, lowest = ZERO - 1, np.inf
+        # 3.
+        best, lowest = ZERO + NO_NODE, np.inf
         for i in range(nodes):
-            low = _estimates(values, i)[0]
-            if low < lowest:
-                best, lowest = i, low
-        value, where = values[0], 0.0
-        if best >= 0:  # not constant
-            value, where = _minimum_near(values, strength, profile, reach, best, power)
+            estimate = _estimates(values, i)[0]
+            if estimate < lowest:
+                best, lowest = i, estimate
+        # 4. Without a local minimum the average is constant.
+        average, where = values[0], 0.0
+        if best != NO_NODE:
+            average, where = _minimum_near(values, strength, profile, reach, best, power)
         for i in range(nodes):
-            low, error = _estimates(values, i)
-            if i != best and low - error < value:
-                other, elsewhere = _minimum_near(values, strength, profile, reach, i, power)
-                if other < value:
-                    value, where = other, elsewhere
+            estimate, error = _estimates(values, i)
+            if i != best and estimate - error < average:
+                minimum_i, place_i = _minimum_near(values, strength, profile, reach, i, power)
+                if minimum_i < average:
+                    average, where = minimum_i, place_i
         where %= nodes
-        minimum[row] = value
+        minimum[row] = average
         place[row] = where if where < nodes else 0.0  # a tiny negative place rounds to `nodes`

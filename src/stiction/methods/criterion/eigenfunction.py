@@ -1,6 +1,22 @@
-"""The critical slip-rate profile of a line (Uenishi and Rice, 2003) as a weight on its nodes.
+"""The critical slip-rate profile of a line as a weight on its nodes.
 
-On [-1, 1] it is g(cos t) = sum over odd m of b_m sin(m t), of unit integral: b_m = 2 a_m/pi.
+Problem
+-------
+K. Uenishi and J. R. Rice (J. Geophys. Res. 108, 2003, equation 14): a patch of half-length a is
+just unstable if the slip rate v solves an eigenproblem on [-1, 1], with W a/G* = lambda_0. The
+weight g of the local criterion is v with unit integral,
+
+    g(cos t) = sum over odd m of b_m sin(m t),  b_m = 2 a_m/pi,  a_1 = 1.
+
+On a grid its weights shall not be negative, so that an average of the strength lies between the
+least and the greatest strength.
+
+Algorithm
+---------
+1. Galerkin's method gives lambda_0 and a_m (`eigenvalue_and_vector`).
+2. The midpoint rule gives the transform of g (`multiplier`).
+3. Weights of the nodes are samples of g inside the patch, and at its ends are fitted to the
+   transform among weights that are not negative (`grid_weights`).
 """
 
 from functools import lru_cache
@@ -11,14 +27,15 @@ from scipy.optimize import nnls
 
 from stiction.base.arrays import Array
 
-TERMS = 40  # of the eigenfunction, whose transform is within 2e-7 of the limit of many
-EDGE = 16  # nodes at either end of a patch that are fitted; samples of g are exact further in
-BATCH = 1 << 20  # cosines at once
-SMOOTH = 2.0  # |k| h_n/2 above which the fit counts less, as the fourth power
+N_SINES = 40  # of the eigenfunction, whose transform is then within 2e-7 of the limit
+N_FITTED_NODES = 16  # at either end of a patch; samples of g are exact further in
+COSINES_AT_ONCE = 1 << 20
+FITTED_WAVE = 2.0  # |k| h_n/2 above which the fit counts less, as the fourth power
+WEIGHT_OF_SUM = 1e3  # of the equation that the weights sum to one
 
 
 @lru_cache(maxsize=4)
-def eigenvalue_and_vector(terms: int = TERMS) -> tuple[float, Array]:
+def eigenvalue_and_vector(terms: int = N_SINES) -> tuple[float, Array]:
     """Return the smallest eigenvalue lambda_0 and its eigenvector a_1, a_2, ... with a_1 = 1.
 
     Uenishi and Rice (2003): a patch of half-length a is critical at a W/G* = lambda_0, with
@@ -54,13 +71,13 @@ def multiplier(z: Array) -> Array:
     """Return the transform of g at z = |k| h_n/2, (m,): what a moving average does to a cosine.
 
     The integral of g(cos t) cos(z cos t) sin t over [0, pi], by the midpoint rule, which is exact
-    to round-off with more than (z + TERMS)/2 points.
+    to round-off with more than (z + N_SINES)/2 points.
     """
-    points = int(0.25 * np.max(z)) + TERMS  # the other half is the same
+    points = int(0.25 * np.max(z)) + N_SINES  # the other half is the same
     t = (np.arange(points) + 0.5) * (0.5 * np.pi / points)
     share = weight(np.cos(t)) * np.sin(t) * (np.pi / points)
-    parts = np.array_split(z, 1 + np.size(z) * points // BATCH)
-    return np.concatenate([np.cos(np.outer(each, np.cos(t))) @ share for each in parts])
+    parts = np.array_split(z, 1 + np.size(z) * points // COSINES_AT_ONCE)
+    return np.concatenate([np.cos(np.outer(part, np.cos(t))) @ share for part in parts])
 
 
 def grid_weights(half_width: float) -> Array:
@@ -77,20 +94,20 @@ def grid_weights(half_width: float) -> Array:
     the transform at |k| h_n/2 = 3: 1e-4, 5e-6, 1e-9 with 9, 16, 35 nodes in h_n.
     """
     last = int(np.ceil(half_width)) + 1
-    inner = max(last + 1 - EDGE, 0)
+    inner = max(last + 1 - N_FITTED_NODES, 0)
     half = 4 * last + 64  # wavenumbers to Nyquist's, close enough for the wave across the patch
     wave = np.pi / half * np.arange(half + 1)
     w = np.zeros(last + 1)
     w[:inner] = weight(np.arange(inner) / half_width) / half_width
     z = wave * half_width
-    wanted = multiplier(z)
+    transform = multiplier(z)
     fitted = np.arange(inner, last + 1)
     columns = np.where(fitted == 0, 1.0, 2.0) * np.cos(np.outer(wave, fitted))
-    importance = (1.0 + (z / SMOOTH) ** 2) ** -2.0
-    importance[0] = 1e3  # the sum
-    missing = wanted - np.fft.rfft(around(w, 2 * half)).real
+    importance = (1.0 + (z / FITTED_WAVE) ** 2) ** -2.0
+    importance[0] = WEIGHT_OF_SUM
+    missing = transform - np.fft.rfft(around(w, 2 * half)).real
     w[inner:], _ = nnls(columns * importance[:, None], missing * importance)
-    result: Array = w * (wanted[0] / np.fft.rfft(around(w, 2 * half)).real[0])
+    result: Array = w * (transform[0] / np.fft.rfft(around(w, 2 * half)).real[0])
     return result
 
 

@@ -1,4 +1,24 @@
-"""Griffith's criterion under any load: energy release rate and critical crack length."""
+"""Griffith's criterion under any load: energy release rate and critical crack length.
+
+Problem
+-------
+A crack of half-length a lies on a periodic line (period L, modulus G*) between two identical
+half-spaces, with the stress drop D(x) (Pa). With U = tan(pi a/L) and tan(pi (x - centre)/L) =
+U cos t its stress intensity factors at both tips (H. Bueckner, Zeitschrift fuer Angewandte
+Mathematik und Mechanik 50, 1970; W. Koiter, Ingenieur-Archiv 28, 1959) are
+
+    K = ((L/pi^2) (1 + U^2) U)^(1/2) int_0^pi D (1 +- cos t)/(1 + U^2 cos^2 t) dt,            (1)
+
+and the energy release rate is G = K |K|/(2 G*). A. Griffith (Phil. Trans. A 221, 1921): a crack
+runs once G exceeds the fracture energy.
+
+Algorithm
+---------
+1. Gauss and Chebyshev's rule for (1), with D linear between the nodes (`_intensity_factors`). K is
+   linear in D, so that one evaluation serves all loads.
+2. Bracket the crossings of G with the fracture energy at lengths one node apart, and at shorter
+   ones near zero. Bisect them (`griffith_length`).
+"""
 
 from typing import Any
 
@@ -9,10 +29,10 @@ from stiction.base.errors import InputError
 from stiction.base.model import Flag, Numbers, Positive, Real, checked, describe
 from stiction.problem.problem import Problem
 
-POINTS = 512  # fewest Gauss-Chebyshev points along a crack; smooth drops are exact to round-off
-SHORT = np.geomspace(1e-6, 1.0, 40, endpoint=False)  # lengths below one node spacing
-BATCH = 1 << 20  # points evaluated at once
-HALVINGS = 30
+MIN_POINTS = 512  # Gauss-Chebyshev points along a crack; smooth drops are exact to round-off
+SHORT_LENGTHS = np.geomspace(1e-6, 1.0, 40, endpoint=False)  # below one node spacing
+POINTS_AT_ONCE = 1 << 20
+N_HALVINGS = 30
 
 
 @checked
@@ -61,13 +81,13 @@ def energy_release_rate(
     True
     """
     resting, profile = _stress_drops(problem)
-    whole, period = np.atleast_1d(lengths), problem.interface.extent
-    if whole.ndim != 1 or not np.all((whole > 0.0) & (whole < period)):
+    flat, period = np.atleast_1d(lengths), problem.interface.extent
+    if flat.ndim != 1 or not np.all((flat > 0.0) & (flat < period)):
         raise InputError(
             f"lengths: must be between 0 and {period:g} m, got {describe(lengths)}"
         )
     drops = (resting + load * profile)[None]
-    return _release_rate(problem, _intensity_factors(problem, drops, whole, centre)[0])
+    return _release_rate(problem, _intensity_factors(problem, drops, flat, centre)[0])
 
 
 @checked
@@ -112,20 +132,22 @@ def griffith_length(
         rate = _release_rate(problem, resting + tau * unit)
         return rate.min(axis=-1) > fracture_energy
 
-    # Crossings are bracketed at lengths one node apart, and at ever shorter ones, then bisected.
-    whole = problem.interface.spacing * np.append(SHORT, np.arange(1, problem.interface.size))
-    above = runs(whole, tau)
+    # 2.
+    lengths = problem.interface.spacing * np.append(
+        SHORT_LENGTHS, np.arange(1, problem.interface.size)
+    )
+    above = runs(lengths, tau)
     if arrest:
         above = ~above & np.maximum.accumulate(above, axis=1)
     crosses, first = above.any(axis=1), above.argmax(axis=1)
-    low, high = np.append(0.0, whole)[first[crosses]], whole[first[crosses]]
-    for _ in range(HALVINGS if crosses.any() else 0):
+    low, high = np.append(0.0, lengths)[first[crosses]], lengths[first[crosses]]
+    for _ in range(N_HALVINGS if crosses.any() else 0):
         middle = 0.5 * (low + high)
         beyond = runs(middle, tau[crosses, 0]) != arrest
         low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
-    found = np.full(tau.size, np.inf)
-    found[crosses] = high
-    return found if load.ndim else float(found[0])
+    critical = np.full(tau.size, np.inf)
+    critical[crosses] = high
+    return critical if load.ndim else float(critical[0])
 
 
 def _stress_drops(problem: Problem) -> Array:
@@ -144,26 +166,25 @@ def _stress_drops(problem: Problem) -> Array:
     return drops
 
 
-def _intensity_factors(problem: Problem, drops: Array, whole: Array, centre: float) -> Array:
-    """Return K at both tips of cracks of these lengths, Pa m^(1/2), (drops, m, 2)."""
+def _intensity_factors(problem: Problem, drops: Array, lengths: Array, centre: float) -> Array:
+    """Step 1: return K at both tips of cracks of these lengths, Pa m^(1/2), (drops, m, 2)."""
     interface, period = problem.interface, problem.interface.extent
-    points = max(POINTS, interface.size)
+    points = max(MIN_POINTS, interface.size)
     cosine = np.cos((np.arange(points) + 0.5) * np.pi / points)
-    found = []
-    for some in np.array_split(whole, 1 + whole.size * points // BATCH):
-        reach = np.tan(0.5 * np.pi * some / period)  # U
-        u = reach[:, None] * cosine
+    factors = []
+    for part in np.array_split(lengths, 1 + lengths.size * points // POINTS_AT_ONCE):
+        U = np.tan(0.5 * np.pi * part / period)
+        u = U[:, None] * cosine
         place = (centre + np.arctan(u) * period / np.pi) / interface.spacing
         left = np.floor(place)
         share, left = place - left, left.astype(np.int64) % interface.size
-        after = (left + 1) % interface.size
-        # K = (L (1 + U^2) U)^(1/2)/pi times the integral of drop (1 +- cos t)/(1 + u^2) over t.
-        scale = np.sqrt(period * (1.0 + reach**2) * reach)
-        weighted = [(d[left] * (1.0 - share) + d[after] * share) / (1.0 + u * u) for d in drops]
+        right = (left + 1) % interface.size
+        scale = np.sqrt(period * (1.0 + U**2) * U)
+        weighted = [(D[left] * (1.0 - share) + D[right] * share) / (1.0 + u * u) for D in drops]
         tips = [[scale * (w * (1.0 + side * cosine)).mean(axis=1) for side in (-1.0, 1.0)]
                 for w in weighted]  # fmt: skip
-        found.append(np.moveaxis(np.array(tips), 1, 2))
-    return np.concatenate(found, axis=1)
+        factors.append(np.moveaxis(np.array(tips), 1, 2))
+    return np.concatenate(factors, axis=1)
 
 
 def _release_rate(problem: Problem, factor: Array) -> Array:

@@ -23,14 +23,16 @@ MAX_RMS_DIFFERENCE = 0.01
 """Difference to the exact onset above which samples are compared."""
 INSTEAD = "; use st.Equilibrium() or st.Rupture()"
 
-OWN_VARIABLES = {
+OF_PLANES = {
     "critical_aspect": Variable(
         "1", "extent of the critical ellipse along x over that along y"
     ),
     "critical_patch_extent": Variable("m", "extents of the critical ellipse"),
     "critical_patch_area": Variable("m2", "area of the critical ellipse"),
 }
-LENGTH = {"critical_patch_length": Variable("m", "nucleation length at the critical place")}
+OF_SPECIMENS = {
+    "critical_patch_length": Variable("m", "nucleation length at the critical place")
+}
 
 
 @model(kw_only=True)
@@ -81,8 +83,8 @@ class LocalCriterion:
 
     def seconds_per_sample(self, problem: Problem) -> float:
         """Return the approximate time of a sample on one core, s."""
-        own, each = (5e-4, 8e-8) if problem.interface.is_plane else (3e-5, 3e-8)
-        return own + each * problem.interface.size
+        fixed, per_node = (5e-4, 8e-8) if problem.interface.is_plane else (3e-5, 3e-8)
+        return fixed + per_node * problem.interface.size
 
     def supports(self, problem: Problem) -> list[str]:
         """Return the reasons why it cannot solve a problem; none if it can."""
@@ -120,11 +122,11 @@ class LocalCriterion:
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
         """Return the variables that the solver computes for each sample."""
-        found = onset_variables(problem.interface)
+        variables = onset_variables(problem.interface)
         if problem.interface.is_plane:
-            extent = position(problem.interface, OWN_VARIABLES["critical_patch_extent"])
-            found = found | OWN_VARIABLES | {"critical_patch_extent": extent}
-        return found if problem.specimen is None else found | LENGTH
+            extent = position(problem.interface, OF_PLANES["critical_patch_extent"])
+            variables = variables | OF_PLANES | {"critical_patch_extent": extent}
+        return variables if problem.specimen is None else variables | OF_SPECIMENS
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, Array]]:
         """Return a solver for samples of this problem.
@@ -142,25 +144,25 @@ class LocalCriterion:
             excess, profile = excess_of(sample), sample.load_profile
             load, patch = np.empty(len(excess)), np.empty((len(excess), 4))
             place = np.empty((len(excess), 2) if interface.is_plane else len(excess))
-            for rate, same in _rates(sample):
+            for rate, rows in _rates(sample):
                 windows = windows_of(problem, rate)
-                load[same], place[same], chosen = least_average(
-                    interface, windows, excess[same], profile
+                load[rows], place[rows], chosen = least_average(
+                    interface, windows, excess[rows], profile
                 )
                 if interface.is_plane:
-                    patches = [(one.aspect, *one.extents, one.area) for one in windows]
-                    patch[same] = np.array(patches)[chosen]
+                    patches = [(y.aspect, *y.extents, y.area) for y in windows]
+                    patch[rows] = np.array(patches)[chosen]
             stress = sample.mean_stress(load)
-            found = {
+            values = {
                 "critical_load": load,
                 "critical_stress": stress,
                 "first_instability": stress.copy(),
                 "critical_position": place * interface.spacings,
             }
             if interface.is_plane:
-                own = patch[:, 0], patch[:, 1:3], patch[:, 3]
-                found |= zip(OWN_VARIABLES, own, strict=True)
-            return found
+                columns = patch[:, 0], patch[:, 1:3], patch[:, 3]
+                values |= zip(OF_PLANES, columns, strict=True)
+            return values
 
         return solve
 
@@ -171,14 +173,14 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
     excess, spacing = excess_of(sample), problem.interface.spacing
     load, start, width, relief = np.zeros((4, sample.samples))
     allowed, blocks = np.empty(problem.interface.size), problem.blocks
-    for rate, same in _rates(sample):
+    for rate, rows in _rates(sample):
         windows = blocks.windows(rate, rate)
         if not windows.starts.size:
             raise InputError(
                 "interface.length: no part of the specimen becomes unstable by itself, so the local"
                 " criterion does not hold; use st.Equilibrium()"
             )
-        for i in same:
+        for i in rows:
             load[i], c, start[i] = weakest_window(
                 excess[i],
                 sample.load_profile,
@@ -256,13 +258,13 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     problem.refuse_specimen("nucleation_stress", "st.LocalCriterion() gives its minimum")
     sample, interface = problem.sample(tau_p), problem.interface
     _warn_if_coarse(problem, sample)
-    ((rate, _), *others) = _rates(sample)
-    if others:
+    ((rate, _), *further_rates) = _rates(sample)
+    if further_rates:
         raise InputError("weakening_rate: differs between samples; pass them one by one")
     excess, profile = excess_of(sample), sample.load_profile
     windows = windows_of(problem, rate)
-    several = averages(interface, windows, excess, profile)
-    result = np.array([np.minimum.reduce(list(each)) for each in several])
+    samples = averages(interface, windows, excess, profile)
+    result = np.array([np.minimum.reduce(list(fields)) for fields in samples])
     # The weights keep to these bounds, the rounding of the transforms does not.
     ratio = windows[0].total * (excess / profile)
     low, high = (end(axis=sample.axes, keepdims=True) for end in (ratio.min, ratio.max))

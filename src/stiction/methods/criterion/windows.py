@@ -1,12 +1,29 @@
 """Critical windows: patches that are just unstable by themselves, and weights of their nodes.
 
-On a line the window is the nucleation length with the eigenfunction of Uenishi and Rice (2003) as
-its weight. On a plane it is an ellipse: for each of five aspects the smallest on whose nodes the
-lowest eigenvalue of K has fallen to W, with the eigenvector as weight. The eigenvector is a
-multiplier of the whole interface, so the average of strength less initial stress with this weight,
-over that of the load profile, bounds the load at onset from above, as long as no node reaches its
-residual strength (strictly for a Z-matrix). For nu = 0 the critical disc has radius
-2.0061 G/(2W).
+Problem
+-------
+K is the stiffness and W the uniform weakening rate (Pa/m). A window is a set of nodes on which the
+lowest eigenvalue of K is at most W, and y > 0 the eigenvector, of unit sum. With all other nodes
+held, slip on it is unstable from the load <s, y>/<p, y> on, where s is the strength less initial
+stress (Pa) and p the load profile. If K has no positive entry off its diagonal, y is a multiplier
+of the whole interface, so that this load bounds the onset from above as long as no node reaches its
+residual strength.
+
+Algorithm
+---------
+On a line the window is the nucleation length h_n, and y the eigenfunction of K. Uenishi and J. R.
+Rice (J. Geophys. Res. 108, 2003) as weights of the nodes (`eigenfunction`). On a plane it is an
+ellipse, for each of five aspects:
+
+1. Start with a small box of nodes of the plane, made periodic with the stiffness between its own
+   nodes. A block of a Toeplitz matrix is a block of a circulant matrix, so that the problem on an
+   ellipse of at most half the length of the box stays the same. So the cost follows the ellipse
+   and not the plane.
+2. Find by bisection the smallest ellipse in the box whose lowest eigenvalue is at most W
+   (`_smallest_unstable`), with LOBPCG (`elasticity.operator`).
+3. If there is none, double the box and go to 2. If the box is the plane, the window does not fit.
+
+For nu = 0 the critical disc has radius 2.0061 G/(2W).
 """
 
 from collections.abc import Sequence
@@ -26,8 +43,11 @@ from stiction.problem.problem import Problem
 # Aspects of the ellipses over that of the middle one. With the paper's strength nine shapes from
 # 0.8 to 2 lower the bound by less than 0.05 % more.
 STRETCHES = (2.0 / 3.0, 5.0 / 6.0, 1.0, 6.0 / 5.0, 3.0 / 2.0)
-TOLERANCE, ITERATIONS = 1e-9, 500  # residual of an eigenvector, as a share of W
-SMALLEST_BOX = 32  # nodes along each side of the part of a plane that is searched first
+EIGENVECTOR_RTOL = 1e-9  # residual of an eigenvector, as a share of W
+MAX_EIGENVECTOR_ITERATIONS = 500
+MIN_BOX_NODES = 32  # along each side of the box that is searched first
+RADIUS_RTOL = 1e-9  # nodes that are equally far by symmetry differ by round-off
+FIRST_PROBE_SHARE = 16  # the first ellipse is tried after this share of all of them
 
 
 class Window(NamedTuple):
@@ -66,27 +86,27 @@ def windows_of(
         weights = _line_weights(0.5 * length / interface.spacing, interface.size)
         return [Window(1.0, (length,), length, rate, *weights)]
     middle = float(1.0 / np.sqrt(1.0 - solid.poisson_ratio))
-    found = []
+    windows = []
     for aspect in (middle * stretch for stretch in stretches):
         window = _ellipse(problem.half_spaces, interface.shape, rate, aspect)
         if window is None:
-            size = " x ".join(f"{one:.4g}" for one in interface.lengths)
+            size = " x ".join(f"{side:.4g}" for side in interface.lengths)
             raise InputError(
                 f"interface.length: a critical patch does not fit on a plane of {size} m: in each"
                 f" direction it takes nearly twice the nucleation length, {length:.4g} m; {advice}"
             )
-        found.append(window)
-    return found
+        windows.append(window)
+    return windows
 
 
 @lru_cache(maxsize=64)
 def _line_weights(half_width: float, nodes: int) -> tuple[Array, Array]:
     """Return the weights around node 0 and their transform; `half_width` is h_n/2 in nodes."""
     weights = around(grid_weights(half_width), nodes)
-    found = weights, np.fft.rfft(weights).real
-    for array in found:
+    spectrum = np.fft.rfft(weights).real
+    for array in (weights, spectrum):
         array.flags.writeable = False
-    return found
+    return weights, spectrum
 
 
 @lru_cache(maxsize=64)
@@ -106,43 +126,51 @@ def ellipse_window(
 ) -> Window | None:
     """Return the smallest unstable ellipse of one aspect; None if it meets its images.
 
-    The problem on the nodes of an ellipse is the same on a box of the plane that is twice as
-    long, made periodic with the stiffness between its own nodes: a block of a Toeplitz matrix is
-    one of a circulant. So the cost follows the ellipse and not the plane.
+    See steps 1 to 3 at the top of this file.
     """
     spacings = np.divide(lengths, shape)
     column = np.fft.irfft2(symbol, shape)
-    least, side = 0.0, SMALLEST_BOX
+    stable_square, side = 0.0, MIN_BOX_NODES
     while True:
+        # 1. An ellipse may fill half of the box, or all of the plane.
         box = np.minimum(side, shape)
         share = np.where(box == shape, 0.5, 0.25)
         axis = float(np.min(box * spacings * share * (1.0, aspect)))
-        steps = [np.rint(np.fft.fftfreq(n) * n).astype(np.int64) for n in box]
-        nodes = np.ix_(*(one % n for one, n in zip(steps, shape, strict=True)))
-        x, y = (one * spacing for one, spacing in zip(steps, spacings, strict=True))
+        steps_x, steps_y = (np.rint(np.fft.fftfreq(n) * n).astype(np.int64) for n in box)
+        nodes = np.ix_(steps_x % shape[0], steps_y % shape[1])
+        x, y = steps_x * spacings[0], steps_y * spacings[1]
         distance = x[:, None] ** 2 + (aspect * y[None, :]) ** 2
-        found = _smallest_unstable(column[nodes], distance, rate, least, axis**2)
-        if found is not None:
-            square, value, vector = found
+        # 2.
+        ellipse = _smallest_unstable(column[nodes], distance, rate, stable_square, axis**2)
+        if ellipse is not None:
             weight = np.zeros(shape)
-            weight[nodes] = np.maximum(vector, 0.0)
+            weight[nodes] = np.maximum(ellipse.vector, 0.0)
             weight /= weight.sum()
-            length = 2.0 * float(np.sqrt(square))
-            area = float((distance <= square).sum() * np.prod(spacings))
-            spectrum = np.conj(np.fft.rfft2(weight))
-            return Window(aspect, (length, length / aspect), area, value, weight, spectrum)
+            length = 2.0 * float(np.sqrt(ellipse.square))
+            area = float((distance <= ellipse.square).sum() * np.prod(spacings))
+            extents, spectrum = (length, length / aspect), np.conj(np.fft.rfft2(weight))
+            return Window(aspect, extents, area, ellipse.eigenvalue, weight, spectrum)
+        # 3.
         if (box == shape).all():
             return None
-        least, side = axis**2, 2 * side
+        stable_square, side = axis**2, 2 * side
+
+
+class Ellipse(NamedTuple):
+    """An ellipse on whose nodes K has an eigenvalue up to W."""
+
+    square: float  # of its semi-axis along x, m²
+    eigenvalue: float  # Pa/m
+    vector: Array  # on the nodes of the box
 
 
 def _smallest_unstable(
-    column: Array, distance: Array, rate: float, least: float, most: float
-) -> tuple[float, float, Array] | None:
-    """Find by bisection the squared distance (m²) within which K has an eigenvalue up to W.
+    column: Array, distance: Array, rate: float, stable_square: float, max_square: float
+) -> Ellipse | None:
+    """Step 2: find the smallest unstable ellipse by bisection; None up to `max_square` (m²).
 
-    The column is the stress (Pa) at each node of a box by unit slip at node (0, 0). Nodes up to
-    `least` are stable. The eigenvalue and the eigenvector come along.
+    The column is the stress (Pa) at each node of the box by unit slip at node (0, 0). Ellipses up
+    to `stable_square` are known to be stable.
     """
     symbol = np.fft.rfft2(column).real
     operator = make_operator(symbol, rate, column.shape)._replace(
@@ -150,22 +178,26 @@ def _smallest_unstable(
         inverse=1.0 / (np.maximum(symbol.flatten(), 0.0) + 0.5 * rate),
     )
     radii = np.unique(distance)
-    # Nodes that are equally far by symmetry differ by round-off.
-    radii = radii[np.append(np.diff(radii) > 1e-9 * radii[1:], True)] * (1.0 + 1e-9)
-    low, high = (int(np.searchsorted(radii, square)) for square in (least, most))
+    is_last_of_equals = np.append(np.diff(radii) > RADIUS_RTOL * radii[1:], True)
+    radii = radii[is_last_of_equals] * (1.0 + RADIUS_RTOL)
+    low, high = (int(np.searchsorted(radii, square)) for square in (stable_square, max_square))
     low -= 1
-    found: tuple[float, float, Array] | None = None
+    ellipse: Ellipse | None = None
     vector = np.ones(column.shape)
-    probe = max(1, (high - low) // 16)  # small ones first: they take the fewest iterations
+    probe = max(1, (high - low) // FIRST_PROBE_SHARE)  # small ones take the fewest iterations
     while high - low > 1:
-        middle = (low + high) // 2 if found else min(low + probe, high - 1)
+        middle = (low + high) // 2 if ellipse else min(low + probe, high - 1)
         inside = distance <= radii[middle]
         vector = vector.copy() if vector[inside].any() else np.ones(column.shape)
         value, _ = lowest_eigenvector(
-            operator, inside.reshape(-1), vector.reshape(-1), TOLERANCE * rate, ITERATIONS
+            operator,
+            inside.reshape(-1),
+            vector.reshape(-1),
+            EIGENVECTOR_RTOL * rate,
+            MAX_EIGENVECTOR_ITERATIONS,
         )
         if value <= rate:
-            high, found = middle, (float(radii[middle]), value, vector)
+            high, ellipse = middle, Ellipse(float(radii[middle]), value, vector)
         else:
             low, probe = middle, 2 * probe
-    return found
+    return ellipse
