@@ -36,7 +36,6 @@ from functools import lru_cache
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
-import scipy.integrate
 from scipy.fft import idct
 
 from stiction.base.arrays import Array, one_blas_thread
@@ -218,6 +217,8 @@ def _mean_logarithm(harmonics: Harmonics, low: float, high: float, rtol: float) 
         angles = np.array([apart, low + high - apart, low + high + apart])
         logarithms = harmonics.sums(1j * angles).inverse.real
         return float((width - apart) * (logarithms @ [1.0, -0.5, -0.5]))
+
+    import scipy.integrate
 
     integral, _ = scipy.integrate.quad(integrand, 0.0, width, epsabs=0.0, epsrel=rtol)
     return float(integral) / width**2

@@ -7,7 +7,7 @@ import math
 from collections.abc import Collection, Mapping
 from functools import reduce
 from operator import attrgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import model_validator
@@ -23,7 +23,6 @@ from stiction.base.errors import (
 from stiction.base.model import Mode, describe, is_unplaced, model
 from stiction.base.units import Doubt, doubt_units
 from stiction.base.variables import PROFILES
-from stiction.elasticity.driven import Driven
 from stiction.elasticity.protocol import HalfSpaces
 from stiction.problem.friction import SCALES, Friction, contradictions
 from stiction.problem.interface import Interface
@@ -40,6 +39,9 @@ from stiction.problem.sample import (
 )
 from stiction.problem.solid import Solid
 from stiction.problem.specimen import Blocks
+
+if TYPE_CHECKING:
+    from stiction.elasticity.driven import Driven
 
 MIN_NODES_IN_NUCLEATION = 4
 """Nodes in a nucleation length."""

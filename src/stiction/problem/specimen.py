@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 
 from stiction.base.errors import InputError
 from stiction.base.kinds import Kinds, OneOf
 from stiction.base.model import Mode, Positive, Real, as_number, model
-from stiction.elasticity.blocks import Pushes
-from stiction.elasticity.driven import Driven, driven
 from stiction.problem.solid import Solid
+
+if TYPE_CHECKING:
+    from stiction.elasticity.blocks import Pushes
+    from stiction.elasticity.driven import Driven
 
 
 def _stiffness(value: Any) -> float:
@@ -145,11 +147,15 @@ class Blocks:
         drive = self.drive
         if isinstance(drive, Platen):
             return None
+        from stiction.elasticity.blocks import Pushes
+
         sides: Any = ("left", "right") if drive.side == "both" else (drive.side,)
         return Pushes(sides, drive.height, drive.width)
 
     def driven(self, length: float, nodes: int, solid: Solid, mode: Mode) -> Driven:
         """Return stiffness and profiles of the blocks behind their machine, at the nodes."""
+        from stiction.elasticity.driven import driven  # scipy takes half a second
+
         machine = self.drive.stiffness
         if 0.0 < machine < math.inf:  # half of the symmetric set-up is twice as stiff
             machine *= 2.0 / (self.thickness or 1.0)
