@@ -33,7 +33,8 @@ from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
 
 MAX_OPERATIONS = 4e9
-"""Cubes of the numbers of nodes that move, summed over steps: beyond, a sample is undecided."""
+"""Cubes of the nodes that move and squares of all nodes, summed over steps: beyond, a sample is
+undecided."""
 FROZEN_STEPS = 4
 """Steps with frozen strengths before Newton's is tried again."""
 REST_RTOL, JOIN_RTOL = 1e-5, 1e-9
@@ -120,7 +121,7 @@ def slides(
             return True
         # 3.
         moving = np.flatnonzero((slip > 0.0) | (overstress > JOIN_RTOL * scale))
-        operations += moving.size**3
+        operations += moving.size**3 + nodes**2
         force = np.maximum(overstress[moving], 0.0)
         if force.max(initial=0.0) < REST_RTOL * scale:
             return False
