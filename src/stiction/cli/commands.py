@@ -163,6 +163,11 @@ def run(
 
     Exit code 0: complete; 1: samples failed or the run could not continue; 2: errors in the study
     or the command; 130: interrupted.
+
+    \b
+    Examples:
+      stiction run study.toml --out run
+      stiction run study.toml --out run --part 3/100
     """
     import pandas as pd
 
@@ -191,6 +196,10 @@ def status(run: RunPath) -> None:
 
     Checksums find damage, not forgery. Exit code 0: complete; 1: samples are missing, failed or
     damaged, or the run cannot be read; 2: links, pipes or folders lie in place of its files.
+
+    \b
+    Examples:
+      stiction status run
     """
     from stiction.study.study import open_run
 
@@ -229,6 +238,11 @@ def export(
     A table (.csv) has one row for each sample and columns named `name (unit)`; it leaves out
     profiles along the interface and events. Exit code 1: samples are missing, and nothing is
     written; with --partial they are NaN.
+
+    \b
+    Examples:
+      stiction export run result.nc
+      stiction export run samples.csv --partial
     """
     from stiction.study.study import open_run
 
@@ -246,6 +260,10 @@ def report(
     """Write one self-contained HTML page: figures, tables, failures, the study and versions.
 
     Exit code 0: complete; 1: samples are missing, and the page is of those that are there.
+
+    \b
+    Examples:
+      stiction report run --out page.html
     """
     _ignore_local_style()
     from stiction.cli.report import write_report
@@ -265,7 +283,12 @@ def report(
 
 
 def example() -> None:
-    """Print a study to start from."""
+    """Print a study to start from.
+
+    \b
+    Examples:
+      stiction example > study.toml
+    """
     from importlib.resources import files
 
     echo(files("stiction.cli").joinpath("example.toml").read_text("utf-8").rstrip("\n"))
@@ -276,6 +299,10 @@ def check(study: StudyFile) -> None:
 
     All errors come at once, and the warnings of a run before its first sample. Files outside the
     study's folder that it reads are listed: their numbers go into the run.
+
+    \b
+    Examples:
+      stiction check study.toml
     """
     from stiction.ensemble.monte_carlo import check_run
     from stiction.study.study import read_with_files
@@ -396,6 +423,11 @@ def onset(
     or without x; on a plane it is .npy of shape (nx, ny). Values are in Pa and m unless the file
     states units, as in 'x (mm); strength (MPa)'. Every applicable method is used: that of the
     study with its options, the others with their defaults, and `rupture` at 2e7 Pa/s.
+
+    \b
+    Examples:
+      stiction onset study.toml --strength profile.csv --unit MPa --x-unit mm
+      stiction onset study.toml --strength scan.nc --method equilibrium --gaps fill
     """
     import pandas as pd
 
@@ -474,6 +506,11 @@ def rupture(
     and x) and a figure of the slip rate in space and time (PNG and PDF). The loading rate is that
     of the study's method `rupture`, else 2e7 Pa/s. On a specimen it is the event that slides,
     with a figure of the blocks.
+
+    \b
+    Examples:
+      stiction rupture study.toml --sample 3 --film
+      stiction rupture study.toml --strength profile.csv --out rupture
     """
     _ignore_local_style()
     from stiction import plot
@@ -556,6 +593,12 @@ def reliability(
     equally likely interfaces, and the band that holds 90 % of them is beside it. Rerunning the
     command resumes an interrupted run, and computes more if there are to be more repetitions.
     `stiction export` writes the curve as a table, `stiction report` a page with its figure.
+
+    \b
+    Examples:
+      stiction reliability study.toml --force 40e3
+      stiction reliability study.toml --probability 1e-3
+      stiction reliability study.toml --out curve --smallest 1e-6
     """
     from stiction.study.export import table_of
     from stiction.study.study import Study, open_run
@@ -673,37 +716,8 @@ def _command(function: Callable[..., None]) -> Callable[..., None]:
     return wrapped
 
 
-EXAMPLES: dict[Callable[..., None], tuple[str, ...]] = {
-    example: ("stiction example > study.toml",),
-    check: ("stiction check study.toml",),
-    run: (
-        "stiction run study.toml --out run",
-        "stiction run study.toml --out run --part 3/100",
-    ),
-    status: ("stiction status run",),
-    export: ("stiction export run result.nc", "stiction export run samples.csv --partial"),
-    report: ("stiction report run --out page.html",),
-    onset: (
-        "stiction onset study.toml --strength profile.csv --unit MPa --x-unit mm",
-        "stiction onset study.toml --strength scan.nc --method equilibrium --gaps fill",
-    ),
-    rupture: (
-        "stiction rupture study.toml --sample 3 --film",
-        "stiction rupture study.toml --strength profile.csv --out rupture",
-    ),
-    reliability: (
-        "stiction reliability study.toml --force 40e3",
-        "stiction reliability study.toml --probability 1e-3",
-        "stiction reliability study.toml --out curve --smallest 1e-6",
-    ),
-}
-"""Commands and calls that their help shows."""
-
-for _function, _calls in EXAMPLES.items():
-    app.command(
-        short_help=(_function.__doc__ or "").partition("\n\n")[0],
-        epilog="\b\nExamples:\n" + "\n".join(f"  {call}" for call in _calls),
-    )(_command(_function))
+for _function in (example, check, run, status, export, report, onset, rupture, reliability):
+    app.command(short_help=(_function.__doc__ or "").partition("\n\n")[0])(_command(_function))
 
 
 def main() -> None:
