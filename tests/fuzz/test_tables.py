@@ -24,12 +24,18 @@ NAMES = (("x", "strength"), ("Position", "tau_p"), ("pos", "peak_strength"))
 
 @strategies.composite
 def dialects(draw):
-    """How a table is written, all that may differ between two laboratories."""
+    """How a table is written, all that may differ between two laboratories.
+
+    Where points mark thousands, commas mark decimals, so that no comma separates columns.
+    """
     choose = lambda *options: draw(strategies.sampled_from(options))  # noqa: E731
+    mark = choose(".", ",")
+    thousands = choose("", "", "", *{".", ","} - {mark}, "'", " ", "\N{NARROW NO-BREAK SPACE}")
+    separators = (";", "\t") if thousands == "." else (";", "\t", ",", " ", "   ")
     return {
-        "separator": choose(";", "\t", ",", " ", "   "),
-        "mark": choose(".", ","),
-        "thousands": choose("", "", "", ".", ",", "'", " ", "\N{NARROW NO-BREAK SPACE}"),
+        "separator": choose(*separators),
+        "mark": mark,
+        "thousands": thousands,
         "digits": choose(0, 1, 3, 6),
         "encoding": choose("utf-8", "utf-8-sig", "cp1252", "utf-16"),
         "heading": choose(*HEADINGS),

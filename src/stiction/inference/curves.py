@@ -59,6 +59,8 @@ FEWEST = 8
 """Readings of a test."""
 BACK = 0.05
 """Share of its range by which travel may go back: more is another cycle."""
+ROUND_OFF = 1e-12
+"""Share of the largest force below which differences of readings are round-off."""
 STANDS = 1e-6
 """Share of the peak below which a fall is round-off, without any noise."""
 
@@ -110,11 +112,12 @@ class Curve:
     plateau_deviation: float
 
     def __str__(self) -> str:
+        count = self.drops.size.size
         text = (
             f"{self.name}: peak {in_words(self.unit, self.peak)} at"
-            f" {in_words(self.travel_unit, self.peak_travel)}, {self.drops.size.size} precursors"
+            f" {in_words(self.travel_unit, self.peak_travel)}, {count} precursor{'s' * (count != 1)}"
         )
-        if self.drops.size.size:
+        if count:
             first = in_words(self.unit, self.drops.force[0])
             text += f" from {first} on, of up to {in_words(self.unit, self.drops.size.max())}"
         after = f", plateau {in_words(self.unit, self.plateau)}" * math.isfinite(self.plateau)
@@ -213,7 +216,7 @@ def read_curve(
     >>> travel = np.linspace(0.0, 1e-3, 500)
     >>> force = np.minimum(2e5 * travel, 100.0) - 20.0 * (travel > 3e-4) - 10.0 * (travel > 8e-4)
     >>> print(st.read_curve((travel, force), unit="N", travel_unit="m"))
-    test: peak 80 N at 501 µm, 1 precursors from 59.9 N on, of up to 19.6 N, plateau 70 N, noise 0 N
+    test: peak 80 N at 501 µm, 1 precursor from 59.7 N on, of up to 19.6 N, plateau 70 N, noise 0 N
     """
     options = reading_options(missing, decimal, skip, sheet)
     tests: list[Curve] = []
@@ -414,10 +417,12 @@ def noise_of(force: Array) -> float:
     """Return the standard deviation of a reading (step 1)."""
     second = np.abs(force[:-2] - 2.0 * force[1:-1] + force[2:])
     steps = np.abs(np.diff(force))
-    # Steps of less than round-off are none.
-    steps = steps[steps > 1e-12 * np.abs(force).max()]
-    quantum = float(steps.min()) if steps.size and np.median(second) == 0.0 else 0.0
-    return max(1.4826 * float(np.median(second)) / math.sqrt(6.0), quantum / math.sqrt(12.0))
+    least = ROUND_OFF * float(np.abs(force).max())
+    if (middle := float(np.median(second))) > least:
+        return 1.4826 * middle / math.sqrt(6.0)
+    if np.median(steps) > least or steps.max() <= least:  # a straight line, or no change at all
+        return 0.0
+    return float(steps[steps > least].min()) / math.sqrt(12.0)
 
 
 def turning_points(force: Array, threshold: float) -> tuple[Any, Any]:

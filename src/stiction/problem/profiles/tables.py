@@ -466,7 +466,14 @@ def _decimal_mark(
             f"{first[',']}, and {first['.']}: two decimal marks; if points mark thousands, pass"
             " decimal=',', and decimal='.' if commas do"
         )
-    doubtful = {mark for mark in first if mark == "," or separator in (";", "\t")} - told
+    # Programs write the same number of decimals in a column; 980 above 1.020 is 1020.
+    bare = any(
+        any(map(str.isdigit, columns[i])) and any("." in cell for cell in columns[i])
+        for i in numeric
+    )
+    doubtful = {
+        mark for mark in first if mark == "," or separator in (";", "\t") or bare
+    } - told
     for mark in doubtful:
         (thousands,) = {".", ","} - {mark}
         raise InputError(
