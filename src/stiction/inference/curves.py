@@ -115,7 +115,9 @@ class Curve:
         count = self.drops.size.size
         text = (
             f"{self.name}: peak {in_words(self.unit, self.peak)} at"
-            f" {in_words(self.travel_unit, self.peak_travel)}, {count} precursor{'s' * (count != 1)}"
+            f" {in_words(self.travel_unit, self.peak_travel)}, {count} precursor"
+            + "s"
+            * (count != 1)
         )
         if count:
             first = in_words(self.unit, self.drops.force[0])
