@@ -30,6 +30,7 @@ from stiction.problem.friction import SCALES
 from stiction.problem.problem import Problem, refusals
 from stiction.problem.results import along
 from stiction.problem.sample import Sample
+from stiction.random.dotted_keys import with_values
 from stiction.random.equally_likely import as_random
 from stiction.random.stresses import (
     check_pressure,
@@ -177,14 +178,40 @@ class Experiment:
         """
         return self.problem.own_sample(profiles, optional_member(self.method, "accepts"))
 
+    def solve(self, draws: Array) -> tuple[dict[str, Array], Values]:
+        """Return profiles and results of draws, each with the constants of its interface."""
+        constants = getattr(self.random, "constants", ())
+        if not constants:
+            profiles = self.profiles(draws)
+            return profiles, self.onset(profiles)
+        variant = self.random.variant(draws)
+        parts, order = [], []
+        for number in np.unique(variant).tolist():
+            rows = np.flatnonzero(variant == number)
+            own = copy.copy(self)
+            problem = with_values(self.problem, constants[number], "problem")
+            object.__setattr__(own, "problem", problem)
+            profiles = own.profiles(draws[rows])
+            parts.append((profiles, own.onset(profiles)))
+            order.append(rows)
+        places = np.argsort(np.concatenate(order))
+        found = [
+            {
+                name: np.concatenate([one[k][name] for one in parts])[places]
+                for name in parts[0][k]
+            }
+            for k in (0, 1)
+        ]
+        return found[0], found[1]
+
     def prepare(self) -> Solver:
         """Return the prepared solver of the method, which is kept for the next call."""
         return _solver(self.problem, self.method)
 
     def results(self, first: int, count: int) -> Values:
         """Return all `variables` of samples from `first` on, solved without threads."""
-        profiles = self.profiles(self.draws(first, count))
-        return self.onset(profiles) | {name: profiles[name] for name in self.keep}
+        profiles, values = self.solve(self.draws(first, count))
+        return values | {name: profiles[name] for name in self.keep}
 
     @property
     def batch(self) -> int:

@@ -106,8 +106,8 @@ class LimitState:
         return stress if given.ndim == 2 else stress[0]
 
     def _stress(self, draws: Array) -> Array:
-        profiles = self.profiles(draws)
-        stress: Array = self.experiment.onset(profiles)[self.event]
+        profiles, values = self.experiment.solve(draws)
+        stress: Array = values[self.event]
         if self._random_pressure:
             pressure = profiles["normal_pressure"].reshape(draws.shape[0], -1).mean(axis=1)
             stress = stress * self.experiment.pressure / pressure
@@ -142,6 +142,8 @@ class LimitState:
     def bounds_of_members(self, negligible: float = 0.0) -> list[tuple[float, float]]:
         """Return the same for each of equally likely interfaces."""
         members = self.experiment.random.members
+        if getattr(self.experiment.random, "constants", ()):  # they move the bounds
+            return [(-math.inf, math.inf)] * len(members)
         return [self._bounds_of(member, negligible) for member in members]
 
     def _bounds_of(self, random: RandomInterface, negligible: float) -> tuple[float, float]:

@@ -41,6 +41,7 @@ from stiction.inference.whittle import SpectrumFamily, spectrum_of
 from stiction.inference.window import RecordWindow
 from stiction.problem.interface import Interface
 from stiction.problem.load import NotNegative
+from stiction.random.equally_likely import Uncertain, uncertain
 from stiction.random.fields import RandomField, RandomInterface
 from stiction.random.spectra import Share
 
@@ -244,6 +245,10 @@ class FieldFit:
         members = tuple(of_mean(RandomInterface(strength=one), mean) for one in fields)
         families = self._families or families_of(True)
         return Profiles(members, mean, levels, within, families, self._prior)
+
+    def uncertain(self, parameters: Mapping[str, Any]) -> Uncertain:
+        """Return this as a source with uncertain parameters, as of `stiction.uncertain`."""
+        return uncertain(self, parameters)
 
     def __str__(self) -> str:
         marginal = getattr(self.field.marginal, "type", "marginal").replace("_", " ")

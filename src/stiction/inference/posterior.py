@@ -16,6 +16,7 @@ from stiction.inference.peaks import Peaks
 from stiction.inference.prior import Prior
 from stiction.problem.problem import Problem
 from stiction.random.dotted_keys import full_key
+from stiction.random.equally_likely import Uncertain, uncertain
 from stiction.random.fields import RandomInterface
 from stiction.random.spectra import Share
 
@@ -141,6 +142,10 @@ class Posterior:
         total = self.u.shape[0]
         draws = np.random.default_rng([seed, 4]).choice(total, count, replace=count > total)
         return [self.at(int(draw))[1] for draw in draws]
+
+    def uncertain(self, parameters: Mapping[str, Any]) -> Uncertain:
+        """Return this as a source with uncertain parameters, as of `stiction.uncertain`."""
+        return uncertain(self, parameters)
 
     def prior_transform(self, u: Any) -> Array:
         """Return the parameters at points u of the unit cube, in which the prior is uniform.

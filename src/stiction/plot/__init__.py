@@ -10,7 +10,7 @@ pressure, friction coefficients are drawn too. `axes` and `style` are what all f
 `fields`, `specimens`, `ruptures`, `distributions` and `fits` draw a kind of result each.
 """
 
-from stiction.plot.distributions import failure_curve, monte_carlo, quantiles
+from stiction.plot.distributions import failure_curve, monte_carlo, quantiles, sensitivities
 from stiction.plot.fields import field, onset
 from stiction.plot.fits import agreement, fit
 from stiction.plot.ruptures import film, rupture
@@ -31,5 +31,6 @@ __all__ = [
     "precursors",
     "quantiles",
     "rupture",
+    "sensitivities",
     "specimen",
 ]

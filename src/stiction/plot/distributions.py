@@ -25,7 +25,7 @@ from stiction.plot.axes import (
     with_unit,
 )
 from stiction.plot.style import ACCENT, BAND, INK, PALE, QUIET, color, series
-from stiction.reliability.answer import bounded
+from stiction.reliability.answer import Answer, bounded
 from stiction.statistics.densities import density
 from stiction.statistics.estimates import quantiles as estimate_quantiles
 
@@ -347,4 +347,57 @@ def failure_curve(
             with suppress(InputError):  # a problem that exists in Python only: stresses alone
                 add_friction_scale(axes, problem_of(curve), "x", factor)
         axes.legend(loc="lower right")
+    return axes
+
+
+def sensitivities(design: Answer, *, ax: Axes | None = None) -> Axes:
+    """Draw what moves a design, the widest at the top.
+
+    Parameters
+    ----------
+    design : Answer
+        From `stiction.design_stress`, with `sensitivities`.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw on; new ones by default.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        Each bar reaches from the design at one end of a range to that at the other; the line is
+        the design, and the band its interval.
+
+    Raises
+    ------
+    InputError
+        If the answer has no `sensitivities`.
+    """
+    found = design.sensitivities
+    if not found.sizes.get("source"):
+        raise InputError(
+            "design: has no sensitivities; st.design_stress(..., sensitivities=True)"
+        )
+    quantity = "force" if np.isfinite(design.area) else "stress"
+    area = design.area if quantity == "force" else 1.0
+    ends = np.stack([found[f"{quantity}_at_low"].values, found[f"{quantity}_at_high"].values])
+    factor, unit = unit_for("N" if quantity == "force" else "Pa", ends.ravel())
+    place = np.arange(ends.shape[1])[::-1]
+    with on_axes(ax) as axes:
+        axes.axvspan(
+            *(end * area * factor for end in design.interval), color=BAND, linewidth=0.0
+        )
+        axes.axvline(design.stress * area * factor, color=INK, linewidth=0.8)
+        low, high = np.sort(ends, axis=0) * factor
+        axes.barh(place, high - low, left=low, height=0.5, color=color(1))
+        for number, (one, other) in enumerate(ends.T * factor):
+            left, right = ("low", "high") if one <= other else ("high", "low")
+            for at, name, side in (
+                (min(one, other), left, "right"), (max(one, other), right, "left")
+            ):  # fmt: skip
+                text = f" {found[name].values[number]} "
+                axes.text(at, place[number], text, ha=side, va="center", fontsize=7)
+        axes.set_yticks(
+            place, [str(name).removeprefix("problem.") for name in found.source.values]
+        )
+        axes.set_xlabel(with_unit(f"design {quantity}", unit))
+        axes.margins(x=0.25)
     return axes

@@ -1,6 +1,6 @@
 """Several equally likely random interfaces as one: which of them holds is one more draw."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import (
@@ -19,9 +19,10 @@ from pydantic import BeforeValidator
 from scipy.special import ndtr, ndtri
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError
+from stiction.base.errors import InputError, prefixed
 from stiction.base.model import describe
 from stiction.problem.interface import Interface
+from stiction.random.dotted_keys import distributions_of, full_key, with_values
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface, layout
 from stiction.random.synthesis import SAMPLES_PER_BLOCK, Stream
 
@@ -30,6 +31,8 @@ MEMBER_STREAM = Stream(2000, SAMPLES_PER_BLOCK, np.arange(0), mean_mode=True)
 MAX_DRAWS_OF_STREAM = 1 << 40
 """More than any stream has."""
 
+VARIANTS = 40
+"""Values of each uncertain constant of the problem."""
 FIRST_MEMBERS, MAX_MEMBERS = 1_000, 8_000
 """Members that are drawn from a source at first, and at most."""
 
@@ -80,6 +83,7 @@ class EquallyLikely:
     source: Source | None = None  # that they were drawn from
     complete: bool = False  # they are all there are, and no sample of more
     fields: tuple[int, ...] = ()  # number of each member's field within, all of one mean
+    constants: tuple[Mapping[str, float], ...] = ()  # of the problem, taken in turn by members
 
     def __post_init__(self) -> None:
         if not self.members:
@@ -123,7 +127,9 @@ class EquallyLikely:
         """A number for each member, the same for those whose strengths are in proportion."""
         known: dict[Any, int] = {}
         strengths = [member.strength for member in self.members]
-        return np.array(self.fields or [known.setdefault(s, len(known)) for s in strengths])
+        fields = np.array(self.fields or [known.setdefault(s, len(known)) for s in strengths])
+        variants = max(len(self.constants), 1)
+        return fields * variants + np.arange(fields.size) % variants
 
     @cached_property
     def means(self) -> Array:
@@ -150,6 +156,18 @@ class EquallyLikely:
         count = len(self.members)
         place = np.argsort(self.order) if self.order else np.arange(count)
         draws[rows, 0] = ndtri((place[members] + 0.5) / count)
+
+    def uncertain(self, parameters: Mapping[str, Any]) -> "Uncertain":
+        """Return this as a source with uncertain parameters, as of `stiction.uncertain`."""
+        return uncertain(self, parameters)
+
+    def variant(self, draws: Array) -> NDArray[np.int64]:
+        """Return the number of the constants of each sample."""
+        return self.member(draws) % max(len(self.constants), 1)
+
+    def interfaces(self, count: int, seed: int = 0) -> list[RandomInterface]:
+        """Return so many members, again from the first after the last."""
+        return [self.members[number % len(self.members)] for number in range(count)]
 
     def larger(self, count: int, seed: int) -> "EquallyLikely":
         """Return as many members from the same source."""
@@ -226,7 +244,91 @@ def drawn_from(source: Source, count: int, seed: int) -> EquallyLikely:
     """Return so many equally likely interfaces from a source, grouped by field if it knows."""
     grouped = getattr(source, "grouped", None)
     members, fields = grouped(count, seed) if grouped else (source.interfaces(count, seed), ())
-    return EquallyLikely(tuple(members), source=source, fields=tuple(fields))
+    constants = source.constants(seed) if isinstance(source, Uncertain) else ()
+    return EquallyLikely(
+        tuple(members), source=source, fields=tuple(fields), constants=tuple(constants)
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertain:
+    """A source with distributions of parameters of what is random, and of the problem."""
+
+    given: Any  # a random interface, several, or a source
+    laws: Mapping[str, Any]  # by full key
+
+    def grouped(self, count: int, seed: int) -> tuple[list[RandomInterface], Sequence[int]]:
+        """Return equally likely interfaces, and the number of the field within each if known."""
+        given = as_random(self.given, seed)
+        source = given.source if isinstance(given, EquallyLikely) else None
+        likely = drawn_from(source, count, seed) if source else given
+        members = [likely.members[number % len(likely.members)] for number in range(count)]
+        keys = [key for key in self.laws if not key.startswith("problem.")]
+        if not keys:
+            numbers = getattr(likely, "groups", np.zeros(1, np.int64))
+            return members, [int(numbers[n % len(numbers)]) for n in range(count)]
+        rows = hypercube({key: self.laws[key] for key in keys}, count, seed)
+        pairs = zip(members, rows, strict=True)
+        return [
+            with_values(member, {k.removeprefix("random."): v for k, v in row.items()})
+            for member, row in pairs
+        ], ()
+
+    def interfaces(self, count: int, seed: int = 0) -> list[RandomInterface]:
+        """Return so many equally likely interfaces; constants of the problem are left out."""
+        return self.grouped(count, seed)[0]
+
+    def constants(self, seed: int) -> list[dict[str, float]]:
+        """Return values of the constants of the problem, by keys without ``problem.``."""
+        keys = [key for key in self.laws if key.startswith("problem.")]
+        laws = {key.removeprefix("problem."): self.laws[key] for key in keys}
+        return hypercube(laws, VARIANTS, seed + 1) if keys else []
+
+
+def uncertain(random: Any, parameters: Mapping[str, Any]) -> Uncertain:
+    """Make parameters uncertain: of what is random, and constants of the problem.
+
+    Parameters
+    ----------
+    random : RandomInterface, RandomField, list of them, FieldFit or Posterior
+        What is random otherwise.
+    parameters : mapping
+        Distributions by dotted key, such as ``"problem.friction.residual_ratio"``,
+        ``"problem.load.pressing_force"`` or ``"strength.spectrum.correlation_length"``, as in
+        `RandomInterface.uncertain`. They are independent.
+
+    Returns
+    -------
+    Uncertain
+        For `design_stress`, `failure_probability` and wherever a fit is taken. Constants of the
+        problem have forty values, evenly spread over their distributions.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=256)
+    >>> strength = st.paper.strength(problem, correlation_ratio=1.0)
+    >>> source = st.uncertain(strength, {"problem.friction.weakening_rate": (4e12, 6e12)})
+    >>> len(source.constants(seed=0))
+    40
+    """
+    with prefixed("uncertain"):
+        laws = {full_key(k): law for k, law in distributions_of(parameters).items()}
+        if not laws:
+            raise InputError("must map keys to distributions, got none")
+        if wrong := [k for k in laws if k.startswith("problem.interface.")]:
+            raise InputError(f"{wrong[0]}: samples are drawn on one interface; sweep over it")
+    as_random(random)  # refuses what is none
+    return Uncertain(random, laws)
+
+
+def hypercube(laws: Mapping[str, Any], count: int, seed: int) -> list[dict[str, float]]:
+    """Return values of independent distributions, one in every interval of probability 1/count."""
+    rng = np.random.default_rng([seed, 6])
+    cells = rng.permuted(np.tile(np.arange(count), (len(laws), 1)), axis=1)
+    shares = (cells + rng.random(cells.shape)) / count
+    rows = [law.ppf(share) for law, share in zip(laws.values(), shares, strict=True)]
+    return [dict(zip(laws, values, strict=True)) for values in np.transpose(rows).tolist()]
 
 
 def as_random(

@@ -129,6 +129,12 @@ class Answer:
         From `failure_probability`: some samples of the failure set over ('sample', 'x'),
         drawn with its distribution: `strength` (and what else is random),
         `critical_stress`, `critical_position`, ...
+    sensitivities : xarray.Dataset
+        Of `design_stress`: what moves the design, over 'source', the widest first: the setting
+        at either end (`low`, `high`) and `force_at_low`, `force_at_high`, N, and the same of the
+        stress, Pa. Attributes ``stress by ...`` are of each family of the factor between
+        specimens. ``sensitivities.to_dataframe().to_csv(path)`` writes a file, and
+        `stiction.plot.sensitivities` draws it.
     of_stress : bool
         Whether the stress is estimated, as by `design_stress`, or the probability.
     quantity : str
@@ -152,6 +158,7 @@ class Answer:
     area: float = math.nan
     members: Array = field(default_factory=lambda: np.zeros(0), repr=False)
     failing_profiles: xr.Dataset = field(default_factory=xr.Dataset, repr=False)
+    sensitivities: xr.Dataset = field(default_factory=xr.Dataset, repr=False)
     of_stress: bool = False
     quantity: str = "stress"
 
@@ -234,7 +241,37 @@ class Answer:
             result += f" (c.o.v. by the list {self.members_cv:.2g}, by sampling {sampled:.2g})"
         if self.algorithm == "exact":
             return f"{result}; {self.reason}"
-        return f"{result}; {self.algorithm}, {self.evaluations} evaluations"
+        result += f"; {self.algorithm}, {self.evaluations} evaluations"
+        return "\n".join([result, *self._moved()])
+
+    def _moved(self) -> list[str]:
+        """Return what moves a design, as lines."""
+        found = self.sensitivities
+        if not found.sizes.get("source"):
+            return []
+        unit = "Pa" if math.isnan(self.area) else "N"
+        area = 1.0 if math.isnan(self.area) else self.area
+        lines = [
+            "  the interval holds the error of the computation only; what moves the design:",
+            *(
+                f"    {name}: {low} to {high}: {in_words(unit, area * one)} to"
+                f" {in_words(unit, area * other)}"
+                for name, low, high, one, other in zip(
+                    found.source.values, found.low.values, found.high.values,
+                    found.stress_at_low.values, found.stress_at_high.values, strict=True,
+                )
+            ),
+        ]  # fmt: skip
+        families = [
+            f"{name.removeprefix('stress by ')} {in_words(unit, area * value)}"
+            for name, value in found.attrs.items()
+            if name.startswith("stress by ")
+        ]
+        if len(families) > 1:
+            lines.append(
+                f"    by family of the factor between specimens: {', '.join(families)}"
+            )
+        return lines
 
 
 def band_of(members: Array) -> tuple[float, float]:

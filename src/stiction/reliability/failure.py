@@ -38,6 +38,7 @@ from stiction.reliability.answer import (
 )
 from stiction.reliability.counting import count_failures
 from stiction.reliability.factors import Counts, count_tail
+from stiction.reliability.sensitivities import sensitivities as sensitivities_of
 from stiction.reliability.tail import Goal, Tail, sample_curve, sample_tail
 from stiction.reliability.uncertainty import binomial_interval, generator, lognormal_interval
 
@@ -409,6 +410,7 @@ def design_stress(
     max_evaluations: Budget | None = None,
     event: StressName = "critical_stress",
     mixture: Flag = False,
+    sensitivities: Flag | dict[str, tuple[Real, Real]] | None = None,
     workers: Count | None = None,
     progress: Progress = True,
 ) -> Answer:
@@ -425,13 +427,19 @@ def design_stress(
         is refused unless `max_evaluations` is 20,000 or more.
     target_cv : float
         Coefficient of variation to reach, of the failure probability at the stress.
+    sensitivities : bool or mapping, optional
+        Whether to compute what moves the design: by default if `random` is a fit, a posterior
+        or `uncertain`. A mapping of dotted keys of the problem to ranges, such as
+        ``{"problem.friction.residual_ratio": (0.6, 0.8)}``, replaces the usual 10 % on either
+        side.
     problem, random, seed, max_evaluations, event, mixture, workers, progress
         As in `failure_probability`.
 
     Returns
     -------
     Answer
-        With `stress` and its 95 % `interval`, Pa.
+        With `stress` and its 95 % `interval`, Pa, which holds the error of the computation, and
+        `sensitivities`.
 
     Raises
     ------
@@ -457,6 +465,12 @@ def design_stress(
     def solve(experiment: Experiment, meter: Meter) -> Answer:
         state, budget = prepare(experiment, event, workers, meter, max_evaluations)
         found = _quantile(state, probability, target_cv, budget)
+        source = getattr(experiment.random, "source", None)
+        wanted = source is not None if sensitivities is None else bool(sensitivities)
+        if wanted and math.isfinite(found.stress):
+            stated = sensitivities if isinstance(sensitivities, dict) else {}
+            moved = sensitivities_of(state, probability, found.stress, stated)
+            found = replace(found, sensitivities=moved)
         return replace(found, quantity="stress" if math.isnan(found.area) else "force")
 
     experiment = Experiment(problem, as_random(random, seed, mixture), method, seed=seed)

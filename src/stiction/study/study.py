@@ -45,7 +45,7 @@ from stiction.methods.protocol import METHODS, as_method
 from stiction.problem.problem import Problem
 from stiction.problem.profiles.reading import ProfileFile, profile_in_file
 from stiction.random.dotted_keys import with_values
-from stiction.random.equally_likely import as_random
+from stiction.random.equally_likely import as_random, drawn_from, uncertain
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 from stiction.reliability.answer import Answer, Probability, TargetCv
 from stiction.reliability.failure import design_stress, failure_probability
@@ -125,7 +125,9 @@ class Question:
         options |= {"method": experiment.method, "seed": experiment.seed, "workers": workers}
         options["mixture"] = getattr(experiment.random, "complete", False)
         ask = failure_probability if self.probability is None else design_stress
-        return ask(experiment.problem, experiment.given, **options)
+        if self.probability is not None:
+            options["sensitivities"] = True
+        return ask(experiment.problem, experiment.random, **options)
 
 
 @model(kw_only=True)
@@ -272,7 +274,7 @@ class Study(_Parts):
             raise InputError("mixture: interfaces of [uncertain] are a sample; leave it out")
         return as_random(random, mixture=True)
 
-    def _likely(self, random: Any) -> list[RandomInterface]:
+    def _likely(self, random: Any) -> Any:
         """Return the equally likely interfaces of uncertain parameters."""
         parameters = dict(self.uncertain)
         count = parameters.pop("count")
@@ -280,14 +282,11 @@ class Study(_Parts):
         swept = [
             key for key in parameters if any(f"{key}.".startswith(f"{axis}.") for axis in axes)
         ]
-        if swept or isinstance(random, list):
-            raise InputError(
-                f"uncertain: {swept[0]} is swept, too; take it out of one of them"
-                if swept
-                else "uncertain: random is a list of equally likely interfaces already"
-            )
-        likely: list[RandomInterface] = random.uncertain(parameters, count, self.ensemble.seed)
-        return likely
+        if swept:
+            raise InputError(f"uncertain: {swept[0]} is swept, too; take it out of one of them")
+        if isinstance(random, list) or any(key.startswith("problem.") for key in parameters):
+            return drawn_from(uncertain(random, parameters), count, self.ensemble.seed)
+        return random.uncertain(parameters, count, self.ensemble.seed)
 
     @property
     def axes(self) -> GridAxes:

@@ -1,0 +1,104 @@
+"""What moves a design, and constants of the problem that are uncertain."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import scipy.stats
+from refusals import refuses
+
+import stiction as st
+
+PROBLEM = st.Problem(
+    st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
+    st.Interface(0.05, 64, width=0.01),
+    st.LinearWeakening(weakening_rate=0.25e12, residual_ratio=0.4),
+    load=st.Load(normal_pressure=5e6),
+)
+FIELD = st.RandomField(
+    st.Gamma(mean=0.2, cv=0.15), st.PowerLawSpectrum(4e-3), of="friction_coefficient",
+    mean_mode=True,
+)  # fmt: skip
+RANDOM = st.RandomInterface(strength=FIELD, between={"strength": st.Lognormal(mean=1, cv=0.1)})
+GIVEN = {"method": st.LocalCriterion(), "progress": False, "target_cv": 0.2}
+PRESSURE = "problem.load.normal_pressure"
+
+
+def test_a_design_is_in_proportion_to_the_pressure():
+    """Stated ends count, the others are 10 % off; common draws make the ratios exact."""
+    families = (st.Lognormal, st.Weibull)
+    likely = [
+        dataclasses.replace(RANDOM, between={"strength": kind(mean=1.0, cv=0.12)})
+        for kind in families
+    ]
+    design = st.design_stress(
+        PROBLEM, likely, probability=1e-2, mixture=True, sensitivities=True, **GIVEN
+    )
+    found = design.sensitivities.sel(source=PRESSURE)
+    assert float(found.stress_at_low) == pytest.approx(0.9 * design.stress, rel=1e-6)
+    assert float(found.force_at_high) == pytest.approx(1.1 * design.force, rel=1e-6)
+    stated = {PRESSURE: (4e6, 8e6)}
+    given = GIVEN | {"sensitivities": stated, "probability": 1e-2}
+    wide = st.design_stress(PROBLEM, RANDOM, **given)
+    ends = wide.sensitivities.sel(source=PRESSURE)
+    assert float(ends.stress_at_high / ends.stress_at_low) == pytest.approx(2.0, rel=1e-6)
+    assert wide.sensitivities.source.values[0] == PRESSURE  # the widest
+    # The Weibull family has the heavier lower tail; the answer names both, and what it covers.
+    by = {k: v for k, v in design.sensitivities.attrs.items() if k.startswith("stress by")}
+    assert by["stress by weibull"] < design.stress < by["stress by lognormal"]
+    text = str(design)
+    assert "the error of the computation only" in text
+    assert "weibull to lognormal" in text
+    assert st.plot.sensitivities(design).get_yticklabels()[-1].get_text()
+    refuses(
+        "sensitivities: problem.load.weight: is no constant",
+        lambda: st.design_stress(
+            PROBLEM, RANDOM, **given | {"sensitivities": {"problem.load.weight": (1, 2)}}
+        ),
+    )
+    plain = st.design_stress(PROBLEM, RANDOM, probability=1e-2, **GIVEN)
+    refuses("has no sensitivities", lambda: st.plot.sensitivities(plain))
+
+
+@pytest.mark.parametrize("several", [False, True], ids=["field", "list"])
+def test_an_uncertain_pressure_is_one_more_factor(several):
+    """The probability is an integral over pressure, factor and 5,000 onsets of the field."""
+    law = scipy.stats.lognorm(0.15, scale=5e6)
+    given = [RANDOM, RANDOM] if several else RANDOM
+    source = st.uncertain(given, {PRESSURE: law})
+    demand = 0.72e6
+    found = st.failure_probability(PROBLEM, source, demand, seed=2, **GIVEN)
+    inner = st.monte_carlo(
+        PROBLEM, FIELD, method=GIVEN["method"], samples=5000, pilot=False, progress=False
+    )
+    shares = (np.arange(200) + 0.5) / 200
+    at = demand * 5e6 / law.ppf(shares)[:, None] / inner.critical_stress.values
+    exact = RANDOM.between["strength"].distribution.cdf(at).mean()
+    assert np.log(found.probability / exact) == pytest.approx(0.0, abs=4.0 * found.cv)
+    assert len(source.constants(0)) == 40
+
+
+def test_a_study_has_uncertain_constants():
+    table = {"count": 50, PRESSURE: [4e6, 6e6]}
+    study = st.Study(
+        problem=PROBLEM, random=RANDOM, method=GIVEN["method"], ensemble=st.Ensemble(samples=20),
+        uncertain=table, reliability={"probability": 1e-2, "target_cv": 0.3},
+    )  # fmt: skip
+    (point,) = study.experiments
+    design = study.reliability.answer(point)
+    ends = design.sensitivities.sel(source=PRESSURE)
+    assert [float(ends.low), float(ends.high)] == pytest.approx([4.1e6, 5.9e6])
+    fixed = dataclasses.replace(study, uncertain=None)
+    stress = study.run(progress=False, pilot=False).critical_stress
+    own = fixed.run(progress=False, pilot=False).critical_stress
+    ratio = (stress / own).values
+    assert 0.8 < ratio.min() < 0.9
+    assert 1.1 < ratio.max() < 1.2
+
+
+def test_what_uncertain_refuses():
+    refuses("uncertain: problem.interface.length", lambda: st.uncertain(
+        RANDOM, {"problem.interface.length": (0.1, 0.2)}
+    ))  # fmt: skip
+    refuses("uncertain: must map keys", lambda: st.uncertain(RANDOM, {}))
+    refuses("random: must be", lambda: st.uncertain(3, {PRESSURE: (1e6, 2e6)}))
