@@ -192,12 +192,6 @@ class FieldFit:
 
     def grouped(self, count: int, seed: int) -> tuple[list[RandomInterface], list[int]]:
         """Return equally likely interfaces, and the number of the field within each."""
-        if self.quantity not in ("strength", "friction_coefficient"):
-            raise InputError(
-                f"interfaces: need a strength, and the fit is of {self.quantity}; fit one of"
-                " quantity='strength' or 'friction_coefficient', or put the `repetitions` of this"
-                " into random interfaces of your own"
-            )
         chosen = self._chosen(count, seed)
         place = {own: number for number, own in enumerate(self._every)}
         numbers = [place[field] for field in chosen]
@@ -208,6 +202,12 @@ class FieldFit:
 
     def _chosen(self, count: int, seed: int) -> list[RandomField]:
         """Return likely fields, of each family in proportion to its weight."""
+        if self.quantity not in ("strength", "friction_coefficient"):
+            raise InputError(
+                f"interfaces: need a strength, and the fit is of {self.quantity}; fit one of"
+                " quantity='strength' or 'friction_coefficient', or put the `repetitions` of this"
+                " into random interfaces of your own"
+            )
         rng = np.random.default_rng([seed, 5])
         ends = np.cumsum([one.weight for one in self.families.values() if one.weight > 0.0])
         places = (rng.random() + EVENLY * np.arange(count)) % 1.0 * ends[-1]
