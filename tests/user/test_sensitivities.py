@@ -5,22 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 import scipy.stats
+from joint import GIVEN, PROBLEM, RANDOM
 from refusals import refuses
 
 import stiction as st
 
-PROBLEM = st.Problem(
-    st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
-    st.Interface(0.05, 64, width=0.01),
-    st.LinearWeakening(weakening_rate=0.25e12, residual_ratio=0.4),
-    load=st.Load(normal_pressure=5e6),
-)
-FIELD = st.RandomField(
-    st.Gamma(mean=0.2, cv=0.15), st.PowerLawSpectrum(4e-3), of="friction_coefficient",
-    mean_mode=True,
-)  # fmt: skip
-RANDOM = st.RandomInterface(strength=FIELD, between={"strength": st.Lognormal(mean=1, cv=0.1)})
-GIVEN = {"method": st.LocalCriterion(), "progress": False, "target_cv": 0.2}
 PRESSURE = "problem.load.normal_pressure"
 
 
@@ -69,7 +58,12 @@ def test_an_uncertain_pressure_is_one_more_factor(several):
     demand = 0.72e6
     found = st.failure_probability(PROBLEM, source, demand, seed=2, **GIVEN)
     inner = st.monte_carlo(
-        PROBLEM, FIELD, method=GIVEN["method"], samples=5000, pilot=False, progress=False
+        PROBLEM,
+        RANDOM.strength,
+        method=GIVEN["method"],
+        samples=5000,
+        pilot=False,
+        progress=False,
     )
     shares = (np.arange(200) + 0.5) / 200
     at = demand * 5e6 / law.ppf(shares)[:, None] / inner.critical_stress.values

@@ -570,6 +570,9 @@ def reliability(
         Path | None,
         Option(metavar="RUN", help="Compute the curve; repetitions are stored in this folder."),
     ] = None,
+    page: Annotated[
+        Path | None, Option(metavar="HTML", help="Write the design as a page to file.")
+    ] = None,
     smallest: Annotated[
         float | None, Option(help="Smallest probability of the curve; 1e-9 by default.")
     ] = None,
@@ -584,8 +587,9 @@ def reliability(
 
     One line answers at each point of the sweep: to `--force`, `--stress` or
     `--friction-coefficient` with a probability, to `--probability` with the design; without an
-    option, to the table [reliability] of the study. With `--out` it is the whole curve, decade by
-    decade.
+    option, to the table [reliability] of the study. `--page` writes a design as a page that prints
+    on A4: characteristic value, partial factor, inputs, doubts and what moves it. With `--out` it
+    is the whole curve, decade by decade.
 
     Problem, strength, method, seed and sweep come from the study file; its number of samples is
     not used. The stress is the mean shear stress on the interface; failure means that the
@@ -618,8 +622,10 @@ def reliability(
             raise InputError(
                 f"{_options_of(given)}: of a whole curve; give its folder by --out"
             )
-        _answer(loaded, asked, workers)
+        _answer(loaded, asked, workers, page)
         return
+    if page is not None:
+        asked["page"] = 0.0
     if asked:
         raise InputError(f"--out: is for the whole curve; leave it or {_options_of(asked)} out")
     with _resumable(out), _executor(scheduler) as executor:
@@ -646,7 +652,9 @@ def _options_of(names: Iterable[str]) -> str:
     return ", ".join(f"--{name.replace('_', '-')}" for name in names)
 
 
-def _answer(study: Any, asked: dict[str, float], workers: int | None) -> None:
+def _answer(
+    study: Any, asked: dict[str, float], workers: int | None, page: Path | None = None
+) -> None:
     """Print the answer to what was asked, or else to the question of the study, at each point."""
     from stiction.study.study import Question
 
@@ -665,7 +673,16 @@ def _answer(study: Any, asked: dict[str, float], workers: int | None) -> None:
         )
     for point, experiment in zip(study.points, study.experiments, strict=True):
         where = f"{point}: " if point.values else ""
-        echo(f"{where}{question.answer(experiment, workers)}")
+        answer = question.answer(experiment, workers)
+        echo(f"{where}{answer}")
+        if page is not None:
+            from stiction.cli.design_page import write_design_page
+
+            number = f"_{point.number}" if point.values else ""
+            path = page.with_stem(page.stem + number)
+            title = study.title or "Design of a joint"
+            write_design_page(answer, path, problem=experiment.problem, title=title)
+            echo(f"page: {path}")
 
 
 # -- the program ---------------------------------------------------------------------------------

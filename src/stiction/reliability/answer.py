@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from pydantic import Field
+from scipy.special import ndtri
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, collect_warnings, warn_accuracy
@@ -135,6 +136,13 @@ class Answer:
         stress, Pa. Attributes ``stress by ...`` are of each family of the factor between
         specimens. ``sensitivities.to_dataframe().to_csv(path)`` writes a file, and
         `stiction.plot.sensitivities` draws it.
+    characteristic_stress, confidence : float
+        Of `design_stress`, where specimens were counted: the stress below which 5 % of the
+        specimens slide, with this confidence (EN 1990: 75 %), Pa; NaN otherwise. It is a quantile
+        over equally likely interfaces.
+    partial_factor, reliability_index : float
+        `characteristic_stress` over `stress`, and the quantile of the normal distribution for the
+        probability, with its sign changed.
     of_stress : bool
         Whether the stress is estimated, as by `design_stress`, or the probability.
     quantity : str
@@ -159,6 +167,8 @@ class Answer:
     members: Array = field(default_factory=lambda: np.zeros(0), repr=False)
     failing_profiles: xr.Dataset = field(default_factory=xr.Dataset, repr=False)
     sensitivities: xr.Dataset = field(default_factory=xr.Dataset, repr=False)
+    characteristic_stress: float = math.nan
+    confidence: float = 0.75
     of_stress: bool = False
     quantity: str = "stress"
 
@@ -192,6 +202,16 @@ class Answer:
     def force(self) -> float:
         """`stress` times the area of the interface, N; NaN where that is unknown."""
         return self.stress * self.area
+
+    @property
+    def partial_factor(self) -> float:
+        """Characteristic value over the design value."""
+        return self.characteristic_stress / self.stress
+
+    @property
+    def reliability_index(self) -> float:
+        """Index beta, for which the normal distribution has the probability below -beta."""
+        return -float(ndtri(self.probability))
 
     @property
     def band(self) -> tuple[float, float]:

@@ -38,6 +38,8 @@ from stiction.reliability.uncertainty import generator
 
 FACTORS = 128
 """Specimens for each solved sample."""
+CHARACTERISTIC = 0.05
+"""Share of the specimens below the characteristic value."""
 FIRST, MOST_STEP = 500, 8_000
 """Samples that are solved at first, and most that are solved in one step."""
 MARGIN = 1.1
@@ -88,6 +90,31 @@ class Counts(NamedTuple):
             found[new, column] = ndtri(shares[new])
             random.select(found, np.where(new)[0], self.members.ravel()[picks][new])
         return found
+
+    def characteristic(self, confidence: float) -> float:
+        """Return the 5 % quantile that this share of the interfaces exceeds, Pa.
+
+        Onsets of an interface are those of a mean and a factor of 1 in its group, times its mean
+        and factors at equal shares of its law.
+        """
+        random = self.state.experiment.random
+        if not np.isfinite(self.shares).any():
+            return float(np.quantile(self.values, CHARACTERISTIC))
+        laws, law = random.factor_laws
+        first = self.members[:, 0]
+        ratios = self.values[:, 0] / random.means[first]
+        for number in np.unique(law[first]):
+            rows = np.flatnonzero(law[first] == number)
+            ratios[rows] /= laws[number].distribution.ppf(self.shares[rows, 0])
+        steps = (np.arange(FACTORS) + 0.5) / FACTORS
+        factors = np.array([one.distribution.ppf(steps) for one in laws])
+        found = []
+        for number, group in enumerate(random.groups):
+            own = ratios[random.groups[first] == group]
+            if own.size:
+                values = random.means[number] * np.outer(own, factors[law[number]])
+                found.append(np.quantile(values, CHARACTERISTIC))
+        return float(np.quantile(found, 1.0 - confidence))
 
     def lowest(self, stress: float, count: int) -> tuple[Array, Array]:
         """Return draws and onsets of some of the lowest specimens, half of them below a stress."""

@@ -20,6 +20,7 @@ from stiction.methods.protocol import MethodObject, label
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset
 from stiction.random.equally_likely import AnyRandom, as_random
+from stiction.random.spectra import Share
 from stiction.reliability.answer import (
     SAMPLED,
     Answer,
@@ -410,6 +411,7 @@ def design_stress(
     max_evaluations: Budget | None = None,
     event: StressName = "critical_stress",
     mixture: Flag = False,
+    confidence: Share = 0.75,
     sensitivities: Flag | dict[str, tuple[Real, Real]] | None = None,
     workers: Count | None = None,
     progress: Progress = True,
@@ -427,6 +429,8 @@ def design_stress(
         is refused unless `max_evaluations` is 20,000 or more.
     target_cv : float
         Coefficient of variation to reach, of the failure probability at the stress.
+    confidence : float
+        Of the `characteristic_stress`.
     sensitivities : bool or mapping, optional
         Whether to compute what moves the design: by default if `random` is a fit, a posterior
         or `uncertain`. A mapping of dotted keys of the problem to ranges, such as
@@ -464,7 +468,7 @@ def design_stress(
 
     def solve(experiment: Experiment, meter: Meter) -> Answer:
         state, budget = prepare(experiment, event, workers, meter, max_evaluations)
-        found = _quantile(state, probability, target_cv, budget)
+        found = _quantile(state, probability, target_cv, budget, confidence)
         source = getattr(experiment.random, "source", None)
         wanted = source is not None if sensitivities is None else bool(sensitivities)
         if wanted and math.isfinite(found.stress):
@@ -477,7 +481,9 @@ def design_stress(
     return _answered(experiment, target_cv, "design_stress", progress, solve)
 
 
-def _quantile(state: LimitState, probability: float, target_cv: float, budget: int) -> Answer:
+def _quantile(
+    state: LimitState, probability: float, target_cv: float, budget: int, confidence: float
+) -> Answer:
     lowest = state.bounds[0]
     target_cv *= SAMPLED if state.is_sample else 1.0
     goal = Goal(target_cv, probability=probability)
@@ -517,6 +523,9 @@ def _quantile(state: LimitState, probability: float, target_cv: float, budget: i
             near = counted[0].lowest(found.stress, 2 * CHECKED)
         doubts += exact_doubts(state, near, found.stress, probability)
     interval = tail.stress_interval(probability, found.cv, lowest)
+    if counted:
+        asked["characteristic_stress"] = counted[0].characteristic(confidence)
+        asked["confidence"] = confidence
     return Answer.of(found, doubts, interval=interval, **asked)
 
 

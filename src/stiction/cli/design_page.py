@@ -1,0 +1,180 @@
+"""A design as one self-contained HTML page to file; it prints on A4."""
+
+import math
+from collections.abc import Mapping, Sequence
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from stiction import plot
+from stiction.base.errors import InputError
+from stiction.base.files import write_whole
+from stiction.base.model import FilePath, checked, to_plain
+from stiction.base.units import in_words
+from stiction.base.variables import UNITS
+from stiction.cli.report import Page
+from stiction.ensemble.batches import versions
+from stiction.plot.style import PAGE, paper_style
+from stiction.problem.problem import Problem
+from stiction.reliability.answer import Answer
+
+
+@checked
+def write_design_page(
+    design: Answer,
+    path: FilePath,
+    *,
+    problem: Problem,
+    evidence: Sequence[Any] = (),
+    sources: Mapping[str, str] | None = None,
+    title: str = "Design of a joint",
+) -> Path:
+    """Write a design as one HTML page: force, inputs with units, evidence, doubts, what moves it.
+
+    Parameters
+    ----------
+    design : Answer
+        From `stiction.design_stress`.
+    path : path
+        HTML file.
+    problem : Problem
+        That of the design; its constants are the inputs.
+    evidence : sequence
+        What the design rests on, as printed: a fit, a posterior, an agreement. Their doubts and
+        notes are listed as doubts.
+    sources : mapping, optional
+        Where each input comes from, by its dotted key, such as ``{"load.pressing_force":
+        "drawing 12"}``. Others are said to be assumed.
+    title : str
+
+    Returns
+    -------
+    path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If the answer is no design, or the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=256)
+    >>> strength = st.paper.strength(problem, correlation_ratio=1.0)
+    >>> design = st.design_stress(
+    ...     problem, strength, probability=1e-2, method=st.LocalCriterion(), target_cv=0.3
+    ... )
+    >>> page = st.write_design_page(
+    ...     design, Path(tempfile.mkdtemp()) / "design.html", problem=problem
+    ... )
+    >>> "reliability index" in page.read_text()
+    True
+    """
+    if not design.of_stress:
+        raise InputError("design: must come from st.design_stress, got a failure probability")
+    page = Page(title)
+    page.text(f"{date.today().isoformat()}; stiction, {versions()}.")
+    page.table("Design", ["quantity", "value"], _numbers(design))
+    page.text(
+        "The interval holds the error of the computation: sampling, and the list of equally likely"
+        " interfaces. Uncertainty of the parameters is in the force itself, which is for the mean"
+        " probability over all of them. Constants that were assumed are not in it: see below."
+    )
+    if design.sensitivities.sizes.get("source"):
+        with paper_style():
+            count = design.sensitivities.sizes["source"]
+            figure = Figure(figsize=(0.75 * PAGE, 1.2 + 0.3 * count), layout="constrained")
+            plot.sensitivities(design, ax=figure.subplots())
+            page.figure(figure, "What moves the design; the band is its interval.")
+        page.table("What moves the design", *_moves(design))
+    page.table("Inputs", ["input", "value", "unit", "source"], _inputs(problem, sources or {}))
+    doubts = [*design.warnings]
+    for item in evidence:
+        page.listing(f"Evidence: {type(item).__name__}", str(item))
+        doubts += [*getattr(item, "doubts", ()), *getattr(item, "notes", ())]
+    page.table("Doubts", ["doubt"], [[text] for text in doubts or ["none"]])
+    try:
+        write_whole(path, page.html().encode())
+    except OSError as error:
+        raise InputError(f"path: {path} cannot be written: {error.strerror}") from None
+    return path
+
+
+def _numbers(design: Answer) -> list[list[Any]]:
+    unit, area = ("Pa", 1.0) if math.isnan(design.area) else ("N", design.area)
+    low, high = (in_words(unit, area * end) for end in design.interval)
+    rows: list[list[Any]] = [
+        [
+            "design " + ("stress" if unit == "Pa" else "force"),
+            in_words(unit, area * design.stress),
+        ],
+        ["95 % interval of the computation", f"{low} to {high}"],
+        ["target probability of failure", f"{design.probability:g}"],
+        ["reliability index β", f"{design.reliability_index:.3g}"],
+    ]
+    if math.isfinite(design.characteristic_stress):
+        value = in_words(unit, area * design.characteristic_stress)
+        share = f"{100.0 * design.confidence:g}"
+        rows += [
+            [f"characteristic value (5 %, confidence {share} %)", value],
+            [
+                "partial factor (characteristic over design value)",
+                f"{design.partial_factor:.3g}",
+            ],
+        ]
+    rows += [["mean shear stress", in_words("Pa", design.stress)]]
+    if math.isfinite(design.friction_coefficient):
+        rows += [["friction coefficient", f"{design.friction_coefficient:.4g}"]]
+    return [*rows, ["algorithm", f"{design.algorithm}, {design.evaluations} evaluations"]]
+
+
+def _moves(design: Answer) -> tuple[list[str], list[list[str]]]:
+    found = design.sensitivities
+    unit, name = ("Pa", "stress") if math.isnan(design.area) else ("N", "force")
+    ends = found[f"{name}_at_low"].values, found[f"{name}_at_high"].values
+    rows = [
+        [str(source), str(low), str(high), in_words(unit, one), in_words(unit, other)]
+        for source, low, high, one, other in zip(
+            found.source.values, found.low.values, found.high.values, *ends, strict=True
+        )
+    ]
+    area = 1.0 if unit == "Pa" else design.area
+    rows += [
+        [
+            key.replace("stress by", "family of the factor:"),
+            "",
+            "",
+            in_words(unit, area * value),
+            "",
+        ]
+        for key, value in found.attrs.items()
+        if key.startswith("stress by")
+    ]
+    return ["source", "from", "to", f"{name} at the first", f"{name} at the second"], rows
+
+
+def _inputs(problem: Problem, sources: Mapping[str, str]) -> list[list[Any]]:
+    """Return the constants of a problem by dotted key, with units and sources."""
+    rows: list[list[Any]] = []
+
+    def add(table: Mapping[str, Any], begin: str) -> None:
+        for name, value in table.items():
+            key = f"{begin}{name}"
+            if isinstance(value, Mapping):
+                add(value, f"{key}.")
+            elif value is not None:
+                numbers = isinstance(value, list) and len(value) > 8
+                shown = f"{len(value)} values, mean {np.mean(value):.5g}" if numbers else value
+                rows.append([key, shown, UNITS.get(name, ""), sources.get(key, "assumed")])
+
+    add(to_plain(problem), "")
+    keys = {row[0] for row in rows}
+    if unknown := [key for key in sources if key not in keys]:
+        raise InputError(f"sources: {unknown[0]}: is no input; inputs are {', '.join(keys)}")
+    return rows

@@ -1,0 +1,88 @@
+"""The page of a design: its numbers, inputs, evidence and doubts, from Python and a command."""
+
+import numpy as np
+import pytest
+from joint import GIVEN, PROBLEM, RANDOM
+from refusals import refuses
+from scipy.stats import norm
+
+import stiction as st
+from stiction.cli.commands import app
+
+KEY = "problem.load.normal_pressure"
+
+
+def test_a_page_of_a_design(tmp_path):
+    """Characteristic value and partial factor by hand, where interfaces differ in the mean."""
+    design = st.design_stress(PROBLEM, RANDOM, probability=1e-3, sensitivities=True, **GIVEN)
+    assert design.reliability_index == pytest.approx(-norm.ppf(1e-3))
+    inner = st.monte_carlo(
+        PROBLEM,
+        RANDOM.strength,
+        method=GIVEN["method"],
+        samples=5000,
+        pilot=False,
+        progress=False,
+    ).critical_stress.values
+    law = RANDOM.between["strength"].distribution
+    levels = np.linspace(0.6e6, 0.9e6, 301)
+    below = [law.cdf(level / inner).mean() for level in levels]
+    # A single interface: the confidence does not count.
+    right = np.interp(0.05, below, levels)
+    assert design.characteristic_stress == pytest.approx(right, rel=0.01)
+    assert design.partial_factor == design.characteristic_stress / design.stress > 1.0
+    source = {"load.normal_pressure": "drawing 12"}
+    evidence = [st.Lognormal(mean=1.0, cv=0.1)]
+    path = st.write_design_page(
+        design, tmp_path / "design.html", problem=PROBLEM, evidence=evidence, sources=source,
+        title="Lap joint 7",
+    )  # fmt: skip
+    text = path.read_text(encoding="utf-8")
+    for words in (
+        "Lap joint 7", "reliability index", f"{design.partial_factor:.3g}", "drawing 12",
+        "assumed", "Evidence: Lognormal", KEY, "size: A4", "data:image/png",
+    ):  # fmt: skip
+        assert words in text, words
+    refuses(
+        "sources: load.weight: is no input",
+        lambda: st.write_design_page(
+            design, path, problem=PROBLEM, sources={"load.weight": "scales"}
+        ),
+    )
+    demand = st.failure_probability(PROBLEM, RANDOM, 0.7e6, **GIVEN)
+    refuses(
+        "design: must come from st.design_stress",
+        lambda: st.write_design_page(demand, path, problem=PROBLEM),
+    )
+    # More confidence asks for less: where means differ by 5 %, 95 % of them exceed it.
+    means = 0.2 * np.exp(0.05 * norm.ppf((np.arange(40) + 0.5) / 40))
+    likely = [
+        st.RandomInterface(
+            strength=st.RandomField(
+                st.Gamma(mean=mean, cv=0.15), RANDOM.strength.spectrum, of="friction_coefficient",
+                mean_mode=True,
+            ),
+            between=RANDOM.between,
+        )
+        for mean in means
+    ]  # fmt: skip
+    bold, careful = (
+        st.design_stress(PROBLEM, likely, probability=1e-2, confidence=share, **GIVEN)
+        for share in (0.5, 0.95)
+    )
+    ratio = careful.characteristic_stress / bold.characteristic_stress
+    assert np.log(ratio) == pytest.approx(-0.05 * norm.ppf(0.95), abs=0.03)
+
+
+def test_the_command_writes_the_page(tmp_path):
+    study = st.Study(
+        problem=PROBLEM, random=RANDOM, method=GIVEN["method"], ensemble=st.Ensemble(samples=1),
+        reliability={"probability": 1e-2, "target_cv": 0.3}, title="Joint A",
+    )  # fmt: skip
+    study.to_toml(tmp_path / "study.toml")
+    page = tmp_path / "out.html"
+    app(
+        ["reliability", str(tmp_path / "study.toml"), "--page", str(page)],
+        standalone_mode=False,
+    )
+    assert "Joint A" in page.read_text(encoding="utf-8")
