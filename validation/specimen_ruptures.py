@@ -18,7 +18,7 @@ import numpy as np
 import stiction as st
 from stiction.methods.dynamics.specimens import RuptureProgram, front_speeds
 from stiction.methods.equilibrium.sample import sample_of
-from stiction.methods.equilibrium.solver import follow, make_program
+from stiction.methods.equilibrium.solver import follow_to_sliding, make_program
 
 MACHINE = 2e7
 DRIVES = {
@@ -68,10 +68,10 @@ def compared(
         rows = problem.sample(strength)
         sample = sample_of(rows, program.pieces, 0)
         began = time.process_time()
-        path = follow(program, sample)
+        path = follow_to_sliding(program, sample)
         found["seconds"].append(time.process_time() - began)
         found["count"].append(len(path.events))
-        found["drop"].append(path.peak / follow(overdamped, sample).peak - 1.0)
+        found["drop"].append(path.peak / follow_to_sliding(overdamped, sample).peak - 1.0)
         states = [(event.before, event.after) for event in path.events]
         for before, after in [*states, (path.last, None)]:
             if not before.unstable:

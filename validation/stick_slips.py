@@ -24,7 +24,7 @@ from stiction.methods.dynamics.specimens import RuptureProgram
 from stiction.methods.equilibrium.events import relief_of
 from stiction.methods.equilibrium.patches import line_patch
 from stiction.methods.equilibrium.sample import sample_of
-from stiction.methods.equilibrium.solver import follow, make_program
+from stiction.methods.equilibrium.solver import follow_to_sliding, make_program
 from stiction.plot.style import ACCENT, INK, PAGE, QUIET, panel, paper_style
 
 TABLE = Path(__file__).parent / "data" / "stick_slips" / "events.csv"
@@ -359,7 +359,7 @@ def last_events(problem, strength, method=None):
     x, rows = problem.interface.x, []
     for one in strength.sample(problem.interface, samples=CYCLES, seed=1):
         sample = sample_of(problem.sample(one), program.pieces, 0)
-        path = follow(program, sample)
+        path = follow_to_sliding(program, sample)
         before, grows = path.last.slip, path.last.direction
         slope = crossed = np.nan
         if method:

@@ -14,7 +14,7 @@ from stiction.methods.dynamics.mesh import condensed, layer_matrix, make_mesh
 from stiction.methods.dynamics.specimens import RuptureProgram, begin
 from stiction.methods.dynamics.waves import FRICTION, SPEED, TRAVEL, at_rest, wave_steps
 from stiction.methods.equilibrium.sample import LINEAR, sample_of
-from stiction.methods.equilibrium.solver import follow as path_of
+from stiction.methods.equilibrium.solver import follow_to_sliding as path_of
 from stiction.methods.equilibrium.solver import make_program
 
 LOW = st.Pusher(height=0.006, width=0.004, stiffness=3e7)

@@ -11,7 +11,7 @@ import stiction as st
 import stiction.methods.equilibrium.dense.program
 from stiction.methods.equilibrium.dense.program import DenseProgram
 from stiction.methods.equilibrium.sample import at_rest, sample_of
-from stiction.methods.equilibrium.solver import follow
+from stiction.methods.equilibrium.solver import follow_to_sliding
 
 
 def assert_first(problem, tau_p, rate=None):
@@ -186,7 +186,9 @@ def test_sliding_is_proved(problem, make_strength):
     # Griffith's length grows with the modulus, of which the test for arrest knows only here.
     program.runs = program.runs._replace(modulus=np.inf)
     rows = problem.sample(tau_p)
-    paths = [follow(program, sample_of(rows, program.pieces, row)) for row in range(200)]
+    paths = [
+        follow_to_sliding(program, sample_of(rows, program.pieces, row)) for row in range(200)
+    ]
     loads = [path.last.load for path in paths]
     np.testing.assert_allclose(plain.critical_load, loads, rtol=1e-12)
     np.testing.assert_array_equal(plain.arrested_events, [len(path.events) for path in paths])

@@ -12,7 +12,7 @@ import stiction as st
 from stiction.base.model import to_plain
 from stiction.methods.dynamics.specimens import RuptureProgram
 from stiction.methods.equilibrium.sample import present_pieces, sample_of
-from stiction.methods.equilibrium.solver import follow, make_program
+from stiction.methods.equilibrium.solver import follow_to_sliding, make_program
 
 LOW = st.Pusher(height=0.006, width=0.004, stiffness=3e7)
 SPECIMEN = crooked(nodes=64, drive=LOW)
@@ -38,7 +38,7 @@ def test_no_event_is_shorter_than_without_inertia_and_each_ends_in_equilibrium(d
     program, overdamped = RuptureProgram(problem, st.Rupture()), make_program(problem)
     for strength in rough(problem, 5, samples=4):
         sample = sample_of(problem.sample(strength), program.pieces, 0)
-        for before, after in follow(program, sample).events:
+        for before, after in follow_to_sliding(program, sample).events:
             least = overdamped.jump(sample, before)
             assert least.arrested
             assert np.all(after.slip >= least.state.slip - 1e-6 * after.slip.max())

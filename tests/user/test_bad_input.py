@@ -15,7 +15,7 @@ import stiction as st
 from stiction.elasticity.memory_kernels import fit_exponentials
 from stiction.ensemble.dataset import Gathered
 from stiction.ensemble.experiment import Experiment
-from stiction.methods.equilibrium.solver import follow
+from stiction.methods.equilibrium.solver import follow_to_sliding
 from stiction.reliability import subset
 
 LINE, PLANE = st.Interface(0.1, 256), st.Interface((0.5, 0.5), (4096, 4096))
@@ -65,8 +65,8 @@ def test_errors_of_equilibrium_are_warned_of():
 
 
 def test_a_path_whose_end_is_not_known_is_said(monkeypatch):
-    ends = "stiction.methods.equilibrium.path.follow"
-    monkeypatch.setattr(ends, lambda *given: follow(*given)._replace(known=False))
+    ends = "stiction.methods.equilibrium.path.follow_to_sliding"
+    monkeypatch.setattr(ends, lambda *given: follow_to_sliding(*given)._replace(known=False))
     with pytest.warns(st.AccuracyWarning, match="no equilibrium was found beyond 900000 Pa"):
         st.equilibrium_path(PROBLEM, 0.9 * ONE, [1e5, 2e6])
     with warnings.catch_warnings(action="error"):

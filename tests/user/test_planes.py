@@ -55,7 +55,7 @@ def test_a_path_that_is_lost_is_warned_of(monkeypatch):
 
 
 def test_the_sample_that_fails_is_named(monkeypatch):
-    real, seen = solver.follow, []
+    real, seen = solver.follow_to_sliding, []
 
     def second_fails(*arguments):
         seen.append(arguments)
@@ -63,7 +63,7 @@ def test_the_sample_that_fails_is_named(monkeypatch):
             raise FloatingPointError("singular")
         return real(*arguments)
 
-    monkeypatch.setattr(solver, "follow", second_fails)
+    monkeypatch.setattr(solver, "follow_to_sliding", second_fails)
     with pytest.raises(FloatingPointError) as caught:
         exact_onset(PLANE, TWO[[0, 1, 0]])
     assert caught.value.__notes__ == ["in sample 1 of the 3 that were solved together"]

@@ -44,7 +44,7 @@ from stiction.problem.problem import Problem
 # 0.8 to 2 lower the bound by less than 0.05 % more.
 STRETCHES = (2.0 / 3.0, 5.0 / 6.0, 1.0, 6.0 / 5.0, 3.0 / 2.0)
 EIGENVECTOR_RTOL = 1e-9  # residual of an eigenvector, as a share of W
-MAX_EIGENVECTOR_ITERATIONS = 500
+MAX_ELLIPSE_ITERATIONS = 500
 MIN_BOX_NODES = 32  # along each side of the box that is searched first
 RADIUS_RTOL = 1e-9  # nodes that are equally far by symmetry differ by round-off
 FIRST_PROBE_SHARE = 16  # the first ellipse is tried after this share of all of them
@@ -194,7 +194,7 @@ def _smallest_unstable(
             inside.reshape(-1),
             vector.reshape(-1),
             EIGENVECTOR_RTOL * rate,
-            MAX_EIGENVECTOR_ITERATIONS,
+            MAX_ELLIPSE_ITERATIONS,
         )
         if value <= rate:
             high, ellipse = middle, Ellipse(float(radii[middle]), value, vector)

@@ -22,7 +22,7 @@ from stiction.methods.dynamics.waves import FORCE, FRICTION, SPEED, TRAVEL
 from stiction.methods.dynamics.waves import TIME as NOW
 from stiction.methods.equilibrium.events import relief_of
 from stiction.methods.equilibrium.sample import present_pieces, residual_nodes, sample_of
-from stiction.methods.equilibrium.solver import follow
+from stiction.methods.equilibrium.solver import follow_to_sliding
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset
 from stiction.problem.sample import Sample
@@ -70,7 +70,7 @@ def simulate_event(
     program: RuptureProgram = method.program(problem)
     sample = sample_of(rows, program.pieces, 0)
     with Meter("rupture", show=progress, unit="events") as meter:
-        path = follow(program, sample)
+        path = follow_to_sliding(program, sample)
         states = [event.before for event in path.events]
         states += [path.last] if path.last.unstable else []
         meter.advance(len(states))

@@ -37,8 +37,14 @@ from stiction.methods.equilibrium.dense.cholesky import SlipState
 from stiction.methods.equilibrium.dense.jump import jump
 from stiction.methods.equilibrium.dense.program import DenseProgram
 from stiction.methods.equilibrium.method import Equilibrium
-from stiction.methods.equilibrium.sample import Jump, Outcome, State, StaticSample, refused
-from stiction.methods.equilibrium.solver import OnsetSolver, Path
+from stiction.methods.equilibrium.sample import (
+    EquilibriumState,
+    Jump,
+    Outcome,
+    StaticSample,
+    refused,
+)
+from stiction.methods.equilibrium.solver import OnsetSolver, SamplePath
 from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
 
@@ -76,7 +82,7 @@ class DynamicEvent:
 
     Attributes
     ----------
-    before : State
+    before : EquilibriumState
         The equilibrium that became unstable.
     start : (n,) array
         Stress of the static state at the start, less the initial stress, Pa.
@@ -91,7 +97,7 @@ class DynamicEvent:
 
     sample: StaticSample
     mesh: Mesh
-    before: State
+    before: EquilibriumState
     start: Array
     waves: Waves
     front: Array
@@ -124,7 +130,7 @@ class DynamicEvent:
 
 
 def begin(
-    sample: StaticSample, mesh: Mesh, stiffness: Array, before: State, arrival: float
+    sample: StaticSample, mesh: Mesh, stiffness: Array, before: EquilibriumState, arrival: float
 ) -> DynamicEvent:
     """Step 1: return an event that is about to run.
 
@@ -162,11 +168,11 @@ class RuptureProgram(DenseProgram):
         law = problem.friction
         self.arrival = min(law.slip_at(1.0 - method.arrival), law.reach) / law.reach
 
-    def event(self, sample: StaticSample, unstable: State) -> DynamicEvent:
+    def event(self, sample: StaticSample, unstable: EquilibriumState) -> DynamicEvent:
         """Return an event that is about to run from an instability."""
         return begin(sample, self.mesh, self.problem.blocks.stiffness, unstable, self.arrival)
 
-    def jump(self, sample: StaticSample, unstable: State) -> Jump:
+    def jump(self, sample: StaticSample, unstable: EquilibriumState) -> Jump:
         """Step 3: let an unstable state run until it rests, or all of it slides."""
         event = self.event(sample, unstable)
         event.run(self.max_steps)
@@ -177,7 +183,7 @@ class RuptureProgram(DenseProgram):
             elastic, true = self._workspaces
             slip_state = SlipState(sample, slip, stiff, elastic, self.may_stop)
             outcome = jump(slip_state, unstable.load, np.inf, true)
-        state = State(
+        state = EquilibriumState(
             unstable.load,
             slip,
             unstable.direction,
@@ -204,7 +210,7 @@ class RuptureSolver(OnsetSolver):
         return super().__call__(rows)
 
     def _values(
-        self, rows: Sample, row: int, sample: StaticSample, path: Path
+        self, rows: Sample, row: int, sample: StaticSample, path: SamplePath
     ) -> dict[str, Any]:
         speeds = dict.fromkeys(SPEEDS, np.nan)
         if path.arrival is not None:

@@ -10,7 +10,7 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.variables import Variable
 from stiction.methods.equilibrium.patches import largest_patch
-from stiction.methods.equilibrium.sample import State
+from stiction.methods.equilibrium.sample import EquilibriumState
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
 from stiction.problem.results import position
@@ -25,7 +25,7 @@ OF_SPECIMENS = {
     "event_travel_step": Variable("m", "travel of the drives in the event", ("event",)),
     "event_start": Variable("m", "left end of the patch that slipped", ("event",)),
 }
-EVENT_CORE = 1e-3
+MIN_ADDED_SLIP = 1e-3
 """Share of the largest added slip above which a node belongs to the patch of an event."""
 
 
@@ -51,21 +51,21 @@ def event_variables(interface: Interface) -> dict[str, Variable]:
     }
 
 
-class Event(NamedTuple):
+class ArrestedEvent(NamedTuple):
     """An instability that came to rest: the states before and after it."""
 
-    before: State
-    after: State
+    before: EquilibriumState
+    after: EquilibriumState
 
 
 def event_table(
-    problem: Problem, rows: Sample, row: int, events: list[Event]
+    problem: Problem, rows: Sample, row: int, events: list[ArrestedEvent]
 ) -> dict[str, Array]:
     """Return the variables of the arrested events of one sample, (events, ...) arrays."""
     initial, profile = rows.initial_stress[row].mean(), rows.load_profile.mean()
     measured = [_measures(problem, initial, profile, *event) for event in events]
     return {
-        name: np.array([each[name] for each in measured]).reshape(
+        name: np.array([values[name] for values in measured]).reshape(
             len(events), *(2 for _ in variable.dims[1:])
         )
         for name, variable in event_variables(problem.interface).items()
@@ -73,16 +73,21 @@ def event_table(
 
 
 def _measures(
-    problem: Problem, initial: float, profile: float, before: State, after: State
+    problem: Problem,
+    initial: float,
+    profile: float,
+    before: EquilibriumState,
+    after: EquilibriumState,
 ) -> dict[str, Any]:
     """Return the variables of one event; initial stress and load profile are means."""
     interface = problem.interface
     added = (after.slip - before.slip).reshape(interface.shape)
-    inside, patch = largest_patch(np.maximum(added, 0.0), interface, EVENT_CORE)
-    held, left = (one.load - relief_of(problem, one.slip) for one in (before, after))
+    inside, patch = largest_patch(np.maximum(added, 0.0), interface, MIN_ADDED_SLIP)
+    stress_before = before.load - relief_of(problem, before.slip)
+    stress_after = after.load - relief_of(problem, after.slip)
     values = {
         "event_load": before.load,
-        "event_stress": initial + held * profile,
+        "event_stress": initial + stress_before * profile,
         "event_position": patch.centre,
         "event_length": patch.area,
         "event_extent": patch.extents,
@@ -91,12 +96,14 @@ def _measures(
         "event_moment": problem.solid.shear_modulus * float(added.sum()) * interface.cell,
     }
     if problem.specimen is not None:
-        moved, on = (travel_of(problem, one.load, one.slip) for one in (before, after))
+        travel_before = travel_of(problem, before.load, before.slip)
+        travel_after = travel_of(problem, after.load, after.slip)
         values |= {
-            "event_stress_drop": (held - left) * profile,
-            "event_travel": moved,
-            "event_crosshead_travel": moved + elongation_of(problem, values["event_stress"]),
-            "event_travel_step": on - moved,
+            "event_stress_drop": (stress_before - stress_after) * profile,
+            "event_travel": travel_before,
+            "event_crosshead_travel": travel_before
+            + elongation_of(problem, values["event_stress"]),
+            "event_travel_step": travel_after - travel_before,
             "event_start": float(np.argmax(inside)) * interface.spacing,
         }
     return values

@@ -17,7 +17,7 @@ from stiction.base.jit import jit
 
 Mask = NDArray[np.bool_]
 
-CORE = 0.1
+MIN_PATCH_WEIGHT = 0.1
 """Share of the largest weight above which a node of a plane belongs to the critical patch.
 
 Its border is where y falls off over some nodes: of half or twice the share areas differ by a sixth
@@ -160,7 +160,9 @@ def critical_patch(multiplier: Array, interface: Any) -> Patch:
     strengths these reach across the plane, with a y close to zero.
     """
     if interface.is_plane:
-        return largest_patch(multiplier.reshape(interface.shape), interface, CORE)[1]
+        return largest_patch(multiplier.reshape(interface.shape), interface, MIN_PATCH_WEIGHT)[
+            1
+        ]
     return line_patch(multiplier, interface)
 
 

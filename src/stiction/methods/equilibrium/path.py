@@ -16,7 +16,7 @@ from stiction.methods.equilibrium.events import (
     travel_of,
 )
 from stiction.methods.equilibrium.sample import at_rest, sample_of
-from stiction.methods.equilibrium.solver import follow, make_program, warn_of_signs
+from stiction.methods.equilibrium.solver import follow_to_sliding, make_program, warn_of_signs
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset
 
@@ -33,7 +33,7 @@ TRAVEL = {
     "crosshead_travel": Variable("m", "travel of the machine's far ends", ("load",)),
 }
 EVENT = Variable("1", "event number", ("event",))
-CLOSE = 1e-9
+LOAD_RTOL = 1e-9
 """Relative distance of loads that count as the same."""
 
 
@@ -119,8 +119,8 @@ def equilibrium_path(
     program = make_program(problem) if method is None else method.program(problem)
     warn_of_signs(problem)
     sample = sample_of(rows, program.pieces, 0)
-    whole = follow(program, sample)
-    passed, end, known = whole.events, whole.last.load, whole.known
+    path = follow_to_sliding(program, sample)
+    passed, end, known = path.events, path.last.load, path.known
     slip, stress = np.full((2, given.size, interface.size), np.nan)
     travel, far = np.full((2, given.size), np.nan)
     at = np.array([event.before.load for event in passed])
@@ -130,15 +130,16 @@ def equilibrium_path(
     for i, load in enumerate(map(float, given[~sliding])):
         if events[i]:
             after = passed[events[i] - 1].after
-            state = max(after, state, key=lambda one: one.load)
-        there = program.at(sample, state, load)
-        ahead = passed[events[i]].before if events[i] < len(passed) else None
-        if there is None and ahead is not None and load > (1.0 - CLOSE) * ahead.load:
-            there = ahead  # the state about to jump
-        if there is None:  # within the accuracy of the load of sliding
+            state = max(after, state, key=lambda reached: reached.load)
+        state_there = program.at(sample, state, load)
+        next_event = passed[events[i]].before if events[i] < len(passed) else None
+        is_at_event = next_event is not None and load > (1.0 - LOAD_RTOL) * next_event.load
+        if state_there is None and is_at_event:
+            state_there = next_event  # the state about to jump
+        if state_there is None:  # within the accuracy of the load of sliding
             sliding[i:] = True
             break
-        state = there
+        state = state_there
         slip[i] = state.slip
         released = program.stress_released(state)
         stress[i] = rows.initial_stress[0].reshape(-1) + load * sample.profile - released

@@ -19,7 +19,7 @@ from stiction.problem.friction import FrictionLaw
 from stiction.problem.friction.parameters import Linear, Polygon
 from stiction.problem.sample import Sample
 
-FLAT = 1e-11
+CONSTANT_STRENGTH_RTOL = 1e-11
 """Share of the mean strength by which a node must weaken to count as weakening. A smaller fall
 is within the round-off of K d; an instability of such nodes adds no slip and never ends."""
 
@@ -94,9 +94,9 @@ def make_sample(
     """
     fall = excess - residual
     largest = max(excess.max(), residual.max(), -excess.min(), -residual.min())
-    if not fall.min() > FLAT * largest:
+    if not fall.min() > CONSTANT_STRENGTH_RTOL * largest:
         scale = np.maximum(np.abs(excess), np.abs(residual)).mean(axis=-1, keepdims=True)
-        constant = ~(fall > FLAT * scale)
+        constant = ~(fall > CONSTANT_STRENGTH_RTOL * scale)
         residual = np.where(constant, excess, residual)
         fall, rate = np.where(constant, 0.0, (fall, rate))
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -130,13 +130,13 @@ class Present(NamedTuple):
 
 
 @dataclass
-class State:
+class EquilibriumState:
     """An equilibrium on the path of one sample, by default one at which it is unstable."""
 
     load: float  # tau_0, Pa
     slip: Array  # (n,): d, m
     direction: Array  # (n,): in which it is unstable
-    stiff: Array = field(default_factory=lambda: np.empty(0))  # (n,): K d, Pa; empty on planes
+    Kd: Array = field(default_factory=lambda: np.empty(0))  # (n,): K d, Pa; empty on planes
     gap: float = np.nan  # distance to a load without equilibrium, Pa; NaN where none is known
     certified: bool = True  # the gap is proved
     unstable: bool = True  # the path is unstable here
@@ -147,7 +147,7 @@ class State:
     # Largest mean stress on the way here over the mean of the load profile, Pa: the load itself
     # (None), unless a machine drives.
     peak: float | None = None
-    stiff_direction: Array | None = None  # (n,): K times the direction, if it is known
+    K_direction: Array | None = None  # (n,): K times the direction, if it is known
     # The exact y with <p, y> = 1, if the direction is that; else the direction stands for it.
     multiplier: Array | None = None
 
@@ -157,13 +157,13 @@ class State:
         return self.load if self.peak is None else self.peak
 
 
-def at_rest(sample: StaticSample) -> State:
+def at_rest(sample: StaticSample) -> EquilibriumState:
     """Return the state in which the first node is about to slip."""
     load = float((sample.excess / sample.profile).min())
-    return State(load, *np.zeros((3, sample.excess.size)))
+    return EquilibriumState(load, *np.zeros((3, sample.excess.size)))
 
 
-def multiplier_of(sample: StaticSample, state: State) -> Array:
+def multiplier_of(sample: StaticSample, state: EquilibriumState) -> Array:
     """Return the multiplier y of an instability, <p, y> = 1."""
     if state.multiplier is not None:
         return state.multiplier
@@ -175,7 +175,7 @@ class Jump(NamedTuple):
 
     arrested: bool
     known: bool
-    state: State
+    state: EquilibriumState
     counts: bool = True  # false where the path was not seen to turn: a long step of it
     arrival: Array | None = None  # when the front arrived at each node, with inertia, s
 
@@ -189,22 +189,26 @@ class Program(Protocol):
     pieces: Pieces
     widest_gap: float
 
-    def next(self, sample: StaticSample, state: State | None = None) -> State:
+    def next(
+        self, sample: StaticSample, state: EquilibriumState | None = None
+    ) -> EquilibriumState:
         """Return the next instability from a stable state, or from rest."""
 
-    def jump(self, sample: StaticSample, found: State) -> Jump:
+    def jump(self, sample: StaticSample, instability: EquilibriumState) -> Jump:
         """Let an unstable state jump to another equilibrium, or to sliding."""
 
-    def at(self, sample: StaticSample, state: State, load: float) -> State | None:
+    def at(
+        self, sample: StaticSample, state: EquilibriumState, load: float
+    ) -> EquilibriumState | None:
         """Return the equilibrium at a load from a state below, None if it is not found."""
 
-    def gradient(self, sample: StaticSample, state: State) -> Array:
+    def gradient(self, sample: StaticSample, state: EquilibriumState) -> Array:
         """Return the derivative of the mean stress at an instability by the strengths there.
 
         Over the mean of the load profile; the strengths are those continued to zero slip.
         """
 
-    def stress_released(self, state: State) -> Array:
+    def stress_released(self, state: EquilibriumState) -> Array:
         """Return the stress that the slip takes off the interface, K d, Pa."""
 
 

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy, warn_of_samples
 from stiction.methods.equilibrium.dense.program import DenseProgram
-from stiction.methods.equilibrium.events import Event, event_table, relief_of
+from stiction.methods.equilibrium.events import ArrestedEvent, event_table, relief_of
 from stiction.methods.equilibrium.patches import Mask, critical_patch, patches_of
 from stiction.methods.equilibrium.sample import (
+    EquilibriumState,
     Program,
-    State,
     StaticSample,
     make_sample,
     multiplier_of,
@@ -26,21 +26,21 @@ from stiction.methods.equilibrium.transforms.plane import PlaneProgram
 from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
 
-FINE = 8.0
-"""Nodes in the nucleation length below which there is a warning."""
-ROUGHLY = {
+MIN_NODES_IN_NUCLEATION_LENGTH = 8.0
+"""Below, there is a warning with the expected error."""
+ERRORS_OF_COARSE_GRIDS = {  # by the number of dimensions
     1: "single onsets are off by 0.4 % at 9 nodes and 3 % at 4 if the correlation length is a"
     " quarter of it, by 3 and 9 % if it is a tenth",
     2: "single onsets are off by 0.15 % at 9 nodes along x and 6 along y, by 0.5 % at 6 and 4",
 }
-SLIDING_ONLY = 0.02
+MIN_PEAK_HEIGHT = 0.02
 """Height of the peak above the mean residual strength, as a share of the fall of strength, below
-which nothing but sliding is left of it."""
-QUOTIENT = 1e-7
+which the peak is hardly more than the stress of sliding."""
+STRENGTH_STEP = 1e-7
 """Rise of the strength of a node for a difference quotient, as a share of the mean."""
 
 
-class Path(NamedTuple):
+class SamplePath(NamedTuple):
     """Course of one sample until it slides.
 
     `first` is the first instability, `last` the last equilibrium, `known` is false where a jump
@@ -49,35 +49,35 @@ class Path(NamedTuple):
     event that slides arrived at each node, with inertia.
     """
 
-    first: State
-    last: State
+    first: EquilibriumState
+    last: EquilibriumState
     peak: float
-    events: list[Event]
+    events: list[ArrestedEvent]
     known: bool
     arrival: Array | None
 
 
-def follow(program: Program, sample: StaticSample) -> Path:
+def follow_to_sliding(program: Program, sample: StaticSample) -> SamplePath:
     """Follow a sample from rest to global sliding.
 
     Arrest is overdamped: the patch stops at the least equilibrium of the same load. Inertia may
     carry it through.
     """
-    found = program.next(sample)
-    first: State | None = None
-    events: list[Event] = []
-    known, peak, arrival = found.known, found.highest, None
-    while found.unstable:
-        jump = program.jump(sample, found)
+    state = program.next(sample)
+    first: EquilibriumState | None = None
+    events: list[ArrestedEvent] = []
+    known, peak, arrival = state.known, state.highest, None
+    while state.unstable:
+        jump = program.jump(sample, state)
         if jump.counts:
-            first = first or found
+            first = first or state
             if not jump.arrested:
                 known, arrival = jump.known, jump.arrival
                 break
-            events.append(Event(found, jump.state))
-        found = program.next(sample, jump.state)
-        known, peak = found.known, max(peak, found.highest)
-    return Path(first or found, found, peak, events, known, arrival)
+            events.append(ArrestedEvent(state, jump.state))
+        state = program.next(sample, jump.state)
+        known, peak = state.known, max(peak, state.highest)
+    return SamplePath(first or state, state, peak, events, known, arrival)
 
 
 def make_program(problem: Problem, gap: float = 1e-6) -> Program:
@@ -106,12 +106,16 @@ class OnsetSolver:
     def __call__(self, rows: Sample) -> dict[str, NDArray[Any]]:
         """Return the onset of each sample; see `Equilibrium`."""
         warn_of_signs(self.problem)
-        self.problem.warn_if_coarse(rows, FINE, ROUGHLY[len(self.problem.interface.shape)])
+        self.problem.warn_if_coarse(
+            rows,
+            MIN_NODES_IN_NUCLEATION_LENGTH,
+            ERRORS_OF_COARSE_GRIDS[len(self.problem.interface.shape)],
+        )
         samples, table, flags = sample_of(rows, self.program.pieces), [], []
         for row in range(rows.samples):
             sample = row_of(samples, row)
             try:
-                path = follow(self.program, sample)
+                path = follow_to_sliding(self.program, sample)
             except Exception as error:
                 error.add_note(
                     f"in sample {row} of the {rows.samples} that were solved together"
@@ -119,7 +123,7 @@ class OnsetSolver:
                 raise
             flags.append((path.known, path.first.certified, path.first.stopped))
             table.append(self._values(rows, row, sample, path))
-        values = {name: np.array([each[name] for each in table]) for name in table[0]}
+        values = {name: np.array([row[name] for row in table]) for name in table[0]}
         values["critical_stress"] = rows.mean_stress(values["critical_stress"])
         values["first_instability"] = rows.mean_stress(values["first_instability"])
         values["certificate_gap"] *= rows.load_profile.mean()
@@ -127,23 +131,25 @@ class OnsetSolver:
         return values
 
     def _values(
-        self, rows: Sample, row: int, sample: StaticSample, path: Path
+        self, rows: Sample, row: int, sample: StaticSample, path: SamplePath
     ) -> dict[str, Any]:
         """Return the variables of one sample, the first instability as a load."""
         interface, shape = self.problem.interface, rows.strength[row].shape
         first, last = path.first, path.last
-        slides = patch = critical_patch(multiplier_of(sample, first), interface)
+        sliding_patch = patch = critical_patch(multiplier_of(sample, first), interface)
         # On lines the multiplier is known of a programme, which passes no corner.
         straight = last is first and first.multiplier is not None and not interface.is_plane
         if last is not first and last.direction.any():
-            slides = critical_patch(last.direction, interface)
+            sliding_patch = critical_patch(last.direction, interface)
         values: dict[str, Any] = {
             "critical_load": last.load,
             "critical_stress": path.peak,
             "first_instability": first.load - relief_of(self.problem, first.slip),
             "certificate_gap": first.gap,
             "critical_position": patch.centre if interface.is_plane else patch.centre[0],
-            "sliding_position": slides.centre if interface.is_plane else slides.centre[0],
+            "sliding_position": (
+                sliding_patch.centre if interface.is_plane else sliding_patch.centre[0]
+            ),
             "slip_patches": patches_of(first.slip, interface),
             "arrested_events": len(path.events),
             "residual_reached": not straight and bool(residual_nodes(sample, last.slip).any()),
@@ -221,7 +227,7 @@ class OnsetSolver:
             "all but the last nodes are at their residual strength before the peak in {samples}:"
             " static friction is then the mean residual strength, to {worst:.2g} of what strength"
             " falls by, and depends on little else",
-            values["residual_reached"] & (above < SLIDING_ONLY),
+            values["residual_reached"] & (above < MIN_PEAK_HEIGHT),
             above,
         )
         if self.options.sensitivity:
@@ -235,7 +241,7 @@ class OnsetSolver:
 
 
 def _sensitivity(
-    problem: Problem, program: Program, sample: StaticSample, state: State
+    problem: Problem, program: Program, sample: StaticSample, state: EquilibriumState
 ) -> Array:
     """Derivative of the stress of an instability by the peak strengths.
 
@@ -251,16 +257,18 @@ def _sensitivity(
     return program.gradient(sample, state) * np.where(sample.critical > 0.0, share, 1.0)
 
 
-def _quotients(problem: Problem, program: Program, sample: StaticSample, first: State) -> Array:
+def _quotients(
+    problem: Problem, program: Program, sample: StaticSample, first: EquilibriumState
+) -> Array:
     """Derivative of the stress of a first instability, node by node: paths are straight."""
-    before = first.load - relief_of(problem, first.slip)
-    step = QUOTIENT * float(np.abs(sample.excess).mean())
-    found = np.empty(sample.excess.size)
-    for node in range(found.size):
+    stress_before = first.load - relief_of(problem, first.slip)
+    step = STRENGTH_STEP * float(np.abs(sample.excess).mean())
+    derivative = np.empty(sample.excess.size)
+    for node in range(derivative.size):
         excess, residual = sample.excess.copy(), sample.residual.copy()
         excess[node] += step
         residual[node] += step * (sample.critical[node] == 0.0)  # its strength is constant
-        rise = make_sample(excess, residual, sample.profile, sample.rate, sample.pieces)
-        state = program.next(rise)
-        found[node] = (state.load - relief_of(problem, state.slip) - before) / step
-    return found
+        raised = make_sample(excess, residual, sample.profile, sample.rate, sample.pieces)
+        state = program.next(raised)
+        derivative[node] = (state.load - relief_of(problem, state.slip) - stress_before) / step
+    return derivative

@@ -31,9 +31,9 @@ from stiction.methods.equilibrium.dense.linear_program import (
 from stiction.methods.equilibrium.dense.runaway import Runs, runs_away, runs_of
 from stiction.methods.equilibrium.dense.stable_path import PathStatus, follow_stable_path
 from stiction.methods.equilibrium.sample import (
+    EquilibriumState,
     Jump,
     Outcome,
-    State,
     StaticSample,
     at_rest,
     exceeds,
@@ -104,8 +104,8 @@ class DenseProgram:
         self,
         sample: StaticSample,
         cap: float = np.inf,
-        state: State | None = None,
-    ) -> State | None:
+        state: EquilibriumState | None = None,
+    ) -> EquilibriumState | None:
         """Return the critical load of one sample (below `cap`) with its proofs, None if it stalls.
 
         Only the first piece of the friction law counts: `excess` and `rate`. The state is an
@@ -130,9 +130,11 @@ class DenseProgram:
         load, solved = solve_program(slip_state, start, bound, cap, multiplier)
         if not solved:
             return None
-        return State(load, slip, multiplier, Kd, multiplier=multiplier)
+        return EquilibriumState(load, slip, multiplier, Kd, multiplier=multiplier)
 
-    def _by_transforms(self, sample: StaticSample, state: State | None) -> State | None:
+    def _by_transforms(
+        self, sample: StaticSample, state: EquilibriumState | None
+    ) -> EquilibriumState | None:
         """Solve a programme in which many nodes slip; None if its bounds stay apart."""
         half_spaces = self.elastic.half_spaces
         if half_spaces is None:
@@ -149,11 +151,14 @@ class DenseProgram:
         multiplier /= multiplier @ sample.profile
         symbol = half_spaces.symbol((self.nodes,))
         Kd = np.fft.irfft(symbol * np.fft.rfft(onset.slip), self.nodes)
-        return State(onset.lower, onset.slip, multiplier, Kd, multiplier=multiplier)
+        return EquilibriumState(onset.lower, onset.slip, multiplier, Kd, multiplier=multiplier)
 
     def next(
-        self, sample: StaticSample, state: State | None = None, target: float = np.inf
-    ) -> State:
+        self,
+        sample: StaticSample,
+        state: EquilibriumState | None = None,
+        target: float = np.inf,
+    ) -> EquilibriumState:
         """Return the next instability from a state or from rest, or the state at a load before it.
 
         See steps 1 to 3 at the top of this file.
@@ -168,10 +173,10 @@ class DenseProgram:
             if instability is not None:
                 return instability
             by_events = not from_rest
-        slip, Kd, direction = state.slip.copy(), state.stiff.copy(), state.direction.copy()
+        slip, Kd, direction = state.slip.copy(), state.Kd.copy(), state.direction.copy()
         slip_state = SlipState(sample, slip, Kd, self._workspaces[1], self.may_stop)
         end = follow_stable_path(slip_state, state.load, target, direction)
-        reached = State(
+        reached = EquilibriumState(
             end.load, slip, direction, Kd,
             unstable=end.status == PathStatus.UNSTABLE,
             known=end.status != PathStatus.GIVEN_UP,
@@ -186,8 +191,8 @@ class DenseProgram:
         return reached
 
     def _next_by_programme(
-        self, sample: StaticSample, state: State, from_rest: bool
-    ) -> State | None:
+        self, sample: StaticSample, state: EquilibriumState, from_rest: bool
+    ) -> EquilibriumState | None:
         """Return the next instability by a linear programme; None if a corner comes before it."""
         present = sample if from_rest else present_sample(sample, state.slip)
         solution = self.solve(present, state=None if from_rest else state)
@@ -196,18 +201,22 @@ class DenseProgram:
         piece = None if from_rest else present_pieces(sample, state.slip).piece
         if exceeds(sample, solution.slip, piece):
             return None
-        solution.stiff_direction = self._certify(present, solution, solution.direction)
+        solution.K_direction = self._certify(present, solution, solution.direction)
         return solution
 
-    def _certify(self, present: StaticSample, instability: State, multiplier: Array) -> Array:
+    def _certify(
+        self, present: StaticSample, instability: EquilibriumState, multiplier: Array
+    ) -> Array:
         """Write the distance of the bounds of an instability; return K times the multiplier."""
         Ky = np.empty(self.nodes)
         instability.gap = certificate(
-            present, instability.slip, instability.stiff, multiplier, self._workspaces[0], Ky
+            present, instability.slip, instability.Kd, multiplier, self._workspaces[0], Ky
         )
         return Ky
 
-    def at(self, sample: StaticSample, state: State, load: float) -> State | None:
+    def at(
+        self, sample: StaticSample, state: EquilibriumState, load: float
+    ) -> EquilibriumState | None:
         if load <= state.load:
             return state
         if not (state.jumped or state.by_events or self.driven):
@@ -217,8 +226,8 @@ class DenseProgram:
         reached = self.next(sample, replace(state, by_events=True), load)
         return None if reached.unstable or not reached.known else reached
 
-    def jump(self, sample: StaticSample, instability: State) -> Jump:
-        slip, Kd = instability.slip.copy(), instability.stiff.copy()
+    def jump(self, sample: StaticSample, instability: EquilibriumState) -> Jump:
+        slip, Kd = instability.slip.copy(), instability.Kd.copy()
         outcome, unstoppable = self._run(sample, instability, slip)
         if outcome == Outcome.UNDECIDED:
             elastic, true_pieces = self._workspaces
@@ -230,13 +239,15 @@ class DenseProgram:
             if not np.any(after > before):
                 # Round-off: only nodes that pass a corner can stop an instability.
                 outcome = Outcome.UNDECIDED
-        state = State(
+        state = EquilibriumState(
             instability.load, slip, instability.direction, Kd,
             by_events=instability.by_events, jumped=True, stopped=instability.stopped,
         )  # fmt: skip
         return Jump(outcome == Outcome.ARRESTED, outcome != Outcome.UNDECIDED, state)
 
-    def _run(self, sample: StaticSample, instability: State, slip: Array) -> tuple[int, float]:
+    def _run(
+        self, sample: StaticSample, instability: EquilibriumState, slip: Array
+    ) -> tuple[int, float]:
         """Test for sliding (step 4); return the outcome, and a length that is unstoppable.
 
         The length is a number of residual nodes. Slip moves on to a lower bound of the next
@@ -246,7 +257,7 @@ class DenseProgram:
         if self.runs is None:
             step = step_to_corner(sample, slip, direction, np.inf)
             return (Outcome.SLIDING if step == np.inf else Outcome.UNDECIDED), np.inf
-        K_direction = instability.stiff_direction
+        K_direction = instability.K_direction
         if K_direction is None:
             nodes, K_direction = np.flatnonzero(direction), np.empty(self.nodes)
             apply_circular(
@@ -254,11 +265,11 @@ class DenseProgram:
                 np.empty((2, self.nodes // 2)), K_direction,
             )  # fmt: skip
         return runs_away(
-            sample, self.runs, instability.load, slip, instability.stiff, direction,
+            sample, self.runs, instability.load, slip, instability.Kd, direction,
             K_direction,
         )  # fmt: skip
 
-    def gradient(self, sample: StaticSample, state: State) -> Array:
+    def gradient(self, sample: StaticSample, state: EquilibriumState) -> Array:
         """Return the multiplier y, or, behind a machine, the derivative of the mean stress.
 
         With a relief of r (Pa/m) the mean stress is D - r <p, d>/n at a drive D, and y is the
@@ -278,8 +289,8 @@ class DenseProgram:
         slip_rate[slips] = np.linalg.solve(block, p[slips])
         return y - self.elastic.relief / y.size * ((p @ slip_rate) * y - slip_rate)
 
-    def stress_released(self, state: State) -> Array:
-        return state.stiff
+    def stress_released(self, state: EquilibriumState) -> Array:
+        return state.Kd
 
 
 def present_sample(sample: StaticSample, slip: Array) -> StaticSample:

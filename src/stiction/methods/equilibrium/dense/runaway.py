@@ -22,8 +22,8 @@ length (`unstoppable_length`).
    alike, so that one Cholesky factor serves all runs of all samples.
 4. The interface slides if nodes at their residual strength form a run of the unstoppable length,
    or if the mean strength of the interface cannot carry the load.
-5. The test gives up (UNDECIDED) if slip hardly grows any more, after `MAX_STEPS` steps, or if the
-   run, or the unstoppable length, is longer than the factor.
+5. The test gives up (UNDECIDED) if slip hardly grows any more, after `MAX_RUN_STEPS` steps, or if
+   the run, or the unstoppable length, is longer than the factor.
 6. Compute the stress that all slip added so far causes, on the run and half its length to both
    sides, and go to 2.
 """
@@ -52,7 +52,7 @@ from stiction.methods.equilibrium.sample import (
     unsupported,
 )
 
-MAX_STEPS = 30
+MAX_RUN_STEPS = 30
 """Elastic steps; most samples need five to eight."""
 MIN_GROWTH = 1e-3
 """Growth in a step, as a share of the largest slip, below which the test gives up."""
@@ -164,7 +164,7 @@ def runs_away(
     for q in range(n):
         i = (origin + q) % n
         stress[q] = load * sample.profile[i] - Kd[i] - step * K_direction[i]
-    for _ in range(MAX_STEPS):
+    for _ in range(MAX_RUN_STEPS):
         # 2.
         while begin > low:
             i = (origin + begin - 1) % n

@@ -108,7 +108,7 @@ class PathEnd(NamedTuple):
     status: PathStatus
 
 
-class Event(NamedTuple):
+class PathEvent(NamedTuple):
     """The next start or corner; NOBODY in both places if the target comes first."""
 
     step: float  # rise of the load, Pa
@@ -259,7 +259,7 @@ def _refresh(state: SlipState, load: float, n_slipping: int) -> None:
 @jit_inside
 def _next_event(
     state: SlipState, load: float, target: float, piece: NDArray[np.int64], n_slipping: int
-) -> Event:
+) -> PathEvent:
     """Step 3: the first event on the way to the target."""
     sample, slip, Kd, workspace, _ = state
     p, corners = sample.profile, sample.pieces.ends
@@ -282,7 +282,7 @@ def _next_event(
                 step = left / workspace.v[t]
                 starting_node = NOBODY
                 corner = t
-    return Event(step, starting_node, corner)
+    return PathEvent(step, starting_node, corner)
 
 
 @jit_inside

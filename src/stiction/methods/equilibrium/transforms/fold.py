@@ -33,7 +33,7 @@ from stiction.methods.equilibrium.transforms.relaxation import residual_toleranc
 
 MAX_EVENTS = 300
 """Events of a path to its turn, which is begun a step of the load before."""
-SLIP_RTOL = 1e-11
+TURN_SLIP_RTOL = 1e-11
 """Residual stress of the slip, as a share of the mean strength or load."""
 SOLUTION_RTOL = 1e-9
 """Residual of other solutions, as a share of their largest right side."""
@@ -64,7 +64,7 @@ def _equilibrium_near(
     operator: Operator, sample: StaticSample, load: float, slip: Array
 ) -> Array | None:
     """Step 1: slip at a load from a rough one; None if there is none."""
-    tolerance = residual_tolerance(sample, load, SLIP_RTOL)
+    tolerance = residual_tolerance(sample, load, TURN_SLIP_RTOL)
     for _ in range(MAX_PIECE_REVISIONS):
         present = present_pieces(sample, slip)
         drive = load * sample.profile - present.strength

@@ -29,9 +29,9 @@ from stiction.base.arrays import Array
 from stiction.elasticity.operator import Operator, inner, make_operator
 from stiction.elasticity.protocol import HalfSpaces
 from stiction.methods.equilibrium.sample import (
+    EquilibriumState,
     Jump,
     Outcome,
-    State,
     StaticSample,
     at_rest,
     exceeds,
@@ -205,7 +205,9 @@ class PlaneProgram:
         excess, profile, rate, corner = (field.reshape(self.shape) for field in fields)
         return plane_onset(self.elastic, excess, profile, rate, self.requested, corner=corner)
 
-    def next(self, sample: StaticSample, state: State | None = None) -> State:
+    def next(
+        self, sample: StaticSample, state: EquilibriumState | None = None
+    ) -> EquilibriumState:
         """Return the next instability on the path from a stable state or from rest (4 to 6).
 
         If the path was followed because of a coarse grid, and turns before any node reaches a
@@ -222,9 +224,9 @@ class PlaneProgram:
         slip, multiplier = onset.slip.reshape(-1), onset.multiplier.reshape(-1)
         if exceeds(sample, slip):
             return self._follow_from_rest(sample, onset)
-        return State(onset.lower, slip, multiplier, gap=onset.upper - onset.lower)
+        return EquilibriumState(onset.lower, slip, multiplier, gap=onset.upper - onset.lower)
 
-    def _follow_from_rest(self, sample: StaticSample, onset: PlaneOnset) -> State:
+    def _follow_from_rest(self, sample: StaticSample, onset: PlaneOnset) -> EquilibriumState:
         """Follow the path from rest, at first most of the way to the onset without corners."""
         rest = at_rest(sample)
         step = max(
@@ -232,7 +234,9 @@ class PlaneProgram:
         )
         return self._follow_in_steps(sample, rest, step)
 
-    def _follow_in_steps(self, sample: StaticSample, state: State, step: float) -> State:
+    def _follow_in_steps(
+        self, sample: StaticSample, state: EquilibriumState, step: float
+    ) -> EquilibriumState:
         """Steps 5 and 6: follow the stable path in steps of the load to its end.
 
         A long step may look unstable only because nodes begin to slip in it before others reach
@@ -258,9 +262,9 @@ class PlaneProgram:
                 turn = self._turn(operator, sample, passed, load_beyond)
                 if turn is None:
                     direction = slip - passed[0][1]
-                    return State(load, slip, direction, gap=step, certified=False)
+                    return EquilibriumState(load, slip, direction, gap=step, certified=False)
                 if turn.direction.any():
-                    return State(
+                    return EquilibriumState(
                         turn.load, turn.slip, turn.direction, gap=load_beyond - turn.load,
                         certified=False, multiplier=turn.direction,
                     )  # fmt: skip
@@ -289,7 +293,7 @@ class PlaneProgram:
                 return turn
         return None
 
-    def gradient(self, sample: StaticSample, state: State) -> Array:
+    def gradient(self, sample: StaticSample, state: EquilibriumState) -> Array:
         """Find the direction in which the path turns; NaN if that is not found."""
         if state.multiplier is not None or state.gap == 0.0:
             return multiplier_of(sample, state)
@@ -303,7 +307,7 @@ class PlaneProgram:
             slip = np.zeros(slip.size)  # that which proves the bound may be beyond the turn
         return np.full(slip.size, np.nan)
 
-    def jump(self, sample: StaticSample, instability: State) -> Jump:
+    def jump(self, sample: StaticSample, instability: EquilibriumState) -> Jump:
         load_beyond = instability.load + instability.gap
         load_beyond += self.requested * abs(load_beyond)
         end = least_equilibrium(
@@ -313,10 +317,12 @@ class PlaneProgram:
         arrested = end.status == Outcome.ARRESTED
         # Where no turn was found, and the rest is in order, a stable path was only hard to follow.
         counts = not arrested or instability.multiplier is not None
-        after = State(load_beyond, end.slip, instability.direction, jumped=True)
+        after = EquilibriumState(load_beyond, end.slip, instability.direction, jumped=True)
         return Jump(arrested, end.status != Outcome.UNDECIDED, after, counts)
 
-    def at(self, sample: StaticSample, state: State, load: float) -> State | None:
+    def at(
+        self, sample: StaticSample, state: EquilibriumState, load: float
+    ) -> EquilibriumState | None:
         if load <= state.load:
             return state
         end = least_equilibrium(self._operator(sample), sample, load, state.slip, SLIP_RTOL)
@@ -324,7 +330,7 @@ class PlaneProgram:
             return None
         return replace(state, load=load, slip=end.slip, unstable=False)
 
-    def stress_released(self, state: State) -> Array:
+    def stress_released(self, state: EquilibriumState) -> Array:
         symbol = self.elastic.symbol(self.shape)
         slip = state.slip.reshape(self.shape)
         released: Array = np.fft.irfft2(symbol * np.fft.rfft2(slip), self.shape).reshape(-1)

@@ -74,9 +74,9 @@ from stiction.methods.equilibrium.transforms.held_equilibrium import equilibrate
 # than a tenth (planes of 64 and 96 squared, with and without arrests).
 MAX_REVISIONS = 100
 """Revisions of the pieces in Newton's method, which ends by itself."""
-MAX_STEPS = 2000
+MAX_JUMP_STEPS = 2000
 """Steps of a jump, which may creep along in ever smaller steps."""
-LOOSE_RESIDUAL = 0.03
+PIECES_RESIDUAL = 0.03
 """Factor by which a residual is reduced before the pieces are revised."""
 CURVATURE_RESIDUAL = 0.1
 """Factor by which a residual is reduced in the search for negative curvature."""
@@ -85,7 +85,7 @@ DIRECTION_RTOL = 1e-5
 DRAG = 1e-3
 """Stiffness that is added in place of the omitted weakening, as a share of the largest W. Without
 it a step of a plane that slides as a whole would have no solution."""
-STEP_RESIDUAL = 0.05
+BOUND_RESIDUAL = 0.05
 """Largest residual stress of a step, as a share of the weakening omitted in the step before."""
 MIN_OMITTED = 0.02
 """Share of the weakening that is omitted first."""
@@ -157,7 +157,7 @@ def stable_equilibrium(
         if allowed > tolerance:
             residual_of(operator._replace(rate=present.rate), drive, end, residual)
             largest = np.where(end > 0.0, np.abs(residual), residual).max()
-            allowed = max(tolerance, LOOSE_RESIDUAL * float(largest))
+            allowed = max(tolerance, PIECES_RESIDUAL * float(largest))
         status, solution = solve_pieces(operator, drive, present.rate, end, allowed)
         if status != SOLVED:
             return None
@@ -273,7 +273,7 @@ def least_equilibrium(
     omitted = 0.0  # share of the weakening that is omitted
     omitted_before = 0.0  # the same, before a step with the share 1 was tried
     fall = 0.0  # largest fall of strength in the step before, Pa
-    for _ in range(MAX_STEPS):
+    for _ in range(MAX_JUMP_STEPS):
         # 1.
         present = present_pieces(sample, slip)
         drive = load * sample.profile - present.strength
@@ -284,7 +284,7 @@ def least_equilibrium(
             bound = Bound(NEGATIVE_CURVATURE, slip, False)
             is_unstable = False
         else:
-            allowed = max(tolerance, STEP_RESIDUAL * omitted * fall)
+            allowed = max(tolerance, BOUND_RESIDUAL * omitted * fall)
             bound = _bound(operator, sample, load, slip, present, omitted, allowed)
         if bound.is_equilibrium:  # 3.
             return Relaxed(Outcome.ARRESTED, bound.slip)
