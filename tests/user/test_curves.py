@@ -7,6 +7,7 @@ import pytest
 from refusals import refuses
 
 import stiction as st
+from stiction.inference.agreement import _p_values, _permuted
 from stiction.inference.curves import Curves, noise_of, summary_of, turning_points
 
 RNG = np.random.default_rng(0)
@@ -202,3 +203,14 @@ def test_precursors_agree_with_their_own_prediction_and_not_with_another(paths):
     assert axes.lines[-1].get_label() == "6 tests"
     stress = np.array([1.0, 2.0, 3.0]) * u.Pa
     refuses("are in Pa", lambda: st.plot.monte_carlo(own, measured=stress))
+
+
+def test_p_values_hold_for_four_tests():
+    """Numbers of precursors, many of them equal: a right prediction is below p in p of campaigns."""
+    rng = np.random.default_rng(0)
+    pools = rng.poisson(3.0, (400, 64)).astype(float)
+    p = np.array([_p_values(_permuted(pool[:4], pool[4:], 199, rng))[0] for pool in pools])
+    for level in (0.05, 0.2, 0.5):
+        error = (level * (1.0 - level) / p.size) ** 0.5
+        assert np.mean(p <= level) < level + 3.0 * error
+        assert np.mean(p <= level) > 0.6 * level
