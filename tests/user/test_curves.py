@@ -206,7 +206,7 @@ def test_precursors_agree_with_their_own_prediction_and_not_with_another(paths):
 
 
 def test_p_values_hold_for_four_tests():
-    """Numbers of precursors, many of them equal: a right prediction is below p in p of campaigns."""
+    """Numbers of precursors, many of them equal, of campaigns that are as predicted."""
     rng = np.random.default_rng(0)
     pools = rng.poisson(3.0, (400, 64)).astype(float)
     p = np.array([_p_values(_permuted(pool[:4], pool[4:], 199, rng))[0] for pool in pools])
