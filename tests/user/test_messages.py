@@ -50,6 +50,9 @@ STUDIES = {  # what is wrong, and the exit code of a run
     "below the residual": (altered(problem__friction__residual_strength=1.2e6), 2),
     "coarse": (altered(random__strength__spectrum__correlation_length=4e-4), 0),
     "a law without scale": (altered(problem__friction={}), 2),
+    "a force without an area": (altered(reliability={"force": 40e3}), 2),
+    "a coefficient without a pressure": (altered(reliability={"friction_coefficient": 0.4}), 2),
+    "a station off the interface": (altered(save={"stations": {"far": 3.0}}), 2),
 }
 
 

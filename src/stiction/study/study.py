@@ -35,7 +35,7 @@ from stiction.base.model import (
     model,
     to_plain,
 )
-from stiction.ensemble.dataset import GridAxes, variables_in
+from stiction.ensemble.dataset import GridAxes, distinct, variables_in
 from stiction.ensemble.experiment import Ensemble, Experiment
 from stiction.ensemble.limit_state import StressName
 from stiction.ensemble.monte_carlo import gather
@@ -215,7 +215,23 @@ class Study(_Parts):
                 f"sweep: {', '.join(wide)} cannot be kept along an interface that is swept; make a"
                 " study of each"
             )
+        for point in distinct(points, "problem", "random"):
+            self._check_tables(point)
         return self
+
+    def _check_tables(self, point: Experiment) -> None:
+        """Refuse a demand, or a station, that a point has no place for."""
+        question = self.reliability
+        if question is not None and question.force is not None:
+            point.problem.stress_of("reliability.force", question.force)
+        if question is not None and question.friction_coefficient and not point.pressure > 0.0:
+            raise InputError(
+                "reliability.friction_coefficient: needs a normal pressure (Pa,"
+                " problem.load.normal_pressure) or a pressing force (N)"
+            )
+        if self.save is not None:
+            with prefixed("save", "."):
+                self.save.nodes(point.problem.interface)
 
     @property
     def points(self) -> list[Point]:
