@@ -410,6 +410,21 @@ def test_a_study_names_no_folder_to_write_to(tmp_path):
         refuses("save.to", lambda read=read: read(tmp_path / "study.toml"))
 
 
+@pytest.mark.parametrize("saved", [3, [], "to", {"to": 3, "too": 4}])
+def test_a_table_of_another_kind_is_no_traceback(tmp_path, saved):
+    (tmp_path / "study.toml").write_text(tomli_w.dumps(STUDY | {"save": saved}))
+    refuses("save", lambda: st.Study.from_toml(tmp_path / "study.toml"))
+
+
+def test_many_mistakes_and_long_keys_are_told_in_few_words(tmp_path):
+    for keys in ({f"k{i}": i for i in range(10_000)}, {"k" * 10**5: 1}):
+        for tables in ({}, STUDY):
+            (tmp_path / "study.toml").write_text(tomli_w.dumps(keys | tables))
+            with pytest.raises(st.InputError) as refusal:
+                st.Study.from_toml(tmp_path / "study.toml")
+            assert len(str(refusal.value)) < 50_000
+
+
 def test_check_lists_files_outside(tmp_path, command):
     (tmp_path / "inside").mkdir()
     study = small_study(64)

@@ -247,6 +247,10 @@ def valid_keys(cls: Any) -> list[str]:
     return [*keys_of(cls), *getattr(cls, "instead_of_fields", ())]
 
 
+MAX_MISTAKES = 100
+"""Mistakes of a model that are explained."""
+
+
 def mistakes(
     error: pydantic.ValidationError, valid: Sequence[str], call: bool
 ) -> list[tuple[str, str]]:
@@ -258,7 +262,8 @@ def mistakes(
     texts: dict[tuple[str, str, str], list[str]] = {}  # a union has an item for each member
     shown = [name for name in valid if name != "self"]
     misspelt: set[str] = set()
-    for item in error.errors():
+    items = error.errors()
+    for item in items[:MAX_MISTAKES]:
         kind, given = item["type"], f", got {describe(item.get('input'))}"
         context, steps = item.get("ctx") or {}, list(item["loc"])
         cause = context.get("error")
@@ -290,7 +295,7 @@ def mistakes(
         (path, text + " or ".join(dict.fromkeys(members)) + given)
         for (path, text, given), members in texts.items()
         if text != MISSING or path not in misspelt
-    ]
+    ] + [("", f"and {len(items) - MAX_MISTAKES} more")] * (len(items) > MAX_MISTAKES)
 
 
 def _joined(*steps: str, by: str = ".") -> str:

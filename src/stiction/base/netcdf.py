@@ -32,7 +32,7 @@ from stiction.base.files import check_unpacked
 if TYPE_CHECKING:
     import xarray as xr
 
-MAX_OBJECTS = 10_000
+MAX_OBJECTS = 1_000
 MAX_VALUES = 2**23
 """Values of a file of fewer bytes than this; larger files may hold one value a byte."""
 SHUFFLE, DEFLATE, CHECKSUM, VIRTUAL = 2, 1, 3, 3

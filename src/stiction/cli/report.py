@@ -33,6 +33,12 @@ QUANTITIES = ("critical_stress", "first_instability", "friction_coefficient", "c
 SPREAD = ("mean", "standard deviation")
 
 
+CONTROLS = {
+    code: "\N{REPLACEMENT CHARACTER}" for code in (*range(9), *range(11, 32), *range(127, 160))
+}
+"""Letters that steer terminals, which may print a page, too."""
+
+
 @dataclass
 class Page:
     """Text, figures, tables and listings in the order in which they are added."""
@@ -69,7 +75,8 @@ class Page:
             lstrip_blocks=True,
             undefined=jinja2.StrictUndefined,
         )
-        return environment.get_template("report.html.j2").render(page=self)
+        page = environment.get_template("report.html.j2").render(page=self)
+        return page.translate(CONTROLS)
 
 
 def shown(entry: Any) -> str:

@@ -142,7 +142,7 @@ class Store:
                 continue
             try:
                 mark, table = _table_in(data)
-            except (*UNREADABLE, TypeError, RecursionError):
+            except (*UNREADABLE, TypeError, RecursionError, MemoryError):
                 self.damage[name] = "is no chunk, though its checksum is right"
                 continue
             if mark != self._mark:

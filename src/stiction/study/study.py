@@ -30,6 +30,7 @@ from stiction.base.model import (
     Text,
     check,
     checked,
+    describe,
     explain,
     keys_of,
     model,
@@ -61,6 +62,8 @@ CURVES = "failure_curve"
 """Key of the settings of failure curves beside the study of a run."""
 MAX_TOML_BYTES, MAX_TOML_WORDS, MAX_DOTS = 2**21, 2**18, 64
 """Bytes of a study file, bytes of it that are not lists of numbers, and dots of a line of these."""
+SHOWN_KEYS = 10
+"""Keys of a file that is no study."""
 _NUMBERS = re.compile(rb"(?:[^=#]{1,200}=)?([\s\d.,eE+_\[\]-]*)")
 """A line that holds numbers, or a key and numbers."""
 
@@ -548,11 +551,13 @@ def _read(
     check("study", given, dict)
     context = {}
     if given and not {*keys_of(cls)} & {*given}:
+        some = ", ".join(map(describe, [*given][:SHOWN_KEYS]))
         raise InputError(
-            f"study: has none of the tables {', '.join(PARTS)}, but {', '.join(map(repr, given))};"
+            f"study: has none of the tables {', '.join(PARTS)}, but {some};"
             " `stiction example` prints a study to start from"
         )
-    if folder is not None and "to" in (given.get("save") or ()):
+    saved = given.get("save")
+    if folder is not None and isinstance(saved, dict) and "to" in saved:
         raise InputError(
             "save.to: is no option of a study file; give --out to stiction rupture"
         )

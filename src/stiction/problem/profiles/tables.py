@@ -20,6 +20,7 @@ import csv
 import io
 import math
 import re
+import warnings
 import zipfile
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
@@ -48,8 +49,8 @@ INSTRUMENTS = (
 """Binary files of profilometers and microscopes, which SurfaceTopography reads."""
 LARGE = 2**19
 """Bytes of a text from which on pandas reads the lines behind the first of them."""
-MAX_UNEVEN_BYTES = 2**22
-"""Bytes of a text that pandas cannot read: its cells take a hundred times this memory."""
+MAX_UNEVEN_CELLS = 2**19
+"""Cells of a text that pandas cannot read: each takes hundreds of bytes and microseconds."""
 END = 20
 """Lines at the end of a text that show what separates its columns."""
 HEAD = 2**16
@@ -214,7 +215,10 @@ def _read_image(path: Path) -> Array:
 
     content = content_of(path)
     try:
-        with Image.open(io.BytesIO(content), formats=("PNG", "TIFF")) as image:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            image = Image.open(io.BytesIO(content), formats=("PNG", "TIFF"))
+        with image:
             check_unpacked(image.width * image.height, content, MAX_CELLS, 1)
             grey = np.asarray(image)
     except InputError:
@@ -249,11 +253,13 @@ def read_table(path: Path, options: Options = Options()) -> xr.Dataset:  # noqa:
             content = _text(content).encode()
         large = _large(content, options) if len(content) > LARGE else None
         if large is None:
-            if len(content) > MAX_UNEVEN_BYTES:
+            marks = max(map(content.count, (b",", b";", b"\t")))
+            cells = max(marks + content.count(b"\n"), len(content.split()))
+            if cells > MAX_UNEVEN_CELLS:
                 raise InputError(
-                    f"has {len(content)} bytes, and its lines are not all of the same kind; files"
-                    f" of more than {MAX_UNEVEN_BYTES} hold no comments, blank lines or remarks"
-                    " between or below the numbers, and the same number of cells in each line"
+                    f"has about {cells} cells in lines of different kinds; a text of more than"
+                    f" {MAX_UNEVEN_CELLS} holds no comments, blank lines or remarks between or"
+                    " below the numbers, and the same number of cells in each line"
                 )
             grid = _lines(_text(content), options)
             table = _parsed(grid, options)

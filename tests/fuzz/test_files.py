@@ -1,0 +1,197 @@
+"""Mutated tables, workbooks, NetCDF and runs are refused in a line, or read: no traceback.
+
+More of them: pytest tests/fuzz/test_files.py --fuzz-count 15000 --fuzz-seed 771.
+"""
+
+import copy
+import io
+import json
+import random
+import shutil
+import time
+import traceback
+import zipfile
+
+import numpy as np
+import openpyxl
+import pytest
+import xarray as xr
+from small_study import small_study
+
+import stiction as st
+from stiction.base import files
+from stiction.ensemble import store
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+X, Y = np.arange(32) * 1e-3, np.random.default_rng(0).random(32) + 1.0
+JUNK = (
+    b"\0", b"\xff\xff\xff\xff", b"\x7f\xff\xff\xff", b"9" * 400, b"(", b'"', b";", b",,,", b"\n",
+    b"\x1b[2J", b"nan", b"1e999", b"-1", b"[[[[", b"<a>", b"&x;", b"\xef\xbb\xbf", b"\r", b"#",
+    b" " * 300,
+)  # fmt: skip
+
+
+def text(name, separator, **options):
+    rows = [f"{x:.6g}{separator}{y:.6g}" for x, y in zip(X, Y, strict=True)]
+    return name, "\n".join([f"x (m){separator}strength (MPa)", *rows]).encode(), options
+
+
+def workbook():
+    book, file = openpyxl.Workbook(), io.BytesIO()
+    for row in [("x (m)", "strength (MPa)"), *zip(X.tolist(), Y.tolist(), strict=True)]:
+        book.active.append(row)
+    book.save(file)
+    return "p.xlsx", file.getvalue(), {}
+
+
+def netcdf(folder, **options):
+    data = xr.Dataset({"strength": ("x", Y, {"units": "MPa"})}, {"x": ("x", X)})
+    data.to_netcdf(folder / "p.nc", engine="netcdf4", **options)
+    return "p.nc", (folder / "p.nc").read_bytes(), {}
+
+
+@pytest.fixture(scope="module")
+def sources(tmp_path_factory):
+    """Good files to begin with, and a run."""
+    folder = tmp_path_factory.mktemp("sources")
+    array = io.BytesIO()
+    np.save(array, Y)
+    packed = {"encoding": {"strength": {"zlib": True, "shuffle": True, "fletcher32": True}}}
+    good = [
+        text("p.csv", ";"), text("p.txt", " "), text("p.dat", ","), workbook(), netcdf(folder),
+        netcdf(folder, **packed), netcdf(folder, format="NETCDF3_CLASSIC"),
+        ("p.npy", array.getvalue(), {}),
+    ]  # fmt: skip
+    st.Study.from_dict(small_study(64)).run(out=folder / "run", workers=1, progress=False)
+    return good, folder / "run"
+
+
+def mutated(data, chance):
+    """Bytes with some changed, lost, repeated or put between."""
+    data = bytearray(data)
+    for _ in range(chance.choice((1, 1, 2, 4, 16))):
+        at, kind = chance.randrange(len(data) + 1), chance.randrange(5)
+        if kind == 0:
+            data[at : at + 1] = bytes([chance.randrange(256)])
+        elif kind == 1:
+            del data[at : at + chance.choice((1, 4, 40, 4000))]
+        elif kind == 2:
+            data[at:at] = data[chance.randrange(len(data) + 1) :][: chance.choice((8, 200))]
+        else:
+            junk = chance.choice(JUNK)
+            data[at : at + len(junk) * (kind == 3)] = junk
+    return bytes(data)
+
+
+def mutated_workbook(data, chance):
+    """A workbook one of whose parts is mutated: a mutated archive is soon refused."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(data)) as whole, zipfile.ZipFile(file, "w") as packed:
+        names = whole.namelist()
+        victim = chance.choice(["xl/worksheets/sheet1.xml", chance.choice(names)])
+        for name in names:
+            part = whole.read(name)
+            packed.writestr(name, mutated(part, chance) if name == victim else part)
+    return file.getvalue()
+
+
+def mutated_json(given, chance):
+    """Plain content with one value replaced, anywhere."""
+    values = (
+        None,
+        -1,
+        2**63,
+        1e308,
+        "x",
+        "\x1b[2J",
+        [],
+        {},
+        [[]],
+        True,
+        "9" * 5000,
+        {"a": [1]},
+    )
+    if isinstance(given, dict | list) and given and chance.random() < 0.8:
+        given = copy.copy(given)
+        key = chance.choice(list(given) if isinstance(given, dict) else range(len(given)))
+        given[key] = mutated_json(given[key], chance)
+        return given
+    return chance.choice(values)
+
+
+def forge(folder, chance):
+    """Change something of a run, and make all digests right."""
+    (path,) = (folder / "chunks").iterdir()
+    arrays = files.read_arrays(path)
+    kind = chance.choice(("study", "about", "rows", "bytes", "pilot"))
+    if kind in ("study", "pilot"):
+        victim = folder / f"{kind}.json"
+        store._write_json(victim, mutated_json(store.read_json(victim), chance))
+        return kind
+    if kind == "about":
+        parts = mutated_json(json.loads(arrays["about"].tobytes()), chance)
+        arrays["about"] = np.frombuffer(json.dumps(parts).encode(), np.uint8)
+    elif kind == "rows":
+        rows = arrays["rows"].copy()
+        name = chance.choice(rows.dtype.names)
+        rows[name] = chance.choice((-1, 0, 2**62, 7))
+        kinds = [(one, rows.dtype[one]) for one in rows.dtype.names]
+        at = chance.randrange(len(kinds))
+        kinds[at] = (
+            chance.choice((kinds[at][0], "x")),
+            chance.choice(("f4", "i8", "U3", "(2,)f8")),
+        )
+        arrays["rows"] = chance.choice((rows, rows[:0], rows[:, None], rows.astype(kinds)))
+    packed = io.BytesIO()
+    np.savez(packed, **arrays)
+    data = packed.getvalue() if kind != "bytes" else mutated(packed.getvalue(), chance)
+    path.unlink()
+    (path.parent / f"{store.digest(data)}.npz").write_bytes(data)
+    return kind
+
+
+def fault(use):
+    """What is wrong with the end of a trial: a traceback, several lines, a wait."""
+    begin = time.perf_counter()
+    try:
+        use()
+    except (st.InputError, st.RunError) as error:
+        problems = getattr(error, "problems", [str(error)])
+        if not all(len(text.strip()) in range(1, 2000) for text in problems):
+            return f"refused with {problems!r:.300}"
+    except Exception:
+        return traceback.format_exc(-3)
+    return "" if time.perf_counter() - begin < 20.0 else "more than 20 s"
+
+
+def test_mutated_files_are_refused_or_read(tmp_path, fuzz, sources):
+    chance, faults = random.Random(fuzz.seed), []
+    for number in range(fuzz.count):
+        name, data, options = chance.choice(sources[0])
+        change = mutated_workbook if name == "p.xlsx" and chance.random() < 0.9 else mutated
+        path = tmp_path / name
+        path.write_bytes(change(data, chance))
+        read = st.read_peaks if name == "p.csv" and chance.random() < 0.2 else st.read_profile
+        if wrong := fault(lambda read=read, path=path, options=options: read(path, **options)):
+            faults.append(f"file {number} ({name}): {wrong}")
+    assert not faults, "\n".join(faults)
+
+
+def test_forged_runs_are_refused_damaged_or_read(tmp_path, fuzz, sources):
+    chance, faults = random.Random(fuzz.seed), []
+
+    def use(folder):
+        stored = st.open_run(folder)
+        stored.status()
+        stored.export(folder / "out.nc", partial=True)
+        study = st.Study.from_dict(small_study(64))
+        study.run(out=folder, workers=1, progress=False)
+
+    for number in range(max(1, fuzz.count // 5)):
+        folder = tmp_path / f"{number}"
+        shutil.copytree(sources[1], folder)
+        kind = forge(folder, chance)
+        if wrong := fault(lambda folder=folder: use(folder)):
+            faults.append(f"run {number} ({kind}): {wrong}")
+        shutil.rmtree(folder)
+    assert not faults, "\n".join(faults)
