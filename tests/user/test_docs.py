@@ -108,10 +108,8 @@ SHOWN = {
     }),
     "docs/reliability.md": (of_reliability, {}),
     "docs/what-do-twenty-five-tests-tell-me.md": (of_peaks, {}),
-    "docs/decisions.md": (of_decisions, {
+    "docs/design-force.md": (of_decisions, {
         "between=True": "between=True, bootstrap=20",
-        r"interfaces\(60\)": "interfaces(6)",
-        "samples=400": "samples=40",
         "probability=1e-3, method": "probability=0.03, method",
         "nodes=256": "nodes=128",
     }),
