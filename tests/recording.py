@@ -40,6 +40,7 @@ ROUND_OFF = ("certificate_gap",)
 """Outputs that are nothing but round-off where all is well: recorded as whether they are small."""
 MAX_WORDS_OF_A_NAME = 3
 """Texts of more words are prose, which is not recorded."""
+NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w.])")
 VERSIONS = re.compile(r"version|created|platform")
 
 
@@ -184,6 +185,13 @@ def _same(one: Any, other: Any, close: float) -> bool:
         return alike and _near(one["digest"], other["digest"], close)
     if isinstance(one, list) and isinstance(other, list):
         return len(one) == len(other) and _near(one, other, close)
+    if isinstance(one, str) and isinstance(other, str):  # a field or a number as a text
+        words, values = NUMBER.sub("", one), list(map(float, NUMBER.findall(one)))
+        recorded = list(map(float, NUMBER.findall(other)))
+        alike = words == NUMBER.sub("", other) and len(values) == len(recorded)
+        return alike and all(
+            _near([x], [y], close) for x, y in zip(values, recorded, strict=True)
+        )
     return type(one) is type(other) and one == other
 
 
