@@ -55,16 +55,16 @@ def main(arguments: list[str] | None = None) -> None:
                     page.write(out / "report.html", so_far, {}, images, run, [], done=False)
             if options.figure:
                 return
-            found = {
+            judged = {
                 title: [finding for claim in rows if (finding := claims.judge(claim, data))]
                 for title, rows in groups.items()
             }
     texts = (str(w.message) for w in caught if issubclass(w.category, st.AccuracyWarning))
     warned = sorted({re.sub(r"\d\S*", "", text): text for text in texts}.values())
     claims.write_csv(
-        [finding for rows in found.values() for finding in rows], out / "claims.csv"
+        [finding for rows in judged.values() for finding in rows], out / "claims.csv"
     )
-    page.write(out / "report.html", data, found, images, run, warned, done=True)
+    page.write(out / "report.html", data, judged, images, run, warned, done=True)
     run.say(f"done: {out / 'report.html'}")
 
 

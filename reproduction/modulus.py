@@ -110,27 +110,27 @@ def compare(data: Data, visible: float = 1.0) -> list[Reading]:
     count = data["readings"].sizes["sample"]
     drawn = np.random.default_rng(0).integers(count, size=(RESAMPLED, count))
     drawn = np.vstack([np.arange(count), drawn])
-    found = []
+    readings = []
     for key, text in READINGS.items():
-        own = functools.partial(at, data, key)
+        values_of = functools.partial(at, data, key)
 
         @functools.cache
-        def resampled(name, ratio, function=np.asarray, own=own):
-            return np.mean(function(own(name, ratio))[drawn], axis=1)
+        def resampled(name, ratio, function=np.asarray, values_of=values_of):
+            return np.mean(function(values_of(name, ratio))[drawn], axis=1)
 
-        found.append(
+        readings.append(
             Reading(
                 key=key,
                 text=text,
                 length=float(data["readings"]["length"].sel(reading=key)),
-                excess=tuple(mean(own("excess", ratio)) * 100.0 for ratio in SIMULATED),
-                misplaced=tuple(share(own("misplaced", ratio)) for ratio in SIMULATED),
-                patches=mean(own("patches", SIMULATED[0])),
+                excess=tuple(mean(values_of("excess", ratio)) * 100.0 for ratio in SIMULATED),
+                misplaced=tuple(share(values_of("misplaced", ratio)) for ratio in SIMULATED),
+                patches=mean(values_of("patches", SIMULATED[0])),
                 eight=_bootstrapped(_eight(resampled)),
                 chances=tuple(function(resampled, visible) for _, _, function in EVIDENCE),
             )
         )
-    return found
+    return readings
 
 
 def odds(data: Data, evidence=slice(None), visible: float = 1.0) -> tuple[float, float, float]:

@@ -19,14 +19,14 @@ class Number:
     def __mul__(self, factor: float) -> Number:
         return Number(self.value * factor, self.error * abs(factor))
 
-    def __sub__(self, other) -> Number:
-        other = other if isinstance(other, Number) else Number(float(other))
-        return Number(self.value - other.value, math.hypot(self.error, other.error))
+    def __sub__(self, subtrahend) -> Number:
+        subtrahend = subtrahend if isinstance(subtrahend, Number) else Number(float(subtrahend))
+        return Number(self.value - subtrahend.value, math.hypot(self.error, subtrahend.error))
 
-    def __truediv__(self, other) -> Number:
-        other = other if isinstance(other, Number) else Number(float(other))
-        value = self.value / other.value
-        parts = (self.error / other.value, value * other.error / other.value)
+    def __truediv__(self, divisor) -> Number:
+        divisor = divisor if isinstance(divisor, Number) else Number(float(divisor))
+        value = self.value / divisor.value
+        parts = (self.error / divisor.value, value * divisor.error / divisor.value)
         return Number(value, math.hypot(*parts))
 
     def __abs__(self) -> Number:
@@ -96,16 +96,19 @@ def quantile(values, p: float) -> Number:
 def lower_spread(values, upper: float = 0.5) -> Number:
     """Return the median less the lower quartile, the spread that the paper plots."""
     values = np.ravel(values)
-    high, one = _quantile_influence(values, upper)
-    quartile, other = _quantile_influence(values, 0.25)
-    return Number(float(high - quartile), float((one - other).std()) / math.sqrt(values.size))
+    high, upper_influence = _quantile_influence(values, upper)
+    quartile, quartile_influence = _quantile_influence(values, 0.25)
+    return Number(
+        float(high - quartile),
+        float((upper_influence - quartile_influence).std()) / math.sqrt(values.size),
+    )
 
 
-def ratio_of_means(values, others) -> Number:
+def ratio_of_means(values, divisors) -> Number:
     """Return the ratio of the means of paired values."""
-    values, others = np.ravel(values), np.ravel(others)
-    ratio = float(values.mean() / others.mean())
-    error = float((values - ratio * others).std()) / abs(float(others.mean()))
+    values, divisors = np.ravel(values), np.ravel(divisors)
+    ratio = float(values.mean() / divisors.mean())
+    error = float((values - ratio * divisors).std()) / abs(float(divisors.mean()))
     return Number(ratio, error / math.sqrt(values.size))
 
 

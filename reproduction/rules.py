@@ -170,17 +170,17 @@ def graded(strict: Rule, weak: Rule) -> Rule:
     return Rule(f"{strict.text}; a correction if only {weak.text}", judge)
 
 
-def main(first: Rule, other: Rule) -> Rule:
+def main(first: Rule, second: Rule) -> Rule:
     """The first rule decides; a failure of the other one earns a correction."""
 
     def judge(series: Sequence[Numbers]) -> Verdict:
-        verdict, rest = _found((first, other), series)
+        verdict, rest = _found((first, second), series)
         if verdict is Verdict.HOLDS and rest is not Verdict.HOLDS:
             return Verdict.CORRECTED if rest is Verdict.FAILS else Verdict.OPEN
         return verdict
 
-    text = f"{first.text}; a correction unless the last is {other.text}"
-    return Rule(text, judge, first.series + other.series)
+    text = f"{first.text}; a correction unless the last is {second.text}"
+    return Rule(text, judge, first.series + second.series)
 
 
 def never(limit: float) -> Rule:
@@ -227,11 +227,11 @@ def alike(*rules: Rule) -> Rule:
     """One rule for every measure of what the text does not define, or a rule for each."""
 
     def judge(series: Sequence[Numbers]) -> Verdict:
-        every = rules if len(rules) > 1 else rules * (len(series) // rules[0].series)
-        found = _found(every, series)
-        if Verdict.FAILS in found:
-            return together(found)
-        return min(found, key=(Verdict.CORRECTED, Verdict.OPEN, Verdict.HOLDS).index)
+        each_rule = rules if len(rules) > 1 else rules * (len(series) // rules[0].series)
+        results = _found(each_rule, series)
+        if Verdict.FAILS in results:
+            return together(results)
+        return min(results, key=(Verdict.CORRECTED, Verdict.OPEN, Verdict.HOLDS).index)
 
     text = "; or ".join(rule.text for rule in rules)
     return Rule(f"by each measure: {text}", judge, sum(rule.series for rule in rules))

@@ -12,10 +12,9 @@ from reproduction.modulus import at
 from reproduction.numbers_with_errors import Number, deviation, lower_spread, mean, share
 from reproduction.rules import above, alike, below, each, falling, graded, rising, within
 from reproduction.setting import FIRST, HIGH, LAST, MEAN, RATIOS, SECOND, SIMULATED, H, L
-from reproduction.statements_onset import TWENTY, by_reading
+from reproduction.statements_onset import KPA, MPA, PER_CENT, TWENTY, by_reading
 from reproduction.studies import READINGS
 
-KPA, MPA, PER_CENT = 1e-3, 1e-6, 100.0
 MOST = above(0.5, "most of it", share=True)
 RARE = below(0.01, "extremely unlikely: 60 simulations would not show it", share=True)
 

@@ -16,10 +16,10 @@ from reproduction.modulus import odds
 from reproduction.numbers_with_errors import Number, lower_spread, mean, root_mean_square, share
 from reproduction.rules import Verdict
 from reproduction.setting import FIRST, LAST, RATIOS, SIMULATED
+from reproduction.statements_onset import PER_CENT
 
 ABOVE = 1e-9
 """Relative difference of two onsets that the tolerance of the solver cannot tell from zero."""
-PER_CENT = 100.0
 
 
 def over(function, ratios=RATIOS) -> list[Number]:

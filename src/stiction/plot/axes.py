@@ -85,13 +85,13 @@ def named(results: Any) -> dict[str, xr.Dataset]:
     if isinstance(results, xr.Dataset):
         results = [results]
     if not isinstance(results, Mapping):
-        found: dict[str, Any] = {}
-        for number, one in enumerate(results):
+        by_name: dict[str, Any] = {}
+        for number, result in enumerate(results):
             name = f"result {number}"
             with suppress(AttributeError, KeyError, TypeError, ValueError):
-                name = json.loads(one.attrs["study"])["method"]["type"].replace("_", " ")
-            found[f"{name}, result {number}" if name in found else name] = one
-        results = found
+                name = json.loads(result.attrs["study"])["method"]["type"].replace("_", " ")
+            by_name[f"{name}, result {number}" if name in by_name else name] = result
+        results = by_name
     if not results:
         raise InputError("result: is empty; give one result or several")
     return dict(results)

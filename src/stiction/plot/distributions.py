@@ -79,15 +79,15 @@ def monte_carlo(
     quantity = shown_quantity(next(iter(results.values())), quantity)
     curves: list[tuple[str | None, xr.DataArray]] = []
     along: list[str] = []
-    for name, one in results.items():
-        need(one, quantity)
-        along = _swept(one[quantity])
+    for name, dataset in results.items():
+        need(dataset, quantity)
+        along = _swept(dataset[quantity])
         if len(along) > 1:
             raise InputError(
                 f"result: is swept over {', '.join(along)}; choose steps of all but one with"
                 f" result.isel({along[0]}=0)"
             )
-        curves += _steps(one[quantity], along[0]) if along else [(name, one[quantity])]
+        curves += _steps(dataset[quantity], along[0]) if along else [(name, dataset[quantity])]
     single = isinstance(result, xr.Dataset) and not along
     peaks = None if measured is None else _peaks_of(measured, quantity, curves[0][1])
     factor, unit, text = scaled(*(variable for _, variable in curves))
@@ -102,7 +102,7 @@ def monte_carlo(
         axes.set_ylabel(f"density (1/{unit})" if unit else "density")
         axes.set_ylim(bottom=0.0)
         if axes.get_legend_handles_labels()[1]:
-            axes.legend(title=scaled(one[along[0]])[2] if along else None)
+            axes.legend(title=scaled(dataset[along[0]])[2] if along else None)
     return axes
 
 
@@ -126,8 +126,8 @@ def _draw_values(
         cells = int(np.clip(values.size / 50, 5, 40))
         axes.stairs(*np.histogram(values, cells, density=True), **style)
     elif values.size >= FEWEST and np.ptp(values) > 0.0:
-        found = density(values)
-        axes.plot(found.x, found.value, **style)
+        estimate = density(values)
+        axes.plot(estimate.x, estimate.value, **style)
     else:
         style |= {"linestyle": "none", "marker": "|", "clip_on": False}
         axes.plot(values, np.zeros_like(values), **style)
@@ -244,16 +244,16 @@ def _quantiles(
     part: xr.DataArray, factor: float, along: str
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return quantiles (levels, steps), and errors of the median (2, steps), as drawn."""
-    found = np.full((len(LEVELS), part.sizes[along]), np.nan)
-    errors = found[:2].copy()
+    values_at = np.full((len(LEVELS), part.sizes[along]), np.nan)
+    errors = values_at[:2].copy()
     for step in range(part.sizes[along]):
         values = _finite(part.isel({along: step})) * factor
         if values.size:
-            one = estimate_quantiles(values, LEVELS)
-            found[:, step] = one.value
-            ends = np.clip([one.lower[2], one.upper[2]], values.min(), values.max())
-            errors[:, step] = np.abs(ends - one.value[2])
-    return found, errors
+            estimate = estimate_quantiles(values, LEVELS)
+            values_at[:, step] = estimate.value
+            ends = np.clip([estimate.lower[2], estimate.upper[2]], values.min(), values.max())
+            errors[:, step] = np.abs(ends - estimate.value[2])
+    return values_at, errors
 
 
 def _finite(values: Any) -> NDArray[np.float64]:
@@ -371,14 +371,14 @@ def sensitivities(design: Answer, *, ax: Axes | None = None) -> Axes:
     InputError
         If the answer has no `sensitivities`.
     """
-    found = design.sensitivities
-    if not found.sizes.get("source"):
+    table = design.sensitivities
+    if not table.sizes.get("source"):
         raise InputError(
             "design: has no sensitivities; st.design_stress(..., sensitivities=True)"
         )
     quantity = "force" if np.isfinite(design.area) else "stress"
     area = design.area if quantity == "force" else 1.0
-    ends = np.stack([found[f"{quantity}_at_low"].values, found[f"{quantity}_at_high"].values])
+    ends = np.stack([table[f"{quantity}_at_low"].values, table[f"{quantity}_at_high"].values])
     factor, unit = unit_for("N" if quantity == "force" else "Pa", ends.ravel())
     place = np.arange(ends.shape[1])[::-1]
     with on_axes(ax) as axes:
@@ -388,15 +388,15 @@ def sensitivities(design: Answer, *, ax: Axes | None = None) -> Axes:
         axes.axvline(design.stress * area * factor, color=INK, linewidth=0.8)
         low, high = np.sort(ends, axis=0) * factor
         axes.barh(place, high - low, left=low, height=0.5, color=color(1))
-        for number, (one, other) in enumerate(ends.T * factor):
-            left, right = ("low", "high") if one <= other else ("high", "low")
+        for number, (at_low, at_high) in enumerate(ends.T * factor):
+            left, right = ("low", "high") if at_low <= at_high else ("high", "low")
             for at, name, side in (
-                (min(one, other), left, "right"), (max(one, other), right, "left")
+                (min(at_low, at_high), left, "right"), (max(at_low, at_high), right, "left")
             ):  # fmt: skip
-                text = f" {found[name].values[number]} "
+                text = f" {table[name].values[number]} "
                 axes.text(at, place[number], text, ha=side, va="center", fontsize=7)
         axes.set_yticks(
-            place, [str(name).removeprefix("problem.") for name in found.source.values]
+            place, [str(name).removeprefix("problem.") for name in table.source.values]
         )
         axes.set_xlabel(with_unit(f"design {quantity}", unit))
         axes.margins(x=0.25)

@@ -197,19 +197,22 @@ def onset(
     'position $x$ (mm)'
     """
     results = named(result)
-    for one in results.values():
-        need(one, "critical_load", "critical_position")
+    for dataset in results.values():
+        need(dataset, "critical_load", "critical_position")
     problem = problem_of(next(iter(results.values())), problem)
     rows = rows_of(problem.interface, strength)
     if is_coefficient(strength) and problem.given_pressure is not None:
         rows = rows * problem.normal_pressure
-    counts = {rows.shape[0], *(one.sizes["sample"] for one in results.values())}
+    counts = {rows.shape[0], *(dataset.sizes["sample"] for dataset in results.values())}
     if len(counts) > 1 or not 0 <= sample < min(counts):
         raise InputError(
             f"sample: {sample} of results and strength with {', '.join(map(str, sorted(counts)))}"
             " samples; they must have the same number"
         )
-    chosen = {name: one.isel(sample=slice(sample, sample + 1)) for name, one in results.items()}
+    chosen = {
+        name: dataset.isel(sample=slice(sample, sample + 1))
+        for name, dataset in results.items()
+    }
     is_plane = problem.interface.is_plane
     size = {"height": map_height(problem.interface, 2.0)} if is_plane else {"width": PAGE}
     with on_axes(ax, **size) as axes:
@@ -227,10 +230,10 @@ def _draw_line(
     interface = problem.interface
     x = interface.x * unit_for("m", interface.lengths)[0]
     factor, unit = unit_for("Pa", tau_p)
-    found = next(iter(results.values()))
+    first = next(iter(results.values()))
     axes.plot(x, tau_p * factor, color=QUIET, linewidth=0.8, label=r"strength $\tau_p$")
-    if MEASURED in found.coords:
-        missing = ~found[MEASURED].values.reshape(-1)
+    if MEASURED in first.coords:
+        missing = ~first[MEASURED].values.reshape(-1)
         beside = np.roll(missing, 1) | np.roll(missing, -1)
         axes.fill_between(
             x, 0.0, 1.0, where=missing | beside, transform=axes.get_xaxis_transform(),
@@ -262,8 +265,8 @@ def _mark(
     for number, (name, result) in enumerate(results.items()):
         place = np.atleast_1d(result["critical_position"].values[0]) * length
         load = float(result["critical_load"][0])
-        own, unit = unit_for("Pa", load)
-        text = f"{name}: {load * own:.4f} {unit}"
+        factor_of_load, unit = unit_for("Pa", load)
+        text = f"{name}: {load * factor_of_load:.4f} {unit}"
         if "friction_coefficient" in result:
             text += f" (coefficient {float(result['friction_coefficient'][0]):.4f})"
         text += f" at {', '.join(f'{one:.2f}' for one in place)} {length_unit}"

@@ -34,12 +34,12 @@ PER_OCTAVE = 4
 """Bands of wavenumbers in an octave."""
 
 
-def fit(found: FieldFit) -> NDArray[Any]:
+def fit(field_fit: FieldFit) -> NDArray[Any]:
     """Draw a fitted random field beside the records.
 
     Parameters
     ----------
-    found : FieldFit
+    field_fit : FieldFit
         From `stiction.fit_field`.
 
     Returns
@@ -50,50 +50,52 @@ def fit(found: FieldFit) -> NDArray[Any]:
         (b): 90 % of the fits to records simulated from the fitted field; in (c) and (d): 90
         % of such sets of records. Each panel is of all records together.
     """
-    estimate, rng = found._estimate, np.random.default_rng(0)
+    estimate, rng = field_fit._estimate, np.random.default_rng(0)
     windows = estimate.setting.windows
-    observed = observe(found._rows, windows)
+    observed = observe(field_fit._rows, windows)
     simulated = [observe(estimate.simulate(rng), windows) for _ in range(SHOWN)]
     figure = new_figure(PAGE, 5.4)
     with paper_style():
         panels: NDArray[Any] = figure.subplots(2, 2).ravel()
-        _histogram(panels[0], found)
-        _quantiles(panels[1], found)
-        _correlation(panels[2], found, observed, simulated)
-        _spectrum(panels[3], found, observed, simulated)
+        _histogram(panels[0], field_fit)
+        _quantiles(panels[1], field_fit)
+        _correlation(panels[2], field_fit, observed, simulated)
+        _spectrum(panels[3], field_fit, observed, simulated)
         for letter, axes in zip("abcd", panels, strict=True):
             panel(axes, letter)
     return panels
 
 
-def _histogram(axes: Axes, found: FieldFit) -> None:
-    values = np.concatenate(found._rows)
-    factor, unit = unit_for(QUANTITIES[found.quantity].units, values)
+def _histogram(axes: Axes, field_fit: FieldFit) -> None:
+    values = np.concatenate(field_fit._rows)
+    factor, unit = unit_for(QUANTITIES[field_fit.quantity].units, values)
     counts, *_ = axes.hist(values * factor, bins=40, density=True, color=PALE, label="measured")
     at = np.linspace(values.min(), values.max(), 400)
     density, *spread = (
-        one.marginal.distribution.pdf(at) / factor
-        for one in (found.field, *found.repetitions[:SHOWN])
+        field.marginal.distribution.pdf(at) / factor
+        for field in (field_fit.field, *field_fit.repetitions[:SHOWN])
     )
     _band(axes, at * factor, spread)
-    noisy = found._estimate.model.noise > 0.05 * found.parameters["standard_deviation"]
+    noisy = field_fit._estimate.model.noise > 0.05 * field_fit.parameters["standard_deviation"]
     name = "fitted, without the noise" if noisy else "fitted"
     axes.plot(at * factor, density, color=color(1), label=name)
     # A density that is infinite at a bound must not set the scale of the panel.
     axes.set_ylim(0.0, 1.6 * np.max(counts))
-    axes.set_xlabel(with_unit(found.quantity.replace("_", " "), unit))
+    axes.set_xlabel(with_unit(field_fit.quantity.replace("_", " "), unit))
     axes.set_ylabel(f"density (1/{unit})" if unit else "density")
     axes.legend()
 
 
-def _quantiles(axes: Axes, found: FieldFit) -> None:
-    estimate = found._estimate
-    values = estimate.setting.marginal.quiet(np.concatenate(found._rows), estimate.model.noise)
-    factor, unit = unit_for(QUANTITIES[found.quantity].units, values)
+def _quantiles(axes: Axes, field_fit: FieldFit) -> None:
+    estimate = field_fit._estimate
+    values = estimate.setting.marginal.quiet(
+        np.concatenate(field_fit._rows), estimate.model.noise
+    )
+    factor, unit = unit_for(QUANTITIES[field_fit.quantity].units, values)
     share = (np.arange(200) + 0.5) / 200
     expected, *spread = (
-        one.marginal.distribution.ppf(share) * factor
-        for one in (found.field, *found.repetitions[:SHOWN])
+        field.marginal.distribution.ppf(share) * factor
+        for field in (field_fit.field, *field_fit.repetitions[:SHOWN])
     )
     _compare(axes, expected, np.quantile(values, share) * factor, expected, spread)
     axes.set_xlabel(with_unit("quantile of the fit", unit))
@@ -121,9 +123,9 @@ def _pooled_correlation(lag: Array, observed: list[Observed], powers: list[Array
 
 
 def _correlation(
-    axes: Axes, found: FieldFit, observed: list[Observed], simulated: list[list[Observed]]
+    axes: Axes, field_fit: FieldFit, observed: list[Observed], simulated: list[list[Observed]]
 ) -> None:
-    model, windows = found._estimate.model, [of_window.window for of_window in observed]
+    model, windows = field_fit._estimate.model, [of_window.window for of_window in observed]
     spacing = min(window.spacings[0] for window in windows)
     longest = max(window.shape[0] * window.spacings[0] for window in windows)
     most = LAGS * model.spectrum.correlation_length
@@ -157,10 +159,12 @@ def _pooled_spectrum(observed: list[Observed], powers: list[Array]) -> Array:
 
 
 def _spectrum(
-    axes: Axes, found: FieldFit, observed: list[Observed], simulated: list[list[Observed]]
+    axes: Axes, field_fit: FieldFit, observed: list[Observed], simulated: list[list[Observed]]
 ) -> None:
-    scale, unit = unit_for(QUANTITIES[found.quantity].units, np.concatenate(found._rows))
-    model, windows = found._estimate.model, [of_window.window for of_window in observed]
+    scale, unit = unit_for(
+        QUANTITIES[field_fit.quantity].units, np.concatenate(field_fit._rows)
+    )
+    model, windows = field_fit._estimate.model, [of_window.window for of_window in observed]
     k, measured = _pooled_spectrum(observed, _powers(observed))
     fitted = _pooled_spectrum(observed, [model.expectation(w) for w in windows])[1]
     spread = [scale**2 * _pooled_spectrum(some, _powers(some))[1] for some in simulated]
@@ -193,12 +197,12 @@ def _band(axes: Axes, at: Any, rows: Any) -> None:
     axes.fill_between(at, low, high, color=color(1), alpha=0.25, linewidth=0.0)
 
 
-def agreement(found: Agreement, *, ax: Axes | None = None) -> Axes:
+def agreement(result: Agreement, *, ax: Axes | None = None) -> Axes:
     """Draw measured peaks as steps on the predicted distribution.
 
     Parameters
     ----------
-    found : Agreement
+    result : Agreement
         From `stiction.statistics.agreement`.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on; new ones by default.
@@ -221,16 +225,16 @@ def agreement(found: Agreement, *, ax: Axes | None = None) -> Axes:
     >>> st.plot.agreement(found).get_xlabel()
     'peak (MPa)'
     """
-    peaks = found.peaks
+    peaks = result.peaks
     factor, unit = unit_for(peaks.unit, np.concatenate(peaks.values))
     ends: list[float] = []
     with on_axes(ax) as axes:
         for number, (length, values, (at, share)) in enumerate(
-            zip(peaks.lengths, peaks.values, found.predicted, strict=True)
+            zip(peaks.lengths, peaks.values, result.predicted, strict=True)
         ):
             of = "" if length is None else f", {length:g} m"
             paint = color(number + 1)
-            away = found.band / np.sqrt(values.size)
+            away = result.band / np.sqrt(values.size)
             band = (np.clip(share + sign * away, 0.0, 1.0) for sign in (-1.0, 1.0))
             name = f"90 % of {values.size} tests each{of}"
             axes.fill_between(
@@ -251,7 +255,7 @@ def agreement(found: Agreement, *, ax: Axes | None = None) -> Axes:
             with_unit("coefficient of friction" if peaks.unit == "1" else "peak", unit)
         )
         axes.set_ylabel("share of tests up to it")
-        p = found.p_values["cramer_von_mises"]
+        p = result.p_values["cramer_von_mises"]
         axes.set_title(f"p = {p:.2g}", fontsize=8, loc="left", color=QUIET)
         axes.legend()
     return axes

@@ -209,8 +209,8 @@ def _clock(axes: Axes, run: xr.Dataset) -> tuple[Any, str, list[str]]:
     stress, stress_unit = unit_for("Pa", run["mean_stress"].values)
     mean = (run["mean_stress"].values * stress).round(3) + 0.0  # no minus before a zero
     texts = [
-        f"{time:,.1f} {unit}{begin},  mean stress {one:.3f} {stress_unit}"
-        for time, one in zip(factor * since, mean, strict=True)
+        f"{time:,.1f} {unit}{begin},  mean stress {stress:.3f} {stress_unit}"
+        for time, stress in zip(factor * since, mean, strict=True)
     ]
     return axes.text(0.0, 1.04, " ", transform=axes.transAxes, color=QUIET), "text", texts
 

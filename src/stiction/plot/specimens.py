@@ -75,9 +75,9 @@ def specimen(
     below.plot(x, blocks.pressure, label="pressure $p$", **series(1))
     if result is not None:
         need(result, "critical_position", "critical_patch_length")
-        one = result.isel(sample=sample) if "sample" in result.dims else result
-        middle = float(one["critical_position"]) * scale
-        half = 0.5 * float(one["critical_patch_length"]) * scale
+        row = result.isel(sample=sample) if "sample" in result.dims else result
+        middle = float(row["critical_position"]) * scale
+        half = 0.5 * float(row["critical_patch_length"]) * scale
         for axes in (top, below):
             axes.axvspan(middle - half, middle + half, color=ACCENT, alpha=0.3, linewidth=0.0)
         below.plot([], [], color=ACCENT, alpha=0.3, linewidth=6.0, label="critical patch")
