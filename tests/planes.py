@@ -38,7 +38,6 @@ def moduli(modulus, ratio):
 def plane_sample(strength, residual, rate):
     """A sample on a plane under a uniform load, of (nx, ny) fields or numbers."""
     shape = np.shape(strength)
-    whole = (
-        np.broadcast_to(given, shape).flatten() for given in (strength, residual, 1.0, rate)
-    )
-    return make_sample(*whole, LINEAR._replace(at_corner=AT_CORNER))
+    fields = (strength, residual, 1.0, rate)
+    flat = (np.broadcast_to(field, shape).flatten() for field in fields)
+    return make_sample(*flat, LINEAR._replace(at_corner=AT_CORNER))
