@@ -116,48 +116,74 @@ def posterior(levels, peaks):
 
 
 def designs(levels, peaks, promised=PROMISED):
-    """Return the design by each family and by their average, {name: (promised,)}."""
+    """Return designs by each family and by their average, {name: (promised,)}, and intervals.
+
+    Intervals are of 90 %, of mean and scatter by the average, (2, 2).
+    """
     mean, weights = posterior(levels, peaks)
     centre = mean.mean()
-    at = centre + np.linspace(-2.0, 0.5, 2501)
+    at = centre + np.linspace(-2.5, 0.5, 3001)
     curves = {}
     for family in FAMILIES:
         w = weights[family]
         found = np.zeros(at.size)
         for place, own in zip(mean, w.T, strict=True):
-            found += np.interp(at - place, X, own @ BELOW[family])
+            if own.sum() > 1e-9:
+                found += np.interp(at - place, X, own @ BELOW[family])
         curves[family] = found / w.sum(), w.sum()
-    total = sum(evidence for _, evidence in curves.values())
-    curves["average"] = sum(c * e for c, e in curves.values()) / total, total
-    return {n: np.exp(np.interp(promised, c, at)) for n, (c, _) in curves.items()}
+    curves["average"] = sum(c * e for c, e in curves.values()), 1.0
+    total = sum(weights.values())
+    of_mean, of_scatter = np.cumsum(total.sum(axis=0)), np.cumsum(total.sum(axis=1))
+    ends = [
+        np.exp(np.interp([0.05, 0.95], of_mean, mean + 0.005)),
+        np.interp([0.05, 0.95], of_scatter - 0.5 * np.diff(of_scatter, prepend=0.0), CVS),
+    ]
+    return {n: np.exp(np.interp(promised, c, at)) for n, (c, _) in curves.items()}, ends
+
+
+def student(values):
+    """Return the designs by Student's t on the logarithms of some numbers."""
+    logs = np.log(values)
+    t = scipy.stats.t.ppf(PROMISED, logs.size - 1) * np.sqrt(1.0 + 1.0 / logs.size)
+    return np.exp(logs.mean() + t * logs.std(ddof=1))
 
 
 def main(campaigns=150, seed=1):
-    """Print true over promised probabilities, and designs over the right ones."""
+    """Print true over promised probabilities, designs over the right ones, intervals that hold."""
     rng = np.random.default_rng(seed)
     for truth in ("lognormal", "weibull", "gamma", "normal", "two batches"):
-        known = np.sort(
-            factors(truth, 2_000_000, rng) * np.exp(OF_PEAK * rng.standard_normal(2_000_000))
-        )
+        spread = np.exp(OF_PEAK * rng.standard_normal(2_000_000))
+        known = np.sort(factors(truth, 2_000_000, rng) * spread)
         right = np.quantile(known, PROMISED)
-        rows = []
+        rows = {}
         for _ in range(campaigns):
             errors = OF_LEVEL * rng.standard_normal(LEVELS) - 0.5 * OF_LEVEL**2
             levels = factors(truth, LEVELS, rng) * np.exp(errors)
             peaks = factors(truth, PEAKS, rng) * np.exp(OF_PEAK * rng.standard_normal(PEAKS))
-            found = designs(levels, peaks)
-            logs = np.log(np.concatenate([levels, peaks]))
-            t = scipy.stats.t.ppf(PROMISED, logs.size - 1) * np.sqrt(1.0 + 1.0 / logs.size)
-            found["student"] = np.exp(logs.mean() + t * logs.std(ddof=1))
-            rows.append([found[name] for name in ("lognormal", "average", "student")])
-        rows = np.array(rows)  # (campaigns, methods, promised)
-        chance = np.searchsorted(known, rows) / known.size / PROMISED
-        for number, name in enumerate(("log-normal", "average", "Student's t")):
-            cells = []
-            for place in (0, 1):
-                own, ratio = chance[:, number, place], rows[:, number, place] / right[place]
-                error = own.std(ddof=1) / np.sqrt(campaigns)
-                cells.append(f"{own.mean():.2f} +- {error:.2f} ({ratio.mean():.2f})")
+            for name, data in (
+                ("profiles", (levels, peaks[:0])), ("both", (levels, peaks)),
+                ("tests", (levels[:0], peaks)),
+            ):  # fmt: skip
+                found, ends = designs(*data)
+                inside = [
+                    low < value < high
+                    for (low, high), value in zip(ends, (1.0, SCATTER), strict=True)
+                ]
+                rows.setdefault(f"{name}, average", []).append([found["average"], inside])
+                if name == "both":
+                    own = [found["lognormal"], [False, False]]
+                    rows.setdefault("both, log-normal", []).append(own)
+            every = np.concatenate([levels, peaks])
+            rows.setdefault("both, Student's t", []).append([student(every), [False, False]])
+            rows.setdefault("tests, Student's t", []).append([student(peaks), [False, False]])
+        for name, own in rows.items():
+            stresses = np.array([row[0] for row in own])
+            chance = np.searchsorted(known, stresses) / known.size / PROMISED
+            error = chance.std(axis=0, ddof=1) / np.sqrt(campaigns)
+            means, ratio = chance.mean(axis=0), (stresses / right).mean(axis=0)
+            cells = [f"{means[k]:.2f} ± {error[k]:.2f} ({ratio[k]:.2f})" for k in (0, 1)]
+            held = np.mean([row[1] for row in own], axis=0)
+            cells += [f"{share:.0%}" if "average" in name else "" for share in held]
             print(f"| {truth} | {name} | {' | '.join(cells)} |", flush=True)
 
 

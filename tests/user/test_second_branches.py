@@ -1,0 +1,140 @@
+"""Second branches of inference: a guide of no use, threads in an estimate, peaks with a unit."""
+
+import dataclasses
+from types import SimpleNamespace
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+import stiction as st
+from stiction.base.progress import duration
+from stiction.inference import likelihood as likelihoods
+from stiction.inference.peaks import make_peaks
+
+PROBLEM = st.Problem(
+    st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
+    st.Interface(0.05, 64, width=0.013),
+    st.LinearWeakening(weakening_rate=0.25e12),
+)
+FIELD = st.RandomField(st.Gamma(mean=1e6, cv=0.2), st.PowerLawSpectrum(4e-3), mean_mode=True)
+LOCAL = st.LocalCriterion()
+PEAKS = np.array([0.78e6, 0.83e6, 0.8e6, 0.86e6])
+
+
+@dataclasses.dataclass(frozen=True)
+class Mixed:
+    """A share of the local criterion's onset, and the strength at one node for the rest."""
+
+    share: float
+    type: ClassVar[str] = "mixed"
+    label: ClassVar[str] = "stand-in"
+    variables = staticmethod(LOCAL.variables)
+    supports = staticmethod(lambda problem: [])
+    seconds_per_sample = staticmethod(lambda problem: 1e-4)
+
+    def prepare(self, problem):
+        solve = LOCAL.prepare(problem)
+
+        def mixed(rows):
+            values = solve(rows)
+            own = self.share * values["critical_stress"] + (1.0 - self.share) * (
+                0.8 * rows.strength[:, 5]
+            )
+            return values | {"critical_stress": own}
+
+        return mixed
+
+
+@pytest.mark.parametrize("share", [0.2, 0.45])
+def test_a_guide_that_hardly_correlates_is_not_used(share, monkeypatch):
+    """Correlations of 0.1 to 0.8: the onsets are those of a simulation at every node."""
+    given = {
+        "prior": {"correlation_length": (2e-3, 6e-3)}, "method": Mixed(share), "samples": 100,
+        "progress": False,
+    }  # fmt: skip
+    guided = st.infer(PROBLEM, FIELD, PEAKS, **given)
+    alike = np.corrcoef(
+        *(
+            st.monte_carlo(
+                PROBLEM, FIELD, method=method, samples=300, progress=False, pilot=False
+            ).critical_stress.values
+            for method in (Mixed(share), LOCAL)
+        )
+    )[0, 1]
+    assert 0.1 < alike < 0.8
+    monkeypatch.setattr(likelihoods, "no_single_length", lambda *_: "no guide")
+    alone = st.infer(PROBLEM, FIELD, PEAKS, **given)
+    for one, other in zip(guided.likelihood.densities, alone.likelihood.densities, strict=True):
+        assert one.onsets.shape == other.onsets.shape
+    assert guided.mean("correlation_length") == pytest.approx(
+        alone.mean("correlation_length"), rel=1e-6
+    )
+
+
+@pytest.mark.parametrize("workers", [1, 4])
+def test_an_estimate_of_the_time_counts_the_threads(workers):
+    slow = SimpleNamespace(seconds=9.0, method=SimpleNamespace(label="stand-in"))
+    with pytest.warns(UserWarning, match=f"about {duration(9000.0 / workers)}:") as caught:
+        likelihoods.warn_if_long(slow, 1000, workers)
+    assert len(caught) == 1
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+@pytest.mark.parametrize(
+    "prior", [None, {"marginal.mean": (0.8e6, 1.2e6), "marginal.cv": (0.1, 0.3)}]
+)
+def test_the_estimate_is_told_the_threads_of_the_call(workers, prior, monkeypatch):
+    seen = []
+
+    def stop(experiment, samples, threads):
+        seen.append(threads)
+        raise RuntimeError
+
+    monkeypatch.setattr(likelihoods, "warn_if_long", stop)
+    monkeypatch.setattr("stiction.inference.joined.warn_if_long", stop)
+    with pytest.raises(RuntimeError):
+        st.infer(
+            PROBLEM,
+            FIELD,
+            PEAKS,
+            prior=prior,
+            method=st.Equilibrium(),
+            workers=workers,
+            progress=False,
+        )
+    assert seen == [workers]
+
+
+def test_agreement_takes_every_kind_of_peaks():
+    """In stress and in force, as numbers with a unit and as `Peaks`, with an error of the cell."""
+    options = {"method": LOCAL, "samples": 200, "progress": False}
+    predicted = st.monte_carlo(PROBLEM, FIELD, pilot=False, **options)
+    area = 0.05 * 0.013
+    error = 1e4
+    posterior = st.infer(PROBLEM, FIELD, 1.01 * PEAKS[::-1], **options)
+    in_stress = [
+        (PEAKS, {}),
+        (1e-3 * PEAKS, {"unit": "kPa"}),
+        (make_peaks(1e-6 * PEAKS, "MPa"), {}),
+    ]
+    found = [st.statistics.agreement(predicted, peaks, **more) for peaks, more in in_stress]
+    found += [st.statistics.agreement(predicted, 1e-3 * area * PEAKS, unit="kN")]
+    found += [st.statistics.agreement(predicted, make_peaks(area * PEAKS, "N"))]
+    for other in found[1:]:
+        assert other.p_values == found[0].p_values
+    with_error = [
+        st.statistics.agreement(predicted, PEAKS, load_cell_error=error),
+        st.statistics.agreement(
+            predicted, 1e-3 * PEAKS, unit="kPa", load_cell_error=1e-3 * error
+        ),
+        st.statistics.agreement(predicted, make_peaks(PEAKS), load_cell_error=error),
+    ]
+    assert with_error[0].cramer_von_mises != found[0].cramer_von_mises
+    for other in with_error[1:]:
+        assert other.cramer_von_mises == pytest.approx(with_error[0].cramer_von_mises)
+    by_posterior = [
+        st.statistics.agreement(posterior, peaks, **more) for peaks, more in in_stress
+    ]
+    for other in by_posterior[1:]:
+        assert other.p_values == by_posterior[0].p_values
