@@ -416,6 +416,14 @@ def test_a_table_of_another_kind_is_no_traceback(tmp_path, saved):
     refuses("save", lambda: st.Study.from_toml(tmp_path / "study.toml"))
 
 
+@pytest.mark.parametrize("settings", [3, {"smallest": "x", "event": []}, {}])
+def test_forged_settings_of_a_curve_are_no_traceback(tmp_path, run, settings):
+    shutil.copytree(run, tmp_path / "run")
+    study = store.read_study(run) | {"failure_curve": settings}
+    store._write_json(tmp_path / "run" / "study.json", study)
+    refuses("cannot be read", lambda: st.open_run(tmp_path / "run"), st.RunError)
+
+
 def test_many_mistakes_and_long_keys_are_told_in_few_words(tmp_path):
     for keys in ({f"k{i}": i for i in range(10_000)}, {"k" * 10**5: 1}):
         for tables in ({}, STUDY):

@@ -58,7 +58,12 @@ def read_netcdf(content: bytes, unwanted: Collection[str] = ()) -> xr.Dataset:
             with xr.open_dataset(io.BytesIO(content), engine="scipy", **options) as opened:
                 numeric = [name for name, one in opened.items() if one.dtype.kind in "fiu"]
                 return opened[numeric].load()
-        return xr.decode_cf(_from_hdf5(content, unwanted), **options).load()
+        variables, attributes = _from_hdf5(content, unwanted)
+        decoded, attributes, coordinates = xr.conventions.decode_cf_variables(
+            variables, attributes, **options
+        )
+        data = xr.Dataset(decoded, attrs=attributes)
+        return data.set_coords(coordinates & {*decoded}).load()
     except InputError:
         raise
     except Exception as error:  # libraries let through whatever a broken file leads to
@@ -66,8 +71,8 @@ def read_netcdf(content: bytes, unwanted: Collection[str] = ()) -> xr.Dataset:
         raise InputError(f"is not a NetCDF file of numbers: {text}") from None
 
 
-def _from_hdf5(content: bytes, unwanted: Collection[str]) -> xr.Dataset:
-    """Return the variables of an HDF5 file as they are stored."""
+def _from_hdf5(content: bytes, unwanted: Collection[str]) -> tuple[dict[str, Any], Any]:
+    """Return the variables of an HDF5 file as they are stored, and attributes of the file."""
     import h5py
     import xarray as xr
 
@@ -89,7 +94,7 @@ def _from_hdf5(content: bytes, unwanted: Collection[str]) -> xr.Dataset:
             if about.get("CLASS") == SCALE
         }
         variables = {
-            name.removeprefix(NOT_A_SCALE): (
+            name.removeprefix(NOT_A_SCALE): xr.Variable(
                 _dims(item, name, about, scales),
                 _values(item) if item.dtype.kind in "fiu" else _texts(item, budget),
                 {key: value for key, value in about.items() if key not in HIDDEN},
@@ -100,7 +105,7 @@ def _from_hdf5(content: bytes, unwanted: Collection[str]) -> xr.Dataset:
             or (h5py.check_string_dtype(item.dtype) and item.ndim == 1)
             if not str(about.get("NAME")).startswith(NO_VARIABLE)
         }
-        return xr.Dataset(variables, attrs=_attributes(file, budget))
+        return variables, _attributes(file, budget)
 
 
 def _datasets(file: Any) -> Iterator[Any]:

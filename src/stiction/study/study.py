@@ -604,6 +604,12 @@ def open_run(path: Any) -> StoredRun:
     plain = read_study(place)
     store, settings = Store(place, plain), plain.pop(CURVES, None)
     try:
+        if settings is not None:
+            given = check(CURVES, settings, dict)
+            kinds = {"smallest": Probability, "event": StressName}
+            settings = {
+                name: check(name, given.get(name), kind) for name, kind in kinds.items()
+            }
         study = Study.from_dict(plain)
     except InputError as error:
         raise StoreError(
