@@ -15,16 +15,21 @@ from stiction.inference.grid import grid_of
 from stiction.inference.likelihood import Likelihood, make_likelihood, variable_of
 from stiction.inference.peaks import factor_of
 from stiction.inference.prior import make_prior
+from stiction.inference.widths import expected_widths
 from stiction.methods.protocol import MethodObject
 from stiction.problem.load import NotNegative
 from stiction.problem.problem import Problem
 from stiction.problem.results import to_dataset
-from stiction.random.fields import RandomField, RandomInterface
+from stiction.random.spectra import Share
 
 POINTS = 8_000
 """Number of points of the grid of each posterior."""
 TINY = 1e-12
 """Width of a box, as a share of the prior, in which rounding hides the posterior."""
+USUAL = {f"{n} tests": n for n in (5, 10, 20, 40)} | {
+    f"{n} profiles": {"profiles": n} for n in (2, 5, 10)
+}
+"""Further tests and profiles, by default."""
 VARIABLES = {
     "information": "expected information about a parameter, nats",
     "standard_error": "standard error of the information, nats",
@@ -34,10 +39,11 @@ VARIABLES = {
 @checked
 def design_of_tests(
     problem: Problem,
-    random: RandomInterface | RandomField,
+    random: Any,
     *,
-    prior: Any,
-    designs: dict[str, Any],
+    prior: Any = None,
+    designs: dict[str, Any] | None = None,
+    probability: Share = 1e-3,
     method: MethodObject,
     load_cell_error: NotNegative = 0.0,
     unit: str = "Pa",
@@ -47,7 +53,11 @@ def design_of_tests(
     workers: Count | None = None,
     progress: Progress = True,
 ) -> xr.Dataset:
-    """Estimate the information that each design of tests will give on each parameter.
+    """Estimate what each design of tests will tell: narrower intervals, or information.
+
+    With a fit or a posterior of `infer`: the expected widths of the intervals of mean and scatter
+    between specimens, and of the design force. With a `prior` of other parameters: the expected
+    information on each.
 
     Parameters
     ----------
@@ -56,7 +66,11 @@ def design_of_tests(
     designs : mapping
         Designs by name: a number of tests, a mapping of lengths (m) to numbers of tests, or
         a table ``{"tests": ..., "known": [...]}`` in which ``known`` lists parameters of
-        the prior that are known from elsewhere, such as a marginal that was measured.
+        the prior that are known from elsewhere, such as a marginal that was measured. With a
+        fit or a posterior ``{"tests": ..., "profiles": ...}``, further ones of either; by
+        default 5, 10, 20 or 40 tests, or 2, 5 or 10 profiles.
+    probability : float
+        Of the design, with a fit or a posterior.
     load_cell_error : float
         Standard deviation of the error of a peak, in `unit`.
     unit : str
@@ -69,7 +83,10 @@ def design_of_tests(
     xarray.Dataset
         Over 'design' and 'parameter': `information`, the expected divergence of the
         posterior of a parameter from its prior (nats; NaN where it is known), and its
-        `standard_error`.
+        `standard_error`. With a fit or a posterior: `width`, the expected width of the 90 %
+        interval, with its `standard_error`; and over 'design' `design_stress`, the expected
+        design, and `design_low` and `design_high`, between which 90 % of the designs will lie,
+        Pa. The first design, 'now', is of what was measured already.
 
     Raises
     ------
@@ -99,7 +116,16 @@ def design_of_tests(
     >>> bool(information.sel(design="many") > information.sel(design="few"))
     True
     """
+    if prior is None:
+        with Meter("design of tests", show=progress) as meter:
+            return expected_widths(
+                problem, random, USUAL if designs is None else designs,
+                probability=probability, method=method, error=load_cell_error * factor_of(unit),
+                unit=unit, repetitions=repetitions, samples=samples, seed=seed, workers=workers,
+                meter=meter,
+            )  # fmt: skip
     parameters = make_prior(problem, random, prior)
+    designs = designs or {}
     variable = variable_of(*parameters.at(parameters.middle), unit)
     plans = _plans(designs, parameters.names)
     lengths = list(dict.fromkeys(length for tests, _ in plans for length in tests))

@@ -162,7 +162,7 @@ def join(
     variable = variable_of(problem, profiles.fields[0], measured.unit)
     count = samples or ONSETS.get(method.type, FEW_ONSETS)
     kinds = [
-        _simulated(
+        simulated_onsets(
             profiles, problem, method, measured.lengths[number], peaks, number, error,
             variable=variable, samples=count, seed=seed, workers=workers, meter=meter, done=done,
         )
@@ -210,7 +210,7 @@ def _result(grid: Grid, peaks: Peaks, **more: Any) -> SpecimenPosterior:
     return SpecimenPosterior(peaks=peaks, draws=grid.described(u), u=u, grid=grid, **options)
 
 
-def _simulated(
+def simulated_onsets(
     profiles: Profiles, problem: Problem, method: Any, length: float | None, peaks: Array,
     number: int, error: float, *, variable: str, samples: int, seed: int, workers: int | None,
     meter: Meter, done: dict[Any, Array],
@@ -245,6 +245,7 @@ def _simulated(
     at, fields = np.zeros(1), len(profiles.fields)
     if not scales_with_strength(problem, profiles.fields[0], method):
         ratios, known = onsets(0, at)
+        peaks = peaks if peaks.size else area * ratios.ravel()
         low, high, _ = Onsets(at, ratios[None], (known,), area).ranges(peaks, error)
         at = np.linspace(low - MARGIN, high + MARGIN, STEPS)
     warn_if_long(first, fields * at.size * samples, workers)

@@ -1,0 +1,168 @@
+"""What further tests or profiles will tell: expected widths of intervals and of the design.
+
+Steps, for each design and each simulated campaign:
+
+1. Draw a truth (field, family, s and mean) from the posterior of what was measured.
+2. Draw the further peaks and levels of profiles from it.
+3. Compute the posterior of all measurements together (`stiction.inference.specimens`).
+4. Take the width of the 90 % interval of each parameter, and the design of its predictive
+   distribution. Their means over campaigns are what to expect (Lindley, 1956, with a width in place
+   of information).
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, unknown_name
+from stiction.base.model import is_whole
+from stiction.base.progress import Meter
+from stiction.inference.joined import (
+    FEW_ONSETS,
+    ONSETS,
+    SpecimenPosterior,
+    profiles_of,
+    simulated_onsets,
+)  # fmt: skip
+from stiction.inference.likelihood import variable_of
+from stiction.inference.peaks import si_of
+from stiction.inference.specimens import (
+    MEAN,
+    SCATTER,
+    Grid,
+    Profiles,
+    Tables,
+    factor_of_family,
+    grid_of_profiles,
+)  # fmt: skip
+from stiction.problem.problem import Problem
+
+FIELDS = 12
+"""Fields within a specimen that stand for all, those with the largest mass."""
+DRAWS = 2_000
+"""Draws of a posterior from which an interval is taken."""
+
+
+def expected_widths(
+    problem: Problem,
+    random: Any,
+    designs: Mapping[str, Any],
+    *,
+    probability: float,
+    method: Any,
+    error: float,
+    unit: str,
+    repetitions: int,
+    samples: int | None,
+    seed: int,
+    workers: int | None,
+    meter: Meter,
+) -> xr.Dataset:
+    """Return widths of intervals and designs after further tests, see `design_of_tests`."""
+    plans = {"now": (0, 0)} | {name: _plan(name, given) for name, given in designs.items()}
+    if isinstance(random, SpecimenPosterior):
+        tables, mass = random.likelihood, random.grid.mass.sum(axis=(1, 2, 3))
+    else:
+        profiles = profiles_of(random, None, None, seed)
+        if not profiles.levels.size:
+            raise InputError(
+                "prior: is left out, so random must be a fit or a posterior of `infer`, which"
+                " hold measurements"
+            )
+        onsets = simulated_onsets(
+            profiles, problem, method, None, np.zeros(0), 0, error, seed=seed, workers=workers,
+            variable=variable_of(problem, profiles.fields[0], si_of(unit)), meter=meter,
+            samples=samples or ONSETS.get(method.type, FEW_ONSETS), done={},
+        )  # fmt: skip
+        tables, mass = Tables(profiles, method, (onsets,), error, (np.zeros(0),)), np.ones(1)
+    if any(levels for _, levels in plans.values()) and not tables.profiles.levels.size:
+        raise InputError(
+            "designs: profiles: need a fit, whose profiles say how long further ones are"
+        )
+    tables = _fewer(tables, mass)
+    _, now = grid_of_profiles(tables.profiles, tables)
+    rng, total = np.random.default_rng([seed, 8]), len(plans) * repetitions
+    meter.stage("simulated campaigns", total)
+    widths, stresses = (
+        np.empty((len(plans), repetitions, 2)),
+        np.empty((len(plans), repetitions)),
+    )
+    for row, (tests, levels) in enumerate(plans.values()):
+        for number in range(repetitions):
+            truth = now.draws(1, rng)
+            grid, both = now, tables
+            if tests or levels:
+                grid, both = _after(tables, truth, tests, levels, rng)
+            drawn = grid.described(grid.draws(DRAWS, rng))
+            ends = [np.quantile(drawn[name], [0.05, 0.95]) for name in (MEAN, SCATTER)]
+            widths[row, number] = np.ptp(ends, axis=1)
+            stresses[row, number] = both.quantile(grid, np.array([probability]))[0]
+            meter.advance()
+    area = both.onsets[0].area
+    low, high = np.quantile(stresses, [0.05, 0.95], axis=1) / area
+    of = ("design", "parameter")
+    about = {"units": "Pa"}
+    return xr.Dataset(
+        {
+            "width": (of, widths.mean(axis=1)),
+            "standard_error": (of, widths.std(axis=1) / np.sqrt(repetitions)),
+            "design_stress": ("design", stresses.mean(axis=1) / area, about),
+            "design_low": ("design", low, about),
+            "design_high": ("design", high, about),
+        },
+        {"design": list(plans), "parameter": [MEAN, SCATTER]},
+        {"probability": probability, "repetitions": repetitions},
+    )
+
+
+def _plan(name: str, given: Any) -> tuple[int, int]:
+    """Return numbers of further tests and profiles."""
+    table = dict(given) if isinstance(given, Mapping) else {"tests": given}
+    if unknown := [str(key) for key in table if key not in ("tests", "profiles")]:
+        raise InputError(unknown_name(f"designs: {name}", unknown[0], ("tests", "profiles")))
+    numbers = table.get("tests", 0), table.get("profiles", 0)
+    if not all(is_whole(number, 0) for number in numbers) or not sum(numbers):
+        raise InputError(
+            f"designs: {name}: tests and profiles must be whole numbers, one of them >= 1"
+        )
+    return numbers
+
+
+def _fewer(tables: Tables, mass: Array) -> Tables:
+    """Return the tables of some fields only, those with the largest mass."""
+    profiles = tables.profiles
+    order = np.argsort(-np.broadcast_to(mass, len(profiles.fields)), kind="stable")[:FIELDS]
+    fewer = profiles._replace(
+        fields=tuple(profiles.fields[k] for k in order), within=profiles.within[order]
+    )
+    onsets = tuple(
+        replace(own, ratios=own.ratios[order], densities=tuple(own.densities[k] for k in order))
+        for own in tables.onsets
+    )
+    return replace(tables, profiles=fewer, onsets=onsets)
+
+
+def _after(
+    tables: Tables, truth: Array, tests: int, levels: int, rng: np.random.Generator
+) -> tuple[Grid, Tables]:
+    """Return the posterior after further tests and profiles of a truth (1, 4)."""
+    profiles: Profiles = tables.profiles
+    peaks = tables.predicted(0, np.repeat(truth, tests, axis=0), int(rng.integers(2**31)))
+    field, family, cv, log_mean = truth[0]
+    law = factor_of_family(profiles.families[int(family)], float(cv)).distribution
+    count = max(profiles.within.shape[1], 1)
+    within = profiles.within.sum(axis=1, keepdims=True).repeat(levels, axis=1) / count
+    variance = within[int(field)]
+    errors = np.sqrt(variance) * rng.standard_normal(levels) - 0.5 * variance
+    new = profiles.reference * law.ppf(rng.random(levels)) * np.exp(log_mean + errors)
+    both = profiles._replace(
+        levels=np.concatenate([profiles.levels, new]),
+        within=np.concatenate([profiles.within, within], axis=1),
+    )
+    further = (np.concatenate([tables.peaks[0], np.maximum(peaks, 1e-9)]), *tables.peaks[1:])
+    own = replace(tables, profiles=both, peaks=further)
+    return grid_of_profiles(both, own)[1], own

@@ -1,0 +1,73 @@
+"""`st.design_of_tests` of a fit and of a posterior: widths that further tests will leave."""
+
+import numpy as np
+import pytest
+from refusals import refuses
+
+import stiction as st
+
+PROBLEM = st.Problem(
+    st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
+    st.Interface(0.05, 64),
+    st.LinearWeakening(weakening_rate=0.25e12),
+)
+FIELD = st.RandomField(st.Gamma(mean=1e6, cv=0.15), st.PowerLawSpectrum(4e-3), mean_mode=True)
+GIVEN = {"method": st.LocalCriterion(), "progress": False}
+
+
+def test_intervals_become_narrower_as_the_root_of_the_tests():
+    factors = np.exp(0.1 * np.random.default_rng(2).standard_normal(8))
+    onsets = st.monte_carlo(PROBLEM, FIELD, samples=8, pilot=False, **GIVEN)
+    peaks = onsets.critical_stress.values * factors
+    posterior = st.infer(PROBLEM, FIELD, peaks, samples=200, **GIVEN)
+    designs = {"many": 56}
+    found = st.design_of_tests(PROBLEM, posterior, designs=designs, repetitions=12, **GIVEN)
+    assert found.design.values.tolist() == ["now", "many"]
+    for name in ("strength.mean", "between.strength"):
+        now, many = found.width.sel(parameter=name).values
+        assert now == pytest.approx(np.ptp(posterior.interval(name)), rel=0.1)
+        # Eight times as many tests: a third of the width, less where eight leave heavy tails.
+        assert 0.15 * now < many < 0.5 * now
+    assert found.design_low[1] < found.design_stress[1] < found.design_high[1]
+    refuses(
+        "need a fit",
+        lambda: st.design_of_tests(
+            PROBLEM, posterior, designs={"more": {"profiles": 2}}, **GIVEN
+        ),
+    )
+    assert found.design_stress[1] > found.design_stress[0]  # what is known better carries more
+
+
+def test_a_fit_is_taken_and_what_is_refused():
+    records = [
+        factor * FIELD.sample(PROBLEM.interface, seed=k)[0]
+        for k, factor in enumerate((1.0, 0.9, 1.1, 1.04, 0.97))
+    ]
+    fit = st.fit_field(
+        records,
+        PROBLEM.interface,
+        marginal="gamma",
+        noise=False,
+        between=True,
+        bootstrap=20,
+        progress=False,
+    )
+    found = st.design_of_tests(
+        PROBLEM,
+        fit,
+        designs={"few": 5, "profiles": {"profiles": 6}},
+        repetitions=10,
+        samples=100,
+        **GIVEN,
+    )
+    for name in ("few", "profiles"):
+        assert np.all(found.width.sel(design=name) < found.width.sel(design="now"))
+    refuses("hold measurements", lambda: st.design_of_tests(PROBLEM, FIELD, **GIVEN))
+    refuses(
+        "designs: few: tests and profiles must be whole",
+        lambda: st.design_of_tests(PROBLEM, fit, designs={"few": {"tests": 0}}, **GIVEN),
+    )
+    refuses(
+        "did you mean 'profiles'",
+        lambda: st.design_of_tests(PROBLEM, fit, designs={"few": {"profile": 2}}, **GIVEN),
+    )
