@@ -147,7 +147,7 @@ KINDS = {
     "huge": lambda path: os.truncate(path.touch() or path, 2**40),
     "nested": lambda path: path.write_text("a=" + "[" * 10**6),
     "digits": lambda path: path.write_text("a=" + "9" * 10**6),
-    "dots": lambda path: path.write_text("a" + ".a" * 10**6 + "=1"),
+    "dots": lambda path: path.write_text("a" + ".a" * 10**5 + "=1"),
     "brackets": lambda path: path.write_text("a " + "(" * 10**6 + "\n1 2\n"),
     "blanks": lambda path: path.write_text("a (" + " " * 10**6 + "x,y\n1,2\n"),
     "columns": lambda path: path.write_text("1.0," * 10**6),
@@ -180,6 +180,8 @@ def test_no_reader_takes_such_a_file(tmp_path, run, kind):
         except (st.InputError, st.RunError, *files.UNREADABLE) as error:
             said = str(error).strip()
             said = len(said) < 1000 and said
+            if kind in ("pipe", "device", "folder"):  # which is seen before it is opened
+                assert "regular" in said or "link" in said, name
         assert said, name
 
 
