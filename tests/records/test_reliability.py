@@ -117,6 +117,7 @@ class Piled:
     variables = staticmethod(LOCAL.variables)
     supports = staticmethod(lambda problem: [])
     seconds_per_sample = staticmethod(lambda problem: 1e-3)
+    bounded_by_strength = staticmethod(LOCAL.bounded_by_strength)
 
     def prepare(self, problem):
         solve = LOCAL.prepare(problem)
