@@ -199,7 +199,7 @@ def rounded(number: Number) -> str:
 
 
 def short(number: Number) -> str:
-    """Return a number rounded to what its standard error allows, without the error."""
+    """Return a number without its error, to a digit that is worth half of the error or more."""
     value, error = number.value, number.error
     if not math.isfinite(value):
         return "not known"
@@ -208,7 +208,7 @@ def short(number: Number) -> str:
     size = abs(value) or error
     places = 2 - math.floor(math.log10(size))  # three digits at most
     if error > 0.0:
-        places = min(places, math.floor(-math.log10(error)))
+        places = min(places, math.floor(-math.log10(0.5 * error)))
     value = round(value, places) + 0.0
     return f"{value:,.{max(places, 0)}f}".replace("-", MINUS)
 

@@ -16,8 +16,8 @@ from reproduction.statements_onset import dynamic_mean, offsets, stress_density
 
 def figure_1(d: Data):
     """Draw the system, the load, the friction law, and one field with its statistics."""
-    figure = common.new(6.2)
-    grid = figure.add_gridspec(3, 4, height_ratios=(1.0, 1.0, 1.15))
+    figure = common.new(6.9)
+    grid = figure.add_gridspec(3, 4, height_ratios=(0.9, 1.0, 1.7))
     _system(figure.add_subplot(grid[0, :]))
     _load(figure.add_subplot(grid[1, :2]))
     _law(figure.add_subplot(grid[1, 2:]))

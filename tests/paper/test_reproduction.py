@@ -101,6 +101,11 @@ def test_what_is_printed_and_what_is_missing():
     assert claims.rounded(Number(0.76812, 0.00031)) == "0.76812 ± 0.00031"
     assert claims.rounded(Number(-12.3, 1.4)) == "\N{MINUS SIGN}12.3 ± 1.4"
     assert claims.rounded(Number(0.66443)) == "0.6644"
+    for value, error, text in (
+        (0.782, 0.0102, "0.78"), (17.85, 0.35, "18"), (0.77233, 0.00025, "0.772"), (0.0, 0.0, "0"),
+        (0.0131, 0.00096, "0.013"), (1234.4, 0.1, "1,230"), (-0.02, 0.01, "\N{MINUS SIGN}0.02"),
+    ):  # fmt: skip
+        assert claims.short(Number(value, error)) == text
 
 
 def test_readings_that_differ_leave_a_statement_to_the_text_and_limits_are_varied():
