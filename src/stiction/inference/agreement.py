@@ -21,14 +21,14 @@ from stiction.inference.peaks import Peaks, factor_of, make_peaks
 from stiction.inference.posterior import Posterior
 from stiction.problem.load import NotNegative
 
-POINTS, VALUES = 1000, 400
+POSTERIOR_POINTS, LAW_VALUES = 1000, 400
 """Parameters that stand for a posterior, and values at which the law of a peak is kept."""
-MARGIN = 0.25
+RANGE_MARGIN = 0.25
 """What is added on either side to the range of the predicted peaks, as a share of it."""
-BEYOND = 1e-3
+OUTLYING_SHARE = 1e-3
 """Share of the predicted peaks on either side that does not count for this range: it may have
 heavy tails."""
-BAND = 0.9
+BAND_LEVEL = 0.9
 PRECURSORS = {"number": "number", "size": "largest", "first_load": "load of the first"}
 """What is compared of precursors, in words."""
 
@@ -72,10 +72,10 @@ class Agreement:
     precursors: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        one, other, *_ = self.p_values.values()
+        squares_p, deviation_p, *_ = self.p_values.values()
         text = (
-            f"{self.peaks} against the prediction: p = {one:.3g} (Cramer-von Mises), {other:.3g}"
-            " (largest deviation)"
+            f"{self.peaks} against the prediction: p = {squares_p:.3g} (Cramer-von Mises),"
+            f" {deviation_p:.3g} (largest deviation)"
         )
         shown = [f"{self.p_values[name]:.3g} ({PRECURSORS[name]})" for name in self.precursors]
         return text + f"; precursors: p = {', '.join(shown)}" * bool(shown)
@@ -224,28 +224,33 @@ def _values(prediction: xr.Dataset, measured: Peaks) -> Array:
 
 def _with_sample(values: Array, measured: Peaks, replicates: int, rng: Any) -> Agreement:
     """Permutation test: which of all values are the measured ones?"""
-    (own,) = measured.values
+    (peaks,) = measured.values
     measured.refuse_far([values])
-    found = _permuted(own, values, replicates, rng)
-    at = np.unique(np.concatenate([own, values]))
+    distances = _permuted(peaks, values, replicates, rng)
+    at = np.unique(np.concatenate([peaks, values]))
     share = np.searchsorted(np.sort(values), at, side="right") / values.size
-    return _summary(measured, found, (Predicted(at, share),))
+    return _summary(measured, distances, (Predicted(at, share),))
 
 
-def _permuted(own: Array, values: Array, replicates: int, rng: Any) -> Array:
+def _permuted(peaks: Array, values: Array, replicates: int, rng: Any) -> Array:
     """Return both distances, (1 + replicates, 2), of which the first are the measured ones."""
     at, place, counts = np.unique(
-        np.concatenate([own, values]), return_inverse=True, return_counts=True
+        np.concatenate([peaks, values]), return_inverse=True, return_counts=True
     )
     share = counts / place.size
-    found = np.empty((replicates + 1, 2))
+    distances = np.empty((replicates + 1, 2))
     for row in range(replicates + 1):
-        chosen = rng.choice(place.size, own.size, replace=False) if row else np.arange(own.size)
-        reached = np.cumsum(np.bincount(place[chosen], minlength=at.size)) / own.size
+        chosen = (
+            rng.choice(place.size, peaks.size, replace=False) if row else np.arange(peaks.size)
+        )
+        reached = np.cumsum(np.bincount(place[chosen], minlength=at.size)) / peaks.size
         # The others' share follows from that of all.
         away = (reached - np.cumsum(share)) * place.size / values.size
-        found[row] = own.size * (share @ away**2), np.sqrt(own.size) * np.abs(away).max()
-    return found
+        distances[row] = (
+            peaks.size * (share @ away**2),
+            np.sqrt(peaks.size) * np.abs(away).max(),
+        )
+    return distances
 
 
 def _with_posterior(
@@ -266,27 +271,27 @@ def _with_posterior(
         )
     kinds = [fitted.lengths.index(length) for length in measured.lengths]
     measured.refuse_far([posterior.predicted[kind] for kind in kinds])
-    u = posterior.u[rng.choice(len(posterior.u), POINTS)]
-    chosen = rng.integers(POINTS, size=replicates)
-    found, predicted = np.zeros((replicates + 1, 2)), []
+    u = posterior.u[rng.choice(len(posterior.u), POSTERIOR_POINTS)]
+    chosen = rng.integers(POSTERIOR_POINTS, size=replicates)
+    distances, predicted = np.zeros((replicates + 1, 2)), []
     for kind, peaks in zip(kinds, measured.values, strict=True):
         at, shares = _law(posterior, kind, u, peaks)
         uniform = rng.random((replicates, peaks.size))
         drawn = [np.interp(p, shares[i], at) for p, i in zip(uniform, chosen, strict=True)]
         law = Predicted(at, shares.mean(axis=0))
         squares, most = _distances(np.interp(np.sort([peaks, *drawn]), *law))
-        found[:, 0] += squares
-        found[:, 1] = np.maximum(found[:, 1], most)
+        distances[:, 0] += squares
+        distances[:, 1] = np.maximum(distances[:, 1], most)
         predicted.append(law)
-    return _summary(measured, found, tuple(predicted))
+    return _summary(measured, distances, tuple(predicted))
 
 
 def _law(posterior: Posterior, kind: int, u: Array, peaks: Array) -> tuple[Array, Array]:
-    """Return peaks, and the shares up to each at parameters u, (points, VALUES)."""
-    ends = np.quantile(posterior.predicted[kind], [BEYOND, 1.0 - BEYOND])
+    """Return peaks, and the shares up to each at parameters u, (points, LAW_VALUES)."""
+    ends = np.quantile(posterior.predicted[kind], [OUTLYING_SHARE, 1.0 - OUTLYING_SHARE])
     low, high = min(ends[0], peaks.min()), max(ends[1], peaks.max())
-    margin = MARGIN * (high - low)
-    at = np.linspace(max(low - margin, 0.5 * low), high + margin, VALUES)
+    margin = RANGE_MARGIN * (high - low)
+    at = np.linspace(max(low - margin, 0.5 * low), high + margin, LAW_VALUES)
     density = np.exp(posterior.likelihood.of([at], [kind]).parts(u))
     between = 0.5 * (density[:, 1:] + density[:, :-1])
     share = np.cumsum(np.pad(between, ((0, 0), (1, 0))), axis=1)
@@ -304,21 +309,21 @@ def _distances(share: Array) -> tuple[Array, Array]:
     return squares, np.sqrt(size) * most
 
 
-def _p_values(found: Array) -> list[float]:
+def _p_values(distances: Array) -> list[float]:
     """Return the shares of replicates whose distances are at least those of the first row."""
-    as_far = np.sum(found[1:] >= found[0] * (1.0 - 1e-9), axis=0)
-    return ((1 + as_far) / len(found)).tolist()
+    as_far = np.sum(distances[1:] >= distances[0] * (1.0 - 1e-9), axis=0)
+    return ((1 + as_far) / len(distances)).tolist()
 
 
-def _summary(measured: Peaks, found: Array, predicted: Any) -> Agreement:
+def _summary(measured: Peaks, distances: Array, predicted: Any) -> Agreement:
     """Summarise distances (1 + replicates, 2), of which the first are the measured ones."""
-    own, others = found[0], found[1:]
+    observed, replicates = distances[0], distances[1:]
     names = ("cramer_von_mises", "largest_deviation")
     return Agreement(
         peaks=measured,
-        cramer_von_mises=float(own[0]),
-        largest_deviation=float(own[1]),
-        p_values=dict(zip(names, _p_values(found), strict=True)),
+        cramer_von_mises=float(observed[0]),
+        largest_deviation=float(observed[1]),
+        p_values=dict(zip(names, _p_values(distances), strict=True)),
         predicted=predicted,
-        band=float(np.quantile(others[:, 1], BAND, method="higher")),
+        band=float(np.quantile(replicates[:, 1], BAND_LEVEL, method="higher")),
     )

@@ -18,13 +18,13 @@ from stiction.random.dotted_keys import with_values
 from stiction.random.fields import RandomField
 from stiction.random.marginals import Beta
 
-FEWEST = 20
+MIN_REPETITIONS = 20
 """Number of repetitions that determine a tail of errors."""
-PLACES = ("mean", "marginal.mean", "marginal.loc")
+LOCATION_PARAMETERS = ("mean", "marginal.mean", "marginal.loc")
 """Parameters of location."""
 SIDES = {"marginal.low": -1.0, "marginal.high": 1.0}
 """Side of the mean on which a bound lies."""
-SAME = 1e-3
+MIN_WIDTH = 1e-3
 """Distance within which an interval is uninformative, as a share of an end of a range."""
 
 
@@ -47,22 +47,22 @@ class NotRepeated(InputError):
 
 
 def bootstrapped(
-    found: Estimate,
+    fitted: Estimate,
     count: int,
     confidence: float,
     seed: int,
     progress: Show,
     workers: int | None = None,
-    others: Sequence[tuple[Estimate, int]] = (),
+    further: Sequence[tuple[Estimate, int]] = (),
 ) -> tuple[list[Repetitions], list[Repetitions]]:
     """Fit records simulated from an estimate, and from it `at_ends` of its correlation length.
 
-    Also from `others`, each with its own number of repetitions. Those to which the family
+    Also from `further`, each with its own number of repetitions. Those to which the family
     cannot be fitted are missing.
     """
 
     def repeat(truth: Estimate, count: int = count) -> Repetitions:
-        def one(number: int) -> Estimate | None:
+        def refit(number: int) -> Estimate | None:
             rng = np.random.default_rng([seed, number])
             try:
                 again = estimate(truth.simulate(rng), truth.setting, truth)
@@ -71,32 +71,32 @@ def bootstrapped(
             meter.advance()
             return again
 
-        results = in_threads(one, range(count), workers or usable_cores())
+        results = in_threads(refit, range(count), workers or usable_cores())
         fits = [result for result in results if result is not None]
-        if len(fits) < FEWEST:
+        if len(fits) < MIN_REPETITIONS:
             raise NotRepeated(truth.setting.marginal, len(fits), count)
         return Repetitions(truth, fits)
 
-    ends = "correlation_length" in found.setting.spectrum.free
-    total = (3 if ends else 1) * count + sum(number for _, number in others)
+    ends = "correlation_length" in fitted.setting.spectrum.free
+    total = (3 if ends else 1) * count + sum(number for _, number in further)
     with Meter("fit_field", total, progress) as meter:
-        repeated = [repeat(found)]
+        repeated = [repeat(fitted)]
         if ends:
             repeated += [repeat(truth) for truth in at_ends(repeated[0], confidence)]
-        return repeated, [repeat(*other) for other in others]
+        return repeated, [repeat(*other) for other in further]
 
 
 def at_ends(around: Repetitions, confidence: float) -> list[Estimate]:
     """Return the field with its correlation length at either end of a first interval."""
-    found, family = around.truth, around.truth.setting.spectrum
+    fitted, family = around.truth, around.truth.setting.spectrum
     place = family.free.index("correlation_length")
     moved = []
     scale, tail = Scale("spectrum.correlation_length"), 0.5 * (1.0 - confidence)
     for share in (tail, 1.0 - tail):
-        vector = family.vector_of(found.model)
-        end = np.quantile(scale.less(found, around), share, method="weibull")
+        vector = family.vector_of(fitted.model)
+        end = np.quantile(scale.less(fitted, around), share, method="weibull")
         vector[place] = np.clip(end, *family.limits[place])
-        moved.append(replace(found, model=family.model(vector, found.model.shares)))
+        moved.append(replace(fitted, model=family.model(vector, fitted.model.shares)))
     return moved
 
 
@@ -130,29 +130,29 @@ class Scale(NamedTuple):
         away = math.exp(at)
         return values["mean"] + SIDES[name] * away if name in SIDES else origin(name) + away
 
-    def of(self, one: Estimate) -> tuple[float, float]:
+    def of(self, fitted: Estimate) -> tuple[float, float]:
         """Return an estimate on this scale, and a quantity to which its error is in proportion."""
         if self.name == "noise":
-            return one.noise
-        width = math.sqrt(one.parameters["efolding_length"])
-        if self.name in PLACES:
-            width *= one.parameters["standard_deviation"]
-        return self.to(one.parameters), width
+            return fitted.noise
+        width = math.sqrt(fitted.parameters["efolding_length"])
+        if self.name in LOCATION_PARAMETERS:
+            width *= fitted.parameters["standard_deviation"]
+        return self.to(fitted.parameters), width
 
-    def less(self, found: Estimate, repeated: Repetitions) -> Array:
+    def less(self, fitted: Estimate, repeated: Repetitions) -> Array:
         """Return an estimate less the error of each repetition, in proportion to its width."""
-        at, width = self.of(found)
-        true, each = (
+        at, width = self.of(fitted)
+        true, refitted = (
             self.to(repeated.truth.parameters),
             np.array([*map(self.of, repeated.fits)]),
         )
-        return at - width * (each[:, 0] - true) / each[:, 1]
+        return at - width * (refitted[:, 0] - true) / refitted[:, 1]
 
 
 def scale_of(name: str, repeated: Sequence[Repetitions]) -> Scale:
     """Return the scale of a parameter, linear if it was found negative."""
     least = min(one.parameters[name] for own in repeated for one in (own.truth, *own.fits))
-    return Scale(name, name in PLACES or (name not in SIDES and least < 0.0))
+    return Scale(name, name in LOCATION_PARAMETERS or (name not in SIDES and least < 0.0))
 
 
 def intervals(
@@ -166,7 +166,7 @@ def intervals(
     with the correlation length. Intervals of bounds end outside of `values` without noise.
     """
     around, *moved = repeated
-    found, estimated = around.truth, around.truth.parameters
+    fitted, estimated = around.truth, around.truth.parameters
     tail = 0.5 * (1.0 - confidence)
     lengths = [math.log(one.parameters["efolding_length"]) for one in around.fits]
     result = {}
@@ -176,29 +176,31 @@ def intervals(
         if np.cov([scale.of(one)[0] for one in around.fits], lengths)[0, 1] < 0.0:
             shorter, longer = longer, shorter
         low, high = (
-            float(np.quantile(scale.less(found, one), share, method="weibull"))
-            for one, share in ((shorter, tail), (longer, 1.0 - tail))
+            float(np.quantile(scale.less(fitted, repetitions), share, method="weibull"))
+            for repetitions, share in ((shorter, tail), (longer, 1.0 - tail))
         )
         if name == "noise" and high <= 0.0:  # by chance: as wide as of an estimate of zero
-            high -= found.noise[0]
+            high -= fitted.noise[0]
         first, last = sorted(scale.back(end, estimated) for end in (low, high))
         result[name] = first, last
-    noise = result["noise"][1] if "noise" in result else found.model.noise
-    limits = limits_of(found, values, noise)
+    noise = result["noise"][1] if "noise" in result else fitted.model.noise
+    limits = limits_of(fitted, values, noise)
     for name in limits.keys() & result.keys():
         ends = limits[name]
         low, high = np.clip(result[name], *ends).tolist()
-        if high - low <= (SAME * high if np.isfinite(ends).all() else 0.0):  # nothing is left
+        if high - low <= (
+            MIN_WIDTH * high if np.isfinite(ends).all() else 0.0
+        ):  # nothing is left
             low, high = (end if math.isfinite(end) else estimated[name] for end in ends)
         result[name] = low, high
     return result
 
 
-def limits_of(found: Estimate, values: Array, noise: float) -> dict[str, tuple[float, float]]:
+def limits_of(fitted: Estimate, values: Array, noise: float) -> dict[str, tuple[float, float]]:
     """Return the limits of parameters, with bounds of the marginal outside of all values."""
-    estimated = found.parameters
-    quiet = found.setting.marginal.quiet(values, noise)
-    bottom, top = (float(end) for end in found.marginal.distribution.support())
+    estimated = fitted.parameters
+    quiet = fitted.setting.marginal.quiet(values, noise)
+    bottom, top = (float(end) for end in fitted.marginal.distribution.support())
     least, most = max(float(quiet.min()), bottom), min(float(quiet.max()), top)
     below = 0.0 if values.min() > 0.0 and least > 0.0 else -math.inf, least
     above = most, math.inf
@@ -218,27 +220,29 @@ def limits_of(found: Estimate, values: Array, noise: float) -> dict[str, tuple[f
 
 def likely(repeated: Repetitions, measured: Array, quantity: str) -> list[RandomField]:
     """Return fields as likely as the one found: it less the error of each repetition."""
-    found = repeated.truth
-    field, limits = found.field(quantity), limits_of(found, measured, found.model.noise)
+    fitted = repeated.truth
+    field, limits = fitted.field(quantity), limits_of(fitted, measured, fitted.model.noise)
     free: dict[str, list[float]] = {}
-    for name in found.parameters:
+    for name in fitted.parameters:
         if name == "mean" or name.startswith("marginal.") or name in NAMES.values():
             scale = scale_of(name, [repeated])
-            places = scale.less(found, repeated).tolist()
+            places = scale.less(fitted, repeated).tolist()
             means = free.get("mean", places)  # bounds lie at distances from them
             pairs = zip(places, means, strict=True)
             free[name] = [scale.back(at, {"mean": mean}) for at, mean in pairs]
     del free["mean"]
     members = []
     for row in zip(*free.values(), strict=True):
-        own = dict(zip(free, row, strict=True))
-        within = {n: float(np.clip(own[n], *limits[n])) for n in own.keys() & limits.keys()}
-        one = with_values(field, own | within)
-        if isinstance(one.marginal, Beta):  # of the same mean and scatter between its limits
-            bounds = {n: own[n] for n in own.keys() & SIDES.keys()}
-            before = with_values(field, own | within | bounds)
-            ends = one.marginal.low, one.marginal.high
+        values = dict(zip(free, row, strict=True))
+        within = {
+            n: float(np.clip(values[n], *limits[n])) for n in values.keys() & limits.keys()
+        }
+        member = with_values(field, values | within)
+        if isinstance(member.marginal, Beta):  # of the same mean and scatter between its limits
+            bounds = {n: values[n] for n in values.keys() & SIDES.keys()}
+            before = with_values(field, values | within | bounds)
+            ends = member.marginal.low, member.marginal.high
             marginal = beta_of(before.mean, before.standard_deviation, *ends)
-            one = replace(one, marginal=marginal)
-        members.append(one)
+            member = replace(member, marginal=marginal)
+        members.append(member)
     return members

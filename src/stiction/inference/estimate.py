@@ -26,7 +26,7 @@ from stiction.inference.window import RecordWindow
 from stiction.random.fields import RandomField
 from stiction.random.mapping import from_normal
 
-NEGLIGIBLE = 1e-4
+NEGLIGIBLE_CHANGE = 1e-4
 """Share of noise that does not change a marginal."""
 LAGS = np.concatenate(([0.0], np.geomspace(0.01, 4.0, 400)))
 """Lags in correlation lengths; the correlation of every spectrum falls to 1/e within them."""
@@ -79,8 +79,8 @@ class Estimate:
             "mean": float(self.marginal.distribution.mean()),
             "standard_deviation": float(self.marginal.distribution.std()),
         }
-        own = self.setting.marginal.parameters(self.marginal)
-        values |= {f"marginal.{name}": value for name, value in own.items()}
+        of_marginal = self.setting.marginal.parameters(self.marginal)
+        values |= {f"marginal.{name}": value for name, value in of_marginal.items()}
         free = self.setting.spectrum.of(self.model)
         values |= {NAMES[name]: value for name, value in free.items() if name in NAMES}
         if "noise_share" in free:
@@ -175,11 +175,11 @@ def _estimate_in_rounds(
     if not setting.between:
         return _estimate(rows, setting, start)
     equal = as_of_one(rows, np.zeros(len(rows)))
-    found = start or _estimate(equal, setting, None)
+    fitted = start or _estimate(equal, setting, None)
     for _ in range(ROUNDS):
-        found = _estimate(found.as_of_one(rows), setting, found)
-    between = scatter_between(np.log(levels_of(rows)), found.within)
-    return replace(found, between=between)
+        fitted = _estimate(fitted.as_of_one(rows), setting, fitted)
+    between = scatter_between(np.log(levels_of(rows)), fitted.within)
+    return replace(fitted, between=between)
 
 
 def _estimate(rows: Sequence[Array], setting: FitSetting, start: Estimate | None) -> Estimate:
@@ -196,27 +196,27 @@ def _estimate(rows: Sequence[Array], setting: FitSetting, start: Estimate | None
         vector = family.vector_of(start.model)
         marginal, noise = start.marginal, start.model.noise
     for _ in range(2):
-        marginal = own = setting.marginal.fit(values, noise, marginal)
+        marginal = of_values = setting.marginal.fit(values, noise, marginal)
         likelihood = Whittle(family, hermite_shares(marginal), observed)
         vector = likelihood.fit(likelihood.coarse() if vector is None else vector)
         model = family.model(vector, likelihood.shares)
         if model.noise_share < 0.0:  # zero is the best possible
             without = likelihood._replace(family=replace(family, noise=0.0))
             model = without.family.model(without.fit(vector[:-1]), likelihood.shares)
-        if abs(model.noise**2 - noise**2) < NEGLIGIBLE * model.variance:
+        if abs(model.noise**2 - noise**2) < NEGLIGIBLE_CHANGE * model.variance:
             break
         noise = model.noise
     ratios = [
-        math.log((measured + one.floor) / (predicted + one.floor))
-        for one in observed
-        for _, measured, predicted in bands(one, model.expectation(one.window))
+        math.log((measured + group.floor) / (predicted + group.floor))
+        for group in observed
+        for _, measured, predicted in bands(group, model.expectation(group.window))
     ]
     return Estimate(
         setting=setting,
-        marginal=setting.marginal.widened(own, _left(setting.windows, model) ** -0.5),
-        own=own,
+        marginal=setting.marginal.widened(of_values, _left(setting.windows, model) ** -0.5),
+        own=of_values,
         model=model,
-        distance=distance(own, setting.marginal.quiet(values, model.noise)),
+        distance=distance(of_values, setting.marginal.quiet(values, model.noise)),
         roughness=float(np.mean(np.square(ratios))),
         noise=likelihood.noise_variance(vector) if family.noise is None else (0.0, 0.0),
     )
@@ -237,14 +237,14 @@ def _left(windows: Sequence[RecordWindow], model: Model) -> float:
     return max(1.0 - (taken + mean / points) / points, LEAST_LEFT)
 
 
-def bands(one: Observed, expected: Array, per_octave: int = 3) -> Array:
+def bands(group: Observed, expected: Array, per_octave: int = 3) -> Array:
     """Return wavenumber (rad/m), periodogram and expectation averaged over bands, (bands, 3)."""
-    weights = one.window.weights
-    k = np.broadcast_to(np.sqrt(sum(v**2 for v in one.window.wave_vectors)), weights.shape)
+    weights = group.window.weights
+    k = np.broadcast_to(np.sqrt(sum(v**2 for v in group.window.wave_vectors)), weights.shape)
     kept = weights > 0.0
     k = k[kept]
     band = np.unique(np.round(per_octave * np.log2(k / k.min())), return_inverse=True)[1]
-    sums = [np.bincount(band, weights=w) for w in (k, one.average[kept], expected[kept])]
+    sums = [np.bincount(band, weights=w) for w in (k, group.average[kept], expected[kept])]
     return np.transpose(sums) / np.bincount(band)[:, None]
 
 
@@ -295,12 +295,14 @@ def compare(
         try:
             if setting.spectrum.noise == 0.0:
                 setting.marginal.check(np.concatenate(rows))
-            found = estimate(rows, setting)
+            estimated = estimate(rows, setting)
         except InputError as error:
             problems += error.problems
             continue
-        values = np.concatenate(found.as_of_one(rows))
-        fitted.append((mean_log_likelihood(found.own, values, found.model.noise), found))
+        values = np.concatenate(estimated.as_of_one(rows))
+        fitted.append(
+            (mean_log_likelihood(estimated.own, values, estimated.model.noise), estimated)
+        )
     if not fitted:
         raise InputError(problems)
     independent = max(fitted, key=lambda one: one[0])[1].independent
@@ -312,9 +314,9 @@ def compare(
     best_first = np.argsort(-scores, kind="stable").tolist()
     estimates = [fitted[place][1] for place in best_first]
     families = {
-        one.setting.marginal.label: Goodness(
-            one.marginal, one.distance, float(scores[place]), float(weights[place])
+        member.setting.marginal.label: Goodness(
+            member.marginal, member.distance, float(scores[place]), float(weights[place])
         )
-        for place, one in zip(best_first, estimates, strict=True)
+        for place, member in zip(best_first, estimates, strict=True)
     }
     return estimates, families, independent

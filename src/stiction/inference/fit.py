@@ -17,7 +17,7 @@ from stiction.base.model import Count, Flag, Number, Positive, Progress, at_leas
 from stiction.base.variables import OF_THE_FIELD, QUANTITIES, UNITS
 from stiction.inference.between import chance_of_scatter
 from stiction.inference.bootstrap import (
-    FEWEST,
+    MIN_REPETITIONS,
     NotRepeated,
     Repetitions,
     bootstrapped,
@@ -28,8 +28,8 @@ from stiction.inference.estimate import Estimate, FitSetting, Goodness, compare,
 from stiction.inference.marginal_fit import Family, family_of
 from stiction.inference.records import records_of, refuse_uncorrelated
 from stiction.inference.specimens import (
-    MEAN,
-    SCATTER,
+    MEAN_KEY,
+    SCATTER_KEY,
     FactorPrior,
     Grid,
     Profiles,
@@ -292,7 +292,7 @@ def fit_field(
     between: Factors = False,
     prior: Any = None,
     quantity: str = "strength",
-    bootstrap: at_least(FEWEST) = 200,  # type: ignore[valid-type]
+    bootstrap: at_least(MIN_REPETITIONS) = 200,  # type: ignore[valid-type]
     confidence: Share = 0.9,
     seed: Number = 0,
     workers: Count | None = None,
@@ -423,7 +423,9 @@ def fit_field(
     while True:
         estimates, families, independent = compare(settings, rows)
         weights = [one.weight for one in families.values() if one.weight > 0.0]
-        counts = [max(FEWEST, round(bootstrap * one / max(weights))) for one in weights[1:]]
+        counts = [
+            max(MIN_REPETITIONS, round(bootstrap * one / max(weights))) for one in weights[1:]
+        ]
         try:
             repeated, others = bootstrapped(
                 estimates[0], bootstrap, confidence, seed, progress, workers,
@@ -489,9 +491,9 @@ def _judged(
         draws = grid.described(grid.draws(DRAWS, np.random.default_rng(0)))
         tails = 0.5 - 0.5 * confidence, 0.5 + 0.5 * confidence
         for name in {"mean", "marginal.mean"} & parameters.keys():  # of other specimens, too
-            ends[name] = tuple(np.quantile(draws[MEAN], tails).tolist())
-        parameters["between"] = float(np.median(draws[SCATTER]))
-        low, high = ends["between"] = tuple(np.quantile(draws[SCATTER], tails).tolist())
+            ends[name] = tuple(np.quantile(draws[MEAN_KEY], tails).tolist())
+        parameters["between"] = float(np.median(draws[SCATTER_KEY]))
+        low, high = ends["between"] = tuple(np.quantile(draws[SCATTER_KEY], tails).tolist())
         if len(rows) < FEW_SPECIMENS:
             doubts.append(
                 f"{len(rows)} specimen(s) leave the coefficient of variation between specimens at"

@@ -28,7 +28,7 @@ from stiction.inference.likelihood import (
 from stiction.inference.peaks import Peaks, factor_of, make_peaks
 from stiction.inference.posterior import DRAWS, Posterior, posterior_of
 from stiction.inference.prior import Prior, make_prior
-from stiction.inference.specimens import MEAN, SCATTER
+from stiction.inference.specimens import MEAN_KEY, SCATTER_KEY
 from stiction.methods.criterion.local import LocalCriterion
 from stiction.methods.protocol import MethodObject, optional_member
 from stiction.problem.load import NotNegative
@@ -190,7 +190,7 @@ def infer(
             f"load_cell_error: {load_cell_error:g} {unit} is more than the largest peak; it is a"
             " standard deviation in the unit of the peaks"
         )
-    if not (prior and {*prior} - {MEAN, SCATTER}):
+    if not (prior and {*prior} - {MEAN_KEY, SCATTER_KEY}):
         with _forgetting_errors(), Meter("infer", show=progress) as meter:
             found = join(
                 problem, random, measured, prior=prior, between=between, method=method, error=error,

@@ -33,9 +33,9 @@ from stiction.inference.peaks import Peaks
 from stiction.inference.posterior import DRAWS, Posterior
 from stiction.inference.prior import refuse_conditioned
 from stiction.inference.specimens import (
-    MEAN,
-    SCATTER,
-    STEPS,
+    MEAN_KEY,
+    ONSET_MEANS,
+    SCATTER_KEY,
     FactorPrior,
     Grid,
     Onsets,
@@ -247,7 +247,7 @@ def simulated_onsets(
         ratios, known = onsets(0, at)
         peaks = peaks if peaks.size else area * ratios.ravel()
         low, high, _ = Onsets(at, ratios[None], (known,), area).ranges(peaks, error)
-        at = np.linspace(low - MARGIN, high + MARGIN, STEPS)
+        at = np.linspace(low - MARGIN, high + MARGIN, ONSET_MEANS)
     warn_if_long(first, fields * at.size * samples, workers)
     meter.stage("simulated onsets", fields * at.size * samples)
     found = in_threads(
@@ -261,7 +261,7 @@ def simulated_onsets(
 
 def _information(grid: Grid, before: Grid, proper: bool) -> dict[str, float]:
     """Return the divergence of mean and scatter from what they were without peaks, nats."""
-    axes = {SCATTER: (0, 1, 3)} | ({MEAN: (0, 1, 2)} if proper else {})
+    axes = {SCATTER_KEY: (0, 1, 3)} | ({MEAN_KEY: (0, 1, 2)} if proper else {})
     return {
         name: float(entropy(grid.mass.sum(axis=of), before.mass.sum(axis=of)))
         for name, of in axes.items()

@@ -12,12 +12,12 @@ chapter 5; the half-Cauchy prior of a scatter is Gelman's (2006, Bayesian Analys
 Steps, with x = log(m b/reference), the logarithm of the strength of one specimen:
 
 1. Simulate onsets T of each field at the reference mean. If T(c)/c does not depend on c, this is
-   all; otherwise simulate at `STEPS` means and interpolate T(c)/c, sample by sample.
+   all; otherwise simulate at `ONSET_MEANS` means and interpolate T(c)/c, sample by sample.
 2. Tabulate the likelihood of each measured number as a function of x: the normal density of a level
    about it, or the density of simulated onsets at a peak (`stiction.inference.density`).
-3. Take `CELLS` values of s at equal shares of its prior, and `MEANS` values of log m. The
-   likelihood of a number at (family, s, m) is the integral of step 2 over the density of x, that
-   of log b shifted by log m: a convolution.
+3. Take `SCATTER_CELLS` values of s at equal shares of its prior, and `MEAN_CELLS` values of log m.
+   The likelihood of a number at (family, s, m) is the integral of step 2 over the density of x,
+   that of log b shifted by log m: a convolution.
 4. Multiply over the numbers, and close in on the means that hold the mass.
 5. Fields are equally likely given the profiles. The peaks then change their shares by the mean of
    the likelihood over (family, s, m).
@@ -49,28 +49,28 @@ FAMILIES: dict[str, Any] = {
     "normal": TruncatedNormal,  # above zero
     "weibull": Weibull,
 }
-MEAN, SCATTER = "strength.mean", "between.strength"
+MEAN_KEY, SCATTER_KEY = "strength.mean", "between.strength"
 """Keys of the two parameters, in a prior and among the draws."""
 PRIOR_SCALE = 0.1
 """Scale of the half-Cauchy prior of s."""
 LEAST_CV, MOST_CV = 2e-3, 0.9
 """Smallest and largest s."""
-CELLS, MEANS, STEPS = 40, 48, 5
+SCATTER_CELLS, MEAN_CELLS, ONSET_MEANS = 40, 48, 5
 """Values of s and of log m on the grid, and means at which onsets are simulated where T(c)/c
 depends on c."""
-BEYOND = 1.0
+LOG_MEAN_MARGIN = 1.0
 """Range of log m beyond that of x at first."""
 LOWEST, PREDICTED = 3.0, 1_000
 """Range of x below that of log m, and points of x, of a predictive distribution."""
-NEGLIGIBLE = 1e-6
+OUTER_MASS = 1e-6
 """Mass on either side of log m that is left out."""
-ZOOMS = 4
-FINE, MOST_POINTS = 4.0, 2_000
+MAX_MEAN_ZOOMS = 4
+FINE, MAX_X_POINTS = 4.0, 2_000
 """Points of x for the least deviation of a number, and at most in all. Cells of x add a twelfth of
 their square to a variance: 0.5 % of the least one."""
 LOWEST_FACTOR, TABULATED = 6.0, 2_401
 """Range of log b on either side of zero, and values at which its distribution is tabulated."""
-REACH = 6.0
+TABULATED_DEVIATIONS = 6.0
 """Standard deviations to which the likelihood of a number is tabulated."""
 LEAST_DEVIATION = 1e-3
 """Least standard deviation of the logarithm of a level or a peak that the grid resolves."""
@@ -101,24 +101,26 @@ class FactorPrior(NamedTuple):
 
     @classmethod
     def of(cls, given: Any) -> Self:
-        """Return the prior of a mapping of `MEAN` and `SCATTER` to distributions."""
-        found = distributions_of(given or {})
-        if unknown := [key for key in found if key not in (MEAN, SCATTER)]:
-            raise InputError([unknown_name("prior", key, (MEAN, SCATTER)) for key in unknown])
+        """Return the prior of a mapping of `MEAN_KEY` and `SCATTER_KEY` to distributions."""
+        priors = distributions_of(given or {})
+        if unknown := [key for key in priors if key not in (MEAN_KEY, SCATTER_KEY)]:
+            raise InputError(
+                [unknown_name("prior", key, (MEAN_KEY, SCATTER_KEY)) for key in unknown]
+            )
         default = cls()
-        prior = cls(found.get(SCATTER, default.scatter), found.get(MEAN))
+        prior = cls(priors.get(SCATTER_KEY, default.scatter), priors.get(MEAN_KEY))
         low, high = prior.scatter.cdf([0.0, MOST_CV])
         if not low < high:
             raise InputError(
-                f"prior: {SCATTER}: is a coefficient of variation between 0 and {MOST_CV:g}, where"
-                " this distribution has no mass"
+                f"prior: {SCATTER_KEY}: is a coefficient of variation between 0 and {MOST_CV:g},"
+                " where this distribution has no mass"
             )
         return prior
 
     def cells(self) -> Array:
-        """Return values of s at equal shares of the prior, (CELLS,)."""
+        """Return values of s at equal shares of the prior, (SCATTER_CELLS,)."""
         low, high = self.scatter.cdf([0.0, MOST_CV])
-        shares = low + (high - low) * (np.arange(CELLS) + 0.5) / CELLS
+        shares = low + (high - low) * (np.arange(SCATTER_CELLS) + 0.5) / SCATTER_CELLS
         return np.maximum(self.scatter.ppf(shares), LEAST_CV)
 
 
@@ -142,8 +144,8 @@ class Profiles(NamedTuple):
 
 def of_mean(random: RandomInterface, mean: float, factor: Any = None) -> RandomInterface:
     """Return a random interface of another mean strength, and another factor of the strength."""
-    others = {k: v for k, v in (random.between or {}).items() if k != "strength"}
-    between = others | ({} if factor is None else {"strength": factor})
+    factors = {k: v for k, v in (random.between or {}).items() if k != "strength"}
+    between = factors | ({} if factor is None else {"strength": factor})
     field = random.strength
     marginal = multiplied(field.marginal, mean / field.mean)
     return replace(random, strength=replace(field, marginal=marginal), between=between or None)
@@ -175,7 +177,7 @@ class Onsets:
         """Return the range of x that such peaks leave, and the least deviation of x."""
         logs = np.log(self.area * self.ratios)
         deviation = max(float(logs.std(axis=2).min()), LEAST_DEVIATION)
-        away = REACH * np.hypot(float(logs.std()), error / peaks.min())
+        away = TABULATED_DEVIATIONS * np.hypot(float(logs.std()), error / peaks.min())
         ends = np.log(peaks.min()), np.log(peaks.max())
         return ends[0] - logs.max() - away, ends[1] - logs.min() + away, deviation
 
@@ -185,7 +187,7 @@ def points_between(ranges: Sequence[tuple[float, float, float]]) -> Array:
     low, high, deviation = (
         pick(v) for pick, v in zip((min, max, min), zip(*ranges, strict=True), strict=True)
     )
-    count = int(np.clip(np.ceil(FINE * (high - low) / deviation), 64, MOST_POINTS))
+    count = int(np.clip(np.ceil(FINE * (high - low) / deviation), 64, MAX_X_POINTS))
     return np.linspace(low, high, count)
 
 
@@ -223,24 +225,26 @@ class Grid:
 
     def draws(self, count: int, rng: np.random.Generator, fields: Any = None) -> Array:
         """Draw field, family, s and log m, (count, 4); of given fields if there are some."""
-        cells, (rng, others) = self.mass[0].size, rng.spawn(2)  # a draw depends on its number
+        cells, (rng, mean_rng) = self.mass[0].size, rng.spawn(2)  # a draw depends on its number
         if fields is None:
             places = rng.choice(self.mass.size, count, p=self.mass.ravel())
         else:
             below = np.cumsum(self.mass.reshape(-1, cells), axis=1)
             shares = rng.random(count) * below[fields, -1]
-            own = [np.searchsorted(below[f], p) for f, p in zip(fields, shares, strict=True)]
-            places = np.asarray(fields) * cells + np.minimum(own, cells - 1)
+            drawn = [np.searchsorted(below[f], p) for f, p in zip(fields, shares, strict=True)]
+            places = np.asarray(fields) * cells + np.minimum(drawn, cells - 1)
         field, family, cell, mean = np.unravel_index(places, self.mass.shape)
         step = self.means[1] - self.means[0]
-        logs = self.means[mean] + step * (others.random(count) - 0.5)
+        logs = self.means[mean] + step * (mean_rng.random(count) - 0.5)
         return np.stack([field, family, self.profiles.prior.cells()[cell], logs], axis=1)
 
     def interface(self, drawn: Array) -> RandomInterface:
         """Return the random interface of one draw (4,)."""
-        own = self.profiles
-        factor = factor_of_family(own.families[int(drawn[1])], float(drawn[2]))
-        return of_mean(own.fields[int(drawn[0])], own.reference * math.exp(drawn[3]), factor)
+        profiles = self.profiles
+        factor = factor_of_family(profiles.families[int(drawn[1])], float(drawn[2]))
+        return of_mean(
+            profiles.fields[int(drawn[0])], profiles.reference * math.exp(drawn[3]), factor
+        )
 
     def grouped(self, drawn: Array) -> tuple[list[RandomInterface], list[int]]:
         """Return the interfaces of draws (draws, 4), and the numbers of their fields."""
@@ -248,18 +252,18 @@ class Grid:
 
     def described(self, drawn: Array) -> dict[str, Array]:
         """Return draws (draws, 4) as columns of parameters."""
-        own, field = self.profiles, drawn[:, 0].astype(np.int64)
-        means = own.reference * np.exp(drawn[:, 3])
-        strengths = [one.strength for one in own.fields]
+        profiles, field = self.profiles, drawn[:, 0].astype(np.int64)
+        means = profiles.reference * np.exp(drawn[:, 3])
+        strengths = [one.strength for one in profiles.fields]
         of_field = {
             "strength.standard_deviation": [one.standard_deviation for one in strengths],
             "strength.efolding_length": [one.spectrum.efolding_length for one in strengths],
         }
-        found = {MEAN: means, SCATTER: drawn[:, 2]}
+        columns = {MEAN_KEY: means, SCATTER_KEY: drawn[:, 2]}
         for name, values in of_field.items():
-            found[name] = np.array(values)[field]
-        found["strength.standard_deviation"] *= means / own.reference
-        return found
+            columns[name] = np.array(values)[field]
+        columns["strength.standard_deviation"] *= means / profiles.reference
+        return columns
 
 
 def grid_of_profiles(profiles: Profiles, tables: "Tables | None" = None) -> tuple[Grid, Grid]:
@@ -268,16 +272,16 @@ def grid_of_profiles(profiles: Profiles, tables: "Tables | None" = None) -> tupl
     deviations = np.maximum(np.sqrt(profiles.within), LEAST_DEVIATION)
     ranges = [] if tables is None else tables.ranges()
     if levels.size:
-        reach = REACH * deviations
+        reach = TABULATED_DEVIATIONS * deviations
         ranges.append(((levels - reach).min(), (levels + reach).max(), deviations.min()))
     x = points_between(ranges)
     # 2. the likelihood of each number as a function of x
     of_levels = -0.5 * ((x - levels[..., None]) / deviations[..., None]) ** 2
     of_levels -= np.log(deviations[..., None])
     of_peaks = np.zeros((len(profiles.fields), 0, x.size)) if tables is None else tables(x)
-    box = np.array([x[0] - BEYOND, x[-1] + BEYOND])
-    for _ in range(ZOOMS):
-        means = box[0] + np.ptp(box) * (np.arange(MEANS) + 0.5) / MEANS
+    box = np.array([x[0] - LOG_MEAN_MARGIN, x[-1] + LOG_MEAN_MARGIN])
+    for _ in range(MAX_MEAN_ZOOMS):
+        means = box[0] + np.ptp(box) * (np.arange(MEAN_CELLS) + 0.5) / MEAN_CELLS
         # 3. and 4.
         kernel = np.array(
             [
@@ -300,12 +304,12 @@ def grid_of_profiles(profiles: Profiles, tables: "Tables | None" = None) -> tupl
         if levels.size or profiles.prior.mean is not None:
             along.append(np.exp(before).sum(axis=(0, 1, 2)))
         empty = [
-            min(int(np.sum(np.cumsum(own[::way]) <= NEGLIGIBLE)) for own in along)
+            min(int(np.sum(np.cumsum(own[::way]) <= OUTER_MASS)) for own in along)
             for way in (1, -1)
         ]
-        if sum(empty) <= 0.1 * MEANS:
+        if sum(empty) <= 0.1 * MEAN_CELLS:
             break
-        cell = np.ptp(box) / MEANS
+        cell = np.ptp(box) / MEAN_CELLS
         box = box + cell * np.array([max(empty[0] - 1, 0), -max(empty[1] - 1, 0)])
     return Grid(profiles, means, np.exp(before)), Grid(profiles, means, mass, evidence)
 
@@ -323,8 +327,8 @@ def _products(kernel: Array, tables: Array) -> Array:
     flat = kernel.reshape(-1, points).T
     for number in range(numbers):
         top = tops[:, number]
-        found = np.exp(tables[:, number] - top[:, None]) @ flat
-        total += np.log(np.maximum(found, 1e-300)).reshape(total.shape)
+        integrals = np.exp(tables[:, number] - top[:, None]) @ flat
+        total += np.log(np.maximum(integrals, 1e-300)).reshape(total.shape)
         total += top[:, None, None, None]
     return total
 
@@ -372,13 +376,13 @@ class Tables:
         rows = np.empty((len(u), x.size))
         for family, cv, places in _laws(self.profiles, u):
             rows[places] = masses(family, cv, u[places, 3], x)
-        found = np.empty((len(u), sum(map(np.size, self.peaks))))
+        densities = np.empty((len(u), sum(map(np.size, self.peaks))))
         pairs = list(zip(self.onsets, self.peaks, strict=True))
         for f in np.unique(u[:, 0].astype(np.int64)):
-            own = np.flatnonzero(u[:, 0] == f)
+            members = np.flatnonzero(u[:, 0] == f)
             table = np.concatenate([k.tabulated(f, p, self.error, x) for k, p in pairs])
-            found[own] = np.log(np.maximum(rows[own] @ np.exp(table).T, 1e-300))
-        return found
+            densities[members] = np.log(np.maximum(rows[members] @ np.exp(table).T, 1e-300))
+        return densities
 
     def predicted(self, kind: int, u: Array, seed: int) -> Array:
         """Draw a peak of a kind of specimen at each of some draws (draws, 4)."""
@@ -400,7 +404,7 @@ class Tables:
         The predictive distribution: the mean over field, onset and grid, without draws.
         """
         profiles, known = self.profiles, self.onsets[kind]
-        x = np.linspace(grid.means[0] - LOWEST, grid.means[-1] + BEYOND, PREDICTED)
+        x = np.linspace(grid.means[0] - LOWEST, grid.means[-1] + LOG_MEAN_MARGIN, PREDICTED)
         below = np.zeros((len(profiles.fields), x.size))
         for family, name in enumerate(profiles.families):
             for cell, cv in enumerate(profiles.prior.cells()):
@@ -423,11 +427,13 @@ class Tables:
                 / samples
             )
 
-        found = []
+        log_peaks = []
         for probability in probabilities:
             low, high = x[0] + logs.min() - known.at[0], x[-1] + logs.max() - known.at[-1]
-            found.append(brentq(lambda at, p=probability: chance(at) - p, low, high, xtol=1e-6))
-        return np.exp(found)
+            log_peaks.append(
+                brentq(lambda at, p=probability: chance(at) - p, low, high, xtol=1e-6)
+            )
+        return np.exp(log_peaks)
 
 
 def _laws(profiles: Profiles, u: Array) -> list[tuple[str, float, Any]]:

@@ -31,8 +31,8 @@ from stiction.inference.joined import (
 from stiction.inference.likelihood import variable_of
 from stiction.inference.peaks import si_of
 from stiction.inference.specimens import (
-    MEAN,
-    SCATTER,
+    MEAN_KEY,
+    SCATTER_KEY,
     Grid,
     Profiles,
     Tables,
@@ -98,7 +98,7 @@ def expected_widths(
             if tests or levels:
                 grid, both = _after(tables, truth, tests, levels, rng)
             drawn = grid.described(grid.draws(DRAWS, rng))
-            ends = [np.quantile(drawn[name], [0.05, 0.95]) for name in (MEAN, SCATTER)]
+            ends = [np.quantile(drawn[name], [0.05, 0.95]) for name in (MEAN_KEY, SCATTER_KEY)]
             widths[row, number] = np.ptp(ends, axis=1)
             stresses[row, number] = both.quantile(grid, np.array([probability]))[0]
             meter.advance()
@@ -114,7 +114,7 @@ def expected_widths(
             "design_low": ("design", low, about),
             "design_high": ("design", high, about),
         },
-        {"design": list(plans), "parameter": [MEAN, SCATTER]},
+        {"design": list(plans), "parameter": [MEAN_KEY, SCATTER_KEY]},
         {"probability": probability, "repetitions": repetitions},
     )
 
