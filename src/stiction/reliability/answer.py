@@ -33,16 +33,16 @@ TargetCv: TypeAlias = Annotated[Real, Field(ge=1e-6, le=1)]
 Probability: TypeAlias = Annotated[Real, Field(ge=1e-30, lt=1)]
 Budget: TypeAlias = at_least(100)  # type: ignore[valid-type]  # a call makes it
 
-SECONDS, FEWEST, MOST = 100.0, 1_000, 2_000_000
+COUNTING_SECONDS, FEWEST_EVALUATIONS, MOST_EVALUATIONS = 100.0, 1_000, 2_000_000
 """Computing time of counting by a slow method, fewest and most evaluations, by default."""
-CHAIN, PATIENCE = 20_000, 900.0
+CHAIN_EVALUATIONS, PATIENCE_SECONDS = 20_000, 900.0
 """Evaluations of subset simulation for about P = 1e-4 with a cv of 0.1, and seconds on one core
 that evaluations take at most if `max_evaluations` does not allow more."""
-LISTED, SAMPLED = 0.6, 0.8
+LIST_SHARE, SAMPLING_SHARE = 0.6, 0.8
 """Parts of the target for the errors by the list of interfaces and by sampling, in squares."""
-MORE, CARRIED = 1.2, 0.9
+REQUEST_MARGIN, CARRIED_SHARE = 1.2, 0.9
 """Margin on the number of members wanted; share of the mean whose carriers are counted."""
-CHECKED = (8, 64)
+EXACT_CHECKS = (8, 64)
 """Fewest and most samples that are solved exactly to check those of an approximate method."""
 CHECK_SECONDS = 10.0
 """Seconds of one core for these."""
@@ -85,8 +85,8 @@ class Estimate:
         if not self.state.several:
             return np.zeros(0)
         lows, highs = np.array(self.state.bounds_of_members()).T
-        found = self.tail.of_members(self.stress, lows.size)
-        return np.select([self.stress <= lows, self.stress >= highs], [0.0, 1.0], found)
+        probabilities = self.tail.of_members(self.stress, lows.size)
+        return np.select([self.stress <= lows, self.stress >= highs], [0.0, 1.0], probabilities)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -245,8 +245,10 @@ class Answer:
         else:
             chance = f"P = {self.probability:.3g} (95 %: {low:.3g} to {high:.3g},"
             result = f"{chance} c.o.v. {self.cv:.2g}) below {result}"
-        others = [text for name, text in known.items() if math.isfinite(getattr(self, name))]
-        result += f" ({', '.join(others)})" if others else ""
+        equivalents = [
+            text for name, text in known.items() if math.isfinite(getattr(self, name))
+        ]
+        result += f" ({', '.join(equivalents)})" if equivalents else ""
         if bounded(self.lower_bound):
             result += f", {self.stress_above_bound / 1e3:.4g} kPa above the bound"
         if self.survived:
@@ -266,25 +268,25 @@ class Answer:
 
     def _moved(self) -> list[str]:
         """Return what moves a design, as lines."""
-        found = self.sensitivities
-        if not found.sizes.get("source"):
+        effects = self.sensitivities
+        if not effects.sizes.get("source"):
             return []
         unit = "Pa" if math.isnan(self.area) else "N"
         area = 1.0 if math.isnan(self.area) else self.area
         lines = [
             "  the interval holds the error of the computation only; what moves the design:",
             *(
-                f"    {name}: {low} to {high}: {in_words(unit, area * one)} to"
-                f" {in_words(unit, area * other)}"
-                for name, low, high, one, other in zip(
-                    found.source.values, found.low.values, found.high.values,
-                    found.stress_at_low.values, found.stress_at_high.values, strict=True,
+                f"    {name}: {low} to {high}: {in_words(unit, area * at_low)} to"
+                f" {in_words(unit, area * at_high)}"
+                for name, low, high, at_low, at_high in zip(
+                    effects.source.values, effects.low.values, effects.high.values,
+                    effects.stress_at_low.values, effects.stress_at_high.values, strict=True,
                 )
             ),
         ]  # fmt: skip
         families = [
             f"{name.removeprefix('stress by ')} {in_words(unit, area * value)}"
-            for name, value in found.attrs.items()
+            for name, value in effects.attrs.items()
             if name.startswith("stress by ")
         ]
         if len(families) > 1:
@@ -329,18 +331,22 @@ def prepare(
     if problems:
         raise InputError(problems)
     check_fields([experiment])
-    seconds = SECONDS if too_slow(experiment, max_evaluations) else PATIENCE
-    return state, max_evaluations or int(min(MOST, max(FEWEST, seconds / experiment.seconds)))
+    seconds = COUNTING_SECONDS if too_slow(experiment, max_evaluations) else PATIENCE_SECONDS
+    return state, max_evaluations or int(
+        min(MOST_EVALUATIONS, max(FEWEST_EVALUATIONS, seconds / experiment.seconds))
+    )
 
 
 def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
     """Return why chains of samples take too long by this method; None if allowed."""
-    seconds, kind = CHAIN * experiment.seconds, experiment.method.type
-    fast = seconds <= PATIENCE and not optional_member(experiment.method, "counted_only")
-    if fast or (max_evaluations or 0) >= CHAIN:
+    seconds, kind = CHAIN_EVALUATIONS * experiment.seconds, experiment.method.type
+    fast = seconds <= PATIENCE_SECONDS and not optional_member(
+        experiment.method, "counted_only"
+    )
+    if fast or (max_evaluations or 0) >= CHAIN_EVALUATIONS:
         return None
     return (
-        f"{CHAIN:,} evaluations of subset simulation by {kind!r} would take about"
+        f"{CHAIN_EVALUATIONS:,} evaluations of subset simulation by {kind!r} would take about"
         f" {seconds / 3600.0:.1g} h on one core; allow them with max_evaluations, or use plain"
         " Monte Carlo (algorithm='plain' of failure_probability, or st.monte_carlo)"
     )
@@ -353,21 +359,21 @@ def bounded(lowest: float) -> bool:
 
 def wanted_members(random: Any, cv: float, target_cv: float) -> int:
     """Return how many members to draw from a source instead, 0 for no more."""
-    least = cv / (LISTED * target_cv)
+    least = cv / (LIST_SHARE * target_cv)
     count = len(random.members)
     if getattr(random, "source", None) is None or least <= 1.0 or count >= MAX_MEMBERS:
         return 0
-    return int(min(max(MORE * count * least * least, 2 * count), MAX_MEMBERS))
+    return int(min(max(REQUEST_MARGIN * count * least * least, 2 * count), MAX_MEMBERS))
 
 
-def few_members(random: Any, found: Answer | Estimate, target_cv: float) -> list[str]:
+def few_members(random: Any, estimate: Answer | Estimate, target_cv: float) -> list[str]:
     """Return a warning if the list makes the estimate less precise than `target_cv`."""
-    by_list = found.members_cv
-    if not (found.cv > target_cv and by_list > LISTED * target_cv):
+    by_list = estimate.members_cv
+    if not (estimate.cv > target_cv and by_list > LIST_SHARE * target_cv):
         return []
-    members = np.nan_to_num(found.members)
+    members = np.nan_to_num(estimate.members)
     shares = np.cumsum(np.sort(np.bincount(random.kinds, members))[::-1])
-    count = 1 + int(np.searchsorted(shares, CARRIED * shares[-1]))
+    count = 1 + int(np.searchsorted(shares, CARRIED_SHARE * shares[-1]))
     advice = (
         "give what it was drawn from, a fit or a posterior, in its place: more are then drawn; or"
         " a longer list (count of [uncertain])"
@@ -379,7 +385,7 @@ def few_members(random: Any, found: Answer | Estimate, target_cv: float) -> list
         )
     return [
         f"the list of interfaces is a sample, and {count} of its {shares.size} different ones carry"
-        f" {CARRIED:.0%} of the mean: by this alone the coefficient of variation is"
+        f" {CARRIED_SHARE:.0%} of the mean: by this alone the coefficient of variation is"
         f" {by_list:.2g} (target {target_cv:g}); {advice}; more profiles or tests make them"
         " more alike"
     ]
@@ -389,7 +395,7 @@ def imprecise(cv: float, target_cv: float, evaluations: int) -> list[str]:
     """Return a warning if the estimate is less precise than `target_cv`."""
     advice = "raise max_evaluations"
     if math.isfinite(cv):
-        advice += f" to about {MORE * evaluations * (cv / target_cv) ** 2:.1g}"
+        advice += f" to about {REQUEST_MARGIN * evaluations * (cv / target_cv) ** 2:.1g}"
     text = (
         f"the coefficient of variation by sampling is {cv:.3g}, not {target_cv:.3g}: {evaluations}"
         f" evaluations do not suffice; {advice}, or target_cv"
@@ -417,7 +423,7 @@ def exact_doubts(
     if exact is None or not values.size:
         return []
     seconds = seconds_per_sample(experiment.problem, exact)
-    count = int(np.clip(CHECK_SECONDS / seconds, *CHECKED))
+    count = int(np.clip(CHECK_SECONDS / seconds, *EXACT_CHECKS))
     chosen = different(values, count, np.random.default_rng(0))
     state.meter.note = f"checking by {exact.label}"
     with collect_warnings():

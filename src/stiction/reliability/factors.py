@@ -40,9 +40,9 @@ FACTORS = 128
 """Specimens for each solved sample."""
 CHARACTERISTIC = 0.05
 """Share of the specimens below the characteristic value."""
-FIRST, MOST_STEP = 500, 8_000
+FIRST_SAMPLES, MOST_STEP_SAMPLES = 500, 8_000
 """Samples that are solved at first, and most that are solved in one step."""
-MARGIN = 1.1
+COUNT_MARGIN = 1.1
 """Factor on the number of samples, as the error so far is itself an estimate."""
 SUBSET_EVALUATIONS = 50.0
 """Evaluations of subset simulation for a coefficient of variation of 1, over log10(P)^2: fitted to
@@ -63,8 +63,8 @@ class Counts(NamedTuple):
     @property
     def tail(self) -> Tail:
         """The lower tail, of which each solved sample is one ancestor."""
-        samples, each = self.values.shape
-        ancestors = np.repeat(np.arange(samples), each)
+        samples, specimens = self.values.shape
+        ancestors = np.repeat(np.arange(samples), specimens)
         level = Population(
             math.inf,
             0.0,
@@ -74,22 +74,22 @@ class Counts(NamedTuple):
             np.empty((0, 0)),
         )
         descent = Descent(samples, [level], -math.inf, samples, complete=True)
-        reason = f"counting takes fewer evaluations: {each} specimens of each sample"
+        reason = f"counting takes fewer evaluations: {specimens} specimens of each sample"
         return Tail([descent], "plain", reason, samples)
 
     def draws(self, picks: NDArray[np.int64]) -> Array:
         """Return the draws of some specimens, by their numbers."""
-        state, each = self.state, self.values.shape[1]
+        state, specimens = self.state, self.values.shape[1]
         random, seed = state.experiment.random, state.experiment.seed
-        rows = [state.draws(seed, int(pick) // each, 1) for pick in picks]
-        found = np.concatenate([np.empty((0, state.dimension)), *rows])
+        rows = [state.draws(seed, int(pick) // specimens, 1) for pick in picks]
+        draws = np.concatenate([np.empty((0, state.dimension)), *rows])
         shares = self.shares.ravel()[picks]
         new = np.isfinite(shares)
         if new.any():
             column = random.factor_column(state.experiment.problem.interface)
-            found[new, column] = ndtri(shares[new])
-            random.select(found, np.where(new)[0], self.members.ravel()[picks][new])
-        return found
+            draws[new, column] = ndtri(shares[new])
+            random.select(draws, np.where(new)[0], self.members.ravel()[picks][new])
+        return draws
 
     def characteristic(self, confidence: float) -> float:
         """Return the 5 % quantile that this share of the interfaces exceeds, Pa.
@@ -108,13 +108,13 @@ class Counts(NamedTuple):
             ratios[rows] /= laws[number].distribution.ppf(self.shares[rows, 0])
         steps = (np.arange(FACTORS) + 0.5) / FACTORS
         factors = np.array([one.distribution.ppf(steps) for one in laws])
-        found = []
+        quantiles = []
         for number, group in enumerate(random.groups):
-            own = ratios[random.groups[first] == group]
-            if own.size:
-                values = random.means[number] * np.outer(own, factors[law[number]])
-                found.append(np.quantile(values, CHARACTERISTIC))
-        return float(np.quantile(found, 1.0 - confidence))
+            group_ratios = ratios[random.groups[first] == group]
+            if group_ratios.size:
+                values = random.means[number] * np.outer(group_ratios, factors[law[number]])
+                quantiles.append(np.quantile(values, CHARACTERISTIC))
+        return float(np.quantile(quantiles, 1.0 - confidence))
 
     def lowest(self, stress: float, count: int) -> tuple[Array, Array]:
         """Return draws and onsets of some of the lowest specimens, half of them below a stress."""
@@ -167,8 +167,8 @@ def solve(state: LimitState, first: int, samples: int) -> Counts:
     )
     factors = np.empty(shares.shape)
     for number in np.unique(law[chosen]):
-        own = law[chosen] == number
-        factors[own] = laws[number].distribution.ppf(shares[own])
+        of_law = law[chosen] == number
+        factors[of_law] = laws[number].distribution.ppf(shares[of_law])
     return Counts(state, ratios[:, None] * random.means[chosen] * factors, chosen, shares)
 
 
@@ -177,7 +177,7 @@ def count_tail(state: LimitState, goal: Goal, budget: int) -> tuple[Counts, Tail
     long_list = len(state.experiment.random.members) > LONG_LIST
     if state.may_survive or not (long_list or _expands(state)):
         return None
-    counts = solve(state, 0, min(FIRST, budget))
+    counts = solve(state, 0, min(FIRST_SAMPLES, budget))
     while True:
         tail, samples = counts.tail, len(counts.values)
         stress = tail.quantile(goal.probability) if goal.probability else goal.stress
@@ -187,14 +187,16 @@ def count_tail(state: LimitState, goal: Goal, budget: int) -> tuple[Counts, Tail
         state.meter.note = f"c.o.v. {cv:.2g} (target {goal.cv:g})"
         if cv <= goal.cv or samples >= budget:
             return counts, tail
-        wanted = MARGIN * samples * (cv / goal.cv) ** 2 if math.isfinite(cv) else math.inf
+        wanted = COUNT_MARGIN * samples * (cv / goal.cv) ** 2 if math.isfinite(cv) else math.inf
         decades = max(-math.log10(chance), 1.0) if chance else math.inf
         price = (
             SUBSET_EVALUATIONS * (decades / goal.cv) ** 2 * (LIST_COST if long_list else 1.0)
         )
         if wanted > min(price, budget):
             return None
-        size = int(min(max(wanted - samples, FIRST), budget - samples, MOST_STEP))
+        size = int(
+            min(max(wanted - samples, FIRST_SAMPLES), budget - samples, MOST_STEP_SAMPLES)
+        )
         if size <= 0:
             return counts, tail
         more = solve(state, samples, size)

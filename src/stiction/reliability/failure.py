@@ -22,7 +22,7 @@ from stiction.problem.results import along, study_attributes, to_dataset
 from stiction.random.equally_likely import AnyRandom, as_random
 from stiction.random.spectra import Share
 from stiction.reliability.answer import (
-    SAMPLED,
+    SAMPLING_SHARE,
     Answer,
     Budget,
     Estimate,
@@ -45,7 +45,7 @@ from stiction.reliability.uncertainty import binomial_interval, generator, logno
 
 F = TypeVar("F", Answer, Estimate)
 
-PILOT = 1_000
+PILOT_SAMPLES = 1_000
 """Number of plain samples by which the algorithm is chosen."""
 FREQUENT = 0.01
 """Probability above which counting needs no more evaluations than subset simulation."""
@@ -55,15 +55,15 @@ CURVE_CV = 0.3
 """Coefficient of variation at the end of a curve by default."""
 COMMONEST, PER_DECADE = 0.5, 3
 """Probability at which a curve begins, and its points for each decade."""
-NEGLIGIBLE = 1e-15
+NEGLIGIBLE_PROBABILITY = 1e-15
 """Probability of failing, or of holding, below which no sample is drawn."""
 DOUBTFUL = 0.02
 """Share of the mean strength below which a stress is probably in another unit."""
 THOUSAND = 1e3
 """Factor off the mean strength that means another unit: kN for N, MPa for Pa."""
-SHOWN = 20
+SHOWN_PROFILES = 20
 """Failing profiles kept."""
-CHECKED = 32
+CHECKED_FAILURES = 32
 """Number of failures among the samples that are also solved by equilibrium."""
 COVERED = 0.8
 """Share of the failures that the first stage must reach to avoid a warning."""
@@ -195,10 +195,10 @@ def failure_probability(
             (friction_coefficient or 0.0) * experiment.pressure if stress is None else stress
         )
         _check_unit(state, name, given[name] or 0.0, wanted)
-        found = _probability(
+        answer = _probability(
             state, float(wanted), algorithm, target_cv, budget, max_evaluations
         )
-        return replace(found, quantity=name)
+        return replace(answer, quantity=name)
 
     experiment = Experiment(problem, as_random(random, seed, mixture), method, seed=seed)
     return _answered(experiment, target_cv, "failure_probability", progress, solve)
@@ -213,10 +213,10 @@ def _answered(
 ) -> Answer:
     """Return an answer from as many members as the target needs, with its warnings."""
     with Meter(name, show=progress) as meter, merge_warnings() as warned:
-        own, found = _of_enough_members(experiment, target_cv, meter, warned, solve)
-        for text in few_members(own.random, found, target_cv):
+        experiment, answer = _of_enough_members(experiment, target_cv, meter, warned, solve)
+        for text in few_members(experiment.random, answer, target_cv):
             warn_accuracy(text)
-    return replace(found, warnings=tuple(texts_of(warned)))
+    return replace(answer, warnings=tuple(texts_of(warned)))
 
 
 def _of_enough_members(
@@ -228,14 +228,14 @@ def _of_enough_members(
 ) -> tuple[Experiment, F]:
     """Return what is solved, with as many members as the error by the list needs."""
     while True:
-        found, known = solve(experiment, meter), experiment.random
-        if not (count := wanted_members(known, found.members_cv, target_cv)):
-            return experiment, found
-        meter.note = f"{count:,} interfaces, c.o.v. by the list {found.members_cv:.2g}"
+        solution, known = solve(experiment, meter), experiment.random
+        if not (count := wanted_members(known, solution.members_cv, target_cv)):
+            return experiment, solution
+        meter.note = f"{count:,} interfaces, c.o.v. by the list {solution.members_cv:.2g}"
         larger = known.larger(count, experiment.seed)
         # A longer list by a posterior of a list holds some more that are rare.
         if larger.kinds.max() + 1 < FRESH * (known.kinds.max() + 1):
-            return experiment, found
+            return experiment, solution
         experiment = replace(experiment, random=larger)
         warned.clear()
 
@@ -259,14 +259,14 @@ def _probability(
     state: LimitState, stress: float, algorithm: str, target_cv: float, budget: int,
     allowed: int | None,
 ) -> Answer:  # fmt: skip
-    likely = state.likely_bounds(NEGLIGIBLE)
+    likely = state.likely_bounds(NEGLIGIBLE_PROBABILITY)
     if not likely[0] < stress < likely[1]:
         return _certain(state, stress, likely)
-    reason, pilot, least = "as requested", None, min(PILOT, max(budget // 5, 50))
+    reason, pilot, least = "as requested", None, min(PILOT_SAMPLES, max(budget // 5, 50))
     if algorithm == "auto" and (slow := too_slow(state.experiment, allowed)):
         algorithm, reason = "plain", slow
     elif algorithm == "auto":
-        aim = Goal(target_cv * (SAMPLED if state.is_sample else 1.0), stress)
+        aim = Goal(target_cv * (SAMPLING_SHARE if state.is_sample else 1.0), stress)
         if counted := count_tail(state, aim, budget):
             return _by_tail(Estimate(state, counted[1], stress), aim.cv, counted[0])
         state = weakest_first(state)
@@ -277,7 +277,7 @@ def _probability(
         algorithm = "auto" if rare else "plain"
         reason = f"{failures} failure{'s' * (failures != 1)} of {least} plain samples: "
         reason += "rare" if rare else "frequent enough to count"
-    target_cv *= SAMPLED if state.is_sample else 1.0
+    target_cv *= SAMPLING_SHARE if state.is_sample else 1.0
     if algorithm == "plain":
         begun = 0 if pilot is None else least
         return _by_counting(state, stress, target_cv, budget, least, begun, reason)
@@ -294,7 +294,7 @@ def _certain(state: LimitState, stress: float, likely: tuple[float, float]) -> A
     """Return the answer where no sample is needed."""
     certain = not state.bounds[0] < stress < state.bounds[1]
     low, high = state.bounds if certain else likely
-    doubt = 0.0 if certain else NEGLIGIBLE
+    doubt = 0.0 if certain else NEGLIGIBLE_PROBABILITY
     chance = float(stress >= high)
     reason = f"no interface slides at or below {low:.7g} Pa"
     if chance:
@@ -339,25 +339,25 @@ def _by_counting(
     stresses = counted.populations[0].values
     failed = np.flatnonzero(stresses < stress)
     # The weakest samples: failures and others in their true shares.
-    some = failed[:CHECKED]
+    some = failed[:CHECKED_FAILURES]
     near = np.argsort(stresses[: some.max(initial=-1) + 1], kind="stable")[: 2 * some.size]
-    found = Estimate(state, Tail([counted], "plain", reason, start + stresses.size), stress)
-    cv, interval = math.hypot(count.cv, found.members_cv), count.interval()
-    if found.members_cv:
+    estimate = Estimate(state, Tail([counted], "plain", reason, start + stresses.size), stress)
+    cv, interval = math.hypot(count.cv, estimate.members_cv), count.interval()
+    if estimate.members_cv:
         interval = lognormal_interval(count.probability, cv)
-    doubts = imprecise(count.cv, target_cv, found.tail.spent)
+    doubts = imprecise(count.cv, target_cv, estimate.tail.spent)
     doubts += exact_doubts(state, (drawn(near), stresses[near]), stress, count.probability)
     return Answer.of(
-        found, doubts, probability=count.probability, cv=cv, interval=interval,
-        failing_profiles=_profiles(state, drawn(failed[:SHOWN])),
+        estimate, doubts, probability=count.probability, cv=cv, interval=interval,
+        failing_profiles=_profiles(state, drawn(failed[:SHOWN_PROFILES])),
     )  # fmt: skip
 
 
-def _by_tail(found: Estimate, target_cv: float, counts: Counts | None = None) -> Answer:
-    state, tail, stress = found.state, found.tail, found.stress
-    probability, last = found.probability, tail.repetitions[-1]
-    interval = lognormal_interval(probability, found.cv)
-    doubts = imprecise(found.sampling_cv, target_cv, tail.spent)
+def _by_tail(estimate: Estimate, target_cv: float, counts: Counts | None = None) -> Answer:
+    state, tail, stress = estimate.state, estimate.tail, estimate.stress
+    probability, last = estimate.probability, tail.repetitions[-1]
+    interval = lognormal_interval(probability, estimate.cv)
+    doubts = imprecise(estimate.sampling_cv, target_cv, tail.spent)
     if tail.algorithm == "two_level" and probability == 0.0:
         interval = 0.0, math.exp(last.populations[-1].log_probability)
         doubts = [
@@ -371,7 +371,9 @@ def _by_tail(found: Estimate, target_cv: float, counts: Counts | None = None) ->
                 " be low; compare with algorithm='subset'"
             )
     elif counts:
-        doubts += exact_doubts(state, counts.lowest(stress, 2 * CHECKED), stress, probability)
+        doubts += exact_doubts(
+            state, counts.lowest(stress, 2 * CHECKED_FAILURES), stress, probability
+        )
     elif tail.complete:
         doubts += exact_doubts(state, last.around(stress), stress, probability)
     else:
@@ -379,12 +381,12 @@ def _by_tail(found: Estimate, target_cv: float, counts: Counts | None = None) ->
         interval = 0.0, lognormal_interval(*there)[1]
         doubts = [f"{tail.short_of(f'{stress:.7g} Pa')}; the interval ends there"]
     if counts:
-        draws = counts.failing(stress, SHOWN)
+        draws = counts.failing(stress, SHOWN_PROFILES)
     else:
         draws, stresses = last.failing(stress)
-        draws = draws[different(stresses, SHOWN, generator(state.experiment.seed, 2))]
+        draws = draws[different(stresses, SHOWN_PROFILES, generator(state.experiment.seed, 2))]
     profiles = _profiles(state, draws)
-    return Answer.of(found, doubts, interval=interval, failing_profiles=profiles)
+    return Answer.of(estimate, doubts, interval=interval, failing_profiles=profiles)
 
 
 def _profiles(state: LimitState, draws: Array) -> xr.Dataset:
@@ -468,14 +470,14 @@ def design_stress(
 
     def solve(experiment: Experiment, meter: Meter) -> Answer:
         state, budget = prepare(experiment, event, workers, meter, max_evaluations)
-        found = _quantile(state, probability, target_cv, budget, confidence)
+        answer = _quantile(state, probability, target_cv, budget, confidence)
         source = getattr(experiment.random, "source", None)
         wanted = source is not None if sensitivities is None else bool(sensitivities)
-        if wanted and math.isfinite(found.stress):
+        if wanted and math.isfinite(answer.stress):
             stated = sensitivities if isinstance(sensitivities, dict) else {}
-            moved = sensitivities_of(state, probability, found.stress, stated)
-            found = replace(found, sensitivities=moved)
-        return replace(found, quantity="stress" if math.isnan(found.area) else "force")
+            moved = sensitivities_of(state, probability, answer.stress, stated)
+            answer = replace(answer, sensitivities=moved)
+        return replace(answer, quantity="stress" if math.isnan(answer.area) else "force")
 
     experiment = Experiment(problem, as_random(random, seed, mixture), method, seed=seed)
     return _answered(experiment, target_cv, "design_stress", progress, solve)
@@ -485,7 +487,7 @@ def _quantile(
     state: LimitState, probability: float, target_cv: float, budget: int, confidence: float
 ) -> Answer:
     lowest = state.bounds[0]
-    target_cv *= SAMPLED if state.is_sample else 1.0
+    target_cv *= SAMPLING_SHARE if state.is_sample else 1.0
     goal = Goal(target_cv, probability=probability)
     counted = count_tail(state, goal, budget)
     if counted:
@@ -498,35 +500,37 @@ def _quantile(
         )  # fmt: skip
     asked: dict[str, Any] = {"probability": probability, "of_stress": True}
     if not tail.complete:  # the tail ends at its lowest sample
-        found = Estimate(state, tail, tail.extent[0])
-        interval = (lowest, found.stress) if found.stress > lowest else state.bounds
+        estimate = Estimate(state, tail, tail.extent[0])
+        interval = (lowest, estimate.stress) if estimate.stress > lowest else state.bounds
         doubts = [tail.short_of(f"P = {probability:g}")]
-        return Answer.of(found, doubts, interval=interval, cv=math.inf, members_cv=0.0, **asked)
-    found, doubts = Estimate(state, tail, tail.quantile(probability)), []
-    if math.isinf(found.stress):
+        return Answer.of(
+            estimate, doubts, interval=interval, cv=math.inf, members_cv=0.0, **asked
+        )
+    estimate, doubts = Estimate(state, tail, tail.quantile(probability)), []
+    if math.isinf(estimate.stress):
         doubts.append(
             f"the event happens in {1.0 - tail.survived:.3g} of all samples, less than"
             f" P = {probability:g}: no stress has that probability"
         )
     bound = Estimate(state, tail, math.nextafter(lowest, math.inf))
     if bound.probability >= probability:
-        found, asked["stress"] = bound, lowest
+        estimate, asked["stress"] = bound, lowest
         doubts.append(
             f"{bound.probability:.2g} of all samples slide at the bound of {lowest:.7g} Pa,"
             " within the accuracy of the method: the stress at P ="
             f" {probability:g} is the bound itself"
         )
-    doubts += imprecise(found.sampling_cv, target_cv, tail.spent)
+    doubts += imprecise(estimate.sampling_cv, target_cv, tail.spent)
     if tail.algorithm != "two_level":
-        near = tail.repetitions[-1].around(found.stress)
+        near = tail.repetitions[-1].around(estimate.stress)
         if counted:
-            near = counted[0].lowest(found.stress, 2 * CHECKED)
-        doubts += exact_doubts(state, near, found.stress, probability)
-    interval = tail.stress_interval(probability, found.cv, lowest)
+            near = counted[0].lowest(estimate.stress, 2 * CHECKED_FAILURES)
+        doubts += exact_doubts(state, near, estimate.stress, probability)
+    interval = tail.stress_interval(probability, estimate.cv, lowest)
     if counted:
         asked["characteristic_stress"] = counted[0].characteristic(confidence)
         asked["confidence"] = confidence
-    return Answer.of(found, doubts, interval=interval, **asked)
+    return Answer.of(estimate, doubts, interval=interval, **asked)
 
 
 @checked
@@ -589,10 +593,10 @@ def failure_curve(
     experiment = Experiment(problem, as_random(random, seed, mixture), method, seed=seed)
     with Meter("failure_curve", show=progress) as meter, merge_warnings() as warned:
 
-        def solve(own: Experiment, meter: Meter) -> Estimate:
-            state, budget = prepare(own, event, workers, meter, max_evaluations)
+        def solve(experiment: Experiment, meter: Meter) -> Estimate:
+            state, budget = prepare(experiment, event, workers, meter, max_evaluations)
             state = weakest_first(state)
-            aim = target_cv * (SAMPLED if state.is_sample else 1.0)
+            aim = target_cv * (SAMPLING_SHARE if state.is_sample else 1.0)
             tail = sample_curve(state, Goal(aim, probability=smallest), budget)
             reached = tail.quantile(smallest) if tail.complete else tail.reached
             return Estimate(state, tail, reached)
@@ -619,8 +623,8 @@ def chances(smallest: float) -> Array:
     """Return the probabilities of a curve, (points,)."""
     decades = max(np.log10(COMMONEST / smallest), 0.0)
     count = int(np.ceil(decades * PER_DECADE)) + 1
-    found: Array = COMMONEST * 10.0 ** -np.linspace(0.0, decades, count)
-    return found
+    probabilities: Array = COMMONEST * 10.0 ** -np.linspace(0.0, decades, count)
+    return probabilities
 
 
 def curve_of(
@@ -631,12 +635,14 @@ def curve_of(
     area = state.experiment.problem.area or np.nan
     rows, members = [], []
     for chance in wanted.tolist():
-        one = Estimate(state, tail, stress := tail.quantile(chance))
-        members.append(one.members)
-        values = stress, stress - lowest, stress / pressure, stress * area, one.probability
-        ends = lognormal_interval(one.probability, one.cv)
-        sides = tail.stress_interval(chance, one.cv, lowest)
-        rows.append((*values, *ends, one.cv, *sides, *band_of(members[-1]), one.members_cv))
+        estimate = Estimate(state, tail, stress := tail.quantile(chance))
+        members.append(estimate.members)
+        values = stress, stress - lowest, stress / pressure, stress * area, estimate.probability
+        ends = lognormal_interval(estimate.probability, estimate.cv)
+        sides = tail.stress_interval(chance, estimate.cv, lowest)
+        rows.append(
+            (*values, *ends, estimate.cv, *sides, *band_of(members[-1]), estimate.members_cv)
+        )
     table: dict[str, Any] = dict(zip(CURVE, np.array(rows).T, strict=False))
     table["members"] = np.array(members)
     survive = np.isinf(table["stress"])  # so many that no stress has this probability

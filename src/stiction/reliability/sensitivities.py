@@ -5,11 +5,12 @@ design more: constants of the problem that were not measured, and the family of 
 
 Steps, with the draws of the same solved samples everywhere, so that differences are accurate:
 
-1. Solve `SAMPLES` samples and take the quantile of the design's probability (`factors.solve`).
+1. Solve `SAMPLES_PER_END` samples and take the quantile of the design's probability
+   (`factors.solve`).
 2. For each family take the quantile over the interfaces with this family: these are draws from the
    posterior given the family.
 3. For each constant solve the same samples at either end of its range: the stated one, the 5 and
-   95 % quantiles of an uncertain constant, or `USUAL` below and above its value.
+   95 % quantiles of an uncertain constant, or `USUAL_SHARE` below and above its value.
 4. Multiply the design by the ratios of these quantiles to the first.
 """
 
@@ -26,9 +27,9 @@ from stiction.ensemble.limit_state import LimitState
 from stiction.random.dotted_keys import with_values
 from stiction.reliability.factors import Counts, solve
 
-SAMPLES = 300
+SAMPLES_PER_END = 300
 """Samples that are solved at each end of a range."""
-USUAL = 0.1
+USUAL_SHARE = 0.1
 """Share of a constant below and above its value where no range is stated."""
 CONSTANTS = (
     "friction.residual_ratio", "friction.residual_strength", "friction.weakening_rate",
@@ -42,19 +43,19 @@ FAMILY = "family of the factor"
 
 def value_at(problem: Any, key: str) -> Any:
     """Return the value of a dotted key of a problem; None if there is none."""
-    found = problem
+    value = problem
     for name in key.split("."):
-        found = getattr(found, name, None)
-    return found
+        value = getattr(value, name, None)
+    return value
 
 
 def ranges_of(problem: Any, random: Any, stated: Mapping[str, Any]) -> dict[str, Any]:
     """Return the range of each constant, by dotted key without ``problem.``."""
-    found = {}
+    ranges = {}
     for key in CONSTANTS:
         value = value_at(problem, key)
         if np.ndim(value) == 0 and is_finite(value) and value > 0.0:
-            found[key] = value * (1.0 - USUAL), value * (1.0 + USUAL)
+            ranges[key] = value * (1.0 - USUAL_SHARE), value * (1.0 + USUAL_SHARE)
     laws = getattr(getattr(random, "source", None), "laws", {})
     given = {key: tuple(map(float, law.ppf([0.05, 0.95]))) for key, law in laws.items()} | {
         **stated
@@ -62,10 +63,10 @@ def ranges_of(problem: Any, random: Any, stated: Mapping[str, Any]) -> dict[str,
     for key, ends in given.items():
         short = key.removeprefix("problem.")
         if key.startswith("problem.") and value_at(problem, short) is not None:
-            found[short] = tuple(ends)
+            ranges[short] = tuple(ends)
         elif key in stated:
             raise InputError(f"sensitivities: {key}: is no constant of this problem")
-    return found
+    return ranges
 
 
 def sensitivities(
@@ -78,8 +79,8 @@ def sensitivities(
         random = replace(random, constants=())
     rows: list[tuple[str, str, str, float, float]] = []  # source, its ends, quantiles there
     with collect_warnings():
-        own = replace(state, experiment=replace(experiment, random=random))
-        counts = solve(own, 0, SAMPLES)
+        fixed_state = replace(state, experiment=replace(experiment, random=random))
+        counts = solve(fixed_state, 0, SAMPLES_PER_END)
         reference = counts.tail.quantile(probability)
         families = _by_family(counts, probability)
         if len(families) > 1:
@@ -89,7 +90,9 @@ def sensitivities(
             state.meter.note = f"what moves the design: {key}"
             try:
                 quantiles = [
-                    solve(_at(own, key, end), 0, SAMPLES).tail.quantile(probability)
+                    solve(_at(fixed_state, key, end), 0, SAMPLES_PER_END).tail.quantile(
+                        probability
+                    )
                     for end in ends
                 ]
             except InputError:  # the end is no value that it may have
@@ -101,7 +104,7 @@ def sensitivities(
     names, low, high, at_low, at_high = columns
     ratios = np.array([at_low, at_high], dtype=float).reshape(2, -1) / reference
     area = problem.area or np.nan
-    found = xr.Dataset(
+    effects = xr.Dataset(
         {
             "low": ("source", np.array(low, dtype=str)),
             "high": ("source", np.array(high, dtype=str)),
@@ -114,8 +117,8 @@ def sensitivities(
         {"probability": probability, "stress": stress},
     )
     for name, value in families.items():
-        found.attrs[f"stress by {name}"] = stress * value / reference
-    return found
+        effects.attrs[f"stress by {name}"] = stress * value / reference
+    return effects
 
 
 def _at(state: LimitState, key: str, value: float) -> LimitState:
@@ -128,10 +131,10 @@ def _by_family(counts: Counts, probability: float) -> dict[str, float]:
     random = counts.state.experiment.random
     laws, law = random.factor_laws
     kinds = np.array([getattr(one, "type", "none") for one in laws])[law]
-    found = {}
+    quantiles = {}
     for kind in np.unique(kinds):
-        own = np.where(kinds[counts.members] == kind, counts.values, np.nan)
-        rows = own[np.isfinite(own).any(axis=1)]
+        stresses = np.where(kinds[counts.members] == kind, counts.values, np.nan)
+        rows = stresses[np.isfinite(stresses).any(axis=1)]
         if np.isfinite(rows).sum() * probability >= 1.0:
-            found[str(kind)] = float(np.nanquantile(rows, probability))
-    return found
+            quantiles[str(kind)] = float(np.nanquantile(rows, probability))
+    return quantiles

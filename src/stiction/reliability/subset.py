@@ -25,9 +25,9 @@ ACCEPTANCE = 0.37
 """Target share of accepted steps; from 0.25 to 0.44 efficiency differs by 10 % at most."""
 FIRST_STEP = 0.7
 MOST_LEVELS = 40
-KEEP = 3
+KEPT_POPULATIONS = 3
 """Number of the last populations that keep their draws."""
-COPIES = KEEP + 2  # the states of the chains and their noise
+STORED_COPIES = KEPT_POPULATIONS + 2  # the states of the chains and their noise
 ADVICE = "take fewer nodes, truncate the spectrum earlier, or use algorithm='plain'"
 
 
@@ -51,7 +51,7 @@ class Population(NamedTuple):
 class Below(NamedTuple):
     """Samples below a value: the probability of each, their members and ancestors."""
 
-    each: float
+    probability: float  # of each sample
     members: NDArray[np.int64]
     ancestors: NDArray[np.int64]
     drawn: NDArray[np.int64] | None = None  # members of all samples, if they are plain ones
@@ -103,10 +103,10 @@ class Descent(NamedTuple):
     def below(self, value: float) -> Below:
         """Return the samples below a value."""
         rarest = self._holders(value)[-1]
-        each = math.exp(rarest.log_probability) / max(rarest.values.size, 1) / self.last
+        probability = math.exp(rarest.log_probability) / max(rarest.values.size, 1) / self.last
         failed = rarest.values < value
         drawn = rarest.members if rarest.log_probability == 0.0 else None
-        return Below(each, rarest.members[failed], rarest.ancestors[failed], drawn)
+        return Below(probability, rarest.members[failed], rarest.ancestors[failed], drawn)
 
     def relative_variance(self, value: float) -> float:
         """Return the squared cv of `probability(value)`, from ancestry."""
@@ -154,8 +154,8 @@ def grow(
     All chains move together; the step size follows their acceptance, ever more slowly.
     """
     chains, dimension = draws.shape
-    states, found = np.empty((steps, chains, dimension)), np.empty((steps, chains))
-    states[0], found[0] = draws, values
+    states, chain_values = np.empty((steps, chains, dimension)), np.empty((steps, chains))
+    states[0], chain_values[0] = draws, values
     accepted = 0.0
     for t in range(1, steps):
         noise = rng.standard_normal((chains, dimension))
@@ -165,11 +165,11 @@ def grow(
         outcome = function(candidate)
         taken = outcome < ceiling
         states[t] = np.where(taken[:, None], candidate, states[t - 1])
-        found[t] = np.where(taken, outcome, found[t - 1])
+        chain_values[t] = np.where(taken, outcome, chain_values[t - 1])
         share = float(taken.mean())
         accepted += share
         step = min(1.0, step * math.exp((share - ACCEPTANCE) / math.sqrt(t)))
-    return states.reshape(-1, dimension), found.ravel(), accepted / (steps - 1), step
+    return states.reshape(-1, dimension), chain_values.ravel(), accepted / (steps - 1), step
 
 
 def descend(
@@ -199,7 +199,7 @@ def descend(
     """
     count = max(2, round(samples * LEVEL_PROBABILITY))
     samples = count * max(2, round(samples / count))
-    check_memory("algorithm 'subset'", COPIES * 8.0 * samples * dimension, ADVICE)
+    check_memory("algorithm 'subset'", STORED_COPIES * 8.0 * samples * dimension, ADVICE)
     draws = rng.standard_normal((samples, dimension))
     populations = [
         Population(math.inf, 0.0, function(draws), np.arange(samples), label(draws), draws)
@@ -208,8 +208,8 @@ def descend(
     while True:
         here = populations[-1]
         values = here.values
-        if len(populations) > KEEP:
-            populations[-KEEP - 1] = populations[-KEEP - 1].light()
+        if len(populations) > KEPT_POPULATIONS:
+            populations[-KEPT_POPULATIONS - 1] = populations[-KEPT_POPULATIONS - 1].light()
         lowest = float(np.partition(values, count)[count])
         final, bottom = lowest < threshold, lowest <= floor
         if final:
@@ -230,11 +230,13 @@ def descend(
         stuck = share == 0.0 or len(populations) >= MOST_LEVELS
         if complete or stuck or evaluations + cost > max_evaluations:
             return Descent(samples, populations, lowest, evaluations, complete)
-        states, found, acceptance, step = grow(
+        states, chain_values, acceptance, step = grow(
             function, here.draws[seeds], values[seeds], lowest, steps, here.step, rng
         )
         family = np.tile(here.ancestors[seeds], steps)
         populations.append(
-            Population(lowest, reached, found, family, label(states), states, acceptance, step)
+            Population(
+                lowest, reached, chain_values, family, label(states), states, acceptance, step
+            )
         )
         evaluations += cost

@@ -14,18 +14,18 @@ from stiction.reliability.subset import Descent, descend
 from stiction.reliability.two_level import bridge
 from stiction.reliability.uncertainty import generator, log_width
 
-MOST = 10**18
+UNLIMITED_EVALUATIONS = 10**18
 """Evaluations that no repetition needs."""
-MARGIN = 1.1
+SIZE_MARGIN = 1.1
 """Factor on the sample size, as the variance so far is itself an estimate."""
 SUBSET, BRIDGE, OF_CURVES = (1, 1_000, 5_000), (3, 200, 1_000), (4, 2_000, 2_000)
 """First key of the generators; samples per level, or exact samples of two levels, of the first
 and of the largest repetition. Those of curves are stored: all are of one size."""
 DEEPER = 0.3
 """Repetitions go on to this share of a probability, for the lower end of the interval."""
-PILOT = 500
+GUIDE_PILOT_SAMPLES = 500
 """Number of plain samples by which a less expensive method is judged as a guide."""
-ALIKE = 0.9
+LEAST_SHARE_PICKED = 0.9
 """Share of the weakest of them that a guide must pick to lead to the rarest."""
 RESOLVED = 3
 """Samples of one of equally likely interfaces that tell its probability from others."""
@@ -110,20 +110,20 @@ class Tail(NamedTuple):
         share of those of that interface, whose number is chance too, and most of the error
         near P = 1; all repetitions share it, since a single one may have few or none.
         """
-        found, seen, low, plain = np.zeros((4, count))
+        chances, seen, low, plain = np.zeros((4, count))
         weight = 0.0
-        for share, one in zip(self._shares, self.repetitions, strict=True):
-            each, members, _, drawn = one.below(stress)
-            own = np.bincount(members, minlength=count)
-            seen += own
+        for share, descent in zip(self._shares, self.repetitions, strict=True):
+            per_sample, members, _, drawn = descent.below(stress)
+            by_member = np.bincount(members, minlength=count)
+            seen += by_member
             if drawn is None:
-                found += share * count * each * own
+                chances += share * count * per_sample * by_member
             else:
-                low += own
+                low += by_member
                 plain += np.bincount(drawn, minlength=count)
                 weight += share
-        found += weight * low / np.maximum(plain, 1.0)
-        return np.where(seen >= RESOLVED, np.minimum(found, 1.0), np.nan)
+        chances += weight * low / np.maximum(plain, 1.0)
+        return np.where(seen >= RESOLVED, np.minimum(chances, 1.0), np.nan)
 
     def members_cv(self, stress: float, kinds: Array) -> float:
         """Return the coefficient of variation by the list of interfaces being a sample.
@@ -136,12 +136,12 @@ class Tail(NamedTuple):
         """
         entries = np.bincount(kinds)
         total, pairs, alike = np.zeros(entries.size), 0.0, 0.0
-        for one in self.repetitions:
-            each, members, ancestors, _ = one.below(stress)
-            each, own = each * one.samples, kinds[members]
-            total += each * np.bincount(own, minlength=entries.size)
-            pairs -= each * each * _squares(ancestors)
-            alike -= each * each * _squares(own, ancestors)
+        for descent in self.repetitions:
+            per_sample, members, ancestors, _ = descent.below(stress)
+            per_sample, sample_kinds = per_sample * descent.samples, kinds[members]
+            total += per_sample * np.bincount(sample_kinds, minlength=entries.size)
+            pairs -= per_sample * per_sample * _squares(ancestors)
+            alike -= per_sample * per_sample * _squares(sample_kinds, ancestors)
         pairs, alike = pairs + float(total.sum()) ** 2, alike + float(total @ total)
         if not pairs > 0.0:
             return 0.0
@@ -207,18 +207,20 @@ def repeat_until_precise(
     done: list[Any] = []
     spent, size = 0, first
     while size >= first:
-        one = make(size, len(done), max_evaluations - spent)
-        spent += one.evaluations
-        if not one.complete:
-            return done or [one]
-        done = [*(earlier.light() for earlier in done), one]
+        latest = make(size, len(done), max_evaluations - spent)
+        spent += latest.evaluations
+        if not latest.complete:
+            return done or [latest]
+        done = [*(earlier.light() for earlier in done), latest]
         cv = judge(done)
         if cv <= target_cv:
             break
         meter.note = f"repetition {len(done)}, c.o.v. {cv:.2g} (target {target_cv:g})"
         total = sum(each.samples for each in done)
         price = sum(each.evaluations for each in done) / total
-        wanted = MARGIN * total * (cv / target_cv) ** 2 - total if math.isfinite(cv) else total
+        wanted = (
+            SIZE_MARGIN * total * (cv / target_cv) ** 2 - total if math.isfinite(cv) else total
+        )
         affordable = (max_evaluations - spent) / price
         size = int(min(max(wanted, first), largest, affordable))
     return done
@@ -260,28 +262,28 @@ def sample_tail(
     if algorithm == "two_level" or (auto and two_levels_refused(state) is None):
         guide = state.by(METHODS[state.experiment.method.first_stage]())
     if auto and guide and pilot is None:
-        draws = state.draws(seed, 0, min(PILOT, budget // 5))
+        draws = state.draws(seed, 0, min(GUIDE_PILOT_SAMPLES, budget // 5))
         pilot = draws, state(draws)
     spent = 0 if pilot is None else pilot[1].size
     label = guide.experiment.method.label if guide else ""
     if auto and guide and pilot:
         share = share_picked(guide(pilot[0]), pilot[1])
         reason += f"; of {spent} plain samples the {label} picks {share:.0%} of the weakest"
-        guide = guide if share >= ALIKE else None
-    found = _repetitions(state, goal, budget - spent, guide, POOR if auto else 0.0)
-    spent += sum(one.evaluations for one in found)
-    if auto and guide and _share_failing(found[0]) < POOR:
-        share = _share_failing(found[0])
+        guide = guide if share >= LEAST_SHARE_PICKED else None
+    repetitions = _repetitions(state, goal, budget - spent, guide, POOR if auto else 0.0)
+    spent += sum(one.evaluations for one in repetitions)
+    if auto and guide and _share_failing(repetitions[0]) < POOR:
+        share = _share_failing(repetitions[0])
         reason += f"; {share:.1%} of the failures by the {label} hold: a poor guide"
-        guide, found = None, _repetitions(state, goal, budget - spent)
-        spent += sum(one.evaluations for one in found)
-    return Tail(found, "subset" if guide is None else "two_level", reason, spent)
+        guide, repetitions = None, _repetitions(state, goal, budget - spent)
+        spent += sum(one.evaluations for one in repetitions)
+    return Tail(repetitions, "subset" if guide is None else "two_level", reason, spent)
 
 
 def sample_curve(state: LimitState, goal: Goal, budget: int) -> Tail:
     """Sample the lower tail by the repetitions of curves."""
-    found = _repetitions(state, goal, budget, kind=OF_CURVES)
-    return Tail(found, spent=sum(one.evaluations for one in found))
+    repetitions = _repetitions(state, goal, budget, kind=OF_CURVES)
+    return Tail(repetitions, spent=sum(one.evaluations for one in repetitions))
 
 
 def _repetitions(
@@ -316,7 +318,7 @@ def repetition(
     key: int,
     samples: int,
     number: int,
-    max_evaluations: int = MOST,
+    max_evaluations: int = UNLIMITED_EVALUATIONS,
 ) -> Descent:
     """Return a repetition down to the goal, which depends on seed, key and number only."""
     options: dict[str, Any] = {
@@ -334,7 +336,7 @@ def repetition(
         return bridge(guide, state, state.dimension, probability=chance, **options)
 
 
-def _share_failing(one: Descent) -> float:
+def _share_failing(descent: Descent) -> float:
     """Return the share of failures among the samples of a guide, 1 without samples."""
-    values = one.populations[-1].values
-    return float(np.mean(values < one.threshold)) if one.complete else 1.0
+    values = descent.populations[-1].values
+    return float(np.mean(values < descent.threshold)) if descent.complete else 1.0

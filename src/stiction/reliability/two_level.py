@@ -22,10 +22,10 @@ GUIDING = 5
 """Samples of the guide per level for each exact sample of the middle factor."""
 LAST_FACTOR = 0.95
 """Smallest last factor: below it the walk must first find failures that the guide misses."""
-STEPS = 10
-FORGOTTEN = 5
+WALK_STEPS = 10
+FORGOTTEN_STEPS = 5
 """Exact steps of each walk in the failure set, and the number of them that are discarded."""
-MARGIN = 2.5
+LEVEL_RATIO = 2.5
 """Least ratio of the probability of the guide's level to the requested probability."""
 
 
@@ -70,12 +70,12 @@ def bridge(
     """
     descent = descend(
         guide, dimension, rng=rng, samples=GUIDING * samples, threshold=threshold,
-        probability=MARGIN * probability, floor=floor, label=label,
+        probability=LEVEL_RATIO * probability, floor=floor, label=label,
     )  # fmt: skip
     guided, spent, lowest = descent.evaluations, 0, descent.populations[-1]
     best: Descent | None = None
     for population in reversed(descent.populations):
-        if population.draws.shape[0] == 0 or spent + samples + STEPS > max_evaluations:
+        if population.draws.shape[0] == 0 or spent + samples + WALK_STEPS > max_evaluations:
             break
         looked = rng.permutation(population.values.size)[:samples]
         draws, families = population.draws[looked], population.ancestors[looked]
@@ -96,26 +96,26 @@ def bridge(
         last, last_variance = 1.0, 0.0
         walked = draws[failed], values[failed]
         if failed.any() and math.isfinite(population.ceiling):
-            room = (max_evaluations - spent) // STEPS
-            walkers = min(int(failed.sum()), max(16, samples // STEPS), room)
+            room = (max_evaluations - spent) // WALK_STEPS
+            walkers = min(int(failed.sum()), max(16, samples // WALK_STEPS), room)
             seeds, theirs = (one[:walkers] for one in walked)
             # The seeds themselves come first, and do not count.
             states, stresses, *_ = grow(
-                exact, seeds, theirs, limit, STEPS + 1, lowest.step, rng
+                exact, seeds, theirs, limit, WALK_STEPS + 1, lowest.step, rng
             )
-            spent += walkers * STEPS
-            later = states[walkers * (1 + FORGOTTEN) :]
+            spent += walkers * WALK_STEPS
+            later = states[walkers * (1 + FORGOTTEN_STEPS) :]
             last, last_variance = _covered(
                 later, guide, population.ceiling, families[failed][:walkers], samples
             )
             guided += later.shape[0]
             walked = states[-walkers:], stresses[-walkers:]
-        found = Population(
+        exact_level = Population(
             math.inf, population.log_probability, values, families, population.members[looked],
             np.empty((0, dimension)),
         )  # fmt: skip
         best = Descent(
-            samples, [found], limit, spent, True, guided, last, last_variance, walked
+            samples, [exact_level], limit, spent, True, guided, last, last_variance, walked
         )
         if last >= LAST_FACTOR:
             break

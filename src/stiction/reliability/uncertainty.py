@@ -53,8 +53,8 @@ def ancestral_variance(ancestors: NDArray[np.int64], samples: int) -> float:
         return math.inf
     _, sizes = np.unique(ancestors, return_counts=True)
     shares = sizes / ancestors.size
-    found = max(float(np.sum(shares * shares)) - 1.0 / samples, (2.0 / samples) ** 2)
-    return found / (1.0 - found) if found < 1.0 else math.inf
+    spread = max(float(np.sum(shares * shares)) - 1.0 / samples, (2.0 / samples) ** 2)
+    return spread / (1.0 - spread) if spread < 1.0 else math.inf
 
 
 def generator(seed: int, *key: int) -> np.random.Generator:
