@@ -135,13 +135,13 @@ def _numbers(design: Answer) -> list[list[Any]]:
 
 
 def _moves(design: Answer) -> tuple[list[str], list[list[str]]]:
-    found = design.sensitivities
+    effects = design.sensitivities
     unit, name = ("Pa", "stress") if math.isnan(design.area) else ("N", "force")
-    ends = found[f"{name}_at_low"].values, found[f"{name}_at_high"].values
+    ends = effects[f"{name}_at_low"].values, effects[f"{name}_at_high"].values
     rows = [
-        [str(source), str(low), str(high), in_words(unit, one), in_words(unit, other)]
-        for source, low, high, one, other in zip(
-            found.source.values, found.low.values, found.high.values, *ends, strict=True
+        [str(source), str(low), str(high), in_words(unit, at_low), in_words(unit, at_high)]
+        for source, low, high, at_low, at_high in zip(
+            effects.source.values, effects.low.values, effects.high.values, *ends, strict=True
         )
     ]
     area = 1.0 if unit == "Pa" else design.area
@@ -153,7 +153,7 @@ def _moves(design: Answer) -> tuple[list[str], list[list[str]]]:
             in_words(unit, area * value),
             "",
         ]
-        for key, value in found.attrs.items()
+        for key, value in effects.attrs.items()
         if key.startswith("stress by")
     ]
     return ["source", "from", "to", f"{name} at the first", f"{name} at the second"], rows

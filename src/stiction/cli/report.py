@@ -147,20 +147,20 @@ def add_figures(page: Page, result: xr.Dataset, dims: list[str]) -> None:
         figure = densities(result, None)
         page.figure(figure, f"{what.capitalize()} and critical position.")
         return
-    along, *others = sorted(dims, key=lambda dim: -result.sizes[dim])
-    first = result.isel(dict.fromkeys(others, 0))
+    along, *other_dims = sorted(dims, key=lambda dim: -result.sizes[dim])
+    first = result.isel(dict.fromkeys(other_dims, 0))
     page.figure(
         densities(first, along),
-        f"Densities of the {what} and of the critical position{_where(first, others)}.",
+        f"Densities of the {what} and of the critical position{_where(first, other_dims)}.",
     )
-    part = result.isel(dict.fromkeys(others[1:], 0))
+    part = result.isel(dict.fromkeys(other_dims[1:], 0))
     figure = Figure(figsize=(0.75 * PAGE, 3.2))
     plot.quantiles(part, along=along, ax=figure.subplots())
-    bands = "" if others else ", pale band: between the 5 % and 95 % quantiles"
+    bands = "" if other_dims else ", pale band: between the 5 % and 95 % quantiles"
     page.figure(
         figure,
-        f"Median of the {what} with its 95 % confidence interval{_where(part, others[1:])}; band:"
-        f" between quartiles{bands}.",
+        f"Median of the {what} with its 95 % confidence interval{_where(part, other_dims[1:])};"
+        f" band: between quartiles{bands}.",
     )
 
 

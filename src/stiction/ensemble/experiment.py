@@ -188,21 +188,21 @@ class Experiment:
         parts, order = [], []
         for number in np.unique(variant).tolist():
             rows = np.flatnonzero(variant == number)
-            own = copy.copy(self)
+            experiment = copy.copy(self)
             problem = with_values(self.problem, constants[number], "problem")
-            object.__setattr__(own, "problem", problem)
-            profiles = own.profiles(draws[rows])
-            parts.append((profiles, own.onset(profiles)))
+            object.__setattr__(experiment, "problem", problem)
+            profiles = experiment.profiles(draws[rows])
+            parts.append((profiles, experiment.onset(profiles)))
             order.append(rows)
         places = np.argsort(np.concatenate(order))
-        found = [
+        combined = [
             {
                 name: np.concatenate([one[k][name] for one in parts])[places]
                 for name in parts[0][k]
             }
             for k in (0, 1)
         ]
-        return found[0], found[1]
+        return combined[0], combined[1]
 
     def prepare(self) -> Solver:
         """Return the prepared solver of the method, which is kept for the next call."""

@@ -116,7 +116,7 @@ def gather(
     axes: GridAxes = MappingProxyType({}),
     *,
     store: Store | None = None,
-    others: NDArray[Any] | bool = False,
+    elsewhere: NDArray[Any] | bool = False,
     workers: int | None = None,
     executor: Executor | None = None,
     progress: Show = True,
@@ -124,13 +124,13 @@ def gather(
 ) -> xr.Dataset:
     """Compute an ensemble at every point of a sweep, or the part of it that is not stored.
 
-    Samples go to the `store` as they are done; `others`, (points, samples), are those that
+    Samples go to the `store` as they are done; `elsewhere`, (points, samples), are those that
     another job computes. For the rest see `monte_carlo`.
     """
     rows, cores = Gathered(points, ensemble), workers or usable_cores()
     if store:
         store.resume(rows)
-    missing = ~(others | rows.done)
+    missing = ~(elsewhere | rows.done)
     if missing.any():
         check_run(points)
         if executor is None:

@@ -42,7 +42,7 @@ from stiction.ensemble.batches import NUMBER, POINT, Failure, Table, versions
 from stiction.ensemble.pilot import MAX_RANKED_SAMPLES
 
 FORMAT = 5
-STUDY, PILOT, CHUNKS = "study.json", "pilot.json", "chunks"
+STUDY, PILOT_FILE, CHUNKS = "study.json", "pilot.json", "chunks"
 NAME = re.compile(r"[0-9a-f]{32}\.npz")
 SAVE_SECONDS = 10.0
 """A chunk holds the samples of this time."""
@@ -106,7 +106,7 @@ class Store:
             if (
                 before and before["ensemble"]["samples"] < MAX_RANKED_SAMPLES
             ):  # a pilot of fewer samples
-                (path / PILOT).unlink(missing_ok=True)
+                (path / PILOT_FILE).unlink(missing_ok=True)
             _write_json(path / STUDY, study)
         return store
 
@@ -155,9 +155,9 @@ class Store:
         for name, text in self.damage.items():
             self.warn(f"{CHUNKS}/{name}: {text}; its samples are computed again")
             (self.path / CHUNKS / name).unlink(missing_ok=True)
-        for other in sorted({*self.versions} - {versions()}):
+        for version in sorted({*self.versions} - {versions()}):
             self.warn(
-                f"was begun with {other}, not {versions()}: samples of the two may differ"
+                f"was begun with {version}, not {versions()}: samples of the two may differ"
                 " in their last digits"
             )
 
@@ -169,12 +169,12 @@ class Store:
     def pilot(self) -> dict[str, Any] | None:
         """Result of the pilot; None if there was none."""
         with suppress(Damaged):
-            return read_json(self.path / PILOT)
+            return read_json(self.path / PILOT_FILE)
         return None
 
     def note_pilot(self, attributes: Mapping[str, Any]) -> None:
         """Store the result of the pilot."""
-        _write_json(self.path / PILOT, attributes)
+        _write_json(self.path / PILOT_FILE, attributes)
 
     def add(self, table: Table) -> None:
         """Take a table, and store all that were taken if it is time or they are large."""
@@ -297,13 +297,15 @@ def _identity(study: Mapping[str, Any]) -> dict[str, Any]:
 def _refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any]) -> None:
     """Refuse a study that differs from the stored one, but for more samples."""
     now, before = here["ensemble"]["samples"], there["ensemble"]["samples"]
-    found = _differences(_identity(here), _identity(there))
+    differences = _differences(_identity(here), _identity(there))
     if now < before:
-        found += [f"ensemble.samples: {now} here, {before} there: a run can grow, not shrink"]
-    if found:
+        differences += [
+            f"ensemble.samples: {now} here, {before} there: a run can grow, not shrink"
+        ]
+    if differences:
         raise InputError(
             f"{path}: holds another study; choose another place, or make the study the same:\n"
-            + "\n".join(f"  {text}" for text in found[:20])
+            + "\n".join(f"  {text}" for text in differences[:20])
         )
 
 

@@ -14,7 +14,7 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.model import Positive, as_count, as_number, in_si, model
 
-FEWEST, MOST = 8, 2**24
+FEWEST_NODES, MOST_NODES = 8, 2**24
 """Nodes in each direction, and in all."""
 SHORTEST = 1e-30
 """Spacing of nodes, m, below which squares and ratios leave the range of numbers."""
@@ -39,8 +39,8 @@ def _length(value: Any) -> float:
 
 
 def _node_count(value: Any) -> int:
-    if as_count(value) < FEWEST or as_count(value) % 2:
-        raise ValueError(f"must be even and at least {FEWEST}")
+    if as_count(value) < FEWEST_NODES or as_count(value) % 2:
+        raise ValueError(f"must be even and at least {FEWEST_NODES}")
     return as_count(value)
 
 
@@ -94,8 +94,10 @@ class Interface:
             raise InputError(
                 "ends: a plane is periodic in both directions; only lines have free ends"
             )
-        if self.size > MOST:
-            raise InputError(f"nodes: must be at most 2^24 = {MOST} in all, got {self.nodes}")
+        if self.size > MOST_NODES:
+            raise InputError(
+                f"nodes: must be at most 2^24 = {MOST_NODES} in all, got {self.nodes}"
+            )
         if min(self.spacings) < SHORTEST:
             raise InputError(
                 f"length: the nodes must be at least {SHORTEST:g} m apart, got"

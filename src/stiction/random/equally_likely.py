@@ -148,8 +148,8 @@ class EquallyLikely:
         """Return the number of the draw of the factor of the strength; None if one has none."""
         if None in self.factor_laws[0]:
             return None
-        own = self.members[0].factor_column(interface)
-        return int(_columns(self, interface).of[0][own])
+        column = self.members[0].factor_column(interface)
+        return int(_columns(self, interface).of[0][column])
 
     def select(self, draws: Array, rows: NDArray[np.int64], members: NDArray[np.int64]) -> None:
         """Make rows of draws samples of given members."""

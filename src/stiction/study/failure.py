@@ -187,15 +187,15 @@ def complete_curves(
     rows: Repetitions,
     store: Store,
     *,
-    others: NDArray[Any] | bool,
+    elsewhere: NDArray[Any] | bool,
     workers: int | None,
     executor: Executor | None,
     progress: Show,
     pilot: bool,
 ) -> None:
-    """Compute what is not stored; `others`, (points, repetitions), another job computes."""
+    """Compute what is not stored; `elsewhere`, (points, repetitions), another job computes."""
     store.resume(rows)
-    missing, states, cores = ~(rows.done | others), rows.states, workers or usable_cores()
+    missing, states, cores = ~(rows.done | elsewhere), rows.states, workers or usable_cores()
     with merge_warnings():
         if missing.any():
             check_fields([state.experiment for state in states])

@@ -370,14 +370,14 @@ class Study(_Parts):
             self.attributes,
             self.axes,
             store=store,
-            others=self._others(part, self.ensemble.samples),
+            elsewhere=self._elsewhere(part, self.ensemble.samples),
             workers=workers,
             executor=executor,
             progress=progress,
             pilot=pilot and (part is None or part[0] == 1),
         )
 
-    def _others(self, part: tuple[int, int] | None, samples: int) -> Any:
+    def _elsewhere(self, part: tuple[int, int] | None, samples: int) -> Any:
         """Return which samples other jobs compute, (points, samples)."""
         return part is not None and ~samples_of_part(part, len(self.experiments), samples)
 
@@ -428,7 +428,7 @@ class Study(_Parts):
         complete_curves(
             rows,
             Store.open(out, study.to_dict() | {CURVES: settings}),
-            others=self._others(part, repetitions),
+            elsewhere=self._elsewhere(part, repetitions),
             workers=workers,
             executor=executor,
             progress=progress,

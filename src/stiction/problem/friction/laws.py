@@ -431,8 +431,8 @@ def contradictions(law: FrictionLaw) -> list[str]:
         f"the integral of f, area(inf), must be finite, got {law.integral:g}; let f end at 0":
             not 0.0 < law.integral < np.inf,
     }  # fmt: skip
-    if found := [text for text, is_so in wrong.items() if is_so]:
-        return [f"{name}: {found[0]}"]
+    if violations := [text for text, is_so in wrong.items() if is_so]:
+        return [f"{name}: {violations[0]}"]
     pairs: dict[str, tuple[Any, Any]] = {
         "initial_slope": (law.initial_slope, slope[0]),
         "the integral of -f'": (np.trapezoid(slope, u), 1.0 - f[-1]),
@@ -441,9 +441,9 @@ def contradictions(law: FrictionLaw) -> list[str]:
     for share in (0.5, 0.0 if np.isfinite(end) else NEARLY_RESIDUAL):
         pairs[f"f(slip_at({share:g}))"] = (share, law.fraction(law.slip_at(share)))
     return [
-        f"{name}: {what} is {float(found):.3g}, but {float(own):.3g} by its f"
-        for what, (found, own) in pairs.items()
-        if not abs(found - own) <= 1e-3 * max(1.0, slope.max())
+        f"{name}: {what} is {float(stated):.3g}, but {float(integrated):.3g} by its f"
+        for what, (stated, integrated) in pairs.items()
+        if not abs(stated - integrated) <= 1e-3 * max(1.0, slope.max())
     ]
 
 

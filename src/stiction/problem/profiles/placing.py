@@ -166,8 +166,8 @@ def _check_repeats(
         pair = [twins[i], i]
         sides = zip(places.values(), interface.lengths, strict=True)
         apart = max(np.ptp(x[pair]) / length for x, length in sides)
-        one, other = rows.T[pair]
-        if apart < 0.5 or not np.array_equal(one, other, equal_nan=True):
+        first, second = rows.T[pair]
+        if apart < 0.5 or not np.array_equal(first, second, equal_nan=True):
             where = ", ".join(
                 f"{dim} = {x[twins[i]]:.9g} and {x[i]:.9g} m" for dim, x in places.items()
             )
@@ -285,23 +285,23 @@ def with_gaps(problem: Any, result: xr.Dataset, measured: Any) -> xr.Dataset:
         close = np.abs(apart) < (1.0 - 1e-9) * max(
             0.5 * lengths[axis], interface.spacings[axis]
         )
-        others = [i for i in range(1, len(interface.dims) + 1) if i != axis + 1]
-        near = near & np.expand_dims(close, others)
-    found = (near & ~measured).any(axis=interface.axes)
-    if found.any():
+        other_axes = [i for i in range(1, len(interface.dims) + 1) if i != axis + 1]
+        near = near & np.expand_dims(close, other_axes)
+    in_gap = (near & ~measured).any(axis=interface.axes)
+    if in_gap.any():
         first = ", ".join(
             f"{dim} = {at:.6g} m"
-            for dim, at in zip(interface.dims, places[int(np.argmax(found))], strict=True)
+            for dim, at in zip(interface.dims, places[int(np.argmax(in_gap))], strict=True)
         )
         warn_accuracy(
             f"the critical patch at {first} reaches into a gap of the profile"
-            f" ({found.sum()} of {found.size} samples): the strength there was filled in, not"
+            f" ({in_gap.sum()} of {in_gap.size} samples): the strength there was filled in, not"
             " measured"
         )
     about = {"units": "1", "long_name": "whether the critical patch reaches into a gap"}
     dims = position.dims[: len(position.dims) - (len(interface.dims) > 1)]
     shape = position.shape[: len(dims)]
-    result[IN_GAP] = (dims, found.reshape(shape), about)
+    result[IN_GAP] = (dims, in_gap.reshape(shape), about)
     along = ("sample", *interface.dims) if len(measured) > 1 else interface.dims
     known = measured if len(measured) > 1 else measured[0]
     units = {dim: (dim, x, {"units": "m"}) for dim, x in interface.coordinates.items()}

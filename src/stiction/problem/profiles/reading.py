@@ -76,11 +76,11 @@ SENTINELS = np.array(
      3.40282e38, -3.40282e38]
 )  # fmt: skip
 """Numbers that instruments and formats write for a missing value."""
-SAMPLES = ("sample", "samples")
+SAMPLE_NAMES = ("sample", "samples")
 _UNNAMED = re.compile(r"\d+$|values?$|y\d*$")
 """Columns that say nothing of what they hold; without a heading they are called by numbers."""
 
-LISTED = 20
+LISTED_COLUMNS = 20
 """Names of columns in a message."""
 TALL = 1e-3
 """Range of heights, m, from which on a unit must be stated: numbers in um or nm have more."""
@@ -468,8 +468,8 @@ def labelled(
     array = data[chosen]
     at = {dim: data[name].variable for dim, name in places.items()}
     at = {dim: one for dim, one in at.items() if {*one.dims} <= {*array.dims}}
-    own = [name for name in array.coords if name not in (MEASURED, *array.dims)]
-    array = _directed(array.drop_vars(own).assign_coords(at), dims)
+    dropped = [name for name in array.coords if name not in (MEASURED, *array.dims)]
+    array = _directed(array.drop_vars(dropped).assign_coords(at), dims)
     if len({*dims} & {*array.coords}) == 1 < len(dims):
         raise InputError("has the coordinate x or y only; a map has both, or none")
     array = without_missing(array, options)
@@ -700,8 +700,8 @@ def _column(data: Any, names: list[Any], what: str, wanted: Column) -> Any:
 def _unclear(data: Any, names: list[Any], quantity: str, dims: tuple[str, ...]) -> str:
     units = {name: unit_of(data.variables[name]) for name in names if not str(name).isdecimal()}
     shown = [f"{name!r} in {unit}" if unit else repr(name) for name, unit in units.items()]
-    listed = ", ".join(shown[:LISTED]) or f"{len(names)} columns without names"
-    listed += f" and {len(shown) - LISTED} more" * (len(shown) > LISTED)
+    listed = ", ".join(shown[:LISTED_COLUMNS]) or f"{len(names)} columns without names"
+    listed += f" and {len(shown) - LISTED_COLUMNS} more" * (len(shown) > LISTED_COLUMNS)
     if len(dims) == 2 and not {*dims} <= {_plain(name) for name in data.variables}:
         return f"has no columns x and y: got {listed}{OF_A_PLANE}"
     return (
@@ -727,13 +727,13 @@ def _directed(array: Any, dims: tuple[str, ...]) -> Any:
     names = [str(dim) for dim in array.dims]
     if len(dims) == 1 and "x" not in names:
         called = [name for name in names if _plain(name) in PLACES]
-        called = called or [name for name in names if _plain(name) not in SAMPLES]
+        called = called or [name for name in names if _plain(name) not in SAMPLE_NAMES]
         if len(called) == 1 or (names and all(name.startswith("dim_") for name in names)):
             array = array.rename({called[-1]: "x"})  # without names the order counts
     along = [dim for dim in (*dims, "row") if dim in array.dims]
     samples = [dim for dim in array.dims if dim not in along]
     one_each = not along and len(samples) == 1
-    one_each = one_each and (len(dims) == 1 or _plain(samples[0]) in SAMPLES)
+    one_each = one_each and (len(dims) == 1 or _plain(samples[0]) in SAMPLE_NAMES)
     clear = one_each or along in ([*dims], ["row"])
     if not clear or len(samples) > 1 or "y" in samples or len({*array.dims}) < array.ndim:
         raise InputError(
@@ -792,9 +792,9 @@ def profile_in_file(given: Any, field: str, folder: Path) -> Any:
     if "file" not in table:
         return given
     path = folder / check("file", table.pop("file"), FilePath)
-    own = sorted(table.keys() & {"source", "quantity", "interface"})
-    if own:
-        raise InputError(f"{own[0]}: is not an option in a study file")
+    reserved = sorted(table.keys() & {"source", "quantity", "interface"})
+    if reserved:
+        raise InputError(f"{reserved[0]}: is not an option in a study file")
     return ProfileFile(path, table | {"quantity": quantity_of(field)})
 
 
