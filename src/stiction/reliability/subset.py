@@ -1,8 +1,35 @@
 """Subset simulation of any function of standard normal draws.
 
-Level after level keeps the lowest tenth of its samples and grows them back to full number
-by Metropolis steps z' = sqrt(1 - b^2) z + b w, which leave the normal distribution as it is
-and are rejected where they leave the level.
+Problem. Estimate P(g(z) < y) for a function g of many standard normal numbers z, where the
+probability is so small that nearly no plain sample is below y.
+
+Source. Au and Beck (2001), Probabilistic Engineering Mechanics 16, 263, with the conditional
+sampling of Papaioannou, Betz, Zwirglmaier and Straub (2015), a preconditioned Crank-Nicolson
+walk whose acceptance does not fall with the dimension.
+
+Steps. A level is the set of z with g(z) below its ceiling.
+
+1. Draw N samples and evaluate them: the first level, whose ceiling is infinite.
+2. The next ceiling is the lowest value that does not go on, if a tenth of N goes on. Where
+   this is below the requested threshold, the threshold takes its place. Where it is at the floor
+   of g, the number just above the floor does.
+3. The probability of the next level is that of the last one times the share of its samples
+   strictly below the ceiling.
+4. Stop if the threshold, the floor or the requested probability is reached. Stop without having
+   reached it if no sample goes on, after `MOST_LEVELS`, or if evaluations do not suffice.
+5. Each sample that goes on begins a chain, about N states in all. A step takes z to
+   z' = sqrt(1 - b^2) z + b w, with w standard normal, which leaves the normal distribution as
+   it is. The chain stays at z where g(z') is not below the ceiling. After step t, b is
+   multiplied by exp((share of accepted steps - `ACCEPTANCE`) / sqrt(t)), up to b = 1. The
+   states are the samples of the next level: go on with 2.
+6. P(g < y) is the probability of the rarest level whose ceiling is at least y, times the share
+   of its samples below y. The error follows from their first ancestors
+   (`uncertainty.ancestral_variance`).
+
+Departures. Only samples strictly below the ceiling go on: then the product of the shares is
+unbiased although the levels are chosen from the samples (Brehier, Gazeau, Goudenege, Lelievre
+and Rousset, 2016). Where the lowest values are all equal, the next higher value is the ceiling.
+All chains move together, and the step size follows their acceptance at every step.
 """
 
 import math
@@ -96,7 +123,7 @@ class Descent(NamedTuple):
         return [one for one in self.populations if one.ceiling >= value]
 
     def probability(self, value: float) -> float:
-        """Return the estimate of P(function < value); zero where no sample went so low."""
+        """Return the estimate of P(function < value) (step 6); zero without a sample below."""
         rarest = self._holders(value)[-1]
         return math.exp(rarest.log_probability) * _share(rarest.values < value) / self.last
 
@@ -151,7 +178,7 @@ def grow(
 ) -> tuple[Array, Array, float, float]:
     """Return states and values of chains, the given ones first, acceptance and last step size.
 
-    All chains move together; the step size follows their acceptance, ever more slowly.
+    All chains move together (step 5). The step size follows their acceptance, ever more slowly.
     """
     chains, dimension = draws.shape
     states, chain_values = np.empty((steps, chains, dimension)), np.empty((steps, chains))
@@ -189,17 +216,11 @@ def descend(
     `function` takes draws (k, dimension) to values (k,); low values are rare, and none is
     below `floor`. Each level has `samples`; none is begun that would exceed
     `max_evaluations`. `label` returns which of equally likely interfaces each sample is of.
-
-    Au and Beck (2001) with the conditional sampling of Papaioannou, Betz, Zwirglmaier and Straub
-    (2015), a preconditioned Crank-Nicolson walk whose acceptance does not fall with the dimension.
-    The threshold of a level is the lowest value that does *not* go on, and only samples strictly
-    below it do: then the product of the shares is unbiased although the levels are chosen from
-    the samples (Brehier, Gazeau, Goudenege, Lelievre and Rousset, 2016). Where the lowest values
-    are all equal, the next higher value is the threshold.
     """
     count = max(2, round(samples * LEVEL_PROBABILITY))
     samples = count * max(2, round(samples / count))
     check_memory("algorithm 'subset'", STORED_COPIES * 8.0 * samples * dimension, ADVICE)
+    # 1. plain samples
     draws = rng.standard_normal((samples, dimension))
     populations = [
         Population(math.inf, 0.0, function(draws), np.arange(samples), label(draws), draws)
@@ -210,6 +231,7 @@ def descend(
         values = here.values
         if len(populations) > KEPT_POPULATIONS:
             populations[-KEPT_POPULATIONS - 1] = populations[-KEPT_POPULATIONS - 1].light()
+        # 2. the next ceiling
         lowest = float(np.partition(values, count)[count])
         final, bottom = lowest < threshold, lowest <= floor
         if final:
@@ -219,9 +241,11 @@ def descend(
         elif lowest == values.min() < values.max():
             lowest = float(values[values > lowest].min())
         # States repeat along chains: with ties at the threshold a few fewer go on.
+        # 3. the probability of the next level
         chosen = values < lowest
         share = float(chosen.mean())
         reached = here.log_probability + math.log(share) if share else -math.inf
+        # 4. the end
         enough = reached <= math.log(max(probability, 1e-300))
         complete = share > 0.0 and (final or bottom or enough)
         seeds = rng.permutation(np.flatnonzero(chosen))
@@ -230,6 +254,7 @@ def descend(
         stuck = share == 0.0 or len(populations) >= MOST_LEVELS
         if complete or stuck or evaluations + cost > max_evaluations:
             return Descent(samples, populations, lowest, evaluations, complete)
+        # 5. back to full number
         states, chain_values, acceptance, step = grow(
             function, here.draws[seeds], values[seeds], lowest, steps, here.step, rng
         )

@@ -1,4 +1,28 @@
-"""The lower tail of the onset: independent repetitions, pooled until precise enough."""
+"""The lower tail of the onset: independent repetitions, pooled until precise enough.
+
+Problem. Estimate p(s) = P(T < s) of the onset T below a stress s, or the stress of a
+probability, with a coefficient of variation that is at most a target.
+
+Source. Independent repetitions of subset simulation (`subset`) or of two levels (`two_level`).
+
+Steps:
+
+1. Choose the algorithm if it is 'auto' and two levels are possible: solve a pilot of plain
+   samples by the method and by its less expensive first stage, the guide. Take two
+   levels if the guide's weakest tenth holds at least `LEAST_SHARE_PICKED` of the weakest
+   fiftieth of the samples.
+2. Make a repetition of moderate size, which depends on the seed and its number only.
+3. Pool repetitions: p = sum of w_r p_r, with shares w_r by their numbers of samples,
+   which do not depend on the outcome. The squared coefficient of variation is the sum of
+   (w_r p_r)^2 v_r over p^2, with the relative variances v_r.
+4. If it is above the target, make the next repetition, of the size that would reach the target
+   within the limits of size and evaluations (2), and pool again (3).
+5. If a share below `POOR` of the samples of a guide that 'auto' chose are failures, sample
+   again by subset simulation.
+6. The stress of a probability follows from p(s) by bisection. The ends of its interval are
+   the stresses of the ends of the interval of p. Where no sample is so low, the lower end is
+   the least possible stress.
+"""
 
 import math
 from collections.abc import Callable, Sequence
@@ -91,7 +115,7 @@ class Tail(NamedTuple):
         return self._shares * [one.probability(stress) for one in self.repetitions]
 
     def probability(self, stress: float) -> float:
-        """Return the estimate of P(onset below `stress`)."""
+        """Return the estimate of P(onset below `stress`) (step 3)."""
         return float(sum(self._parts(stress)))
 
     def cv(self, stress: float) -> float:
@@ -153,7 +177,7 @@ class Tail(NamedTuple):
         return math.sqrt(max(excess, 0.0))
 
     def quantile(self, probability: float) -> float:
-        """Return the stress below which the onset lies with this probability.
+        """Return the stress below which the onset lies with this probability (step 6).
 
         Infinite where the event is not so frequent.
         """
@@ -211,10 +235,12 @@ def repeat_until_precise(
         spent += latest.evaluations
         if not latest.complete:
             return done or [latest]
+        # 3. pooled
         done = [*(earlier.light() for earlier in done), latest]
         cv = judge(done)
         if cv <= target_cv:
             break
+        # 4. the next size
         meter.note = f"repetition {len(done)}, c.o.v. {cv:.2g} (target {target_cv:g})"
         total = sum(each.samples for each in done)
         price = sum(each.evaluations for each in done) / total
@@ -258,6 +284,7 @@ def sample_tail(
     same weakest ones among plain samples, and the first repetition finds failures by it.
     `budget` includes the pilot: (draws, stresses) of plain samples that are there already.
     """
+    # 1. the algorithm
     guide, auto, seed = None, algorithm == "auto", state.experiment.seed
     if algorithm == "two_level" or (auto and two_levels_refused(state) is None):
         guide = state.by(METHODS[state.experiment.method.first_stage]())
@@ -270,8 +297,10 @@ def sample_tail(
         share = share_picked(guide(pilot[0]), pilot[1])
         reason += f"; of {spent} plain samples the {label} picks {share:.0%} of the weakest"
         guide = guide if share >= LEAST_SHARE_PICKED else None
+    # 2 to 4
     repetitions = _repetitions(state, goal, budget - spent, guide, POOR if auto else 0.0)
     spent += sum(one.evaluations for one in repetitions)
+    # 5. a poor guide
     if auto and guide and _share_failing(repetitions[0]) < POOR:
         share = _share_failing(repetitions[0])
         reason += f"; {share:.1%} of the failures by the {label} hold: a poor guide"

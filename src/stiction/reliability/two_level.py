@@ -1,13 +1,32 @@
 """Two levels: an inexpensive limit state, the guide, goes down the tail; the exact one ends it.
 
-With L the guide's stress and E the exact one, for any ceiling b,
+Problem. Estimate P(E < s) for an exact stress E that is expensive, with the help of the
+guide's stress L, which is not. By the definition of conditional probabilities, for any
+ceiling b,
 
     P(E < s) = P(L < b) P(E < s | L < b) / P(L < b | E < s).
 
 Where L follows E closely the last factor is near one and the middle one is not small, so
-that a few hundred exact evaluations replace thousands. The last factor is measured by walks
-that start from failures with L < b. Failures that L misses and that no short walk reaches
-are never found: `stiction.reliability.tail` compares beforehand how L and E rank samples.
+that a few hundred exact evaluations replace thousands.
+
+Source. Subset simulation with less expensive models on its first levels is due to Ullmann and
+Papaioannou (2015), Multilevel estimation of rare events. The choice of b and the walks that
+measure the last factor are our own.
+
+Steps:
+
+1. Walk down by the guide alone (`subset.descend`), with `GUIDING` times as many samples per
+   level. Its levels are candidates for L < b, each with its P(L < b).
+2. From the rarest level on, solve some of its samples exactly. The share with E < s is the
+   middle factor. Where a probability is requested, s is the quantile of these that meets it.
+3. From failures among these, walk among the failures E < s (`subset.grow`), and forget the
+   first `FORGOTTEN_STEPS` steps. The share of the later states with L < b is the last factor.
+   `_covered` estimates its error, with one observation for each family of walkers.
+4. Take this level if the last factor is at least `LAST_FACTOR`. Otherwise go on with 2 at the
+   next less rare level, as far as evaluations and levels with draws allow.
+
+Failures that L misses and that no short walk reaches are never found:
+`stiction.reliability.tail` compares beforehand how L and E rank samples.
 """
 
 import math
@@ -68,6 +87,7 @@ def bridge(
     set; `max_evaluations` limits both. Without a failure the estimate is zero: leaving it
     out would favour repetitions that found one.
     """
+    # 1. levels of the guide
     descent = descend(
         guide, dimension, rng=rng, samples=GUIDING * samples, threshold=threshold,
         probability=LEVEL_RATIO * probability, floor=floor, label=label,
@@ -77,6 +97,7 @@ def bridge(
     for population in reversed(descent.populations):
         if population.draws.shape[0] == 0 or spent + samples + WALK_STEPS > max_evaluations:
             break
+        # 2. exact values of a level
         looked = rng.permutation(population.values.size)[:samples]
         draws, families = population.draws[looked], population.ancestors[looked]
         values = exact(draws)
@@ -93,6 +114,7 @@ def bridge(
                 break
             if probability:  # this level is rarer than the requested probability
                 continue
+        # 3. walks among failures
         last, last_variance = 1.0, 0.0
         walked = draws[failed], values[failed]
         if failed.any() and math.isfinite(population.ceiling):
@@ -117,6 +139,7 @@ def bridge(
         best = Descent(
             samples, [exact_level], limit, spent, True, guided, last, last_variance, walked
         )
+        # 4. the level is taken
         if last >= LAST_FACTOR:
             break
     if best is not None:  # a last look, in vain, counts as well
