@@ -11,10 +11,10 @@ from scipy.stats import norm
 import stiction as st
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import LimitState
-from stiction.inference.density import REACH, tabulate
+from stiction.inference.density import TABLE_REACH, tabulate
 from stiction.inference.specimens import (
-    MEAN,
-    SCATTER,
+    MEAN_KEY,
+    SCATTER_KEY,
     Onsets,
     Profiles,
     Tables,
@@ -39,7 +39,7 @@ def package(levels, peaks):
     within = np.full((1, len(levels)), closed.OF_LEVEL**2)
     profiles = Profiles((FIELD,), 1.0, np.array(levels), within)
     ratios = np.exp(closed.OF_PEAK * ndtri((np.arange(4000) + 0.5) / 4000))[None, None]
-    z = np.linspace(-REACH, REACH, 401)
+    z = np.linspace(-TABLE_REACH, TABLE_REACH, 401)
     # The density itself, not a kernel density of the onsets.
     known = tabulate(ratios[0], np.zeros(1))._replace(
         mean=np.zeros(1), spread=np.full(1, closed.OF_PEAK), table=norm.logpdf(z)[None]
@@ -66,8 +66,8 @@ def test_posterior_is_that_of_the_closed_form(levels):
     shares = {family: own.sum() for family, own in weights.items()}
     assert grid.families == pytest.approx(shares, abs=1e-3)
     drawn = grid.described(grid.draws(40_000, np.random.default_rng(1)))
-    assert drawn[MEAN].mean() == pytest.approx(mean, abs=4.0 * deviation / 200.0)
-    assert drawn[SCATTER].mean() == pytest.approx(scatter, rel=0.02)  # four errors
+    assert drawn[MEAN_KEY].mean() == pytest.approx(mean, abs=4.0 * deviation / 200.0)
+    assert drawn[SCATTER_KEY].mean() == pytest.approx(scatter, rel=0.02)  # four errors
 
 
 LINE = st.Problem(

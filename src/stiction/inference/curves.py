@@ -53,15 +53,15 @@ TRAVEL = (
 TIME = ("time", "zeit", "t")
 TEST = ("test", "specimen", "run", "probe", "versuch")
 """First words of headings: of the force, the travel, the time and the number of the test."""
-FORCES, PLACES = ("N", "Pa", "1"), ("m", "s")
+FORCE_UNITS, TRAVEL_UNITS = ("N", "Pa", "1"), ("m", "s")
 """Units of what is measured, and of what it is measured over."""
-FEWEST = 8
+MIN_READINGS = 8
 """Readings of a test."""
-BACK = 0.05
+MAX_BACKWARD_SHARE = 0.05
 """Share of its range by which travel may go back: more is another cycle."""
 ROUND_OFF = 1e-12
 """Share of the largest force below which differences of readings are round-off."""
-STANDS = 1e-6
+MIN_DROP_SHARE = 1e-6
 """Share of the peak below which a fall is round-off, without any noise."""
 
 
@@ -290,11 +290,14 @@ def _columns(
 ) -> Columns:
     """Return the force and the travel of a table, in SI."""
     if isinstance(table, tuple | list):
-        pairs = [with_stated_unit(v, u) for v, u in zip(table, (PLACES, FORCES), strict=True)]
+        pairs = [
+            with_stated_unit(v, u)
+            for v, u in zip(table, (TRAVEL_UNITS, FORCE_UNITS), strict=True)
+        ]
         (at, at_unit), (values, value_unit) = pairs
         lines = np.arange(np.size(at))
     else:
-        column = column_of(table, FORCE, FORCES, force)
+        column = column_of(table, FORCE, FORCE_UNITS, force)
         along = column_of(table, TRAVEL, ("m",), travel)
         along = column_of(table, TIME, ("s",)) if along is None else along
         if column is None or along is None:
@@ -309,8 +312,8 @@ def _columns(
         at, values = along.values, column.values
         at_unit, value_unit = along.attrs.get("units"), column.attrs.get("units")
         lines = table.attrs.get("lines", np.arange(at.size))
-    at, at_si = _in_si(at, at_unit, travel_unit, PLACES, "travel")
-    values, si = _in_si(values, value_unit, unit, FORCES, "force")
+    at, at_si = _in_si(at, at_unit, travel_unit, TRAVEL_UNITS, "travel")
+    values, si = _in_si(values, value_unit, unit, FORCE_UNITS, "force")
     if at.shape != values.shape or at.ndim != 1:
         raise InputError(f"travel and force have shapes {at.shape} and {values.shape}")
     if at_si == "s" and speed is not None:
@@ -369,9 +372,9 @@ def _curve(name: str, columns: Columns, chosen: Array, noise: float | None) -> C
     if not known.all():
         warn_accuracy(f"{name}: {int((~known).sum())} of {known.size} readings are missing")
         travel, force, lines = travel[known], force[known], lines[known]
-    if force.size < FEWEST:
-        raise InputError(f"holds {force.size} readings, fewer than {FEWEST}")
-    allowed = 0.0 if columns.travel_unit == "s" else BACK * float(np.ptp(travel))
+    if force.size < MIN_READINGS:
+        raise InputError(f"holds {force.size} readings, fewer than {MIN_READINGS}")
+    allowed = 0.0 if columns.travel_unit == "s" else MAX_BACKWARD_SHARE * float(np.ptp(travel))
     back = np.flatnonzero(np.maximum.accumulate(travel) - travel > allowed)
     if back.size:
         raise InputError(
@@ -385,10 +388,12 @@ def _curve(name: str, columns: Columns, chosen: Array, noise: float | None) -> C
     if not force.max() > 0.0:
         raise InputError("all forces are zero")
     top = int(np.argmax(force))
-    rising = force[: top + 1] if top >= FEWEST else force
+    rising = force[: top + 1] if top >= MIN_READINGS else force
     if noise is None:
         noise = noise_of(rising)
-    threshold = max(2.0 * noise * math.sqrt(2.0 * math.log(force.size)), STANDS * force[top])
+    threshold = max(
+        2.0 * noise * math.sqrt(2.0 * math.log(force.size)), MIN_DROP_SHARE * force[top]
+    )
     starts, ends = turning_points(force, threshold)
     before = starts < top
     after = ends[starts == top]

@@ -23,9 +23,9 @@ from stiction.base.jit import jit
 
 GROUPS = 256
 """Largest number of groups of neighbouring sorted samples, whose means stand for the sample."""
-REACH = 10.0
+TABLE_REACH = 10.0
 STEP = 0.05
-FAR = 1e5
+BOUND_DEVIATIONS = 1e5
 """Distance of a bound, in standard deviations, from onsets that have none."""
 ERRORS, SPREADS = 4.0, 6.0
 """Half range of the integration, in standard deviations of the load cell, and of v."""
@@ -38,7 +38,7 @@ class Densities(NamedTuple):
     bound: Array  # (nodes,): least possible onset
     mean: Array  # of v, (nodes,)
     spread: Array
-    table: Array  # logarithms in steps of `STEP` from -`REACH`, (nodes, steps)
+    table: Array  # logarithms in steps of `STEP` from -`TABLE_REACH`, (nodes, steps)
 
     def standardised(self) -> Array:
         """Return standardised v of the onsets, (nodes, samples)."""
@@ -79,28 +79,28 @@ def to_v(onsets: Array, bound: Array) -> Array:
 def tabulate(onsets: Array, bound: Array) -> Densities:
     """Densities of onsets (nodes, samples) that cannot be below `bound` (nodes,)."""
     if not np.isfinite(bound).all():
-        bound = onsets.mean(axis=1) - FAR * onsets.std(axis=1).max()
+        bound = onsets.mean(axis=1) - BOUND_DEVIATIONS * onsets.std(axis=1).max()
     v = to_v(onsets, bound)
     mean, spread = v.mean(axis=1), v.std(axis=1)
     spread = np.maximum(spread, 1e-12 * np.maximum(np.abs(mean), 1.0))
-    z = np.linspace(-REACH, REACH, round(2.0 * REACH / STEP) + 1)
+    z = np.linspace(-TABLE_REACH, TABLE_REACH, round(2.0 * TABLE_REACH / STEP) + 1)
     width = 1.06 * onsets.shape[1] ** -0.2  # Silverman's
-    found = Densities(onsets, bound, mean, spread, np.empty((mean.size, z.size)))
-    for row, own in zip(found.table, found.standardised(), strict=True):
-        centres, share = grouped(np.sort(own))
+    densities = Densities(onsets, bound, mean, spread, np.empty((mean.size, z.size)))
+    for row, values in zip(densities.table, densities.standardised(), strict=True):
+        centres, share = grouped(np.sort(values))
         away = (z[:, None] - math.sqrt(1.0 - width**2) * centres) / width
         powers = -0.5 * away**2
         top = powers.max(axis=1)
         row[:] = top + np.log(np.exp(powers - top[:, None]) @ share)
         row -= math.log(width * math.sqrt(2.0 * math.pi))
-    return found
+    return densities
 
 
 @jit
 def _interpolated(table: Array, index: NDArray[np.int64], weight: Array, z: float) -> float:
     """Logarithm of the standardised density, linear between nodes and steps."""
-    inside = min(max(z, -REACH), REACH)
-    at = (inside + REACH) / STEP
+    inside = min(max(z, -TABLE_REACH), TABLE_REACH)
+    at = (inside + TABLE_REACH) / STEP
     k = min(int(at), table.shape[1] - 2)
     t = at - k
     value = 0.0

@@ -22,11 +22,11 @@ from stiction.problem.problem import Problem
 from stiction.problem.results import to_dataset
 from stiction.random.spectra import Share
 
-POINTS = 8_000
+CAMPAIGN_GRID_POINTS = 8_000
 """Number of points of the grid of each posterior."""
-TINY = 1e-12
+MIN_BOX_WIDTH = 1e-12
 """Width of a box, as a share of the prior, in which rounding hides the posterior."""
-USUAL = {f"{n} tests": n for n in (5, 10, 20, 40)} | {
+USUAL_DESIGNS = {f"{n} tests": n for n in (5, 10, 20, 40)} | {
     f"{n} profiles": {"profiles": n} for n in (2, 5, 10)
 }
 """Further tests and profiles, by default."""
@@ -119,7 +119,7 @@ def design_of_tests(
     if prior is None:
         with Meter("design of tests", show=progress) as meter:
             return expected_widths(
-                problem, random, USUAL if designs is None else designs,
+                problem, random, USUAL_DESIGNS if designs is None else designs,
                 probability=probability, method=method, error=load_cell_error * factor_of(unit),
                 unit=unit, repetitions=repetitions, samples=samples, seed=seed, workers=workers,
                 meter=meter,
@@ -138,8 +138,10 @@ def design_of_tests(
         rows = []
         for tests, free in plans:
             kinds = [lengths.index(length) for length in tests]
-            own = simulated.of((), kinds)
-            rows.append(_expected(own, list(tests.values()), free, repetitions, seed, meter))
+            likelihood = simulated.of((), kinds)
+            rows.append(
+                _expected(likelihood, list(tests.values()), free, repetitions, seed, meter)
+            )
     dims = ("design", "parameter")
     variables = {name: Variable("1", text, dims) for name, text in VARIABLES.items()}
     values = dict(zip(variables, np.stack(rows, axis=1), strict=True))
@@ -156,8 +158,10 @@ def _plans(
     """Return numbers of tests by length, m, and the places of parameters that are not known."""
     problems = [] if designs else ["designs: must not be empty"]
     plans = []
-    for name, one in designs.items():
-        table = one if isinstance(one, Mapping) and "tests" in one else {"tests": one}
+    for name, design in designs.items():
+        table = (
+            design if isinstance(design, Mapping) and "tests" in design else {"tests": design}
+        )
         given = table["tests"]
         tests = dict(given) if isinstance(given, Mapping) else {None: given}
         known = check("known", table.get("known", ()), Names)
@@ -165,11 +169,11 @@ def _plans(
             problems.append(
                 f"designs: {name}: tests: must be whole numbers >= 1, by length (m)"
             )
-        for path, found, valid in (
+        for path, keys, valid in (
             (f"designs: {name}", table, ("tests", "known")),
             (f"designs: {name}: known", known, names),
         ):
-            problems += [unknown_name(path, str(k), valid) for k in found if k not in valid]
+            problems += [unknown_name(path, str(k), valid) for k in keys if k not in valid]
         if set(known) >= set(names):
             problems.append(f"designs: {name}: known: every parameter would be known")
         plans.append((tests, [i for i, own in enumerate(names) if own not in known]))
@@ -202,13 +206,13 @@ def _expected(
             u[:, free] = v
             return of(u)
 
-        while (grid := grid_of(given, box, POINTS)) is None and np.ptp(
+        while (grid := grid_of(given, box, CAMPAIGN_GRID_POINTS)) is None and np.ptp(
             box, axis=0
-        ).min() > TINY:
+        ).min() > MIN_BOX_WIDTH:
             # The posterior lies between the points of a coarse grid, and the truth in it.
             box = 0.75 * truth[free] + 0.25 * box
         if grid is not None:
             gains[row, free] = [grid.information(place) for place in range(len(free))]
         meter.advance()
-    found = gains[np.isfinite(gains).any(axis=1)]
-    return np.stack([found.mean(axis=0), found.std(axis=0) / np.sqrt(len(found))])
+    finite = gains[np.isfinite(gains).any(axis=1)]
+    return np.stack([finite.mean(axis=0), finite.std(axis=0) / np.sqrt(len(finite))])

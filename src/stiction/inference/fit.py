@@ -49,7 +49,7 @@ MARGINALS = ("lognormal", "weibull", "gamma", "beta")
 ENOUGH_LENGTHS = 10.0
 """Correlation lengths below which a record constrains no parameter well."""
 FIXED = {"exponent": ", as in spectrum={'type': 'power_law', 'exponent': 4}"}
-FAR = 0.01
+MIN_P_VALUE = 0.01
 """p-value below which a family does not fit."""
 ADVICE = {
     "marginal": "the values are far from its family; compare families",
@@ -63,7 +63,7 @@ FEW_SPECIMENS = 5
 """Specimens below which the scatter between them decides what is rare."""
 EVENLY = 0.5 * (math.sqrt(5.0) - 1.0)
 """Step of a sequence that fills [0, 1) evenly, however long it is (Niederreiter, 1992)."""
-DRAWS = 4000
+INTERVAL_DRAWS = 4000
 """Draws of the posterior from which intervals are taken."""
 
 
@@ -264,8 +264,8 @@ class FieldFit:
             if name == "mean" and "marginal.mean" in self.parameters:
                 continue  # the same number
             (low, high), last = self.interval[name], name.rpartition(".")[2]
-            own = QUANTITIES[self.quantity].units
-            unit = own if last in OF_THE_FIELD else UNITS.get(last, "1")
+            field_units = QUANTITIES[self.quantity].units
+            unit = field_units if last in OF_THE_FIELD else UNITS.get(last, "1")
             line = f"  {name:{width}s}  {value:<11.5g} {low:.4g} to {high:.4g}"
             lines.append(line if unit == "1" else f"{line} {unit}")
         p_values = ", ".join(f"{name} {p:.3g}" for name, p in self.p_values.items())
@@ -424,10 +424,10 @@ def fit_field(
         estimates, families, independent = compare(settings, rows)
         weights = [one.weight for one in families.values() if one.weight > 0.0]
         counts = [
-            max(MIN_REPETITIONS, round(bootstrap * one / max(weights))) for one in weights[1:]
+            max(MIN_REPETITIONS, round(bootstrap * w / max(weights))) for w in weights[1:]
         ]
         try:
-            repeated, others = bootstrapped(
+            repeated, further = bootstrapped(
                 estimates[0], bootstrap, confidence, seed, progress, workers,
                 list(zip(estimates[1:], counts, strict=False)),
             )  # fmt: skip
@@ -449,7 +449,7 @@ def fit_field(
         independent=independent,
         missing=(points - sum(row.size for row in rows), points),
         quantity=quantity,
-        _repeated=[repeated[0], *others],
+        _repeated=[repeated[0], *further],
         _rows=estimates[0].as_of_one(rows),
         _levels=np.array([row.mean() for row in rows]),
         _families=between,
@@ -472,23 +472,23 @@ def _judged(
     prior: FactorPrior,
 ) -> dict[str, Any]:
     """Return parameters, their intervals, p-values and doubts; `count` repetitions were tried."""
-    found, fits = repeated[0]
-    parameters = dict(found.parameters)
-    ends = intervals(repeated, confidence, np.concatenate(found.as_of_one(rows)))
+    fitted, fits = repeated[0]
+    parameters = dict(fitted.parameters)
+    ends = intervals(repeated, confidence, np.concatenate(fitted.as_of_one(rows)))
     tests = {"marginal": "distance", "spectrum": "roughness"}
-    p_values = {name: _p_value(of, found, fits) for name, of in tests.items()}
+    p_values = {name: _p_value(of, fitted, fits) for name, of in tests.items()}
     levels = np.array([row.mean() for row in rows])
-    if levels.size > 1 and not found.setting.between:
-        p_values["level"] = chance_of_scatter(levels, found.of_means)
-    doubts = _doubts(found, p_values)
+    if levels.size > 1 and not fitted.setting.between:
+        p_values["level"] = chance_of_scatter(levels, fitted.of_means)
+    doubts = _doubts(fitted, p_values)
     if failed := len(repeated) * count - sum(len(one.fits) for one in repeated):
         doubts.append(f"the family does not fit {failed} repetitions, which the intervals omit")
-    if found.setting.between:
-        field, mean = found.field("strength"), parameters["mean"]
-        one = (RandomInterface(strength=field),)
-        profiles = Profiles(one, mean, levels, found.within[None], families, prior)
+    if fitted.setting.between:
+        field, mean = fitted.field("strength"), parameters["mean"]
+        interfaces = (RandomInterface(strength=field),)
+        profiles = Profiles(interfaces, mean, levels, fitted.within[None], families, prior)
         grid, _ = grid_of_profiles(profiles)
-        draws = grid.described(grid.draws(DRAWS, np.random.default_rng(0)))
+        draws = grid.described(grid.draws(INTERVAL_DRAWS, np.random.default_rng(0)))
         tails = 0.5 - 0.5 * confidence, 0.5 + 0.5 * confidence
         for name in {"mean", "marginal.mean"} & parameters.keys():  # of other specimens, too
             ends[name] = tuple(np.quantile(draws[MEAN_KEY], tails).tolist())
@@ -509,20 +509,25 @@ def _judged(
 
 def _p_value(name: str, truth: Estimate, fits: Sequence[Estimate]) -> float:
     """P-value of data from their model: logarithms of distances are about normal."""
-    own, others = math.log(getattr(truth, name)), np.log([getattr(one, name) for one in fits])
-    away = (own - others.mean()) / (others.std(ddof=1) * math.sqrt(1.0 + 1.0 / others.size))
-    return float(student.sf(away, others.size - 1))
+    value, repeats = (
+        math.log(getattr(truth, name)),
+        np.log([getattr(one, name) for one in fits]),
+    )
+    away = (value - repeats.mean()) / (
+        repeats.std(ddof=1) * math.sqrt(1.0 + 1.0 / repeats.size)
+    )
+    return float(student.sf(away, repeats.size - 1))
 
 
-def _doubts(found: Estimate, p_values: Mapping[str, float]) -> list[str]:
+def _doubts(fitted: Estimate, p_values: Mapping[str, float]) -> list[str]:
     doubts = []
-    held, noise = found.lengths_held, found.model.noise
+    held, noise = fitted.lengths_held, fitted.model.noise
     if held < ENOUGH_LENGTHS:
         doubts.append(
             f"the records hold {held:.2g} correlation lengths, too few for reliable intervals:"
             f" measure a longer profile, or several, of at least {ENOUGH_LENGTHS:g}"
         )
-    left = max(_power_at_cutoff(found, window) for window in set(found.setting.windows))
+    left = max(_power_at_cutoff(fitted, window) for window in set(fitted.setting.windows))
     if left <= noise**2:
         doubts.append(
             f"the noise ({noise:.3g}) hides the cut-off of the spectrum, where the field has"
@@ -531,20 +536,20 @@ def _doubts(found: Estimate, p_values: Mapping[str, float]) -> list[str]:
     doubts += [
         f"{name} {value:.3g} lies at an end of the searched range: the data do not determine it;"
         f" fix its value{FIXED.get(name, '')}"
-        for name, value in found.setting.spectrum.at_end(found.model).items()
+        for name, value in fitted.setting.spectrum.at_end(fitted.model).items()
     ]
     doubts += [
-        f"the p-value of the {name} is {p:.2g}, below {FAR:g}: {ADVICE[name]}, or look at"
+        f"the p-value of the {name} is {p:.2g}, below {MIN_P_VALUE:g}: {ADVICE[name]}, or look at"
         " st.plot.fit"
         for name, p in p_values.items()
-        if p <= FAR
+        if p <= MIN_P_VALUE
     ]
     return doubts
 
 
-def _power_at_cutoff(found: Estimate, window: RecordWindow) -> float:
+def _power_at_cutoff(fitted: Estimate, window: RecordWindow) -> float:
     """What is left of the field's power where it has fallen to a quarter, beside white noise."""
-    model = found.model
+    model = fitted.model
     if model.noise_share <= 0.0:
         return math.inf
     power = model.variance * (1.0 - model.noise_share) * model.signal(window)

@@ -8,13 +8,13 @@ from scipy.stats import entropy
 
 from stiction.base.arrays import Array
 
-POINTS = 100_000
+GRID_POINTS = 100_000
 """Approximate number of points of a grid."""
 MOST_ALONG = 512
-ZOOMS = 6
-NEGLIGIBLE = 1e-6
+MAX_GRID_ZOOMS = 6
+OUTSIDE_MASS = 1e-6
 """Mass left outside on either side of a parameter when the grid closes in."""
-BATCH = 5_000
+MAX_BATCH = 5_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,8 +27,8 @@ class PosteriorGrid:
 
     def marginal(self, axis: int) -> Array:
         """Return the mass of the cells along one parameter."""
-        others = tuple(i for i in range(self.mass.ndim) if i != axis)
-        return self.mass.sum(axis=others)
+        axes = tuple(i for i in range(self.mass.ndim) if i != axis)
+        return self.mass.sum(axis=axes)
 
     def information(self, axis: int) -> float:
         """Return the divergence of the marginal of one parameter from its prior, nats."""
@@ -47,7 +47,7 @@ class PosteriorGrid:
 def grid_of(
     function: Callable[[Array], Array],
     box: Array,
-    points: int = POINTS,
+    points: int = GRID_POINTS,
 ) -> PosteriorGrid | None:
     """Return a density, given by its logarithm at points (points, parameters), in a box.
 
@@ -60,10 +60,10 @@ def grid_of(
     along = int(min(MOST_ALONG, max(8, points ** (1.0 / dimension))))
     steps = [(np.arange(along) + 0.5) / along] * dimension
     unit = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1)
-    for _ in range(ZOOMS):
+    for _ in range(MAX_GRID_ZOOMS):
         low, high = box
         u = (low + (high - low) * unit).reshape(-1, dimension)
-        parts = [function(u[start : start + BATCH]) for start in range(0, u.shape[0], BATCH)]
+        parts = [function(u[k : k + MAX_BATCH]) for k in range(0, u.shape[0], MAX_BATCH)]
         values = np.concatenate(parts).reshape(unit.shape[:-1])
         top = float(values.max())
         if top == -np.inf:
@@ -73,7 +73,7 @@ def grid_of(
         grid = PosteriorGrid(box, mass / mass.sum(), evidence)
         # Cells on either side that hold almost no mass, less one of margin.
         rows = [grid.marginal(axis) for axis in range(dimension)]
-        empty = [[np.sum(np.cumsum(r) <= NEGLIGIBLE) - 1 for r in (o, o[::-1])] for o in rows]
+        empty = [[np.sum(np.cumsum(r) <= OUTSIDE_MASS) - 1 for r in (o, o[::-1])] for o in rows]
         below, above = np.maximum(empty, 0).T * cell
         box = np.stack([low + below, high - above])
         if np.all(box[1] - box[0] > 0.9 * (high - low)):

@@ -26,7 +26,7 @@ from stiction.inference.likelihood import (
     variable_of,
 )
 from stiction.inference.peaks import Peaks, factor_of, make_peaks
-from stiction.inference.posterior import DRAWS, Posterior, posterior_of
+from stiction.inference.posterior import POSTERIOR_DRAWS, Posterior, posterior_of
 from stiction.inference.prior import Prior, make_prior
 from stiction.inference.specimens import MEAN_KEY, SCATTER_KEY
 from stiction.methods.criterion.local import LocalCriterion
@@ -42,9 +42,9 @@ NEVER = 1e-9
 """Probability of a peak beyond the strengths that are thought possible."""
 WIDEN = 0.1
 """Width of the first posterior that is added to the box of the second on either side."""
-NEAR, HELD = 0.05, 1e-3
+BOX_END_SHARE, HELD = 0.05, 1e-3
 """Share of the box at either end, and mass of the posterior there above which the box grows."""
-EDGE, PILED = 0.02, 4.0
+PRIOR_END, PILED = 0.02, 4.0
 """Share of a prior at its ends, and its multiple at which the posterior piles up there."""
 
 UNFINISHED: dict[Any, Array] = {}
@@ -192,16 +192,18 @@ def infer(
         )
     if not (prior and {*prior} - {MEAN_KEY, SCATTER_KEY}):
         with _forgetting_errors(), Meter("infer", show=progress) as meter:
-            found = join(
+            posterior = join(
                 problem, random, measured, prior=prior, between=between, method=method, error=error,
                 samples=samples, seed=seed, workers=workers, meter=meter, done=UNFINISHED,
             )  # fmt: skip
         UNFINISHED.clear()
-        return found
+        return posterior
     parameters = make_prior(problem, random, prior)
     variable = variable_of(*parameters.at(parameters.middle), measured.unit)
-    (own,) = experiments_at(parameters, parameters.middle, method)
-    own.problem.warn_of_units(mean_in_stress(own.problem, own.random, "strength"))
+    (experiment,) = experiments_at(parameters, parameters.middle, method)
+    experiment.problem.warn_of_units(
+        mean_in_stress(experiment.problem, experiment.random, "strength")
+    )
     _check_reach(parameters, method, measured, error)
     with _forgetting_errors(), Meter("infer", show=progress) as meter:
 
@@ -214,12 +216,12 @@ def infer(
 
         whole = box = parameters.whole
         approximate = optional_member(method, "exact_method") is not None
-        if not approximate and not no_single_length(own.problem, own.random):
+        if not approximate and not no_single_length(experiment.problem, experiment.random):
             box = _first_box(likelihood_of(LocalCriterion(), None, whole))
         while True:
             likelihood = likelihood_of(method, samples, box)
             grid = grid_of(likelihood, box)
-            u = None if grid is None else grid.draws(DRAWS, seed)
+            u = None if grid is None else grid.draws(POSTERIOR_DRAWS, seed)
             wider = _grown(box, u)
             if np.array_equal(wider, box):
                 break
@@ -265,7 +267,7 @@ def _grown(box: Array, u: Array | None) -> Array:
     """Return the box, wider by its width where draws (draws, parameters) reach its end."""
     width, touched = np.ptp(box, axis=0), np.ones(box.shape, dtype=np.bool_)
     if u is not None:
-        low, high = box[0] + NEAR * width, box[1] - NEAR * width
+        low, high = box[0] + BOX_END_SHARE * width, box[1] - BOX_END_SHARE * width
         touched = np.stack([np.mean(u < low, axis=0), np.mean(u > high, axis=0)]) > HELD
     return np.clip(box + width * touched * np.array([[-1.0], [1.0]]), 0.0, 1.0)
 
@@ -292,16 +294,17 @@ def _piled_up(prior: Prior, u: Array) -> list[str]:
     """Return the ends of the prior at which draws (draws, parameters) of the posterior pile up."""
     texts = [
         f"the {side} end of {name}, {end:g}, holds {np.mean(near):.0%} of the draws"
-        for name, own, ends in zip(prior.names, u.T, prior.ends.T, strict=True)
+        for name, draws, ends in zip(prior.names, u.T, prior.ends.T, strict=True)
         for side, near, end in (
-            ("lower", own < EDGE, ends[0]),
-            ("upper", own > 1.0 - EDGE, ends[1]),
+            ("lower", draws < PRIOR_END, ends[0]),
+            ("upper", draws > 1.0 - PRIOR_END, ends[1]),
         )
-        if np.mean(near) > PILED * EDGE
+        if np.mean(near) > PILED * PRIOR_END
     ]
     if not texts:
         return []
     return [
-        f"the posterior piles up at the ends of the prior: {'; '.join(texts)} within {EDGE:.0%} of"
-        " the prior; check the unit of the peaks, and widen the prior where its end is a guess"
+        f"the posterior piles up at the ends of the prior: {'; '.join(texts)} within"
+        f" {PRIOR_END:.0%} of the prior; check the unit of the peaks, and widen the prior"
+        " where its end is a guess"
     ]

@@ -30,7 +30,7 @@ from stiction.inference.likelihood import (
     warn_if_long,
 )
 from stiction.inference.peaks import Peaks
-from stiction.inference.posterior import DRAWS, Posterior
+from stiction.inference.posterior import POSTERIOR_DRAWS, Posterior
 from stiction.inference.prior import refuse_conditioned
 from stiction.inference.specimens import (
     MEAN_KEY,
@@ -49,14 +49,14 @@ from stiction.problem.problem import Problem
 from stiction.random.equally_likely import Source, as_random
 from stiction.random.fields import RandomInterface
 
-FIELDS = 60
+LIKELY_FIELDS = 60
 """Fields within a specimen that stand for all that are likely."""
 ONSETS = {"local_criterion": 200}
 FEW_ONSETS = 100
 """Simulated onsets of each field, by other methods."""
 DOUBT = 0.05
 """P-value of agreement below which a warning says that peaks and profiles contradict."""
-MARGIN = 0.3
+LOG_STRENGTH_MARGIN = 0.3
 """Logarithm of the strength beyond what the peaks need at which onsets are simulated too."""
 
 
@@ -85,7 +85,7 @@ class SpecimenPosterior(Posterior):
     def before(self) -> dict[str, Array]:
         """Draws by the profiles alone, or from the prior without profiles."""
         rng = np.random.default_rng([self.seed, 7])
-        return self.by_profiles.described(self.by_profiles.draws(DRAWS, rng))
+        return self.by_profiles.described(self.by_profiles.draws(POSTERIOR_DRAWS, rng))
 
     def at(self, draw: int) -> tuple[Problem, RandomInterface]:
         """Return the problem and what is random at one draw, to compute with."""
@@ -130,13 +130,13 @@ def profiles_of(random: Any, prior: Any, families: Any, seed: int) -> Profiles:
     more: dict[str, Any] = {} if prior is None else {"prior": FactorPrior.of(prior)}
     more |= {} if families is None else {"families": families_of(families)}
     if isinstance(random, FieldFit):
-        return random.profiles(FIELDS, seed)._replace(**more)
+        return random.profiles(LIKELY_FIELDS, seed)._replace(**more)
     if isinstance(random, Posterior):
         raise InputError(
             "random: is a posterior, which holds its peaks already; give what it was made from,"
             " and all peaks together"
         )
-    given = random.interfaces(FIELDS, seed) if isinstance(random, Source) else random
+    given = random.interfaces(LIKELY_FIELDS, seed) if isinstance(random, Source) else random
     members = as_random(given).members
     refuse_conditioned(members)
     return Profiles.of_interfaces(members, **more)
@@ -182,19 +182,19 @@ def join(
         "monte_carlo_error": math.sqrt(tests / (len(profiles.fields) * count)),
     }  # fmt: skip
     known = profiles.levels.size > 0
-    found = None
+    comparison = None
     if known:
         alone = _result(
             by_profiles, measured._replace(values=tuple(np.empty(0) for _ in kinds)), **common
         )
-        found = agreement(alone, measured, seed=seed)
-    notes = _notes(profiles, tests, found)
+        comparison = agreement(alone, measured, seed=seed)
+    notes = _notes(profiles, tests, comparison)
     for text in notes:
         warn_accuracy(text)
     proper = known or profiles.prior.mean is not None
     evidence = grid.log_evidence if proper else math.nan
     return _result(
-        grid, measured, notes=tuple(notes), agreement=found, log_evidence=evidence,
+        grid, measured, notes=tuple(notes), agreement=comparison, log_evidence=evidence,
         information=_information(grid, by_profiles, proper), **common,
     )  # fmt: skip
 
@@ -205,7 +205,7 @@ def profiles_mean(profiles: Profiles, peaks: Array, kind: Onsets) -> float:
 
 
 def _result(grid: Grid, peaks: Peaks, **more: Any) -> SpecimenPosterior:
-    u = grid.draws(DRAWS, np.random.default_rng(more["seed"]))
+    u = grid.draws(POSTERIOR_DRAWS, np.random.default_rng(more["seed"]))
     options: dict[str, Any] = {"information": {}, "log_evidence": math.nan, "notes": ()} | more
     return SpecimenPosterior(peaks=peaks, draws=grid.described(u), u=u, grid=grid, **options)
 
@@ -230,33 +230,33 @@ def simulated_onsets(
             )
             for c in strengths
         ]
-        found = simulate(
+        relative = simulate(
             experiments, samples=samples, first=number * SPECIMEN + place * samples, seed=seed,
             variable=of, workers=1, meter=meter, done=done,
         ) / strengths[:, None]  # fmt: skip
-        if not np.isfinite(found).all() or found.min() <= 0.0:
+        if not np.isfinite(relative).all() or relative.min() <= 0.0:
             raise InputError(
                 "method: some simulated specimens have no positive onset, so that their peaks say"
                 " nothing of the strength"
             )
         bounds = np.array([bounds_of(one, of)[0] for one in experiments]) / strengths
-        return found, tabulate(found, np.maximum(bounds, 0.0))
+        return relative, tabulate(relative, np.maximum(bounds, 0.0))
 
     at, fields = np.zeros(1), len(profiles.fields)
     if not scales_with_strength(problem, profiles.fields[0], method):
         ratios, known = onsets(0, at)
         peaks = peaks if peaks.size else area * ratios.ravel()
         low, high, _ = Onsets(at, ratios[None], (known,), area).ranges(peaks, error)
-        at = np.linspace(low - MARGIN, high + MARGIN, ONSET_MEANS)
+        at = np.linspace(low - LOG_STRENGTH_MARGIN, high + LOG_STRENGTH_MARGIN, ONSET_MEANS)
     warn_if_long(first, fields * at.size * samples, workers)
     meter.stage("simulated onsets", fields * at.size * samples)
-    found = in_threads(
+    by_field = in_threads(
         lambda place: onsets(place, at), range(fields), workers or usable_cores()
     )
     # Standardised densities differ little between fields: their mean has a smaller error.
-    table = np.log(np.mean([np.exp(known.table) for _, known in found], axis=0))
-    densities = tuple(known._replace(table=table) for _, known in found)
-    return Onsets(at, np.stack([ratios for ratios, _ in found]), densities, area)
+    table = np.log(np.mean([np.exp(known.table) for _, known in by_field], axis=0))
+    densities = tuple(known._replace(table=table) for _, known in by_field)
+    return Onsets(at, np.stack([ratios for ratios, _ in by_field]), densities, area)
 
 
 def _information(grid: Grid, before: Grid, proper: bool) -> dict[str, float]:
@@ -268,9 +268,9 @@ def _information(grid: Grid, before: Grid, proper: bool) -> dict[str, float]:
     }
 
 
-def _notes(profiles: Profiles, tests: int, found: Agreement | None) -> list[str]:
+def _notes(profiles: Profiles, tests: int, comparison: Agreement | None) -> list[str]:
     notes = []
-    if found is not None and (p := min(found.p_values.values())) < DOUBT:
+    if comparison is not None and (p := min(comparison.p_values.values())) < DOUBT:
         notes.append(
             f"the peaks contradict the profiles, p = {p:.2g} of their agreement: the tests, the"
             " profiles or the model miss something, and so does a force by both; check units,"

@@ -31,13 +31,13 @@ COARSE = {0: 1, 1: 5, 2: 4, 3: 3, 4: 2}
 local criterion is simulated at those, and another method only at these."""
 LOG = 3.0
 """Ratio of the ends of a prior from which a parameter is interpolated in its logarithm."""
-ALIKE = 0.8
+MIN_CORRELATION = 0.8
 """Correlation of the onsets by two methods above which one helps the other."""
 SPECIMEN = 2**20
 """Samples of a specimen of another length begin at multiples of this."""
-LONG = 60.0
+WARN_SECONDS = 60.0
 """Seconds from which on it is said beforehand how long the simulation takes."""
-BEYOND = 2.0
+REACH_SPREADS = 2.0
 """Spreads beyond the extremes of these at which a peak is out of reach."""
 
 
@@ -97,12 +97,12 @@ def experiments_at(
 
     The node spacing is that of the problem.
     """
-    found = []
+    experiments = []
     for theta in np.atleast_2d(thetas):
         problem, random = prior.at(theta)
         with prior.named(theta):
-            found.append(experiment_on(problem, random, method, length))
-    return found
+            experiments.append(experiment_on(problem, random, method, length))
+    return experiments
 
 
 def experiment_on(
@@ -144,17 +144,19 @@ def simulate(
     peaks = np.empty((len(experiments), samples))
     jobs = [
         (number, start, count)
-        for number, own in enumerate(experiments)
-        for start, count in own.batches(first, samples, max(SAMPLES_PER_BLOCK, own.batch))
+        for number, experiment in enumerate(experiments)
+        for start, count in experiment.batches(
+            first, samples, max(SAMPLES_PER_BLOCK, experiment.batch)
+        )
     ]
 
     def work(job: tuple[int, int, int]) -> None:
         number, start, count = job
-        own = experiments[number].with_seed(seed)
-        key = own, start, count, variable
+        experiment = experiments[number].with_seed(seed)
+        key = experiment, start, count, variable
         values = done.get(key)
         if values is None:
-            values = done[key] = own.results(start, count)[variable]
+            values = done[key] = experiment.results(start, count)[variable]
         peaks[number, start - first : start - first + count] = values
         meter.advance(count)
 
@@ -275,7 +277,7 @@ class Likelihood:
         texts = []
         for kind, (known, peaks) in enumerate(zip(self.densities, self.peaks, strict=True)):
             shift, stretch = self.scales(kind, points)
-            room = BEYOND * known.onsets.std(axis=1)
+            room = REACH_SPREADS * known.onsets.std(axis=1)
             lowest = np.maximum(known.onsets.min(axis=1) - room, known.bound)
             reach = np.stack([lowest, known.onsets.max(axis=1) + room])
             reach = shift + stretch * np.repeat(reach, 2 ** len(scaled), axis=1)
@@ -347,28 +349,28 @@ def make_likelihood(
             end.random.warn_if_inaccurate(end.problem.interface)
         options: Any = {"first": number * SPECIMEN, "seed": seed, "variable": variable}
         options |= {"workers": workers, "done": done}
-        own = experiments_at(prior, coarse, method, length)
-        found = simulate(own, samples=count, meter=meter, **options)
+        at_coarse = experiments_at(prior, coarse, method, length)
+        onsets = simulate(at_coarse, samples=count, meter=meter, **options)
         if guided:
             known = simulate(
-                [one.by(LocalCriterion()) for one in own], samples=count, **options
+                [one.by(LocalCriterion()) for one in at_coarse], samples=count, **options
             )
             options["samples"] = max(count, LocalCriterion.samples_at_point)
             meter.stage("onsets by the local criterion", len(thetas) * options["samples"])
             nearby = [one.by(LocalCriterion()) for one in experiments]
             many = simulate(nearby, meter=meter, **options)
             alike = np.mean(
-                [np.corrcoef(*pair)[0, 1] for pair in zip(found, known, strict=True)]
+                [np.corrcoef(*pair)[0, 1] for pair in zip(onsets, known, strict=True)]
             )
-            if alike > ALIKE:
-                found = moved(many, found, known, *weights)
+            if alike > MIN_CORRELATION:
+                onsets = moved(many, onsets, known, *weights)
                 effective = effective_samples(float(alike), many.shape[1], count)
             else:
                 warn_if_long(experiments[0], len(thetas) * count, workers)
                 meter.stage("simulated onsets", len(thetas) * count)
-                found = simulate(experiments, **options | {"samples": count, "meter": meter})
+                onsets = simulate(experiments, **options | {"samples": count, "meter": meter})
         bounds = [bounds_of(own, variable)[0] for own in experiments]
-        densities.append(tabulate(found, np.array(bounds)))
+        densities.append(tabulate(onsets, np.array(bounds)))
     none = Area(1.0, [])
     areas = [area_of(prior, method, length) if forces else none for length in lengths]
     return Likelihood(prior, method, scaling, axes, error, densities, areas, effective, box)
@@ -386,13 +388,15 @@ def moved(
     spread, is interpolated between the nodes around each point, `index`, by their `weight`.
     """
     mean, spread = known.mean(axis=1, keepdims=True), known.std(axis=1, keepdims=True)
-    own = (np.sort(known) - mean) / spread
+    standardised = (np.sort(known) - mean) / spread
     away = (np.sort(few) - np.sort(known)) / spread
     result = np.empty_like(many)
     for row, values, nodes, share in zip(result, many, index, weight, strict=True):
         same = values[: few.shape[1]]
         z = (values - same.mean()) / same.std()
-        shift = share @ np.stack([np.interp(z, own[node], away[node]) for node in nodes])
+        shift = share @ np.stack(
+            [np.interp(z, standardised[node], away[node]) for node in nodes]
+        )
         row[:] = values + same.std() * shift
     return result
 
@@ -403,13 +407,13 @@ def effective_samples(alike: float, many: int, few: int) -> float:
 
 
 def warn_if_long(experiment: Experiment, samples: int, workers: int | None) -> None:
-    each = experiment.seconds
-    seconds = samples * each / (workers or usable_cores())
-    if seconds > LONG:
+    per_onset = experiment.seconds
+    seconds = samples * per_onset / (workers or usable_cores())
+    if seconds > WARN_SECONDS:
         warn_user(
             f"the likelihood takes about {duration(seconds)}: {samples:,} onsets by"
-            f" {experiment.method.label} of {duration(each)} each; fewer samples, nodes or unknown"
-            " parameters take less, and LocalCriterion() takes seconds where it holds",
+            f" {experiment.method.label} of {duration(per_onset)} each; fewer samples, nodes or"
+            " unknown parameters take less, and LocalCriterion() takes seconds where it holds",
             UserWarning,
         )
 

@@ -23,23 +23,23 @@ from stiction.random.dotted_keys import with_values
 from stiction.random.marginals import MARGINALS, Beta, ScipyMarginal, marginal_of
 
 BINS = 160
-REACH = 5.0
+NOISE_DEVIATIONS = 5.0
 """Standard deviations of the noise to which its distribution is integrated."""
 LEAST = 1e-12
 """Least probability of a bin."""
-DIFFERENCE = 1e-5
+MARGINAL_STEP = 1e-5
 WIDEST = 10.0
 """Largest distance of free bounds from the values, in their ranges: more has no effect."""
-NEGLIGIBLE = 1e-4
+NEGLIGIBLE_NOISE = 1e-4
 """Share of noise that does not change a marginal."""
-INSIDE = 1e-2
+BOUND_MARGIN = 1e-2
 """Least distance of noisy values from a bound for a first guess, as a share of their range."""
 MOST_NOISE = 0.95
 LEAST_TOTAL = 0.2
 """Least sum of the shapes of 'beta' where moments determine them."""
 SCALED = {"mean", "low", "high", "loc", "scale"}
 """Parameters that grow with the values."""
-STEPS = 40
+MAX_CLIMB_STEPS = 40
 HIGHEST = 1e8
 """Damping at which no step raises the likelihood any more."""
 
@@ -102,7 +102,7 @@ class Family:
         quiet = self.quiet(values, noise)
         if self.name not in KINDS:
             return self._by_scipy(quiet)
-        if noise**2 <= NEGLIGIBLE * values.var():
+        if noise**2 <= NEGLIGIBLE_NOISE * values.var():
             noise, values = 0.0, quiet
         family, distribution, log_density = KINDS[self.name]
         search = (_beta if self.name == "beta" else _by_scale)(
@@ -121,12 +121,12 @@ class Family:
             return log_density(u, *shapes) - math.log(scale)
 
         def value_of(v: Array) -> tuple[float, Array]:
-            found = terms(v)
-            return float(counts @ found), found
+            logs = terms(v)
+            return float(counts @ logs), logs
 
-        def derivatives(v: Array, found: Array) -> tuple[Array, Array]:
-            sides = np.where(v + DIFFERENCE <= limits[:, 1], DIFFERENCE, -DIFFERENCE)
-            slopes = np.stack([(terms(v + s) - found) / s.sum() for s in np.diag(sides)])
+        def derivatives(v: Array, logs: Array) -> tuple[Array, Array]:
+            sides = np.where(v + MARGINAL_STEP <= limits[:, 1], MARGINAL_STEP, -MARGINAL_STEP)
+            slopes = np.stack([(terms(v + s) - logs) / s.sum() for s in np.diag(sides)])
             return slopes @ counts, (slopes * counts) @ slopes.T
 
         best = climb(search.start, limits, value_of, derivatives, longest=0.5, settled=1e-4)
@@ -151,7 +151,7 @@ class Family:
         mean, variance = float(values.mean()), float(values.var())
         share = min(noise**2 / variance, MOST_NOISE)
         low, high = self.bounds
-        margin = INSIDE * float(np.ptp(values))
+        margin = BOUND_MARGIN * float(np.ptp(values))
         values = mean + math.sqrt(1.0 - share) * (values - mean)
         values = np.where(values <= low, low + margin, values)
         return np.where(values >= high, high - margin, values)
@@ -207,15 +207,15 @@ def beta_of(mean: float, deviation: float, low: float, high: float) -> Beta:
 
 
 def _all_parameters(marginal: Any) -> dict[str, float]:
-    own = marginal.parameters if isinstance(marginal, ScipyMarginal) else vars(marginal)
+    named = marginal.parameters if isinstance(marginal, ScipyMarginal) else vars(marginal)
     names = {"type", "distribution"}
-    return {n: float(v) for n, v in dict(own).items() if v is not None and n not in names}
+    return {n: float(v) for n, v in dict(named).items() if v is not None and n not in names}
 
 
 def multiplied(marginal: Any, factor: float) -> Any:
     """Return the marginal of values times a factor."""
-    own = _all_parameters(marginal)
-    larger = {name: factor * own[name] for name in own.keys() & SCALED}
+    parameters = _all_parameters(marginal)
+    larger = {name: factor * parameters[name] for name in parameters.keys() & SCALED}
     return marginal_of(with_values(marginal, larger))
 
 
@@ -245,8 +245,8 @@ def family_of(given: Any) -> Family:
     if problems := [unknown_name(name, key, known) for key in fixed if key not in known]:
         raise InputError(problems)
     zero = {"low": 0.0} if name in KINDS and name != "beta" else {}
-    own = {key: check(f"{name}.{key}", value, Real) for key, value in fixed.items()}
-    return Family(name, zero | own)
+    stated = {key: check(f"{name}.{key}", value, Real) for key, value in fixed.items()}
+    return Family(name, zero | stated)
 
 
 def _by_scale(family: Family, values: Array, quiet: Array, noise: float, start: Any) -> Search:
@@ -301,7 +301,7 @@ def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], 
     parts, weight = 1, np.ones(1)
     if noise > 0.2 * width:
         parts = math.ceil(2.0 * width / noise)
-        reach = math.ceil(REACH * noise * parts / width)
+        reach = math.ceil(NOISE_DEVIATIONS * noise * parts / width)
         weight = np.exp(-0.5 * (np.arange(-reach, reach + 1) * width / parts / noise) ** 2)
         weight /= weight.sum()
     outside = weight.size // 2
@@ -319,7 +319,7 @@ def mean_log_likelihood(marginal: Any, values: Array, noise: float) -> float:
     With noise it is the probability of a bin over its width. A family to which a value is
     all but impossible has a low one, and not none.
     """
-    if noise**2 <= NEGLIGIBLE * values.var():
+    if noise**2 <= NEGLIGIBLE_NOISE * values.var():
         least = math.log(LEAST / float(np.ptp(values)))
         return float(np.maximum(marginal.distribution.logpdf(values), least).mean())
     counts, at, probabilities = _bins(values, noise)
@@ -349,7 +349,7 @@ def climb(
     at = np.clip(at, limits[:, 0], limits[:, 1])
     value, state = value_of(at)
     damping = 1e-3
-    for _ in range(STEPS):
+    for _ in range(MAX_CLIMB_STEPS):
         score, information = derivatives(at, state)
         # A parameter that pushes against its limit is held there, or the others could not move.
         held = ((at <= limits[:, 0]) & (score < 0.0)) | ((at >= limits[:, 1]) & (score > 0.0))

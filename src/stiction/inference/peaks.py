@@ -21,12 +21,12 @@ from stiction.problem.profiles.reading import (
 )
 from stiction.problem.profiles.tables import Options, column_of, read_table, table_of_frame
 
-FEWEST = 3
+MIN_PEAKS = 3
 """Fewest peaks in all: of two numbers, one may be a mistake."""
-FAR = 50.0
+MAX_PEAK_RATIO = 50.0
 """Ratio of measured and predicted peaks that no experiment explains: their unit is wrong."""
-PEAK = ("peak", "tau", "stress", "strength", "force", "friction")
-LENGTH = ("length", "specimen")
+PEAK_COLUMNS = ("peak", "tau", "stress", "strength", "force", "friction")
+LENGTH_COLUMNS = ("length", "specimen")
 VARIABLES = {"Pa": "critical_stress", "N": "critical_force", "1": "friction_coefficient"}
 """What is measured in each unit, by its name among the results of a method."""
 
@@ -50,12 +50,12 @@ class Peaks(NamedTuple):
 
     def refuse_far(self, predicted: Sequence[Array]) -> None:
         """Refuse peaks so far from those predicted of each kind that their unit must be wrong."""
-        for values, others in zip(self.values, predicted, strict=True):
-            own, other = np.median(values), np.median(others)
-            if not 1.0 / FAR < own / other < FAR:
+        for values, predictions in zip(self.values, predicted, strict=True):
+            measured, expected = np.median(values), np.median(predictions)
+            if not 1.0 / MAX_PEAK_RATIO < measured / expected < MAX_PEAK_RATIO:
                 raise InputError(
-                    f"peaks: are about {own:.3g} {self.unit}, predictions {other:.3g} {self.unit}:"
-                    " another unit? state it, as in unit='kPa' or unit='N'"
+                    f"peaks: are about {measured:.3g} {self.unit}, predictions {expected:.3g}"
+                    f" {self.unit}: another unit? state it, as in unit='kPa' or unit='N'"
                 )
 
     @property
@@ -95,11 +95,11 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
         )
     lengths = tuple(None if length is None else float(length) for length in groups)
     values = tuple(_values(given, unit) for given in groups.values())
-    every = np.concatenate([np.zeros(0), *values])
-    if np.unique(every).size < FEWEST:
+    all_values = np.concatenate([np.zeros(0), *values])
+    if np.unique(all_values).size < MIN_PEAKS:
         raise InputError(
-            f"peaks: at least {FEWEST} different values are needed, got"
-            f" {np.unique(every).size} in {every.size} peaks; fewer than about ten"
+            f"peaks: at least {MIN_PEAKS} different values are needed, got"
+            f" {np.unique(all_values).size} in {all_values.size} peaks; fewer than about ten"
             " constrain little: see st.design_of_tests"
         )
     return Peaks(lengths, values, si_of(unit))
@@ -198,7 +198,7 @@ def read_peaks(
 
 def _of_table(table: Any, unit: str | None, options: Options) -> Peaks:
     """Return the peaks in a table of tests."""
-    length, peak = column_of(table, LENGTH), column_of(table, PEAK, VARIABLES)
+    length, peak = column_of(table, LENGTH_COLUMNS), column_of(table, PEAK_COLUMNS, VARIABLES)
     if peak is None:
         names = ", ".join(map(str, table.data_vars))
         raise InputError(f"no column has a name like 'peak [MPa]'; found {names}")

@@ -20,7 +20,7 @@ from stiction.random.equally_likely import Uncertain, uncertain
 from stiction.random.fields import RandomInterface
 from stiction.random.spectra import Share
 
-DRAWS, CHAINS = 4000, 4
+POSTERIOR_DRAWS, CHAINS = 4000, 4
 """Number of draws, and of chains into which these independent ones are cut for ArviZ."""
 
 
@@ -74,8 +74,8 @@ class Posterior:
     @property
     def prior(self) -> Prior:
         """The prior: `theta(u)` and `u(theta)` map the unit cube to the parameters and back."""
-        found: Prior = self.likelihood.prior
-        return found
+        prior: Prior = self.likelihood.prior
+        return prior
 
     @cached_property
     def before(self) -> dict[str, Array]:
@@ -133,11 +133,11 @@ class Posterior:
         >>> len({one.strength.marginal.low for one in posterior.interfaces(10)})
         10
         """
-        others = [name for name in self.names if full_key(name).startswith("problem.")]
-        if others:
+        of_problem = [name for name in self.names if full_key(name).startswith("problem.")]
+        if of_problem:
             raise InputError(
-                f"interfaces: {', '.join(others)} belong to the problem, which interfaces do not"
-                " hold; take `at(draw)`, a problem and an interface for each draw"
+                f"interfaces: {', '.join(of_problem)} belong to the problem, which interfaces do"
+                " not hold; take `at(draw)`, a problem and an interface for each draw"
             )
         total = self.u.shape[0]
         draws = np.random.default_rng([seed, 4]).choice(total, count, replace=count > total)
@@ -171,8 +171,8 @@ class Posterior:
             -inf outside the prior.
         """
         given = self._points("theta", theta)
-        found = self.likelihood(self.prior.u(np.atleast_2d(given)))
-        return float(found[0]) if given.ndim == 1 else found
+        values = self.likelihood(self.prior.u(np.atleast_2d(given)))
+        return float(values[0]) if given.ndim == 1 else values
 
     def _points(self, name: str, given: Any) -> Array:
         points: Array = check(name, given, Numbers)
@@ -223,8 +223,8 @@ class Posterior:
     def _campaigns(self) -> Array:
         """Draw as many independent tests as were made for each draw, (draws, tests)."""
         parts = [
-            self.likelihood.predicted(kind, np.repeat(self.u, own.size, axis=0), self.seed)
-            for kind, own in enumerate(self.peaks.values)
+            self.likelihood.predicted(kind, np.repeat(self.u, peaks.size, axis=0), self.seed)
+            for kind, peaks in enumerate(self.peaks.values)
         ]
         return np.concatenate([part.reshape(len(self.u), -1) for part in parts], axis=1)
 
@@ -252,7 +252,7 @@ def posterior_of(
     seed: int,
 ) -> Posterior:
     """Return draws from a grid; `error` is that by Monte Carlo."""
-    u, prior = grid.draws(DRAWS, seed), likelihood.prior
+    u, prior = grid.draws(POSTERIOR_DRAWS, seed), likelihood.prior
     return Posterior(
         peaks=peaks,
         draws=dict(zip(prior.names, prior.theta(u).T, strict=True)),

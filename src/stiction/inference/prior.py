@@ -17,7 +17,7 @@ from stiction.problem.problem import Problem
 from stiction.random.dotted_keys import distributions_of, full_key, with_values
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 
-TAIL = 1e-4
+TAIL_PROBABILITY = 1e-4
 """Probability that is cut from either end of a prior whose density is zero there."""
 
 
@@ -108,8 +108,8 @@ def with_parameters(
 
 def refuse_conditioned(interfaces: Iterable[RandomInterface]) -> None:
     """Refuse fields that are conditioned on what was measured of one specimen."""
-    for one in interfaces:
-        for name, field in one.properties.items():
+    for interface in interfaces:
+        for name, field in interface.properties.items():
             if field.conditions is not None:
                 raise InputError(
                     f"random: {name} is conditioned on one specimen, but the peaks are of others;"
@@ -120,7 +120,7 @@ def refuse_conditioned(interfaces: Iterable[RandomInterface]) -> None:
 @lru_cache(maxsize=64)
 def _tails(distribution: Any) -> tuple[float, float]:
     low, high = (
-        0.0 if np.isfinite(end) and distribution.pdf(end) > 0.0 else TAIL
+        0.0 if np.isfinite(end) and distribution.pdf(end) > 0.0 else TAIL_PROBABILITY
         for end in distribution.support()
     )
     return low, 1.0 - high
@@ -134,7 +134,7 @@ def make_prior(problem: Problem, random: Any, given: Any) -> Prior:
             f" {{'correlation_length': (1e-3, 1e-2)}}, got {describe(given)}"
         )
     with prefixed("prior"):
-        found = distributions_of(given)
+        distributions = distributions_of(given)
     if not isinstance(random, RandomField | RandomInterface):
         raise InputError(
             "prior: is of one random field or interface; leave it out where a fit or a list of"
@@ -142,7 +142,7 @@ def make_prior(problem: Problem, random: Any, given: Any) -> Prior:
         )
     random = as_random_interface(random)
     refuse_conditioned([random])
-    prior = Prior(problem, random, found)
+    prior = Prior(problem, random, distributions)
     for corner in itertools.product(*prior.ends.T):
         prior.at(np.array(corner))
     return prior

@@ -13,7 +13,7 @@ from stiction.problem.interface import Interface
 from stiction.problem.profiles.placing import points_of
 from stiction.problem.profiles.reading import POSITIVE, is_labelled, labelled, simplified
 
-FEWEST = 64
+MIN_POINTS = 64
 """Fewest measured points from which a spectrum can be estimated."""
 NARROWEST = 8
 """Fewest points in each direction."""
@@ -39,28 +39,29 @@ def records_of(profiles: Any, interface: Interface | None, quantity: str) -> lis
     several = isinstance(profiles, list | tuple) and not (
         profiles and all(map(_is_scalar, profiles))
     )
-    found: list[Record] = []
+    records: list[Record] = []
     problems: list[str] = []
-    for number, one in enumerate(profiles if several else [profiles]):
+    for number, profile in enumerate(profiles if several else [profiles]):
         try:
             with prefixed(f"profiles[{number}]" if several else "profiles"):
-                found += [
-                    _checked(record, quantity) for record in _records(one, interface, quantity)
+                records += [
+                    _checked(record, quantity)
+                    for record in _records(profile, interface, quantity)
                 ]
         except InputError as error:
             problems += error.problems
-    if not found and not problems:
+    if not records and not problems:
         problems.append("profiles: must not be empty")
-    if len({record.values.ndim for record in found}) > 1:
+    if len({record.values.ndim for record in records}) > 1:
         problems.append("profiles: lines and planes are mixed; fit them separately")
     if problems:
         raise InputError(problems)
-    if (again := len(found) - len({one.values.tobytes() for one in found})) > 0:
+    if (again := len(records) - len({one.values.tobytes() for one in records})) > 0:
         warn_accuracy(
-            f"{again} of {len(found)} profiles repeat another one, value by value: they count as"
+            f"{again} of {len(records)} profiles repeat another one, value by value: they count as"
             " further measurements, and make intervals too narrow; leave them out"
         )
-    return found
+    return records
 
 
 def _is_scalar(value: Any) -> bool:
@@ -136,10 +137,11 @@ def _checked(record: Record, quantity: str) -> Record:
     if np.isinf(values).any():
         first = int(np.argmax(np.isinf(record.values.ravel())))
         raise InputError(f"must be finite; entry {first} is not")
-    if values.size < FEWEST or min(record.values.shape) < NARROWEST:
+    if values.size < MIN_POINTS or min(record.values.shape) < NARROWEST:
         raise InputError(
-            f"holds {values.size} measured points, too short for a spectrum: at least {FEWEST} are"
-            f" needed, {NARROWEST} in each direction, and about ten correlation lengths"
+            f"holds {values.size} measured points, too short for a spectrum: at least"
+            f" {MIN_POINTS} are needed, {NARROWEST} in each direction, and about ten"
+            " correlation lengths"
         )
     if np.ptp(values) <= 1e-12 * np.abs(values).max():
         raise InputError(f"is constant, {values[0]:g} everywhere; there is nothing to fit")

@@ -47,8 +47,8 @@ class Scaling(NamedTuple):
 
     def of(self, theta: Array) -> Array:
         """Return shift (unit of the peaks) and stretch at points, (2, points)."""
-        found: Array = (theta - self.reference)[:, list(self.keys)] @ self.slopes
-        return np.ascontiguousarray(found.T) + np.array([[0.0], [1.0]])
+        shift_stretch: Array = (theta - self.reference)[:, list(self.keys)] @ self.slopes
+        return np.ascontiguousarray(shift_stretch.T) + np.array([[0.0], [1.0]])
 
 
 def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:

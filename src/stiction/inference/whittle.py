@@ -50,10 +50,10 @@ FLOOR = 1e-3
 NEIGHBOURS = 5
 ORDERS, COARSE = 10, 0.1
 """Hermite orders of a marginal's map, and steps of z by which they are found to 1e-4."""
-SHOWN = ("correlation_length", "exponent", "anisotropy")
+REPORTED = ("correlation_length", "exponent", "anisotropy")
 AT_END = 1e-3
 """Distance from an end of a range, as a share of it, within which an estimate is at it."""
-DIFFERENCE = 1e-4
+LOG_STEP = 1e-4
 SETTLED = 1e-3
 """Gain of log likelihood below which scoring ends; a standard error is worth a half."""
 LONGEST = 1.5
@@ -81,12 +81,12 @@ def observe(rows: Sequence[Array], windows: Sequence[RecordWindow]) -> list[Obse
     powers: dict[RecordWindow, list[Array]] = {}
     for row, window in zip(rows, windows, strict=True):
         powers.setdefault(window, []).append(window.periodogram(row))
-    found = []
-    for window, own in powers.items():
-        average = np.stack(own).mean(axis=0)
+    observed = []
+    for window, periodograms in powers.items():
+        average = np.stack(periodograms).mean(axis=0)
         highest = uniform_filter(average, NEIGHBOURS, mode="nearest").max()
-        found.append(Observed(window, len(own), average, FLOOR * float(highest)))
-    return found
+        observed.append(Observed(window, len(periodograms), average, FLOOR * float(highest)))
+    return observed
 
 
 class Model(NamedTuple):
@@ -156,9 +156,9 @@ class SpectrumFamily:
         """Names of the free parameters, in the order of the vector of parameters."""
         known: dict[str, Any] = self.fixed | {"anisotropy": self.anisotropy}
         known["noise_share"] = self.noise
-        others = ("exponent",) if self.name != "power_law" else ()
+        absent = ("exponent",) if self.name != "power_law" else ()
         names = ("variance", "correlation_length", "exponent", "anisotropy", "noise_share")
-        return tuple(n for n in names if known.get(n) is None and n not in others)
+        return tuple(n for n in names if known.get(n) is None and n not in absent)
 
     @cached_property
     def limits(self) -> Array:
@@ -169,15 +169,15 @@ class SpectrumFamily:
 
     def model(self, vector: Array, shares: Array) -> Model:
         """Return the model of a vector of parameters."""
-        found = {
+        values = {
             n: float(v) if n == "noise_share" else origin(n) + math.exp(v)
             for n, v in zip(self.free, vector, strict=True)
         }
-        variance = found.pop("variance")
-        anisotropy = found.pop("anisotropy", self.anisotropy or 1.0)
+        variance = values.pop("variance")
+        anisotropy = values.pop("anisotropy", self.anisotropy or 1.0)
         known = min((self.noise or 0.0) ** 2 / variance, RANGES["noise_share"][1])
-        noise = found.pop("noise_share", known)
-        options = self.fixed | found
+        noise = values.pop("noise_share", known)
+        options = self.fixed | values
         end_given = not {"truncation", "power_kept"}.isdisjoint(options)
         return Model(
             SPECTRA[self.name](**options), anisotropy, noise, variance, shares, end_given
@@ -204,7 +204,9 @@ class SpectrumFamily:
         aside = np.abs(self.limits - self.vector_of(model)[:, None]).min(axis=1)
         near = aside < AT_END * np.ptp(self.limits, axis=1)
         values = zip(self.of(model).items(), near, strict=True)
-        return {name: value for (name, value), is_near in values if is_near and name in SHOWN}
+        return {
+            name: value for (name, value), is_near in values if is_near and name in REPORTED
+        }
 
 
 class Whittle(NamedTuple):
@@ -217,12 +219,12 @@ class Whittle(NamedTuple):
     def of(self, expected: Sequence[Array]) -> float:
         """Return the log likelihood; -inf where less than nothing is expected."""
         value = 0.0
-        for one, e in zip(self.observed, expected, strict=True):
-            lifted = e + one.floor
+        for group, e in zip(self.observed, expected, strict=True):
+            lifted = e + group.floor
             if lifted.min() <= 0.0:
                 return -math.inf
-            terms = np.log(lifted) + (one.average + one.floor) / lifted
-            value -= one.records * float(np.sum(one.window.weights * terms))
+            terms = np.log(lifted) + (group.average + group.floor) / lifted
+            value -= group.records * float(np.sum(group.window.weights * terms))
         return value
 
     def coarse(self) -> Array:
@@ -269,23 +271,23 @@ class Whittle(NamedTuple):
         for i, name in enumerate(family.free):
             if name not in ("variance", "noise_share"):
                 aside = at.copy()
-                aside[i] += DIFFERENCE if at[i] + DIFFERENCE <= limits[i, 1] else -DIFFERENCE
+                aside[i] += LOG_STEP if at[i] + LOG_STEP <= limits[i, 1] else -LOG_STEP
                 moved[name] = family.model(aside, self.shares), aside[i] - at[i]
         result, information = np.zeros(at.size), np.zeros((at.size, at.size))
-        for one, signal in zip(self.observed, signals, strict=True):
-            expected = model.expectation(one.window, signal)
+        for group, signal in zip(self.observed, signals, strict=True):
+            expected = model.expectation(group.window, signal)
             # Of a known noise the share falls as the variance grows.
             slopes = {
                 "variance": expected if family.noise is None else model.variance * signal,
-                "noise_share": model.variance * (one.window.white - signal),
+                "noise_share": model.variance * (group.window.white - signal),
             }
             scale = model.variance * (1.0 - model.noise_share)
-            for name, (other, step) in moved.items():
-                slopes[name] = scale * (other.signal(one.window) - signal) / step
-            lifted = expected + one.floor
+            for name, (shifted, step) in moved.items():
+                slopes[name] = scale * (shifted.signal(group.window) - signal) / step
+            lifted = expected + group.floor
             d = np.stack([(slopes[name] / lifted).ravel() for name in family.free])
-            weight = one.records * one.window.weights.ravel()
-            result += d @ (weight * ((one.average - expected) / lifted).ravel())
+            weight = group.records * group.window.weights.ravel()
+            result += d @ (weight * ((group.average - expected) / lifted).ravel())
             information += (d * weight) @ d.T
         return result, information
 

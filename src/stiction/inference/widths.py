@@ -41,9 +41,9 @@ from stiction.inference.specimens import (
 )  # fmt: skip
 from stiction.problem.problem import Problem
 
-FIELDS = 12
+MAX_FIELDS = 12
 """Fields within a specimen that stand for all, those with the largest mass."""
-DRAWS = 2_000
+WIDTH_DRAWS = 2_000
 """Draws of a posterior from which an interval is taken."""
 
 
@@ -97,7 +97,7 @@ def expected_widths(
             grid, both = now, tables
             if tests or levels:
                 grid, both = _after(tables, truth, tests, levels, rng)
-            drawn = grid.described(grid.draws(DRAWS, rng))
+            drawn = grid.described(grid.draws(WIDTH_DRAWS, rng))
             ends = [np.quantile(drawn[name], [0.05, 0.95]) for name in (MEAN_KEY, SCATTER_KEY)]
             widths[row, number] = np.ptp(ends, axis=1)
             stresses[row, number] = both.quantile(grid, np.array([probability]))[0]
@@ -135,13 +135,15 @@ def _plan(name: str, given: Any) -> tuple[int, int]:
 def _fewer(tables: Tables, mass: Array) -> Tables:
     """Return the tables of some fields only, those with the largest mass."""
     profiles = tables.profiles
-    order = np.argsort(-np.broadcast_to(mass, len(profiles.fields)), kind="stable")[:FIELDS]
+    order = np.argsort(-np.broadcast_to(mass, len(profiles.fields)), kind="stable")[:MAX_FIELDS]
     fewer = profiles._replace(
         fields=tuple(profiles.fields[k] for k in order), within=profiles.within[order]
     )
     onsets = tuple(
-        replace(own, ratios=own.ratios[order], densities=tuple(own.densities[k] for k in order))
-        for own in tables.onsets
+        replace(
+            kind, ratios=kind.ratios[order], densities=tuple(kind.densities[k] for k in order)
+        )
+        for kind in tables.onsets
     )
     return replace(tables, profiles=fewer, onsets=onsets)
 
@@ -164,5 +166,5 @@ def _after(
         within=np.concatenate([profiles.within, within], axis=1),
     )
     further = (np.concatenate([tables.peaks[0], np.maximum(peaks, 1e-9)]), *tables.peaks[1:])
-    own = replace(tables, profiles=both, peaks=further)
-    return grid_of_profiles(both, own)[1], own
+    updated = replace(tables, profiles=both, peaks=further)
+    return grid_of_profiles(both, updated)[1], updated
