@@ -232,3 +232,15 @@ def test_images_need_a_scale_and_a_map(tmp_path):
     np.testing.assert_allclose(heights, grey.T * 1e-9, rtol=1e-12)
     Image.fromarray(np.zeros((3, 4, 3), np.uint8)).save(path)
     refuses("grey image", lambda: st.read_profile(path, spacing=1e-6, quantity="height"))
+
+
+def test_a_curve_is_not_a_list_of_peaks(tmp_path):
+    path = tmp_path / "curve.csv"
+    path.write_text(
+        "Weg;Kraft\nmm;N\n"
+        + "\n".join(f"{k / 100};{10 * k if k < 90 else 700}" for k in range(120))
+    )
+    refuses("'Weg' only rises over 120 lines ... st.read_curve", lambda: st.read_peaks(path))
+    assert "peak 890 N" in str(st.read_curve(path))
+    path.write_text("time (s);peak (N)\n" + "\n".join(f"{60 * k};{70 + k}" for k in range(12)))
+    assert st.read_peaks(path).values[0].size == 12

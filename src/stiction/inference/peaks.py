@@ -25,6 +25,8 @@ MIN_PEAKS = 3
 """Fewest peaks in all: of two numbers, one may be a mistake."""
 MAX_PEAK_RATIO = 50.0
 """Ratio of measured and predicted peaks that no experiment explains: their unit is wrong."""
+MIN_CURVE_LINES = 100
+"""Fewest lines of a table in which a time or travel that only rises makes it a curve."""
 PEAK_COLUMNS = ("peak", "tau", "stress", "strength", "force", "friction")
 LENGTH_COLUMNS = ("length", "specimen")
 VARIABLES = {"Pa": "critical_stress", "N": "critical_force", "1": "friction_coefficient"}
@@ -177,7 +179,8 @@ def read_peaks(
     Raises
     ------
     InputError
-        If a unit is missing or unknown, columns are ambiguous, or a number is missing.
+        If a unit is missing or unknown, columns are ambiguous, a number is missing, or the file
+        is the curve of one test.
 
     Examples
     --------
@@ -196,12 +199,29 @@ def read_peaks(
         return _of_table(read_table(source, options), unit, options)
 
 
+def _refuse_curve(table: Any, read: set[str]) -> None:
+    """Refuse a long table with a time or a travel that only rises: the record of one test."""
+    for name, column in table.items():
+        timed = any(is_in(column.attrs.get("units"), si) for si in ("m", "s"))
+        if (
+            timed
+            and name not in read
+            and len(column) >= MIN_CURVE_LINES
+            and np.all(np.diff(column) >= 0)
+        ):
+            raise InputError(
+                f"{name!r} only rises over {len(column)} lines, as in the curve of one test; read"
+                " curves with st.read_curve, and pass them to st.read_peaks"
+            )
+
+
 def _of_table(table: Any, unit: str | None, options: Options) -> Peaks:
     """Return the peaks in a table of tests."""
     length, peak = column_of(table, LENGTH_COLUMNS), column_of(table, PEAK_COLUMNS, VARIABLES)
     if peak is None:
         names = ", ".join(map(str, table.data_vars))
         raise InputError(f"no column has a name like 'peak [MPa]'; found {names}")
+    _refuse_curve(table, {column.name for column in (length, peak) if column is not None})
     stated = peak.attrs.get("units", unit)
     if stated is None or stated != (unit or stated):
         raise InputError(
