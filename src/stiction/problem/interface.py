@@ -175,8 +175,8 @@ class Interface:
     @property
     def coordinates(self) -> dict[str, Array]:
         """Positions of the nodes along each direction, in [0, length), m."""
-        each = zip(self.dims, self.shape, self.spacings, strict=True)
-        return {dim: (np.arange(n) + self.first) * spacing for dim, n, spacing in each}
+        directions = zip(self.dims, self.shape, self.spacings, strict=True)
+        return {dim: (np.arange(n) + self.first) * spacing for dim, n, spacing in directions}
 
     @property
     def x(self) -> Array:

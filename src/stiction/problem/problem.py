@@ -659,12 +659,12 @@ class Problem:
             number = int(over.any(axis=1).argmax())
             node = int(over[number].argmax())
             most, least = initial[number].flat[node], strength[number].flat[node]
-            others = int(over.any(axis=1).sum()) - 1
+            further = int(over.any(axis=1).sum()) - 1
             problems.append(
                 f"strength: must be above initial_stress everywhere; it is not at"
                 f" {over[number].sum()} of {over.shape[1]} nodes of sample {number}, the first at"
                 f" {self.interface.describe_node(node)}: {least:g} against {most:g} Pa"
-                f"{f', and in {others} more samples' * (others > 0)}; st.Rupture() accepts this"
+                f"{f', and in {further} more samples' * (further > 0)}; st.Rupture() accepts this"
             )
         if (
             np.max(strength, where=np.isfinite(strength), initial=0.0)

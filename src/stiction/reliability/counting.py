@@ -11,7 +11,8 @@ from stiction.ensemble.limit_state import LimitState
 from stiction.reliability.subset import Descent, Population
 from stiction.reliability.uncertainty import binomial_interval
 
-BATCH_SAMPLES = 1024
+COUNT_BATCH = 1024
+"""Most samples that are drawn and solved before failures are counted again."""
 
 
 class Counted(NamedTuple):
@@ -71,10 +72,8 @@ def count_failures(
     while done < least or (failures < wanted and done < max_evaluations):
         size = least - done
         if size <= 0:
-            size = (
-                math.ceil((wanted - failures) * done / failures) if failures else BATCH_SAMPLES
-            )
-        size = min(size, BATCH_SAMPLES, max_evaluations - done)
+            size = math.ceil((wanted - failures) * done / failures) if failures else COUNT_BATCH
+        size = min(size, COUNT_BATCH, max_evaluations - done)
         draws = state.draws(seed, start + done, size)
         parts.append(state(draws))
         members.append(state.member(draws))
