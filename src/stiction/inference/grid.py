@@ -1,4 +1,17 @@
-"""The posterior on a grid that closes in on its mass, and draws from it."""
+"""The posterior on a grid that closes in on its mass, and draws from it.
+
+Problem: the density L(u)/Z of parameters u whose prior is uniform in the unit cube, with the
+likelihood L and the evidence Z, the integral of L over the cube. L may be narrow.
+
+Steps:
+
+1. Divide a box into equal cells, and compute log L in the middle of each.
+2. Take the mass of a cell as L over the sum of L, and Z as the sum of L times the volume of a cell
+   (midpoint rule). What lies outside of the box is neglected.
+3. Close in on the cells that hold all but `OUTSIDE_MASS` on either side of each parameter, and one
+   cell more on either side.
+4. Repeat, at most `MAX_GRID_ZOOMS` times in all, until no side of the box shrinks by a tenth.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -61,21 +74,21 @@ def grid_of(
     steps = [(np.arange(along) + 0.5) / along] * dimension
     unit = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1)
     for _ in range(MAX_GRID_ZOOMS):
-        low, high = box
+        low, high = box  # 1.
         u = (low + (high - low) * unit).reshape(-1, dimension)
         parts = [function(u[k : k + MAX_BATCH]) for k in range(0, u.shape[0], MAX_BATCH)]
         values = np.concatenate(parts).reshape(unit.shape[:-1])
         top = float(values.max())
         if top == -np.inf:
             return None
-        mass, cell = np.exp(values - top), (high - low) / along
+        mass, cell = np.exp(values - top), (high - low) / along  # 2.
         evidence = top + float(np.log(mass.sum() * np.prod(cell)))
         grid = PosteriorGrid(box, mass / mass.sum(), evidence)
-        # Cells on either side that hold almost no mass, less one of margin.
+        # 3. Cells on either side that hold almost no mass, less one of margin.
         rows = [grid.marginal(axis) for axis in range(dimension)]
         empty = [[np.sum(np.cumsum(r) <= OUTSIDE_MASS) - 1 for r in (o, o[::-1])] for o in rows]
         below, above = np.maximum(empty, 0).T * cell
         box = np.stack([low + below, high - above])
-        if np.all(box[1] - box[0] > 0.9 * (high - low)):
+        if np.all(box[1] - box[0] > 0.9 * (high - low)):  # 4.
             break
     return grid

@@ -13,7 +13,7 @@ from stiction.problem.interface import Interface
 from stiction.problem.profiles.placing import points_of
 from stiction.problem.profiles.reading import POSITIVE, is_labelled, labelled, simplified
 
-MIN_POINTS = 64
+MIN_RECORD_POINTS = 64
 """Fewest measured points from which a spectrum can be estimated."""
 NARROWEST = 8
 """Fewest points in each direction."""
@@ -137,10 +137,10 @@ def _checked(record: Record, quantity: str) -> Record:
     if np.isinf(values).any():
         first = int(np.argmax(np.isinf(record.values.ravel())))
         raise InputError(f"must be finite; entry {first} is not")
-    if values.size < MIN_POINTS or min(record.values.shape) < NARROWEST:
+    if values.size < MIN_RECORD_POINTS or min(record.values.shape) < NARROWEST:
         raise InputError(
             f"holds {values.size} measured points, too short for a spectrum: at least"
-            f" {MIN_POINTS} are needed, {NARROWEST} in each direction, and about ten"
+            f" {MIN_RECORD_POINTS} are needed, {NARROWEST} in each direction, and about ten"
             " correlation lengths"
         )
     if np.ptp(values) <= 1e-12 * np.abs(values).max():
