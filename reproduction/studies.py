@@ -19,7 +19,7 @@ NORMAL = np.linspace(-2.0, 2.0, 17)
 """Places in standard deviations at which tau_n is compared with a normal distribution."""
 TREND = (0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 30.0)
 WINDOWS = (2.0, 4.0, 8.0, 16.0)
-LEVELS = (0.88, 0.90, 0.92, 0.94, 0.95, 0.96, 0.97, 0.98, 0.985, 0.99, 0.995, 0.999)
+LOAD_SHARES = (0.88, 0.90, 0.92, 0.94, 0.95, 0.96, 0.97, 0.98, 0.985, 0.99, 0.995, 0.999)
 RATES = (0.1, 0.3, 1.0, 3.0, 10.0)
 READINGS = {
     "a": "plane stress throughout",
@@ -359,7 +359,7 @@ def growth(run: Runner, count: int) -> xr.Dataset:
         tau_p = strength(ratio).sample(interface, seed=run.seed_of(ratio), first=sample)[0]
         onset = st.onset(PROBLEM, tau_p, method=EXACT, progress=False)
         load = float(onset["first_instability"][0])
-        path = st.equilibrium_path(PROBLEM, tau_p, load * np.array(LEVELS))
+        path = st.equilibrium_path(PROBLEM, tau_p, load * np.array(LOAD_SHARES))
         labels = [patches(row > 0.0) for row in np.nan_to_num(path["slip"].values)]
         node = round(float(onset["critical_position"][0]) / interface.spacing) % interface.size
         slipping = np.flatnonzero(labels[-1] >= 0)
@@ -377,7 +377,7 @@ def growth(run: Runner, count: int) -> xr.Dataset:
         )
 
     growing = run.grid(grow, correlation_ratio=RATIOS, sample=range(count))
-    return growing.assign_coords(level=list(LEVELS))
+    return growing.assign_coords(level=list(LOAD_SHARES))
 
 
 def dips(*places):

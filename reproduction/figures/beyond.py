@@ -9,12 +9,12 @@ from scipy.stats import binomtest
 from reproduction import setting
 from reproduction.claims import Data
 from reproduction.figures import common
-from reproduction.figures.common import COLOURS, GREY, INK, OVER_MEAN, RED, TAU_CR, XI
+from reproduction.figures.common import COLOURS, DARK, GREY, OVER_MEAN, RED, TAU_CR, XI
 from reproduction.numbers_with_errors import deviation, lower_spread, mean
 from reproduction.setting import HIGH, MEAN, PROBLEM, RATIOS, SIMULATED, H, L
 from reproduction.statements_onset import bound_above, trend
 from reproduction.statements_rupture import arrested, largest_energy, shares, with_inertia
-from reproduction.studies import DRIVING, LEVELS, RATES
+from reproduction.studies import DRIVING, LOAD_SHARES, RATES
 
 
 def figure_8(d: Data):
@@ -95,7 +95,7 @@ def figure_11(d: Data):
     number, single, pair, lowering = (figure.add_subplot(grid[i]) for i in range(4))
     for ratio in RATIOS:
         rows = d.at("growth", "patches", ratio)
-        number.errorbar(LEVELS, rows.mean(axis=0), 2 * rows.std(axis=0) / np.sqrt(len(rows)),
+        number.errorbar(LOAD_SHARES, rows.mean(axis=0), 2 * rows.std(axis=0) / np.sqrt(len(rows)),
                         **common.line(ratio), lw=1, label=f"{ratio:g}")  # fmt: skip
     number.set(xlabel=r"$\tau_0/\tau_\mathrm{cr}$", ylabel="slipping patches", ylim=(0, None))
     number.legend(title=XI, loc="upper left", ncols=2)
@@ -147,7 +147,7 @@ def figure_12(d: Data):
         (moving, 0.12, "X", "arrested with inertia, too"),
     ):
         place = events["length"].values[chosen] / H
-        top.plot(place, y + 0 * place, marker, color=INK, ms=5, mfc="none", label=text)
+        top.plot(place, y + 0 * place, marker, color=DARK, ms=5, mfc="none", label=text)
     top.set(xlabel=r"length of the rupture over $h_\mathrm{n}$", xlim=(0, length[-1]),
             ylim=(0, 1.6), ylabel=r"$G/\Gamma_\mathrm{max}$")  # fmt: skip
     top.legend(loc="lower right", title=XI)

@@ -7,7 +7,7 @@ from reproduction.setting import HIGH, LOW, MAX_RATIOS, MEAN, RATIOS
 
 WIDTH = 4.5
 """Inches; type of 8.5 points is then 9 pixels high on a screen of 390 pixels."""
-INK, GREY, PALE, RED = "#1a1a1a", "#7a7a7a", "#d0d0d0", "#b5322a"
+DARK, GREY, LIGHT, RED = "#1a1a1a", "#7a7a7a", "#d0d0d0", "#b5322a"
 COLOURS = ("#14213d", "#2a6f97", "#c8553d", "#e0a030", "#6a994e", "#7b4f9e")
 DASHES = (
     "-",

@@ -8,7 +8,7 @@ import stiction as st
 from reproduction import setting
 from reproduction.claims import Data
 from reproduction.figures import common
-from reproduction.figures.common import COLOURS, GREY, INK, MEAN_P, OVER_MEAN, RED, TAU_CR, XI
+from reproduction.figures.common import COLOURS, DARK, GREY, MEAN_P, OVER_MEAN, RED, TAU_CR, XI
 from reproduction.numbers_with_errors import mean, quantile
 from reproduction.setting import HIGH, LOW, MEAN, PROBLEM, RATIOS, SIMULATED, H, L
 from reproduction.statements_onset import dynamic_mean, offsets, stress_density
@@ -32,7 +32,7 @@ def figure_1(d: Data):
     inset = field.inset_axes((0.3, 0.68, 0.66, 0.32))
     lag = PROBLEM.interface.x / H
     for name, style in (("correlation", "-"), ("gaussian_correlation", ":")):
-        inset.plot(lag, d.at("theory", name, setting.FIRST), style, color=INK, lw=0.9)
+        inset.plot(lag, d.at("theory", name, setting.FIRST), style, color=DARK, lw=0.9)
     inset.set(xlim=(0, 2.4 * setting.FIRST), ylabel=r"$C$", yticks=(0, 1))
     inset.text(1.2 * setting.FIRST, 0.3, r"$\xi/h_\mathrm{n}$", ha="center")
     inset.legend([r"$\tau_\mathrm{p}$", "$z$"], loc="upper right", handlelength=1.2)
@@ -51,7 +51,7 @@ def _system(axes) -> None:
     for y, sign in ((0.72, 1), (-0.72, -1)):
         for start in (0.15, 0.45, 0.75):
             axes.annotate("", (start + sign * 0.06, y), (start - sign * 0.06, y),
-                          arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 0.9})  # fmt: skip
+                          arrowprops={"arrowstyle": "-|>", "color": DARK, "lw": 0.9})  # fmt: skip
     axes.text(0.5, 0.36, r"elastic half-space: $G,\ \nu,\ \rho$", ha="center", va="center")
     axes.text(0.5, -0.38, r"the same, periodic with $L$", ha="center", va="center")
     axes.text(0.02, 0.13, r"$\tau_\mathrm{f}(\delta, x)$", color=COLOURS[1])
@@ -63,7 +63,7 @@ def _system(axes) -> None:
 
 def _load(axes) -> None:
     axes.plot([0, 1, 1.03, 1.35], [0, 1, 0.3, 0.3], color=COLOURS[0])
-    axes.plot(1, 1, "o", color=INK, ms=4)
+    axes.plot(1, 1, "o", color=DARK, ms=4)
     axes.set(xlabel="time", ylabel=r"$\tau_0$", xticks=(), ylim=(0, 1.15), xlim=(0, 1.4))
     axes.set_yticks((0.3, 1.0), (r"$\tau_\mathrm{kin}$", TAU_CR))
     common.letter(axes, "b", x=-0.2)
@@ -73,7 +73,7 @@ def _law(axes) -> None:
     for peak, style, colour in ((1.0, "-", COLOURS[0]), (0.8, "--", GREY), (1.2, "--", GREY)):
         end = peak - 0.2
         axes.plot([0, end, 1.4], [peak, 0.2, 0.2], style, color=colour, lw=1.1)
-    axes.plot([0.8, 0.8], [0, 0.2], ":", color=INK, lw=0.8)
+    axes.plot([0.8, 0.8], [0, 0.2], ":", color=DARK, lw=0.8)
     axes.annotate("$W$", (0.42, 0.6), (0.62, 0.75))
     axes.set_xticks((0.8,), (r"$d_\mathrm{c}$",))
     axes.set_yticks((0.2, 1.0), (r"$\tau_\mathrm{r}$", r"$\tau_\mathrm{p}(x)$"))
@@ -160,7 +160,7 @@ def figure_3(d: Data):
         way = 0.6 * late * 1e-4 * onset * speed / L
         shown = min(1.0, 0.5 / way)  # the line stays within the panel
         away = np.array([0.12, 0.12 + shown * way])
-        zoom.plot(centre - away, (0.0, 0.6 * late * shown), color=INK, lw=1.2, ls="--")
+        zoom.plot(centre - away, (0.0, 0.6 * late * shown), color=DARK, lw=1.2, ls="--")
         zoom.text(centre - away[1], 0.62 * late * shown, text, ha="center", va="bottom")
     common.letter(zoom, "a", x=-0.1)
     figure.colorbar(picture, ax=zoom, label=r"slip rate $\times\,G^*/(\langle\tau_\mathrm{p}\rangle"
@@ -176,7 +176,7 @@ def figure_3(d: Data):
     wide.set(xlim=(0, 1), xlabel="$x/L$")
     wide.tick_params(labelleft=False)
     for axes, place in ((load, 1), (wide, centre)):
-        axes.plot(place, 1, "o", color=INK, ms=4, clip_on=False)
+        axes.plot(place, 1, "o", color=DARK, ms=4, clip_on=False)
         axes.set_ylim(first - 0.01, 1.005)
     common.letter(load, "b", x=-0.5)
     strength = figure.add_subplot(grid[2, :])
@@ -203,7 +203,7 @@ def figure_4(d: Data):
     )
     top.plot(x, tau_p, "--", color=GREY, lw=0.8, label=r"$\tau_\mathrm{p}$")
     top.plot(x, tau_n, color=COLOURS[1], label=r"$\tau_\mathrm{n}$")
-    top.plot(x[tau_n.argmin()], tau_n.min(), "o", color=INK, ms=5)
+    top.plot(x[tau_n.argmin()], tau_n.min(), "o", color=DARK, ms=5)
     top.set(xlabel="$x/L$", ylabel=rf"stress ${OVER_MEAN}", xlim=(0, 1))
     top.legend(loc="upper right", ncols=2)
     common.letter(top, "a", x=-0.1)
@@ -213,7 +213,7 @@ def figure_4(d: Data):
         middle.plot(stress, 100 * offsets(d, ratio, "local"), **style, ms=4, label=f"{ratio:g}")
         if "printed" in d:
             middle.plot(stress, 100 * offsets(d, ratio, "printed"), ms=3, mfc="none", zorder=1,
-                        **{**style, "color": common.PALE})  # fmt: skip
+                        **{**style, "color": common.LIGHT})  # fmt: skip
     middle.axhline(0, color=GREY, lw=0.8)
     middle.set(xlabel=rf"$\tau_\mathrm{{cr}}{OVER_MEAN} of the rupture",
                ylabel="theory above rupture (%)")  # fmt: skip
@@ -250,7 +250,7 @@ def figure_5(d: Data):
     x = PROBLEM.interface.x / L
     s = np.linspace(LOW, HIGH, 300)
     minima, averages, ranges = [], [], []
-    upper[0].plot(setting.MARGINAL.distribution.pdf(s) * MEAN, s / MEAN, color=INK)
+    upper[0].plot(setting.MARGINAL.distribution.pdf(s) * MEAN, s / MEAN, color=DARK)
     for ratio, strip in zip(RATIOS, fields, strict=True):
         tau_p = setting.strength(ratio).sample(PROBLEM.interface)  # of the same draws for each
         strip.plot(x, tau_p[0] / MEAN, color=common.line(ratio)["color"], lw=0.9)
@@ -423,7 +423,7 @@ def figure_7(d: Data):
                 spread = d.at("moments", "powers", sampled_ratio)
                 sampled = spread[:, 1].mean() - spread[:, 0].mean() ** 2
                 share = sampled * (MEAN / setting.DEVIATION) ** 2
-                panel.plot(sampled_ratio, share, "o", color=INK, ms=4)
+                panel.plot(sampled_ratio, share, "o", color=DARK, ms=4)
         panel.set(xlim=(0, high), xlabel=XI, ylim=(0, 1.02))
     axes[1, 0].set_ylabel(r"Var[$\tau_\mathrm{n}$]/Var[$\tau_\mathrm{p}$]")
     axes[1, 0].axhline(1.0, color=GREY, lw=0.8, ls="--")

@@ -28,7 +28,7 @@ from stiction.base.errors import (
 )
 from stiction.base.progress import Meter, duration, interrupted
 
-SHOWN = 12
+MAX_SHOWN_FAILURES = 12
 """Points, failures or damaged chunks that are listed."""
 RUPTURE = (
     "critical_stress", "stress_drop", "onset_time", "critical_position", "median_rupture_speed"
@@ -83,10 +83,10 @@ def _method(match: re.Match[str]) -> str:
 
 
 def _show_some(texts: Sequence[Any], prefix: str, *, err: bool = False) -> None:
-    for text in texts[:SHOWN]:
+    for text in texts[:MAX_SHOWN_FAILURES]:
         echo(f"{prefix}{text}", err=err)
-    if len(texts) > SHOWN:
-        echo(f"{prefix}and {len(texts) - SHOWN} more", err=err)
+    if len(texts) > MAX_SHOWN_FAILURES:
+        echo(f"{prefix}and {len(texts) - MAX_SHOWN_FAILURES} more", err=err)
 
 
 def _ignore_local_style() -> None:

@@ -28,8 +28,13 @@ from stiction.study.run import StoredRun
 
 MOST_ROWS = 200
 MOST_FIGURES = 12
-LEVELS = (0.05, 0.5, 0.95)
-QUANTITIES = ("critical_stress", "first_instability", "friction_coefficient", "critical_force")
+QUANTILE_LEVELS = (0.05, 0.5, 0.95)
+REPORTED = (
+    "critical_stress",
+    "first_instability",
+    "friction_coefficient",
+    "critical_force",
+)
 SPREAD = ("mean", "standard deviation")
 
 
@@ -105,7 +110,10 @@ def write_report(run: StoredRun, path: Path) -> None:
         if run.settings:
             add_curves(page, run)
         else:
-            result, axes = run.dataset(only=[*QUANTITIES, "critical_position"]), run.study.axes
+            result, axes = (
+                run.dataset(only=[*REPORTED, "critical_position"]),
+                run.study.axes,
+            )
             add_figures(page, result, list(axes))
             add_tables(page, result, axes)
     if state.failures:
@@ -212,10 +220,10 @@ def add_tables(page: Page, result: xr.Dataset, axes: GridAxes) -> None:
     count = min(flat.sizes["point"], MOST_ROWS)
     labels = list(itertools.islice(zip(*places, strict=True), count)) if keys else [()]
     quantities = [f"{what} \N{PLUS-MINUS SIGN} standard error" for what in SPREAD]
-    quantities += [f"{100 * level:g} % quantile" for level in LEVELS]
+    quantities += [f"{100 * level:g} % quantile" for level in QUANTILE_LEVELS]
     if flat["first_instability"].equals(flat["critical_stress"]):  # of the local criterion
         flat = flat.drop_vars("first_instability")
-    for name in QUANTITIES:
+    for name in REPORTED:
         if name in flat:
             factor, unit, _ = scaled(flat[name])
             columns = [*swept, *(with_unit(quantity, unit) for quantity in quantities)]
@@ -228,8 +236,8 @@ def _estimates(samples: Any) -> list[Any]:
     """Return number, mean, standard deviation and quantiles of samples as texts."""
     values = samples[np.isfinite(samples)]
     if values.size < 4:
-        return [values.size, *[None] * (2 + len(LEVELS))]
-    levels = quantiles(values, LEVELS)
+        return [values.size, *[None] * (2 + len(QUANTILE_LEVELS))]
+    levels = quantiles(values, QUANTILE_LEVELS)
     errors = 0.25 * (levels.upper - levels.lower)  # 95 % lie within two
     estimates = [
         f"{rounded(part.value, part.error)} \N{PLUS-MINUS SIGN} {rounded(part.error, part.error)}"

@@ -29,10 +29,10 @@ from stiction.reliability.answer import Answer, bounded
 from stiction.statistics.densities import density
 from stiction.statistics.estimates import quantiles as estimate_quantiles
 
-CURVES = 6
+MAX_CURVES = 6
 FEWEST = 20
 """Values from which on a density is estimated; fewer are marked one by one."""
-LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
+DRAWN_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 TINY = 1e-300
 """Probability that stands for none on a logarithmic scale."""
 
@@ -234,9 +234,9 @@ def _swept(variable: xr.DataArray) -> list[str]:
 
 
 def _steps(variable: xr.DataArray, along: str) -> list[tuple[str | None, xr.DataArray]]:
-    """Return at most `CURVES` steps of a sweep, spread evenly, each with its name."""
+    """Return at most `MAX_CURVES` steps of a sweep, spread evenly, each with its name."""
     last, names = variable.sizes[along] - 1, _step_texts(variable[along])
-    steps = np.unique(np.linspace(0, last, min(CURVES, last + 1)).round().astype(int))
+    steps = np.unique(np.linspace(0, last, min(MAX_CURVES, last + 1)).round().astype(int))
     return [(names[step], variable.isel({along: step})) for step in steps]
 
 
@@ -244,12 +244,12 @@ def _quantiles(
     part: xr.DataArray, factor: float, along: str
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return quantiles (levels, steps), and errors of the median (2, steps), as drawn."""
-    values_at = np.full((len(LEVELS), part.sizes[along]), np.nan)
+    values_at = np.full((len(DRAWN_QUANTILES), part.sizes[along]), np.nan)
     errors = values_at[:2].copy()
     for step in range(part.sizes[along]):
         values = _finite(part.isel({along: step})) * factor
         if values.size:
-            estimate = estimate_quantiles(values, LEVELS)
+            estimate = estimate_quantiles(values, DRAWN_QUANTILES)
             values_at[:, step] = estimate.value
             ends = np.clip([estimate.lower[2], estimate.upper[2]], values.min(), values.max())
             errors[:, step] = np.abs(ends - estimate.value[2])
