@@ -88,6 +88,12 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
         parser.error(f"--figure: must be 1 to {len(FIGURES)}, got {options.figure}")
     if options.parameters:
         _read_parameters(parser, options.parameters)
+        what_ifs = {path.stem for path in Path(__file__).parent.glob("what_if/*.toml")}
+        if options.figure and what_ifs & {*FIGURES[str(options.figure)]["needs"]}:
+            parser.error(
+                f"--figure: {options.figure} is about what-ifs, which state parameters of their"
+                " own; draw it without --parameters"
+            )
     return options
 
 

@@ -69,7 +69,8 @@ def write(path: Path, data: Data, groups, images, runner, warned, *, done: bool)
             return None
 
     template = environment.from_string(Path(__file__).with_name("page.html").read_text("utf-8"))
-    readings = ready(lambda: compare(data)) or []
+    # The appendix, of which the readings are a part, is written at the end only.
+    readings = (ready(lambda: compare(data)) if done else None) or []
     order = [Verdict.FAILS, Verdict.TEXT, Verdict.OPEN, Verdict.CORRECTED]
     exceptions = [f for f in findings if f.verdict in order]
     exceptions.sort(key=lambda f: order.index(f.verdict))

@@ -118,6 +118,8 @@ _LAW = MARGINAL.distribution
 MEAN, DEVIATION = _LAW.mean(), _LAW.std()
 SUPPORT = _LAW.support()
 """Bounds of the strength, Pa; the upper one may be infinite."""
+DENSITY_BOUNDS = [bound if np.isfinite(bound) else None for bound in SUPPORT]
+"""The same for densities of stresses, Pa; None where there is no bound."""
 LOW = SUPPORT[0] if SUPPORT[0] > 0.0 else float(_LAW.ppf(TAIL))
 HIGH = SUPPORT[1] if np.isfinite(SUPPORT[1]) else float(_LAW.ppf(1.0 - TAIL))
 """The range of the strength in figures, and the largest strength of the energy balance, Pa."""
@@ -131,14 +133,22 @@ def residual(strength):
     return float(law.residual_strength or 0.0)
 
 
-LOADING_RATE = PARAMETERS.get("loading_rate") or (
-    float(f"{PRINTED_RATE * (MEAN / 1e6) / (L / PROBLEM.solid.shear_wave_speed / 1.08e-4):.2g}")
-    if PARAMETERS else PRINTED_RATE
-)  # fmt: skip
-"""Of the ruptures, Pa/s; by default the load rises by the same share of the mean strength while
-a shear wave runs along the interface as it does with the paper's parameters."""
+def _loading_rate() -> float:
+    if "loading_rate" in PARAMETERS:
+        rate = PARAMETERS["loading_rate"]
+        if not (isinstance(rate, int | float) and 0.0 < rate < np.inf):
+            raise st.InputError(f"loading_rate: give a positive number, Pa/s, got {rate!r}")
+        return float(rate)
+    if not PARAMETERS:
+        return PRINTED_RATE
+    return float(f"{PRINTED_RATE * (MEAN / 1e6) / (CROSSING / 1.08e-4):.2g}")
+
+
 CROSSING = L / PROBLEM.solid.shear_wave_speed
 """Time in which a shear wave runs along the interface, s."""
+LOADING_RATE = _loading_rate()
+"""Of the ruptures, Pa/s; by default the load rises by the same share of the mean strength while
+a shear wave runs along the interface as it does with the paper's parameters."""
 WHAT_IF = Path(__file__).parent / "what_if"
 
 

@@ -387,8 +387,7 @@ def bound_above(d: Data, ratio: float) -> np.ndarray:
 
 def stress_density(d: Data, ratio: float):
     """Return the density of tau_cr."""
-    bounds = [bound if np.isfinite(bound) else None for bound in setting.SUPPORT]
-    return st.statistics.density(d.stress(ratio), bounds=bounds)
+    return st.statistics.density(d.stress(ratio), bounds=setting.DENSITY_BOUNDS)
 
 
 GROUPS = {

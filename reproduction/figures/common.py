@@ -57,16 +57,6 @@ def span(*rows, margin: float = 0.06) -> tuple[float, float]:
     return float(values.min() - gap), float(values.max() + gap)
 
 
-def left_out(axes, values, limits) -> None:
-    """Say how many values lie outside the limits of an axis."""
-    values = np.ravel(values)
-    count = int(np.sum((values < limits[0]) | (values > limits[1])))
-    if count:
-        axes.text(
-            0.99, 0.02, f"{count} outside", transform=axes.transAxes, ha="right", va="bottom"
-        )
-
-
 def letters(panels, *, x: float = -0.12) -> None:
     """Letter panels in their order."""
     for text, axes in zip("abcd", panels, strict=False):

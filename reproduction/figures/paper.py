@@ -262,7 +262,7 @@ def figure_5(d: Data):
         tau_n = st.theory.nucleation_stress(PROBLEM, tau_p)[0]
         lower[0].plot(x, tau_n / MEAN, **common.line(ratio), lw=0.9)
         weakest = d.at("moments", "weakest_strength", ratio)
-        least = st.statistics.density(weakest, bounds=_bounds())
+        least = st.statistics.density(weakest, bounds=setting.DENSITY_BOUNDS)
         minima.append(least.x[least.value > 1e-3 * least.value.max()] / MEAN)
         averages.append(tau_n / MEAN)
         upper[1].plot(least.value / least.value.max(), least.x / MEAN, **common.line(ratio))
@@ -313,10 +313,6 @@ def figure_5(d: Data):
     common.letter(stress, "c", x=-0.12)
     common.letter(place, "d", x=-0.12)
     return figure
-
-
-def _bounds() -> list[float | None]:
-    return [bound if np.isfinite(bound) else None for bound in setting.SUPPORT]
 
 
 _PLACES = np.array([np.log2(setting.FIRST) - 1.2, *np.log2(RATIOS), np.log2(RATIOS[-1]) + 1.2])

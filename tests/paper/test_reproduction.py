@@ -487,6 +487,9 @@ def test_the_parameters_of_the_documentation_are_taken(monkeypatch):
     ("arguments", "own", "text"),
     [
         (("--figure", "17"), OWN, "must be 1 to 16, got 17"),
+        (("--figure", "14"), OWN, "14 is about what-ifs"),
+        ((), "loading_rate = -1.0", "loading_rate: give a positive number, Pa/s, got -1.0"),
+        ((), "loading_rate = 'fast'", "loading_rate: give a positive number"),
         (("--samples", "20"), OWN, "must be 100 or more, got 20"),
         ((), "lenght = 0.15", "my.toml: lenght: unknown key (valid: problem, random,"),
         ((), "correlation_ratios = [2, 1]", "2 to 6 rising positive numbers"),
