@@ -5,6 +5,7 @@ import pytest
 from joint import GIVEN, PROBLEM, RANDOM
 from refusals import refuses
 from scipy.stats import norm
+from setups import ensemble
 
 import stiction as st
 from stiction.cli.commands import app
@@ -16,13 +17,8 @@ def test_a_page_of_a_design(tmp_path):
     """Characteristic value and partial factor by hand, where interfaces differ in the mean."""
     design = st.design_stress(PROBLEM, RANDOM, probability=1e-3, sensitivities=True, **GIVEN)
     assert design.reliability_index == pytest.approx(-norm.ppf(1e-3))
-    inner = st.monte_carlo(
-        PROBLEM,
-        RANDOM.strength,
-        method=GIVEN["method"],
-        samples=5000,
-        pilot=False,
-        progress=False,
+    inner = ensemble(
+        PROBLEM, RANDOM.strength, 5000, method=GIVEN["method"]
     ).critical_stress.values
     law = RANDOM.between["strength"].distribution
     levels = np.linspace(0.6e6, 0.9e6, 301)

@@ -7,6 +7,7 @@ import pytest
 import scipy.stats
 from joint import GIVEN, PROBLEM, RANDOM
 from refusals import refuses
+from setups import ensemble
 
 import stiction as st
 
@@ -57,14 +58,7 @@ def test_an_uncertain_pressure_is_one_more_factor(several):
     source = st.uncertain(given, {PRESSURE: law})
     demand = 0.72e6
     found = st.failure_probability(PROBLEM, source, demand, seed=2, **GIVEN)
-    inner = st.monte_carlo(
-        PROBLEM,
-        RANDOM.strength,
-        method=GIVEN["method"],
-        samples=5000,
-        pilot=False,
-        progress=False,
-    )
+    inner = ensemble(PROBLEM, RANDOM.strength, 5000, method=GIVEN["method"])
     shares = (np.arange(200) + 0.5) / 200
     at = demand * 5e6 / law.ppf(shares)[:, None] / inner.critical_stress.values
     exact = RANDOM.between["strength"].distribution.cdf(at).mean()
