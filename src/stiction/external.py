@@ -10,7 +10,7 @@ from stiction.base.errors import InputError
 from stiction.base.model import Names, Numbers, at_least, check, checked, describe
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import limit_state
-from stiction.inference.likelihood import simulate
+from stiction.inference.likelihood import Simulation, simulate
 from stiction.inference.prior import with_parameters
 from stiction.methods.dynamics.scec import write_scec
 from stiction.methods.protocol import MethodObject
@@ -90,12 +90,11 @@ def simulator(
                 f"theta: must be {len(parameters)} finite numbers, {', '.join(parameters)}, got"
                 f" {describe(theta)}"
             )
-        experiment = Experiment(
-            *with_parameters(problem, interface, parameters, values), method
-        )
+        at_values = with_parameters(problem, interface, parameters, values)
         (peaks,) = simulate(
-            [experiment], samples=samples, first=first, seed=seed, variable="critical_stress"
-        )
+            [Experiment(*at_values, method)], Simulation(method, samples, seed), first,
+            "critical_stress",
+        )  # fmt: skip
         errors = np.random.default_rng([seed, first, 1]).standard_normal(samples)
         return peaks + load_cell_error * errors
 

@@ -8,10 +8,10 @@ import scipy.stats
 from setups import EXACT, LOCAL, turns
 
 import stiction as st
-from stiction.base.progress import SILENT
 from stiction.inference.density import log_likelihoods, tabulate
 from stiction.inference.grid import grid_of
 from stiction.inference.likelihood import (
+    Simulation,
     effective_samples,
     experiments_at,
     make_likelihood,
@@ -42,17 +42,15 @@ def with_load(**options):
 
 
 def likelihood_of(prior, error=0.0, samples=400, lengths=(None,)):
+    simulation = Simulation(LOCAL, samples, seed=0)
     return make_likelihood(
-        prior, method=LOCAL, lengths=lengths, error=error, samples=samples, seed=0,
-        variable="critical_stress", meter=SILENT,
-    )  # fmt: skip
+        prior, simulation, lengths=lengths, error=error, variable="critical_stress"
+    )
 
 
 def onsets(prior, theta, method=LOCAL, samples=60, seed=3):
-    return simulate(
-        experiments_at(prior, np.atleast_2d(theta), method),
-        samples=samples, first=0, seed=seed, variable="critical_stress", meter=SILENT,
-    )  # fmt: skip
+    experiments = experiments_at(prior, np.atleast_2d(theta), method)
+    return simulate(experiments, Simulation(method, samples, seed), 0, "critical_stress")
 
 
 WAVE = np.cos(turns(256))

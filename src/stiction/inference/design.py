@@ -12,7 +12,7 @@ from stiction.base.model import Count, Names, Progress, at_least, check, checked
 from stiction.base.progress import Meter
 from stiction.base.variables import Variable
 from stiction.inference.grid import grid_of
-from stiction.inference.likelihood import Likelihood, make_likelihood, variable_of
+from stiction.inference.likelihood import Likelihood, Simulation, make_likelihood, variable_of
 from stiction.inference.peaks import factor_of
 from stiction.inference.prior import make_prior
 from stiction.inference.widths import expected_widths
@@ -116,13 +116,13 @@ def design_of_tests(
     >>> bool(information.sel(design="many") > information.sel(design="few"))
     True
     """
+    error = load_cell_error * factor_of(unit)
     if prior is None:
         with Meter("design of tests", show=progress) as meter:
+            simulation = Simulation(method, samples, seed, workers, meter)
             return expected_widths(
-                problem, random, USUAL_DESIGNS if designs is None else designs,
-                probability=probability, method=method, error=load_cell_error * factor_of(unit),
-                unit=unit, repetitions=repetitions, samples=samples, seed=seed, workers=workers,
-                meter=meter,
+                problem, random, USUAL_DESIGNS if designs is None else designs, simulation,
+                probability, error, unit, repetitions,
             )  # fmt: skip
     parameters = make_prior(problem, random, prior)
     designs = designs or {}
@@ -130,10 +130,10 @@ def design_of_tests(
     plans = _plans(designs, parameters.names)
     lengths = list(dict.fromkeys(length for tests, _ in plans for length in tests))
     with Meter("design of tests", show=progress) as meter:
+        simulation = Simulation(method, samples, seed, workers, meter)
         simulated = make_likelihood(
-            parameters, method=method, lengths=lengths, error=load_cell_error * factor_of(unit),
-            samples=samples, seed=seed, variable=variable, workers=workers, meter=meter,
-        )  # fmt: skip
+            parameters, simulation, lengths=lengths, error=error, variable=variable
+        )
         meter.stage("simulated campaigns", repetitions * len(plans))
         rows = []
         for tests, free in plans:

@@ -11,7 +11,7 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Count, Progress, at_least, checked
-from stiction.base.progress import Meter
+from stiction.base.progress import Meter, Show
 from stiction.ensemble.limit_state import no_single_length
 from stiction.ensemble.pilot import compare, pilot_doubt
 from stiction.inference.curves import Curves
@@ -19,6 +19,7 @@ from stiction.inference.grid import grid_of
 from stiction.inference.joined import join
 from stiction.inference.likelihood import (
     Likelihood,
+    Simulation,
     bounds_of,
     experiments_at,
     make_likelihood,
@@ -52,12 +53,16 @@ UNFINISHED: dict[Any, Array] = {}
 
 
 @contextmanager
-def _forgetting_errors() -> Iterator[None]:
-    try:
-        yield
-    except Exception:  # Ctrl-C is none: it can be taken up
+def _simulating(
+    method: Any, samples: int | None, seed: int, workers: int | None, progress: Show
+) -> Iterator[Simulation]:
+    with Meter("infer", show=progress) as meter:
+        try:
+            yield Simulation(method, samples, seed, workers, meter, UNFINISHED)
+        except Exception:  # after Ctrl-C the next call goes on with these onsets
+            UNFINISHED.clear()
+            raise
         UNFINISHED.clear()
-        raise
 
 
 @checked
@@ -191,13 +196,10 @@ def infer(
             " standard deviation in the unit of the peaks"
         )
     if not (prior and {*prior} - {MEAN_KEY, SCATTER_KEY}):
-        with _forgetting_errors(), Meter("infer", show=progress) as meter:
-            posterior = join(
-                problem, random, measured, prior=prior, between=between, method=method, error=error,
-                samples=samples, seed=seed, workers=workers, meter=meter, done=UNFINISHED,
-            )  # fmt: skip
-        UNFINISHED.clear()
-        return posterior
+        with _simulating(method, samples, seed, workers, progress) as simulation:
+            return join(
+                problem, random, measured, simulation, prior=prior, between=between, error=error
+            )
     parameters = make_prior(problem, random, prior)
     variable = variable_of(*parameters.at(parameters.middle), measured.unit)
     (experiment,) = experiments_at(parameters, parameters.middle, method)
@@ -205,28 +207,25 @@ def infer(
         mean_in_stress(experiment.problem, experiment.random, "strength")
     )
     _check_reach(parameters, method, measured, error)
-    with _forgetting_errors(), Meter("infer", show=progress) as meter:
+    with _simulating(method, samples, seed, workers, progress) as simulation:
 
-        def likelihood_of(method: Any, samples: int | None, box: Array) -> Likelihood:
-            return make_likelihood(
-                parameters, box, method=method, lengths=measured.lengths, error=error,
-                samples=samples, seed=seed, variable=variable, workers=workers, meter=meter,
-                done=UNFINISHED,
-            ).of(measured.values)  # fmt: skip
+        def likelihood_of(simulation: Simulation, box: Array) -> Likelihood:
+            given: Any = {"lengths": measured.lengths, "error": error, "variable": variable}
+            return make_likelihood(parameters, simulation, box, **given).of(measured.values)
 
         whole = box = parameters.whole
         approximate = optional_member(method, "exact_method") is not None
         if not approximate and not no_single_length(experiment.problem, experiment.random):
-            box = _first_box(likelihood_of(LocalCriterion(), None, whole))
+            local = simulation._replace(method=LocalCriterion(), samples=None)
+            box = _first_box(likelihood_of(local, whole))
         while True:
-            likelihood = likelihood_of(method, samples, box)
+            likelihood = likelihood_of(simulation, box)
             grid = grid_of(likelihood, box)
             u = None if grid is None else grid.draws(POSTERIOR_DRAWS, seed)
             wider = _grown(box, u)
             if np.array_equal(wider, box):
                 break
             box = wider
-    UNFINISHED.clear()
     if np.all(likelihood.box == whole) and (refused := likelihood.refusals()):
         raise InputError(refused)
     if grid is None or u is None:

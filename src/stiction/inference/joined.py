@@ -15,7 +15,6 @@ from scipy.stats import entropy
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Count, Number, checked
-from stiction.base.progress import Meter
 from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.limit_state import scales_with_strength
 from stiction.inference.agreement import Agreement, agreement
@@ -23,6 +22,7 @@ from stiction.inference.density import tabulate
 from stiction.inference.fit import FieldFit
 from stiction.inference.likelihood import (
     SPECIMEN,
+    Simulation,
     bounds_of,
     experiment_on,
     simulate,
@@ -146,48 +146,35 @@ def join(
     problem: Problem,
     random: Any,
     measured: Peaks,
+    simulation: Simulation,
     *,
     prior: Any,
     between: Any,
-    method: Any,
     error: float,
-    samples: int | None,
-    seed: int,
-    workers: int | None,
-    meter: Meter,
-    done: dict[Any, Array],
 ) -> SpecimenPosterior:
     """Return the posterior of mean and scatter between specimens, from profiles and peaks."""
-    profiles = profiles_of(random, prior, between, seed)
+    profiles = profiles_of(random, prior, between, simulation.seed)
     variable = variable_of(problem, profiles.fields[0], measured.unit)
-    count = samples or ONSETS.get(method.type, FEW_ONSETS)
     kinds = [
-        simulated_onsets(
-            profiles, problem, method, measured.lengths[number], peaks, number, error,
-            variable=variable, samples=count, seed=seed, workers=workers, meter=meter, done=done,
-        )
-        for number, peaks in enumerate(measured.values)
-    ]  # fmt: skip
-    predictions = [
-        kind.area * profiles_mean(profiles, peaks, kind) * kind.ratios[:, 0].ravel()
-        for kind, peaks in zip(kinds, measured.values, strict=True)
+        simulated_onsets(profiles, problem, simulation, length, peaks, number, error, variable)
+        for number, (length, peaks, _) in enumerate(zip(*measured, strict=False))
     ]
-    if profiles.levels.size:
-        measured.refuse_far(predictions)
-    tables = Tables(profiles, method, tuple(kinds), error, tuple(measured.values))
-    by_profiles, grid = grid_of_profiles(profiles, tables)
-    tests = sum(map(np.size, measured.values))
-    common: dict[str, Any] = {
-        "problem": problem, "likelihood": tables, "seed": seed, "by_profiles": by_profiles,
-        "monte_carlo_error": math.sqrt(tests / (len(profiles.fields) * count)),
-    }  # fmt: skip
     known = profiles.levels.size > 0
+    if known:
+        mean = float(profiles.levels.mean() / profiles.reference)
+        measured.refuse_far([kind.area * mean * kind.ratios[:, 0].ravel() for kind in kinds])
+    tables = Tables(profiles, simulation.method, tuple(kinds), error, tuple(measured.values))
+    by_profiles, grid = grid_of_profiles(profiles, tables)
+    tests, onsets = sum(map(np.size, measured.values)), kinds[0].ratios[:, 0].size
+    common: dict[str, Any] = {
+        "problem": problem, "likelihood": tables, "seed": simulation.seed,
+        "by_profiles": by_profiles, "monte_carlo_error": math.sqrt(tests / onsets),
+    }  # fmt: skip
     comparison = None
     if known:
-        alone = _result(
-            by_profiles, measured._replace(values=tuple(np.empty(0) for _ in kinds)), **common
-        )
-        comparison = agreement(alone, measured, seed=seed)
+        nothing = measured._replace(values=tuple(np.empty(0) for _ in kinds))
+        alone = _result(by_profiles, nothing, **common)
+        comparison = agreement(alone, measured, seed=simulation.seed)
     notes = _notes(profiles, tests, comparison)
     for text in notes:
         warn_accuracy(text)
@@ -199,11 +186,6 @@ def join(
     )  # fmt: skip
 
 
-def profiles_mean(profiles: Profiles, peaks: Array, kind: Onsets) -> float:
-    """Return the mean level over the reference, or 1 without profiles."""
-    return float(profiles.levels.mean() / profiles.reference) if profiles.levels.size else 1.0
-
-
 def _result(grid: Grid, peaks: Peaks, **more: Any) -> SpecimenPosterior:
     u = grid.draws(POSTERIOR_DRAWS, np.random.default_rng(more["seed"]))
     options: dict[str, Any] = {"information": {}, "log_evidence": math.nan, "notes": ()} | more
@@ -211,11 +193,19 @@ def _result(grid: Grid, peaks: Peaks, **more: Any) -> SpecimenPosterior:
 
 
 def simulated_onsets(
-    profiles: Profiles, problem: Problem, method: Any, length: float | None, peaks: Array,
-    number: int, error: float, *, variable: str, samples: int, seed: int, workers: int | None,
-    meter: Meter, done: dict[Any, Array],
-) -> Onsets:  # fmt: skip
+    profiles: Profiles,
+    problem: Problem,
+    simulation: Simulation,
+    length: float | None,
+    peaks: Array,
+    number: int,
+    error: float,
+    variable: str,
+) -> Onsets:
     """Return onsets of all fields on one kind of specimen (step 1 of `specimens`)."""
+    method, meter, workers = simulation.method, simulation.meter, simulation.workers
+    samples = simulation.samples or ONSETS.get(method.type, FEW_ONSETS)
+    simulation = simulation._replace(samples=samples, workers=1)  # a thread for each field
     first = experiment_on(problem, profiles.fields[0], method, length)
     forces = variable == "critical_force"
     area = (first.problem.area or math.nan) if forces else 1.0
@@ -224,16 +214,10 @@ def simulated_onsets(
     def onsets(place: int, at: Array) -> tuple[Array, Any]:
         """Return onsets over c/reference, (steps, samples), and their densities."""
         strengths = np.exp(at)
-        experiments = [
-            experiment_on(
-                problem, of_mean(profiles.fields[place], c * profiles.reference), method, length
-            )
-            for c in strengths
-        ]
-        relative = simulate(
-            experiments, samples=samples, first=number * SPECIMEN + place * samples, seed=seed,
-            variable=of, workers=1, meter=meter, done=done,
-        ) / strengths[:, None]  # fmt: skip
+        fields = [of_mean(profiles.fields[place], c * profiles.reference) for c in strengths]
+        experiments = [experiment_on(problem, field, method, length) for field in fields]
+        start = number * SPECIMEN + place * samples
+        relative = simulate(experiments, simulation, start, of) / strengths[:, None]
         if not np.isfinite(relative).all() or relative.min() <= 0.0:
             raise InputError(
                 "method: some simulated specimens have no positive onset, so that their peaks say"

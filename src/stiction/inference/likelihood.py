@@ -125,22 +125,28 @@ def experiment_on(
     return Experiment(problem, random, method)
 
 
+class Simulation(NamedTuple):
+    """How onsets are simulated."""
+
+    method: Any
+    samples: int | None  # at each point; by default as many as the method needs
+    seed: int
+    workers: int | None = None  # threads; all cores by default
+    meter: Meter = SILENT
+    done: dict[Any, Array] | None = (
+        None  # onsets of an interrupted call, to which these are added
+    )
+
+
 def simulate(
-    experiments: Sequence[Experiment],
-    *,
-    samples: int,
-    first: int,
-    seed: int,
-    variable: str,
-    workers: int | None = None,
-    meter: Meter = SILENT,
-    done: dict[Any, Array] | None = None,
+    experiments: Sequence[Experiment], simulation: Simulation, first: int, variable: str
 ) -> Array:
     """Return onsets of samples first, ... of some experiments, (experiments, samples).
 
-    Sample i has the same draws in each of them. What is `done` is taken, and added to.
+    Sample i has the same draws in each experiment.
     """
-    done = {} if done is None else done
+    done = {} if simulation.done is None else simulation.done
+    samples: Any = simulation.samples
     peaks = np.empty((len(experiments), samples))
     jobs = [
         (number, start, count)
@@ -152,15 +158,14 @@ def simulate(
 
     def work(job: tuple[int, int, int]) -> None:
         number, start, count = job
-        experiment = experiments[number].with_seed(seed)
+        experiment = experiments[number].with_seed(simulation.seed)
         key = experiment, start, count, variable
-        values = done.get(key)
-        if values is None:
-            values = done[key] = experiment.results(start, count)[variable]
-        peaks[number, start - first : start - first + count] = values
-        meter.advance(count)
+        if key not in done:
+            done[key] = experiment.results(start, count)[variable]
+        peaks[number, start - first : start - first + count] = done[key]
+        simulation.meter.advance(count)
 
-    in_threads(work, jobs, workers or usable_cores())
+    in_threads(work, jobs, simulation.workers or usable_cores())
     return peaks
 
 
@@ -309,66 +314,63 @@ def out_of_reach(
 
 def make_likelihood(
     prior: Prior,
+    simulation: Simulation,
     box: Array | None = None,
     *,
-    method: Any,
     lengths: Sequence[float | None],
     error: float,
-    samples: int | None,
-    seed: int,
     variable: str,
-    workers: int | None = None,
-    meter: Meter = SILENT,
-    done: dict[Any, Array] | None = None,
 ) -> Likelihood:
-    """Simulate the onsets that the likelihood needs, but for those that are `done`.
+    """Simulate the onsets that the likelihood needs.
 
     `lengths` are those of the specimens, m, None for the problem's own; `variable` is the
     name of the peaks among the results, with the standard `error` of the load cell. `box`
     is the part of the prior that matters, (2, parameters) as u; all of it if left out.
     """
-    box = prior.whole if box is None else box
+    box, method, meter = (
+        prior.whole if box is None else box,
+        simulation.method,
+        simulation.meter,
+    )
     forces = variable == "critical_force"
     variable = "critical_stress" if forces else variable
     scaling = find_scaling(prior, method, variable)
     axes = make_axes(prior, scaling, box)
     thetas = nodes_of(axes, scaling.reference)
-    count = samples or optional_member(method, "samples_at_point")
+    count = simulation.samples or optional_member(method, "samples_at_point")
+    simulation = simulation._replace(samples=count)
     local = optional_member(method, "exact_method") is not None
     guided = not local and not no_single_length(*prior.at(prior.middle))
     few = make_axes(prior, scaling, box, COARSE) if guided else axes
     coarse, weights = nodes_of(few, scaling.reference), corners(few, thetas)
     total = len(coarse) * len(lengths) * count
     if not local:
-        warn_if_long(experiments_at(prior, coarse[:1], method)[0], total, workers)
+        warn_if_long(experiments_at(prior, coarse[:1], method)[0], total, simulation.workers)
     meter.stage("simulated onsets", total)
     effective, densities = float(count), []
     for number, length in enumerate(lengths):
         experiments = experiments_at(prior, thetas, method, length)
         for end in (experiments[0], experiments[-1]):
             end.random.warn_if_inaccurate(end.problem.interface)
-        options: Any = {"first": number * SPECIMEN, "seed": seed, "variable": variable}
-        options |= {"workers": workers, "done": done}
         at_coarse = experiments_at(prior, coarse, method, length)
-        onsets = simulate(at_coarse, samples=count, meter=meter, **options)
+        first = number * SPECIMEN
+        onsets = simulate(at_coarse, simulation, first, variable)
         if guided:
-            known = simulate(
-                [one.by(LocalCriterion()) for one in at_coarse], samples=count, **options
-            )
-            options["samples"] = max(count, LocalCriterion.samples_at_point)
-            meter.stage("onsets by the local criterion", len(thetas) * options["samples"])
-            nearby = [one.by(LocalCriterion()) for one in experiments]
-            many = simulate(nearby, meter=meter, **options)
-            alike = np.mean(
-                [np.corrcoef(*pair)[0, 1] for pair in zip(onsets, known, strict=True)]
-            )
+            by_local = [one.by(LocalCriterion()) for one in at_coarse]
+            known = simulate(by_local, simulation._replace(meter=SILENT), first, variable)
+            by_local = [one.by(LocalCriterion()) for one in experiments]
+            size = max(count, LocalCriterion.samples_at_point)
+            meter.stage("onsets by the local criterion", len(thetas) * size)
+            many = simulate(by_local, simulation._replace(samples=size), first, variable)
+            pairs = zip(onsets, known, strict=True)
+            alike = float(np.mean([np.corrcoef(*pair)[0, 1] for pair in pairs]))
             if alike > MIN_CORRELATION:
                 onsets = moved(many, onsets, known, *weights)
-                effective = effective_samples(float(alike), many.shape[1], count)
+                effective = effective_samples(alike, size, count)
             else:
-                warn_if_long(experiments[0], len(thetas) * count, workers)
+                warn_if_long(experiments[0], len(thetas) * count, simulation.workers)
                 meter.stage("simulated onsets", len(thetas) * count)
-                onsets = simulate(experiments, **options | {"samples": count, "meter": meter})
+                onsets = simulate(experiments, simulation, first, variable)
         bounds = [bounds_of(own, variable)[0] for own in experiments]
         densities.append(tabulate(onsets, np.array(bounds)))
     none = Area(1.0, [])

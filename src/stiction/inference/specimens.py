@@ -35,6 +35,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 import scipy.stats
 from scipy.optimize import brentq
+from scipy.special import logsumexp
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, unknown_name
@@ -160,12 +161,18 @@ class Onsets:
     densities: tuple[Densities, ...]  # of each field
     area: float = 1.0  # of peaks per onset
 
+    def of(self, order: Any) -> Self:
+        """Return the onsets of some fields, by their numbers."""
+        densities = tuple(self.densities[k] for k in order)
+        return replace(self, ratios=self.ratios[order], densities=densities)
+
     def tabulated(self, field: int, peaks: Array, error: float, x: Array) -> Array:
         """Return the density of each peak at x, (peaks, points), up to a factor of each peak."""
-        place = np.clip(np.interp(x, self.at, np.arange(self.at.size)), 0, self.at.size - 1)
-        first = np.minimum(place.astype(np.int64), max(self.at.size - 2, 0))
+        last = self.at.size - 1
+        place = np.interp(x, self.at, np.arange(last + 1))
+        first = np.minimum(place.astype(np.int64), max(last - 1, 0))
         share = place - first
-        index = np.stack([first, np.minimum(first + 1, self.at.size - 1)], axis=1)
+        index = np.stack([first, np.minimum(first + 1, last)], axis=1)
         weight = np.stack([1.0 - share, share], axis=1)
         known, out = self.densities[field], np.empty((x.size, peaks.size))
         scales = self.area * np.stack([np.zeros(x.size), np.exp(x)])
@@ -184,10 +191,9 @@ class Onsets:
 
 def points_between(ranges: Sequence[tuple[float, float, float]]) -> Array:
     """Return points of x that cover ranges in steps of a quarter of the least deviation."""
-    low, high, deviation = (
-        pick(v) for pick, v in zip((min, max, min), zip(*ranges, strict=True), strict=True)
-    )
-    count = int(np.clip(np.ceil(FINE * (high - low) / deviation), 64, MAX_X_POINTS))
+    lows, highs, deviations = zip(*ranges, strict=True)
+    low, high = min(lows), max(highs)
+    count = int(np.clip(np.ceil(FINE * (high - low) / min(deviations)), 64, MAX_X_POINTS))
     return np.linspace(low, high, count)
 
 
@@ -219,9 +225,8 @@ class Grid:
     @property
     def families(self) -> dict[str, float]:
         """Posterior probability of each family of the factor."""
-        return dict(
-            zip(self.profiles.families, self.mass.sum(axis=(0, 2, 3)).tolist(), strict=True)
-        )
+        masses = self.mass.sum(axis=(0, 2, 3)).tolist()
+        return dict(zip(self.profiles.families, masses, strict=True))
 
     def draws(self, count: int, rng: np.random.Generator, fields: Any = None) -> Array:
         """Draw field, family, s and log m, (count, 4); of given fields if there are some."""
@@ -240,11 +245,10 @@ class Grid:
 
     def interface(self, drawn: Array) -> RandomInterface:
         """Return the random interface of one draw (4,)."""
-        profiles = self.profiles
-        factor = factor_of_family(profiles.families[int(drawn[1])], float(drawn[2]))
-        return of_mean(
-            profiles.fields[int(drawn[0])], profiles.reference * math.exp(drawn[3]), factor
-        )
+        (field, family), profiles = drawn[:2].astype(int), self.profiles
+        factor = factor_of_family(profiles.families[family], float(drawn[2]))
+        mean = profiles.reference * math.exp(drawn[3])
+        return of_mean(profiles.fields[field], mean, factor)
 
     def grouped(self, drawn: Array) -> tuple[list[RandomInterface], list[int]]:
         """Return the interfaces of draws (draws, 4), and the numbers of their fields."""
@@ -252,18 +256,16 @@ class Grid:
 
     def described(self, drawn: Array) -> dict[str, Array]:
         """Return draws (draws, 4) as columns of parameters."""
-        profiles, field = self.profiles, drawn[:, 0].astype(np.int64)
-        means = profiles.reference * np.exp(drawn[:, 3])
-        strengths = [one.strength for one in profiles.fields]
-        of_field = {
-            "strength.standard_deviation": [one.standard_deviation for one in strengths],
-            "strength.efolding_length": [one.spectrum.efolding_length for one in strengths],
+        field, scale = drawn[:, 0].astype(np.int64), np.exp(drawn[:, 3])
+        strengths = [one.strength for one in self.profiles.fields]
+        deviations = np.array([one.standard_deviation for one in strengths])
+        lengths = np.array([one.spectrum.efolding_length for one in strengths])
+        return {
+            MEAN_KEY: self.profiles.reference * scale,
+            SCATTER_KEY: drawn[:, 2],
+            "strength.standard_deviation": deviations[field] * scale,
+            "strength.efolding_length": lengths[field],
         }
-        columns = {MEAN_KEY: means, SCATTER_KEY: drawn[:, 2]}
-        for name, values in of_field.items():
-            columns[name] = np.array(values)[field]
-        columns["strength.standard_deviation"] *= means / profiles.reference
-        return columns
 
 
 def grid_of_profiles(profiles: Profiles, tables: "Tables | None" = None) -> tuple[Grid, Grid]:
@@ -280,37 +282,33 @@ def grid_of_profiles(profiles: Profiles, tables: "Tables | None" = None) -> tupl
     of_levels -= np.log(deviations[..., None])
     of_peaks = np.zeros((len(profiles.fields), 0, x.size)) if tables is None else tables(x)
     box = np.array([x[0] - LOG_MEAN_MARGIN, x[-1] + LOG_MEAN_MARGIN])
+    cells, by_field = profiles.prior.cells(), (1, 2, 3)
     for _ in range(MAX_MEAN_ZOOMS):
         means = box[0] + np.ptp(box) * (np.arange(MEAN_CELLS) + 0.5) / MEAN_CELLS
         # 3. and 4.
         kernel = np.array(
-            [
-                [masses(f, cv, means, x) for cv in profiles.prior.cells()]
-                for f in profiles.families
-            ]
+            [[masses(name, cv, means, x) for cv in cells] for name in profiles.families]
         )
         before = _products(kernel, of_levels)
         if profiles.prior.mean is not None:
             before += profiles.prior.mean.logpdf(profiles.reference * np.exp(means)) + means
-        before -= _log_sum(before)[:, None, None, None] + math.log(len(profiles.fields))
+        before -= logsumexp(before, axis=by_field, keepdims=True) + math.log(len(before))
         after = before + _products(kernel, of_peaks)
-        evidence = float(_log_sum(after[None])[0])
+        evidence = float(logsumexp(after))
         if not math.isfinite(evidence):
             raise InputError(
-                "peaks: contradict the profiles or the prior: no mean and scatter give both"
+                "peaks: no mean and scatter give the peaks and what is known before"
             )
         mass = np.exp(after - evidence)
         along = [mass.sum(axis=(0, 1, 2))]
         if levels.size or profiles.prior.mean is not None:
             along.append(np.exp(before).sum(axis=(0, 1, 2)))
-        empty = [
-            min(int(np.sum(np.cumsum(own[::way]) <= OUTER_MASS)) for own in along)
-            for way in (1, -1)
-        ]
-        if sum(empty) <= 0.1 * MEAN_CELLS:
+        empty = np.array(
+            [[np.sum(np.cumsum(p) <= OUTER_MASS) for p in (row, row[::-1])] for row in along]
+        ).min(axis=0)
+        if empty.sum() <= 0.1 * MEAN_CELLS:
             break
-        cell = np.ptp(box) / MEAN_CELLS
-        box = box + cell * np.array([max(empty[0] - 1, 0), -max(empty[1] - 1, 0)])
+        box = box + np.ptp(box) / MEAN_CELLS * np.maximum(empty - 1, 0) * [1, -1]
     return Grid(profiles, means, np.exp(before)), Grid(profiles, means, mass, evidence)
 
 
@@ -319,25 +317,12 @@ def _products(kernel: Array, tables: Array) -> Array:
 
     `tables` are log likelihoods at x of numbers by field, (fields, numbers, points).
     """
-    fields, numbers, points = tables.shape
-    total = np.zeros((fields, *kernel.shape[:-1]))
-    if not numbers:
-        return total
-    tops = tables.max(axis=2)
-    flat = kernel.reshape(-1, points).T
-    for number in range(numbers):
-        top = tops[:, number]
-        integrals = np.exp(tables[:, number] - top[:, None]) @ flat
-        total += np.log(np.maximum(integrals, 1e-300)).reshape(total.shape)
-        total += top[:, None, None, None]
-    return total
-
-
-def _log_sum(values: Array) -> Array:
-    """Return the logarithm of the sum of exponentials over all axes but the first."""
-    flat = values.reshape(len(values), -1)
-    top = flat.max(axis=1)
-    return top + np.log(np.exp(flat - top[:, None]).sum(axis=1))
+    flat = kernel.reshape(-1, kernel.shape[-1]).T
+    total = np.zeros((len(tables), flat.shape[1]))
+    for table in np.moveaxis(tables, 1, 0):
+        top = table.max(axis=1, keepdims=True)
+        total += np.log(np.maximum(np.exp(table - top) @ flat, 1e-300)) + top
+    return total.reshape(-1, *kernel.shape[:-1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -358,17 +343,16 @@ class Tables:
     def ranges(self) -> list[tuple[float, float, float]]:
         """Return the ranges of x of all kinds of peaks."""
         pairs = zip(self.onsets, self.peaks, strict=True)
-        return [own.ranges(peaks, self.error) for own, peaks in pairs if peaks.size]
+        return [kind.ranges(peaks, self.error) for kind, peaks in pairs if peaks.size]
+
+    def of_field(self, field: int, x: Array) -> Array:
+        """Return log likelihoods of all peaks at x by one field, (peaks, points)."""
+        pairs = zip(self.onsets, self.peaks, strict=True)
+        return np.concatenate([k.tabulated(field, peaks, self.error, x) for k, peaks in pairs])
 
     def __call__(self, x: Array) -> Array:
         """Return log likelihoods of all peaks at x, (fields, peaks, points)."""
-        pairs = list(zip(self.onsets, self.peaks, strict=True))
-        return np.stack(
-            [
-                np.concatenate([own.tabulated(f, peaks, self.error, x) for own, peaks in pairs])
-                for f in range(len(self.profiles.fields))
-            ]
-        )
+        return np.stack([self.of_field(f, x) for f in range(len(self.profiles.fields))])
 
     def parts(self, u: Array) -> Array:
         """Return logarithms of the density of each peak at draws (draws, 4), (draws, peaks)."""
@@ -377,11 +361,10 @@ class Tables:
         for family, cv, places in _laws(self.profiles, u):
             rows[places] = masses(family, cv, u[places, 3], x)
         densities = np.empty((len(u), sum(map(np.size, self.peaks))))
-        pairs = list(zip(self.onsets, self.peaks, strict=True))
-        for f in np.unique(u[:, 0].astype(np.int64)):
-            members = np.flatnonzero(u[:, 0] == f)
-            table = np.concatenate([k.tabulated(f, p, self.error, x) for k, p in pairs])
-            densities[members] = np.log(np.maximum(rows[members] @ np.exp(table).T, 1e-300))
+        for field in np.unique(u[:, 0].astype(np.int64)):
+            members = np.flatnonzero(u[:, 0] == field)
+            integrals = rows[members] @ np.exp(self.of_field(field, x)).T
+            densities[members] = np.log(np.maximum(integrals, 1e-300))
         return densities
 
     def predicted(self, kind: int, u: Array, seed: int) -> Array:
@@ -393,9 +376,7 @@ class Tables:
             x[places] += np.log(factor_of_family(family, cv).distribution.ppf(share[places]))
         sample = rng.integers(known.ratios.shape[2], size=len(u))
         ratios = known.ratios[u[:, 0].astype(np.int64), :, sample]
-        ratio = np.array(
-            [np.interp(at, known.at, own) for at, own in zip(x, ratios, strict=True)]
-        )
+        ratio = [np.interp(at, known.at, row) for at, row in zip(x, ratios, strict=True)]
         return known.area * np.exp(x) * ratio + self.error * rng.standard_normal(len(u))
 
     def quantile(self, grid: Grid, probabilities: Array, kind: int = 0) -> Array:
@@ -412,27 +393,17 @@ class Tables:
         below = np.cumsum(below, axis=1)
         # T(c) rises with c: where it is t, for every field and sample
         logs = np.log(known.area * known.ratios) + known.at[:, None]
-        samples = logs.shape[2]
 
-        def chance(log_peak: float) -> float:
-            if known.at.size == 1:
-                at = log_peak - logs[:, 0]
-            else:
-                at = np.array(
-                    [[np.interp(log_peak, one, known.at) for one in f.T] for f in logs]
-                )
+        def excess(log_peak: float, probability: float) -> float:
+            at = log_peak - logs[:, 0]
+            if known.at.size > 1:
+                at = np.array([[np.interp(log_peak, s, known.at) for s in f.T] for f in logs])
             pairs = zip(at, below, strict=True)
-            return (
-                float(sum(np.interp(own, x, row, left=0.0).sum() for own, row in pairs))
-                / samples
-            )
+            shares = [np.interp(row, x, chance, left=0.0).sum() for row, chance in pairs]
+            return float(sum(shares)) / logs.shape[2] - probability
 
-        log_peaks = []
-        for probability in probabilities:
-            low, high = x[0] + logs.min() - known.at[0], x[-1] + logs.max() - known.at[-1]
-            log_peaks.append(
-                brentq(lambda at, p=probability: chance(at) - p, low, high, xtol=1e-6)
-            )
+        low, high = x[0] + logs.min() - known.at[0], x[-1] + logs.max() - known.at[-1]
+        log_peaks = [brentq(excess, low, high, args=(p,), xtol=1e-6) for p in probabilities]
         return np.exp(log_peaks)
 
 

@@ -20,15 +20,8 @@ import xarray as xr
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, unknown_name
 from stiction.base.model import is_whole
-from stiction.base.progress import Meter
-from stiction.inference.joined import (
-    FEW_ONSETS,
-    ONSETS,
-    SpecimenPosterior,
-    profiles_of,
-    simulated_onsets,
-)  # fmt: skip
-from stiction.inference.likelihood import variable_of
+from stiction.inference.joined import SpecimenPosterior, profiles_of, simulated_onsets
+from stiction.inference.likelihood import Simulation, variable_of
 from stiction.inference.peaks import si_of
 from stiction.inference.specimens import (
     MEAN_KEY,
@@ -51,18 +44,14 @@ def expected_widths(
     problem: Problem,
     random: Any,
     designs: Mapping[str, Any],
-    *,
+    simulation: Simulation,
     probability: float,
-    method: Any,
     error: float,
     unit: str,
     repetitions: int,
-    samples: int | None,
-    seed: int,
-    workers: int | None,
-    meter: Meter,
 ) -> xr.Dataset:
     """Return widths of intervals and designs after further tests, see `design_of_tests`."""
+    seed, method, meter = simulation.seed, simulation.method, simulation.meter
     plans = {"now": (0, 0)} | {name: _plan(name, given) for name, given in designs.items()}
     if isinstance(random, SpecimenPosterior):
         tables, mass = random.likelihood, random.grid.mass.sum(axis=(1, 2, 3))
@@ -73,11 +62,10 @@ def expected_widths(
                 "prior: is left out, so random must be a fit or a posterior of `infer`, which"
                 " hold measurements"
             )
+        variable = variable_of(problem, profiles.fields[0], si_of(unit))
         onsets = simulated_onsets(
-            profiles, problem, method, None, np.zeros(0), 0, error, seed=seed, workers=workers,
-            variable=variable_of(problem, profiles.fields[0], si_of(unit)), meter=meter,
-            samples=samples or ONSETS.get(method.type, FEW_ONSETS), done={},
-        )  # fmt: skip
+            profiles, problem, simulation, None, np.zeros(0), 0, error, variable
+        )
         tables, mass = Tables(profiles, method, (onsets,), error, (np.zeros(0),)), np.ones(1)
     if any(levels for _, levels in plans.values()) and not tables.profiles.levels.size:
         raise InputError(
@@ -85,18 +73,14 @@ def expected_widths(
         )
     tables = _fewer(tables, mass)
     _, now = grid_of_profiles(tables.profiles, tables)
-    rng, total = np.random.default_rng([seed, 8]), len(plans) * repetitions
-    meter.stage("simulated campaigns", total)
-    widths, stresses = (
-        np.empty((len(plans), repetitions, 2)),
-        np.empty((len(plans), repetitions)),
-    )
+    rng = np.random.default_rng([seed, 8])
+    meter.stage("simulated campaigns", len(plans) * repetitions)
+    widths = np.empty((len(plans), repetitions, 2))
+    stresses = np.empty((len(plans), repetitions))
     for row, (tests, levels) in enumerate(plans.values()):
         for number in range(repetitions):
             truth = now.draws(1, rng)
-            grid, both = now, tables
-            if tests or levels:
-                grid, both = _after(tables, truth, tests, levels, rng)
+            grid, both = _after(tables, truth, tests, levels, rng) if row else (now, tables)
             drawn = grid.described(grid.draws(WIDTH_DRAWS, rng))
             ends = [np.quantile(drawn[name], [0.05, 0.95]) for name in (MEAN_KEY, SCATTER_KEY)]
             widths[row, number] = np.ptp(ends, axis=1)
@@ -136,16 +120,11 @@ def _fewer(tables: Tables, mass: Array) -> Tables:
     """Return the tables of some fields only, those with the largest mass."""
     profiles = tables.profiles
     order = np.argsort(-np.broadcast_to(mass, len(profiles.fields)), kind="stable")[:MAX_FIELDS]
-    fewer = profiles._replace(
-        fields=tuple(profiles.fields[k] for k in order), within=profiles.within[order]
+    fields = tuple(profiles.fields[k] for k in order)
+    fewer = profiles._replace(fields=fields, within=profiles.within[order])
+    return replace(
+        tables, profiles=fewer, onsets=tuple(kind.of(order) for kind in tables.onsets)
     )
-    onsets = tuple(
-        replace(
-            kind, ratios=kind.ratios[order], densities=tuple(kind.densities[k] for k in order)
-        )
-        for kind in tables.onsets
-    )
-    return replace(tables, profiles=fewer, onsets=onsets)
 
 
 def _after(
