@@ -45,16 +45,19 @@ class Found(NamedTuple):
 def benchmark(spacing: float) -> tuple[st.Problem, np.ndarray]:
     """The problem and its peak strength (Pa) on nodes `spacing` (m) apart."""
     nodes = tuple(round(length / spacing) for length in PERIOD)
-    plane = st.Interface(length=PERIOD, nodes=nodes)
+    ends = [
+        (0.5 * (side - fault), 0.5 * (side + fault))
+        for side, fault in zip(PERIOD, FAULT, strict=True)
+    ]
+    plane = st.Interface(length=PERIOD, nodes=nodes, extent=ends)
     places = np.meshgrid(*plane.coordinates.values(), indexing="ij")
     x, y = (np.abs(place - side / 2) for place, side in zip(places, PERIOD, strict=True))
-    fault = (x <= FAULT[0] / 2 + 1e-6) & (y <= FAULT[1] / 2 + 1e-6)
     # A node stands for its cell: one on the edge of the square lies in it by half.
     inside = [np.clip((SQUARE / 2 - away) / spacing + 0.5, 0.0, 1.0) for away in (x, y)]
     initial = AROUND + (INSIDE - AROUND) * inside[0] * inside[1]
     friction = st.LinearWeakening(critical_slip=CRITICAL_SLIP, residual_strength=RESIDUAL)
     load = st.Load(initial_stress=initial)
-    return st.Problem(SOLID, plane, friction, load), np.where(fault, STRENGTH, np.inf)
+    return st.Problem(SOLID, plane, friction, load), np.full(nodes, STRENGTH)
 
 
 def simulate(spacing: float, end_time: float = 9.0) -> Found:

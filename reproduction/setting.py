@@ -105,7 +105,7 @@ PROBLEM = _own.problem
 FIELD = _own.random.properties["strength"]
 H = PROBLEM.nucleation_length
 """Nucleation length h_n, m."""
-L = PROBLEM.interface.extent
+L = PROBLEM.interface.measure
 G_STAR = PROBLEM.effective_modulus
 W = PROBLEM.uniform_rate
 """Weakening rate, Pa/m."""
@@ -163,7 +163,7 @@ def grid(problem, *, length: float = 1.0, nodes: float = 1.0):
     """Return the problem with its length and its number of nodes multiplied."""
     interface = problem.interface
     changed = st.Interface(
-        length=interface.extent * length, nodes=2 * round(0.5 * interface.size * nodes)
+        length=interface.measure * length, nodes=2 * round(0.5 * interface.size * nodes)
     )
     return dataclasses.replace(problem, interface=changed)
 

@@ -505,7 +505,7 @@ def driving(run: Runner, count: int) -> xr.Dataset:
         griffith = np.full(length.size, np.nan)
         there = np.isfinite(length)
         if there.any():
-            centre = 0.5 * problem.interface.extent
+            centre = 0.5 * problem.interface.measure
             griffith[there] = st.theory.griffith_length(
                 problem, stress[there], energy, centre=centre, arrest=True
             )
@@ -554,7 +554,7 @@ def free_end(run: Runner, count: int) -> xr.Dataset:
         mirrored = np.concatenate([tau_p, tau_p[:, ::-1]], axis=1)
         periodic = st.onset(problem, tau_p, method=EXACT, progress=False)
         free = st.onset(double, mirrored, method=EXACT, progress=False)
-        extent = problem.interface.extent
+        extent = problem.interface.measure
         # Nodes are half a spacing from the mirror planes.
         place = (free["critical_position"].values + 0.5 * problem.interface.spacing) % extent
         end = np.minimum(place, extent - place) / length

@@ -28,7 +28,7 @@ SIZES = (1.0, 1.15)
 def longer(problem: st.Problem, times: int) -> st.Problem:
     """The same problem on a line that is so many times longer."""
     line = problem.interface
-    interface = st.Interface(times * line.extent, times * line.size)
+    interface = st.Interface(times * line.measure, times * line.size)
     return dataclasses.replace(problem, interface=interface)
 
 

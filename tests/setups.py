@@ -47,6 +47,12 @@ def without(problem: st.Problem, *keys: str) -> st.Problem:
     return problem
 
 
+def within(problem: st.Problem, extent: Any) -> st.Problem:
+    """The problem on an interface that breaks within an extent only."""
+    interface = dataclasses.replace(problem.interface, extent=extent)
+    return dataclasses.replace(problem, interface=interface)
+
+
 def beta_strength(
     correlation_length: float,
     low: float = 0.66e6,

@@ -235,7 +235,7 @@ def along(problem: st.Problem, strength: Any, kinks: Any) -> Along:
     rows, d, blocks = problem.sample(strength), path.slip.values, problem.blocks
     cell, q = problem.interface.cell, blocks.shear
     initial, residual = rows.initial_stress[0], rows.residual_strength[0]
-    force = (path.mean_stress.values - initial.mean()) * problem.interface.extent
+    force = (path.mean_stress.values - initial.mean()) * problem.interface.measure
     work = 0.5 * (force[1:] + force[:-1]) * np.diff(path.travel.values)
     dead = blocks.stiffness - blocks.relief / q.size * np.outer(q, q)
     stored = force**2 / blocks.drive_stiffness

@@ -22,7 +22,7 @@ REPEATS = 50
 
 def longer(problem, times):
     """The same problem on a line that is so many times longer."""
-    interface = st.Interface(times * problem.interface.extent, times * problem.interface.size)
+    interface = st.Interface(times * problem.interface.measure, times * problem.interface.size)
     return dataclasses.replace(problem, interface=interface)
 
 

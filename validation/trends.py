@@ -65,7 +65,7 @@ def main(pressure=2.5e6, samples=24):
             seed=0,
             pilot=False,
         )
-        mu, share = found.friction_coefficient, found.event_length / problem.interface.extent
+        mu, share = found.friction_coefficient, found.event_length / problem.interface.measure
         error = float(mu.std()) / np.sqrt(samples - 1)
         print(
             f"{name:28s} coefficient {float(mu.mean()):.4f} +- {error:.4f};"

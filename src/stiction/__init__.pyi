@@ -28,6 +28,7 @@ from stiction.methods.onset import onset as onset
 from stiction.problem.friction import ExponentialWeakening as ExponentialWeakening
 from stiction.problem.friction import LinearWeakening as LinearWeakening
 from stiction.problem.friction import PiecewiseWeakening as PiecewiseWeakening
+from stiction.problem.interface import Ellipse as Ellipse
 from stiction.problem.interface import Interface as Interface
 from stiction.problem.load import EdgeLoad as EdgeLoad
 from stiction.problem.load import GradientLoad as GradientLoad

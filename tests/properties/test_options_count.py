@@ -38,7 +38,8 @@ INPUTS: dict[str, dict[str, Any]] = {  # owner: other values of its fields
         "shear_modulus": 1.1e9, "poisson_ratio": 0.3, "density": (WAVES, 1200.0),
         "plane": "stress",
     },
-    "interface": {"length": 0.06, "nodes": 160, "width": 0.02, "ends": "free"},
+    "interface": {"length": 0.06, "nodes": 160, "width": 0.02, "ends": "free",
+                  "extent": (WAVES, (0.01, 0.04))},
     "friction": {
         "weakening_rate": 0.4e12, "critical_slip": 2e-6, "fracture_energy": 1.0,
         "residual_strength": 0.5e6, "residual_ratio": 0.4,

@@ -20,12 +20,12 @@ from setups import (
     ensemble,
     local_onset,
     make_problem,
+    within,
 )
 from specimens import crooked, rough
 
 import stiction as st
 from stiction.ensemble import monte_carlo
-from stiction.methods.criterion.local import excess_of
 from stiction.statistics import density, quantiles
 from stiction.theory import energy_release_rate, nucleation_statistics, nucleation_stress
 
@@ -234,6 +234,17 @@ table_of(calls, {
         lambda: beta_strength(1.6e-3, anisotropy=16.0).sample(
             st.Interface((0.01, 0.03), (128, 32))),
     ],
+    "extents": [
+        *(partial(st.Interface, 0.1, 256, extent=one) for one in (
+            (0.02, 0.11), (0.06, 0.02), (0.02, 0.0203), ("2 cm", "5 kg"), 3.0, (0.1,), NODE < 1,
+            np.ones(255, dtype=bool), [[0.01, 0.02], [0.03, 0.04]], st.Ellipse(
+                centre=(0.05, 0.05), semi_axes=(0.01, 0.01)))),
+        lambda: st.Interface((0.1, 0.1), (32, 32), extent=(0.02, 0.05)),
+        lambda: st.Interface((0.1, 0.1), (32, 32), extent={"centre": [0.05, 0.05]}),
+        lambda: st.Ellipse(centre=(0.05, 0.05), semi_axes=(0.01, 0.0)),
+        lambda: within(PROBLEM, (0.02, 0.022)),
+        lambda: within(make_problem((48, 48), (0.02, 0.02)), ((0.0, 0.01), (0.01, 0.012))),
+    ],
     "interfaces": [
         *each(correlated, *({"correlation": one} for one in (
             {("strength", "residual"): 0.5}, {("strength", "strength"): 0.5},
@@ -272,8 +283,6 @@ table_of(calls, {
         lambda: density(np.linspace(-1, 1, 50), bounds=(0.0, None)),
     ],
     "profiles": [
-        lambda: excess_of(
-            PROBLEM.sample(ONE)._replace(strength=np.where(NODE == 3, np.inf, [ONE]))),
         lambda: on_plane((1.6 * LENGTH, 4.0 * LENGTH)),
         lambda: on_plane((5.0 * LENGTH, 4.0 * LENGTH),
                          RATE * np.linspace(0.9, 1.0, 48 * 48).reshape(48, 48)),
@@ -292,8 +301,6 @@ table_of(calls, {
               {"initial_stress": np.where(NODE > 230, -2e6, 0.0)}),
         *each(ready, {"problem": None, "load_profile": np.linspace(0.9, 1.1, 256)},
               {"residual_strength": -ONE[None]},
-              {"profiles": np.where(NODE == 3, np.inf, ONE), "accept": ("barriers",),
-               "method": EXACT},
               {"profiles": {"strength": ONE, "initial_stress": 2e6 * (NODE < 2)},
                "accept": ("overstress",)}),
         *(partial(st.equilibrium_path, PROBLEM, 0.9 * ONE, one) for one in ([2e5, 1e5], [np.nan])),
@@ -315,7 +322,6 @@ table_of(calls, {
         *each(event, {"start": "rest"}, {"stop": "rest"}, {"max_steps": 1}, {"event": 1000},
               {"save": st.Save(to="run")},
               {"problem": dataclasses.replace(EVENTS, friction=FALLING)},
-              {"profiles": np.where(STRONG > 1.2e6, np.inf, STRONG)},
               {"problem": dataclasses.replace(EVENTS, load=st.Load()),
                "profiles": {"strength": STRONG, "initial_stress": STRONG + 1.0}},
               {"problem": crooked(nodes=64, rate=0.01e12, height=0.02, drive=STIFF)}),

@@ -7,7 +7,7 @@ import numpy as np
 from crooked import across_the_seam, uneven
 from recording import Calls, compared, inside, refusal
 from ruptures import wavy_line
-from setups import beta_strength, make_problem
+from setups import beta_strength, make_problem, within
 
 import stiction as st
 from stiction.methods.dynamics.save import open_rupture
@@ -122,8 +122,8 @@ def barriers_that_never_slip():
     by_slip = dataclasses.replace(problem, friction=st.LinearWeakening(critical_slip=3e-6))
     inside = placed(problem, 0.6, 0.8)
     return {
-        "to the end": summary(problem, np.where(inside, np.inf, strength)),
-        "onset": summary(by_slip, np.where(inside, np.inf, strength), stop="onset"),
+        "to the end": summary(within(problem, ~inside), strength),
+        "onset": summary(within(by_slip, ~inside), strength, stop="onset"),
         "too steep": summary(by_slip, np.where(placed(problem, 0.31, 0.35), 2e7, strength)),
     }
 
@@ -161,10 +161,10 @@ def loads_after_global_sliding():
     slow, given = 1.2e-3, {"loading_rate": None, "stop": "time"}
     falls = ([0.0, slow, 1.25e-3, 1.35e-3, 1.6e-3], [0.0, 1.1e6, 1.1e6, 1e5, 1e5])
     sudden = ([0.0, slow, 1.21e-3, 2e-3], [0.0, 1e6, 2.2e6, 2.2e6])
-    walled = np.where(placed(problem, 0.6, 0.8), np.inf, strength)
+    walled = within(problem, ~placed(problem, 0.6, 0.8))
     return {
         "falls": summary(problem, strength, load=falls, end_time=1.55e-3, **given),
-        "sudden": summary(problem, walled, load=sudden, end_time=1.4e-3, **given),
+        "sudden": summary(walled, strength, load=sudden, end_time=1.4e-3, **given),
     }
 
 

@@ -449,7 +449,7 @@ def onset(
         sheet=_column(sheet), record=record, offset=_number(offset),
     )  # fmt: skip
     with collect_warnings():  # each method refuses, and warns, for itself
-        problem.sample(profile, accept=("barriers", "overstress"))
+        problem.sample(profile, accept=("overstress",))
     printed = (
         *ONSET_VARIABLES, "friction_coefficient", "critical_force", "first_instability_force"
     )  # fmt: skip

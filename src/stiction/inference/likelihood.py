@@ -114,7 +114,7 @@ def experiment_on(
         raise InputError(
             "peaks: specimen lengths apply to lines only; the interface is a plane"
         )
-    if length is not None and not np.isclose(length, interface.extent, rtol=1e-9):
+    if length is not None and not np.isclose(length, interface.measure, rtol=1e-9):
         if problem.load.pressing_force is not None:
             raise InputError(
                 "peaks: on specimens of another length the pressing force is another"

@@ -81,7 +81,7 @@ class OptionalMembers:
     """Members that a method may have, with the defaults for a method without them."""
 
     accepts: ClassVar[tuple[str, ...]] = ()
-    """Profiles that it takes: "barriers" and "overstress", see `Problem.sample`."""
+    """Profiles that it takes: "overstress", see `Problem.sample`."""
     first_stage: ClassVar[str | None] = None
     """Type of a faster method with similar onsets, by which rare failures are found first."""
     exact_method: ClassVar[str | None] = None

@@ -124,7 +124,7 @@ def rows_of(interface: Interface, profile: Any) -> Array:
 def name_line(axes: Axes, interface: Interface, text: str) -> None:
     """Name the scales of profiles along a line."""
     factor, unit = unit_for("m", interface.lengths)
-    axes.set_xlim(0.0, interface.extent * factor)
+    axes.set_xlim(0.0, interface.measure * factor)
     axes.set_xlabel(f"position $x$ ({unit})")
     axes.set_ylabel(text)
 

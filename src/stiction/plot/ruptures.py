@@ -158,7 +158,7 @@ def _strength(run: xr.Dataset) -> tuple[Array, float, str]:
 def _draw_space_time(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
     interface = problem.interface
     (since, begin), (rate, norm) = _since_onset(run), _rates(run["slip_rate"].values, DECADES)
-    beside = BEFORE * interface.extent / problem.solid.shear_wave_speed
+    beside = BEFORE * interface.measure / problem.solid.shear_wave_speed
     slips = since[np.ma.getdata(rate).any(axis=1)]  # and a little before and after
     near = (since >= -beside) & (since <= slips.max(initial=-np.inf) + beside)
     if near.sum() > 2:

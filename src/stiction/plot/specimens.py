@@ -89,7 +89,7 @@ def specimen(
 
 def _draw_blocks(axes: Axes, problem: Problem, scale: float) -> None:
     """Two blocks, and arrows where the drive acts on them; heights have their own scale."""
-    blocks, length = problem.specimen, problem.interface.extent * scale
+    blocks, length = problem.specimen, problem.interface.measure * scale
     assert blocks is not None  # `problem.blocks` has refused it
     height, drive = blocks.height * scale, blocks.drive
     for low in (-height, 0.0):
@@ -329,11 +329,11 @@ def precursors(
             at = path["event_travel"].values * length
             below.vlines(at, start, end, color=ACCENT, linewidth=2.0 / len(results) ** 0.5)
         for test in measured or ():
-            edge = np.full(test.drops.travel.size, interface.extent * scale)
+            edge = np.full(test.drops.travel.size, interface.measure * scale)
             below.plot(
                 test.drops.travel * length, edge, "|", color=INK, markersize=5.0, clip_on=False
             )
     below.set(xlabel=above.get_xlabel(), ylabel=f"position $x$ ({unit})")
-    below.set_ylim(0.0, interface.extent * scale)
+    below.set_ylim(0.0, interface.measure * scale)
     above.set_xlabel("")
     return np.array([above, below])

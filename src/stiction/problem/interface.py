@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
+from functools import cached_property, partial
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, model_validator
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, PlainSerializer, ValidationInfo, model_validator
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
-from stiction.base.model import Positive, as_count, as_number, in_si, model
+from stiction.base.model import Positive, as_count, as_number, in_si, model, to_plain
+from stiction.base.units import factor_to
+
+Mask = NDArray[np.bool_]
 
 FEWEST_NODES, MOST_NODES = 8, 2**24
 """Nodes in each direction, and in all."""
@@ -48,6 +52,85 @@ _lengths = BeforeValidator(partial(_one_or_two, read=_length))
 _counts = BeforeValidator(partial(_one_or_two, read=_node_count))
 
 
+def _place(value: Any) -> float:
+    """Return a length in m: of a number, a quantity, or text such as "0.5 km"."""
+    if isinstance(value, str):
+        number, _, unit = value.strip().partition(" ")
+        value = float(number) * factor_to("m", unit or "m")
+    place = as_number(in_si(value, "length"))
+    if not math.isfinite(place):
+        raise ValueError("must be finite")
+    return place
+
+
+def _two_places(value: Any) -> tuple[float, float]:
+    value = in_si(value, "length")
+    if isinstance(value, str) or np.shape(np.asarray(value, dtype=object)) != (2,):
+        raise ValueError("must be two lengths")
+    return _place(value[0]), _place(value[1])
+
+
+_pair = BeforeValidator(_two_places)
+
+
+@model(kw_only=True)
+class Ellipse:
+    """Ellipse on a plane in which an interface can break, with axes along x and y.
+
+    Parameters
+    ----------
+    centre : (float, float)
+        Position of the centre, m.
+    semi_axes : (float, float)
+        Semi-axes along x and y, m, positive.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> patch = st.Ellipse(centre=("0.5 km", "0.5 km"), semi_axes=("300 m", "200 m"))
+    >>> patch.semi_axes
+    (300.0, 200.0)
+    """
+
+    centre: Annotated[tuple[float, float], _pair]
+    semi_axes: Annotated[tuple[float, float], _pair]
+
+    @model_validator(mode="after")
+    def _positive(self) -> Ellipse:
+        if min(self.semi_axes) <= 0.0:
+            raise InputError(f"semi_axes: must be positive, got {self.semi_axes}")
+        return self
+
+
+def _extent(value: Any, info: ValidationInfo) -> Any:
+    """Return two places of a line, pairs of them or an ellipse of a plane, or a mask of nodes."""
+    read = (info.context or {}).get("read")
+    if isinstance(value, str) and read is not None:
+        value = np.asarray(read(value, "slip").to_xarray()) != 0.0  # a mask in a file
+    if value is None or isinstance(value, Ellipse):
+        return value
+    if isinstance(value, dict):
+        return Ellipse(**value)
+    if not isinstance(value, list | tuple) or any(isinstance(item, bool) for item in value):
+        value = in_si(value, "length")
+    if (given := np.asarray(value)).dtype.kind == "b":
+        mask = given.copy()
+        mask.flags.writeable = False
+        return mask
+    if given.ndim == 2:
+        return tuple(map(_two_places, value))
+    return _two_places(value)
+
+
+def _plain_extent(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray) else to_plain(value)
+
+
+Extent = Annotated[
+    Any, BeforeValidator(_extent), PlainSerializer(_plain_extent), "tuple | Ellipse | mask"
+]
+
+
 @model
 class Interface:
     """Interface with equally spaced nodes, periodic: a line, or a plane; or that of a specimen.
@@ -66,6 +149,17 @@ class Interface:
     ends : {"periodic", "free"}
         Set by a `Problem`: "free" if it has a `specimen`. The nodes are then the centres of cells,
         x_i = (i + 1/2) length/nodes, and nothing is continued beyond the ends.
+    extent : (float, float), ((float, float), (float, float)), Ellipse or mask, optional
+        Where the interface can break; by default everywhere. Beyond, both solids are one piece, and
+        nothing ever slips. A line takes its two ends (m, or text such as "0.5 km"), a plane two
+        pairs (along x and y), an `Ellipse`, or both a mask: a boolean array of shape (*shape), in a
+        study file the path of a ``.npy``. Nodes at the ends can break.
+
+    Notes
+    -----
+    With an extent, mean stresses, friction coefficients, forces and mean strengths are those of the
+    nodes that can break. Periodic images of the extent interact: results depend on the period
+    through the square of extent over period only, once this is small.
 
     Examples
     --------
@@ -74,12 +168,16 @@ class Interface:
     (1024,)
     >>> st.Interface(length=(0.2, 0.1), nodes=(256, 128)).dims
     ('x', 'y')
+    >>> fault = st.Interface(length=8e3, nodes=1000, extent=("3 km", "5 km"))
+    >>> int(fault.breakable.sum())
+    251
     """
 
     length: Annotated[float | tuple[float, float], _lengths]
     nodes: Annotated[int | tuple[int, int], _counts]
     width: Positive | None = None
     ends: Literal["periodic", "free"] = "periodic"
+    extent: Extent = None
 
     @model_validator(mode="after")
     def _one_geometry(self) -> Interface:
@@ -103,7 +201,84 @@ class Interface:
                 f"length: the nodes must be at least {SHORTEST:g} m apart, got"
                 f" {min(self.spacings):g} m; check its unit"
             )
+        if problem := self._wrong_extent():
+            raise InputError(f"extent: {problem}")
         return self
+
+    def _wrong_extent(self) -> str | None:
+        """Return what is wrong with the extent, if anything."""
+        extent, ends = self.extent, self._ends
+        if extent is None:
+            return None
+        if isinstance(extent, np.ndarray) and extent.shape != self.shape:
+            return f"a mask must have the shape {self.shape}, got {extent.shape}"
+        if ends is not None and len(ends) != len(self.shape):
+            valid = "two pairs of ends, an Ellipse" if self.is_plane else "two ends"
+            return f"must be {valid} or a mask of shape {self.shape}, got {extent}"
+        for dim, (low, high), length in zip(self.dims, ends or (), self.lengths, strict=False):
+            if not -1e-9 * length <= low < high <= (1.0 + 1e-9) * length:
+                return (
+                    f"must rise and lie on the interface, from 0 to {length:g} m along {dim}, got"
+                    f" {low:g} to {high:g} m"
+                )
+        inside = self._inside
+        if np.count_nonzero(inside) < 2:
+            return (
+                f"must hold two nodes or more, which are {self.spacing:.3g} m apart, holds"
+                f" {np.count_nonzero(inside)}: nothing could become unstable"
+            )
+        return None
+
+    @property
+    def _ends(self) -> tuple[tuple[float, float], ...] | None:
+        """Ends of the extent along each direction, m; None without one, and of a mask."""
+        extent = self.extent
+        if isinstance(extent, Ellipse):
+            pairs = zip(extent.centre, extent.semi_axes, strict=True)
+            return tuple((middle - half, middle + half) for middle, half in pairs)
+        if isinstance(extent, tuple):
+            return extent if isinstance(extent[0], tuple) else (extent,)
+        return None
+
+    @property
+    def _inside(self) -> Mask:
+        """Nodes in the extent, (*shape); a node on its border counts."""
+        extent, grid = self.extent, np.meshgrid(*self.coordinates.values(), indexing="ij")
+        if isinstance(extent, np.ndarray):
+            return extent
+        if isinstance(extent, Ellipse):
+            axes = zip(grid, extent.centre, extent.semi_axes, strict=True)
+            distance = np.sum(
+                [((at - middle) / half) ** 2 for at, middle, half in axes], axis=0
+            )
+            return np.asarray(distance <= 1.0 + 1e-9)
+        inside = np.ones(self.shape, dtype=bool)
+        for at, (low, high), spacing in zip(
+            grid, self._ends or (), self.spacings, strict=False
+        ):
+            inside &= (at >= low - 1e-9 * spacing) & (at <= high + 1e-9 * spacing)
+        return inside
+
+    @cached_property
+    def breakable(self) -> Mask | None:
+        """Which nodes can break, (*shape), read-only; None if all can."""
+        inside = np.ones(1, dtype=bool) if self.extent is None else self._inside
+        inside.flags.writeable = False
+        return None if inside.all() else inside
+
+    def mean(self, profiles: Array) -> Array:
+        """Return the means of profiles (..., *shape) over the nodes that can break, (...)."""
+        mask = self.breakable
+        means: Array = (
+            profiles.mean(self.axes) if mask is None else profiles[..., mask].mean(-1)
+        )
+        return means
+
+    @property
+    def breakable_measure(self) -> float:
+        """Length of the nodes of a line that can break (m); area on a plane (m²)."""
+        mask = self.breakable
+        return self.measure if mask is None else np.count_nonzero(mask) * self.cell
 
     @property
     def is_free(self) -> bool:
@@ -120,7 +295,7 @@ class Interface:
         """The periodic interface on which its random fields live: itself, or one twice as long."""
         if not self.is_free:
             return self
-        return Interface(2.0 * self.extent, 2 * self.size)
+        return Interface(2.0 * self.measure, 2 * self.size)
 
     @property
     def lengths(self) -> tuple[float, ...]:
@@ -153,14 +328,14 @@ class Interface:
         return math.prod(self.shape)
 
     @property
-    def extent(self) -> float:
+    def measure(self) -> float:
         """Length of a line (m), area of a plane (m²)."""
         return math.prod(self.lengths)
 
     @property
     def cell(self) -> float:
         """Length (m) that a node represents; on a plane, its area (m²)."""
-        return self.extent / self.size
+        return self.measure / self.size
 
     @property
     def spacings(self) -> tuple[float, ...]:

@@ -172,7 +172,7 @@ class Problem:
                 f"specimen.height: {specimen.height:g} m is less than two spacings of the nodes,"
                 f" {interface.spacing:.3g} m; take more nodes"
             )
-        high = specimen.height / interface.extent
+        high = specimen.height / interface.measure
         if self.mode == "II" and not MIN_HEIGHT_RATIO <= high <= MAX_HEIGHT_RATIO:
             problems.append(
                 f"specimen.height: must be {MIN_HEIGHT_RATIO:g} to {MAX_HEIGHT_RATIO:g} times the"
@@ -312,7 +312,7 @@ class Problem:
         if self.specimen is None:
             raise InputError("problem.specimen: is not given; the solids are half-spaces")
         interface = self.interface
-        return self.specimen.driven(interface.extent, interface.size, self.solid, self.mode)
+        return self.specimen.driven(interface.measure, interface.size, self.solid, self.mode)
 
     @property
     def has_machine(self) -> bool:
@@ -328,12 +328,12 @@ class Problem:
 
     @property
     def area(self) -> float | None:
-        """Area of the interface, m², if its width, or the specimen's thickness, is known."""
+        """Area that can break, m², if the width, or the specimen's thickness, is known."""
         interface, specimen = self.interface, self.specimen
         depth = interface.width if specimen is None else specimen.thickness
         if interface.is_plane:
-            return interface.extent
-        return None if depth is None else interface.extent * depth
+            return interface.breakable_measure
+        return None if depth is None else interface.breakable_measure * depth
 
     def stress_of(self, name: str, force: float) -> float:
         """Return a force, N, over the area of the interface, Pa; `name` begins its refusal."""
@@ -422,7 +422,7 @@ class Problem:
     def _check_resolution(self, highest_rate: float) -> None:
         resolution = self.nodes_in_nucleation_length(highest_rate)
         if min(resolution) >= MIN_NODES_IN_NUCLEATION:
-            return
+            return self._check_extent(resolution)
         steepest = highest_rate * self.friction.steepening
         length = self.nucleation_lengths(steepest)[int(np.argmin(resolution))]
         if min(resolution) < HARDLY_RESOLVED:
@@ -439,6 +439,23 @@ class Problem:
             f" interface.nodes >= {self._finer(resolution, MIN_NODES_IN_NUCLEATION)}, got"
             f" {' x '.join(map(str, self.interface.shape))}"
         )
+
+    def _check_extent(self, resolution: tuple[float, ...]) -> None:
+        """Refuse an extent that is narrower than the nucleation length, given in nodes."""
+        interface, breakable = self.interface, self.interface.breakable
+        if breakable is None or self.specimen is not None:  # blocks have no single length
+            return
+        for axis, dim in enumerate(interface.dims):
+            across = tuple({0, 1} - {axis})[: breakable.ndim - 1]
+            width = np.count_nonzero(breakable.any(axis=across))
+            if width < int(resolution[axis]):
+                spacing = interface.spacings[axis]
+                raise InputError(
+                    f"interface.extent: its {width * spacing:.3g} m along {dim} are narrower than"
+                    f" the nucleation length, {resolution[axis] * spacing:.3g} m, so that it cannot"
+                    " become unstable; widen it, or check the units of lengths, shear modulus and"
+                    " weakening rate"
+                )
 
     def _finer(self, resolution: tuple[float, ...], wanted: int) -> str:
         """Return the nodes with which the nucleation length would span `wanted` of them."""
@@ -473,9 +490,8 @@ class Problem:
             All but the strength may also be (samples, 1) or a number: of 'normal_pressure' the
             mean, which glued blocks distribute. A 'friction_coefficient' in the place of the
             strength, or a DataArray that states the unit 1, is multiplied by the pressure.
-        accept : collection of {"barriers", "overstress"}
-            What the method accepts: infinite strength where nothing breaks, initial stress above
-            the strength.
+        accept : collection of {"overstress"}
+            What the method accepts: initial stress above the strength.
 
         Raises
         ------
@@ -518,7 +534,7 @@ class Problem:
                 if not np.all(known):
                     measured.append(known.reshape(-1, *interface.shape))
                 with prefixed(name):
-                    return rows_of(name, value, interface, samples, "barriers" in accept)
+                    return rows_of(name, value, interface, samples)
             except InputError as error:
                 problems.extend(error.problems)
                 return np.ones((samples or 1, *interface.shape))
@@ -534,8 +550,7 @@ class Problem:
         if of != "strength":
             problems += no_coefficients(strength, pressure)
             strength = strength * pressure
-        residual = friction.residual(np.where(np.isinf(strength), 0.0, strength))
-        residual = read("residual_strength", residual, samples)
+        residual = read("residual_strength", friction.residual(strength), samples)
         initial = read("initial_stress", self.load.initial_stress, samples)
         scale, value = friction.scale or (SCALES[0], 1.0)
         scale = scales[0] if scales else scale
@@ -562,7 +577,7 @@ class Problem:
         for name, rows in profiles.items():
             try:
                 with prefixed(name):
-                    check_values(name, rows, self.interface, "barriers" in accept)
+                    check_values(name, rows, self.interface)
             except InputError as error:
                 problems += error.problems
         if problems:
@@ -571,9 +586,7 @@ class Problem:
         scale, value = self.friction.scale or (SCALES[0], 1.0)
         scale = next((name for name in SCALES if name in profiles), scale)
         defaults = {
-            "residual_strength": self.friction.residual(
-                np.where(np.isinf(strength), 0.0, strength)
-            ),
+            "residual_strength": self.friction.residual(strength),
             "initial_stress": self.load.initial_stress,
             scale: value,
             "normal_pressure": np.nan if self.given_pressure is None else self.normal_pressure,
@@ -589,6 +602,9 @@ class Problem:
         pressure: Array, accept: Collection[str],
     ) -> Sample:  # fmt: skip
         """Return a sample of rows whose values are valid one by one, if they go together."""
+        breakable = self.interface.breakable
+        if breakable is not None:
+            strength = np.where(breakable, strength, np.inf)
         if problems := self._impossible(strength, residual, initial, accept):
             raise InputError(problems)
         rates = self._rates(strength, residual, scale, value)
@@ -645,6 +661,7 @@ class Problem:
                 " problem.sample(strength)"
             )
         given = {name: rows for name, rows in sample._asdict().items() if name in PROFILES}
+        given["strength"] = np.where(np.isinf(sample.strength), 1.0, sample.strength)
         if np.isnan(sample.normal_pressure).all():
             del given["normal_pressure"]
         return given

@@ -49,8 +49,8 @@ class Sample(NamedTuple):
     Attributes
     ----------
     strength, residual_strength, weakening_rate, initial_stress : (samples, *shape) arrays
-        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa); not to be written to. Strength
-        may be infinite for methods that accept barriers. Where it is at or below the residual
+        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa); not to be written to. Strength is
+        infinite beyond the extent of the interface. Where it is at or below the residual
         strength, both are equal and W has no effect.
     load_profile : (*shape) array
         p, dimensionless, positive.
@@ -96,6 +96,12 @@ class Sample(NamedTuple):
         flat = self.weakening_rate.reshape(self.samples, -1)
         return bool(np.all(flat == flat[:, :1]))
 
+    def mean(self, profiles: Array) -> Array:
+        """Return the means of profiles (..., *shape) over the nodes that can break, (...)."""
+        if self.problem is None:
+            return np.asarray(profiles.mean(axis=self.axes))
+        return np.asarray(self.problem.interface.mean(profiles))
+
     @property
     def mean_strength(self) -> float:
         """Mean strength where it is finite, Pa."""
@@ -108,12 +114,10 @@ class Sample(NamedTuple):
 
     def mean_stress(self, load: Array) -> Array:
         """Return <tau_i> + tau_0 <p>, Pa, at the loads tau_0 of shape (samples,)."""
-        return self.initial_stress.mean(axis=self.axes) + load * self.load_profile.mean()
+        return self.mean(self.initial_stress) + load * self.mean(self.load_profile)
 
 
-def rows_of(
-    name: str, value: Any, interface: Interface, samples: int | None, barriers: bool
-) -> Array:
+def rows_of(name: str, value: Any, interface: Interface, samples: int | None) -> Array:
     """Return `value` as a (samples, *shape) float64 array, or raise an `InputError`.
 
     A single profile (*shape) is one sample. Where `samples` is given, a number, a profile
@@ -131,34 +135,31 @@ def rows_of(
     if not fits:
         hint = turned(array.shape[-2:], shape)
         raise InputError(f"must have shape {valid}, got shape {array.shape}{hint}")
-    check_values(name, array, interface, barriers)
+    check_values(name, array, interface)
     if samples is None:
         return array.reshape(-1, *shape)
     return np.broadcast_to(array, (samples, *shape))
 
 
-def check_values(name: str, array: Array, interface: Interface, barriers: bool) -> None:
+def check_values(name: str, array: Array, interface: Interface) -> None:
     """Raise an `InputError` if a value is not possible for a profile of this name.
 
-    `array` is a number, a profile or rows of profiles. Strength may be infinite with `barriers`.
+    `array` is a number, a profile or rows of profiles.
     """
     least, greatest = array.min(), array.max()
     if not (least >= -LARGEST and greatest <= LARGEST):  # also NaN
-        infinite = (array == np.inf) & (barriers and name == "strength")
-        bad = ~(np.abs(array) <= LARGEST) & ~infinite
-        if bad.any():
-            entry = tuple(np.argwhere(bad)[0].tolist())
-            given = f"{array[entry]:g} (at most {LARGEST:g})"
-            if name == "strength" and array[entry] == np.inf:
-                given += "; st.Rupture() takes an infinite strength where nothing breaks"
-            raise InputError(f"must be finite; entry {entry} is {given}")
+        entry = tuple(np.argwhere(~(np.abs(array) <= LARGEST))[0].tolist())
+        given = f"{array[entry]:g} (at most {LARGEST:g})"
+        if name == "strength" and array[entry] == np.inf:
+            given += "; give interface.extent, beyond which nothing breaks, instead"
+        raise InputError(f"must be finite; entry {entry} is {given}")
     given = f"{least:g} {QUANTITIES[name].units}"
     if name in SCALES and least <= 0.0:
         raise InputError(f"must be positive, got {given}")
     if name == "residual_strength" and least < 0.0:
         raise InputError(f"must not be negative, got {given}")
     if name == "normal_pressure":
-        means = np.atleast_1d(array.mean(axis=interface.axes) if array.ndim else array)
+        means = np.atleast_1d(interface.mean(array) if array.ndim else array)
         if means.min() <= 0.0:
             worst = f"that of sample {int(np.argmin(means))} is {means.min():g} Pa"
             raise InputError(f"must be positive on average, {worst}")

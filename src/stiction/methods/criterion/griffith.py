@@ -81,7 +81,7 @@ def energy_release_rate(
     True
     """
     resting, profile = _stress_drops(problem)
-    flat, period = np.atleast_1d(lengths), problem.interface.extent
+    flat, period = np.atleast_1d(lengths), problem.interface.measure
     if flat.ndim != 1 or not np.all((flat > 0.0) & (flat < period)):
         raise InputError(
             f"lengths: must be between 0 and {period:g} m, got {describe(lengths)}"
@@ -168,7 +168,7 @@ def _stress_drops(problem: Problem) -> Array:
 
 def _intensity_factors(problem: Problem, drops: Array, lengths: Array, centre: float) -> Array:
     """Step 1: return K at both tips of cracks of these lengths, Pa m^(1/2), (drops, m, 2)."""
-    interface, period = problem.interface, problem.interface.extent
+    interface, period = problem.interface, problem.interface.measure
     points = max(MIN_POINTS, interface.size)
     cosine = np.cos((np.arange(points) + 0.5) * np.pi / points)
     factors = []

@@ -89,6 +89,8 @@ class LocalCriterion:
     def supports(self, problem: Problem) -> list[str]:
         """Return the reasons why it cannot solve a problem; none if it can."""
         friction, reasons = problem.friction, []
+        if problem.interface.breakable is not None:
+            reasons.append("interface.extent: is taken by st.Rupture() between half-spaces")
         if friction.steepening > 1.0:
             reasons.append(
                 f"friction: this law falls up to {friction.steepening:.3g} times as steeply later"

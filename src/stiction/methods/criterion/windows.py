@@ -78,10 +78,10 @@ def windows_of(
     length = problem.nucleation_lengths(rate)[0]
     advice = "the local criterion does not hold there, use st.Equilibrium()"
     if not interface.is_plane:
-        if length > interface.extent:
+        if length > interface.measure:
             raise InputError(
                 f"interface.length: the nucleation length {length:.4g} m is longer than the"
-                f" interface ({interface.extent:.4g} m); {advice} or st.Rupture()"
+                f" interface ({interface.measure:.4g} m); {advice} or st.Rupture()"
             )
         weights = _line_weights(0.5 * length / interface.spacing, interface.size)
         return [Window(1.0, (length,), length, rate, *weights)]

@@ -39,7 +39,7 @@ def warn_of_slip(run: Run, state: RuptureState) -> None:
         warn_accuracy(
             f"{steep.size} nodes slipped, the first at {interface.describe_node(steep[0])}, "
             f"where the strength falls by up to {rates[steep].max():.3g} Pa/m, too steeply for this"
-            " grid; take more nodes, or infinite strength for barriers that never break"
+            " grid; take more nodes, or end the interface there (interface.extent)"
         )
     if now["reverse_margin"] < -_MIN_REVERSE * now["scale"]:
         warn_accuracy(

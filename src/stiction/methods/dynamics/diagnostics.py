@@ -7,6 +7,9 @@ is
 
     <tau> = tau_0 <p> + <tau_i> - Z <V>.                                                      (1)
 
+With an extent it is the mean over all nodes, of which the nodes beyond take over stress without
+any waves (`whole_stress`); results are means over the nodes that can break (`mean_stress`).
+
 An instability is slip that the load does not drive: after a maximum of <tau>, waves lower
 it by `EVENT_DROP` of the stress scale (`docs/theory.md`). It began at that maximum. A fall
 of the load lowers <tau>, too, but is no instability. So the fall that counts is
@@ -98,7 +101,8 @@ def stress_scale(nodes: Nodes) -> PiecewiseLinear:
 @jit_inside
 def _set_maximum(now: Any, radiated: float) -> None:
     """Take the present mean stress for its last maximum."""
-    now.maximum_stress, now.maximum_radiated = now.mean_stress, radiated
+    now.maximum_stress, now.maximum_radiated = now.whole_stress, radiated
+    now.maximum_breakable = now.mean_stress
     now.maximum_time, now.maximum_load, now.maximum_node = now.time, now.load, now.top_node
 
 
@@ -109,7 +113,9 @@ def _begin_event(now: Any) -> None:
     is_first = now.instabilities == 0
     now.instabilities += 1
     if is_first:
-        now.first_stress = now.maximum_stress
+        now.first_stress = now.maximum_breakable
+    if is_first or now.maximum_breakable > now.critical_stress:
+        now.critical_stress = now.maximum_breakable
     if is_first or now.maximum_stress > now.onset_stress:
         now.onset_stress, now.onset_time = now.maximum_stress, now.maximum_time
         now.onset_load, now.onset_node = now.maximum_load, now.maximum_node
@@ -130,7 +136,7 @@ def end_event(now: Any, unstable_rate: float, radiated: float) -> None:
 def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
     """Update maximum and instabilities after a step; return the fall of the mean stress, Pa."""
     # 1. The fall by waves.
-    below = now.maximum_stress - now.mean_stress
+    below = now.maximum_stress - now.whole_stress
     fall = min(below, radiated - now.maximum_radiated)
     # 2. The place of the maximum.
     if below < _AT_MAXIMUM * now.scale and fall > 0.0:
@@ -138,9 +144,9 @@ def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
     if now.in_event:
         # 3. The end of an instability.
         now.event_slip_rate = max(now.event_slip_rate, now.top_slip_rate)
-        if now.mean_stress > now.maximum_stress:
+        if now.whole_stress > now.maximum_stress:
             end_event(now, thresholds.unstable_rate, radiated)
-    elif now.mean_stress > now.maximum_stress:
+    elif now.whole_stress > now.maximum_stress:
         # 4. Another maximum, or the beginning of an instability.
         _set_maximum(now, radiated)
     elif fall > EVENT_DROP * now.scale and not now.all_broken:
@@ -149,6 +155,17 @@ def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
     if now.weakened_nodes >= thresholds.breakable and not now.all_broken:
         now.all_broken, now.kinetic_stress = 1, now.mean_stress
     return fall
+
+
+@jit_inside
+def _mean_where_breakable(strength: Array, stress: Array) -> float:
+    """Return the mean stress of the nodes of finite strength, Pa."""
+    total, count = 0.0, 0
+    for i in range(stress.size):
+        if strength[i] < np.inf:
+            total += stress[i]
+            count += 1
+    return total / count
 
 
 @jit_inside
@@ -184,12 +201,15 @@ def finish_step(
             passed = (slip[i] - share * critical[i]) / max(increments[i], 1e-300)
             arrival[i] = step.time - step.size * min(1.0, passed)
         slip_sum += slip[i]
-    mean_stress = setting.mean_initial + step.load * setting.mean_profile - step.radiated
+    whole_stress = setting.mean_initial + step.load * setting.mean_profile - step.radiated
     now.time, now.size, now.load = step.time, step.size, step.load
-    now.mean_stress, now.weakened_nodes = mean_stress, weakened
+    now.whole_stress, now.weakened_nodes = whole_stress, weakened
+    now.mean_stress = whole_stress
+    if setting.thresholds.held:
+        now.mean_stress = _mean_where_breakable(setting.nodes.strength, stress)
     now.top_slip_rate, now.top_node = top_rate, top_node
     now.reverse_margin, now.reverse_node = margin, margin_node
-    now.work, now.mean_slip = now.work + step.work, slip_sum / slip.size
+    now.work, now.mean_slip = now.work + step.work, slip_sum / setting.thresholds.breakable
     now.scale = max(now.scale, value_at(setting.scale, step.load))
     fall = observe(now, setting.thresholds, step.radiated)
     if record.steps.size > 0:

@@ -78,6 +78,11 @@ class Run:
         elastic: Floats = interface.inverse_transform(stress_hat).ravel()
         return elastic + load * nodes.profile + nodes.initial
 
+    def mean(self, field: Floats) -> float:
+        """Return the mean of a flat field over the nodes that can break."""
+        interface = self.medium.interface
+        return float(interface.mean(field.reshape(interface.shape)))
+
     def strength_after(self, slip: Floats) -> Floats:
         """Return the strength after a slip (m), Pa."""
         nodes, law = self.setting.nodes, self.setting.law
@@ -136,15 +141,20 @@ class Run:
         now["load"] = now["maximum_load"] = now["start_load"] = load
         # Before anything slips: nothing is radiated.
         now["maximum_stress"] = setting.mean_initial + load * setting.mean_profile
-        now["mean_stress"] = stress.mean()
+        now["whole_stress"] = stress.mean()
+        now["maximum_breakable"] = now["maximum_stress"]
+        if thresholds.held:
+            now["maximum_breakable"] = self.mean(load * nodes.profile + nodes.initial)
+        now["mean_stress"] = self.mean(stress)
         now["maximum_node"] = now["top_node"] = int(np.argmax(excess))
-        now["first_stress"] = now["onset_stress"] = now["kinetic_stress"] = np.nan  # not yet
+        for name in ("first_stress", "onset_stress", "critical_stress", "kinetic_stress"):
+            now[name] = np.nan  # not yet
         now["onset_time"] = now["onset_load"] = np.nan
         times, values = setting.load
         lowest = min(load, values[times <= time].min()) if slip is None else load
         margin = stress + limit - (load - lowest) * nodes.profile  # at rest, at the lowest load
         now["reverse_margin"], now["reverse_node"] = margin.min(), int(np.argmin(margin))
-        now["top_slip_rate"], now["mean_slip"] = rate.max(), delta.mean()
+        now["top_slip_rate"], now["mean_slip"] = rate.max(), self.mean(delta)
         now["weakened_nodes"] = np.count_nonzero(delta >= nodes.critical)
         scale = max(0.0, self.scale_at(load))
         now["scale"] = scale

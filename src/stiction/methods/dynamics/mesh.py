@@ -118,20 +118,23 @@ def _mesh(
         platen=isinstance(drive, Platen),
         stiffness=2.0 * drive.stiffness / depth,
         drive_mass=drive.mass / depth,
-        attenuation=np.pi * solid.shear_wave_speed / interface.extent / specimen.quality_factor,
+        attenuation=np.pi
+        * solid.shear_wave_speed
+        / interface.measure
+        / specimen.quality_factor,
     )
     # 2. and 3. The static response, with the machine, and its correction.
     static, profile, stiffness = condensed(mesh, n)
     if mesh.stiffness > 0.0:
-        relief = 0.5 * stiffness / (1.0 + stiffness / mesh.stiffness) / interface.extent
+        relief = 0.5 * stiffness / (1.0 + stiffness / mesh.stiffness) / interface.measure
         static = static + relief / n * np.outer(profile, profile)
-    blocks = specimen.driven(interface.extent, n, solid, mode)
+    blocks = specimen.driven(interface.measure, n, solid, mode)
     correction = blocks.stiffness - static
     # 4. The step.
     speed = solid.shear_wave_speed * (1.0 if mesh.anti_plane else solid.wave_speed_ratio)
     viscous = GRID_VISCOSITY * dx / speed
     step = courant * _limit(speed, solid.shear_wave_speed, mesh, correction, viscous)
-    longest = max(interface.extent, specimen.height)
+    longest = max(interface.measure, specimen.height)
     return mesh._replace(
         viscous_time=viscous,
         step=step,

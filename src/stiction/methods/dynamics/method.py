@@ -76,8 +76,7 @@ class Rupture:
     """Onset from an elastodynamic simulation under a slowly rising load.
 
     Adaptive implicit steps follow the creeping interface, explicit steps its rupture.
-    Strength may be infinite where nothing ever breaks, and the initial stress may be above
-    the strength: such a patch breaks at once, at zero load.
+    The initial stress may be above the strength: such a patch breaks at once, at zero load.
 
     Parameters
     ----------
@@ -185,8 +184,7 @@ class Rupture:
     max_steps: Count = 5_000_000
     events: Number = 0
     type: Literal["rupture"] = "rupture"
-    # Combinations that `Problem.sample` may let through.
-    accepts: ClassVar[tuple[str, ...]] = ("barriers", "overstress")
+    accepts: ClassVar[tuple[str, ...]] = ("overstress",)
     label: ClassVar[str] = "rupture"
     counted_only: ClassVar[bool] = True
 

@@ -188,9 +188,10 @@ class Recorder:
         run, now, medium = self.run, state.now, self.run.medium
         frame: dict[str, Any] = {name: float(now[name]) for name in _FROM_DIAGNOSTICS}
         frame |= {
-            "mean_slip": float(state.slip.mean()),
+            "mean_slip": float(run.mean(state.slip)),
             "top_slip_rate": float(state.rate.max()),
-            "weakened_fraction": float(now["weakened_nodes"]) / state.slip.size,
+            "weakened_fraction": float(now["weakened_nodes"])
+            / run.setting.thresholds.breakable,
             "seismic_moment": seismic_moment(run, state),
         }
         with np.errstate(over="ignore"):  # just before a run becomes non-finite

@@ -159,7 +159,7 @@ def _record_to_end(
         now = state.now
         meter.note = (
             f"t = {now['time']:.6g} s, mean stress {now['mean_stress'] * 1e-6:.4f} MPa, "
-            f"{now['weakened_nodes'] / state.slip.size:.0%} weakened"
+            f"{now['weakened_nodes'] / run.setting.thresholds.breakable:.0%} weakened"
         )
         meter.advance(taken)
         if stopped := run.ending(state, reason):

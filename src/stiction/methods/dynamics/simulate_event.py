@@ -15,7 +15,7 @@ from stiction.methods.dynamics.specimens import (
     DynamicEvent,
     RuptureProgram,
     front_speeds,
-    refuse_barriers,
+    refuse_overstress,
 )
 from stiction.methods.dynamics.summary import SPEEDS
 from stiction.methods.dynamics.waves import FORCE, FRICTION, SPEED, TRAVEL
@@ -66,7 +66,7 @@ def simulate_event(
             "save: an event on a specimen is kept in memory, with all nodes; leave 'to' and"
             " 'stations' out"
         )
-    refuse_barriers(rows)
+    refuse_overstress(rows)
     program: RuptureProgram = method.program(problem)
     sample = sample_of(rows, program.pieces, 0)
     with Meter("rupture", show=progress, unit="events") as meter:
@@ -135,7 +135,7 @@ class EventRecord:
                 "mean_slip": waves.slip.mean(),
                 "top_slip_rate": waves.slip_rate.max(),
                 "weakened_fraction": residual_nodes(sample, waves.slip).mean(),
-                "machine_stress": held + waves.now[FORCE] / problem.interface.extent,
+                "machine_stress": held + waves.now[FORCE] / problem.interface.measure,
                 "drive_travel": 2.0 * waves.now[TRAVEL],
             }
         )

@@ -126,7 +126,8 @@ def _state_at(
     now = state.now
     now["phase"], now["two_step"] = Phase.IMPLICIT, 1
     now["previous_size"], now["top_slip_rate"] = interval, slip_rate.max()
-    now["mean_stress"] = now["maximum_stress"] = stress.mean()
+    for name in ("mean_stress", "whole_stress", "maximum_stress", "maximum_breakable"):
+        now[name] = stress.mean()
     now["maximum_radiated"] = now["previous_radiated"] = radiated
     # The slow path has radiated nothing: that is the work that was done on it.
     now["work"] -= energy_balance(run, state)["radiated_energy"]

@@ -68,6 +68,8 @@ def refusals(method: Any, problem: Problem) -> list[str]:
         for name, value in vars(method).items()
         if name not in OPTIONS and value != getattr(usual, name)
     ]
+    if problem.interface.breakable is not None:
+        reasons.append("interface.extent: is taken by st.Rupture() between half-spaces")
     return reasons + refused(problem.friction)
 
 
@@ -206,7 +208,7 @@ class RuptureSolver(OnsetSolver):
 
     def __call__(self, rows: Sample) -> dict[str, NDArray[Any]]:
         """Return the onset of each sample; see `Rupture`."""
-        refuse_barriers(rows)
+        refuse_overstress(rows)
         return super().__call__(rows)
 
     def _values(
@@ -218,10 +220,8 @@ class RuptureSolver(OnsetSolver):
         return super()._values(rows, row, sample, path) | speeds
 
 
-def refuse_barriers(rows: Sample) -> None:
-    """Refuse profiles that only half-spaces take: infinite strength, stress above strength."""
-    if not np.isfinite(rows.strength).all():
-        raise InputError("strength: infinite strength is taken between half-spaces only")
+def refuse_overstress(rows: Sample) -> None:
+    """Refuse stress above the strength, which only half-spaces take."""
     if np.any(rows.strength < rows.initial_stress):
         raise InputError(
             "initial_stress: is above the strength, which is taken between half-spaces only"

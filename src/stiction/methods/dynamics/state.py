@@ -75,13 +75,15 @@ DIAGNOSTICS = np.dtype(
         ("load", "f8"),  # tau_0, Pa
         ("work", "f8"),  # of the load on the slip so far, J/m
         ("mean_slip", "f8"),  # m
-        ("mean_stress", "f8"),  # Pa, as all stresses here
+        ("mean_stress", "f8"),  # of the nodes that can break, Pa, as all stresses here
+        ("whole_stress", "f8"),  # mean stress of all nodes
         ("top_slip_rate", "f8"),  # largest slip rate, m/s, and where
         ("top_node", "i8"),
         ("weakened_nodes", "i8"),  # number of nodes at the residual strength
         ("non_finite_node", "i8"),  # after Reason.NOT_FINITE, the first whose slip rate is not
-        # The last maximum of the mean stress.
+        # The last maximum of the mean stress of all nodes.
         ("maximum_stress", "f8"),
+        ("maximum_breakable", "f8"),  # mean stress of the nodes that can break at that time
         ("maximum_radiated", "f8"),  # Z <V>
         ("maximum_time", "f8"),
         ("maximum_load", "f8"),
@@ -92,7 +94,8 @@ DIAGNOSTICS = np.dtype(
         ("event_slip_rate", "f8"),  # largest slip rate in it, m/s
         ("arrested_events", "i8"),
         ("first_stress", "f8"),  # mean stress at the first one
-        ("onset_stress", "f8"),  # mean stress at the highest one
+        ("onset_stress", "f8"),  # mean stress of all nodes at the highest one
+        ("critical_stress", "f8"),  # largest mean stress at any, of the nodes that can break
         ("onset_time", "f8"),
         ("onset_load", "f8"),
         ("onset_node", "i8"),

@@ -113,14 +113,15 @@ def _critical_load(run: Run, now: Any, stress: float) -> float:
 def summary(run: Run, state: RuptureState) -> dict[str, Any]:
     """Return the scalars of a finished run; NaN is what did not happen."""
     interface, now = run.medium.interface, state.now
-    stresses = ("onset_stress", "first_stress", "kinetic_stress")
-    onset, first, kinetic = (float(now[name]) for name in stresses)
+    stresses = ("onset_stress", "critical_stress", "first_stress", "kinetic_stress")
+    onset, critical, first, kinetic = (float(now[name]) for name in stresses)
     # A run that goes on until the interface slides, or to its end time, may see it survive.
-    critical = np.nan if np.isnan(kinetic) and run.stop in ("sliding", "time") else onset
+    if np.isnan(kinetic) and run.stop in ("sliding", "time"):
+        critical = np.nan
     node = np.unravel_index(int(now["onset_node"]), interface.shape)
     energies = energy_balance(run, state)
     values: dict[str, Any] = {
-        "critical_load": _critical_load(run, now, critical),
+        "critical_load": np.nan if np.isnan(critical) else _critical_load(run, now, onset),
         "critical_stress": critical,
         "first_instability": first,
         "critical_position": [i * h for i, h in zip(node, interface.spacings, strict=True)],

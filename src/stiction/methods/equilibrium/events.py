@@ -116,7 +116,7 @@ def relief_of(problem: Problem, slip: Array) -> float:
 
 def travel_of(problem: Problem, load: float, slip: Array) -> float:
     """Return the travel of both drives of a specimen together from the unloaded state, m."""
-    force = (load - relief_of(problem, slip)) * problem.interface.extent
+    force = (load - relief_of(problem, slip)) * problem.interface.measure
     return float(problem.blocks.travel(force, slip))
 
 

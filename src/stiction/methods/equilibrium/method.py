@@ -128,6 +128,8 @@ class Equilibrium:
     def supports(self, problem: Problem) -> list[str]:
         """Return the reasons why it cannot solve a problem; none if it can."""
         reasons = refused(problem.friction)
+        if problem.interface.breakable is not None:
+            reasons.append("interface.extent: is taken by st.Rupture() between half-spaces")
         if not problem.interface.is_plane and self.gap != type(self)().gap:
             reasons.append("gap: is of planes; lines are solved to round-off, so leave it out")
         return reasons

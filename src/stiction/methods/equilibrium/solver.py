@@ -84,6 +84,8 @@ def make_program(problem: Problem, gap: float = 1e-6) -> Program:
     """Return the programme that finds equilibria of a problem, or raise an `InputError`."""
     if reasons := refused(problem.friction):
         raise InputError(reasons)
+    if problem.interface.breakable is not None:
+        raise InputError("interface.extent: is taken by st.Rupture() between half-spaces")
     return PlaneProgram(problem, gap) if problem.interface.is_plane else DenseProgram(problem)
 
 

@@ -86,7 +86,7 @@ def place(
         if finer == 1 and not 0 <= flat.min() <= flat.max() < interface.size:
             raise InputError(
                 f"x reaches from {at.min():g} to {at.max():g} m, beyond the nodes of a specimen"
-                f" of {interface.extent:g} m; crop the record, place it with offset= or 'centre',"
+                f" of {interface.measure:g} m; crop the record, place it with offset= or 'centre',"
                 " or pass interpolate=True"
             )
     else:
@@ -179,7 +179,7 @@ def _check_repeats(
 
 def _interpolated(x: Array, values: Array, interface: Interface) -> Array:
     """Linear between points, constant a little beyond those at free ends, NaN in gaps."""
-    length, nodes = interface.extent, interface.x
+    length, nodes = interface.measure, interface.x
     margin = TOLERANCE * interface.spacing
     if not interface.is_free:
         x = np.mod(x, length)
@@ -253,7 +253,7 @@ def _filled(row: Array, hole: Mask, interface: Interface) -> Array:
         return row
     row = row.copy()
     if not interface.is_plane:
-        x, period = interface.x, None if interface.is_free else interface.extent
+        x, period = interface.x, None if interface.is_free else interface.measure
         row[hole] = np.interp(x[hole], x[~hole], row[~hole], period=period)
         return row
     from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator

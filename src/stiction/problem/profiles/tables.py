@@ -163,7 +163,7 @@ def _read_npy(path: Path) -> Array:
     except Exception as error:  # numpy lets through whatever Python's own parser raises
         text = (str(error) or "its header cannot be read").splitlines()[0]
         raise InputError(f"is not a .npy file of numbers: {text}") from None
-    if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
+    if not isinstance(array, np.ndarray) or array.dtype.kind not in "bfiu":
         raise InputError(f"must hold numbers, got {getattr(array, 'dtype', 'an archive')}")
     array = np.squeeze(array.astype(np.float64))
     if array.ndim not in (1, 2) or array.size == 0:
