@@ -155,9 +155,10 @@ def join(
     """Return the posterior of mean and scatter between specimens, from profiles and peaks."""
     profiles = profiles_of(random, prior, between, simulation.seed)
     variable = variable_of(problem, profiles.fields[0], measured.unit)
+    pairs = zip(measured.lengths, measured.values, strict=True)
     kinds = [
         simulated_onsets(profiles, problem, simulation, length, peaks, number, error, variable)
-        for number, (length, peaks, _) in enumerate(zip(*measured, strict=False))
+        for number, (length, peaks) in enumerate(pairs)
     ]
     known = profiles.levels.size > 0
     if known:
