@@ -48,16 +48,27 @@ def onsets(method, samples, seed):
     return found.critical_stress.values
 
 
-def below(truth, stress, ratios):
+def below(truth, stresses, ratios):
     """Return the true probability of an onset below each stress."""
-    at = np.asarray(stress)[:, None] / ratios
     if truth != "two batches":
-        return law(truth, SCATTER).cdf(at).mean(axis=1)
-    apart = SCATTER / np.sqrt(0.25 * 0.75)
-    found = 0.0
-    for share, mean in ((0.25, 1.0 - 0.75 * apart), (0.75, 1.0 + 0.25 * apart)):
-        found = found + share * scipy.stats.norm(mean, 0.02 * mean).cdf(at)
-    return found.mean(axis=1)
+        laws = {law(truth, SCATTER): 1.0}
+    else:
+        apart = SCATTER / np.sqrt(0.25 * 0.75)
+        means = {1.0 - 0.75 * apart: 0.25, 1.0 + 0.25 * apart: 0.75}
+        laws = {scipy.stats.norm(mean, 0.02 * mean): share for mean, share in means.items()}
+    return np.array(
+        [
+            sum(share * own.cdf(stress / ratios) for own, share in laws.items()).mean()
+            for stress in stresses
+        ]
+    )
+
+
+def right_designs(truth, ratios):
+    """Return the stresses of the promised probabilities, by linear interpolation of logarithms."""
+    levels = np.linspace(0.3, 1.2, 1801) * 1e6
+    logs = np.log(below(truth, levels, ratios) + 1e-300)
+    return np.exp(np.interp(np.log(PROMISED), logs, np.log(levels)))
 
 
 def campaign(truth, seed, method):
@@ -96,21 +107,14 @@ def campaign(truth, seed, method):
 def run(path, campaigns, first, method):
     """Append a row of numbers for each campaign."""
     ratios = onsets(method, 20_000 if method.type == "local_criterion" else 4_000, 1)
+    right = {truth: right_designs(truth, ratios) for truth in TRUTHS}
     for seed in range(first, first + campaigns):
         for truth in TRUTHS:
-            levels = np.linspace(0.3, 1.2, 1801) * 1e6
-            right = np.exp(
-                np.interp(
-                    np.log(PROMISED),
-                    np.log(below(truth, levels, ratios) + 1e-300),
-                    np.log(levels),
-                )
-            )
             designs, held, p = campaign(truth, seed, method)
             with path.open("a", newline="") as file:
                 for number, name in enumerate(METHODS):
                     chance = below(truth, designs[number], ratios) / PROMISED
-                    row = [*chance, *(designs[number] / right)]
+                    row = [*chance, *(designs[number] / right[truth])]
                     inside = map(int, held[2 * number : 2 * number + 2])
                     csv.writer(file).writerow(
                         [truth, name, seed, *(f"{v:.6g}" for v in row), *inside, f"{p:.3g}"]

@@ -96,6 +96,7 @@ def test_what_survives_counts_as_survived():
     never = st.design_stress(problem, likely, probability=0.97, **options)
     assert never.stress == math.inf
     assert any("no stress has that probability" in text for text in never.warnings)
+    assert "no stress has P = 0.97" in str(never)
     curve = st.failure_curve(problem, likely, smallest=0.02, **options)
     assert curve.survived == pytest.approx(lost, abs=error)
     assert np.isfinite(curve.stress).all()

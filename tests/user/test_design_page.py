@@ -27,7 +27,7 @@ def test_a_page_of_a_design(tmp_path):
     right = np.interp(0.05, below, levels)
     assert design.characteristic_stress == pytest.approx(right, rel=0.01)
     assert design.partial_factor == design.characteristic_stress / design.stress > 1.0
-    source = {"load.normal_pressure": "drawing 12"}
+    source = {"load.normal_pressure": "drawing 12", "solid.youngs_modulus": "certificate 8"}
     evidence = [st.Lognormal(mean=1.0, cv=0.1)]
     path = st.write_design_page(
         design, tmp_path / "design.html", problem=PROBLEM, evidence=evidence, sources=source,
@@ -39,6 +39,8 @@ def test_a_page_of_a_design(tmp_path):
         "assumed", "Evidence: Lognormal", KEY, "size: A4", "data:image/png",
     ):  # fmt: skip
         assert words in text, words
+    assert text.count("certificate 8") == 2  # of both moduli
+    assert f"{PROBLEM.solid.youngs_modulus:.5g}" in text
     refuses(
         "sources: load.weight: is no input",
         lambda: st.write_design_page(

@@ -10,13 +10,14 @@ from refusals import refuses
 from setups import ensemble
 
 import stiction as st
+from stiction.random.equally_likely import drawn_from
 
 PRESSURE = "problem.load.normal_pressure"
 
 
 def test_a_design_is_in_proportion_to_the_pressure():
     """Stated ends count, the others are 10 % off; common draws make the ratios exact."""
-    families = (st.Lognormal, st.Weibull)
+    families = (st.Lognormal, st.Weibull, st.TruncatedNormal)
     likely = [
         dataclasses.replace(RANDOM, between={"strength": kind(mean=1.0, cv=0.12)})
         for kind in families
@@ -36,6 +37,7 @@ def test_a_design_is_in_proportion_to_the_pressure():
     # The Weibull family has the heavier lower tail; the answer names both, and what it covers.
     by = {k: v for k, v in design.sensitivities.attrs.items() if k.startswith("stress by")}
     assert by["stress by weibull"] < design.stress < by["stress by lognormal"]
+    assert "stress by normal" in by
     text = str(design)
     assert "the error of the computation only" in text
     assert "weibull to lognormal" in text
@@ -90,3 +92,34 @@ def test_what_uncertain_refuses():
     ))  # fmt: skip
     refuses("uncertain: must map keys", lambda: st.uncertain(RANDOM, {}))
     refuses("random: must be", lambda: st.uncertain(3, {PRESSURE: (1e6, 2e6)}))
+
+
+def test_members_in_proportion_share_uncertain_values():
+    """As 128 specimens are made of each solved one only where strengths are in proportion."""
+
+    class Source:
+        def grouped(self, count, seed):
+            fields = np.random.default_rng(seed).integers(3, size=count)
+            return [
+                dataclasses.replace(
+                    RANDOM,
+                    strength=dataclasses.replace(
+                        RANDOM.strength, marginal=st.Gamma(mean=0.2 + 1e-5 * number, cv=cv)
+                    ),
+                )
+                for number, cv in enumerate(np.array([0.12, 0.15, 0.2])[fields])
+            ], fields.tolist()
+
+        def interfaces(self, count, seed=0):
+            return self.grouped(count, seed)[0]
+
+    laws = {"strength.spectrum.correlation_length": (3e-3, 5e-3), PRESSURE: (4e6, 6e6)}
+    random = drawn_from(st.uncertain(Source(), laws), 200, 0)
+    forms = {}
+    for number, (member, group) in enumerate(zip(random.members, random.groups, strict=True)):
+        field, turn = member.strength, number % len(random.constants)
+        form = field.marginal.cv, field.spectrum.correlation_length, turn
+        assert forms.setdefault(group, form) == form
+    assert 200 / 8 <= len(forms) <= 100
+    moved = drawn_from(st.uncertain(Source(), {"strength.marginal.low": (0.0, 0.01)}), 200, 0)
+    assert np.unique(moved.groups).size == 200

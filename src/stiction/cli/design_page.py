@@ -173,7 +173,13 @@ def _inputs(problem: Problem, sources: Mapping[str, str]) -> list[list[Any]]:
                 shown = f"{len(value)} values, mean {np.mean(value):.5g}" if numbers else value
                 rows.append([key, shown, UNITS.get(name, ""), sources.get(key, "assumed")])
 
-    add(to_plain(problem), "")
+    # Young's modulus is shown beside the shear modulus, which is stored, with the same source.
+    plain = to_plain(problem)
+    plain["solid"]["youngs_modulus"] = problem.solid.youngs_modulus
+    moduli = "solid.shear_modulus", "solid.youngs_modulus"
+    stated = [sources[key] for key in moduli if key in sources]
+    sources = dict.fromkeys(moduli, (*stated, "assumed")[0]) | dict(sources)
+    add(plain, "")
     keys = {row[0] for row in rows}
     if unknown := [key for key in sources if key not in keys]:
         raise InputError(f"sources: {unknown[0]}: is no input; inputs are {', '.join(keys)}")

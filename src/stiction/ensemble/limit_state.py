@@ -101,6 +101,11 @@ class LimitState:
             stress = self._stress(rows)
         else:
             stress = np.concatenate(in_threads(self._stress, parts, self.workers))
+        if np.any(stress == -np.inf):
+            raise InputError(
+                f"method: {experiment.method.label} returned an onset at minus infinity; it must"
+                " return a stress, Pa, or NaN where the event does not happen"
+            )
         stress = np.where(np.isnan(stress), np.inf, stress)
         stress = np.maximum(stress, self.bounds[0])  # rounding may be slightly below
         return stress if given.ndim == 2 else stress[0]

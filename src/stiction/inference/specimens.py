@@ -43,13 +43,8 @@ from stiction.inference.density import Densities, log_likelihoods
 from stiction.inference.marginal_fit import multiplied
 from stiction.random.dotted_keys import distributions_of
 from stiction.random.fields import RandomInterface
-from stiction.random.marginals import Lognormal, TruncatedNormal, Weibull
+from stiction.random.marginals import FACTOR_FAMILIES
 
-FAMILIES: dict[str, Any] = {
-    "lognormal": Lognormal,
-    "normal": TruncatedNormal,  # above zero
-    "weibull": Weibull,
-}
 MEAN_KEY, SCATTER_KEY = "strength.mean", "between.strength"
 """Keys of the two parameters, in a prior and among the draws."""
 PRIOR_SCALE = 0.1
@@ -80,17 +75,17 @@ LEAST_DEVIATION = 1e-3
 @lru_cache(maxsize=1024)
 def factor_of_family(family: str, cv: float) -> Any:
     """Return the marginal of a factor of mean 1."""
-    return FAMILIES[family](mean=1.0, cv=cv)
+    return FACTOR_FAMILIES[family](mean=1.0, cv=cv)
 
 
 def families_of(given: Any) -> tuple[str, ...]:
     """Return the families of factors named by True (all), a name or several."""
-    names = tuple(FAMILIES) if given is True else (given,) if isinstance(given, str) else given
+    names = tuple(FACTOR_FAMILIES) if given is True else (given,) if isinstance(given, str) else given
     if not isinstance(names, list | tuple) or not names:
-        raise InputError(f"must be True, False, or some of {', '.join(FAMILIES)}")
-    unknown = [name for name in names if name not in FAMILIES]
+        raise InputError(f"must be True, False, or some of {', '.join(FACTOR_FAMILIES)}")
+    unknown = [name for name in names if name not in FACTOR_FAMILIES]
     if unknown:
-        raise InputError([unknown_name("family", str(name), FAMILIES) for name in unknown])
+        raise InputError([unknown_name("family", str(name), FACTOR_FAMILIES) for name in unknown])
     return tuple(dict.fromkeys(names))
 
 
@@ -132,7 +127,7 @@ class Profiles(NamedTuple):
     reference: float  # Pa, or a coefficient
     levels: Array  # (specimens,), in the unit of the reference; empty without profiles
     within: Array  # variance of the logarithm of a level by the field, (fields, specimens)
-    families: tuple[str, ...] = tuple(FAMILIES)
+    families: tuple[str, ...] = tuple(FACTOR_FAMILIES)
     prior: FactorPrior = FactorPrior()
 
     @classmethod

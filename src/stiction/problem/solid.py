@@ -80,6 +80,11 @@ class Solid:
         return self
 
     @property
+    def youngs_modulus(self) -> float:
+        """E = 2 (1 + nu) G, Pa."""
+        return 2.0 * (1.0 + self.poisson_ratio) * self.shear_modulus
+
+    @property
     def shear_wave_speed(self) -> float:
         """c_s = sqrt(G/rho), m/s."""
         return math.sqrt(self.shear_modulus / self.density)

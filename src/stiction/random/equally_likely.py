@@ -33,6 +33,9 @@ MAX_DRAWS_OF_STREAM = 1 << 40
 
 VARIANTS = 40
 """Values of each uncertain constant of the problem."""
+SHARED_VALUES = 8
+"""Members of one field that share the value of an uncertain parameter, so that their strengths are
+in proportion."""
 FIRST_MEMBERS, MAX_MEMBERS = 1_000, 8_000
 """Members that are drawn from a source at first, and at most."""
 
@@ -259,20 +262,33 @@ class Uncertain:
 
     def grouped(self, count: int, seed: int) -> tuple[list[RandomInterface], Sequence[int]]:
         """Return equally likely interfaces, and the number of the field within each if known."""
-        given = as_random(self.given, seed)
-        source = given.source if isinstance(given, EquallyLikely) else None
-        likely = drawn_from(source, count, seed) if source else given
-        members = [likely.members[number % len(likely.members)] for number in range(count)]
+        source = self.given if isinstance(self.given, Source) else None
+        if isinstance(self.given, EquallyLikely):
+            source = self.given.source
+        likely = drawn_from(source, count, seed) if source else as_random(self.given)
         keys = [key for key in self.laws if not key.startswith("problem.")]
+        ranks = np.arange(count)
+        if len(keys) < len(self.laws):  # constants are taken in turn; members of one field share
+            turns = np.array_split(ranks, VARIANTS)
+            ranks = np.array([turns[n % VARIANTS][n // VARIANTS] for n in range(count)])
+        fields = np.resize(likely.groups, count)
+        numbers = np.argsort(fields, kind="stable")[ranks]
+        fields = fields[numbers]
+        members = [likely.members[number % len(likely.members)] for number in numbers]
         if not keys:
-            numbers = getattr(likely, "groups", np.zeros(1, np.int64))
-            return members, [int(numbers[n % len(numbers)]) for n in range(count)]
-        rows = hypercube({key: self.laws[key] for key in keys}, count, seed)
-        pairs = zip(members, rows, strict=True)
+            return members, fields.tolist()
+        keeps_form = not any(
+            key.startswith("random.strength.marginal") and not key.endswith(".cv") for key in keys
+        )
+        several = 1 < np.unique(likely.groups).size < len(likely.members)
+        shared = SHARED_VALUES if keeps_form and several else 1
+        rows = hypercube({key: self.laws[key] for key in keys}, -(-count // shared), seed)
+        row = ranks // shared if shared > 1 else np.arange(count)
+        pairs = zip(members, (rows[number] for number in row), strict=True)
         return [
-            with_values(member, {k.removeprefix("random."): v for k, v in row.items()})
-            for member, row in pairs
-        ], ()
+            with_values(member, {k.removeprefix("random."): v for k, v in values.items()})
+            for member, values in pairs
+        ], (fields * len(rows) + row).tolist() if shared > 1 else ()
 
     def interfaces(self, count: int, seed: int = 0) -> list[RandomInterface]:
         """Return so many equally likely interfaces; constants of the problem are left out."""
@@ -318,7 +334,8 @@ def uncertain(random: Any, parameters: Mapping[str, Any]) -> Uncertain:
             raise InputError("must map keys to distributions, got none")
         if wrong := [k for k in laws if k.startswith("problem.interface.")]:
             raise InputError(f"{wrong[0]}: samples are drawn on one interface; sweep over it")
-    as_random(random)  # refuses what is none
+    with prefixed("random"):
+        _known(random)
     return Uncertain(random, laws)
 
 

@@ -271,6 +271,14 @@ class ScipyMarginal(Marginal):
         return {"type": self.type, **dict(self.parameters)}
 
 
+FACTOR_FAMILIES: dict[str, Any] = {
+    "lognormal": Lognormal,
+    "normal": TruncatedNormal,  # above zero
+    "weibull": Weibull,
+}
+"""Families of the factor between specimens, by the names in `infer` and in answers."""
+
+
 def affine_parameters(marginal: Any) -> tuple[tuple[str, ...], float, float]:
     """Return the names of parameters that only shift or scale a marginal, and a and b.
 

@@ -219,8 +219,9 @@ class Answer:
 
         5 % of them have at most the one, 95 % at most the other. More tests make it
         narrower. It is too wide by the sampling error of each interface, which a smaller
-        `target_cv` lowers. An end is NaN if `members` is so at its rank, as of lists of
-        thousands: take one of tens. The error of the mean is `interval`.
+        `target_cv` lowers. An end is NaN if `members` is so at its rank, above the interfaces of
+        probability 0, as of lists of thousands: take one of tens. The error of the mean is
+        `interval`.
         """
         return band_of(self.members)
 
@@ -230,6 +231,11 @@ class Answer:
         return self.stress - self.lower_bound
 
     def __str__(self) -> str:
+        if self.of_stress and math.isinf(self.stress):
+            return (
+                f"no stress has P = {self.probability:g}: the event happens in"
+                f" {1.0 - self.survived:.3g} of {self.evaluations} samples"
+            )
         low, high = self.interval
         known = {
             "stress": f"{self.stress / 1e6:.7g} MPa",
@@ -297,12 +303,16 @@ class Answer:
 
 
 def band_of(members: Array) -> tuple[float, float]:
-    """Return the 90 % band over equally likely interfaces; NaN where too few are known."""
+    """Return the 90 % band over equally likely interfaces; NaN where its rank is not known."""
     if not members.size:
         return math.nan, math.nan
-    unknown = np.isnan(members)
-    ends = np.quantile(np.where(unknown, 0.0, members), [0.05, 0.95]).tolist()
-    low, high = np.where(unknown.mean() > [0.05, 0.95], math.nan, ends).tolist()
+    # Unknown probabilities are small, but above those that are exactly zero.
+    shares = np.array([0.05, 0.95])
+    ends = np.quantile(np.nan_to_num(members), shares)
+    zeros, known_from = np.sum(members == 0.0), np.sum(~(members > 0.0))
+    ranks = shares * (members.size - 1)
+    hidden = (zeros < known_from) & (np.ceil(ranks) >= zeros) & (np.floor(ranks) < known_from)
+    low, high = np.where(hidden, math.nan, ends).tolist()
     return low, high
 
 

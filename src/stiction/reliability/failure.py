@@ -527,6 +527,8 @@ def _quantile(
             near = counted[0].lowest(estimate.stress, 2 * CHECKED_FAILURES)
         doubts += exact_doubts(state, near, estimate.stress, probability)
     interval = tail.stress_interval(probability, estimate.cv, lowest)
+    if math.isinf(estimate.stress):
+        interval = interval[0], math.inf
     if counted:
         asked["characteristic_stress"] = counted[0].characteristic(confidence)
         asked["confidence"] = confidence

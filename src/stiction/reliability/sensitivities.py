@@ -25,6 +25,7 @@ from stiction.base.errors import InputError, collect_warnings
 from stiction.base.model import is_finite
 from stiction.ensemble.limit_state import LimitState
 from stiction.random.dotted_keys import with_values
+from stiction.random.marginals import FACTOR_FAMILIES
 from stiction.reliability.factors import Counts, solve
 
 SAMPLES_PER_END = 300
@@ -34,8 +35,8 @@ USUAL_SHARE = 0.1
 CONSTANTS = (
     "friction.residual_ratio", "friction.residual_strength", "friction.weakening_rate",
     "friction.critical_slip", "friction.fracture_energy", "load.normal_pressure",
-    "load.pressing_force", "solid.shear_modulus", "solid.youngs_modulus", "specimen.height",
-    "specimen.drive.stiffness", "specimen.drive.height",
+    "load.pressing_force", "solid.shear_modulus", "specimen.height", "specimen.drive.stiffness",
+    "specimen.drive.height",
 )  # fmt: skip
 """Constants of a problem that may be assumed, by dotted key; those that are numbers count."""
 FAMILY = "family of the factor"
@@ -130,7 +131,8 @@ def _by_family(counts: Counts, probability: float) -> dict[str, float]:
     """Return the quantile by each family of the factor, of which there are enough interfaces."""
     random = counts.state.experiment.random
     laws, law = random.factor_laws
-    kinds = np.array([getattr(one, "type", "none") for one in laws])[law]
+    names = {family: name for name, family in FACTOR_FAMILIES.items()}
+    kinds = np.array([names.get(type(one), getattr(one, "type", "none")) for one in laws])[law]
     quantiles = {}
     for kind in np.unique(kinds):
         stresses = np.where(kinds[counts.members] == kind, counts.values, np.nan)
