@@ -84,3 +84,23 @@ def test_bounds_and_scaling_hold_only_if_a_method_says_so(method):
     prior = make_prior(problem, strength, {"marginal.low": (0.5e6, 0.7e6)})
     assert len(find_scaling(prior, method, "critical_stress").keys) == described
     assert optional_member(method, "counted_only") is False
+
+
+def test_an_onset_at_minus_infinity_is_refused():
+    problem, strength = make_problem(256), beta_strength(7e-3)
+    names = ("critical_stress", "first_instability")
+    given = {"probability": 0.1, "progress": False, "max_evaluations": 100}
+
+    def design(value):
+        method = Broken({})
+        method.prepare = lambda problem: lambda sample: {
+            name: np.full(sample.samples, value if name in names else 1.0)
+            for name in onset_variables(problem.interface)
+        }
+        return st.design_stress(problem, strength, method=method, **given)
+
+    refuses("broken returned an onset at minus infinity", lambda: design(-np.inf))
+    never = design(np.nan)
+    assert never.interval[1] == never.stress == np.inf
+    assert "no stress has P = 0.1: the event happens in 0" in str(never)
+    assert never.warnings
