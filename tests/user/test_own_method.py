@@ -93,10 +93,12 @@ def test_an_onset_at_minus_infinity_is_refused():
 
     def design(value):
         method = Broken({})
-        method.prepare = lambda problem: lambda sample: {
-            name: np.full(sample.samples, value if name in names else 1.0)
-            for name in onset_variables(problem.interface)
-        }
+        method.prepare = lambda problem: (
+            lambda sample: {
+                name: np.full(sample.samples, value if name in names else 1.0)
+                for name in onset_variables(problem.interface)
+            }
+        )
         return st.design_stress(problem, strength, method=method, **given)
 
     refuses("broken returned an onset at minus infinity", lambda: design(-np.inf))

@@ -80,12 +80,15 @@ def factor_of_family(family: str, cv: float) -> Any:
 
 def families_of(given: Any) -> tuple[str, ...]:
     """Return the families of factors named by True (all), a name or several."""
-    names = tuple(FACTOR_FAMILIES) if given is True else (given,) if isinstance(given, str) else given
+    names = (given,) if isinstance(given, str) else given
+    names = tuple(FACTOR_FAMILIES) if given is True else names
     if not isinstance(names, list | tuple) or not names:
         raise InputError(f"must be True, False, or some of {', '.join(FACTOR_FAMILIES)}")
     unknown = [name for name in names if name not in FACTOR_FAMILIES]
     if unknown:
-        raise InputError([unknown_name("family", str(name), FACTOR_FAMILIES) for name in unknown])
+        raise InputError(
+            [unknown_name("family", str(name), FACTOR_FAMILIES) for name in unknown]
+        )
     return tuple(dict.fromkeys(names))
 
 

@@ -268,7 +268,9 @@ class Uncertain:
         likely = drawn_from(source, count, seed) if source else as_random(self.given)
         keys = [key for key in self.laws if not key.startswith("problem.")]
         ranks = np.arange(count)
-        if len(keys) < len(self.laws):  # constants are taken in turn; members of one field share
+        if len(keys) < len(
+            self.laws
+        ):  # constants are taken in turn; members of one field share
             turns = np.array_split(ranks, VARIANTS)
             ranks = np.array([turns[n % VARIANTS][n // VARIANTS] for n in range(count)])
         fields = np.resize(likely.groups, count)
@@ -278,7 +280,8 @@ class Uncertain:
         if not keys:
             return members, fields.tolist()
         keeps_form = not any(
-            key.startswith("random.strength.marginal") and not key.endswith(".cv") for key in keys
+            key.startswith("random.strength.marginal") and not key.endswith(".cv")
+            for key in keys
         )
         several = 1 < np.unique(likely.groups).size < len(likely.members)
         shared = SHARED_VALUES if keeps_form and several else 1
