@@ -32,6 +32,7 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, nearest, unknown
 from stiction.base.progress import Show
 from stiction.base.quantities import is_quantity, magnitude_in_one_of, units_of_argument
+from stiction.base.representation import brief, equal, hash_of, html_of
 
 T = TypeVar("T")
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -351,59 +352,12 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
 
     # Validation inside another model must keep calling pydantic's own path, not this wrapper.
     init.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # pydantic's own marker
-    wrapped.__init__, wrapped.__repr__ = init, brief
-    wrapped.__eq__, wrapped.__hash__ = _equal, _hash
+    wrapped.__init__, wrapped.__repr__, wrapped._repr_html_ = init, brief, html_of
+    wrapped.__eq__, wrapped.__hash__ = equal, hash_of
     hints = typing.get_type_hints(cls, include_extras=True)
     keys = {key: hints[name] for key, name in keys_of(wrapped).items()}
     wrapped.__signature__ = plain_signature(wrapped, keys)
     return wrapped
-
-
-def _comparable(value: Any) -> Any:
-    """Return what stands for a value where objects are compared and hashed."""
-    if value is None or isinstance(value, str | float):
-        return value  # most are, and hashes stand in many calls
-    if isinstance(value, np.ndarray):
-        return value.shape, (value + 0.0).tobytes()  # zeros of both signs are equal
-    if hasattr(value, "identical"):  # labelled arrays
-        return str(value.to_dict())
-    if isinstance(value, dict):
-        return tuple((key, _comparable(value[key])) for key in sorted(value))
-    return tuple(map(_comparable, value)) if isinstance(value, list | tuple) else value
-
-
-def _fields(self: Any) -> tuple[Any, ...]:
-    return tuple(_comparable(getattr(self, field.name)) for field in dataclasses.fields(self))
-
-
-def _equal(self: Any, other: Any) -> bool:
-    return _fields(self) == _fields(other) if type(self) is type(other) else NotImplemented
-
-
-def _hash(self: Any) -> int:
-    return hash(_fields(self))
-
-
-def brief(self: Any) -> str:
-    """Use as `__repr__` of a dataclass: its fields that are not at their default, shortened."""
-    parts = []
-    for field in dataclasses.fields(self):
-        value = getattr(self, field.name)
-        default = type(value) is type(field.default) and value == field.default
-        if field.repr and not default:
-            parts.append(f"{field.name}={_shown(value)}")
-    return f"{type(self).__name__}({', '.join(parts)})"
-
-
-def _shown(value: Any) -> str:
-    if isinstance(value, np.ndarray):
-        shape = " x ".join(str(size) for size in value.shape)
-        if value.dtype.kind not in "fiu" or value.size == 0:
-            return f"<{shape} array>"
-        return f"<{shape} array, {np.nanmin(value):.6g} to {np.nanmax(value):.6g}>"
-    if isinstance(value, list | tuple) and len(value) > 6:
-        return f"<{len(value)} values>"
-    return repr(float(value) if isinstance(value, np.floating) else value)
 
 
 def to_plain(value: Any) -> Any:

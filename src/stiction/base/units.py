@@ -1,7 +1,8 @@
 """Units that measured data state, and their factors to SI: nothing is converted by guessing."""
 
+import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -135,6 +136,19 @@ def in_words(units: str, value: float) -> str:
     value = float(f"{value:.3g}")  # 999.6 N are 1 kN
     factor, unit = unit_for(units, value)
     return f"{value * factor:.3g} {unit}".rstrip()
+
+
+def as_texts(units: str, values: Sequence[float]) -> tuple[list[str], str]:
+    """Return SI values in one unit that suits them, with digits that tell them apart; and the unit.
+
+    A value alone has six digits, a value with an interval two more than the interval resolves.
+    """
+    factor, unit = unit_for(units, values)
+    finite = [value for value in values if math.isfinite(value)]
+    spread = max(finite, default=0.0) - min(finite, default=0.0)
+    ratio = max(map(abs, finite), default=0.0) / spread if spread else 1e4
+    digits = min(max(math.ceil(math.log10(ratio)) + 2, 3), 9)
+    return [f"{value * factor:.{digits}g}" for value in values], unit
 
 
 class Doubt(NamedTuple):

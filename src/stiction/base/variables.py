@@ -69,6 +69,15 @@ UNITS = {name: variable.units for name, variable in PROFILES.items()} | {
 OF_THE_FIELD = ("mean", "standard_deviation", "low", "high", "loc", "scale", "noise")
 """Parameters of a marginal, and of what was measured, in the unit of their field."""
 
+
+def unit_of_key(key: str, of_field: str) -> str:
+    """Return the unit of a parameter by its dotted key, in a field in the unit `of_field`."""
+    *before, last = key.split(".")
+    if {"between", "correlation"} & {*before}:
+        return "1"
+    return of_field if last in OF_THE_FIELD else UNITS.get(last, "1")
+
+
 DIRECTION = "direction"
 """Dimension of the components along x and y."""
 

@@ -15,7 +15,8 @@ import xarray as xr
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
-from stiction.base.model import Number, at_least, brief, checked
+from stiction.base.model import Number, at_least, checked
+from stiction.base.representation import Result, Row, Summary
 from stiction.inference.curves import Curves, summary_of
 from stiction.inference.peaks import Peaks, factor_of, make_peaks
 from stiction.inference.posterior import Posterior
@@ -40,8 +41,8 @@ class Predicted(NamedTuple):
     share: Array  # of peaks up to each
 
 
-@dataclass(frozen=True, eq=False)
-class Agreement:
+@dataclass(frozen=True, eq=False, repr=False)
+class Agreement(Result):
     """Distances between measured and predicted peaks, and how often chance exceeds them.
 
     Attributes
@@ -71,6 +72,10 @@ class Agreement:
     band: float
     precursors: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
 
+    def _summary(self) -> Summary:
+        rows = [Row(f"p-value, {name}", p) for name, p in self.p_values.items()]
+        return Summary(f"{self.peaks} against the prediction", rows)
+
     def __str__(self) -> str:
         squares_p, deviation_p, *_ = self.p_values.values()
         text = (
@@ -79,8 +84,6 @@ class Agreement:
         )
         shown = [f"{self.p_values[name]:.3g} ({PRECURSORS[name]})" for name in self.precursors]
         return text + f"; precursors: p = {', '.join(shown)}" * bool(shown)
-
-    __repr__ = brief
 
 
 @checked

@@ -28,6 +28,7 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed, warn_accuracy
 from stiction.base.model import Number, Positive, checked, describe, real_array
+from stiction.base.representation import Result, Row, Summary
 from stiction.base.units import factor_to, in_words, is_in, parse
 from stiction.problem.profiles.reading import Missing, reading_options, with_stated_unit
 from stiction.problem.profiles.tables import (
@@ -73,8 +74,8 @@ class Drops(NamedTuple):
     size: Array
 
 
-@dataclass(frozen=True, eq=False)
-class Curve:
+@dataclass(frozen=True, eq=False, repr=False)
+class Curve(Result):
     """The curve of one test, and what it says.
 
     Attributes
@@ -125,11 +126,19 @@ class Curve:
         after = f", plateau {in_words(self.unit, self.plateau)}" * math.isfinite(self.plateau)
         return f"{text}{after}, noise {in_words(self.unit, self.noise)}"
 
-    __repr__ = __str__
+    def _summary(self) -> Summary:
+        rows = [
+            Row("peak", self.peak, (), self.unit),
+            Row("peak at", self.peak_travel, (), self.travel_unit),
+            Row("precursors", self.drops.size.size),
+            Row("plateau", self.plateau, (), self.unit),
+            Row("noise of a reading", self.noise, (), self.unit),
+        ]
+        return Summary(self.name, rows)
 
 
-@dataclass(frozen=True, eq=False)
-class Curves:
+@dataclass(frozen=True, eq=False, repr=False)
+class Curves(Result):
     """Curves of repeated tests: a sequence of `Curve`, for `read_peaks`, `infer` and figures."""
 
     tests: tuple[Curve, ...]
@@ -156,7 +165,9 @@ class Curves:
     def __str__(self) -> str:
         return "\n".join(map(str, self.tests))
 
-    __repr__ = __str__
+    def _summary(self) -> Summary:
+        rows = [Row(curve.name, curve.peak, (), curve.unit) for curve in self]
+        return Summary(f"Peaks of {len(self)} tests", rows)
 
 
 @checked

@@ -14,7 +14,8 @@ from scipy.stats import t as student
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed, unknown_name, warn_accuracy
 from stiction.base.model import Count, Flag, Number, Positive, Progress, at_least, checked
-from stiction.base.variables import OF_THE_FIELD, QUANTITIES, UNITS
+from stiction.base.representation import Result, Row, Summary
+from stiction.base.variables import QUANTITIES, unit_of_key
 from stiction.inference.between import chance_of_scatter
 from stiction.inference.bootstrap import (
     MIN_REPETITIONS,
@@ -84,8 +85,8 @@ Spectrum = Annotated[Any, BeforeValidator(spectrum_of), DEFAULT_TOO, "str | Spec
 Factors = Annotated[Any, BeforeValidator(_factors), DEFAULT_TOO, "str | list"]
 
 
-@dataclass(frozen=True, eq=False)
-class FieldFit:
+@dataclass(frozen=True, eq=False, repr=False)
+class FieldFit(Result):
     """Random field fitted to measured profiles, with intervals and doubts.
 
     Attributes
@@ -250,33 +251,29 @@ class FieldFit:
         """Return this as a source with uncertain parameters, as of `stiction.uncertain`."""
         return uncertain(self, parameters)
 
-    def __str__(self) -> str:
+    def _summary(self) -> Summary:
         marginal = getattr(self.field.marginal, "type", "marginal").replace("_", " ")
         spectrum = self.field.spectrum.type.replace("_", " ")
-        lines = [
+        title = (
             f"{marginal} marginal, {spectrum} spectrum from {self.lengths_held:.3g} correlation"
-            f" lengths, {100 * self.confidence:g} % intervals"
+            " lengths"
+        )
+        of_field = QUANTITIES[self.quantity].units
+        rows = [
+            Row(name, value, self.interval[name], unit_of_key(name, of_field))
+            for name, value in self.parameters.items()
+            if name != "mean" or "marginal.mean" not in self.parameters  # the same number
         ]
-        if self.missing[0]:
-            lines.append("  {} of {} points are missing and left out".format(*self.missing))
-        width = max(map(len, self.parameters))
-        for name, value in self.parameters.items():
-            if name == "mean" and "marginal.mean" in self.parameters:
-                continue  # the same number
-            (low, high), last = self.interval[name], name.rpartition(".")[2]
-            field_units = QUANTITIES[self.quantity].units
-            unit = field_units if last in OF_THE_FIELD else UNITS.get(last, "1")
-            line = f"  {name:{width}s}  {value:<11.5g} {low:.4g} to {high:.4g}"
-            lines.append(line if unit == "1" else f"{line} {unit}")
+        missing = "{} of {} points are missing and left out".format(*self.missing)
+        lines = [missing] * bool(self.missing[0])
         p_values = ", ".join(f"{name} {p:.3g}" for name, p in self.p_values.items())
         if len(self.families) > 1:
             told = f" ({', '.join(self.tied)} are not told apart)" if len(self.tied) > 1 else ""
             scores = ", ".join(f"{name} {one.score:.1f}" for name, one in self.families.items())
-            lines.append(f"  scores of families: {scores}{told}")
-        lines.append(f"  p-values: {p_values} ({len(self.repetitions)} repetitions)")
-        return "\n".join([*lines, *(f"  ! {doubt}" for doubt in self.doubts)])
-
-    __repr__ = __str__
+            lines.append(f"scores of families: {scores}{told}")
+        lines.append(f"p-values: {p_values} ({len(self.repetitions)} repetitions)")
+        lines += [f"! {doubt}" for doubt in self.doubts]
+        return Summary(title, rows, f"{100 * self.confidence:g} % interval", lines)
 
 
 @checked

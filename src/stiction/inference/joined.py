@@ -15,6 +15,7 @@ from scipy.stats import entropy
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Count, Number, checked
+from stiction.base.representation import Summary
 from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.limit_state import scales_with_strength
 from stiction.inference.agreement import Agreement, agreement
@@ -60,7 +61,7 @@ LOG_STRENGTH_MARGIN = 0.3
 """Logarithm of the strength beyond what the peaks need at which onsets are simulated too."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class SpecimenPosterior(Posterior):
     """Posterior of the mean, the scatter between specimens and the field within a specimen.
 
@@ -72,8 +73,8 @@ class SpecimenPosterior(Posterior):
         Of the peaks with what the profiles alone predict; None without profiles.
     """
 
-    grid: Grid = field(repr=False)
-    by_profiles: Grid = field(repr=False)
+    grid: Grid = field(repr=False, compare=False)
+    by_profiles: Grid = field(repr=False, compare=False)
     agreement: Agreement | None = field(default=None, repr=False)
 
     @property
@@ -116,13 +117,14 @@ class SpecimenPosterior(Posterior):
         """Raise an `InputError`: fields within a specimen are no parameters."""
         raise InputError("log_likelihood: needs parameters with a prior={...} of `infer`")
 
-    def __str__(self) -> str:
+    def _summary(self) -> Summary:
+        summary = super()._summary()
         shares = ", ".join(f"{name} {share:.0%}" for name, share in self.families.items())
-        lines = [super().__str__(), f"  families of the factor between specimens: {shares}"]
+        notes = [*summary.notes, f"families of the factor between specimens: {shares}"]
         if self.agreement is not None:
             p = min(self.agreement.p_values.values())
-            lines.append(f"  agreement of peaks and profiles: p = {p:.2g}")
-        return "\n".join(lines)
+            notes.append(f"agreement of peaks and profiles: p = {p:.2g}")
+        return summary._replace(notes=notes)
 
 
 def profiles_of(random: Any, prior: Any, families: Any, seed: int) -> Profiles:

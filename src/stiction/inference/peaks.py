@@ -11,6 +11,7 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed
 from stiction.base.model import FilePath, Number, Numbers, check, checked, describe, is_finite
 from stiction.base.quantities import magnitude
+from stiction.base.representation import Result, Row, Summary
 from stiction.base.units import factor_to, is_in
 from stiction.inference.curves import Curves
 from stiction.problem.profiles.reading import (
@@ -33,7 +34,15 @@ VARIABLES = {"Pa": "critical_stress", "N": "critical_force", "1": "friction_coef
 """What is measured in each unit, by its name among the results of a method."""
 
 
-class Peaks(NamedTuple):
+class _Peaks(NamedTuple):
+    """The fields of `Peaks`."""
+
+    lengths: tuple[float | None, ...]
+    values: tuple[Array, ...]
+    unit: str
+
+
+class Peaks(Result, _Peaks):
     """Peaks of repeated tests, by the length of the specimens.
 
     Attributes
@@ -45,10 +54,6 @@ class Peaks(NamedTuple):
     unit : str
         Of the peaks: "Pa", "N" of forces, or "1" of coefficients of friction.
     """
-
-    lengths: tuple[float | None, ...]
-    values: tuple[Array, ...]
-    unit: str
 
     def refuse_far(self, predicted: Sequence[Array]) -> None:
         """Refuse peaks so far from those predicted of each kind that their unit must be wrong."""
@@ -64,6 +69,18 @@ class Peaks(NamedTuple):
     def variable(self) -> str:
         """Name of the measured quantity among the results of a method."""
         return VARIABLES[self.unit]
+
+    def _summary(self) -> Summary:
+        kinds = zip(self.lengths, self.values, strict=True)
+        rows = [
+            Row(f"peak {i + 1}" + (f" at {length:g} m" if length else ""), peak, (), self.unit)
+            for length, values in kinds
+            for i, peak in enumerate(values.tolist())
+        ]
+        return Summary(str(self), rows)
+
+    def __repr__(self) -> str:
+        return self._summary().text
 
     def __str__(self) -> str:
         pairs = zip(self.lengths, self.values, strict=True)

@@ -10,6 +10,9 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.model import Count, Number, Numbers, check, checked
+from stiction.base.representation import Result, Row, Summary
+from stiction.base.units import as_texts
+from stiction.base.variables import unit_of_key
 from stiction.inference.grid import PosteriorGrid
 from stiction.inference.likelihood import Likelihood
 from stiction.inference.peaks import Peaks
@@ -24,8 +27,8 @@ POSTERIOR_DRAWS, CHAINS = 4000, 4
 """Number of draws, and of chains into which these independent ones are cut for ArviZ."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Posterior:
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Posterior(Result):
     """Posterior of the parameters, together with their prior.
 
     Attributes
@@ -56,9 +59,9 @@ class Posterior:
     log_evidence: float
     monte_carlo_error: float
     notes: tuple[str, ...]
-    likelihood: Any = field(repr=False)
-    u: Array = field(repr=False)
-    problem: Any = field(default=None, repr=False)
+    likelihood: Any = field(repr=False, compare=False)
+    u: Array = field(repr=False, compare=False)
+    problem: Any = field(default=None, repr=False, compare=False)
     seed: int = 0
 
     @property
@@ -228,19 +231,19 @@ class Posterior:
         ]
         return np.concatenate([part.reshape(len(self.u), -1) for part in parts], axis=1)
 
-    def __str__(self) -> str:
-        width = max(map(len, self.names))
-        lines = [f"{self.peaks}; onset by {self.method}"]
+    def _summary(self) -> Summary:
+        strength, rows = self.at(0)[1].strength, []
+        of_field = "Pa" if strength is None or strength.of is None else "1"
         for name in self.names:
-            low, high = self.interval(name)
-            least, most = np.quantile(self.before[name], [0.05, 0.95])
-            nats = f", {self.information[name]:.2f} nats" if name in self.information else ""
-            lines.append(
-                f"  {name:{width}s}  mean {self.mean(name):.4g}, 90 % {low:.4g} to {high:.4g}"
-                f" (before the tests {least:.4g} to {most:.4g}){nats}"
-            )
-        lines += [f"  {note}" for note in self.notes]
-        return "\n".join(lines)
+            unit = unit_of_key(name, of_field)
+            before = np.quantile(self.before[name], [0.05, 0.95]).tolist()
+            ends, shown_unit = as_texts(unit, before)
+            remark = f"{' to '.join(ends)} {shown_unit} before the tests".replace("  ", " ")
+            if name in self.information:
+                remark += f", {self.information[name]:.2f} nats"
+            rows.append(Row(name, self.mean(name), self.interval(name), unit, remark))
+        title = f"{self.peaks}; onset by {self.method}, posterior means"
+        return Summary(title, rows, "90 % interval", self.notes)
 
 
 def posterior_of(

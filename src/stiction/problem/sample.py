@@ -10,6 +10,7 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, unknown_name
 from stiction.base.model import as_numbers
+from stiction.base.representation import Result, Row, Summary
 from stiction.base.variables import PROFILES, QUANTITIES
 from stiction.problem.friction import SCALES
 from stiction.problem.interface import Interface
@@ -43,7 +44,19 @@ def steepest_rate(strength: Array, residual: Array, rate: Array) -> float:
     return float(rate.reshape(drop.shape)[drop <= BARRIER * typical].max())
 
 
-class Sample(NamedTuple):
+class _Profiles(NamedTuple):
+    """The profiles of a `Sample`."""
+
+    strength: Array
+    residual_strength: Array
+    weakening_rate: Array
+    initial_stress: Array
+    load_profile: Array
+    normal_pressure: Array
+    problem: Any = None
+
+
+class Sample(Result, _Profiles):
     """One interface or many: the profiles that every method starts from.
 
     Attributes
@@ -60,13 +73,15 @@ class Sample(NamedTuple):
         That made it, and the only one that takes it; None if it was put together by hand.
     """
 
-    strength: Array
-    residual_strength: Array
-    weakening_rate: Array
-    initial_stress: Array
-    load_profile: Array
-    normal_pressure: Array
-    problem: Any = None
+    def _summary(self) -> Summary:
+        rows = []
+        for name, values in self._asdict().items():
+            if name in QUANTITIES and not np.isnan(values).all():
+                ends = float(np.min(values)), float(np.max(values))
+                rows.append(Row(name, float(np.mean(values)), ends, QUANTITIES[name].units))
+        nodes = " x ".join(map(str, self.shape))
+        count = f"{self.samples} interface" + "s" * (self.samples != 1)
+        return Summary(f"{count} of {nodes} nodes, means", rows, "range")
 
     @property
     def samples(self) -> int:

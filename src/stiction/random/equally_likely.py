@@ -21,6 +21,8 @@ from scipy.special import ndtr, ndtri
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed
 from stiction.base.model import describe
+from stiction.base.representation import Result, Row, Summary
+from stiction.base.variables import unit_of_key
 from stiction.problem.interface import Interface
 from stiction.random.dotted_keys import distributions_of, full_key, with_values
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface, layout
@@ -253,12 +255,19 @@ def drawn_from(source: Source, count: int, seed: int) -> EquallyLikely:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Uncertain:
+@dataclass(frozen=True, eq=False, repr=False)
+class Uncertain(Result):
     """A source with distributions of parameters of what is random, and of the problem."""
 
     given: Any  # a random interface, several, or a source
     laws: Mapping[str, Any]  # by full key
+
+    def _summary(self) -> Summary:
+        rows = [
+            Row(key, law.mean(), law.ppf([0.05, 0.95]).tolist(), unit_of_key(key, ""))
+            for key, law in self.laws.items()
+        ]
+        return Summary("Uncertain parameters, means", rows, "90 % interval")
 
     def grouped(self, count: int, seed: int) -> tuple[list[RandomInterface], Sequence[int]]:
         """Return equally likely interfaces, and the number of the field within each if known."""

@@ -18,6 +18,7 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, collect_warnings, warn_accuracy
 from stiction.base.model import Real, at_least
 from stiction.base.progress import Meter
+from stiction.base.representation import Result, Row, Summary
 from stiction.base.units import in_words
 from stiction.ensemble.batches import usable_cores
 from stiction.ensemble.experiment import Experiment
@@ -89,8 +90,8 @@ class Estimate:
         return np.select([self.stress <= lows, self.stress >= highs], [0.0, 1.0], probabilities)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Answer:
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Answer(Result):
     """A stress, and the probability that an interface slides below it.
 
     Attributes
@@ -230,6 +231,31 @@ class Answer:
         """`stress` less `lower_bound`, Pa."""
         return self.stress - self.lower_bound
 
+    def _summary(self) -> Summary:
+        ends = self.interval if self.of_stress else ()
+
+        def over(name: str, scale: float, unit: str) -> Row:
+            return Row(name, self.stress * scale, [end * scale for end in ends], unit)
+
+        rows = [
+            over("stress", 1.0, "Pa"),
+            over("force", self.area, "N"),
+            over("friction coefficient", 1.0 / self.normal_pressure, "1"),
+        ]
+        rows.sort(key=lambda row: row.name != self.quantity.replace("_", " "))
+        chance = Row("probability", self.probability, () if ends else self.interval)
+        rows.insert(len(rows) if ends else 0, chance)
+        rows += [
+            Row("reliability index", self.reliability_index),
+            Row("lower bound of the stress", self.lower_bound or math.nan, (), "Pa"),
+            Row("characteristic stress", self.characteristic_stress, (), "Pa"),
+            Row("partial factor", self.partial_factor),
+        ]
+        known = [row for row in rows if math.isfinite(row.value)]
+        title = "Design value" if self.of_stress else "Probability of sliding"
+        basis = f"{self.algorithm}, {self.evaluations} evaluations: {self.reason}"
+        return Summary(title, known, "95 % interval", [basis, *self.warnings])
+
     def __str__(self) -> str:
         if self.of_stress and math.isinf(self.stress):
             return (
@@ -256,7 +282,8 @@ class Answer:
         ]
         result += f" ({', '.join(equivalents)})" if equivalents else ""
         if bounded(self.lower_bound):
-            result += f", {self.stress_above_bound / 1e3:.4g} kPa above the bound"
+            above = self.stress_above_bound / 1e3
+            result += f", {abs(above):.4g} kPa {'above' if above >= 0.0 else 'below'} the bound"
         if self.survived:
             result += f"; {self.survived:.3g} of plain samples survive any stress"
         if self.members.size:

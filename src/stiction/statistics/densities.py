@@ -20,7 +20,8 @@ from scipy.ndimage import gaussian_filter1d
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
-from stiction.base.model import Real, brief, checked
+from stiction.base.model import Real, checked
+from stiction.base.representation import Result, brief
 from stiction.statistics.estimates import as_sample
 
 GRID_CELLS = 4096
@@ -28,8 +29,8 @@ KERNEL_END = 8.0
 """Where the kernel is cut, in standard deviations."""
 
 
-@dataclass(frozen=True, eq=False)
-class Density:
+@dataclass(frozen=True, eq=False, repr=False)
+class Density(Result):
     """An estimated probability density.
 
     Attributes

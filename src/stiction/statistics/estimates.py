@@ -11,7 +11,8 @@ import scipy.stats
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
-from stiction.base.model import Numbers, brief, check, checked
+from stiction.base.model import Numbers, check, checked
+from stiction.base.representation import Result, Row, Summary
 
 
 @dataclass(frozen=True)
@@ -52,8 +53,8 @@ def standard_deviation(values: Any) -> WithError:
     return WithError(s, error / (2.0 * s) if s else 0.0)
 
 
-@dataclass(frozen=True, eq=False)
-class Quantiles:
+@dataclass(frozen=True, eq=False, repr=False)
+class Quantiles(Result):
     """Quantiles of a sample.
 
     Attributes
@@ -64,14 +65,25 @@ class Quantiles:
     lower, upper : (m,) arrays
         Ends of the 95 % confidence interval of each; infinite where the sample is too small
         to bound that quantile.
+    unit : str
+        Unit of the values, if they state one as an `xarray.DataArray` does.
     """
 
     probability: Array
     value: Array
     lower: Array
     upper: Array
+    unit: str = ""
 
-    __repr__ = brief
+    def _summary(self) -> Summary:
+        pairs = zip(self.lower.tolist(), self.upper.tolist(), strict=True)
+        rows = [
+            Row(f"{probability:g}", value, ends, self.unit)
+            for probability, value, ends in zip(
+                self.probability, self.value, pairs, strict=True
+            )
+        ]
+        return Summary("Quantiles of a sample", rows, "95 % interval")
 
 
 @checked
@@ -111,4 +123,4 @@ def quantiles(values: Any, probability: Numbers) -> Quantiles:
     padded = np.concatenate(([-np.inf], ordered, [np.inf]))
     value = np.quantile(ordered, p, method="median_unbiased")
     lower, upper = padded[np.clip(low, 0, n + 1)], padded[np.clip(high, 0, n + 1)]
-    return Quantiles(p, value, lower, upper)
+    return Quantiles(p, value, lower, upper, getattr(values, "attrs", {}).get("units", ""))

@@ -1,5 +1,6 @@
 """Exact mean and variance of the nucleation stress."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,14 +8,15 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.model import checked
+from stiction.base.representation import Result, Row, Summary
 from stiction.methods.criterion.local import check_law
 from stiction.methods.criterion.windows import windows_of
 from stiction.problem.problem import Problem
 from stiction.random.fields import RandomField
 
 
-@dataclass(frozen=True)
-class NucleationStatistics:
+@dataclass(frozen=True, eq=False, repr=False)
+class NucleationStatistics(Result):
     """Mean and variance of the nucleation stress tau_n, a load tau_0, at a point.
 
     Attributes
@@ -29,6 +31,15 @@ class NucleationStatistics:
     variance: float
     strength_mean: float
     strength_variance: float
+
+    def _summary(self) -> Summary:
+        rows = [
+            Row("mean", self.mean, (), "Pa"),
+            Row("standard deviation", math.sqrt(self.variance), (), "Pa"),
+            Row("mean of the strength", self.strength_mean, (), "Pa"),
+            Row("its standard deviation", math.sqrt(self.strength_variance), (), "Pa"),
+        ]
+        return Summary("Nucleation stress at a point, exact moments", rows)
 
     @property
     def variance_ratio(self) -> float:

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
 from stiction.base.errors import RunError
-from stiction.base.model import FilePath, brief, check
+from stiction.base.model import FilePath, check
+from stiction.base.representation import Result, brief
 from stiction.ensemble.batches import Failure
 from stiction.ensemble.dataset import Gathered
 from stiction.ensemble.store import Store
@@ -50,8 +51,8 @@ def samples_of_part(part: tuple[int, int], points: int, samples: int) -> NDArray
     return mine.reshape(points, samples)
 
 
-@dataclass(frozen=True)
-class Status:
+@dataclass(frozen=True, eq=False, repr=False)
+class Status(Result):
     """State of a run."""
 
     samples: int  # of all points

@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, PlainSerializer
 
 from stiction.base.errors import InputError, prefixed, unknown_name
 from stiction.base.model import Count, check, describe, to_plain
-from stiction.base.variables import OF_THE_FIELD, UNITS, Variable
+from stiction.base.variables import UNITS, Variable, unit_of_key
 from stiction.ensemble.dataset import Coordinates, GridAxes
 from stiction.random.dotted_keys import distributions_of, full_key
 from stiction.random.marginals import Marginal, marginal_of
@@ -159,11 +159,10 @@ def _text(value: Any) -> str:
     return str(kind) if kind else describe(value)
 
 
-def _unit(parts: Sequence[str], coefficients: Collection[str]) -> str:
-    """Return the unit of the values of a key, given by its parts."""
-    if {"marginal", "given"} & {*parts} and parts[-1] in OF_THE_FIELD:
-        return "1" if parts[1] in coefficients else UNITS.get(parts[1], "1")
-    return "1" if "correlation" in parts else UNITS.get(parts[-1], "1")
+def _unit(key: str, coefficients: Collection[str]) -> str:
+    """Return the unit of the values of a key; those of `coefficients` have none."""
+    of_field = key.split(".")[1] if "." in key else ""
+    return unit_of_key(key, "1" if of_field in coefficients else UNITS.get(of_field, "1"))
 
 
 def grid_axes(
@@ -189,7 +188,7 @@ def grid_axes(
         for key, values in axis.items():
             labels = _labels(values)
             number = labels.dtype.kind in "if"
-            unit = _unit(key.split("."), coefficients) if number else "1"
+            unit = _unit(key, coefficients) if number else "1"
             if unit != "1":  # to be shown in other units
                 labels = labels.astype(float)
             coordinates[names[key]] = (labels, Variable(unit, key, (dim,)))

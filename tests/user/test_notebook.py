@@ -1,0 +1,122 @@
+"""The last line of a cell: what each public object shows, and that results keep what they hold."""
+
+import copy
+import json
+import pickle
+from functools import cache
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import stiction as st
+
+PEAKS = [0.69e6, 0.70e6, 0.73e6, 0.68e6, 0.71e6]
+TRAVEL = np.linspace(0.0, 1e-3, 400)
+FORCE = np.where(TRAVEL < 4e-4, 1.23e7 * TRAVEL, 4.1e3)
+
+
+@cache
+def objects():
+    problem = st.paper.problem(nodes=256)
+    strength = st.paper.strength(problem, correlation_ratio=1.0)
+    rows = strength.sample(problem.interface, samples=3, seed=1)
+    how = {"method": st.LocalCriterion(), "progress": False}
+    onsets = st.monte_carlo(problem, strength, samples=200, seed=0, **how).critical_stress
+    coefficient = st.RandomField(
+        st.Lognormal(mean=0.2, cv=0.12), st.PowerLawSpectrum(5e-3), of="friction_coefficient"
+    )
+    pressed = st.Problem(
+        problem.solid, st.Interface(0.1, 256, width=0.01), problem.friction,
+        st.Load(normal_pressure=5e6),
+    )  # fmt: skip
+    posterior = st.infer(
+        problem, strength, PEAKS, prior={"marginal.low": (0.5e6, 0.8e6)}, samples=200, **how
+    )
+    return {
+        "fit": st.fit_field(
+            rows,
+            problem.interface,
+            marginal="lognormal",
+            spectrum="exponential",
+            noise=0.0,
+            bootstrap=20,
+            progress=False,
+        ),
+        "sample": problem.sample(rows),
+        "quantiles": st.statistics.quantiles(onsets, [0.05, 0.5]),
+        "density": st.statistics.density(onsets),
+        "moments": st.theory.nucleation_statistics(problem, strength),
+        "curve": st.read_curve((TRAVEL, FORCE), unit="N", travel_unit="m")[0],
+        "curves": st.read_curve((TRAVEL, FORCE), unit="N", travel_unit="m"),
+        "peaks": posterior.peaks,
+        "probability": st.failure_probability(problem, strength, stress=0.7e6, **how),
+        "design": st.design_stress(pressed, coefficient, probability=0.1, target_cv=0.3, **how),
+        "posterior": posterior,
+        "agreement": st.statistics.agreement(posterior, np.add(PEAKS, 4e3)),
+        "problem": pressed,
+        "field": strength,
+        "method": st.Rupture(loading_rate=2e7),
+        "uncertain": st.uncertain(strength, {"problem.friction.residual_ratio": (0.1, 0.2)}),
+    }
+
+
+SHOWN = {
+    "fit": ["efolding_length", "mm", "90 % interval", "p-values"],
+    "sample": ["3 interfaces of 256 nodes", "strength", "MPa"],
+    "quantiles": ["0.5", "MPa", "95 % interval", "0.69"],
+    "density": ["bandwidth"],
+    "moments": ["0.993333", "MPa"],
+    "curve": ["peak", "4.1", "kN", "precursors"],
+    "curves": ["Peaks of 1 test", "kN"],
+    "peaks": ["5 peaks", "0.73", "MPa"],
+    "probability": ["Probability of sliding", "95 % interval", "0.7", "MPa", "plain"],
+    "design": ["friction coefficient", "force", "N", "reliability index", "0.1"],
+    "posterior": ["marginal.low", "MPa", "0.514 to 0.785 MPa before the tests", "nats"],
+    "agreement": ["p-value", "cramer_von_mises"],
+    "problem": ["shear_modulus", "1000", "MPa", "friction.weakening_rate", "Pa m-1"],
+    "field": ["marginal.alpha", "spectrum.correlation_length", "mm"],
+    "method": ["loading_rate", "Pa s-1"],
+    "uncertain": ["problem.friction.residual_ratio", "0.15", "0.105 to 0.195"],
+}
+
+
+@pytest.mark.parametrize("name", SHOWN)
+def test_an_object_shows_its_numbers_with_units(name):
+    shown = objects()[name]._repr_html_()
+    assert shown.startswith("<table>")
+    assert [text for text in SHOWN[name] if text not in shown] == []
+    assert "nan" not in shown
+    assert len(repr(objects()[name])) < 1500
+
+
+RESULTS = [name for name in SHOWN if name not in ("problem", "field", "method", "uncertain")]
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_a_result_equals_its_copies_and_becomes_json(name):
+    result = objects()[name]
+    for twin in (copy.deepcopy(result), pickle.loads(pickle.dumps(result))):
+        assert result == twin
+        assert hash(result) == hash(twin)
+    assert result != next(objects()[other] for other in RESULTS if other != name)
+    written = json.loads(json.dumps(result.to_dict(), allow_nan=False))
+    assert written.keys() == result.to_dict().keys()
+
+
+def test_results_that_differ_are_not_equal():
+    sample, design = objects()["sample"], objects()["design"]
+    assert sample != sample.part(slice(1))
+    assert design.to_dict()["stress"] == design.stress
+    values = xr.DataArray(np.arange(12.0), attrs={"units": "N"})
+    ten, eleven = (st.statistics.quantiles(values, np.arange(1, n + 1) / 12) for n in (10, 11))
+    assert ten != eleven
+    assert "5.5" in repr(ten)
+
+
+def test_short_arrays_are_shown_in_full():
+    marginal = st.Beta(alpha=1.5, beta=3.0, low=1e6, high=2e6)
+    short, long = (st.Load(profile=np.linspace(0.5, 1.5, n)) for n in (10, 11))
+    assert "0.5, 0.6" in repr(short)
+    assert "<11 array, 0.5 to 1.5>" in repr(long)
+    assert "low=1000000.0" in repr(marginal)
