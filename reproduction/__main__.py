@@ -17,16 +17,16 @@ from pathlib import Path
 if not __package__:  # `python reproduction`
     sys.path[0] = str(Path(__file__).resolve().parent.parent)
 
-from reproduction import PARAMETERS
+from reproduction import PARAMETERS, TEXTS
 
-FIGURES = tomllib.loads(Path(__file__).with_name("page.toml").read_text("utf-8"))["figure"]
+FIGURES = TEXTS["figure"]
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command."""
     options = _options(arguments)
     import stiction as st
-    from reproduction import claims, modulus, page, runner, statements_onset, statements_rupture
+    from reproduction import claims, page, runner
     from reproduction.studies import jobs
 
     size = runner.QUICK if options.quick else runner.USUAL
@@ -36,18 +36,16 @@ def main(arguments: list[str] | None = None) -> None:
         size = dataclasses.replace(size, samples=options.samples, **lowered)
     out = Path(options.out)
     run = runner.Runner(out, size, options.seed, options.workers)
-    wanted = list(jobs(size, options.full or options.figure is not None))
+    wanted = list(jobs(options.full or options.figure is not None))
     if options.figure:
         needed = FIGURES[str(options.figure)]["needs"]
         wanted = [job for job in wanted if job[0] in needed]
-    groups = statements_onset.GROUPS | statements_rupture.GROUPS
-    groups |= {"Which modulus": modulus.CLAIMS}
     images: dict[int, Path] = {}
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", st.AccuracyWarning)
         with run.started(wanted) as studies:
-            data = claims.Data(studies, size)
-            so_far = claims.Data(studies, size, wait=False)
+            data = runner.Data(studies, size)
+            so_far = runner.Data(studies, size, wait=False)
             for number in _drawn(data, options.figure):
                 images[number] = _draw(data, number, out / "figures")
                 run.say(f"figure {number}: {images[number]}")
@@ -57,7 +55,7 @@ def main(arguments: list[str] | None = None) -> None:
                 return
             judged = {
                 title: [finding for claim in rows if (finding := claims.judge(claim, data))]
-                for title, rows in groups.items()
+                for title, rows in claims.GROUPS.items()
             }
     texts = (str(w.message) for w in caught if issubclass(w.category, st.AccuracyWarning))
     warned = sorted({re.sub(r"\d\S*", "", text): text for text in texts}.values())

@@ -1,30 +1,37 @@
-"""A claim is a row: what the paper says, where, what is computed for it, and the rule."""
+"""A claim is a statement of the paper with a rule; a finding is a claim with its numbers."""
 
+import contextlib
 import dataclasses
 import functools
-import math
+import re
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
+import jinja2
 import pandas as pd
-import xarray as xr
 
-from reproduction import PARAMETERS
-from reproduction.numbers_with_errors import Number
+from reproduction import PARAMETERS, measures, modulus, rules, setting
+from reproduction import numbers_with_errors as estimates
+from reproduction.numbers_with_errors import Number, number_of, rounded
 from reproduction.rules import Rule, Verdict, limits_times, together
-from reproduction.runner import Size
-from reproduction.setting import RATIOS
+from reproduction.runner import Data, LeftOut
+from reproduction.setting import RATIOS, SIMULATED
+from reproduction.studies import READINGS
 
-MINUS = "\N{MINUS SIGN}"
-TEXTS = tomllib.loads(Path(__file__).with_name("statements.toml").read_text("utf-8"))
-"""By name: what the paper says, where, and what stands beside the verdict."""
+NAMES = {"abs": abs} | vars(setting) | vars(estimates) | vars(measures)
+"""All that an expression in `statements.toml` and a text in `page.toml` may name."""
+OVER = {"r": RATIOS, "s": SIMULATED, "t": SIMULATED[1:]}
+"""An expression that names one of these letters is computed at each of its xi_0/h_n."""
+JINJA = jinja2.Environment(undefined=jinja2.StrictUndefined)
 
 
-@dataclass(frozen=True)
+@functools.cache
+def _expression(source: str):
+    return JINJA.compile_expression(source, undefined_to_none=False)
+
+
+@dataclasses.dataclass(frozen=True)
 class Series:
     """One computed quantity over keys: values of xi_0/h_n, or names of cases."""
 
@@ -40,83 +47,40 @@ class Series:
             where = f"{key:g}: " if isinstance(key, float) else f"{key}: " if key else ""
             parts.append(where + shown)
         over_ratios = self.rows and isinstance(self.rows[0][0], float)
-        return self.label + (" at xi_0/h_n = " if over_ratios else ": ") + ", ".join(parts)
+        values = ", ".join(parts) or "too few samples"
+        return self.label + (" at xi_0/h_n = " if over_ratios else ": ") + values
 
 
-class LeftOut(KeyError):
-    """A study is not computed in this run, or not yet."""
-
-
-class Data:
-    """The studies by name, as futures, with short ways to their numbers.
-
-    With `wait=False` a study that is still being computed counts as left out.
-    """
-
-    def __init__(self, studies: Mapping[str, Future], size: Size, *, wait: bool = True) -> None:
-        self.studies, self.size, self.wait = studies, size, wait
-
-    def __contains__(self, name: str) -> bool:
-        return name in self.studies and (self.wait or self.studies[name].done())
-
-    def __getitem__(self, name: str) -> xr.Dataset:
-        if name not in self:
-            raise LeftOut(name)
-        return self.studies[name].result()
-
-    def at(self, study: str, name: str, ratio: float) -> np.ndarray:
-        """Return a variable of a study at one xi_0/h_n."""
-        return self[study][name].sel(correlation_ratio=ratio).values
-
-    def stress(self, ratio: float, study: str = "local") -> np.ndarray:
-        """Return tau_cr of every sample, Pa."""
-        return self.at(study, "critical_stress", ratio)
-
-    def excess(self, ratio: float) -> np.ndarray:
-        """Return the first instability by the local criterion over the exact one, less one."""
-        name = "first_instability"
-        return self.at("local", name, ratio) / self.at("exact", name, ratio) - 1.0
-
-    def what_if(self, name: str, variable: str, point: int) -> np.ndarray:
-        """Return a variable of a what-if at one of its points."""
-        return self[name][variable].isel(point=point).values
-
-
-Measured = tuple[Sequence[Series] | Mapping[str, Sequence[Series]], Sequence[Series]]
-
-
-@dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True)
 class Claim:
-    """A statement of the paper, whose text stands in `statements.toml` under its name.
-
-    `measure` returns what is judged, by reading of the modulus if it depends on it, and what
-    stands beside it; `note` makes a note of results. `kind` is "finding"; "arithmetic" for
-    printed numbers, identities and what is true by the definitions; "beyond" for a statement
-    outside the range that the paper covers. The last two are counted apart.
-    """
+    """A statement as it stands in `statements.toml`, where the keys are explained."""
 
     name: str
+    says: str
+    where: str
     rule: Rule
-    measure: Callable[[Data], Measured]
-    note: Callable[[Data], str] | None = None
+    judged: Sequence[Sequence[str]]
+    beside: Sequence[Sequence[str]] = ()
+    note: str = ""
     kind: str = "finding"
 
-    @property
-    def says(self) -> str:
-        """What the paper says, in our words."""
-        return TEXTS[self.name]["says"]
 
-    @property
-    def where(self) -> str:
-        """Section, paragraph and sentence."""
-        return TEXTS[self.name]["where"]
-
-
-Check = functools.partial(Claim, kind="arithmetic")
-Beyond = functools.partial(Claim, kind="beyond")
+def _read() -> dict[str, list[Claim]]:
+    groups = tomllib.loads(Path(__file__).with_name("statements.toml").read_text("utf-8"))
+    return {
+        title: [
+            Claim(name, **row | {"rule": _expression(row["rule"])(vars(rules))})
+            for name, row in rows.items()
+        ]
+        for title, rows in groups.items()
+    }
 
 
-@dataclass(frozen=True)
+GROUPS = _read()
+"""All claims by the title of their group."""
+
+
+@dataclasses.dataclass(frozen=True)
 class Finding:
     """A claim with its numbers and its verdict.
 
@@ -130,13 +94,27 @@ class Finding:
     verdict: Verdict
     readings: Mapping[str, Verdict]
     otherwise: Mapping[str, Verdict]
-    note: str = ""
+
+
+def series(quantity: Sequence[str], data: Data, key: str = "") -> Series:
+    """Compute a quantity of a claim, in a reading of the modulus if it depends on it."""
+    label, unit, source = quantity
+    names = NAMES | {"d": data, "key": key, "v": functools.partial(modulus.at, data, key)}
+    function = _expression(source)
+    for letter, ratios in OVER.items():
+        if re.search(rf"\b{letter}\b", source):
+            values = [(float(x), number_of(function(names, **{letter: x}))) for x in ratios]
+            break
+    else:
+        value = function(names)
+        values = value if isinstance(value, list) else [("", number_of(value))]
+    return Series(f"({key}) {label}" if key else label, unit, values)
 
 
 def verdicts(rule: Rule, cases: Mapping[str, Sequence[Series]]) -> dict[str, Verdict]:
     """Return the verdict of a rule on each case."""
     return {
-        key: rule([[number for _, number in series.rows] for series in judged])
+        key: rule([[number for _, number in row.rows] for row in judged])
         for key, judged in cases.items()
     }
 
@@ -148,12 +126,23 @@ def judge(claim: Claim, data: Data) -> Finding | None:
     """
     if PARAMETERS and claim.kind == "arithmetic":
         return None
+    by_reading = any(re.search(r"\b(v|key)\b", source) for *_, source in claim.judged)
     try:
-        judged, beside = claim.measure(data)
-        note = claim.note(data) if claim.note else TEXTS[claim.name].get("note", "")
+        cases = {
+            key: [series(quantity, data, key) for quantity in claim.judged]
+            for key in (READINGS if by_reading else ("",))
+        }
     except LeftOut:
         return None
-    cases = judged if isinstance(judged, Mapping) else {"": judged}
+    beside = []
+    for quantity in claim.beside:
+        with contextlib.suppress(LeftOut):
+            beside.append(series(quantity, data))
+    return decide(claim, cases, beside)
+
+
+def decide(claim: Claim, cases: Mapping[str, Sequence[Series]], beside=()) -> Finding:
+    """Apply the rule of a claim to its numbers in each reading."""
     readings = verdicts(claim.rule, cases)
     verdict, otherwise = together(readings.values()), {}
     for factor, text in ((0.5, "half"), (2.0, "twice")):
@@ -161,69 +150,21 @@ def judge(claim: Claim, data: Data) -> Finding | None:
             moved = together(verdicts(claim.rule, cases).values())
         if moved is not verdict:
             otherwise[text] = moved
-    rows = [
-        dataclasses.replace(series, label=f"({key}) {series.label}" if key else series.label)
-        for key, judged_series in cases.items()
-        for series in judged_series
-    ]
-    return Finding(
-        claim, rows, beside, verdict, {} if "" in readings else readings, otherwise, note
-    )
-
-
-def over_ratios(
-    label: str, unit: str, function: Callable[[float], Number], ratios=RATIOS
-) -> Series:
-    """Return a series of function(ratio)."""
-    return Series(label, unit, [(float(ratio), function(ratio)) for ratio in ratios])
-
-
-def one(label: str, value, unit: str = "", error: float = 0.0) -> Series:
-    """Return a series of one number."""
-    number = value if isinstance(value, Number) else Number(float(value), error)
-    return Series(label, unit, [("", number)])
-
-
-def rounded(number: Number) -> str:
-    """Return a number with its error, to two digits of the error."""
-    value, error = number.value, number.error
-    if not math.isfinite(value):
-        return "not known"
-    if error > 0.0 and math.isfinite(error):
-        digits = max(1 - math.floor(math.log10(error)), 0)
-        if digits <= 7:
-            return f"{value:.{digits}f} ± {error:.{digits}f}".replace("-", MINUS)
-        return f"{value:.2g} ± {error:.1g}".replace("-", MINUS)
-    small = value != 0.0 and abs(value) < 1e-3
-    return (f"{value:.2g}" if small else f"{value:.4g}").replace("-", MINUS)
-
-
-def short(number: Number) -> str:
-    """Return a number without its error, to a digit that is worth half of the error or more."""
-    value, error = number.value, number.error
-    if not math.isfinite(value):
-        return "not known"
-    if value == 0.0 and error == 0.0:
-        return "0"
-    size = abs(value) or error
-    places = 2 - math.floor(math.log10(size))  # three digits at most
-    if error > 0.0:
-        places = min(places, math.floor(-math.log10(0.5 * error)))
-    value = round(value, places) + 0.0
-    return f"{value:,.{max(places, 0)}f}".replace("-", MINUS)
+    judged = [row for rows in cases.values() for row in rows]
+    return Finding(claim, judged, beside, verdict, readings, otherwise)
 
 
 def write_csv(findings: Sequence[Finding], path: Path) -> None:
     """Write every number of every claim, one a row."""
     rows = []
     for finding in findings:
-        for series in (*finding.judged, *finding.beside):
-            for key, number in series.rows:
+        for row in (*finding.judged, *finding.beside):
+            for key, number in row.rows:
                 ratio, case = (key, "") if isinstance(key, float) else ("", key)
                 rows.append({
                     "claim": finding.claim.name, "verdict": finding.verdict.value,
-                    "quantity": series.label, "xi_0/h_n": ratio, "case": case,
-                    "value": number.value, "error": number.error, "unit": series.unit,
-                    "judged": series in finding.judged,
+                    "quantity": row.label, "xi_0/h_n": ratio, "case": case,
+                    "value": number.value, "error": number.error, "unit": row.unit,
+                    "judged": row in finding.judged,
                 })  # fmt: skip
     pd.DataFrame(rows).to_csv(path, index=False)

@@ -12,10 +12,8 @@ import numpy as np
 from scipy.special import ndtr
 from scipy.stats import binom
 
-from reproduction import setting
-from reproduction.claims import Check, Claim, Data, one
 from reproduction.numbers_with_errors import Number, mean, share
-from reproduction.rules import above, below, graded, printed, within
+from reproduction.runner import Data
 from reproduction.setting import SIMULATED
 from reproduction.studies import READINGS
 
@@ -77,6 +75,10 @@ EVIDENCE = (
 taken to differ if they are visibly apart, in standard errors of a mean of 20."""
 
 
+COUNTS = slice(3)
+"""The part of the evidence that consists of counts."""
+
+
 @dataclass(frozen=True)
 class Reading:
     """What a reading gives for each printed result."""
@@ -133,30 +135,22 @@ def compare(data: Data, visible: float = 1.0) -> list[Reading]:
     return readings
 
 
+def reading(data: Data, key: str) -> Reading:
+    """Return the reading with a letter."""
+    return compare(data)[list(READINGS).index(key)]
+
+
+def most_likely(data: Data) -> float:
+    """Return the largest likelihood of a reading."""
+    return max(float(reading.likelihood[0]) for reading in compare(data)) or 1.0
+
+
 def odds(data: Data, evidence=slice(None), visible: float = 1.0) -> tuple[float, float, float]:
     """Return how much likelier two moduli are than one, with a 95 % interval.
 
     The best reading of each kind counts; `evidence` chooses among the printed results.
     """
-    a, b, *two = [math.prod(reading.chances[evidence]) for reading in compare(data, visible)]
+    readings = compare(data, visible)
+    a, b, *two = [math.prod(reading.chances[evidence]) for reading in readings]
     ratio = np.maximum(*two) / np.maximum(np.maximum(a, b), 1e-300)
     return float(ratio[0]), *map(float, np.quantile(ratio[1:], (0.025, 0.975)))
-
-
-def _over(function: Callable, label: str):
-    """Return a measure of function(reading), judged in every reading."""
-    return lambda d: ({r.key: [one(label, function(r))] for r in compare(d)}, [])
-
-
-CLAIMS = [
-    Claim("effective-modulus", below(0.1, "%: a printed digit"),
-        lambda d: ([one("G/(1-nu) exceeds that of plane stress, G(1+nu), by", 100.0
-                        * (setting.STRAIN.effective_modulus / setting.G_STAR - 1.0), "%")], [])),
-    Check("nucleation-length", graded(printed("0.034"), within(0.034, 0.035)),
-        lambda d: ([one("h_n/L with the printed modulus", setting.PRINTED_H / setting.L)],
-                   [one("in plane stress", setting.H / setting.L)])),
-    Claim("wrong-positions", above(0.05, "as usual for a significant difference"),
-        _over(lambda r: r.eight, "chance of 8 or more of 60")),
-    Claim("patches-at-onset", above(0.05, "as usual for a significant difference"),
-        _over(lambda r: r.chance(2), "share of samples with 20 to 30, xi_0/h_n = 0.25")),
-]  # fmt: skip

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import binom
 
+MINUS = "\N{MINUS SIGN}"
+
 
 @dataclass(frozen=True)
 class Number:
@@ -19,18 +21,60 @@ class Number:
     def __mul__(self, factor: float) -> Number:
         return Number(self.value * factor, self.error * abs(factor))
 
+    def __add__(self, summand) -> Number:
+        summand = number_of(summand)
+        return Number(self.value + summand.value, math.hypot(self.error, summand.error))
+
     def __sub__(self, subtrahend) -> Number:
-        subtrahend = subtrahend if isinstance(subtrahend, Number) else Number(float(subtrahend))
-        return Number(self.value - subtrahend.value, math.hypot(self.error, subtrahend.error))
+        return self + number_of(subtrahend) * -1.0
 
     def __truediv__(self, divisor) -> Number:
-        divisor = divisor if isinstance(divisor, Number) else Number(float(divisor))
+        divisor = number_of(divisor)
         value = self.value / divisor.value
         parts = (self.error / divisor.value, value * divisor.error / divisor.value)
         return Number(value, math.hypot(*parts))
 
     def __abs__(self) -> Number:
         return Number(abs(self.value), self.error)
+
+
+def number_of(value) -> Number:
+    """Return a number, exact if it has no error."""
+    return value if isinstance(value, Number) else Number(float(value))
+
+
+def rounded(number: Number) -> str:
+    """Return a number with its error, to two digits of the error."""
+    value, error = number.value, number.error
+    if not math.isfinite(value):
+        return "not known"
+    if error > 0.0 and math.isfinite(error):
+        digits = max(1 - math.floor(math.log10(error)), 0)
+        if digits <= 7:
+            return f"{value:.{digits}f} ± {error:.{digits}f}".replace("-", MINUS)
+        return f"{value:.2g} ± {error:.1g}".replace("-", MINUS)
+    small = value != 0.0 and abs(value) < 1e-3
+    return (f"{value:.2g}" if small else f"{value:.4g}").replace("-", MINUS)
+
+
+def short(number: Number) -> str:
+    """Return a number without its error, to a digit that is worth half of the error or more."""
+    value, error = number.value, number.error
+    if not math.isfinite(value):
+        return "not known"
+    if value == 0.0 and error == 0.0:
+        return "0"
+    size = abs(value) or error
+    places = 2 - math.floor(math.log10(size))  # three digits at most
+    if error > 0.0:
+        places = min(places, math.floor(-math.log10(0.5 * error)))
+    value = round(value, places) + 0.0
+    return f"{value:,.{max(places, 0)}f}".replace("-", MINUS)
+
+
+def _estimate(value, influence) -> Number:
+    """Return a statistic whose error is the scatter of the influence of each sample on it."""
+    return Number(float(value), float(np.std(influence)) / math.sqrt(np.size(influence)))
 
 
 def mean(values) -> Number:
@@ -48,13 +92,17 @@ def deviation(values) -> Number:
     return Number(s, error)
 
 
+def variation(values) -> Number:
+    """Return the coefficient of variation."""
+    return deviation(values) / float(np.mean(values))
+
+
 def skewness(values) -> Number:
-    """Return the skewness; the error is that of its influence function."""
+    """Return the skewness."""
     values = np.ravel(values)
     u = (values - values.mean()) / values.std()
     g = float(np.mean(u**3))
-    influence = u**3 - g - 3.0 * u - 1.5 * g * (u * u - 1.0)
-    return Number(g, float(influence.std()) / math.sqrt(values.size))
+    return _estimate(g, u**3 - g - 3.0 * u - 1.5 * g * (u * u - 1.0))
 
 
 def share(events) -> Number:
@@ -88,28 +136,26 @@ def _quantile_influence(values, p: float):
 
 def quantile(values, p: float) -> Number:
     """Return a quantile."""
-    values = np.ravel(values)
-    at, influence = _quantile_influence(values, p)
-    return Number(float(at), float(influence.std()) / math.sqrt(values.size))
+    return _estimate(*_quantile_influence(np.ravel(values), p))
 
 
 def lower_spread(values, upper: float = 0.5) -> Number:
     """Return the median less the lower quartile, the spread that the paper plots."""
-    values = np.ravel(values)
-    high, upper_influence = _quantile_influence(values, upper)
-    quartile, quartile_influence = _quantile_influence(values, 0.25)
-    return Number(
-        float(high - quartile),
-        float((upper_influence - quartile_influence).std()) / math.sqrt(values.size),
-    )
+    high, upper_influence = _quantile_influence(np.ravel(values), upper)
+    quartile, quartile_influence = _quantile_influence(np.ravel(values), 0.25)
+    return _estimate(high - quartile, upper_influence - quartile_influence)
+
+
+def whole_spread(values) -> Number:
+    """Return the upper less the lower quartile."""
+    return lower_spread(values, 0.75)
 
 
 def ratio_of_means(values, divisors) -> Number:
     """Return the ratio of the means of paired values."""
     values, divisors = np.ravel(values), np.ravel(divisors)
     ratio = float(values.mean() / divisors.mean())
-    error = float((values - ratio * divisors).std()) / abs(float(divisors.mean()))
-    return Number(ratio, error / math.sqrt(values.size))
+    return _estimate(ratio, (values - ratio * divisors) / float(divisors.mean()))
 
 
 def pooled_moments(sums) -> tuple[Number, Number, Number]:
@@ -127,22 +173,16 @@ def pooled_moments(sums) -> tuple[Number, Number, Number]:
     of_variance = d2 - 2.0 * a1 * d1
     of_third = d3 - 3.0 * a2 * d1 - 3.0 * a1 * d2 + 6.0 * a1 * a1 * d1
     of_skewness = of_third / s**3 - 1.5 * g * of_variance / variance
-    root = math.sqrt(sums.shape[0])
-    return (
-        Number(float(a1), float(d1.std()) / root),
-        Number(s, float(of_variance.std()) / (2.0 * s * root)),
-        Number(float(g), float(of_skewness.std()) / root),
-    )
+    return _estimate(a1, d1), _estimate(s, of_variance / (2.0 * s)), _estimate(g, of_skewness)
 
 
 def relative_changes(values, usual) -> tuple[Number, Number]:
     """Return the relative changes of mean and standard deviation between paired samples."""
     values, usual = np.ravel(values), np.ravel(usual)
-    shift = (values - usual) / usual.mean()
 
     def influence(x):
         return 0.5 * ((x - x.mean()) ** 2 / x.var() - 1.0)
 
     ratio = float(values.std() / usual.std())
-    error = float((influence(values) - influence(usual)).std()) / math.sqrt(values.size)
-    return mean(shift), Number(ratio - 1.0, ratio * error)
+    error = ratio * (influence(values) - influence(usual))
+    return mean((values - usual) / usual.mean()), _estimate(ratio - 1.0, error)

@@ -96,16 +96,6 @@ def above(limit: float, why: str = "", *, share: bool = False) -> Rule:
     return within(limit, math.inf, why, share=share)
 
 
-def to_factor(factor: float, why: str) -> Rule:
-    """Every number is one to a factor."""
-
-    def judge(series: Sequence[Numbers]) -> Verdict:
-        limit = factor ** _FACTOR.get()
-        return within(1.0 / limit, limit).judge(series)
-
-    return Rule(f"1 to a factor of {factor:g} ({why})", judge)
-
-
 def printed(digits: str) -> Rule:
     """The number rounds to the printed digits."""
     half = 0.5 * 10.0 ** Decimal(digits).as_tuple().exponent
@@ -168,19 +158,6 @@ def graded(strict: Rule, weak: Rule) -> Rule:
         return verdict
 
     return Rule(f"{strict.text}; a correction if only {weak.text}", judge)
-
-
-def main(first: Rule, second: Rule) -> Rule:
-    """The first rule decides; a failure of the other one earns a correction."""
-
-    def judge(series: Sequence[Numbers]) -> Verdict:
-        verdict, rest = _found((first, second), series)
-        if verdict is Verdict.HOLDS and rest is not Verdict.HOLDS:
-            return Verdict.CORRECTED if rest is Verdict.FAILS else Verdict.OPEN
-        return verdict
-
-    text = f"{first.text}; a correction unless the last is {second.text}"
-    return Rule(text, judge, first.series + second.series)
 
 
 def never(limit: float) -> Rule:

@@ -16,9 +16,11 @@ import json
 import shutil
 import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
 import stiction as st
@@ -30,7 +32,7 @@ with contextlib.suppress(ImportError):  # xarray would import it in several thre
 
 @dataclasses.dataclass(frozen=True)
 class Size:
-    """How much of each kind is computed; `dynamic` and what follows it by `--full` alone."""
+    """How much of each kind is computed; from `few` on by `--full` alone."""
 
     samples: int
     ruptures: int
@@ -43,25 +45,44 @@ class Size:
 
 
 QUICK = Size(samples=500, ruptures=4, readings=200, few=6, trend=300, what_if=40, arrests=2,
-             dynamic=0)  # fmt: skip
+             dynamic=4)  # fmt: skip
 USUAL = Size(samples=10_000, ruptures=20, readings=1000, few=60, trend=10_000, what_if=400,
-             arrests=200, dynamic=1000)  # fmt: skip
+             arrests=60, dynamic=1000)  # fmt: skip
 
 
-class StoppablePool(ThreadPoolExecutor):
-    """Threads whose queued work ends at once after `stopped` is set, for those who wait for it."""
+class LeftOut(Exception):
+    """A study is not computed in this run, or not yet."""
 
-    def __init__(self, workers: int) -> None:
-        super().__init__(workers)
-        self.stopped = threading.Event()
 
-    def submit(self, function, /, *arguments, **options):
-        def unless_stopped():
-            if self.stopped.is_set():
-                raise RuntimeError("the run has been stopped")
-            return function(*arguments, **options)
+class Data:
+    """The studies by name, as futures, with short ways to their numbers.
 
-        return super().submit(unless_stopped)
+    With `wait=False` a study that is still being computed counts as left out.
+    """
+
+    def __init__(self, studies: Mapping[str, Future], size: Size, *, wait: bool = True) -> None:
+        self.studies, self.size, self.wait = studies, size, wait
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.studies and (self.wait or self.studies[name].done())
+
+    def __getitem__(self, name: str) -> xr.Dataset:
+        if name not in self:
+            raise LeftOut(name)
+        return self.studies[name].result()
+
+    def at(self, study: str, name: str, ratio: float) -> np.ndarray:
+        """Return a variable of a study at one xi_0/h_n."""
+        return self[study][name].sel(correlation_ratio=ratio).values
+
+    def stress(self, ratio: float, study: str = "local") -> np.ndarray:
+        """Return tau_cr of every sample, Pa."""
+        return self.at(study, "critical_stress", ratio)
+
+    def excess(self, ratio: float) -> np.ndarray:
+        """Return the first instability by the local criterion over the exact one, less one."""
+        name = "first_instability"
+        return self.at("local", name, ratio) / self.at("exact", name, ratio) - 1.0
 
 
 class Runner:
@@ -87,7 +108,7 @@ class Runner:
             return function(self)
 
         with (
-            StoppablePool(self.workers) as self.pool,
+            ThreadPoolExecutor(self.workers) as self.pool,
             ThreadPoolExecutor(self.workers + 1) as studies,
         ):
             try:
@@ -96,8 +117,8 @@ class Runner:
                 for future in futures.values():
                     future.result()
             except BaseException:
-                self.pool.stopped.set()
-                studies.shutdown(wait=False, cancel_futures=True)
+                for pool in (studies, self.pool):
+                    pool.shutdown(wait=False, cancel_futures=True)
                 raise
 
     def say(self, text: str) -> None:

@@ -172,24 +172,3 @@ def distance(place, reference, period: float = L):
     """Return the distance of positions on the periodic interface, m."""
     gap = np.abs(np.asarray(place) - np.asarray(reference)) % period
     return np.minimum(gap, period - gap)
-
-
-def discrete_weights(problem=PROBLEM):
-    """Return the window of the local criterion that is strict on the grid, of unit sum.
-
-    The narrowest window of nodes whose stiffness has a smallest eigenvalue of at most the
-    weakening rate. Its positive eigenvector v gives a bound: no equilibrium exists above
-    sum(v tau_p), whatever the patches elsewhere do.
-    """
-    from scipy.linalg import eigh, toeplitz
-
-    interface = problem.interface
-    wavenumber = 2.0 * np.pi * np.abs(np.fft.fftfreq(interface.size, interface.spacing))
-    column = np.fft.ifft(0.5 * problem.effective_modulus * wavenumber).real
-    width = max(round(problem.nucleation_length / interface.spacing) - 4, 1)
-    while True:
-        value, vector = eigh(toeplitz(column[:width]), subset_by_index=[0, 0])
-        if value[0] <= W:
-            weights = np.abs(vector[:, 0])
-            return weights / weights.sum()
-        width += 1

@@ -9,7 +9,7 @@ import xarray as xr
 
 import stiction as st
 from reproduction import PARAMETERS, setting
-from reproduction.runner import Runner, Size, along, kept
+from reproduction.runner import Runner, along, kept
 from reproduction.setting import FIRST, MEAN, PROBLEM, RATIOS, SIMULATED, STRAIN, H, strength
 
 LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
@@ -20,7 +20,6 @@ NORMAL = np.linspace(-2.0, 2.0, 17)
 TREND = (0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 30.0)
 WINDOWS = (2.0, 4.0, 8.0, 16.0)
 LOAD_SHARES = (0.88, 0.90, 0.92, 0.94, 0.95, 0.96, 0.97, 0.98, 0.985, 0.99, 0.995, 0.999)
-RATES = (0.1, 0.3, 1.0, 3.0, 10.0)
 READINGS = {
     "a": "plane stress throughout",
     "b": "plane strain throughout",
@@ -56,12 +55,8 @@ def dynamic(run: Runner) -> xr.Dataset:
 
 @kept(samples=lambda size: size.samples)
 def moments(run: Runner, samples: int) -> xr.Dataset:
-    """Nucleation stress: weakest point, moments, histogram, and the bound that the grid has."""
+    """Nucleation stress: weakest point, moments and histogram."""
     interface = PROBLEM.interface
-    weights = setting.discrete_weights()
-    kernel = np.zeros(interface.size)
-    kernel[: weights.size] = weights
-    transform = np.conj(np.fft.rfft(kernel))
     edges = np.linspace(setting.LOW, setting.HIGH, CELLS + 1)
     spread = {
         r: setting.DEVIATION * variance_ratio(PROBLEM, strength(r)) ** 0.5 for r in RATIOS
@@ -71,7 +66,6 @@ def moments(run: Runner, samples: int) -> xr.Dataset:
         seed = run.seed_of(ratio)
         tau_p = strength(ratio).sample(interface, samples=count, seed=seed, first=first)
         tau_n = st.theory.nucleation_stress(PROBLEM, tau_p)
-        bound = np.fft.irfft(np.fft.rfft(tau_p, axis=1) * transform, interface.size, axis=1)
         d = tau_n / MEAN - 1.0
         powers = [d.mean(axis=1), (d * d).mean(axis=1), (d * d * d).mean(axis=1)]
         # Least tau_n away from its minimum by more than h_n.
@@ -83,7 +77,6 @@ def moments(run: Runner, samples: int) -> xr.Dataset:
             "largest_tau_n": tau_n.max(axis=1),
             "second_tau_n": np.where(near, np.inf, tau_n).min(axis=1),
             "least_tau_n": tau_n.min(axis=1),
-            "bound": bound.min(axis=1),
         }
         extremes = xr.Dataset({name: ("sample", row) for name, row in variables.items()})
         counts = np.histogram(tau_n[:, ::16], edges)[0]
@@ -185,86 +178,29 @@ def readings(run: Runner) -> xr.Dataset:
     return along("reading", list(READINGS), parts)
 
 
-def _weakened(slip, tau_p, node: int) -> float:
-    """Return the share of a rupture at its residual strength once it is 6 h_n long."""
+@kept()
+def representative(run: Runner) -> xr.Dataset:
+    """One rupture in space and time at the shortest correlation length."""
     interface = PROBLEM.interface
-    turn = interface.size // 2 - node
-    weakened = np.roll((tau_p - setting.residual(tau_p)) / setting.W, turn)
-    for row in np.roll(slip, turn, axis=1):
-        stopped = np.flatnonzero(row <= 1e-3 * row.max())
-        left = stopped[stopped < interface.size // 2].max(initial=-1)
-        right = stopped[stopped > interface.size // 2].min(initial=interface.size)
-        if (right - left - 1) * interface.spacing >= 6.0 * H:
-            inside = slice(left + 1, right)
-            return float(np.mean(row[inside] >= 0.999 * weakened[inside]))
-    return np.nan
-
-
-@kept(count=lambda size: 8 if size.few >= 24 else 2)
-def representative(run: Runner, count: int) -> xr.Dataset:
-    """Ruptures in space and time at the shortest correlation length, the first one whole."""
-    ratio, interface = FIRST, PROBLEM.interface
-
-    def rupture(sample):
-        tau_p = strength(ratio).sample(interface, seed=run.seed_of(ratio), first=sample)[0]
-        save = st.Save(["slip_rate", "slip"], every=6)
-        result = st.simulate_rupture(PROBLEM, tau_p, method=RUPTURE, save=save, progress=False)
-        slip = result["slip"].values
-        node = round(float(result["critical_position"]) / interface.spacing)
-        part = xr.Dataset({"weakened": _weakened(slip, tau_p, node)})
-        if sample:
-            return part
-        # The patch around the onset when the mean stress is largest.
-        labels = patches(slip[int(result["mean_stress"].argmax())] > 0.0)
-        label = labels[node % interface.size]
-        length = np.sum(labels == label) * interface.spacing if label >= 0 else np.nan
-        return part.assign(
-            slip_rate=(("time", "x"), result["slip_rate"].values.astype(np.float32)),
-            mean_stress=("time", result["mean_stress"].values),
-            critical_position=float(result["critical_position"]),
-            patch_length=length,
-            strength=("x", tau_p),
-            tau_n=("x", np.ravel(st.theory.nucleation_stress(PROBLEM, tau_p))),
-        ).assign_coords(time=result["time"].values, x=interface.x)
-
-    first, *rest = run.map(rupture, [(sample,) for sample in range(count)])
-    shares = [float(part["weakened"]) for part in (first, *rest)]
-    return first.assign(weakened=("rupture", shares))
-
-
-@kept(count=lambda size: 8 if size.ruptures >= 20 else 2)
-def convergence(run: Runner, count: int) -> xr.Dataset:
-    """Ruptures with other grids, loading rates and time steps, on the same samples."""
-    onset = dataclasses.replace(RUPTURE, stop="onset")
-    half = dataclasses.replace(
-        onset, courant=onset.courant / 2, load_step=onset.load_step / 2,
-        slip_step=onset.slip_step / 2,
-    )  # fmt: skip
-    cases = {
-        f"rate {rate:g}": (
-            PROBLEM, dataclasses.replace(onset, loading_rate=rate * setting.LOADING_RATE)
-        ) for rate in RATES
-    }  # fmt: skip
-    cases |= {
-        "half the nodes": (setting.grid(PROBLEM, nodes=0.5), onset),
-        "twice the nodes": (setting.grid(PROBLEM, nodes=2.0), onset),
-        "half the time step": (PROBLEM, half),
-    }
-    ratio = FIRST
-
-    def onset_of(case, sample):
-        problem, method = cases[case]
-        names = ("critical_stress", "critical_position", "offset")
-        if sample >= 4 and (problem is not PROBLEM or method is half):
-            return xr.Dataset(dict.fromkeys(names, np.nan))
-        tau_p = strength(ratio).sample(problem.interface, seed=run.seed_of(ratio), first=sample)
-        moving = st.onset(problem, tau_p, method=method, progress=False)
-        static = st.onset(problem, tau_p, method=EXACT, progress=False)
-        stress, place = (float(moving[name][0]) for name in names[:2])
-        offset = stress / float(static["first_instability"][0]) - 1.0
-        return xr.Dataset(dict(zip(names, (stress, place, offset), strict=True)))
-
-    return run.grid(onset_of, case=list(cases), sample=range(count))
+    tau_p = strength(FIRST).sample(interface, seed=run.seed_of(FIRST))[0]
+    save = st.Save(["slip_rate", "slip"], every=6)
+    result = st.simulate_rupture(PROBLEM, tau_p, method=RUPTURE, save=save, progress=False)
+    # The patch around the onset when the mean stress is largest.
+    slip = result["slip"].values[int(result["mean_stress"].argmax())]
+    node = round(float(result["critical_position"]) / interface.spacing) % interface.size
+    labels = patches(slip > 0.0)
+    length = np.sum(labels == labels[node]) if labels[node] >= 0 else np.nan
+    return xr.Dataset(
+        {
+            "slip_rate": (("time", "x"), result["slip_rate"].values.astype(np.float32)),
+            "mean_stress": ("time", result["mean_stress"].values),
+            "critical_position": float(result["critical_position"]),
+            "patch_length": length * interface.spacing,
+            "strength": ("x", tau_p),
+            "tau_n": ("x", np.ravel(st.theory.nucleation_stress(PROBLEM, tau_p))),
+        },
+        coords={"time": result["time"].values, "x": interface.x},
+    )
 
 
 def trend(run: Runner) -> xr.Dataset:
@@ -280,20 +216,10 @@ def trend(run: Runner) -> xr.Dataset:
     return result[["critical_stress"]].assign_coords(ratio=list(TREND))
 
 
-@kept(samples=lambda size: size.trend)
-def vanishing(run: Runner, samples: int) -> xr.Dataset:
+def vanishing(run: Runner) -> xr.Dataset:
     """Onsets at vanishing correlation length, by the local criterion on a finer grid."""
     fine = setting.grid(PROBLEM, nodes=4.0)
-
-    def batch(ratio, first, count):
-        field = strength(ratio)
-        tau_p = field.sample(
-            fine.interface, samples=count, seed=run.seed_of(ratio), first=first
-        )
-        least = st.theory.nucleation_stress(fine, tau_p).min(axis=1)
-        return xr.Dataset({"stress": ("sample", least)})
-
-    return run.batches(batch, "ratio", (1 / 64, 1 / 32), samples)
+    return run.sweep("vanishing", fine, strength, LOCAL, run.size.trend, (1 / 64, 1 / 32))
 
 
 @kept(samples=lambda size: size.trend // 2)
@@ -389,7 +315,7 @@ def dips(*places):
 
 @kept()
 def mechanism(run: Runner) -> xr.Dataset:
-    """Patches that act on each other: one, two, and a pair with a helper."""
+    """Patches that act on each other: one, and two at a distance."""
 
     def onset(profile, problem=PROBLEM):
         return st.onset(problem, profile, method=EXACT, progress=False)
@@ -419,11 +345,6 @@ def mechanism(run: Runner) -> xr.Dataset:
         lowering.append((local_stress(two) - stress) / stress - missed)
     result["lowering"] = ("distance", lowering)
     result = result.assign_coords(distance=list(apart))
-    pair = dips((-8.0, 0.30), (6.0, 0.298), (7.5, 0.28))
-    tau_n = np.ravel(st.theory.nucleation_stress(PROBLEM, pair))
-    result["pair_strength"], result["pair_tau_n"] = ("x", pair), ("x", tau_n)
-    result["pair_local"] = PROBLEM.interface.x[tau_n.argmin()]
-    result["pair_exact"] = float(onset(pair)["critical_position"][0])
     # Load and strength exchanged: tau_p(x), and max tau_p with an initial stress in its place.
     field, gaps = strength(setting.SECOND), []
     for tau_p in field.sample(PROBLEM.interface, samples=16, seed=run.seed):
@@ -447,32 +368,21 @@ def arrest(run: Runner, samples: int, most: int) -> xr.Dataset:
         for number in np.flatnonzero(events.sel(correlation_ratio=ratio).values > 0)[:most]
     ]
 
-    def beside(tau_p, centre, length):
-        """Largest strength within h_n/2 of each end of a patch; the smaller of the two."""
-        sides = []
-        for sign in (-1.0, 1.0):
-            middle = centre + sign * (0.5 * length + 0.25 * H)
-            near = setting.distance(interface.x, middle) <= 0.25 * H
-            sides.append(tau_p[near].max())
-        return min(sides)
-
     def again(ratio, number):
         tau_p = strength(ratio).sample(interface, seed=run.seed_of(ratio), first=number)[0]
         static = st.onset(PROBLEM, tau_p, method=st.Equilibrium(events=1), progress=False)
-        length = float(static["event_length"][0, 0])
-        centre = float(static["event_position"][0, 0])
-        at = beside(tau_p, centre, length)
-        by_chance = [beside(tau_p, place, length) for place in interface.x[::8]]
         moving = st.onset(PROBLEM, tau_p, method=RUPTURE, progress=False)
-        rank = float(np.mean(np.array(by_chance) < at))
-        values = (ratio, number, length, rank, float(moving["arrested_events"][0]))
-        return xr.Dataset(dict(zip(names, values, strict=True)))
+        length, events = (
+            static["event_length"].values[0, 0],
+            moving["arrested_events"].values[0],
+        )
+        return xr.Dataset({"length": length, "dynamic": events})
 
-    names = ("ratio", "number", "length", "rank", "dynamic")
     parts = run.map(again, chosen)
-    return xr.Dataset({
-        name: ("event", [float(part[name]) for part in parts]) for name in names
-    })  # fmt: skip
+    names = ("length", "dynamic")
+    return xr.Dataset(
+        {name: ("event", [float(part[name]) for part in parts]) for name in names}
+    )
 
 
 DRIVING = {
@@ -490,148 +400,86 @@ def driven(case: str):
     return dataclasses.replace(problem, friction=friction, load=DRIVING[case])
 
 
-@kept(count=lambda size: 16 if size.few >= 24 else 4)
-def driving(run: Runner, count: int) -> xr.Dataset:
+def driving(run: Runner) -> xr.Dataset:
     """Arrested fronts under non-uniform loads, by equilibrium and with inertia."""
-    field = strength(setting.SECOND)
-
-    def arrests(case, sample):
+    count = 16 if run.size.few >= 24 else 4
+    parts = []
+    for case in DRIVING:
         problem = driven(case)
-        tau_p = field.sample(problem.interface, seed=run.seed, first=sample)[0]
-        static = st.onset(problem, tau_p, method=st.Equilibrium(events=12), progress=False)
-        length, stress = static["event_length"].values[0], static["event_stress"].values[0]
-        drop = tau_p - problem.friction.residual_strength
-        energy = float(np.mean(drop**2)) / (2.0 * setting.W)
-        griffith = np.full(length.size, np.nan)
-        there = np.isfinite(length)
-        if there.any():
-            centre = 0.5 * problem.interface.measure
+        residual = problem.friction.residual_strength
+        energy = setting.MARGINAL.distribution.expect(lambda s, r=residual: (s - r) ** 2)
+        study = st.Study(problem=problem, random=strength(setting.SECOND),
+                         method=st.Equilibrium(events=12),
+                         ensemble=st.Ensemble(samples=count, seed=run.seed))  # fmt: skip
+        events = run.study(f"driving-{case}", study)[["event_length", "event_stress"]]
+        stress = events["event_stress"].values
+        griffith = np.full(stress.shape, np.nan)
+        if (there := np.isfinite(stress)).any():
             griffith[there] = st.theory.griffith_length(
-                problem, stress[there], energy, centre=centre, arrest=True
-            )
-        dynamic = np.nan
-        if case == "edge" and there[0]:
-            dynamic = _held(problem, tau_p, float(stress[0]))
-        arrested = {"length": ("event", length), "griffith": ("event", griffith)}
-        return xr.Dataset(arrested | {"dynamic_length": dynamic})
-
-    return run.grid(arrests, case=list(DRIVING), sample=range(count))
+                problem, stress[there], energy / (2.0 * setting.W),
+                centre=0.5 * problem.interface.measure, arrest=True,
+            )  # fmt: skip
+        parts.append(events.assign(griffith=(("sample", "event"), griffith)))
+    return along("case", list(DRIVING), parts).assign(dynamic_length=held(run)["length"])
 
 
-def _held(problem, tau_p, stress: float) -> float:
-    """Return the length of the patch in which a rupture comes to rest under a load that is held
-    just above that of the first arrested event, m."""
-    rise = 1.005 * stress / setting.LOADING_RATE
-    hold = rise + 10.0 * setting.CROSSING
-    load = ([0.0, rise, hold], [0.0, 1.005 * stress, 1.005 * stress])
-    method = st.Rupture(load=load, stop="rest", end_time=hold)
-    rupture = st.simulate_rupture(
-        problem, tau_p, method=method, save=st.Save(["slip"], every=1_000_000), progress=False
-    )
-    slip = rupture["slip"].values[-1]
-    labels = patches(slip > 1e-2 * slip.max())
-    longest = np.bincount(labels[labels >= 0]).max(initial=0)
-    return float(longest) * problem.interface.spacing
+@kept(count=lambda size: 16 if size.few >= 24 else 4)
+def held(run: Runner, count: int) -> xr.Dataset:
+    """Ruptures under an edge load that is held just above that of the first arrested event."""
+    problem, field = driven("edge"), strength(setting.SECOND)
+
+    def rest(sample):
+        tau_p = field.sample(problem.interface, seed=run.seed, first=sample)[0]
+        static = st.onset(problem, tau_p, method=st.Equilibrium(events=1), progress=False)
+        stress = 1.005 * float(static["event_stress"][0, 0])
+        if np.isnan(stress):
+            return xr.Dataset({"length": np.nan})
+        rise = stress / setting.LOADING_RATE
+        end = rise + 10.0 * setting.CROSSING
+        method = st.Rupture(
+            load=([0.0, rise, end], [0.0, stress, stress]), stop="rest", end_time=end
+        )
+        saved = st.Save(["slip"], every=1_000_000)
+        rupture = st.simulate_rupture(problem, tau_p, method=method, save=saved, progress=False)
+        slip = rupture["slip"].values[-1]
+        labels = patches(slip > 1e-2 * slip.max())
+        longest = np.bincount(labels[labels >= 0]).max(initial=0)
+        return xr.Dataset({"length": longest * problem.interface.spacing})
+
+    return run.grid(rest, sample=range(count))
 
 
-@kept(count=lambda size: min(2 * size.what_if, 400))
-def free_end(run: Runner, count: int) -> xr.Dataset:
-    """Onsets with free ends in mode III, where a mirrored field has them exactly.
-
-    A field mirrored at x = 0 and L makes antiplane displacement even there: no stress acts on
-    these planes, as if the solids ended.
-    """
-    base = dataclasses.replace(PROBLEM, mode="III")
-    length = base.nucleation_length
-    cases = [(ratio, 1.0) for ratio in RATIOS] + [(FIRST, 0.25), (FIRST, 0.5)]
-
-    def batch(case, first, count):
-        ratio, factor = cases[case]
-        problem = setting.grid(base, length=factor, nodes=factor)
-        double = setting.grid(base, length=2.0 * factor, nodes=2.0 * factor)
-        field = strength(ratio, nucleation_length=length)
-        tau_p = field.sample(problem.interface, samples=count, seed=run.seed, first=first)
-        mirrored = np.concatenate([tau_p, tau_p[:, ::-1]], axis=1)
-        periodic = st.onset(problem, tau_p, method=EXACT, progress=False)
-        free = st.onset(double, mirrored, method=EXACT, progress=False)
-        extent = problem.interface.measure
-        # Nodes are half a spacing from the mirror planes.
-        place = (free["critical_position"].values + 0.5 * problem.interface.spacing) % extent
-        end = np.minimum(place, extent - place) / length
-        change = free["first_instability"].values / periodic["first_instability"].values - 1.0
-        return xr.Dataset({"change": ("sample", change), "end": ("sample", end)})
-
-    return run.batches(batch, "case", range(len(cases)), count)
+ARRESTS = ("wide_strength", "random_load", "random_residual")
+"""What-ifs in which arrest is the question, also run with inertia."""
+WHAT_IFS = (*ARRESTS, "normal_load", "length", "exponent", "skewness")
 
 
-@kept()
-def failure(run: Runner) -> xr.Dataset:
-    """Failure probability down to one in a million at xi_0 = h_n/2, by the local criterion."""
-    return st.failure_curve(
-        PROBLEM, strength(setting.SECOND), method=LOCAL, smallest=1e-6, target_cv=0.2,
-        seed=run.seed, progress=False,
-    ).drop_attrs()  # fmt: skip
-
-
-WHAT_IFS = (
-    "wide_strength", "random_residual", "random_load", "normal_load", "length", "exponent",
-    "skewness",
-)  # fmt: skip
-ARRESTS = {"wide_strength": ((3,),), "random_load": ((4, 5),), "random_residual": ((2,), (0,))}
-"""What-ifs in which arrest is the question: of each axis, the values that are run with inertia."""
-TIMES = {"random_load": 2}
-"""Samples by equilibrium, in multiples of the usual number: more where shares are small."""
-TIMES_RUPTURES = {"random_residual": 6}
-"""Ruptures likewise: one in six is arrested there; of 8, most often fewer than the two needed."""
-
-
-def what_if(run: Runner, name: str) -> xr.Dataset:
-    """A study file of `what_if/`, its swept points stacked along 'point'."""
+def what_if(run: Runner, name: str, *, inertia: bool = False) -> xr.Dataset:
+    """A study file of `what_if/`, its swept points stacked along 'point'; by ruptures if asked."""
     study = st.Study.from_toml(setting.WHAT_IF / f"{name}.toml")
-    most = run.size.trend
-    if study.method != LOCAL:
-        most = run.size.what_if * TIMES.get(name, 1)
+    most = run.size.trend if study.method == LOCAL else run.size.what_if
+    if inertia:
+        study, most = dataclasses.replace(study, method=RUPTURE), run.size.arrests
     ensemble = st.Ensemble(samples=min(most, study.ensemble.samples), seed=run.seed)
-    return stacked(run.study(name, dataclasses.replace(study, ensemble=ensemble)))
-
-
-def stacked(result: xr.Dataset) -> xr.Dataset:
-    """Return a dataset with its swept axes stacked along 'point', in the order of the file."""
+    changed = dataclasses.replace(study, ensemble=ensemble)
+    result = run.study(f"{name}-inertia" if inertia else name, changed)
     swept = [dim for dim in result["critical_stress"].dims if dim != "sample"]
     numbered = result.drop_vars([name for name in result.coords if name != "sample"])
     return numbered.stack(point=swept, create_index=False).transpose("point", ...)
-
-
-def what_if_dynamic(run: Runner, name: str) -> xr.Dataset:
-    """Points of a what-if in which arrest is the question, with inertia; 'point' numbers them."""
-    plain = st.Study.from_toml(setting.WHAT_IF / f"{name}.toml").to_dict()
-    sizes = [len(next(iter(axis.values()))) for axis in plain["sweep"]]
-    numbers = np.arange(math.prod(sizes)).reshape(sizes)[np.ix_(*ARRESTS[name])]
-    plain["sweep"] = [
-        {key: [values[i] for i in chosen] for key, values in axis.items()}
-        for axis, chosen in zip(plain["sweep"], ARRESTS[name], strict=True)
-    ]
-    plain["method"] = RUPTURE
-    samples = min(run.size.arrests * TIMES_RUPTURES.get(name, 1), 200)
-    plain["ensemble"] = {"samples": samples, "seed": run.seed}
-    result = stacked(run.study(f"{name}-inertia", st.Study.from_dict(plain)))
-    return result.assign_coords(point=numbers.ravel())
 
 
 PAPER = (local, moments, exact, ruptures, theory, representative)
 """What the paper does, in the order in which it is computed."""
 MODULUS = (printed, readings)
 """Which modulus the paper used: asked with the paper's parameters only."""
-BEYOND = (convergence, trend, vanishing, window, modes, growth, mechanism, arrest, driving,
-          free_end, failure)  # fmt: skip
+BEYOND = (trend, vanishing, window, modes, growth, mechanism, arrest, driving, dynamic)
 """What `--full` adds."""
 
 
-def jobs(size: Size, full: bool):
+def jobs(full: bool):
     """Yield the name, the progress line and the function of every study."""
     studies = PAPER if PARAMETERS else PAPER + MODULUS
     studies += BEYOND if full else ()
-    studies += (dynamic,) if full and size.dynamic else ()
     for study in studies:
         yield study.__name__, study.__doc__.partition(".")[0], study
     # The what-ifs state parameters of their own.
@@ -639,5 +487,5 @@ def jobs(size: Size, full: bool):
         text = f"What if: {name.replace('_', ' ')}"
         yield name, text, functools.partial(what_if, name=name)
         if name in ARRESTS:
-            text += ", with inertia"
-            yield f"{name}-inertia", text, functools.partial(what_if_dynamic, name=name)
+            ruptures = functools.partial(what_if, name=name, inertia=True)
+            yield f"{name}-inertia", f"{text}, with inertia", ruptures

@@ -1,41 +1,41 @@
-"""Figures 8 to 16, beyond the paper."""
+"""Figures 8 to 13, beyond the paper."""
 
 import dataclasses
 import math
 
 import numpy as np
-from scipy.stats import binomtest
 
 from reproduction import setting
-from reproduction.claims import Data
 from reproduction.figures import common
-from reproduction.figures.common import COLOURS, DARK, GREY, OVER_MEAN, RED, TAU_CR, XI
+from reproduction.figures.common import COLOURS, DARK, GREY, OVER_MEAN, RED, XI
+from reproduction.measures import (
+    arrest_shares,
+    arrested,
+    largest_energy,
+    trend,
+    with_inertia,
+)
 from reproduction.numbers_with_errors import deviation, lower_spread, mean
-from reproduction.setting import HIGH, MEAN, PROBLEM, RATIOS, SIMULATED, H, L
-from reproduction.statements_onset import bound_above, trend
-from reproduction.statements_rupture import arrested, largest_energy, shares, with_inertia
-from reproduction.studies import DRIVING, LOAD_SHARES, RATES
+from reproduction.runner import Data
+from reproduction.setting import MEAN, PROBLEM, RATIOS, H, L
+from reproduction.studies import DRIVING, LOAD_SHARES
 
 
 def figure_8(d: Data):
-    """Draw the local criterion and the bound that is strict on the grid against the exact onset."""
-    figure = common.new(5.6)
-    top, bottom = figure.subplots(2, 1)
-    for axes, text, above in (
-        (top, "the bound, by the grid's eigenvector, above the exact onset (%)", bound_above),
-        (bottom, "the local criterion above the exact onset (%)", Data.excess),
-    ):
-        for ratio in RATIOS:
-            ordered = 100 * np.sort(above(d, ratio))
-            left = 1.0 - np.arange(ordered.size) / ordered.size
-            axes.plot(ordered, left, **common.line(ratio), label=f"{ratio:g}")
-        axes.axvline(0, color=GREY, lw=0.8)
-        axes.set_xscale("symlog", linthresh=0.1, linscale=0.5)
-        axes.set(yscale="log", ylim=(0.7 / d.size.samples, 1.3), xlabel=text, xlim=(-0.06, 10),
-                 ylabel="share of samples above")  # fmt: skip
-        common.plain_ticks(axes.xaxis, (0, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10))
-    top.legend(title=XI, loc="upper right")
-    common.letters((top, bottom))
+    """Draw the local criterion against the exact onset."""
+    figure = common.new(3.0)
+    axes = figure.subplots()
+    for ratio in RATIOS:
+        ordered = 100 * np.sort(d.excess(ratio))
+        left = 1.0 - np.arange(ordered.size) / ordered.size
+        axes.plot(ordered, left, **common.line(ratio), label=f"{ratio:g}")
+    axes.axvline(0, color=GREY, lw=0.8)
+    axes.set_xscale("symlog", linthresh=0.1, linscale=0.5)
+    axes.set(yscale="log", ylim=(0.7 / d.size.samples, 1.3), xlim=(-0.06, 10),
+             xlabel="local criterion above the exact onset (%)",
+             ylabel="share of samples above")  # fmt: skip
+    common.plain_ticks(axes.xaxis, (0, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10))
+    axes.legend(title=XI, loc="upper right")
     return figure
 
 
@@ -43,14 +43,14 @@ def figure_9(d: Data):
     """Draw mean and spread of tau_cr over the whole range of correlation lengths."""
     figure = common.new(5.6)
     top, bottom = figure.subplots(2, 1, sharex=True)
-    tiny = d["vanishing"]["stress"]
+    tiny = d["vanishing"]["critical_stress"]
     for axes, function, factor in ((top, mean, 1 / MEAN), (bottom, lower_spread, 1e-3)):
-        finer = [function(row.values) * factor for row in tiny]
-        common.numbers(axes, tiny.ratio.values, finer, color=COLOURS[0], marker="o", mfc="white",
-                       ls="-", label="finer grid, other draws")  # fmt: skip
+        finer = [(float(row.correlation_ratio), function(row.values) * factor) for row in tiny]
         rows = trend(d, function, factor)
-        common.numbers(axes, [r for r, _ in rows], [n for _, n in rows], color=COLOURS[0],
-                       marker="o", label="median less lower quartile")  # fmt: skip
+        for drawn, face, text in ((finer, "white", "finer grid, other draws"),
+                                  (rows, None, "median less lower quartile")):  # fmt: skip
+            common.numbers(axes, *zip(*drawn, strict=True), color=COLOURS[0], mfc=face, label=text,
+                           marker="o", ls="-")  # fmt: skip
     rows = trend(d, deviation, 1e-3)
     bottom.plot([r for r, _ in rows], [n.value for _, n in rows], ":", color=GREY,
                 label="standard deviation")  # fmt: skip
@@ -63,36 +63,14 @@ def figure_9(d: Data):
     common.plain_ticks(bottom.xaxis, (1 / 64, 1 / 16, 0.25, 1, 4, 16),
                        ["1/64", "1/16", "1/4", "1", "4", "16"])  # fmt: skip
     bottom.legend(loc="upper left")
-    common.letters((top, bottom))
+    common.letters(top, bottom)
     return figure
 
 
 def figure_10(d: Data):
-    """Draw how far ruptures lie above exact equilibrium against the loading rate."""
-    figure = common.new(3.2)
-    axes = figure.subplots()
-    offset = d["convergence"]["offset"]
-    rates = np.array(RATES) * setting.LOADING_RATE * 1e-6
-    rows = np.array([offset.sel(case=f"rate {rate:g}").values for rate in RATES]) * 100
-    axes.plot(rates, rows, "-", color="#c4ccd4", lw=0.8)
-    axes.errorbar(rates, rows.mean(axis=1), 2 * rows.std(axis=1, ddof=1) / np.sqrt(rows.shape[1]),
-                  color=COLOURS[0], marker="o", ms=4, label="mean of the samples")  # fmt: skip
-    guide = rows.mean(axis=1)[2] * (rates / rates[2])
-    axes.plot(rates, guide, ":", color=RED, label="in proportion to the rate")
-    axes.axvline(rates[2], color=GREY, lw=0.8, ls="--")
-    axes.text(rates[2] * 0.92, 0.7, "other ruptures", rotation=90, ha="right", va="center",
-              color=GREY, transform=axes.get_xaxis_transform())  # fmt: skip
-    axes.set(xscale="log", yscale="log", xlabel="loading rate (MPa/s)",
-             ylabel="rupture above equilibrium (%)")  # fmt: skip
-    axes.legend(loc="upper left")
-    return figure
-
-
-def figure_11(d: Data):
     """Draw how patches grow in number and merge, and how they act on each other."""
-    figure = common.new(7.6)
-    grid = figure.add_gridspec(4, 1, height_ratios=(1.0, 0.85, 1.0, 0.9))
-    number, single, pair, lowering = (figure.add_subplot(grid[i]) for i in range(4))
+    figure = common.new(6.2)
+    number, single, lowering = figure.subplots(3, 1)
     for ratio in RATIOS:
         rows = d.at("growth", "patches", ratio)
         number.errorbar(LOAD_SHARES, rows.mean(axis=0), 2 * rows.std(axis=0) / np.sqrt(len(rows)),
@@ -106,24 +84,14 @@ def figure_11(d: Data):
     single.plot(x, study["one_strength"] / load, "--", color=GREY, label="strength over load")
     single.set(xlim=(-3, 3), xlabel=r"$x/h_\mathrm{n}$ from a single patch")
     single.legend(loc="lower right")
-    pair.plot(x, study["pair_strength"] / MEAN, "--", color=GREY, label=r"$\tau_\mathrm{p}$")
-    pair.plot(x, study["pair_tau_n"] / MEAN, color=COLOURS[1], label=r"$\tau_\mathrm{n}$")
-    for name, marker, face, text in (("pair_local", "s", "none", "local criterion"),
-                                     ("pair_exact", "o", RED, "exact onset")):  # fmt: skip
-        place = float(study[name])
-        height = float(np.interp(place, PROBLEM.interface.x, study["pair_tau_n"] / MEAN))
-        pair.plot((place - 0.5 * L) / H, height, marker, color=RED, ms=6, mfc=face, label=text)
-    pair.set(xlim=(-12, 12), ylim=(None, 1.3), xlabel=r"$x/h_\mathrm{n}$",
-             ylabel=rf"stress ${OVER_MEAN}")  # fmt: skip
-    pair.legend(loc="upper center", ncols=2)
     lowering.loglog(study["distance"], study["lowering"] * 100, "-o", color=COLOURS[0], ms=4)
     lowering.set(xlabel=r"distance of two dips over $h_\mathrm{n}$", ylabel="onset lowered (%)")
     common.plain_ticks(lowering.xaxis, (1.25, 2, 3, 5, 8))
-    common.letters((number, single, pair, lowering))
+    common.letters(number, single, lowering)
     return figure
 
 
-def figure_12(d: Data):
+def figure_11(d: Data):
     """Draw the energy balance of a growing rupture, and the share of arrested ones."""
     figure = common.new(5.6)
     top, bottom = figure.subplots(2, 1, height_ratios=(1.2, 1.0))
@@ -161,7 +129,7 @@ def figure_12(d: Data):
     common.ratio_axis(bottom)
     bottom.set(ylabel="samples with an\narrested event (%)", ylim=(0, None))
     bottom.legend()
-    common.letters((top, bottom))
+    common.letters(top, bottom)
     return figure
 
 
@@ -169,7 +137,7 @@ ENDLESS = 45.0
 """Where a length over h_n that is infinite is drawn."""
 
 
-def figure_13(d: Data):
+def figure_12(d: Data):
     """Draw arrested fronts under non-uniform loads beside Griffith's lengths."""
     figure = common.new(5.2)
     top, bottom = figure.subplots(2, 1, height_ratios=(0.8, 1.2))
@@ -182,14 +150,13 @@ def figure_13(d: Data):
     study = d["driving"]
     for i, case in enumerate(("edge", "gradient", "uniform")):
         here = study.sel(case=case)
-        length = here["length"].values.ravel() / H
+        length = here["event_length"].values.ravel() / H
         griffith = np.minimum(here["griffith"].values.ravel() / H, ENDLESS)
         bottom.plot(griffith, length, "osv"[i], color=COLOURS[2 - i], ms=4,
                     label=f"{case}, without inertia ({np.isfinite(length).sum()})")  # fmt: skip
-    edge = study.sel(case="edge")
-    bottom.plot(edge["griffith"].values[:, 0] / H, edge["dynamic_length"].values / H, "D",
-                color=RED, mfc="none", ms=5, label="edge, first event, with inertia"
-                f" ({np.isfinite(edge['dynamic_length'].values).sum()})")  # fmt: skip
+    moving = study["dynamic_length"].values / H
+    bottom.plot(study["griffith"].sel(case="edge")[:, 0] / H, moving, "D", color=RED, mfc="none",
+                label=f"edge, first event, with inertia ({np.isfinite(moving).sum()})")  # fmt: skip
     bottom.axline((1, 1), (10, 10), color=GREY, lw=0.8)
     bottom.axvline(L / H, color=GREY, lw=0.8, ls=":")
     bottom.set(xscale="log", yscale="log", xlabel=r"Griffith's length over $h_\mathrm{n}$",
@@ -197,115 +164,31 @@ def figure_13(d: Data):
     common.plain_ticks(bottom.yaxis, (1, 2, 5, 10, 20, 40))
     common.plain_ticks(bottom.xaxis, (5, 10, 20, ENDLESS), ["5", "10", "20", r"$\infty$"])
     bottom.legend(loc="upper left")
-    common.letters((top, bottom))
+    common.letters(top, bottom)
     return figure
 
 
-def _shares(axes, d: Data, name: str, title: str) -> None:
-    places = {case: i for i, (case, _) in enumerate(shares(d, name).rows)}
-    for inertia, shift, colour, marker, text in (
-        (False, -0.12, COLOURS[0], "o", "without inertia"),
-        (True, 0.12, RED, "D", "with inertia"),
-    ):
-        series = shares(d, name, inertia=inertia)
-        size = d[f"{name}-inertia" if inertia else name].sizes["sample"]
-        y = [places[case] + shift for case, _ in series.rows]
-        value = np.array([100 * number.value for _, number in series.rows])
-        exact = [binomtest(round(0.01 * v * size), size).proportion_ci() for v in value]
-        error = np.abs(100 * np.transpose(exact) - value)
-        axes.errorbar(value, y, xerr=error, fmt=marker, color=colour, ms=4, label=text)
-    axes.set_yticks(range(len(places)), places)
-    axes.set(xlim=(-3, 103), title=title, ylim=(len(places) - 0.5, -0.5))
+def _points(axes, rows, shift: float = 0.0, **style) -> None:
+    """Draw named numbers below each other, with bars of twice their errors."""
+    values, errors = [100 * n.value for _, n in rows], [200 * n.error for _, n in rows]
+    places = np.arange(len(rows)) + shift
+    axes.errorbar(values, places, xerr=errors, ms=4, **{"fmt": "o"} | style)
+    axes.set_yticks(np.arange(len(rows)), [label for label, _ in rows])
+    axes.set_ylim(len(rows) - 0.5, -0.5)
 
 
-def figure_14(d: Data):
+def figure_13(d: Data):
     """Draw the share of arrested samples where more is random, with and without inertia."""
-    figure = common.new(5.6)
-    axes = figure.subplots(3, 1, height_ratios=(4, 6, 6), sharex=True)
-    for panel, (name, title) in zip(axes, (
-        ("wide_strength", "range of the strength"),
-        ("random_load", "random initial stress"),
-        ("random_residual", "random residual strength"),
-    ), strict=True):  # fmt: skip
-        _shares(panel, d, name, title)
-    axes[1].legend(loc="upper right")
-    axes[-1].set_xlabel("samples with an arrested event (%)")
-    common.letters(axes, x=-0.25)
-    return figure
-
-
-def figure_15(d: Data):
-    """Draw the effect of length, pressure and ends, and the failure probability."""
-    figure = common.new(8.0)
-    length, pressure, end, tail = figure.subplots(4, 1)
-    extents = np.array((12.5, 25, 50, 100, 200, 400, 800))
-    rows = d["length"]["critical_stress"].values
-    scatter = [deviation(row / row.mean()) * 100 for row in rows]
-    common.numbers(length, extents, scatter, color=COLOURS[0], marker="o")
-    length.set(xscale="log", yscale="log", xlabel="length of the interface (mm)",
-               ylabel=f"variation of {TAU_CR} (%)")  # fmt: skip
-    common.plain_ticks(length.xaxis, extents)
-    common.plain_ticks(length.yaxis, (2, 3, 5))
-    for chosen, colour, marker, text in (
-        ((0, 1, 2), COLOURS[0], "o", r"$\xi_0$ fixed"),
-        ((3, 1, 4), COLOURS[2], "^", r"$\xi_0/h_\mathrm{n}$ fixed"),
-    ):
-        rows = [d.what_if("normal_load", "friction_coefficient", i) for i in chosen]
-        pressure.errorbar((1, 2, 4), [row.mean() for row in rows], [row.std() for row in rows],
-                          color=colour, marker=marker, ms=4, capsize=3, label=text)  # fmt: skip
-    pressure.set(xlabel="normal pressure (MPa)", ylabel="friction coefficient", xlim=(0.5, 4.5))
-    pressure.legend(title="mean \N{PLUS-MINUS SIGN} sd of samples")
-    change = [mean(row) * 100 for row in d["free_end"]["change"].values]
-    shortest, count = np.log2(RATIOS[:1]), len(RATIOS)
-    for x, rows, look, text in ((np.log2(RATIOS), change[:count], 0, "$L$"),
-                                (shortest, change[count + 1:], 1, "$L/2$"),
-                                (shortest, change[count:count + 1], 2, "$L/4$")):  # fmt: skip
-        common.numbers(end, x, rows, color=COLOURS[look], marker="os^"[look], label=text)
-    end.axhline(0, color=GREY, lw=0.8)
-    common.ratio_axis(end)
-    end.set(ylabel=f"{TAU_CR} by free ends (%)")
-    end.legend(loc="lower right", ncols=3)
-    study = d["failure"]
-    tail.semilogy(study["stress"] * 1e-6, study["probability"], color=COLOURS[0],
-                  label="subset simulation, 95 %")  # fmt: skip
-    tail.fill_between(study["stress"] * 1e-6, study["probability_low"], study["probability_high"],
-                      color=COLOURS[1], alpha=0.3, lw=0)  # fmt: skip
-    ordered = np.sort(d.stress(RATIOS[1])) * 1e-6
-    counted = np.arange(1, ordered.size + 1) / ordered.size
-    tail.semilogy(ordered[: ordered.size // 2], counted[: ordered.size // 2], ".", color=RED, ms=2,
-                  label="counting, 95 %", zorder=0)  # fmt: skip
-    error = 2 * np.sqrt(counted * (1 - counted) / ordered.size)
-    tail.fill_between(ordered, np.maximum(counted - error, 1e-9), counted + error, color=RED,
-                      alpha=0.2, lw=0, where=counted <= 0.5)  # fmt: skip
-    tail.set(xlabel="stress (MPa)", ylabel="probability of failure", ylim=(5e-7, 1))
-    tail.legend(loc="lower right")
-    common.letters((length, pressure, end, tail))
-    return figure
-
-
-def figure_16(d: Data):
-    """Draw what other strengths and spectra do to the onset."""
-    figure = common.new(4.6)
-    skew, spectrum = figure.subplots(2, 1)
-    for average, start, colour, marker, text in (
-        (MEAN, 0, COLOURS[0], "o", "the paper's strength"),
-        (setting.LOW + HIGH - MEAN, 4, COLOURS[2], "^", "its mirror image"),
-    ):
-        rows = [d.what_if("skewness", "critical_stress", start + i) / average for i in range(4)]
-        skew.errorbar(np.log2(RATIOS) + 0.01 * start, [row.mean() for row in rows],
-                      [row.std() for row in rows], color=colour, marker=marker, ms=4, capsize=3,
-                      label=text)  # fmt: skip
-    skew.set(ylabel=r"$\tau_\mathrm{cr}$ over own $\langle\tau_\mathrm{p}\rangle$")
-    skew.legend(title="mean \N{PLUS-MINUS SIGN} sd of samples", loc="upper right")
-    for k, ratio in enumerate(SIMULATED):
-        usual = d.what_if("exponent", "critical_stress", 4 * k + 2).mean()
-        rows = [d.what_if("exponent", "critical_stress", 4 * k + j).mean() for j in range(4)]
-        look = common.dots(ratio) | {"linestyle": "-", "ms": 4, "label": f"{ratio:g}"}
-        spectrum.plot((1.5, 2, 4, 8), [100 * (row / usual - 1) for row in rows], **look)
-    spectrum.set(xlabel="exponent of the spectrum, at equal decay length", xscale="log",
-                 ylabel=f"mean {TAU_CR} (%)")  # fmt: skip
-    common.plain_ticks(spectrum.xaxis, (1.5, 2, 4, 8))
-    spectrum.legend(title=XI, loc="upper right")
-    common.ratio_axis(skew)
-    common.letters((skew, spectrum))
+    figure = common.new(6.4)
+    panels = figure.subplots(3, 1, height_ratios=(4, 6, 6), sharex=True)
+    titles = ("range of the strength", "random initial stress", "random residual strength")
+    names = ("wide_strength", "random_load", "random_residual")
+    for axes, name, title in zip(panels, names, titles, strict=True):
+        _points(axes, arrest_shares(d, name), -0.12, color=COLOURS[0], label="without inertia")
+        _points(axes, arrest_shares(d, f"{name}-inertia"), 0.12, color=RED, fmt="D",
+                label="with inertia")  # fmt: skip
+        axes.set(xlim=(-3, 103), title=title)
+    panels[1].legend(loc="upper right")
+    panels[-1].set_xlabel("samples with an arrested event (%)")
+    common.letters(*panels)
     return figure

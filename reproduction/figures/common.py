@@ -32,6 +32,12 @@ def new(height: float) -> Figure:
     return Figure(figsize=(WIDTH, height), layout="constrained")
 
 
+def mosaic(height: float, rows, height_ratios, **shape):
+    """Return a figure of one column and its panels by name, as `Figure.subplot_mosaic` does."""
+    figure = new(height)
+    return figure, figure.subplot_mosaic(rows, height_ratios=height_ratios, **shape)
+
+
 def line(ratio: float) -> dict:
     """Return colour and dashes of a correlation length."""
     i = RATIOS.index(ratio)
@@ -44,9 +50,10 @@ def dots(ratio: float) -> dict:
     return {"color": COLOURS[i], "marker": MARKERS[i], "linestyle": "none"}
 
 
-def letter(axes, text: str, *, x: float = 0.0) -> None:
-    """Letter a panel, above its upper left corner."""
-    axes.text(x, 1.02, f"({text})", transform=axes.transAxes, fontweight="bold", va="bottom")
+def letters(*panels) -> None:
+    """Letter panels in their order, above their upper left corners."""
+    for text, axes in zip("abcd", panels, strict=False):
+        axes.set_title(f"({text})", loc="left", fontweight="bold")
 
 
 def span(*rows, margin: float = 0.06) -> tuple[float, float]:
@@ -55,12 +62,6 @@ def span(*rows, margin: float = 0.06) -> tuple[float, float]:
     values = values[np.isfinite(values)]
     gap = margin * (np.ptp(values) or abs(values[0]) or 1.0)
     return float(values.min() - gap), float(values.max() + gap)
-
-
-def letters(panels, *, x: float = -0.12) -> None:
-    """Letter panels in their order."""
-    for text, axes in zip("abcd", panels, strict=False):
-        letter(axes, text, x=x)
 
 
 def numbers(axes, x, rows, **style) -> None:

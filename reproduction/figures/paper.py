@@ -6,48 +6,62 @@ from scipy.stats import norm
 
 import stiction as st
 from reproduction import setting
-from reproduction.claims import Data
 from reproduction.figures import common
 from reproduction.figures.common import COLOURS, DARK, GREY, MEAN_P, OVER_MEAN, RED, TAU_CR, XI
-from reproduction.numbers_with_errors import mean, quantile
-from reproduction.setting import HIGH, LOW, MEAN, PROBLEM, RATIOS, SIMULATED, H, L
-from reproduction.statements_onset import dynamic_mean, offsets, stress_density
+from reproduction.measures import dynamic_mean, is_misplaced, offsets, stress_density
+from reproduction.numbers_with_errors import Number, mean, quantile
+from reproduction.runner import Data
+from reproduction.setting import FIRST, HIGH, LAST, LOW, MEAN, PROBLEM, RATIOS, SIMULATED, H, L
+
+TAU_P = rf"$\tau_\mathrm{{p}}{OVER_MEAN}"
+TAU_N = rf"$\tau_\mathrm{{n}}{OVER_MEAN}"
+LAW = setting.MARGINAL.distribution
+X = PROBLEM.interface.x / L
 
 
 def figure_1(d: Data):
     """Draw the system, the load, the friction law, and one field with its statistics."""
-    figure = common.new(6.9)
-    grid = figure.add_gridspec(3, 4, height_ratios=(0.9, 1.0, 1.7))
-    _system(figure.add_subplot(grid[0, :]))
-    _load(figure.add_subplot(grid[1, :2]))
-    _law(figure.add_subplot(grid[1, 2:]))
-    bottom = grid[2, :].subgridspec(1, 2, width_ratios=(3.2, 1.0), wspace=0.0)
-    field, density = (figure.add_subplot(bottom[i]) for i in (0, 1))
-    tau_p, x = d["representative"]["strength"].values / MEAN, PROBLEM.interface.x / L
-    field.plot(x, tau_p, color=COLOURS[0], lw=0.9)
+    rows = (8 * ["system"], 4 * ["load"] + 4 * ["law"], 6 * ["field"] + 2 * ["density"])
+    figure, panels = common.mosaic(6.9, rows, (0.9, 1.0, 1.7))
+    system, load, law, field, density = panels.values()
+    _system(system)
+    load.plot([0, 1, 1.03, 1.35], [0, 1, 0.3, 0.3], color=COLOURS[0])
+    load.plot(1, 1, "o", color=DARK, ms=4)
+    load.set(xlabel="time", ylabel=r"$\tau_0$", xticks=(), ylim=(0, 1.15), xlim=(0, 1.4))
+    load.set_yticks((0.3, 1.0), (r"$\tau_\mathrm{kin}$", TAU_CR))
+    for peak, style, colour in ((1.0, "-", COLOURS[0]), (0.8, "--", GREY), (1.2, "--", GREY)):
+        law.plot([0, peak - 0.2, 1.4], [peak, 0.2, 0.2], style, color=colour, lw=1.1)
+    law.plot([0.8, 0.8], [0, 0.2], ":", color=DARK, lw=0.8)
+    law.annotate("$W$", (0.42, 0.6), (0.62, 0.75))
+    law.set_xticks((0.8,), (r"$d_\mathrm{c}$",))
+    law.set_yticks((0.2, 1.0), (r"$\tau_\mathrm{r}$", r"$\tau_\mathrm{p}(x)$"))
+    law.set(xlabel=r"slip $\delta$", xlim=(0, 1.4), ylim=(0, 1.3))
+    tau_p = d["representative"]["strength"].values / MEAN
+    field.plot(X, tau_p, color=COLOURS[0], lw=0.9)
     low, high = common.span(tau_p, common.STRENGTHS)
-    field.set(xlabel=r"$x/L$", ylabel=rf"$\tau_\mathrm{{p}}{OVER_MEAN}", xlim=(0, 1),
-              ylim=(low, high + 1.1 * (high - low)))  # room for the inset  # fmt: skip
-    common.letter(field, "d", x=-0.1)
+    # The upper half is for the inset.
+    field.set(xlabel="$x/L$", ylabel=TAU_P, xlim=(0, 1), ylim=(low, 2.1 * high - 1.1 * low))
     inset = field.inset_axes((0.3, 0.68, 0.66, 0.32))
-    lag = PROBLEM.interface.x / H
-    for name, style in (("correlation", "-"), ("gaussian_correlation", ":")):
-        inset.plot(lag, d.at("theory", name, setting.FIRST), style, color=DARK, lw=0.9)
-    inset.set(xlim=(0, 2.4 * setting.FIRST), ylabel=r"$C$", yticks=(0, 1))
-    inset.text(1.2 * setting.FIRST, 0.3, r"$\xi/h_\mathrm{n}$", ha="center")
-    inset.legend([r"$\tau_\mathrm{p}$", "$z$"], loc="upper right", handlelength=1.2)
+    for name, style, label in (
+        ("correlation", "-", r"$\tau_\mathrm{p}$"), ("gaussian_correlation", ":", "$z$")
+    ):  # fmt: skip
+        correlation = d.at("theory", name, FIRST)
+        inset.plot(X * L / H, correlation, style, color=DARK, lw=0.9, label=label)
+    inset.set(xlim=(0, 2.4 * FIRST), ylabel=r"$C$", yticks=(0, 1))
+    inset.text(1.2 * FIRST, 0.3, r"$\xi/h_\mathrm{n}$", ha="center")
+    inset.legend(loc="upper right", handlelength=1.2)
     s = np.linspace(LOW, HIGH, 300)
-    density.plot(setting.MARGINAL.distribution.pdf(s) * MEAN, s / MEAN, color=COLOURS[0])
+    density.plot(LAW.pdf(s) * MEAN, s / MEAN, color=COLOURS[0])
     density.set(ylim=field.get_ylim(), xlabel=rf"$f(\tau_\mathrm{{p}})\,${MEAN_P}")
     density.tick_params(labelleft=False)
+    common.letters(system, load, law, field)
     return figure
 
 
 def _system(axes) -> None:
-    x = np.linspace(0, 1, 200)
-    axes.fill_between(x, 0, 0.9, color="#e8edf2", lw=0)
-    axes.fill_between(x, -0.9, 0, color="#f2ece8", lw=0)
-    axes.plot(x, 0 * x, color=COLOURS[1], lw=3)
+    axes.axhspan(0, 0.9, color="#e8edf2", lw=0)
+    axes.axhspan(-0.9, 0, color="#f2ece8", lw=0)
+    axes.axhline(0, color=COLOURS[1], lw=3)
     for y, sign in ((0.72, 1), (-0.72, -1)):
         for start in (0.15, 0.45, 0.75):
             axes.annotate("", (start + sign * 0.06, y), (start - sign * 0.06, y),
@@ -58,59 +72,30 @@ def _system(axes) -> None:
     axes.text(0.93, 0.72, r"$\tau_0(t)$", va="center")
     axes.set(xlim=(0, 1), ylim=(-0.9, 0.9))
     axes.axis("off")
-    common.letter(axes, "a")
-
-
-def _load(axes) -> None:
-    axes.plot([0, 1, 1.03, 1.35], [0, 1, 0.3, 0.3], color=COLOURS[0])
-    axes.plot(1, 1, "o", color=DARK, ms=4)
-    axes.set(xlabel="time", ylabel=r"$\tau_0$", xticks=(), ylim=(0, 1.15), xlim=(0, 1.4))
-    axes.set_yticks((0.3, 1.0), (r"$\tau_\mathrm{kin}$", TAU_CR))
-    common.letter(axes, "b", x=-0.2)
-
-
-def _law(axes) -> None:
-    for peak, style, colour in ((1.0, "-", COLOURS[0]), (0.8, "--", GREY), (1.2, "--", GREY)):
-        end = peak - 0.2
-        axes.plot([0, end, 1.4], [peak, 0.2, 0.2], style, color=colour, lw=1.1)
-    axes.plot([0.8, 0.8], [0, 0.2], ":", color=DARK, lw=0.8)
-    axes.annotate("$W$", (0.42, 0.6), (0.62, 0.75))
-    axes.set_xticks((0.8,), (r"$d_\mathrm{c}$",))
-    axes.set_yticks((0.2, 1.0), (r"$\tau_\mathrm{r}$", r"$\tau_\mathrm{p}(x)$"))
-    axes.set(xlabel=r"slip $\delta$", xlim=(0, 1.4), ylim=(0, 1.3))
-    common.letter(axes, "c", x=-0.2)
 
 
 def figure_2(d: Data):
     """Draw the mapping from z to the strength, and the spectrum."""
-    figure = common.new(4.9)
-    grid = figure.add_gridspec(2, 2, height_ratios=(1.1, 1.0))
-    left, right = (figure.add_subplot(grid[0, i]) for i in (0, 1))
-    z = np.linspace(-3.5, 3.5, 300)
-    s = np.linspace(*common.span((LOW, HIGH)), 300)
-    law = setting.MARGINAL.distribution
-    peak = max(law.pdf(s)) * MEAN
+    figure, panels = common.mosaic(4.9, (["z", "strength"], 2 * ["spectrum"]), (1.1, 1.0))
+    left, right, axes = panels.values()
+    z, s = np.linspace(-3.5, 3.5, 300), np.linspace(*common.span((LOW, HIGH)), 300)
+    peak = max(LAW.pdf(s)) * MEAN
     left.plot(z, norm.cdf(z), color=COLOURS[0], label=r"$\Phi$")
     left.plot(z, norm.pdf(z), "--", color=GREY, label="density")
-    right.plot(s / MEAN, law.cdf(s), color=COLOURS[2], label="$F$")
-    right.plot(
-        s / MEAN, law.pdf(s) * MEAN / peak, "--", color=GREY, label=f"density / {peak:.2g}"
-    )
+    right.plot(s / MEAN, LAW.cdf(s), color=COLOURS[2], label="$F$")
+    density = LAW.pdf(s) * MEAN / peak
+    right.plot(s / MEAN, density, "--", color=GREY, label=f"density / {peak:.2g}")
     for value, colour in ((-0.6, COLOURS[1]), (1.1, RED)):
         level = norm.cdf(value)
-        left.plot(value, level, "o", color=colour, ms=5)
-        right.plot(law.ppf(level) / MEAN, level, "o", color=colour, ms=5)
-        left.plot([value, 3.5], [level, level], ":", color=colour, lw=0.9)
-        right.plot(np.array([s[0], law.ppf(level)]) / MEAN, [level, level], ":", color=colour,
-                   lw=0.9)  # fmt: skip
+        strength = LAW.ppf(level) / MEAN
+        left.plot([value, 3.5], [level, level], ":o", color=colour, lw=0.9, markevery=[0])
+        right.plot([strength, s[0] / MEAN], [level, level], ":o", color=colour, lw=0.9,
+                   markevery=[0])  # fmt: skip
     left.set(xlabel="$z$", ylabel="cumulative probability", ylim=(0, 1.02), xlim=(-3.5, 3.5))
-    right.set(xlabel=rf"$\tau_\mathrm{{p}}{OVER_MEAN}", ylim=(0, 1.02),
-              xlim=(s[0] / MEAN, s[-1] / MEAN))  # fmt: skip
+    right.set(xlabel=TAU_P, ylim=(0, 1.02), xlim=(s[0] / MEAN, s[-1] / MEAN))
     right.tick_params(labelleft=False)
     left.legend(loc="upper left")
     right.legend(loc="center right")
-    common.letter(left, "a", x=-0.2)
-    axes = figure.add_subplot(grid[1, :])
     spectrum = setting.FIELD.spectrum
     unit = 2.0 * np.pi / spectrum.correlation_length  # lambda
     cutoff = spectrum.cutoff() / unit
@@ -122,36 +107,39 @@ def figure_2(d: Data):
         axes.axvline(place, color=GREY, lw=0.8, ls=":")
         axes.text(place * 0.94, 2.0 * floor, text, rotation=90, ha="right", va="bottom")
     axes.set(xlabel=r"$k/\lambda$", ylabel=r"$g(k)/g(0)$", ylim=(floor, 3))
-    common.letter(axes, "b", x=-0.09)
+    common.letters(left, axes)
     return figure
 
 
 SLOW_TO_FAST = LinearSegmentedColormap.from_list(
     "slip rate", ["white", "#b5d3e6", "#2a6f97", "#c8553d", "#5a1a12"]
 )
+PLACE = 0.75
+"""x/L of the onset of the shown sample: the periodic interface is shifted, as in the paper."""
 
 
-def _shift(study) -> int:
-    """Return the nodes by which the periodic interface is shifted: its onset is at 0.75 L then."""
-    return round((0.75 - float(study["critical_position"]) / L) * study.sizes["x"])
+def _shifted(study, name: str) -> np.ndarray:
+    """Return a variable of the shown sample with its onset at `PLACE`."""
+    shift = round((PLACE - float(study["critical_position"]) / L) * study.sizes["x"])
+    return np.roll(study[name].values, shift, axis=-1)
 
 
 def figure_3(d: Data):
     """Draw one rupture: slip rate in space and time, load, strength."""
     study, solid = d["representative"], PROBLEM.solid
-    figure = common.new(7.4)
-    grid = figure.add_gridspec(3, 4, height_ratios=(1.25, 1.25, 0.8))
-    time, x = study["time"].values, study["x"].values / L
+    rows = (4 * ["zoom"], ["load"] + 3 * ["wide"], 4 * ["strength"])
+    figure, panels = common.mosaic(7.4, rows, (1.25, 1.25, 0.8))
+    zoom, load, wide, strength = panels.values()
     mean_stress = study["mean_stress"].values
-    onset, end = time[mean_stress.argmax()], time[-1]
-    centre, shift = 0.75, _shift(study)
-    rate = np.roll(study["slip_rate"].values, shift, axis=1) * setting.G_STAR
+    onset = float(study.time[mean_stress.argmax()])
+    time = study["time"].values / onset
+    rate = _shifted(study, "slip_rate")[:-1, :-1] * setting.G_STAR
     rate = np.maximum(rate / (MEAN * solid.shear_wave_speed), 1e-12)
     top = float(rate.max()) / 2.0  # colours over five decades below the fastest
-    zoom = figure.add_subplot(grid[0, :])
-    late = (end / onset - 1.0) * 1e4
-    picture = zoom.pcolormesh(x, (time / onset - 1.0) * 1e4, rate[:-1, :-1], rasterized=True,
-                              norm=LogNorm(1e-5 * top, 3.0 * top), cmap=SLOW_TO_FAST)  # fmt: skip
+    late = (time[-1] - 1.0) * 1e4
+    style = {"cmap": SLOW_TO_FAST, "rasterized": True}
+    picture = zoom.pcolormesh(X, (time - 1.0) * 1e4, rate, norm=LogNorm(1e-5 * top, 3.0 * top),
+                              **style)  # fmt: skip
     zoom.set(ylim=(-0.2 * late, late), ylabel=r"$(t/T-1)\times10^{4}$", xlim=(0, 1))
     for speed, text in (
         (solid.shear_wave_speed, r"$c_\mathrm{s}$"),
@@ -160,180 +148,149 @@ def figure_3(d: Data):
         way = 0.6 * late * 1e-4 * onset * speed / L
         shown = min(1.0, 0.5 / way)  # the line stays within the panel
         away = np.array([0.12, 0.12 + shown * way])
-        zoom.plot(centre - away, (0.0, 0.6 * late * shown), color=DARK, lw=1.2, ls="--")
-        zoom.text(centre - away[1], 0.62 * late * shown, text, ha="center", va="bottom")
-    common.letter(zoom, "a", x=-0.1)
-    figure.colorbar(picture, ax=zoom, label=r"slip rate $\times\,G^*/(\langle\tau_\mathrm{p}\rangle"
-                    r" c_\mathrm{s})$")  # fmt: skip
-    load, wide = figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1:])
-    load.plot(mean_stress / mean_stress.max(), time / onset, color=COLOURS[0])
-    wide.pcolormesh(x, time / onset, rate[:-1, :-1], norm=LogNorm(1e-8 * top, 1e-2 * top),
-                    cmap=SLOW_TO_FAST, rasterized=True)  # fmt: skip
-    first = time[0] / onset
-    shown = mean_stress[time <= onset] / mean_stress.max()
-    load.set(xlim=(min(0.8, shown.min()), 1.03), ylabel="$t/T$",
+        zoom.plot(PLACE - away, (0.0, 0.6 * late * shown), color=DARK, lw=1.2, ls="--")
+        zoom.text(PLACE - away[1], 0.62 * late * shown, text, ha="center", va="bottom")
+    label = r"slip rate $\times\,G^*/(\langle\tau_\mathrm{p}\rangle c_\mathrm{s})$"
+    figure.colorbar(picture, ax=zoom, label=label)
+    stress = mean_stress / mean_stress.max()
+    load.plot(stress, time, color=COLOURS[0])
+    wide.pcolormesh(X, time, rate, norm=LogNorm(1e-8 * top, 1e-2 * top), **style)
+    load.set(xlim=(min(0.8, stress[time <= 1.0].min()), 1.03), ylabel="$t/T$",
              xlabel=r"$\tau_0/\tau_\mathrm{cr}$")  # fmt: skip
     wide.set(xlim=(0, 1), xlabel="$x/L$")
     wide.tick_params(labelleft=False)
-    for axes, place in ((load, 1), (wide, centre)):
+    for axes, place in ((load, 1), (wide, PLACE)):
         axes.plot(place, 1, "o", color=DARK, ms=4, clip_on=False)
-        axes.set_ylim(first - 0.01, 1.005)
-    common.letter(load, "b", x=-0.5)
-    strength = figure.add_subplot(grid[2, :])
-    tau_p = np.roll(study["strength"].values, shift) / MEAN
-    strength.plot(x, tau_p, color=COLOURS[0], lw=0.9)
-    top = tau_p.max() + 0.08
-    strength.errorbar(centre, top, xerr=0.5 * H / L, color=RED, capsize=3, lw=1.4)
-    strength.text(centre + 0.7 * H / L, top, r"$h_\mathrm{n}$", va="center", color=RED)
-    strength.set(xlabel="$x/L$", ylabel=rf"$\tau_\mathrm{{p}}{OVER_MEAN}", xlim=(0, 1),
-                 ylim=(None, top + 0.08))  # fmt: skip
-    common.letter(strength, "c", x=-0.1)
+        axes.set_ylim(time[0] - 0.01, 1.005)
+    tau_p = _shifted(study, "strength") / MEAN
+    strength.plot(X, tau_p, color=COLOURS[0], lw=0.9)
+    above = tau_p.max() + 0.08
+    strength.errorbar(PLACE, above, xerr=0.5 * H / L, color=RED, capsize=3, lw=1.4)
+    strength.text(PLACE + 0.7 * H / L, above, r"$h_\mathrm{n}$", va="center", color=RED)
+    strength.set(xlabel="$x/L$", ylabel=TAU_P, xlim=(0, 1), ylim=(None, above + 0.08))
+    common.letters(zoom, load, strength)
     return figure
 
 
 def figure_4(d: Data):
-    """Draw the nucleation stress of one field, and theory against 60 ruptures."""
+    """Draw the nucleation stress of one field, and theory against the ruptures."""
     figure = common.new(7.6)
-    grid = figure.add_gridspec(3, 1, height_ratios=(0.9, 1.0, 1.3))
-    top, middle, bottom = (figure.add_subplot(grid[i]) for i in range(3))
-    study = d["representative"]
-    x = study["x"].values / L
+    top, middle, bottom = figure.subplots(3, 1, height_ratios=(0.9, 1.0, 1.3))
     tau_p, tau_n = (
-        np.roll(study[name], _shift(study)) / MEAN for name in ("strength", "tau_n")
+        _shifted(d["representative"], name) / MEAN for name in ("strength", "tau_n")
     )
-    top.plot(x, tau_p, "--", color=GREY, lw=0.8, label=r"$\tau_\mathrm{p}$")
-    top.plot(x, tau_n, color=COLOURS[1], label=r"$\tau_\mathrm{n}$")
-    top.plot(x[tau_n.argmin()], tau_n.min(), "o", color=DARK, ms=5)
+    top.plot(X, tau_p, "--", color=GREY, lw=0.8, label=r"$\tau_\mathrm{p}$")
+    top.plot(X, tau_n, color=COLOURS[1], label=r"$\tau_\mathrm{n}$")
+    top.plot(X[tau_n.argmin()], tau_n.min(), "o", color=DARK, ms=5)
     top.set(xlabel="$x/L$", ylabel=rf"stress ${OVER_MEAN}", xlim=(0, 1))
     top.legend(loc="upper right", ncols=2)
-    common.letter(top, "a", x=-0.1)
+    bottom.plot([0, 1], [0, 1], color=GREY, lw=0.8)
     for ratio in SIMULATED:
-        stress = d.stress(ratio, "ruptures") / MEAN
-        style = common.dots(ratio)
+        stress, style = d.stress(ratio, "ruptures") / MEAN, common.dots(ratio)
         middle.plot(stress, 100 * offsets(d, ratio, "local"), **style, ms=4, label=f"{ratio:g}")
+        place, predicted, off = is_misplaced(d, ratio)
+        bottom.plot(predicted / L, place / L, **style, ms=4)
+        bottom.plot(predicted[off] / L, place[off] / L, "o", mfc="none", mec=RED, ms=9)
         if "printed" in d:
-            middle.plot(stress, 100 * offsets(d, ratio, "printed"), ms=3, mfc="none", zorder=1,
-                        **{**style, "color": common.LIGHT})  # fmt: skip
+            pale = style | {"color": common.LIGHT, "mfc": "none", "ms": 3, "zorder": 1}
+            middle.plot(stress, 100 * offsets(d, ratio, "printed"), **pale)
+            place, predicted, off = is_misplaced(d, ratio, "printed")
+            bottom.plot(predicted[off] / L, place[off] / L, "x", color=RED, ms=6)
     middle.axhline(0, color=GREY, lw=0.8)
     middle.set(xlabel=rf"$\tau_\mathrm{{cr}}{OVER_MEAN} of the rupture",
                ylabel="theory above rupture (%)")  # fmt: skip
     middle.legend(title=XI, ncols=3)
-    common.letter(middle, "b", x=-0.1)
-    bottom.plot([0, 1], [0, 1], color=GREY, lw=0.8)
-    for ratio in SIMULATED:
-        place = d.at("ruptures", "critical_position", ratio)
-        predicted = d.at("local", "critical_position", ratio)[: place.size]
-        bottom.plot(predicted / L, place / L, **common.dots(ratio), ms=4)
-        off = setting.distance(place, predicted) > 0.5 * H
-        bottom.plot(predicted[off] / L, place[off] / L, "o", mfc="none", mec=RED, ms=9)
-        if "printed" in d:
-            printed = d.at("printed", "critical_position", ratio)[: place.size]
-            off = setting.distance(place, printed) > 0.5 * setting.PRINTED_H
-            bottom.plot(printed[off] / L, place[off] / L, "x", color=RED, ms=6)
     bottom.set(xlabel=r"predicted $x_\mathrm{cr}/L$", ylabel=r"simulated $x_\mathrm{cr}/L$",
                xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), aspect="equal")  # fmt: skip
-    common.letter(bottom, "c", x=-0.15)
+    common.letters(top, middle, bottom)
     return figure
 
 
 def figure_5(d: Data):
-    """Draw strength, nucleation stress and onset at four correlation lengths."""
-    figure = common.new(8.4)
-    grid = figure.add_gridspec(4, 1, height_ratios=(1.5, 0.9, 0.9, 0.6))
-    count = len(RATIOS)
-    rows = [grid[i].subgridspec((count, 1)[i], 3, width_ratios=(4, 1, 1.2), wspace=0.04,
-                                hspace=0.06) for i in (0, 1)]  # fmt: skip
-    fields = [figure.add_subplot(rows[0][i, 0]) for i in range(count)]
-    low, high = common.span(common.STRENGTHS)
-    upper = [figure.add_subplot(rows[0][:, i]) for i in (1, 2)]
-    lower = [figure.add_subplot(rows[1][i]) for i in range(3)]
-    x = PROBLEM.interface.x / L
+    """Draw strength, nucleation stress and onset at all correlation lengths."""
+    rows = [[f"field {ratio}", "strengths", "minima"] for ratio in RATIOS]
+    rows += [["nucleation", "densities", "."], 3 * ["stress"], 3 * ["place"]]
+    heights = (*len(RATIOS) * (1.5 / len(RATIOS),), 0.9, 0.9, 0.6)
+    figure, panels = common.mosaic(8.4, rows, heights, width_ratios=(4, 1, 1.2))
+    fields = [panels.pop(f"field {ratio}") for ratio in RATIOS]
+    strengths, minima, nucleation, densities, stress, place = panels.values()
     s = np.linspace(LOW, HIGH, 300)
-    minima, averages, ranges = [], [], []
-    upper[0].plot(setting.MARGINAL.distribution.pdf(s) * MEAN, s / MEAN, color=DARK)
+    strengths.plot(LAW.pdf(s) * MEAN, s / MEAN, color=DARK)
+    low, high = common.span(common.STRENGTHS)
+    strengths.set(ylim=(low, high), title=r"$f(\tau_\mathrm{p})$")
+    shown = {minima: [], nucleation: [], stress: []}
     for ratio, strip in zip(RATIOS, fields, strict=True):
+        look = common.line(ratio)
+        colour = look["color"]
         tau_p = setting.strength(ratio).sample(PROBLEM.interface)  # of the same draws for each
-        strip.plot(x, tau_p[0] / MEAN, color=common.line(ratio)["color"], lw=0.9)
-        strip.plot([], [], **common.line(ratio), label=f"{XI} = {ratio:g}")
+        strip.plot(X, tau_p[0] / MEAN, color=colour, lw=0.9)
+        strip.plot([], [], **look, label=f"{XI} = {ratio:g}")
         strip.legend(loc="upper right", borderpad=0.1)
         strip.set(xlim=(0, 1), ylim=(low, high + 0.8 * (high - low)))
         strip.locator_params(axis="y", nbins=3)
         strip.tick_params(labelbottom=strip is fields[-1])
-        tau_n = st.theory.nucleation_stress(PROBLEM, tau_p)[0]
-        lower[0].plot(x, tau_n / MEAN, **common.line(ratio), lw=0.9)
+        tau_n = st.theory.nucleation_stress(PROBLEM, tau_p)[0] / MEAN
+        nucleation.plot(X, tau_n, **look, lw=0.9)
+        shown[nucleation].append(tau_n)
+        counts = d.at("moments", "counts", ratio).reshape(-1, 32).sum(axis=1)
+        edges = np.linspace(LOW, HIGH, counts.size + 1) / MEAN
+        density = counts / counts.sum() / (edges[1] - edges[0])
+        densities.plot(density, 0.5 * (edges[1:] + edges[:-1]), **look)
         weakest = d.at("moments", "weakest_strength", ratio)
         least = st.statistics.density(weakest, bounds=setting.DENSITY_BOUNDS)
-        minima.append(least.x[least.value > 1e-3 * least.value.max()] / MEAN)
-        averages.append(tau_n / MEAN)
-        upper[1].plot(least.value / least.value.max(), least.x / MEAN, **common.line(ratio))
-        counts = d.at("moments", "counts", ratio).reshape(-1, 32).sum(axis=1)
-        edges = np.linspace(LOW, HIGH, counts.size + 1)
-        centre = 0.5 * (edges[1:] + edges[:-1])
-        density = counts / counts.sum() / (edges[1] - edges[0]) * MEAN
-        lower[1].plot(density, centre / MEAN, **common.line(ratio))
-    for panel in (*upper, *lower[1:]):  # narrow panels of densities
-        panel.set_xticks([])
-        panel.tick_params(labelleft=panel is upper[0])
-    for panel in lower:
-        panel.set_ylim(common.span(*averages))
-    fields[1].set_ylabel(rf"$\tau_\mathrm{{p}}{OVER_MEAN}", y=0.0)
-    upper[0].set_ylim(low, high)
-    upper[1].set_ylim(common.span(*minima, margin=0.0))
-    upper[1].yaxis.tick_right()
-    upper[1].tick_params(labelright=True)
-    upper[1].locator_params(axis="y", nbins=5)
-    upper[0].set_title(r"$f(\tau_\mathrm{p})$")
-    upper[1].set_title(r"$f(\min\tau_\mathrm{p})$")
-    lower[0].set(ylabel=rf"$\tau_\mathrm{{n}}{OVER_MEAN}", xlabel="$x/L$", xlim=(0, 1))
-    lower[1].set_title(r"$f(\tau_\mathrm{n})$")
-    lower[2].axis("off")
-    common.letter(fields[0], "a", x=-0.12)
-    common.letter(lower[0], "b", x=-0.12)
-    stress, place = figure.add_subplot(grid[2]), figure.add_subplot(grid[3])
-    for ratio in RATIOS:
-        density, look = stress_density(d, ratio), common.line(ratio)
-        stress.plot(density.x / MEAN, density.value * MEAN, **look)
-        ranges.append(density.x[density.value > 1e-3 * density.value.max()] / MEAN)
-        band = [(density.value + sign * 2 * density.error) * MEAN for sign in (-1, 1)]
-        stress.fill_between(density.x / MEAN, *band, color=look["color"], alpha=0.25, lw=0)
+        minima.plot(least.value / least.value.max(), least.x / MEAN, **look)
+        onset = stress_density(d, ratio)
+        stress.plot(onset.x / MEAN, onset.value * MEAN, **look)
+        band = [(onset.value + sign * 2 * onset.error) * MEAN for sign in (-1, 1)]
+        stress.fill_between(onset.x / MEAN, *band, color=colour, alpha=0.25, lw=0)
+        for axes, curve in ((minima, least), (stress, onset)):
+            shown[axes].append(curve.x[curve.value > 1e-3 * curve.value.max()] / MEAN)
         share, edges = np.histogram(d.at("local", "critical_position", ratio) / L, 20, (0, 1))
-        share = share / d.size.samples * 20
-        place.stairs(share, edges, baseline=None, color=common.line(ratio)["color"],
-                     lw=0.9)  # fmt: skip
-    error = np.sqrt(20.0 / d.size.samples)
-    place.axhspan(1 - 2 * error, 1 + 2 * error, color="#eeeeee", lw=0, zorder=0)
+        place.stairs(share / d.size.samples * 20, edges, baseline=None, color=colour, lw=0.9)
+    for axes in (strengths, minima, densities):  # narrow
+        axes.set_xticks([])
+        axes.tick_params(labelleft=axes is strengths)
+    for axes in (nucleation, densities):
+        axes.set_ylim(common.span(*shown[nucleation]))
+    fields[1].set_ylabel(TAU_P, y=0.0)
+    minima.yaxis.tick_right()
+    minima.tick_params(labelright=True)
+    minima.locator_params(axis="y", nbins=5)
+    limits = common.span(*shown[minima], margin=0.0)
+    minima.set(ylim=limits, title=r"$f(\min\tau_\mathrm{p})$")
+    nucleation.set(ylabel=TAU_N, xlabel="$x/L$", xlim=(0, 1))
+    densities.set_title(r"$f(\tau_\mathrm{n})$")
+    error = 2 * np.sqrt(20.0 / d.size.samples)
+    place.axhspan(1 - error, 1 + error, color="#eeeeee", lw=0, zorder=0)
     if setting.SUPPORT[0] > 0.0:
         stress.axvline(LOW / MEAN, color=GREY, lw=0.8, ls=":")
-        ranges.append(LOW / MEAN)
-    stress.set(xlim=common.span(*ranges, margin=0.02), ylim=(0, None),
+        shown[stress].append(LOW / MEAN)
+    stress.set(xlim=common.span(*shown[stress], margin=0.02), ylim=(0, None),
                xlabel=rf"$\tau_\mathrm{{cr}}{OVER_MEAN}",
                ylabel=rf"$f(\tau_\mathrm{{cr}})\,${MEAN_P}")  # fmt: skip
     place.set(xlim=(0, 1), ylim=(0, None), xlabel=r"$x_\mathrm{cr}/L$",
               ylabel=r"$f(x_\mathrm{cr})\,L$")  # fmt: skip
-    common.letter(stress, "c", x=-0.12)
-    common.letter(place, "d", x=-0.12)
+    common.letters(fields[0], nucleation, stress, place)
     return figure
 
 
-_PLACES = np.array([np.log2(setting.FIRST) - 1.2, *np.log2(RATIOS), np.log2(RATIOS[-1]) + 1.2])
+_PLACES = np.array([np.log2(FIRST) - 1.2, *np.log2(RATIOS), np.log2(LAST) + 1.2])
 """Places on the axis: zero, the correlation lengths on a logarithm, and infinity."""
 
 
-def _statistics(axes, table, ends) -> None:
-    """Draw mean, median and lower quartile; `ends` are those at zero and at infinity."""
-    x = _PLACES[1:-1]
+def _statistics(axes, table, end) -> None:
+    """Draw mean, median and lower quartile; `end` has them at infinity, all are 1 at zero."""
     styles = (("mean", "-", "o", COLOURS[0]), ("median", "--", "s", COLOURS[1]),
               ("25 % quantile", ":", "^", COLOURS[2]))  # fmt: skip
     for i, (name, dashes, marker, colour) in enumerate(styles):
-        row = [numbers[i].value for numbers in table]
+        rows = [numbers[i] for numbers in table]
         style = {"color": colour, "ls": dashes, "marker": marker, "label": name}
-        common.numbers(axes, x, [numbers[i] for numbers in table], **style)
-        axes.plot(_PLACES[:2], [ends[0][i], row[0]], color=colour, ls=(0, (1, 2)), lw=0.9)
-        axes.plot(_PLACES[-2:], [row[-1], ends[1][i]], color=colour, ls=(0, (1, 2)), lw=0.9)
-        axes.plot(_PLACES[[0, -1]], [ends[0][i], ends[1][i]], marker, color=colour, ms=4,
-                  mfc="white", ls="none")  # fmt: skip
-    labels = ("0", *(f"{ratio:g}" for ratio in RATIOS), r"$\infty$")
-    axes.set_xticks(_PLACES, labels)
+        common.numbers(axes, _PLACES[1:-1], rows, **style)
+        values = np.array([1.0, *(number.value for number in rows), end[i]])
+        for ends in (slice(2), slice(-2, None)):
+            axes.plot(_PLACES[ends], values[ends], color=colour, ls=(0, (1, 2)), lw=0.9)
+        axes.plot(_PLACES[[0, -1]], values[[0, -1]], marker, color=colour, ms=4, mfc="white")
+    axes.set_xticks(_PLACES, ("0", *(f"{ratio:g}" for ratio in RATIOS), r"$\infty$"))
     for place in (_PLACES[0] + 0.6, _PLACES[-1] - 0.6):
         axes.text(place, 0, "//", transform=axes.get_xaxis_transform(), ha="center", va="center",
                   fontsize=9)  # fmt: skip
@@ -343,86 +300,67 @@ def _statistics(axes, table, ends) -> None:
 def figure_6(d: Data):
     """Draw mean, median and lower quartile of tau_n and of tau_cr."""
     figure = common.new(6.4)
-    grid = figure.add_gridspec(2, 1, height_ratios=(0.85, 1.3))
-    top, bottom = figure.add_subplot(grid[0]), figure.add_subplot(grid[1])
-    law = setting.MARGINAL.distribution
-    edges = np.linspace(LOW, HIGH, d["moments"].sizes["cell"] + 1)
+    top, bottom = figure.subplots(2, 1, height_ratios=(0.85, 1.3))
+    edges = np.linspace(LOW, HIGH, d["moments"].sizes["cell"] + 1) / MEAN
     table = []
     for ratio in RATIOS:
         counts = np.cumsum(d.at("moments", "counts", ratio))
-        counts = counts / counts[-1]
-        shift = d.at("moments", "powers", ratio)[:, 0]
-        quantiles = [np.interp(p, counts, edges[1:]) / MEAN for p in (0.5, 0.25)]
-        table.append((mean(1.0 + shift), *(mean(np.array([q, q])) for q in quantiles)))
-    uniform = [1.0, law.ppf(0.5) / MEAN, law.ppf(0.25) / MEAN]
-    _statistics(top, table, ([1.0, 1.0, 1.0], uniform))
-    top.set(ylabel=rf"$\tau_\mathrm{{n}}{OVER_MEAN}")
+        quartiles = np.interp([0.5, 0.25], counts / counts[-1], edges[1:])
+        average = mean(1.0 + d.at("moments", "powers", ratio)[:, 0])
+        table.append((average, *map(Number, quartiles)))
+    _statistics(top, table, [1.0, *LAW.ppf([0.5, 0.25]) / MEAN])
+    top.set(ylabel=TAU_N)
     top.legend(loc="lower left")
-    common.letter(top, "a", x=-0.12)
-    table = [
-        tuple(number * (1 / MEAN) for number in (mean(v), quantile(v, 0.5), quantile(v, 0.25)))
-        for v in (d.stress(ratio) for ratio in RATIOS)
-    ]
+    onsets = [d.stress(ratio) / MEAN for ratio in RATIOS]
+    table = [(mean(row), quantile(row, 0.5), quantile(row, 0.25)) for row in onsets]
     low = LOW / MEAN if setting.SUPPORT[0] > 0.0 else np.nan  # no limit without a bound
-    _statistics(bottom, table, ([1.0, 1.0, 1.0], [low, low, low]))
+    _statistics(bottom, table, [low, low, low])
     bottom.set(ylabel=rf"$\tau_\mathrm{{cr}}{OVER_MEAN}")
     bottom.axhline(low, color=GREY, lw=0.8, ls=":")
     places = np.log2(SIMULATED)
-    raw = [mean(d.stress(ratio, "ruptures") / MEAN) for ratio in SIMULATED]
+    raw = [d.stress(ratio, "ruptures").mean() / MEAN for ratio in SIMULATED]
+    errors = [2 * d.stress(ratio, "exact").std() / MEAN / np.sqrt(d.size.ruptures)
+              for ratio in SIMULATED]  # fmt: skip
     inset = bottom.inset_axes((0.42, 0.46, 0.56, 0.52))
     for axes in (bottom, inset):
-        axes.errorbar(places, [n.value for n in raw],
-                      [2 * d.stress(r, "exact").std() / MEAN / np.sqrt(d.size.ruptures)
-                       for r in SIMULATED], fmt="D", color=RED, mfc="none", ms=6, lw=0.8,
-                      label=f"{d.size.ruptures} ruptures each")  # fmt: skip
-    best = [dynamic_mean(d, ratio) * (1 / MEAN) for ratio in SIMULATED]
+        drawn = axes.errorbar(places, raw, errors, fmt="D", color=RED, mfc="none", ms=6, lw=0.8)
+    best = [dynamic_mean(d, ratio).value / MEAN for ratio in SIMULATED]
     inset.plot(np.log2(RATIOS), [n[0].value for n in table], "-o", color=COLOURS[0], ms=4)
-    inset.plot(places, [n.value for n in best], "x", color=RED, ms=7)
+    inset.plot(places, best, "x", color=RED, ms=7)
     common.ratio_axis(inset)
     inset.set(xlabel="", ylabel="mean", xlim=(_PLACES[1] - 0.4, _PLACES[-2] + 0.4))
-    bottom.legend(*_chosen(bottom, 1), loc="lower left")
-    common.letter(bottom, "b", x=-0.12)
+    bottom.legend([drawn], [f"{d.size.ruptures} ruptures each"], loc="lower left")
+    common.letters(top, bottom)
     return figure
-
-
-def _chosen(axes, count: int):
-    handles, labels = axes.get_legend_handles_labels()
-    return handles[-count:], labels[-count:]
 
 
 def figure_7(d: Data):
     """Draw correlation, eigenfunction and the variance of tau_n."""
     figure = common.new(5.4)
-    axes = figure.subplots(2, 2)
+    correlation, eigenfunction, *variances = figure.subplots(2, 2).flat
     theory = d["theory"]
-    lag = theory["x"].values / L
     for ratio in RATIOS:
         values = theory["correlation"].sel(correlation_ratio=ratio)
-        axes[0, 0].plot(lag, values, **common.line(ratio), label=f"{ratio:g}")
-    axes[0, 0].set(xlim=(0, min(1.9 * RATIOS[-1] * H / L, 0.5)), xlabel=r"$\xi/L$",
-                   ylabel=r"$C(\xi)$")  # fmt: skip
-    axes[0, 0].legend(title=XI)
+        correlation.plot(theory.x / L, values, **common.line(ratio), label=f"{ratio:g}")
+    correlation.set(xlim=(0, min(1.9 * LAST * H / L, 0.5)), xlabel=r"$\xi/L$",
+                    ylabel=r"$C(\xi)$")  # fmt: skip
+    correlation.legend(title=XI)
     s = np.linspace(-1, 1, 200)
-    axes[0, 1].plot(s, (0.925 - 0.308 * s**2) * np.sqrt(1 - s**2), color=COLOURS[0])
-    axes[0, 1].set(xlabel="$s$", ylabel="$v_0(s)$", ylim=(0, None))
-    ratio, value = theory["ratio"].values, theory["infinite"].values
-    slope = value[0] / ratio[0]
-    for panel, high in ((axes[1, 0], 8), (axes[1, 1], 1)):
-        near = ratio <= high * 1.3
-        panel.plot(ratio[near], value[near], color=COLOURS[0], label="infinite interface")
-        shown = theory["usable"].values
-        panel.plot(shown[shown <= high], theory["periodic"].values[shown <= high], "--",
-                   color=COLOURS[1], label="this interface")  # fmt: skip
-        panel.plot([0, 1.0 / slope], [0, 1.0], ":", color=RED, label=rf"{slope:.2f} {XI}")
-        for sampled_ratio in RATIOS:
-            if sampled_ratio <= high:
-                spread = d.at("moments", "powers", sampled_ratio)
-                sampled = spread[:, 1].mean() - spread[:, 0].mean() ** 2
-                share = sampled * (MEAN / setting.DEVIATION) ** 2
-                panel.plot(sampled_ratio, share, "o", color=DARK, ms=4)
-        panel.set(xlim=(0, high), xlabel=XI, ylim=(0, 1.02))
-    axes[1, 0].set_ylabel(r"Var[$\tau_\mathrm{n}$]/Var[$\tau_\mathrm{p}$]")
-    axes[1, 0].axhline(1.0, color=GREY, lw=0.8, ls="--")
-    axes[1, 0].legend(loc="lower right")
-    common.letters(axes.flat, x=-0.25)
+    eigenfunction.plot(s, (0.925 - 0.308 * s**2) * np.sqrt(1 - s**2), color=COLOURS[0])
+    eigenfunction.set(xlabel="$s$", ylabel="$v_0(s)$", ylim=(0, None))
+    slope = float(theory["infinite"][0] / theory["ratio"][0])
+    powers = d["moments"]["powers"].mean("sample")
+    sampled = (powers[:, 1] - powers[:, 0] ** 2) * (MEAN / setting.DEVIATION) ** 2
+    for axes, high in zip(variances, (8, 1), strict=True):
+        axes.plot(theory["ratio"], theory["infinite"], color=COLOURS[0],
+                  label="infinite interface")  # fmt: skip
+        axes.plot(theory["usable"], theory["periodic"], "--", color=COLOURS[1],
+                  label="this interface")  # fmt: skip
+        axes.plot([0, 1.0 / slope], [0, 1.0], ":", color=RED, label=rf"{slope:.2f} {XI}")
+        axes.plot(RATIOS, sampled, "o", color=DARK, ms=4)
+        axes.set(xlim=(0, high), xlabel=XI, ylim=(0, 1.02))
+        axes.axhline(1.0, color=GREY, lw=0.8, ls="--")
+    variances[0].set_ylabel(r"Var[$\tau_\mathrm{n}$]/Var[$\tau_\mathrm{p}$]")
+    variances[0].legend(loc="lower right")
+    common.letters(correlation, eigenfunction, *variances)
     return figure
