@@ -35,8 +35,8 @@ def at(problem, place):
 
 test_what_no_station_is = refusals({
     "stations['a']: (7.5,) is not on the interface of 0.04 m": lambda: at(LINE, 7.5),
-    "give x in m": lambda: at(LINE, (0.01, 0.01)),
-    "give x and y in m": lambda: at(BREAKING_PLANE, 0.01),
+    "Give x in m": lambda: at(LINE, (0.01, 0.01)),
+    "Give x and y in m": lambda: at(BREAKING_PLANE, 0.01),
     "must be a finite number, got nan": lambda: at(BREAKING_PLANE, (0.01, np.nan)),
     "from the first node": lambda: at(BREAKING_PLANE, (-0.01, 0.0)),
     "stations ... must be ... got 3": lambda: st.Save(stations={3: 0.01}),
@@ -58,7 +58,7 @@ def test_files_of_a_line_read_back(tmp_path):
     )
     np.testing.assert_allclose(table["j"], run.x - 0.004, atol=1e-9)
     np.testing.assert_allclose(table["t"], run.arrival_time.fillna(1e9), rtol=1e-6)
-    with pytest.raises(st.InputError, match="lacks station_slip; give simulate_rupture"):
+    with pytest.raises(st.InputError, match="lacks station_slip. Give simulate_rupture"):
         st.external.write_scec(
             run.drop_vars("station_slip"), tmp_path, origin=0, normal_stress=0
         )

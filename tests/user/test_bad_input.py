@@ -60,7 +60,7 @@ def test_errors_of_equilibrium_are_warned_of():
         "critical_stress": 1e6 * ones,
     }
     rows = PROBLEM.sample(np.full((2, PROBLEM.interface.size), 1e6))
-    with pytest.warns(st.AccuracyWarning, match="did not close to 1e-09 of it in 1 of 2"):
+    with pytest.warns(st.AccuracyWarning, match="did not close to 1e-09 of the load in 1 of 2"):
         EXACT.prepare(PROBLEM)._warn(rows, values, known=no, certified=~no, stopped=no)
 
 

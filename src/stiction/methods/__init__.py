@@ -1,6 +1,6 @@
-"""Three answers to the question at which load an interface lets go.
+"""Three methods for the load at which an interface begins to slide.
 
-Read `protocol`: what every method offers, and `onset`. `criterion` takes each patch by itself,
-`equilibrium` has every interaction and is exact as long as loading is slow, `dynamics` adds
-inertia and begins where equilibrium ends.
+Read `protocol`, the members of every method, and `onset`. `criterion` takes each patch by itself.
+`equilibrium` has every interaction and is exact as long as loading is slow. `dynamics` adds
+inertia, and starts from the end of equilibrium.
 """

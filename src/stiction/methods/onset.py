@@ -1,8 +1,8 @@
 """The onset of given profiles by any method, and the check of a method that approximates another.
 
-`onset`, `monte_carlo`, `infer` and failure probabilities solve some samples of an approximate
-method, such as the local criterion, by the exact one. `exact_counterpart` says by which,
-`may_differ` whether that is worth its time, and `doubt` puts a difference into words.
+`onset`, `monte_carlo`, `infer` and failure probabilities check an approximate method, such as the
+local criterion: they solve some samples by the exact method, too. `exact_counterpart` returns the
+exact method, `may_differ` whether the check is worth its time, and `doubt` a warning.
 """
 
 from __future__ import annotations
@@ -35,27 +35,36 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MAX_COMPARED, COMPARISON_SECONDS = 32, 2.0
-"""Samples that `onset` solves by the exact method too, and the seconds for them."""
+"""Most samples that `onset` also solves by the exact method, and the seconds for them."""
 MAX_DIFFERENCE = 0.01
 """Mean or scatter of the difference, over the exact onset, above which there is a warning."""
 
 
 def exact_counterpart(problem: Problem, method: Method) -> Method | None:
-    """Return the method that a method approximates; None without one that takes the problem."""
+    """Return the method that a method approximates, or None if it has no such method.
+
+    None also stands for an exact method that cannot take the problem.
+    """
     name = optional_member(method, "exact_method")
     exact: Method | None = METHODS[name]() if name else None
     return None if exact is None or exact.supports(problem) else exact
 
 
 def relative_differences(stress: Array, exact: Array) -> Array:
-    """Return the differences to exact onsets over their mean, of samples that both solve."""
+    """Return the differences from exact onsets, divided by the mean of the exact onsets.
+
+    Samples without an onset by either method are left out.
+    """
     known = np.isfinite(stress) & np.isfinite(exact)
     mean = np.abs(exact.mean(where=known)) if known.any() else 1.0
     return (stress - exact)[known] / mean
 
 
 def doubt(method: Method, differences: Mapping[str, tuple[float, float]]) -> str | None:
-    """Return a warning if a mean or a scatter by kind of samples is above 1 %."""
+    """Return a warning if the mean or scatter of a difference is above 1 %, otherwise None.
+
+    `differences` maps a kind of samples to the mean and scatter of their relative differences.
+    """
     if not any(abs(size) > MAX_DIFFERENCE for pair in differences.values() for size in pair):
         return None
     texts = [
@@ -63,7 +72,7 @@ def doubt(method: Method, differences: Mapping[str, tuple[float, float]]) -> str
         for kind, (mean, scatter) in differences.items()
     ]
     return (
-        f"the {method.label} differs from the exact onset by {', and by '.join(texts)};"
+        f"the {method.label} differs from the exact onset by {', and by '.join(texts)}."
         " method=st.Equilibrium() has no such error"
     )
 
@@ -77,49 +86,50 @@ def onset(
     gaps: Literal["refuse", "fill"] = "refuse",
     progress: Progress = True,
 ) -> xr.Dataset:
-    """Compute the load and position at which interfaces of given strength begin to slide.
+    """Compute the load and position at which interfaces with a given strength begin to slide.
 
     Parameters
     ----------
     problem : Problem
     profiles : array, mapping of arrays, xarray.Dataset or Sample
         Peak strength tau_p (Pa), of shape (samples, nodes) or (nodes,), on a plane
-        (samples, nx, ny) or (nx, ny); or several profiles by name, such as ``{"strength":
-        ..., "residual_strength": ...}``, each given here or in the problem, not in both; see
-        `Problem.sample`. In a DataArray or Dataset, the dimension 'x' runs along the
+        (samples, nx, ny) or (nx, ny). Or several profiles by name, such as ``{"strength":
+        ..., "residual_strength": ...}``; give each of them here or in the problem, not in both
+        (see `Problem.sample`). In a DataArray or Dataset, the dimension 'x' runs along the
         interface (on a plane 'x' and 'y'), its coordinate (m) gives the position of each
-        value, and stated `units` are converted; see `stiction.read_profile`. A DataArray in the
-        unit 1, or the name 'friction_coefficient', holds friction coefficients, which times the
-        normal pressure are the strength.
+        value, and stated `units` are converted (see `stiction.read_profile`). A DataArray with
+        the unit 1, or the name 'friction_coefficient', holds friction coefficients, which are
+        multiplied by the normal pressure.
     method : LocalCriterion, Equilibrium or Rupture
-        The method; there is no default.
+        The method. It has no default.
     gaps : {"refuse", "fill"}
         Whether to refuse missing values (NaN) or fill them as `stiction.read_profile` does.
     progress : bool or callable
-        True shows progress on standard error after a second; a callable gets (done, total).
+        True shows progress on standard error after a second. A callable gets (done, total).
 
     Returns
     -------
     xarray.Dataset
         Over 'sample': `critical_load`, `critical_stress`, `first_instability` (Pa),
-        `critical_position` (m), with a normal pressure `friction_coefficient`, with a thickness,
-        width or area `critical_force` and `first_instability_force` (N), and what the method
-        adds. Every variable has `units` and `long_name`. If gaps were filled, also
-        `in_gap`, whether the critical patch reaches into one, and the coordinate `measured`.
+        `critical_position` (m), and the variables that the method adds. A normal pressure adds
+        `friction_coefficient`; a thickness, width or area adds `critical_force` and
+        `first_instability_force` (N). Every variable has `units` and `long_name`. If gaps were
+        filled, `in_gap` shows whether the critical patch reaches into a gap, and the coordinate
+        `measured` which nodes have measured values.
 
     Raises
     ------
     InputError
-        If any argument is invalid; the message lists every problem.
+        If any argument is invalid. The message lists every mistake.
 
     Warns
     -----
     AccuracyWarning
-        If gaps are filled, or the onset lies in one; if the local criterion is off by more than
-        1 % in the first samples, at most 32, that `Equilibrium` solves in two seconds. They are
-        solved only if a quick test leaves a doubt.
+        If gaps are filled or the onset lies in a gap. If the local criterion is off by more than
+        1 % in the first samples: at most 32, as many as `Equilibrium` solves in two seconds, and
+        only if a quick test leaves a doubt.
     UnitWarning
-        If a value is so far from what solids have that its unit is in doubt.
+        If a value is so unusual for a solid that its unit is in doubt.
 
     Examples
     --------
@@ -151,9 +161,9 @@ def onset(
 
 
 def _compare(problem: Problem, method: Method, sample: Sample, stress: Array) -> None:
-    """Warn if a method that approximates another is off in the first samples.
+    """Warn if an approximate method is off in the first samples.
 
-    As many are compared as the exact method solves in two seconds.
+    The exact method solves at most `MAX_COMPARED` samples, as many as take `COMPARISON_SECONDS`.
     """
     exact = exact_counterpart(problem, method)
     if exact is None:

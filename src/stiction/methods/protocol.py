@@ -1,4 +1,4 @@
-"""The protocol of methods, all methods, and their solvers, checked."""
+"""The protocol of methods, the table of all methods, and solvers whose results are checked."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 BATCH_SECONDS, MAX_BATCH_SAMPLES = 0.5, 512
-"""Seconds of work, and most samples, that are solved at once."""
+"""Seconds of work in a batch, and most samples in it."""
 
 Values = dict[str, NDArray[Any]]
 Solver = Callable[[Sample], Mapping[str, NDArray[Any]]]
@@ -46,68 +46,68 @@ METHODS: Kinds = Kinds("methods", OWN)
 
 
 class Method(Protocol):
-    """Protocol of a method: options, and a solver that follows from them.
+    """Protocol of a method: options, and the solver that they define.
 
-    Any frozen dataclass with these members serves `stiction.onset` and `stiction.monte_carlo`, and
-    study files too if `stiction.extensions.register` or an entry point makes its `type` known.
-    The members of `OptionalMembers` may be added.
+    `stiction.onset` and `stiction.monte_carlo` accept any frozen dataclass with these members. For
+    study files, make its `type` known by `stiction.extensions.register` or an entry point. The
+    members of `OptionalMembers` may be added.
     """
 
     @property
     def type(self) -> str:
-        """Its name in study files."""
+        """Name of the method in study files."""
 
     @property
     def label(self) -> str:
-        """Its name in figures, tables and progress."""
+        """Name of the method in figures, tables and progress."""
 
     def variables(self, problem: Problem) -> Mapping[str, Variable]:
-        """What the solver returns, each with 'sample' as first dimension.
+        """Return the variables of the solver's results, each with 'sample' as first dimension.
 
-        All of `stiction.extensions.onset_variables` must be among them.
+        They include all of `stiction.extensions.onset_variables`.
         """
 
     def seconds_per_sample(self, problem: Problem) -> float:
-        """About how long a sample takes on one core, in seconds, to a factor of three."""
+        """Return how long a sample takes on a core, s, to a factor of three."""
 
     def supports(self, problem: Problem) -> list[str]:
-        """Reasons why it cannot take a problem; none if it can."""
+        """Return the reasons why it cannot take a problem, or an empty list."""
 
     def prepare(self, problem: Problem) -> Solver:
-        """A solver of samples; what is the same for all of them is computed here, once."""
+        """Return a solver of samples. Compute here whatever all samples share."""
 
 
 class OptionalMembers:
-    """Members that a method may have, with the defaults for a method without them."""
+    """Optional members of a method, with their defaults."""
 
     accepts: ClassVar[tuple[str, ...]] = ()
-    """Profiles that it takes: "overstress", see `Problem.sample`."""
+    """Special profiles that it takes: "overstress", see `Problem.sample`."""
     first_stage: ClassVar[str | None] = None
-    """Type of a faster method with similar onsets, by which rare failures are found first."""
+    """Type of a faster method with similar onsets, for the first search of rare failures."""
     exact_method: ClassVar[str | None] = None
-    """Type of the method that this one approximates. Some samples are solved by both, and a warning
-    gives the difference."""
+    """Type of the method that this method approximates. Some samples are solved by both, and a
+    warning gives the difference."""
     scaling: ClassVar[Literal["none", "stretch", "affine"]] = "none"
-    """How onsets follow the strength at a given weakening rate and a uniform load. "affine":
+    """How onsets scale with the strength s at a given weakening rate and a uniform load. "affine":
     onset(a + b s) = a + b onset(s). "stretch": onset(b s) = b onset(s) without residual strength
     and initial stress."""
     counted_only: ClassVar[bool] = False
     """Whether failures are counted in plain samples, not sought by subset simulation."""
     samples_at_point: ClassVar[int] = 100
-    """Samples with which `stiction.infer` simulates each point of a prior."""
+    """Number of samples with which `stiction.infer` simulates each point of a prior."""
 
     def bounded_by_strength(self, problem: Problem, event: str) -> tuple[bool, bool]:
-        """Whether strength bounds the stress of an event from below, and from above.
+        """Return whether strength bounds the stress of an event from below and from above.
 
-        From below: by min (tau_p - tau_i)/p, at which nothing slips yet. From above: by the mean
-        strength. The event is 'critical_stress' or 'first_instability'.
+        From below: by min (tau_p - tau_i)/p, the load at which the first node slips. From above: by
+        the mean strength. The event is 'critical_stress' or 'first_instability'.
         """
         return False, False
 
     def may_differ(self, problem: Problem, sample: Sample, stress: Array) -> bool:
-        """Whether to compare the onsets of samples, Pa, with those of `exact_method`.
+        """Return whether to compare the onsets of samples (Pa) with the onsets of `exact_method`.
 
-        It may be False where a quick test finds that they differ by less than 1 %.
+        Return False if a quick test finds that they differ by less than 1 %.
         """
         return True
 
@@ -118,18 +118,18 @@ def optional_member(method: Any, name: str) -> Any:
 
 
 MEMBERS = [name for name in vars(Method) if not name.startswith("_")]
-"""What every method has."""
+"""Names of the members of every method."""
 
 
 def as_method(value: Any) -> Any:
-    """Return a method, or raise a ValueError that names what it lacks."""
+    """Return a method, or raise a ValueError that names the members it lacks."""
     if isinstance(value, type):
         raise ValueError(f"must be an object; write st.{value.__name__}(...)")
     missing = [name for name in MEMBERS if not hasattr(value, name)]
     if missing:
         raise ValueError(
             "must be a method object such as st.LocalCriterion(), st.Equilibrium() or"
-            f" st.Rupture(loading_rate=...); lacks {', '.join(missing)}"
+            f" st.Rupture(loading_rate=...), but lacks {', '.join(missing)}"
         )
     return value
 
@@ -162,7 +162,7 @@ def _check_values(
 ) -> None:
     if values.keys() != variables.keys():
         raise InputError(
-            f"method: the solver of {name} must return its variables {', '.join(variables)};"
+            f"method: the solver of {name} must return its variables {', '.join(variables)},"
             f" got {', '.join(values)}"
         )
     sizes = dict(zip(("x", "y"), sample.shape, strict=False))
@@ -177,7 +177,7 @@ def _check_values(
 
 
 def seconds_per_sample(problem: Problem, method: Method) -> float:
-    """Return about how long a sample takes, s, at least a nanosecond; refuse what is no time."""
+    """Return how long a sample takes, s, at least a nanosecond, or raise an `InputError`."""
     seconds = method.seconds_per_sample(problem)
     if not (is_finite(seconds) and seconds >= 0.0):
         raise InputError(
@@ -188,7 +188,7 @@ def seconds_per_sample(problem: Problem, method: Method) -> float:
 
 
 def batch_size(problem: Problem, method: Method) -> int:
-    """Return how many samples to solve at once: half a second of work, at most 512."""
+    """Return the number of samples in a batch: half a second of work, at most 512."""
     return max(
         1, min(MAX_BATCH_SAMPLES, int(BATCH_SECONDS / seconds_per_sample(problem, method)))
     )
@@ -197,7 +197,7 @@ def batch_size(problem: Problem, method: Method) -> int:
 def variables_of(
     problem: Problem, method: Method, pressure: bool = False
 ) -> dict[str, Variable]:
-    """Return the variables of a prepared solver; `pressure`: if that differs by sample."""
+    """Return the variables of a prepared solver; `pressure` if each sample has its own."""
     variables = dict(method.variables(problem))
     if pressure or problem.given_pressure is not None:
         variables["friction_coefficient"] = FRICTION_COEFFICIENT
@@ -212,7 +212,7 @@ def label(
     attributes: Mapping[str, Any],
     more_variables: Mapping[str, Variable] = MappingProxyType({}),
 ) -> xr.Dataset:
-    """Label values of many samples: a dataset over 'sample', and the nodes where they differ."""
+    """Return values of many samples as a dataset over 'sample' and, where needed, the nodes."""
     variables = variables_of(problem, method, "friction_coefficient" in values)
     coordinates = {"sample": (samples, SAMPLE)}
     return to_dataset(

@@ -1,1 +1,1 @@
-"""The local nucleation criterion of Uenishi and Rice (2003), applied as a moving average."""
+"""The local criterion of Uenishi and Rice (2003), as a moving average of strength over load."""

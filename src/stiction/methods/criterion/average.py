@@ -1,11 +1,12 @@
-"""The moving average of strength divided by load, over critical windows, and where it is least.
+"""The least moving average of strength over load, taken over critical windows.
 
 Problem
 -------
 s is the strength less initial stress (Pa), p the load profile, and y the weights of a window
 (`windows`). The window centred at x becomes unstable by itself at the load <s, y>_x/<p, y>_x. Find
-the least load over all x and all windows. On a line x lies between the nodes, too. On a plane the
-load is that of a node, which is exact for the discrete problem, and only the place lies between.
+the least load over all x and all windows. On a line, x may lie between the nodes. On a plane the
+load is taken at the nodes, which is exact for the discrete problem, and only its place is
+interpolated.
 
 Algorithm
 ---------
@@ -13,11 +14,11 @@ Algorithm
 2. On a plane, take the lowest node. A parabola through its neighbours gives the place.
 3. On a line, estimate by a parabola through each local minimum of the nodes how low the function
    falls there, and by how much the parabola may be wrong (`_estimates`).
-4. In the lowest of them, and in any other that may be lower, take the minimum of polynomials
-   through `STENCIL` nodes on either side of the node (`_minimum_near`).
+4. In the lowest of them, and in any other that may be lower, take the minimum of the polynomials
+   through `STENCIL` nodes in the cells on both sides of the node (`_minimum_near`).
 
-Rounding and the polynomials, which ring where the strength jumps, must not pass bounds that hold
-for the exact average. So values are cut at these bounds.
+Round-off may exceed bounds that hold for the exact average, and so may the polynomials, which ring
+at jumps of the strength. Values are therefore cut at these bounds.
 """
 
 from collections.abc import Iterator, Sequence
@@ -32,7 +33,7 @@ from stiction.methods.criterion.windows import Window
 from stiction.problem.interface import Interface
 
 STENCIL = 10  # nodes of a polynomial
-PARABOLA_ERROR = 0.065  # largest difference of a cubic to its parabola, in third differences
+PARABOLA_ERROR = 0.065  # largest distance of a cubic from its parabola, in third differences
 MAX_NEWTON_STEPS = 50
 PLACE_ATOL = 1e-11  # change of the place, in nodes, that is round-off
 NO_NODE = -1
@@ -59,11 +60,11 @@ def averages(
 def least_average(
     interface: Interface, windows: Sequence[Window], excess: Array, profile: Array
 ) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Find the least average of each sample over places and windows, see `averages`.
+    """Return the least average of each sample over places and windows, as in `averages`.
 
-    Returned are the averages (Pa), their places in nodes, and the numbers of their windows. On a
-    line the minimum is taken between the nodes. On a plane the load is that of a node, which is
-    exact for the discrete problem, and only the place lies between the nodes.
+    Returns the averages (Pa), their places in nodes, and the numbers of their windows. On a line
+    the minimum may lie between the nodes. On a plane the average is taken at the nodes, and only
+    its place is interpolated.
     """
     count = len(excess)
     load, place, chosen = np.full(count, np.inf), np.zeros(count), np.zeros(count, np.int64)
@@ -74,7 +75,7 @@ def least_average(
         return load, place, chosen
     place = np.zeros((count, 2))
     for i, fields in enumerate(averages(interface, windows, excess, profile)):
-        bound = np.min(excess[i] / profile)  # the rounding of the transforms may not keep to it
+        bound = np.min(excess[i] / profile)  # round-off of the transforms may fall below it
         for window, average in enumerate(fields):
             least = max(average.min(), bound)
             if least < load[i]:
@@ -85,7 +86,7 @@ def least_average(
 def _between_nodes(average: Array) -> Array:
     """Step 2: return where a parabola around the lowest node has its minimum, in nodes.
 
-    Places at nodes would show as stripes in a histogram.
+    Places on the nodes only would show as stripes in a histogram.
     """
     node = np.unravel_index(int(average.argmin()), average.shape)
     place = np.array(node, dtype=np.float64)
@@ -100,7 +101,7 @@ def _between_nodes(average: Array) -> Array:
 
 @jit
 def _estimates(values: Array, i: int) -> tuple[float, float]:
-    """Step 3: minimum near a node by a parabola, and how much lower it may be.
+    """Step 3: return the minimum near a node by a parabola, and how much lower it may be.
 
     The minimum is infinite if the node is no local minimum.
     """
@@ -116,7 +117,7 @@ def _estimates(values: Array, i: int) -> tuple[float, float]:
 
 @jit
 def _slope(power: Array, u: float) -> tuple[float, float]:
-    """First and second derivative of a polynomial."""
+    """Return the first and second derivative of a polynomial at u."""
     slope, curvature = 0.0, 0.0
     for p in range(STENCIL - 1, 0, -1):
         curvature = curvature * u + slope
@@ -128,13 +129,12 @@ def _slope(power: Array, u: float) -> tuple[float, float]:
 def _minimum_near(
     values: Array, strength: Array, profile: Array, reach: int, node: int, power: Array
 ) -> tuple[float, float]:
-    """Step 4: minimum between a node and the next on either side, and its place.
+    """Step 4: return the minimum between a node and its two neighbours, and its place.
 
-    By Newton's method on the slope, kept between the points where the slope is known to change
-    sign; it bisects where the function is not convex. The polynomial rings where the strength
-    jumps: the minimum is not below the least ratio of strength to load under the patch, nor, where
-    the values are convex, below the lines through two values on either side, extended until they
-    meet.
+    Newton's method on the slope is kept inside a bracket, and bisects if the function is not
+    convex. Two bounds keep the ringing of the polynomial out: the least ratio of strength to load
+    under the patch, and, if the values are convex, the lines through two values on either side,
+    extended until they meet.
     """
     n = values.size
     least = np.inf
@@ -150,7 +150,7 @@ def _minimum_near(
             for p in range(STENCIL):
                 power[p] += _FIT[p, j] * value
         u = -0.5 * side
-        if side * _slope(power, u)[0] >= 0.0:  # it rises from the node
+        if side * _slope(power, u)[0] >= 0.0:  # the polynomial rises from the node
             continue
         low, high = -0.5, 0.5
         for _ in range(MAX_NEWTON_STEPS):
@@ -170,7 +170,7 @@ def _minimum_near(
         at_node, beside = values[node], values[(node + side) % n]
         before, rise = at_node - values[(node - side) % n], beside - at_node
         after = values[(node + 2 * side) % n] - beside
-        if before <= rise <= after:
+        if before <= rise <= after:  # convex
             bound = at_node
             if before < after:
                 bound = at_node + before * (after - rise) / (after - before)
@@ -185,7 +185,7 @@ def _minimum_of_rows(
     transform: Transform, excess: Array, profile: Array, multiplier: Array, reach: int,
     minimum: Array, place: Array,
 ) -> None:  # fmt: skip
-    """Steps 1, 3 and 4: lowest average over a line of every row, and its place in nodes."""
+    """Steps 1, 3 and 4: write the lowest average of every row and its place, in nodes."""
     nodes = profile.size
     values, power = np.empty(nodes), np.empty(STENCIL)
     scale, spectrum = np.empty(nodes), np.empty(multiplier.size, np.complex128)
@@ -193,7 +193,7 @@ def _minimum_of_rows(
     for row in range(excess.shape[0]):
         strength = excess[row]
         convolve(transform, multiplier, strength, spectrum, values)
-        # The weights keep to the least ratio; only the rounding of the transforms may not.
+        # The exact average is at least the least ratio. Round-off of the transforms may be below.
         least = np.inf
         for i in range(nodes):
             least = min(least, multiplier[0] * strength[i] / profile[i])

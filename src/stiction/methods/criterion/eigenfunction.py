@@ -8,15 +8,15 @@ weight g of the local criterion is v with unit integral,
 
     g(cos t) = sum over odd m of b_m sin(m t),  b_m = 2 a_m/pi,  a_1 = 1.
 
-On a grid its weights shall not be negative, so that an average of the strength lies between the
-least and the greatest strength.
+The weights of a grid must not be negative, so that an average lies between the least and the
+greatest strength.
 
 Algorithm
 ---------
 1. Galerkin's method gives lambda_0 and a_m (`eigenvalue_and_vector`).
 2. The midpoint rule gives the transform of g (`multiplier`).
-3. Weights of the nodes are samples of g inside the patch, and at its ends are fitted to the
-   transform among weights that are not negative (`grid_weights`).
+3. The weights of nodes inside the patch are samples of g. The weights at its ends are fitted to the
+   transform, by least squares among weights that are not negative (`grid_weights`).
 """
 
 from functools import lru_cache
@@ -27,8 +27,8 @@ from scipy.optimize import nnls
 
 from stiction.base.arrays import Array
 
-N_SINES = 40  # of the eigenfunction, whose transform is then within 2e-7 of the limit
-N_FITTED_NODES = 16  # at either end of a patch; samples of g are exact further in
+N_SINES = 40  # terms of the eigenfunction, whose transform is then within 2e-7 of the limit
+N_FITTED_NODES = 16  # at either end of a patch; samples of g are exact further inside
 COSINES_AT_ONCE = 1 << 20
 FITTED_WAVE = 2.0  # |k| h_n/2 above which the fit counts less, as the fourth power
 WEIGHT_OF_SUM = 1e3  # of the equation that the weights sum to one
@@ -49,7 +49,7 @@ def eigenvalue_and_vector(terms: int = N_SINES) -> tuple[float, Array]:
 
     a = np.diag(np.pi * k / 4.0)
     b = 0.5 * (integral(k[:, None] - k[None, :]) - integral(k[:, None] + k[None, :]))
-    # B is well conditioned only on the low end that matters; solve for 1/lambda instead.
+    # B is well conditioned only for the smallest eigenvalues, so solve for 1/lambda instead.
     inverse, vectors = scipy.linalg.eigh(b, a)
     vector = vectors[:, -1] / vectors[0, -1]
     vector[1::2] = 0.0  # the first eigenfunction is even
@@ -58,7 +58,7 @@ def eigenvalue_and_vector(terms: int = N_SINES) -> tuple[float, Array]:
 
 
 def weight(s: Array) -> Array:
-    """Return g(s), zero for |s| > 1."""
+    """Return the weight g(s) of the local criterion, zero for |s| > 1."""
     inside = np.abs(s) <= 1.0
     t = np.arccos(np.where(inside, s, 0.0))
     sine = eigenvalue_and_vector()[1] * (2.0 / np.pi)
@@ -68,12 +68,12 @@ def weight(s: Array) -> Array:
 
 
 def multiplier(z: Array) -> Array:
-    """Return the transform of g at z = |k| h_n/2, (m,): what a moving average does to a cosine.
+    """Return the transform of g at z = |k| h_n/2, (m,): the factor of a cosine in the average.
 
-    The integral of g(cos t) cos(z cos t) sin t over [0, pi], by the midpoint rule, which is exact
-    to round-off with more than (z + N_SINES)/2 points.
+    It is the integral of g(cos t) cos(z cos t) sin t over [0, pi], by the midpoint rule, which is
+    exact to round-off with more than (z + N_SINES)/2 points.
     """
-    points = int(0.25 * np.max(z)) + N_SINES  # the other half is the same
+    points = int(0.25 * np.max(z)) + N_SINES  # on [0, pi/2]; the other half is the same
     t = (np.arange(points) + 0.5) * (0.5 * np.pi / points)
     share = weight(np.cos(t)) * np.sin(t) * (np.pi / points)
     parts = np.array_split(z, 1 + np.size(z) * points // COSINES_AT_ONCE)
@@ -83,15 +83,16 @@ def multiplier(z: Array) -> Array:
 def grid_weights(half_width: float) -> Array:
     """Return weights w_0, w_1 = w_-1, ... of the nodes 0, 1, ... from the centre of a patch.
 
-    `half_width` is h_n/2 in nodes; w_0 + 2 (w_1 + w_2 + ...) is one. With weights that are not
-    negative, an average lies between the least and the greatest strength, whatever jumps the
-    strength has; those of a product with the transform of g would ring.
+    `half_width` is h_n/2 in nodes, and w_0 + 2 (w_1 + w_2 + ...) = 1. If weights are not negative,
+    an average lies between the least and the greatest strength even if the strength jumps. Weights
+    by a product with the transform of g would ring.
 
-    Inside a patch plain samples of g are as accurate as can be (the trapezoidal rule); its ends,
-    where g falls like a root, need other weights (as in Alpert, 1999, SIAM J. Sci. Comput. 20,
-    1551). These are fitted to the transform of g by least squares among weights that are not
-    negative (Lawson and Hanson, 1974), long waves first, which carry nearly all of tau_n. Error of
-    the transform at |k| h_n/2 = 3: 1e-4, 5e-6, 1e-9 with 9, 16, 35 nodes in h_n.
+    Inside a patch plain samples of g are accurate (the trapezoidal rule). Its ends, where g falls
+    like a square root, need other weights (B. Alpert, SIAM J. Sci. Comput. 20, 1551, 1999). These
+    are fitted to the transform of g by least squares among weights that are not negative (C. Lawson
+    and R. Hanson, Solving Least Squares Problems, 1974). Long waves count most, as they carry
+    nearly all of tau_n. At |k| h_n/2 = 3 the error of the transform is 1e-4 with 9 nodes in h_n,
+    5e-6 with 16 and 1e-9 with 35.
     """
     last = int(np.ceil(half_width)) + 1
     inner = max(last + 1 - N_FITTED_NODES, 0)

@@ -1,4 +1,4 @@
-"""Griffith's criterion under any load: energy release rate and critical crack length.
+"""Griffith's criterion for a non-uniform load: energy release rate and critical crack length.
 
 Problem
 -------
@@ -9,8 +9,8 @@ Mathematik und Mechanik 50, 1970; W. Koiter, Ingenieur-Archiv 28, 1959) are
 
     K = ((L/pi^2) (1 + U^2) U)^(1/2) int_0^pi D (1 +- cos t)/(1 + U^2 cos^2 t) dt,            (1)
 
-and the energy release rate is G = K |K|/(2 G*). A. Griffith (Phil. Trans. A 221, 1921): a crack
-runs once G exceeds the fracture energy.
+and the energy release rate is G = K |K|/(2 G*). A crack runs once G exceeds the fracture energy
+(A. Griffith, Phil. Trans. A 221, 1921).
 
 Algorithm
 ---------
@@ -29,7 +29,7 @@ from stiction.base.errors import InputError
 from stiction.base.model import Flag, Numbers, Positive, Real, checked, describe
 from stiction.problem.problem import Problem
 
-MIN_POINTS = 512  # Gauss-Chebyshev points along a crack; smooth drops are exact to round-off
+MIN_POINTS = 512  # Gauss-Chebyshev points along a crack, exact to round-off for smooth drops
 SHORT_LENGTHS = np.geomspace(1e-6, 1.0, 40, endpoint=False)  # below one node spacing
 POINTS_AT_ONCE = 1 << 20
 N_HALVINGS = 30
@@ -44,19 +44,19 @@ def energy_release_rate(
     Parameters
     ----------
     problem : Problem
-        A line; its load profile, initial stress and residual strength make the stress drop
+        A line. Its load profile, initial stress and residual strength give the stress drop
         tau_i + tau_0 p - tau_r.
     load : float
         tau_0, Pa.
     lengths : (m,) array or float
-        Lengths of the crack, m, between 0 and that of the interface.
+        Lengths of the crack, m, between 0 and the length of the interface.
     centre : float
         Centre of the crack, m.
 
     Returns
     -------
     (m, 2) array, J/m²
-        At the left and the right tip; negative where the faces would close there.
+        At the left and the right tip. Negative if the stress drop acts against the crack there.
 
     Raises
     ------
@@ -65,11 +65,11 @@ def energy_release_rate(
 
     Notes
     -----
-    G = K|K|/(2 G*) between identical half-spaces, K the integral of the drop times the weight of
-    Bueckner (1970). The interface is periodic: u = tan(pi x/L) maps the row of collinear cracks to
-    one crack, so that a uniform drop gives K = drop (L tan(pi a/L))^(1/2), a the half-length
-    (Koiter, 1959). Kammer et al. (2015) and Ke et al. (2018) predict the length of confined
-    ruptures so. Between the nodes the drop is linear.
+    Between identical half-spaces G = K|K|/(2 G*), where K is the integral of the stress drop times
+    the weight of Bueckner (1970). The interface is periodic: u = tan(pi x/L) maps the row of
+    collinear cracks to a single crack, so that a uniform drop gives K = drop (L tan(pi a/L))^(1/2)
+    for the half-length a (Koiter, 1959). Kammer et al. (2015) and Ke et al. (2018) predict the
+    length of confined ruptures in this way. Between the nodes the drop is linear.
 
     Examples
     --------
@@ -106,19 +106,19 @@ def griffith_length(
     problem : Problem
         A line, see `energy_release_rate`.
     load : float or (k,) array
-        tau_0, Pa; many at once cost little more than one.
+        tau_0, Pa. Many loads at once cost little more than a single load.
     fracture_energy : float
-        Gamma, J/m², positive; for random strength its mean.
+        Gamma, J/m², positive. Use the mean for random strength.
     centre : float
         Centre of the crack, m, at equal distances from both tips.
     arrest : bool
-        False: the shortest length above which the smaller of the two release rates exceeds
-        Gamma. True: the next length at which it falls below Gamma again.
+        False returns the shortest length above which the smaller of the two release rates exceeds
+        Gamma, True the next length at which it falls below Gamma again.
 
     Returns
     -------
     float or (k,) array
-        Length, m; infinite where there is none.
+        Length, m. Infinite if there is no such length.
 
     """
     if load.ndim > 1 or not np.all(np.isfinite(load)):
@@ -158,7 +158,7 @@ def _stress_drops(problem: Problem) -> Array:
     if problem.friction.residual_ratio is not None:
         raise InputError(
             "problem.friction.residual_ratio: the stress drop needs the residual strength in Pa;"
-            " give friction.residual_strength, for random strength the ratio times its mean"
+            " give friction.residual_strength (for random strength, the ratio times its mean)"
         )
     resting = problem.load.initial_stress - problem.friction.residual_strength
     drops = np.empty((2, problem.interface.size))

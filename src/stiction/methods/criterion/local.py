@@ -1,4 +1,11 @@
-"""The local criterion: the weakest patch, each patch by itself."""
+"""The local criterion: the onset at the weakest patch, with each patch taken by itself.
+
+1. Find the critical windows of the weakening rate (`windows`).
+2. Take the least average of strength over load, over windows and places (`average`). On a specimen
+   every place has a window of its own (`elasticity.weakest`).
+3. Behind a machine, subtract an estimate of the stress that slip takes off before the onset
+   (`_relief_of_patch`).
+"""
 
 from collections.abc import Callable, Iterator
 from typing import Any, ClassVar, Literal
@@ -20,12 +27,12 @@ from stiction.problem.results import onset_variables, position
 from stiction.problem.sample import Sample, named_profiles
 
 MAX_RMS_DIFFERENCE = 0.01
-"""Difference to the exact onset above which samples are compared."""
-INSTEAD = "; use st.Equilibrium() or st.Rupture()"
+"""Relative difference from the exact onset (rms) above which samples are solved by both methods."""
+INSTEAD = ". Use st.Equilibrium() or st.Rupture()"
 
 OF_PLANES = {
     "critical_aspect": Variable(
-        "1", "extent of the critical ellipse along x over that along y"
+        "1", "ratio of the extents of the critical ellipse along x and y"
     ),
     "critical_patch_extent": Variable("m", "extents of the critical ellipse"),
     "critical_patch_area": Variable("m2", "area of the critical ellipse"),
@@ -37,36 +44,35 @@ OF_SPECIMENS = {
 
 @model(kw_only=True)
 class LocalCriterion:
-    """Onset at the minimum of the nucleation stress, each patch taken in isolation.
+    """Onset at the minimum of the nucleation stress, with each patch taken in isolation.
 
-    If no node reaches its residual strength (zero included) before the onset, this is an
-    upper bound of the exact equilibrium onset, up to discretisation: interaction only makes
-    patches unstable earlier. Where nodes do, the onset comes later than predicted. Events are
-    assumed not to be arrested, so `first_instability` and `critical_stress` are equal. `onset` and
-    `monte_carlo` compare samples with `Equilibrium` where a quick test leaves a doubt, and warn if
-    they differ by more than 1 %.
+    If no node reaches its residual strength (or zero) before the onset, this is an upper bound of
+    the exact onset, up to discretisation: interaction only makes patches unstable earlier. If nodes
+    do reach it, the onset comes later than predicted. Events are assumed not to be arrested, so
+    `first_instability` and `critical_stress` are equal. If a quick test leaves a doubt, `onset` and
+    `monte_carlo` compare samples with `Equilibrium` and warn of differences above 1 %.
 
     Notes
     -----
-    The weights of the average are never negative, so the result lies between the least and
-    the greatest strength also where the strength jumps. On a line the minimum is taken
-    between the nodes. For a nonlinear friction law, the weakening rate at zero slip
-    counts, with an `AccuracyWarning`: if strength falls ever less steeply, the onset comes later. A
-    law that steepens raises an error.
+    The weights of the average are never negative, so the result lies between the least and the
+    greatest strength even if the strength jumps. On a line the minimum may lie between the nodes.
+    For a nonlinear friction law, the criterion uses the weakening rate at zero slip and gives an
+    `AccuracyWarning`: if strength falls ever less steeply, the onset comes later. A law that
+    steepens raises an error.
 
-    On a plane the average is over critical ellipses of five shapes, each the smallest on which the
-    stiffness K - W of the discrete problem is unstable, with its eigenvector as the weight; the
-    minimum is taken over nodes and shapes. `critical_aspect`, `critical_patch_extent` (m, along x
-    and y) and `critical_patch_area` (m²) are those of the critical ellipse.
+    On a plane the average is over critical ellipses with five aspect ratios. Each is the smallest
+    ellipse on which the stiffness K - W of the discrete problem is unstable, and its eigenvector is
+    the weight. The minimum is taken over nodes and ellipses. `critical_aspect`,
+    `critical_patch_extent` (m, along x and y) and `critical_patch_area` (m²) describe the critical
+    ellipse.
 
-    On a specimen each place has a nucleation length of its own, the shortest run of nodes on which
-    the stiffness of the blocks is unstable, with the eigenvector as the weight; that at the
-    critical place is `critical_patch_length` (m). Behind a machine stable slip lowers the mean
-    stress below the drive, `critical_load`. The stresses returned are lower by what the slip of the
-    critical patch by itself takes off, as an estimate; that of other patches is not known, so that
-    they are rather too high: in six set-ups by 0.2 to 5 % in mode II, like the drive itself. A
-    pusher near the interface causes events long before it slides: `critical_stress` is then far too
-    low.
+    On a specimen each place has its own nucleation length: the shortest run of nodes on which the
+    stiffness of the blocks is unstable, with the eigenvector as the weight. `critical_patch_length`
+    (m) is the nucleation length at the critical place. Behind a machine, stable slip lowers the
+    mean stress below the drive, `critical_load`. The stresses returned take off an estimate for the
+    critical patch alone. The slip of other patches is not known, so the stresses are too high, in
+    six set-ups by 0.2 to 5 % in mode II, like the drive itself. A pusher near the interface causes
+    events long before the interface slides. `critical_stress` is then far too low.
 
     Examples
     --------
@@ -82,40 +88,40 @@ class LocalCriterion:
     samples_at_point: ClassVar[int] = 2000
 
     def seconds_per_sample(self, problem: Problem) -> float:
-        """Return the approximate time of a sample on one core, s."""
+        """Return the approximate time of a sample on a core, s."""
         fixed, per_node = (5e-4, 8e-8) if problem.interface.is_plane else (3e-5, 3e-8)
         return fixed + per_node * problem.interface.size
 
     def supports(self, problem: Problem) -> list[str]:
-        """Return the reasons why it cannot solve a problem; none if it can."""
+        """Return the reasons why it cannot solve a problem, or an empty list."""
         friction, reasons = problem.friction, []
         if problem.interface.breakable is not None:
             reasons.append("interface.extent: is taken by st.Rupture() between half-spaces")
         if friction.steepening > 1.0:
             reasons.append(
                 f"friction: this law falls up to {friction.steepening:.3g} times as steeply later"
-                f" as at zero slip, whose weakening rate the local criterion takes{INSTEAD}"
+                f" as at zero slip, but the local criterion uses the rate at zero slip{INSTEAD}"
             )
         if friction.weakening_rate is not None and problem.uniform_rate is None:
             reasons.append(
-                "friction.weakening_rate varies along the interface, so there is no one"
-                f" nucleation length{INSTEAD}"
+                "friction.weakening_rate: varies along the interface, so the nucleation length is"
+                f" not defined{INSTEAD}"
             )
         return reasons
 
     def bounded_by_strength(self, problem: Problem, event: str) -> tuple[bool, bool]:
         """Return whether strength bounds the onset from below and from above.
 
-        From below: weights are positive, but behind a machine the criterion knows no slip. From
-        above: load <g, p> <= <g, tau_p - tau_i> at each place, and between half-spaces, by the mean
-        over places, load <p> <= <tau_p - tau_i>.
+        From below: the weights are positive, but behind a machine the criterion neglects the slip
+        of other patches. From above: load <g, p> <= <g, tau_p - tau_i> at each place, and the mean
+        over all places between half-spaces is load <p> <= <tau_p - tau_i>.
         """
         return not problem.has_machine, problem.specimen is None
 
     def may_differ(self, problem: Problem, sample: Sample, stress: Array) -> bool:
         """Return whether exact onsets may differ by more than 1 % in mean or scatter.
 
-        It is a quick test for lines between half-spaces. Others always may.
+        The quick test is for lines between half-spaces. Otherwise it returns True.
         """
         half_spaces = problem.specimen is None and not problem.interface.is_plane
         if not (half_spaces and problem.friction.linear):
@@ -123,7 +129,7 @@ class LocalCriterion:
         return rms_difference(problem, sample, stress) > MAX_RMS_DIFFERENCE
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
-        """Return the variables that the solver computes for each sample."""
+        """Return the variables of the solver's results."""
         variables = onset_variables(problem.interface)
         if problem.interface.is_plane:
             extent = position(problem.interface, OF_PLANES["critical_patch_extent"])
@@ -131,9 +137,9 @@ class LocalCriterion:
         return variables if problem.specimen is None else variables | OF_SPECIMENS
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, Array]]:
-        """Return a solver for samples of this problem.
+        """Return the solver of samples of a problem.
 
-        It raises an `InputError` if the weakening rate varies along the interface, or a critical
+        It raises an `InputError` if the weakening rate varies along the interface or a critical
         patch does not fit on it.
         """
         check_law(problem)
@@ -170,7 +176,7 @@ class LocalCriterion:
 
 
 def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
-    """Return the onset at the weakest place of each specimen."""
+    """Return the onset of each specimen, at its weakest place."""
     _warn_if_coarse(problem, sample)
     excess, spacing = excess_of(sample), problem.interface.spacing
     load, start, width, relief = np.zeros((4, sample.samples))
@@ -180,7 +186,7 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
         if not windows.starts.size:
             raise InputError(
                 "interface.length: no part of the specimen becomes unstable by itself, so the local"
-                " criterion does not hold; use st.Equilibrium()"
+                " criterion does not hold. Use st.Equilibrium()"
             )
         for i in rows:
             load[i], c, start[i] = weakest_window(
@@ -207,11 +213,11 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
 
 
 def _relief_of_patch(blocks: Driven, rate: float, run: slice, drive: Array) -> float:
-    """Return by how much the slip of a patch lowers the mean stress just before its instability.
+    """Step 3: return by how much a patch's slip lowers the mean stress before its instability.
 
-    (K - W) slip = drive on the patch, by itself. Its unstable mode is free: it is chosen so that
-    the slip vanishes at the ends, by a force there that the load of the instability makes zero. At
-    a free end it does not vanish, and more is taken off.
+    Slip on the patch alone solves (K - W) slip = drive, up to a multiple of the unstable mode. An
+    added equation fixes the multiple so that the slip at the two ends adds up to zero. At a free
+    end slip does not vanish in truth, and takes off more.
     """
     matrix = np.zeros((run.stop - run.start + 1,) * 2)
     matrix[:-1, :-1] = blocks.stiffness[run, run] - rate * np.eye(len(matrix) - 1)
@@ -225,15 +231,15 @@ def _relief_of_patch(blocks: Driven, rate: float, run: slice, drive: Array) -> f
 def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     """Return the nucleation stress tau_n(x) of strength profiles.
 
-    This is the load tau_0 at which a patch of length h_n centred at x, if isolated, becomes
-    unstable: the average of tau_p - tau_i over h_n with the weight of the critical
-    slip-rate profile, over the same average of the load profile (Uenishi and Rice, 2003,
-    Eq. 14; Albertini et al., 2020, Eq. 9). On a plane it is the least over five ellipses.
+    This is the load tau_0 at which an isolated patch of length h_n centred at x becomes unstable:
+    the average of tau_p - tau_i over h_n with the critical slip-rate profile as weight, divided by
+    the same average of the load profile (Uenishi and Rice, 2003, Eq. 14; Albertini et al., 2020,
+    Eq. 9). On a plane it is the least over five ellipses.
 
     Parameters
     ----------
     problem : Problem
-        With a weakening rate uniform along the interface.
+        A problem whose weakening rate is uniform along the interface.
     tau_p : (samples, *shape) or (*shape) array
         Peak strength, Pa.
 
@@ -245,7 +251,7 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     Raises
     ------
     InputError
-        If the weakening rate varies along the interface, or a critical patch is larger than it.
+        If the weakening rate varies along the interface, or if a critical patch does not fit on it.
 
     Examples
     --------
@@ -262,12 +268,12 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     _warn_if_coarse(problem, sample)
     ((rate, _), *further_rates) = _rates(sample)
     if further_rates:
-        raise InputError("weakening_rate: differs between samples; pass them one by one")
+        raise InputError("weakening_rate: differs between samples. Pass samples one by one")
     excess, profile = excess_of(sample), sample.load_profile
     windows = windows_of(problem, rate)
     samples = averages(interface, windows, excess, profile)
     result = np.array([np.minimum.reduce(list(fields)) for fields in samples])
-    # The weights keep to these bounds, the rounding of the transforms does not.
+    # These bounds hold for the exact average. Round-off of the transforms may exceed them.
     ratio = windows[0].total * (excess / profile)
     low, high = (end(axis=sample.axes, keepdims=True) for end in (ratio.min, ratio.max))
     result = np.clip(result, low, high)
@@ -279,46 +285,46 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
 
 
 def check_law(problem: Problem) -> None:
-    """Refuse what the method does not support; warn of a law that is not linear."""
+    """Raise an `InputError` for an unsupported problem, and warn of a nonlinear law."""
     if refused := refusals(problem, LocalCriterion()):
         raise InputError(refused)
     if not problem.friction.linear:
         warn_accuracy(
             "friction: the local criterion takes the weakening rate at zero slip as constant, so"
-            " the onset is later than it predicts (of an exponential law by 2 %, at most 7 %, at a"
-            " correlation length of h_n/4); st.Equilibrium() is exact for piecewise linear laws"
+            " the onset is later than predicted (for an exponential law by 2 %, at most 7 %, at a"
+            " correlation length of h_n/4). st.Equilibrium() is exact for piecewise linear laws"
         )
 
 
 def _warn_if_coarse(problem: Problem, sample: Sample) -> None:
-    """Warn where the moving average is a coarse sum."""
+    """Warn if the moving average is a sum over too few nodes."""
     if problem.interface.is_plane:
         cost = "the local criterion is about 0.15 % too high at 8 nodes, 0.4 % at 5, 0.7 % at 4"
         problem.warn_if_coarse(sample, 8.0, cost)
     else:
         cost = (
-            "where the strength varies within a quarter of it, the local criterion is off by about"
-            " 0.8 % (rms) at 8 nodes and 3 % at 4; for smoother strength by far less"
+            "if the strength varies within a quarter of it, the local criterion is off by about"
+            " 0.8 % (rms) at 8 nodes and 3 % at 4, and by far less for smoother strength"
         )
         problem.warn_if_coarse(sample, 12.0, cost)
 
 
 def excess_of(sample: Sample) -> Array:
-    """Return tau_p - tau_i, Pa; `InputError` where the strength is not finite."""
+    """Return tau_p - tau_i, Pa, or raise an `InputError` if the strength is not finite."""
     if not np.isfinite(sample.strength).all():
         raise InputError(
-            "strength: must be finite everywhere for the local criterion, which averages it; where"
-            " some of it cannot break, give a large finite strength, or use st.Rupture()"
+            "strength: must be finite everywhere for the local criterion, which averages it. Give a"
+            " large finite strength to nodes that cannot break, or use st.Rupture()"
         )
     return np.ascontiguousarray(sample.strength - sample.initial_stress)
 
 
 def _rates(sample: Sample) -> Iterator[tuple[float, NDArray[np.int64]]]:
-    """Yield each weakening rate, and the samples of this rate."""
+    """Yield each weakening rate (Pa/m) with the numbers of its samples."""
     if not sample.uniform_weakening:
         raise InputError(
-            "weakening_rate: varies along the interface, so there is no single nucleation length"
-            f" for the local criterion{INSTEAD}"
+            "weakening_rate: varies along the interface, so the nucleation length of the local"
+            f" criterion is not defined{INSTEAD}"
         )
     rates = sample.weakening_rate.reshape(sample.samples, -1)[:, 0]
     for rate in np.unique(rates):

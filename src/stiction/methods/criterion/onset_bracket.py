@@ -1,27 +1,32 @@
-"""Whether the exact onset of a line is near a prediction, without the kernels of equilibrium.
+"""A quick test of a predicted onset of a line, without the kernels of equilibrium.
 
-Problem: does a line have an equilibrium at the load tau_0, that is a slip d >= 0 with
+Problem
+-------
+Does a line have an equilibrium at the load tau_0, that is a slip d >= 0 (m) with
 
     K d + max(tau_p - W d, tau_r) >= tau_i + tau_0 p ?
 
-A predicted load is right to 1 % if there is one at 0.99 of it and none at 1.01. If it is not, wider
-brackets tell by how much it is off.
+A predicted load is right to 1 % if there is an equilibrium at 0.99 times the load and no
+equilibrium at 1.01 times the load. If it is not, wider brackets tell by how much it is off.
 
-Source: entries of K off the diagonal are not positive, and strength falls with slip. The slip of
-the least equilibrium can therefore be built up from zero without ever being taken back
-(Chandrasekaran 1970, for linear problems). Steps of `slides`, from d = 0:
+Algorithm
+---------
+The entries of K off the diagonal are not positive, and strength falls with slip. So the slip of the
+least equilibrium can be built up from zero and never has to be taken back (R. Chandrasekaran,
+Opsearch 7, 1970, for linear problems). `slides` starts from d = 0:
 
-1. The overstress f = tau_i + tau_0 p - K d - strength, Pa.
-2. The interface slides if the load exceeds the mean strength, or if so many nodes in a row are at
-   their residual strength that no fracture energy stops a crack of this length (Griffith 1921).
-3. S, the nodes that slip or are overstressed. If none is overstressed, d is an equilibrium.
-4. Newton: d_S grows by x with (K - W)_SS x = f, up to the first node that reaches its residual
-   strength.
-5. If K - W is not positive definite on S, a patch is unstable. A few steps with frozen strengths
-   follow, K_SS x = f, which never pass the least equilibrium.
+1. Compute the overstress f = tau_i + tau_0 p - K d - strength, Pa.
+2. The interface slides if the load exceeds the mean strength, or if a run of residual nodes is so
+   long that no fracture energy can stop a crack of this length (Griffith, 1921).
+3. Let S be the nodes that slip or are overstressed. If no node is overstressed, d is an
+   equilibrium.
+4. Newton's method: d_S grows by x with (K - W)_SS x = f, up to the first node that reaches its
+   residual strength.
+5. If K - W is not positive definite on S, a patch is unstable. A few steps with frozen strengths,
+   K_SS x = f, follow. They never pass the least equilibrium.
 
-Departure from the source: strength has a corner, and steps end at a tolerance. Where
-thousands of nodes slip the question is left undecided, as each step solves a dense system.
+Departures from the source: strength has a corner, and steps end at a tolerance. If thousands of
+nodes slip the question stays undecided, as each step solves a dense system.
 """
 
 import numpy as np
@@ -33,28 +38,30 @@ from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
 
 MAX_OPERATIONS = 4e9
-"""Cubes of the nodes that move and squares of all nodes, summed over steps: beyond, a sample is
-undecided."""
+"""Most operations on a sample before it counts as undecided: cubes of the nodes that move and
+squares of all nodes, summed over steps."""
 FROZEN_STEPS = 4
-"""Steps with frozen strengths before Newton's is tried again."""
+"""Steps with frozen strengths before Newton's method is tried again."""
 REST_RTOL, JOIN_RTOL = 1e-5, 1e-9
-"""Overstress over strength below which nothing moves, and below which a node does not join."""
+"""Overstress, as a share of the strength, below which slip is an equilibrium, and below which a
+node does not join S."""
 BRACKETS_RATIO = 2.0**0.5
 BRACKETS = tuple(0.01 * BRACKETS_RATIO**i for i in range(7))
-"""Half-widths of the brackets about a predicted load, as shares of it: 1 to 8 %."""
+"""Half-widths of the brackets around a predicted load, as shares of it: 1 to 8 %."""
 GRIFFITH_MARGIN = 1.5
-"""Safety factor on the length beyond which a crack counts as unstoppable."""
+"""Safety factor on the length of a crack that counts as unstoppable."""
 
 
 def rms_difference(problem: Problem, sample: Sample, stress: Array) -> float:
-    """Return about how far exact onsets are from predicted ones, rms over samples, as a share.
+    """Return the relative distance of exact onsets from predicted onsets, rms over samples.
 
-    Differences below the narrowest bracket, 1 %, count as none. Infinite if a sample is undecided.
+    It is an estimate. Differences below the narrowest bracket, 1 %, count as zero. It is infinite
+    if a sample is undecided.
 
     Parameters
     ----------
     problem : Problem
-        A line between half-spaces, with strength that falls linearly.
+        A line between half-spaces whose strength falls linearly.
     sample : Sample
     stress : (samples,) array
         Predicted mean stress at the onset, Pa.
@@ -76,7 +83,7 @@ def rms_difference(problem: Problem, sample: Sample, stress: Array) -> float:
 def _least_difference(
     column: Array, peak: Array, residual: Array, rate: Array, load: Array, side: int
 ) -> float:
-    """Return the widest bracket on a side beyond which the onset is; 0 if it is in all of them."""
+    """Return the widest bracket on a side that the onset lies outside of, or 0."""
     least = 0.0
     for width in BRACKETS:
         sliding = slides(column, peak, residual, rate, (1.0 + side * width) * load)
@@ -91,7 +98,7 @@ def _least_difference(
 def slides(
     column: Array, peak: Array, residual: Array, rate: Array, load: Array
 ) -> bool | None:
-    """Return whether a line has no equilibrium under a load, and so slides; None if undecided.
+    """Return whether a line slides under a load, having no equilibrium; None if undecided.
 
     Parameters
     ----------
@@ -133,7 +140,7 @@ def slides(
             weakening = np.where(left > 0.0, rate[moving], 0.0)
             _, growth, unstable = dposv(stiffness - np.diag(weakening), force)
             reached = (weakening > 0.0) & (growth >= left)
-            if not unstable and reached.any():
+            if not unstable and reached.any():  # up to the first corner, and just beyond it
                 growth *= np.min(left[reached] / growth[reached]) * (1.0 + 1e-9)
             frozen = FROZEN_STEPS if unstable else 0
         # 5.
@@ -147,10 +154,10 @@ def slides(
 def _unstoppable_nodes(
     column: Array, peak: Array, residual: Array, rate: Array, load: Array
 ) -> float:
-    """Return how many nodes a crack spans that nothing stops; infinite without a stress drop.
+    """Return the length of an unstoppable crack in nodes, infinite without a stress drop.
 
     Griffith's length is 4 G* E/(pi D^2), with the largest fracture energy E and the least stress
-    drop D. Between half-spaces K_0 is pi G*/4 over the spacing.
+    drop D. Between half-spaces K_0 is pi G*/4 divided by the spacing.
     """
     drop = float(np.min(load - residual))
     energy = float(np.max((peak - residual) ** 2 / (2.0 * rate)))

@@ -1,4 +1,4 @@
-"""Critical windows: patches that are just unstable by themselves, and weights of their nodes.
+"""Critical windows: patches that are just unstable by themselves, with weights of their nodes.
 
 Problem
 -------
@@ -16,12 +16,13 @@ Rice (J. Geophys. Res. 108, 2003) as weights of the nodes (`eigenfunction`). On 
 ellipse, for each of five aspects:
 
 1. Start with a small box of nodes of the plane, made periodic with the stiffness between its own
-   nodes. A block of a Toeplitz matrix is a block of a circulant matrix, so that the problem on an
-   ellipse of at most half the length of the box stays the same. So the cost follows the ellipse
-   and not the plane.
+   nodes. A block of a Toeplitz matrix is a block of a circulant matrix, so the problem on an
+   ellipse of at most half the length of the box stays the same. The cost follows the size of the
+   ellipse, not of the plane.
 2. Find by bisection the smallest ellipse in the box whose lowest eigenvalue is at most W
    (`_smallest_unstable`), with LOBPCG (`elasticity.operator`).
-3. If there is none, double the box and go to 2. If the box is the plane, the window does not fit.
+3. If every ellipse in the box is stable, double the box and go to 2. If the box is the plane
+   already, the window does not fit.
 
 For nu = 0 the critical disc has radius 2.0061 G/(2W).
 """
@@ -40,48 +41,49 @@ from stiction.elasticity.protocol import HalfSpaces
 from stiction.methods.criterion.eigenfunction import around, grid_weights
 from stiction.problem.problem import Problem
 
-# Aspects of the ellipses over that of the middle one. With the paper's strength nine shapes from
-# 0.8 to 2 lower the bound by less than 0.05 % more.
+# Aspects of the ellipses, relative to the middle ellipse. With the paper's strength nine shapes
+# from 0.8 to 2 lower the bound by less than 0.05 % more.
 STRETCHES = (2.0 / 3.0, 5.0 / 6.0, 1.0, 6.0 / 5.0, 3.0 / 2.0)
 EIGENVECTOR_RTOL = 1e-9  # residual of an eigenvector, as a share of W
 MAX_ELLIPSE_ITERATIONS = 500
 MIN_BOX_NODES = 32  # along each side of the box that is searched first
-RADIUS_RTOL = 1e-9  # nodes that are equally far by symmetry differ by round-off
-FIRST_PROBE_SHARE = 16  # the first ellipse is tried after this share of all of them
+RADIUS_RTOL = 1e-9  # distances of nodes that are equal by symmetry differ by round-off
+FIRST_PROBE_SHARE = 16  # the first ellipse to be tried has a sixteenth of all radii below it
 
 
 class Window(NamedTuple):
-    """A critical patch, centred on the first node."""
+    """Critical patch, centred on the first node."""
 
-    aspect: float  # semi-axis along x over that along y; 1 on a line
+    aspect: float  # ratio of the semi-axes along x and y; 1 on a line
     extents: tuple[float, ...]  # length in each direction, m
     area: float  # its length (m), on a plane the area of its nodes (m²)
     eigenvalue: float  # lowest eigenvalue of K on it, not above W, Pa/m
     weight: Array  # of each node (*shape), never negative, of unit sum
-    spectrum: NDArray[Any]  # conjugate of its transform: what the moving average does to waves
+    spectrum: NDArray[Any]  # conjugate of its transform, which the moving average multiplies by
 
     @property
     def total(self) -> float:
-        """Sum of the weights, one to round-off."""
+        """Sum of the weights, 1 to round-off."""
         return float(self.spectrum.flat[0].real)
 
 
 def windows_of(
     problem: Problem, rate: float, stretches: Sequence[float] = STRETCHES
 ) -> list[Window]:
-    """Return the critical windows of a weakening rate (Pa/m); `InputError` if one does not fit.
+    """Return the critical windows of a weakening rate (Pa/m), or raise an `InputError`.
 
-    One on a line; on a plane one for each multiple of the aspect 1/sqrt(1 - nu), because a line of
-    mode II is critical at a length that is 1/(1 - nu) times that of mode III.
+    A line has a single window, a plane a window for each multiple of the aspect 1/sqrt(1 - nu): the
+    critical length in mode II is 1/(1 - nu) times the critical length in mode III. Every window
+    must fit on the interface.
     """
     interface, solid = problem.interface, problem.solid
     length = problem.nucleation_lengths(rate)[0]
-    advice = "the local criterion does not hold there, use st.Equilibrium()"
+    advice = "The local criterion does not hold there, use st.Equilibrium()"
     if not interface.is_plane:
         if length > interface.measure:
             raise InputError(
                 f"interface.length: the nucleation length {length:.4g} m is longer than the"
-                f" interface ({interface.measure:.4g} m); {advice} or st.Rupture()"
+                f" interface ({interface.measure:.4g} m). {advice} or st.Rupture()"
             )
         weights = _line_weights(0.5 * length / interface.spacing, interface.size)
         return [Window(1.0, (length,), length, rate, *weights)]
@@ -93,7 +95,7 @@ def windows_of(
             size = " x ".join(f"{side:.4g}" for side in interface.lengths)
             raise InputError(
                 f"interface.length: a critical patch does not fit on a plane of {size} m: in each"
-                f" direction it takes nearly twice the nucleation length, {length:.4g} m; {advice}"
+                f" direction it takes nearly twice the nucleation length, {length:.4g} m. {advice}"
             )
         windows.append(window)
     return windows
@@ -124,7 +126,7 @@ def ellipse_window(
     rate: float,
     aspect: float,
 ) -> Window | None:
-    """Return the smallest unstable ellipse of one aspect; None if it meets its images.
+    """Return the smallest unstable ellipse of an aspect, or None if it meets its images.
 
     See steps 1 to 3 at the top of this file.
     """
@@ -157,7 +159,7 @@ def ellipse_window(
 
 
 class Ellipse(NamedTuple):
-    """An ellipse on whose nodes K has an eigenvalue up to W."""
+    """Ellipse on whose nodes the lowest eigenvalue of K is at most W."""
 
     square: float  # of its semi-axis along x, m²
     eigenvalue: float  # Pa/m
@@ -167,7 +169,7 @@ class Ellipse(NamedTuple):
 def _smallest_unstable(
     column: Array, distance: Array, rate: float, stable_square: float, max_square: float
 ) -> Ellipse | None:
-    """Step 2: find the smallest unstable ellipse by bisection; None up to `max_square` (m²).
+    """Step 2: find the smallest unstable ellipse up to `max_square` (m²), or None, by bisection.
 
     The column is the stress (Pa) at each node of the box by unit slip at node (0, 0). Ellipses up
     to `stable_square` are known to be stable.

@@ -1,4 +1,4 @@
-"""Refusals and warnings of a run: coarse grids, rates of loading, loads that reverse."""
+"""Errors and warnings of a run: coarse grids, loading rates, loads that reverse."""
 
 from typing import Any
 
@@ -11,26 +11,26 @@ from stiction.problem.problem import MIN_NODES_IN_NUCLEATION, Problem
 from stiction.problem.sample import Sample
 
 # Shares of the stress scale:
-_COARSE_RISE, _MAX_RISE = 5e-3, 0.2  # of the load in one explicit step: warned of, and refused
-_MIN_REVERSE = 1e-3  # stress below minus the strength that is warned of
+_COARSE_RISE, _MAX_RISE = 5e-3, 0.2  # rise of the load in an explicit step: warning, and error
+_MIN_REVERSE = 1e-3  # stress below minus the strength from which there is a warning
 
 
 def warn_if_coarse(problem: Problem, rows: Sample) -> None:
-    """Warn where the nucleation length is not resolved, with the error to expect."""
-    # Largest of rough fields against 126 nodes, see docs/validation.md: 16 %, 3 % and 0.6 %
-    # at 8, 16 and 32 nodes.
+    """Warn if the grid does not resolve the nucleation length, with the expected error."""
+    # A power law through the largest errors of rough fields, relative to 126 nodes: 16 %, 3 % and
+    # 0.6 % at 8, 16 and 32 nodes (docs/validation.md).
     percent = 3.0 * (16.0 / min(problem.nodes_in_nucleation_length(rows.steepest_rate))) ** 2.4
     expected = f"up to {percent:.0f} %" if percent < 15.0 else "more than 15 %"
     problem.warn_if_coarse(
         rows,
         15.0,
-        f"expect {expected} error in slip just after onset (3 % at 16 nodes, 0.6 % at 32; the"
-        " critical load is far less sensitive)",
+        f"expect {expected} error in slip just after onset (3 % at 16 nodes, 0.6 % at 32). The"
+        " critical load is far less sensitive",
     )
 
 
 def warn_of_slip(run: Run, state: RuptureState) -> None:
-    """Warn of nodes that weaken too steeply for the grid, such as barriers, and of reversal."""
+    """Warn of nodes that weaken too steeply for the grid, and of stress that would reverse slip."""
     rates, interface, now = run.setting.nodes.weakening, run.medium.interface, state.now
     shortest = MIN_NODES_IN_NUCLEATION * interface.spacing
     steepest = run.medium.problem.nucleation_lengths(1.0)[-1] / shortest
@@ -39,36 +39,38 @@ def warn_of_slip(run: Run, state: RuptureState) -> None:
         warn_accuracy(
             f"{steep.size} nodes slipped, the first at {interface.describe_node(steep[0])}, "
             f"where the strength falls by up to {rates[steep].max():.3g} Pa/m, too steeply for this"
-            " grid; take more nodes, or end the interface there (interface.extent)"
+            " grid. Take more nodes, or end the interface there (interface.extent)"
         )
     if now["reverse_margin"] < -_MIN_REVERSE * now["scale"]:
         warn_accuracy(
             f"the stress fell below minus the strength, by {-now['reverse_margin']:.3g} Pa at "
-            f"{interface.describe_node(int(now['reverse_node']))}: what would slip in reverse"
-            " there, which is not modelled, was kept at rest; change the sign of the load, or"
-            " unload less"
+            f"{interface.describe_node(int(now['reverse_node']))}: slip in reverse is not modelled,"
+            " so these nodes were kept at rest. Change the sign of the load, or unload less"
         )
 
 
 def at_first_slip(run: Run) -> RuptureState | None:
-    """Return the state of rest at first slip, None if none comes; refuse or warn of loads."""
+    """Return the state of rest at the first slip, or None if the load never causes slip.
+
+    Loading too fast for the grid gives an `InputError` or a warning.
+    """
     time, step = run.first_slip(), run.medium.step
     if not time < run.setting.thresholds.end_time:
         return None
     if np.spacing(time) > 0.01 * step:
         raise InputError(
             f"loading_rate: the first slip would come after {time:.3g} s, too late to resolve "
-            f"steps of {step:.2g} s; load faster (the onset no longer depends on the rate)"
+            f"steps of {step:.2g} s. Load faster (the onset no longer depends on the rate)"
         )
     scale = run.scale_at(float(value_at(run.setting.load, time)))
     if not scale > 0.0:
-        raise InputError("initial_stress: too far from the strength; check the units of both")
+        raise InputError("initial_stress: too far from the strength. Check the units of both")
     rise = run.slope(time) * step / scale
     if rise > _COARSE_RISE:
         courant = step / run.medium.largest_step * _COARSE_RISE / rise
         text = (
             f"loading_rate: in one explicit step of {step:.3g} s the load rises by {rise:.2g} of "
-            f"the stress scale, {scale:.3g} Pa; use courant={courant:.2g} or less, or load more"
+            f"the stress scale, {scale:.3g} Pa. Use courant={courant:.2g} or less, or load more"
             " slowly"
         )
         if rise > _MAX_RISE:
@@ -78,14 +80,14 @@ def at_first_slip(run: Run) -> RuptureState | None:
 
 
 def warn_of_survival(stop: str, results: list[Any]) -> None:
-    """Warn of interfaces that did not slide, or become unstable, before their run ended."""
+    """Warn if interfaces did not slide, or become unstable, before their run ended."""
     name = "critical_stress" if stop == "sliding" else "first_instability"
     if any(np.isnan(result[name]) for result in results):
         stuck = any(np.isnan(result["kinetic_stress"]) for result in results)
         what = "slide" if stop == "sliding" and stuck else "become unstable"
         warn_accuracy(
-            f"load: an interface did not {what} before its run ended: what did not happen is NaN,"
-            " and failure_probability counts it as survived"
+            f"load: an interface did not {what} before its run ended. Its values for this event"
+            " are NaN, and failure_probability counts it as survived"
         )
 
 
@@ -97,5 +99,5 @@ def check_finite(run: Run, state: RuptureState, reason: int) -> None:
         raise FloatingPointError(
             f"the slip rate became non-finite at t = {now['time']:.9g} s, "
             f"{run.medium.interface.describe_node(node)} (node {node}), tau_0 = "
-            f"{now['load']:.6g} Pa, after {state.steps} steps; the last finite state is kept"
+            f"{now['load']:.6g} Pa, after {state.steps} steps. The last finite state is kept"
         )

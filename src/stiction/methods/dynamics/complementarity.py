@@ -1,4 +1,4 @@
-"""One implicit step: slip increments with the stress nowhere above the strength.
+"""The slip increments of an implicit step, with the stress nowhere above the strength.
 
 Problem
 -------
@@ -6,29 +6,29 @@ Find the increments u >= 0 of slip (m) of a step, such that at every node
 
     stress g - M u <= strength after the slip,   and equality where u > 0.                    (1)
 
-g is the stress at the end of the step if nothing slipped in it (`tables.trial_stress`), and
-M a circulant matrix with positive eigenvalues (`tables.symbol`, Pa/m): elasticity, memory
-and radiation. The strength of a node follows straight lines, b - w u, whose line may change
-with u; w is the rate at which it weakens (`tables.falling`), g - b its `tables.driving`.
+g is the stress at the end of a step without slip (`tables.trial_stress`). M is a circulant matrix
+with positive eigenvalues (`tables.symbol`, Pa/m): elasticity, memory and radiation. The strength
+of a node follows a straight line, b - w u, and with u it may pass to another line. w is the rate at
+which the node weakens (`tables.falling`), and g - b is `tables.driving`.
 
 Algorithm (`solve_increment`)
 -----------------------------
 A semismooth Newton iteration, in the form of a primal-dual active set (M. Hintermueller, K.
 Ito and K. Kunisch, SIAM Journal on Optimization 13, 2002):
 
-1. Begin with the nodes that slip already and those whose trial stress is above their
-   strength, on the straight lines that belong to the first guess.
-2. On the slipping set S solve (M - W) u = g - b, W = diag(w), with u = 0 elsewhere
-   (`_solve`): the preconditioned conjugate gradients of M. R. Hestenes and E. Stiefel
-   (1952), with the inverse circulant, cut to S, as preconditioner. Letters are theirs:
+1. Begin with the set S of nodes that slip already or whose trial stress is above their strength,
+   on the straight lines of the first guess.
+2. On S solve (M - W) u = g - b, W = diag(w), with u = 0 elsewhere (`_solve`). This uses the
+   conjugate gradients of M. Hestenes and E. Stiefel (Journal of Research of the National Bureau
+   of Standards 49, 1952), with the inverse of M, cut to S, as preconditioner. Letters are theirs:
    residual r, direction p, z = M^-1 r.
-3. Nodes outside S whose stress is above their strength join it, and nodes with u < 0 leave
-   it. Every node takes the straight line that belongs to its u.
-4. Repeat from 2 until no node has changed.
+3. Nodes outside S whose stress is above their strength join S, and nodes with u < 0 leave it.
+   Every node takes the straight line that belongs to its u.
+4. Repeat from 2 until no node changes.
 
-Departures: a direction of negative curvature (an unstable patch, at this size of the step)
-ends the search without a result, as do too many iterations. Laws that are not made of
-straight lines have changed only if the stress on the lines differs by more than a bound.
+Departures: a direction of negative curvature (a patch that is unstable at this size of the step)
+ends the search without a result, and so do too many iterations. For a curved law a node counts as
+changed only if its strength moves by more than a bound.
 """
 
 from typing import Any
@@ -46,7 +46,7 @@ _JOINING = 10.0  # stress above the strength with which a node joins, in units o
 
 @jit_inside
 def _solve(transform: Transform, tables: ImplicitTables, accuracy: float) -> Any:
-    """Step 2, from u in place, to a residual of `accuracy` (Pa); return whether it was reached."""
+    """Step 2: improve u in place to a residual of `accuracy` (Pa). Return whether it is reached."""
     u, slipping, driving = tables.increment, tables.slipping, tables.driving
     falling, product, work = tables.falling, tables.product, tables.work
     r, p, z = tables.cg_residual, tables.cg_direction, tables.cg_preconditioned
@@ -59,7 +59,7 @@ def _solve(transform: Transform, tables: ImplicitTables, accuracy: float) -> Any
             r[i] = driving[i] - product[i] + falling[i] * u[i]
             largest = max(largest, abs(r[i]))
     if not largest > accuracy:
-        return largest <= accuracy  # not if it is NaN
+        return largest <= accuracy  # False for NaN
     rz_before = 1.0
     for iteration in range(_MAX_CG):
         convolve(transform, tables.inverse, r, work, z)
@@ -101,11 +101,11 @@ def solve_increment(
     accuracy: float,
     line_accuracy: float,
 ) -> Any:
-    """Find the slip increments of one implicit step; return whether they were found.
+    """Find the slip increments of an implicit step. Return whether they were found.
 
-    `tables.increment` and `tables.slipping` hold the first guess, and then the solution.
-    The stress is met to `accuracy` (Pa); the strength may be as far as `line_accuracy` (Pa)
-    from the straight line that stands for it.
+    `tables.increment` and `tables.slipping` hold the first guess, and then the solution. The stress
+    is accurate to `accuracy` (Pa). The strength may differ by `line_accuracy` (Pa) from the
+    straight line that replaces it.
     """
     law, nodes = setting.law, setting.nodes
     peak, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
@@ -125,7 +125,7 @@ def solve_increment(
         # 2. The increments of this set on these lines.
         if not _solve(transform, tables, accuracy):
             return False
-        # 3. Nodes that join, that leave, or that go on along another line.
+        # 3. Nodes that join, leave, or pass to another line.
         convolve(transform, tables.symbol, u, tables.work, product)
         changed = 0
         for i in range(n):

@@ -1,9 +1,8 @@
-"""What is known after every step: the last maximum of the mean stress, instabilities, arrivals.
+"""Diagnostics after every step: maxima of the mean stress, instabilities, arrivals of the front.
 
 Problem
 -------
-Waves carry the stress that has lost its balance, so that the mean stress of the interface
-is
+Waves carry the stress that is out of balance, so the mean stress of the interface is
 
     <tau> = tau_0 <p> + <tau_i> - Z <V>.                                                      (1)
 
@@ -11,31 +10,30 @@ With an extent it is the mean over all nodes, of which the nodes beyond take ove
 any waves (`whole_stress`); results are means over the nodes that can break (`mean_stress`).
 
 An instability is slip that the load does not drive: after a maximum of <tau>, waves lower
-it by `EVENT_DROP` of the stress scale (`docs/theory.md`). It began at that maximum. A fall
-of the load lowers <tau>, too, but is no instability. So the fall that counts is
+<tau> by `EVENT_DROP` of the stress scale (`docs/theory.md`). The instability began at that
+maximum. A falling load lowers <tau>, too, but without an instability. So the fall that counts is
 
     fall = min(max <tau> - <tau>, Z <V> - Z <V> at the maximum).                              (2)
 
-Steps, after each step of a run (`observe`)
--------------------------------------------
+Algorithm, after each step of a run (`observe`)
+-----------------------------------------------
 1. Compute the fall (2).
 2. While <tau> is practically at its maximum, the fastest node is the place of the maximum.
-   At slow loading all creeping patches are about equally slow at the maximum itself, and
-   only just after it the one that becomes unstable is faster.
-3. If an instability has begun, it ends when <tau> rises above the maximum at which it
-   began. It was arrested if a node slipped faster than `Thresholds.unstable_rate`, which
-   the waves of an earlier one do not reach. The present <tau> is the next maximum.
-   (Explicit steps also end it when everything is calm, see `explicit`.)
-4. If none has begun, a higher <tau> is the next maximum, and a fall by `EVENT_DROP` is the
-   beginning of an instability. The highest one so far is the onset.
-5. Note <tau> once all nodes that can break are at their residual strength. Nothing becomes
-   unstable from then on. That alone is no instability: the last nodes beside a barrier may
-   creep there.
+   At slow loading all creeping patches are about equally slow at the maximum. Only just after
+   it is the unstable patch faster.
+3. An instability ends when <tau> rises above the maximum at which it began. It was arrested if
+   a node slipped faster than `Thresholds.unstable_rate`, which the waves of an earlier
+   instability do not reach. The present <tau> is the next maximum. (Explicit steps also end an
+   instability when all is calm, see `explicit`.)
+4. Between instabilities a higher <tau> is the next maximum, and a fall by `EVENT_DROP` begins an
+   instability. The onset is the instability with the highest maximum so far.
+5. Note <tau> once all nodes that can break are at their residual strength. From then on no
+   instability can begin. Reaching this state is no instability by itself, as the last nodes
+   beside a barrier may creep to it.
 
-Two consequences: a maximum that no such fall follows, such as the largest load or the
-stress that returns when slip dies, is no instability; and where the stress is above the
-strength at the start, the maximum is the mean stress before anything slips, with which a
-run begins (`Run.start`).
+Two consequences. A maximum without such a fall after it, such as the largest load or the stress
+that returns when slip dies, is no instability. If the stress is above the strength at the start,
+the maximum is the mean stress before the first slip, with which a run begins (`Run.start`).
 """
 
 from typing import Any, NamedTuple
@@ -55,7 +53,7 @@ from stiction.methods.dynamics.state import (
     value_at,
 )
 
-MAX_DROP_RATIO = 3.0  # tau_p - tau_r of a node counts up to so many times the drop of the load
+MAX_DROP_RATIO = 3.0  # largest tau_p - tau_r that counts, relative to the drop by the load
 # Shares of the stress scale:
 EVENT_DROP = 1e-4  # fall of the mean stress that begins an event
 STEADY_STRESS = 1e-2  # Z V of creep whose waves implicit steps may smear
@@ -63,7 +61,7 @@ _AT_MAXIMUM = 1e-5  # distance from its maximum at which the mean stress counts 
 
 
 class TakenStep(NamedTuple):
-    """A step that was taken."""
+    """Step that was taken."""
 
     time: float  # at its end, s
     size: float  # s
@@ -79,9 +77,9 @@ def stress_scale(nodes: Nodes) -> PiecewiseLinear:
 
         max(0, min(tau_p - tau_r, MAX_DROP_RATIO (tau_0 p + tau_i - tau_r))).
 
-    The second term is the drop that the load provides. Where strengths are alike the scale
-    is the mean of tau_p - tau_r. Barriers that the load is far from breaking, infinite ones
-    among them, do not raise it, and it grows with the load that comes to break them.
+    The second term is the drop that the load provides. If strengths are similar, the scale is the
+    mean of tau_p - tau_r. Barriers far above the load, even infinite barriers, do not raise it. It
+    grows with the load as the load comes to break them.
     """
     strength, residual = nodes.strength, nodes.residual
     profile, initial = nodes.profile, nodes.initial
@@ -92,7 +90,7 @@ def stress_scale(nodes: Nodes) -> PiecewiseLinear:
     ends = np.isfinite(last)
     loads, kink = np.unique(np.concatenate([first, last[ends]]), return_inverse=True)
     bends = np.bincount(kink, np.concatenate([slope, -slope[ends]]))
-    # The last slope goes on beyond the last load; one more load makes it visible.
+    # Add a load, so that the table shows the slope beyond the last kink.
     loads = np.append(loads, loads[-1] + max(1.0, abs(loads[-1])))
     scales = np.concatenate([[0.0], np.cumsum(np.cumsum(bends) * np.diff(loads))])
     return PiecewiseLinear(loads, scales)
@@ -100,7 +98,7 @@ def stress_scale(nodes: Nodes) -> PiecewiseLinear:
 
 @jit_inside
 def _set_maximum(now: Any, radiated: float) -> None:
-    """Take the present mean stress for its last maximum."""
+    """Take the present mean stress as the last maximum."""
     now.maximum_stress, now.maximum_radiated = now.whole_stress, radiated
     now.maximum_breakable = now.mean_stress
     now.maximum_time, now.maximum_load, now.maximum_node = now.time, now.load, now.top_node
@@ -108,7 +106,7 @@ def _set_maximum(now: Any, radiated: float) -> None:
 
 @jit_inside
 def _begin_event(now: Any) -> None:
-    """Step 4: an instability has begun at the last maximum of the mean stress."""
+    """Step 4: begin an instability at the last maximum of the mean stress."""
     now.in_event, now.event_slip_rate = 1, now.top_slip_rate
     is_first = now.instabilities == 0
     now.instabilities += 1
@@ -123,10 +121,10 @@ def _begin_event(now: Any) -> None:
 
 @jit_inside
 def end_event(now: Any, unstable_rate: float, radiated: float) -> None:
-    """Step 3: end an event that is under way: the mean stress is as high as before, or all calm."""
+    """Step 3: end an event, as the mean stress is as high as before or all is calm."""
     if now.in_event:
         now.in_event = 0
-        # Once all has broken there is nothing left to arrest.
+        # Once all nodes have broken the event cannot have been arrested.
         if not now.all_broken and now.event_slip_rate > unstable_rate:
             now.arrested_events += 1
         _set_maximum(now, radiated)
@@ -134,7 +132,7 @@ def end_event(now: Any, unstable_rate: float, radiated: float) -> None:
 
 @jit_inside
 def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
-    """Update maximum and instabilities after a step; return the fall of the mean stress, Pa."""
+    """Update maximum and instabilities after a step. Return the fall of the mean stress, Pa."""
     # 1. The fall by waves.
     below = now.maximum_stress - now.whole_stress
     fall = min(below, radiated - now.maximum_radiated)
@@ -179,10 +177,10 @@ def finish_step(
     record: StepRecord,
     row: int,
 ) -> Any:
-    """Update diagnostics, arrivals, and the record if there is one; return the fall of the stress.
+    """Update diagnostics, arrivals and the record. Return the fall of the mean stress, Pa.
 
-    `increments` is the slip in the step (m), `strength` the strength after it (Pa), at the
-    nodes.
+    `increments` is the slip of the nodes in the step (m), `strength` their strength after it (Pa).
+    Without rows the record stays empty.
     """
     now, slip, rate, stress = state.diagnostics[0], state.slip, state.rate, state.stress
     critical, arrival, share = setting.nodes.critical, state.arrival, setting.thresholds.arrival
@@ -195,9 +193,9 @@ def finish_step(
             margin, margin_node = stress[i] + strength[i], i
         if slip[i] >= critical[i]:
             weakened += 1
-        # d_c = 0 where nothing weakens: there the first slip counts.
+        # A node that does not weaken has d_c = 0: there the first slip counts.
         if np.isnan(arrival[i]) and slip[i] > 0.0 and slip[i] >= share * critical[i]:
-            # The slip grew steadily in the step: how long ago did the front pass?
+            # Assume that slip grew at a constant rate in the step, and interpolate.
             passed = (slip[i] - share * critical[i]) / max(increments[i], 1e-300)
             arrival[i] = step.time - step.size * min(1.0, passed)
         slip_sum += slip[i]

@@ -1,30 +1,29 @@
-"""Explicit predictor-corrector steps: second order, one fixed step, all in one compiled loop.
+"""Explicit predictor-corrector steps of fixed size and second order, in a compiled loop.
 
 Problem
 -------
-Equations (1) and (2) of `state`, one step h further: slip d, slip rate V, stress tau at the
-nodes, and the memory variables y of `memory` at the modes. Let f_hat(d_hat, V_hat) be the
-stress that is transferred if a slip rate V_hat acts for the whole step and the slip at its
-end is d_hat:
+Advance equations (1) and (2) of `state` by a step h: slip d, slip rate V and stress tau at the
+nodes, and the memory variables y of `memory` at the modes. Let f_hat(d_hat, V_hat) be the stress
+transferred at the end of the step if a slip rate V_hat acts for the whole step and leads to the
+slip d_hat:
 
     f_hat = (G|k|/2) (S + V_hat Re sum_p w_p B) - K(k) d_hat,   S = Re sum_p w_p E B y.       (1)
 
-A node follows from the stress that it would carry at rest and from its strength s(d):
+The state of a node follows from the stress that it would carry at rest and its strength s(d):
 
     V = max(f + tau_0 p + tau_i - s(d), 0) / Z,   tau = f + tau_0 p + tau_i - Z V.            (2)
 
 Algorithm (Heun's method: K. Heun, Zeitschrift fuer Mathematik und Physik 45, 1900)
 ----------------------------------------------------------------------------------
-1. Predict: the present rate V_0 acts for a step (`_transfer`); (2) gives V* at its end
+1. Predict: the present rate V_0 acts for the step (`_transfer`), and (2) gives V* at its end
    (`_predict`).
 2. Correct: the mean (V_0 + V*)/2 acts for the step (`_transfer`). The slip grows by h times
    this mean, and (2) gives the rate and the stress at the end (`_correct`).
-3. Advance the memory by the same mean (`memory.advance_memory`).
-4. Update what is known after a step (`diagnostics`), and return if the run ends here or if
-   all is so calm that implicit steps can take over (`_calm`).
+3. Advance slip and memory of the modes by the same mean (`memory.advance_memory`).
+4. Update the diagnostics (`diagnostics`). Return if the run ends here, or if all is so calm that
+   implicit steps can take over (`_calm`).
 
-The step is stable below the limit of `medium.largest_step`. A node cannot slip backwards,
-by (2).
+The step is stable below the limit of `medium.largest_step`. By (2) a node cannot slip backwards.
 """
 
 from typing import Any
@@ -59,7 +58,7 @@ _CALM_STRESS = 1e-4  # Z V of waves that implicit steps may smear, in units of t
 
 @jit_inside
 def _transfer(grid: Grid, slip_hat: Array, memory_sum: Array, tables: ExplicitTables) -> None:
-    """Equation (1): the stress `tables.transfer` if `rate_hat` acts for a step."""
+    """Write equation (1), the stress if `rate_hat` acts for a step, to `tables.transfer`."""
     rate_hat, response, shared = tables.rate_hat, tables.response, tables.shared
     offset, step = grid.offset, tables.step
     static, dynamic = grid.stiffness[0], grid.stiffness[1]
@@ -78,7 +77,7 @@ def _transfer(grid: Grid, slip_hat: Array, memory_sum: Array, tables: ExplicitTa
 def _predict(
     state: RuptureState, setting: Setting, tables: ExplicitTables, load: float, impedance: float
 ) -> None:
-    """Step 1: the slip rate `tables.predicted` at the end if the present one acts all along."""
+    """Step 1: write the rate at the end, if the present rate acts all along, to `predicted`."""
     nodes, law = setting.nodes, setting.law
     slip, rate, transfer, predicted = state.slip, state.rate, tables.transfer, tables.predicted
     strength, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
@@ -94,11 +93,10 @@ def _predict(
 def _correct(
     state: RuptureState, setting: Setting, tables: ExplicitTables, load: float, impedance: float
 ) -> Any:
-    """Step 2: slip, rate and stress after the step; return (work, sum of V).
+    """Step 2: update slip, rate and stress. Return the work (without the cell) and the sum of V.
 
-    `tables.transfer` then holds the strength. `tables.predicted` holds the slip by the mean
-    of the rates before and after the step, from which `finish_step` finds when a front
-    arrived.
+    Afterwards `tables.transfer` holds the strength, and `tables.predicted` the slip by the mean of
+    the rates before and after the step, from which `finish_step` finds when a front arrived.
     """
     nodes, law, step = setting.nodes, setting.law, tables.step
     slip, rate, stress = state.slip, state.rate, state.stress
@@ -122,15 +120,14 @@ def _correct(
 
 @jit_inside
 def _calm(now: Any, thresholds: Thresholds, step: float, impedance: float, rise: float) -> Any:
-    """Step 4: count calm steps; return whether there were enough of them in a row.
+    """Step 4: count calm steps. Return whether there were enough of them in a row.
 
-    Waves make slip rates come and go. Creep is slow, or as fast as it was when the row
-    began.
+    Waves make slip rates come and go. Creep is slow, or as fast as it was when the row began.
     """
     scale, before, top = now.scale, now.calm_rate, now.top_slip_rate
     quiet = top < _CALM_STRESS * scale / impedance + thresholds.calm_slip * rise / step
     steady = 0.5 * before <= top <= 2.0 * before
-    # Once all has broken nothing but the load drives steady slip, however fast it rises.
+    # Once all nodes have broken only the load drives steady slip, however fast it is.
     slow = top < STEADY_STRESS * scale / impedance or now.weakened_nodes >= thresholds.slid_stop
     if quiet or (steady and slow):
         now.calm_steps += 1
@@ -148,14 +145,15 @@ def explicit_steps(
     tables: ExplicitTables,
     record: StepRecord,
 ) -> Any:
-    """Take up to `count` explicit steps in place; return (steps taken, reason).
+    """Take up to `count` explicit steps in place. Return (steps taken, reason).
 
-    `state.phase` is EXPLICIT. `record` has at least `count` rows, or none to keep nothing.
+    `state.phase` is EXPLICIT. `record` has at least `count` rows, or no rows to keep no record.
     """
     n, impedance, step = state.slip.size, grid.impedance, tables.step
     now, thresholds = state.diagnostics[0], setting.thresholds
     rate_hat, slip_hat = tables.rate_hat, state.slip_hat
-    taken, reason = ZERO, Reason.DONE  # one way out: each costs as much to compile as the rest
+    # A single return: a further return would double the time to compile.
+    taken, reason = ZERO, Reason.DONE
     while taken < count and reason == Reason.DONE:
         time = now.time + step
         load = value_at(setting.load, time)

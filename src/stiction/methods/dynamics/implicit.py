@@ -1,36 +1,36 @@
-"""Implicit steps of adaptive size while the interface creeps, in one compiled loop.
+"""Implicit steps of adaptive size while the interface creeps, in a compiled loop.
 
 Problem
 -------
-Equations (1) and (2) of `state`, one step h further. Unknown are the slip increments u >=
-0. With the mean slip rate u/h of this step, the mean rate V' of the step before it, of size
-h', and the ratio r = h/(h + h'), the slip rate at the end of the step is of second order,
+Advance equations (1) and (2) of `state` by a step h. The unknowns are the slip increments u >= 0.
+Let u/h be the mean slip rate of this step, V' the mean rate of the step before it, h' the size of
+that step, and r = h/(h + h'). To second order the slip rate at the end of the step is
 
     V = u/h + r (u/h - V'),                                                                   (1)
 
-as in the two-step backward differences (C. F. Curtiss and J. O. Hirschfelder, Proceedings
+as in the two-step backward differences of C. F. Curtiss and J. O. Hirschfelder (Proceedings
 of the National Academy of Sciences 38, 1952). In the step the rate changes linearly, with
-the slope a = 2 r (u/h - V')/h. Without a step before it, r = 0: the step is of first order.
+the slope a = 2 r (u/h - V')/h. Without an earlier step r = 0, and the step is of first order.
 The stress at the end is, mode by mode,
 
     tau_0 p + tau_i - Z V - K (slip + u)
         + (G|k|/2) (S + u/h Re sum_p w_p B + a Re sum_p w_p R),                               (2)
 
-with S, B and R as in `memory`. This is linear in u, so u solves the complementarity problem
-of `complementarity` with a circulant matrix.
+with S, B and R of `memory`. This is linear in u, so u solves the complementarity problem of
+`complementarity` with a circulant matrix.
 
 Algorithm
 ---------
-1. Choose a size: the one asked for, smaller if the load would rise too much, or cut short
-   at a turning point of the load or at the end time (`_choose_size`).
+1. Choose a size: as proposed, smaller if the load would rise too much, or cut short at a turning
+   point of the load or at the end time (`_choose_size`).
 2. Assemble the matrix and the stress without slip in this step (`_assemble`).
 3. Solve for u (`complementarity.solve_increment`).
-4. Try half the size from 1 if no u is found (the patches are unstable at this size), a node
-   weakens too much (`_effect`), or the interface accelerates too much (`_accelerates`). If
-   that is below the smallest size, explicit steps take over.
-5. Take the step (`_accept`), and update what is known after it (`diagnostics`).
-6. Choose the next size from how much nodes weakened (`_next_size`). Sizes change by powers
-   of sqrt 2, so that tables are reused.
+4. Go to 1 with half the size if no u is found (a patch is unstable at this size), if a node
+   weakens too much (`_effect`), or if the interface accelerates too much (`_accelerates`). If
+   half the size is below the smallest size, explicit steps take over.
+5. Take the step (`_accept`), and update the diagnostics (`diagnostics`).
+6. Choose the next size from the weakening of the nodes (`_next_size`). Sizes change by powers of
+   sqrt 2, so that tables can be used again.
 """
 
 from typing import Any, NamedTuple
@@ -61,30 +61,33 @@ from stiction.methods.dynamics.state import (
 from stiction.problem.friction.kernels import strength_at
 
 LARGEST_STEP = 1e20  # s
-_ROUND_OFF_SHARE = 1e-14  # of the largest stress: ten times the error of a few transforms
+_ROUND_OFF_SHARE = (
+    1e-14  # accuracy as a share of the largest stress: ten times the transforms' error
+)
 # Shares of the stress scale:
 _SOLVED_STRESS = 1e-9  # stress at which a step counts as solved
-_SMALL_DROP = 0.1  # weakening of a node below that is not resolved
-_FREE_LOAD_RISE = 5e-7  # rise of the load in a step in which acceleration does not matter
+_SMALL_DROP = 0.1  # a node with a smaller tau_p - tau_r is not resolved to `slip_step`
+_FREE_LOAD_RISE = 5e-7  # rise of the load in a step with any acceleration
 _NOTICED_RADIATION = 1e-7  # Z <V> from which its growth in a step is limited
-_MAX_ACCELERATION = 1.3  # largest factor of that growth
-# Sizes are powers of sqrt(2) times the smallest one, up to round-off, which must not decide.
+_MAX_ACCELERATION = 1.3  # largest factor of this growth
+# Sizes are powers of sqrt(2) times the smallest size, up to round-off, which must not decide.
 _JUST_BELOW, _JUST_ABOVE = 1.0 - 1e-9, 1.0 + 1e-9
 
 
 class _Attempt(NamedTuple):
-    """One step that is tried."""
+    """Step that is tried."""
 
     size: float  # h, s
     time: float  # at its end, s
     load: float  # at its end, Pa
     ratio: float  # r of (1)
-    rise: float  # 2 r/h, 1/s: a over u/h - V'
+    rise: float  # 2 r/h = a/(u/h - V'), 1/s
 
 
 @jit_inside
 def _choose_size(now: Any, setting: Setting, step: float) -> Any:
     """Step 1: return (size to try, size to go on with, whether cut short, whether the last)."""
+
     thresholds, time, clipped, size = setting.thresholds, now.time, False, step
     smallest = thresholds.smallest_step
     small = thresholds.load_step * now.scale
@@ -111,7 +114,7 @@ def _choose_size(now: Any, setting: Setting, step: float) -> Any:
 def _assemble(
     state: RuptureState, grid: Grid, setting: Setting, tables: ImplicitTables, attempt: _Attempt
 ) -> Any:
-    """Step 2: matrix, stress without slip, and first guess; return the accuracy to ask for, Pa."""
+    """Step 2: write matrix, stress without slip and first guess. Return the accuracy of u, Pa."""
     stiffness, entry, symbol = grid.stiffness, grid.entry, tables.symbol
     response, ramp, past_hat = tables.response, tables.ramp_response, tables.past_hat
     size, ratio, rise = attempt.size, attempt.ratio, attempt.rise
@@ -156,8 +159,7 @@ def _effect(
 ) -> Any:
     """Step 4: return (largest weakening of a node, total slip, Z <V>) by slip increments u.
 
-    Weakening is a share of tau_p - tau_r. Creep at the residual strength counts only if it
-    is fast.
+    Weakening is a share of tau_p - tau_r. Creep at the residual strength counts if it is fast.
     """
     nodes, law, slip, past = setting.nodes, setting.law, state.slip, state.past
     peak, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
@@ -182,12 +184,12 @@ def _accelerates(
     now: Any, thresholds: Thresholds, attempt: _Attempt, largest: float, radiated: float
 ) -> Any:
     """Step 4: return whether the interface accelerates too much for an accurate load at onset."""
-    # A step that hardly raises the load cannot put the onset wrong.
+    # A step that hardly raises the load cannot misplace the onset.
     matters = abs(attempt.load - now.load) > _FREE_LOAD_RISE * now.scale
     noticed = _NOTICED_RADIATION * now.scale
     allowed = _MAX_ACCELERATION * max(now.previous_radiated, noticed)
     growing = radiated > noticed and radiated > allowed
-    # At the smallest size, waves of an arrested event alone do not call for explicit steps.
+    # At the smallest size, waves of an arrested event alone are no reason for explicit steps.
     halved = 0.5 * attempt.size >= _JUST_BELOW * thresholds.smallest_step
     shorter = halved or largest > 0.1 * thresholds.slip_step
     return growing and matters and shorter and attempt.ratio > 0.0
@@ -202,7 +204,7 @@ def _accept(
     attempt: _Attempt,
     radiated: float,
 ) -> Any:
-    """Step 5: take the step in place and return it; `tables.driving` then holds the strength."""
+    """Step 5: take the step in place and return it. Write the strength to `tables.driving`."""
     size, ratio, rise, load = attempt.size, attempt.ratio, attempt.rise, attempt.load
     law, nodes, u, transfer = setting.law, setting.nodes, tables.increment, tables.trial_stress
     rate_hat, past_hat, transfer_hat = tables.rate_hat, tables.past_hat, tables.work
@@ -240,7 +242,7 @@ def _accept(
 
 @jit_inside
 def _next_size(asked: float, size: float, largest: float, growing: bool) -> Any:
-    """Step 6: return the next size; `asked` is the weakening of a node that is asked for."""
+    """Step 6: return the next size, for a weakening of `asked` in a step."""
     root = np.sqrt(2.0)
     if largest > asked:
         return size / root
@@ -261,16 +263,17 @@ def implicit_steps(
     tables: ImplicitTables,
     record: StepRecord,
 ) -> Any:
-    """Take up to `count` accepted implicit steps in place; return (steps, next size, reason).
+    """Take up to `count` accepted implicit steps in place. Return (steps, next size, reason).
 
-    Parameters as in `explicit_steps`; `state.phase` is IMPLICIT, `step` is the first size
-    to try.
+    The parameters are described in `explicit_steps`. `state.phase` is IMPLICIT, and `step` is the
+    first size to try.
     """
     now, thresholds, u = state.diagnostics[0], setting.thresholds, tables.increment
     smallest = _JUST_BELOW * thresholds.smallest_step
-    taken, reason = ZERO, Reason.DONE  # one way out: each costs as much to compile as the rest
+    # A single return: a further return would double the time to compile.
+    taken, reason = ZERO, Reason.DONE
     while taken < count:
-        # 1. Size, and what follows from it.
+        # 1. Size, time, load and ratio.
         size, step, clipped, last = _choose_size(now, setting, step)
         if size < smallest and not clipped:
             reason = Reason.TO_EXPLICIT
@@ -285,7 +288,7 @@ def implicit_steps(
         solved = solve_increment(
             grid.transform, setting, state.slip, tables, accuracy, line_accuracy
         )
-        # 4. Is the step good enough?
+        # 4. Keep the step, or try half its size.
         largest, total, radiated = 0.0, 0.0, 0.0
         if solved:
             largest, total, radiated = _effect(state, setting, u, grid.impedance, attempt)

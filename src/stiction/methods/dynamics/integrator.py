@@ -1,13 +1,13 @@
-"""One run: explicit steps and implicit steps, the switch between them, and when it ends.
+"""A run: implicit and explicit steps, the switch between them, and the end.
 
 A run goes through phases (`Run.take_steps`):
 
-1. It begins at rest or at an equilibrium, at the first slip (`Run.start`). Implicit steps
+1. It begins at rest at the first slip, or at an equilibrium (`Run.start`). Implicit steps
    come first, unless the stress is above the strength by more than round-off.
 2. Implicit steps follow creep until their size falls below `Thresholds.smallest_step`. Then
    the memory is rescaled and explicit steps go on (`_to_explicit`).
-3. Explicit steps follow waves until everything has been calm for a while. Then implicit
-   steps go on, the first of them of first order (`_to_implicit`).
+3. Explicit steps follow waves until all has been calm for a while. Then implicit steps go on,
+   the first of them of first order (`_to_implicit`).
 4. The run ends for one of the reasons of `Run.ending`.
 """
 
@@ -43,10 +43,10 @@ from stiction.methods.dynamics.state import (
 from stiction.problem.friction.kernels import strengths
 
 # Shares of the stress scale:
-_OVERSTRESS = 1e-6  # stress above the strength from which slip begins with waves
-_RESTING_STRESS = 1e-9  # Z V up to which nothing slips
+_OVERSTRESS = 1e-6  # stress above the strength from which a run begins with explicit steps
+_RESTING_STRESS = 1e-9  # Z V below which the interface rests
 _REACHED_SHARE = 1e-12  # of the strength: excess of a node that has just reached it
-_STEPS_BETWEEN_CHECKS = 1000  # of whether a run has ended
+_STEPS_BETWEEN_CHECKS = 1000  # steps after which a run checks whether it has ended
 
 _ENDINGS: dict[int, str] = {
     Reason.ALL_SLID: "sliding",
@@ -58,20 +58,20 @@ NO_RECORD = StepRecord(np.empty(0, DIAGNOSTICS), np.empty((0, 0), STATION))
 
 @dataclasses.dataclass(eq=False)
 class Run:
-    """One interface under one load history: what does not change in a run, and tables of steps."""
+    """Constants of a run, an interface under a load history, with its tables of steps."""
 
     medium: Medium
     setting: Setting
     stop: str  # as `Rupture.stop`
-    steepest_rate: float  # largest, Pa/m, at which a node that may break weakens at any slip
-    # Load below which nothing runs away: the mean strength of the weakest nodes that make up half a
-    # nucleation length, Pa; a few nodes of next to no strength do not make it low.
+    steepest_rate: float  # largest weakening rate at any slip of nodes that may break, Pa/m
+    # Load below which no patch runs away: the mean strength of the weakest nodes that make up half
+    # a nucleation length, Pa. A few nodes of almost no strength hardly lower this mean.
     least_load: float
-    # Tables of the last kind of step only: they are large, and one kind at a time is enough.
+    # Tables of the last kind of step only, since they are large.
     tables: ExplicitTables | ImplicitTables | None = None
 
     def elastic_stress(self, slip_hat: NDArray[np.complex128], load: float) -> Floats:
-        """Return the static stress of a slip at a load, Pa: what an interface at rest carries."""
+        """Return the static stress of a slip at a load, as an interface at rest carries it, Pa."""
         grid, nodes = self.medium.grid, self.setting.nodes
         interface = self.medium.interface
         stress_hat = (-grid.stiffness[0] * slip_hat).reshape(interface.wavenumbers.shape)
@@ -90,17 +90,17 @@ class Run:
         return strength
 
     def scale_at(self, load: float) -> float:
-        """Stress scale of a load, Pa, at least that of the least that can run away."""
+        """Return the stress scale of a load, Pa, or of `least_load` if it is larger."""
         return float(value_at(self.setting.scale, max(load, self.least_load)))
 
     @property
     def first_load(self) -> float:
-        """Load at which the first node reaches its strength, if nothing has slipped, Pa."""
+        """Load at which the first node reaches its strength, before any slip, Pa."""
         nodes = self.setting.nodes
         return float(np.min((nodes.strength - nodes.initial) / nodes.profile))
 
     def first_slip(self) -> float:
-        """Return when the first node reaches its strength, s; inf if it never does."""
+        """Return when the first node reaches its strength, s, or infinity."""
         (times, values), target = self.setting.load, self.first_load
         if values[0] >= target:
             return 0.0
@@ -118,8 +118,7 @@ class Run:
     def start(self, time: float, slip: Floats | None = None) -> RuptureState:
         """Return the state of rest, or of an equilibrium with a slip, with an empty memory.
 
-        Where the stress is above the strength by more than round-off, explicit steps come
-        first.
+        If any stress is above the strength by more than round-off, explicit steps come first.
         """
         interface, impedance = self.medium.interface, self.medium.impedance
         setting, nodes, thresholds = self.setting, self.setting.nodes, self.setting.thresholds
@@ -139,7 +138,7 @@ class Run:
         now = diagnostics[0]
         now["time"] = now["maximum_time"] = time
         now["load"] = now["maximum_load"] = now["start_load"] = load
-        # Before anything slips: nothing is radiated.
+        # The mean stress before the first slip, when no waves are radiated.
         now["maximum_stress"] = setting.mean_initial + load * setting.mean_profile
         now["whole_stress"] = stress.mean()
         now["maximum_breakable"] = now["maximum_stress"]
@@ -183,7 +182,7 @@ class Run:
         return bool(remaining <= 1e-6 * self.medium.step)
 
     def ending(self, state: RuptureState, reason: int) -> str | None:
-        """Return the reason why a run ends here, in a word; None if it goes on."""
+        """Return the reason why a run ends here, in a word, or None if it goes on."""
         if reason == Reason.ALL_SLID and self.setting.thresholds.held:
             return "rest"
         if reason in _ENDINGS:
@@ -191,7 +190,7 @@ class Run:
         if self.ended(state):
             return "time"
         times, values = self.setting.load
-        resting = (  # the load, beyond its last piece, never rises again, and nothing slips
+        resting = (  # the last piece of the load does not rise, and no node slips
             not state.explicit
             and state.now["time"] >= times[-1]
             and values[-1] <= values[-2]
@@ -200,10 +199,9 @@ class Run:
         return "rest" if self.stop != "time" and resting else None
 
     def run_to_end(self, state: RuptureState, max_steps: int) -> tuple[str | None, int]:
-        """Go on to the end of the run, or to `max_steps` in all; return why it ended and the code.
+        """Go on to the end of the run, or to `max_steps` in all. Return (ending, `Reason`).
 
-        The reason is None if it has not ended; the code is then NOT_FINITE or DONE (all
-        steps).
+        The ending is None if the run has not ended. The reason is then NOT_FINITE or DONE.
         """
         ending, reason = None, int(Reason.DONE)
         while ending is None and reason != Reason.NOT_FINITE and state.steps < max_steps:
@@ -216,10 +214,10 @@ class Run:
     def take_steps(
         self, state: RuptureState, count: int, record: StepRecord = NO_RECORD
     ) -> tuple[int, int]:
-        """Take up to `count` steps in place; return (steps taken, why it returned).
+        """Take up to `count` steps in place. Return (steps taken, reason).
 
-        The reason is DONE after `count` steps or at the end time, else ALL_SLID, DROPPED,
-        AT_REST or NOT_FINITE. Rows of `record` are filled, one a step.
+        The reason is DONE after `count` steps or at the end time, otherwise ALL_SLID, DROPPED,
+        AT_REST or NOT_FINITE. Each step fills a row of `record`.
         """
         taken = 0
         while taken < count:
@@ -245,7 +243,7 @@ class Run:
     def _implicit(self, state: RuptureState, count: int, record: StepRecord) -> tuple[int, int]:
         size, grid = float(state.now["next_size"]), self.medium.grid
         if not isinstance(self.tables, ImplicitTables):
-            self.tables = None  # release those of explicit steps before these are made
+            self.tables = None  # release the tables of explicit steps before making new tables
             self.tables = implicit_tables(grid)
         taken, state.now["next_size"], reason = implicit_steps(
             count, size, state, grid, self.setting, self.tables, record
@@ -268,5 +266,5 @@ class Run:
         to_implicit(self.medium.grid, state, self.medium.step)
         state.past[:] = state.rate
         state.now["next_size"] = 2.0 * self.setting.thresholds.smallest_step
-        state.now["two_step"] = 0  # the first implicit step is one of first order
+        state.now["two_step"] = 0  # the first implicit step is of first order
         state.now["previous_radiated"] = self.medium.impedance * state.rate.mean()

@@ -1,20 +1,21 @@
-"""Data shared by all runs of one problem: stiffness, memory kernel, explicit time step.
+"""Data shared by all runs of a problem: stiffness, memory kernel, explicit time step.
 
 Problem of the time step (`largest_step`)
 -----------------------------------------
-An interface that slides freely carries undamped Rayleigh waves, the shortest of which limit
-the explicit step h. With D = |k| slip, V/c_s and the memory variables of one mode as state,
-a step of `explicit` is a matrix that depends on kappa = |k| c_s h only (`amplification`).
-Wanted is the largest kappa up to which no eigenvalue of it is larger than 1.
+An interface that slides freely carries undamped Rayleigh waves, and the shortest of them limit
+the explicit step h. Let the state of a mode be |k| slip, V/c_s and the memory variables. Then a
+step of `explicit` is a matrix that depends on kappa = |k| c_s h only (`amplification`). Find the
+largest kappa up to which no eigenvalue of the matrix is larger than 1.
 
-1. Raise kappa in steps of 0.1 until an eigenvalue is larger (`_largest_kappa`). If that is
-   so in the first step, the error of the memory kernel makes long waves grow, and no step
+Algorithm: our own
+------------------
+1. Raise kappa in steps of 0.1 until an eigenvalue is larger than 1 (`_largest_kappa`). If it is
+   larger after the first step, the error of the memory kernel makes long waves grow, and no step
    is stable.
-2. Bisect between the last two.
+2. Bisect between the last two values of kappa.
 3. On a line the largest |k| is pi/dx. On a plane the shortest waves lie on the rim of the
-   rectangle |kx| <= pi/dx, |ky| <= pi/dy, and differ in length and in their share of mode
-   II. The waves on the axes and in the corner are the first to grow: take the smallest of
-   their steps.
+   rectangle |kx| <= pi/dx, |ky| <= pi/dy, and differ in length and in their share of mode II. The
+   waves on the axes and in the corner are the first to grow, so take the smallest of their steps.
 """
 
 import dataclasses
@@ -31,10 +32,10 @@ from stiction.methods.dynamics.state import Floats, Grid
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
 
-LARGEST_RATIO = 7.15  # c_d over c_s: nu = 0.49 in plane strain
-SMALLEST_RATIO = 1.002  # nu = -0.99 in plane stress
-STEADY_TOLERANCE = 1e-4  # sums this good were stable for every Poisson's ratio
-_MAX_WAVE_GROWTH = 1e-5  # in a step; a rupture takes thousands
+LARGEST_RATIO = 7.15  # largest c_d/c_s: nu = 0.49 in plane strain
+SMALLEST_RATIO = 1.002  # smallest c_d/c_s: nu = -0.99 in plane stress
+STEADY_TOLERANCE = 1e-4  # sums with this error were stable for every Poisson's ratio
+_MAX_WAVE_GROWTH = 1e-5  # in a step; a rupture takes thousands of steps
 _KAPPA_STEP, _MAX_KAPPA, _BISECTIONS = 0.1, 6.0, 12
 
 
@@ -46,7 +47,7 @@ class Medium:
     grid: Grid
     step: float  # explicit time step, s
     largest_step: float  # limit of stability of the explicit step, s
-    # Kept for a line; on a plane it would leave no room for tables of implicit steps.
+    # Kept for lines only: on a plane it would leave no memory for the tables of implicit steps.
     step_table: tuple[Floats, Floats] | None
 
     @property
@@ -61,7 +62,10 @@ class Medium:
 
 
 def prepare_medium(problem: Problem, tolerance: float, courant: float) -> Medium:
-    """Return tables for a problem; refuse a solid or a tolerance that no step is stable for."""
+    """Return the tables of a problem, or raise an `InputError` if no step is stable.
+
+    The error names the solid or the tolerance of the memory kernel.
+    """
     solid, interface, mode = problem.solid, problem.interface, problem.mode
     if mode == "II" and not SMALLEST_RATIO <= solid.wave_speed_ratio <= LARGEST_RATIO:
         valid = "nu <= 0.49" if solid.plane == "strain" else "nu >= -0.99"
@@ -72,8 +76,8 @@ def prepare_medium(problem: Problem, tolerance: float, courant: float) -> Medium
     eta, speed = solid.wave_speed_ratio, solid.shear_wave_speed
     names = ("II", "III") if interface.is_plane else (mode,)
     kernels = [kernel_sum(name, eta, tolerance) for name in names]
-    # At its largest a run takes implicit steps: memory variables and tables, on a line those of
-    # explicit steps too, and forty arrays of nodes.
+    # A run needs most memory in implicit steps: memory variables and tables (on a line also the
+    # tables of explicit steps), and forty arrays of nodes.
     modes, pairs = interface.wavenumbers.size, sum(kernel.poles.size for kernel in kernels)
     tables = 6 * modes / 2 if interface.is_plane else 10 * modes
     size = 8.0 * (pairs * (4 * modes + tables) + 40 * interface.size)
@@ -83,7 +87,7 @@ def prepare_medium(problem: Problem, tolerance: float, courant: float) -> Medium
         error = max(kernel.error for kernel in kernels)
         raise InputError(
             f"kernel_tolerance: with an error of {error:.2g} in the memory kernel waves grow"
-            f" at any time step; got {tolerance:g}, use {STEADY_TOLERANCE:g} or less"
+            f" at any time step. Got {tolerance:g}, use {STEADY_TOLERANCE:g} or less"
         )
     grid, step = _grid(problem, kernels), courant * limit
     table = None if interface.is_plane else step_table(grid, step)
@@ -91,10 +95,11 @@ def prepare_medium(problem: Problem, tolerance: float, courant: float) -> Medium
 
 
 def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:
-    """Stiffness and memory on the modes of the interface.
+    """Return stiffness and memory on the modes of the interface.
 
-    On a plane a wave vector has a = (kx/k)² of mode II and b = 1 - a of mode III (Geubelle
-    and Rice 1995), as K has, and the memory is (G k/2)[a C_II + b C_III] * V.
+    On a plane the share of mode II in a wave vector is a = (kx/k)², the share of mode III b = 1 - a
+    (P. Geubelle and J. Rice, 1995). K and the memory (G k/2)[a C_II + b C_III] * V have these
+    shares.
     """
     solid, interface = problem.solid, problem.interface
     k, share = interface.wavenumbers, interface.in_plane_share
@@ -124,7 +129,7 @@ def largest_step(
 ) -> float:
     """Return the largest stable c_s dt, m, of the explicit predictor-corrector.
 
-    It is 0 where the error of the kernel makes waves grow whatever the step.
+    It is 0 if the error of the kernel makes waves grow at any step.
     """
     kernels = [kernel_sum(mode, eta, tolerance) for mode in modes]
     static = static_stiffness(modes[0], eta)
@@ -166,12 +171,14 @@ def _stable(kappa: float, kernel: ExponentialSum, stiffness: float) -> bool:
 
 
 def _largest_kappa(kernel: ExponentialSum, stiffness: float) -> float:
-    """Largest |k| c_s dt up to which no wave grows."""
+    """Steps 1 and 2: return the largest |k| c_s dt up to which no wave grows."""
     # 1. Raise kappa.
     low, high = 0.0, _KAPPA_STEP
     while high < _MAX_KAPPA and _stable(high, kernel, stiffness):
         low, high = high, high + _KAPPA_STEP
-    if low == 0.0:  # long waves grow: that is the kernel, which no smaller step mends
+    if (
+        low == 0.0
+    ):  # long waves grow by an error of the kernel, which a smaller step cannot mend
         return 0.0
     # 2. Bisect.
     for _ in range(_BISECTIONS):
@@ -181,7 +188,7 @@ def _largest_kappa(kernel: ExponentialSum, stiffness: float) -> float:
 
 
 def _mixed(kernels: list[ExponentialSum], share: float) -> ExponentialSum:
-    """The kernel of a wave vector on a plane, whose share of mode II is (kx/k)²."""
+    """Return the kernel of a wave vector on a plane with a share of mode II of (kx/k)²."""
     weights = share * kernels[0].weights, (1.0 - share) * kernels[1].weights
     poles = np.concatenate([kernel.poles for kernel in kernels])
     return ExponentialSum(

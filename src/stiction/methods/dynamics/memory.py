@@ -1,18 +1,18 @@
-"""The memory of past slip rates: what is remembered of each mode, and how steps advance it.
+"""The memory of past slip rates: memory variables of each mode, and how steps advance them.
 
 Problem
 -------
-The stress that a mode k of past slip rates V transfers is (G|k|/2) times the convolution
+Past slip rates V of a mode k transfer the stress (G|k|/2) S, with the convolution
 
     S(t) = int_0^t C(|k| c_s t') V(t - t') dt',   C(T) = Re sum_p w_p exp(s_p T).             (1)
 
-So it is enough to know one memory variable for each pair (s_p, w_p) and mode,
+It is therefore enough to know a memory variable for each pair (s_p, w_p) and mode,
 
     psi_p(t) = int_0^t exp(s_p |k| c_s t') V(t - t') dt',   S = Re sum_p w_p psi_p.           (2)
 
-V has a real and an imaginary part, and each is a real signal with a complex psi_p of its
-own. On a plane the pairs before `Grid.split` have the weight (kx/k)² w_p and those of mode
-III, which follow, the weight (1 - (kx/k)²) w_p.
+The real and the imaginary part of V are two real signals, each with its own complex psi_p. On a
+plane the pairs before `Grid.split` have the weight (kx/k)² w_p. The pairs of mode III follow, with
+the weight (1 - (kx/k)²) w_p.
 
 Algorithm
 ---------
@@ -20,32 +20,32 @@ Exponential time differencing (S. M. Cox and P. C. Matthews, Journal of Computat
 Physics 176, 2002): psi' = z/h psi + V is integrated exactly for a slip rate that is a
 polynomial in a step h. With z = s_p |k| c_s h, E = exp(z), and phi(z) = (exp(z) - 1)/z:
 
-1. Explicit step, constant slip rate V. psi <- E psi + B V, with B = h phi(z). The variables
-   are kept as y = psi/B, so that the pass has one multiplication less:
+1. Explicit step, constant slip rate V: psi <- E psi + B V, with B = h phi(z). The variables are
+   stored as y = psi/B, which saves a multiplication in each pass:
 
        y <- E y + V,   and for the next step at once   Re sum_p w_p E B y                     (3)
 
-   (`advance_memory`). The sum is the part of S at the end of the next step that is known
-   before it. The current slip rate adds V Re sum_p w_p B (`response` of `step_table`).
-2. Implicit step, slip rate V + a (t - h/2) for 0 < t < h. The variables are psi itself:
+   (`advance_memory`). The sum is the part of S at the end of the next step that is already known.
+   The slip rate of that step adds V Re sum_p w_p B (`response` of `step_table`).
+2. Implicit step, slip rate V + a (t - h/2) for 0 < t < h. The variables are stored as psi:
 
        psi <- E psi + B V + R a,   R = int_0^h exp(s_p |k| c_s (h - t)) (t - h/2) dt          (4)
 
-   (`advance_with_ramp`, with the tables of `tabulate`), after `fading_memory` has summed
-   Re sum_p w_p E psi, the part of S at the end of the step that is known before it.
-3. Between the two kinds `to_explicit` divides by B and `to_implicit` multiplies by it. They
-   set `Phase`, which says in which of both forms `RuptureState.memory` is.
+   (`advance_with_ramp`, with the tables of `tabulate`). Before that `fading_memory` sums
+   Re sum_p w_p E psi, the part of S at the end of the step that is already known.
+3. Between the two kinds of steps `to_explicit` divides by B and `to_implicit` multiplies by B.
+   They set `Phase`, which tells the form of `RuptureState.memory`.
 
 Layout
 ------
-Variables lie in blocks of 64 modes, so that one pass stays in registers. Tables have an
-entry for each wave vector that differs in what waves do: on a line k > 0, on a plane kx >=
-0 and ky >= 0, because (kx, ky) and (-kx, ky) share |k| and the share of mode II. Such an
-entry has multiplicity 2. Entries are padded to whole blocks. Tables are packed as
-[block][pair][row][64], Fourier arrays as [block][copy][real, imaginary][64] and memory
-variables as [block][copy][pair][4][64]. The four rows are the real and imaginary part of
-the memory of the real signal, then of the imaginary signal. The constant row length lets
-the compiler vectorise without run-time checks of overlap.
+Variables lie in blocks of 64 modes, so that the sums of a pass stay in registers. Tables have an
+entry for each wave vector with different waves: on a line k > 0, on a plane kx >= 0 and ky >= 0,
+because (kx, ky) and (-kx, ky) have the same |k| and share of mode II. On a plane an entry therefore
+has multiplicity 2. Entries are padded to whole blocks. Tables are packed as [block][pair][row][64],
+Fourier arrays as [block][copy][real, imaginary][64] and memory variables as
+[block][copy][pair][4][64]. The four rows are the real and imaginary part of the memory of the real
+signal, then of the imaginary signal. The constant row length lets the compiler vectorise without
+run-time checks of overlap.
 """
 
 from typing import Any
@@ -67,15 +67,15 @@ from stiction.methods.dynamics.state import (
 )
 
 ENTRIES = 64
-"""Entries of a block of the memory, which a pass takes together."""
+"""Entries in a block of the memory, which a pass takes together."""
 TWO_ROWS, THREE_ROWS, FOUR_ROWS = 2 * ENTRIES, 3 * ENTRIES, 4 * ENTRIES
-"""Numbers in so many rows of a block."""
+"""Numbers in two, three and four rows of a block."""
 CACHE_LINE = 64
-"""Bytes."""
+"""Bytes in a line of the processor's cache."""
 
 
 def phi(z: Spectrum) -> Spectrum:
-    """(exp(z) - 1)/z, also for small z."""
+    """Return (exp(z) - 1)/z, also for small z."""
     small = np.abs(z) < 1e-3
     series = 1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0 * (1.0 + z / 5.0)))
     safe = np.where(small, 1.0, z)
@@ -97,15 +97,15 @@ def offsets(half: tuple[int, ...]) -> tuple[Ints, Ints, int]:
 
 
 def blocks(entries: int) -> int:
-    """Number of blocks for so many entries."""
+    """Return the number of blocks for a number of entries."""
     return -(-entries // ENTRIES)
 
 
 def zeros(size: int, kind: type = float) -> NDArray[Any]:
-    """Zeros from the start of a cache line on, so that no vector of a pass lies across two.
+    """Return zeros that begin at a cache line, so that no vector of a pass lies across two lines.
 
-    (Allocated memory begins 16 bytes later: every second load would touch two lines, which
-    costs a third of the pass.)
+    NumPy's arrays may begin 16 bytes later. Every second load would then touch two lines, which
+    makes a pass a third slower.
     """
     buffer = np.zeros(size * np.dtype(kind).itemsize + CACHE_LINE, dtype=np.uint8)
     first = -buffer.ctypes.data % CACHE_LINE
@@ -113,11 +113,11 @@ def zeros(size: int, kind: type = float) -> NDArray[Any]:
 
 
 def work_arrays(count: int, size: int, kind: type) -> list[NDArray[Any]]:
-    """Arrays to work in, whose distance is no multiple of a page: stores then hold up no loads.
+    """Return work arrays whose distance is not a multiple of a page, so that loads do not wait.
 
-    (If two addresses are equal modulo 4096 bytes, processors take a load from one to depend
-    on the store to the other before it. With grids of powers of two that would cost half a
-    step.)
+    If two addresses are equal modulo 4096 bytes, processors assume that a load from the first
+    depends on an earlier store to the second. On grids of powers of two, steps would take half as
+    long again.
     """
     distance = -(-size // 8) * 8 + 80
     buffer = zeros(count * distance, kind)
@@ -125,18 +125,18 @@ def work_arrays(count: int, size: int, kind: type) -> list[NDArray[Any]]:
 
 
 def empty_memory(grid: Grid) -> tuple[Floats, Floats]:
-    """Memory variables and their sum for the next explicit step, all zero."""
+    """Return memory variables and their sum for the next explicit step, all zero."""
     count = blocks(grid.frequency.size) * grid.multiplicity * ENTRIES
     return zeros(count * grid.poles.size * 4), zeros(count * 2)
 
 
 def step_table(grid: Grid, step: float) -> tuple[Floats, Floats]:
-    """Step 1: `table` and `response` of `ExplicitTables` for one fixed explicit step h."""
+    """Step 1: return `table` and `response` of `ExplicitTables` for an explicit step h."""
     pairs, count = grid.poles.size, blocks(grid.frequency.size)
     table = zeros(count * pairs * 4 * ENTRIES).reshape(count, pairs, 4, ENTRIES)
     response = np.empty(grid.frequency.size)
     in_plane = (np.arange(pairs) < grid.split)[:, None]
-    for block in range(count):  # not all exponentials together: they would take more memory
+    for block in range(count):  # block by block, since all exponentials need more memory
         entries = slice(block * ENTRIES, (block + 1) * ENTRIES)
         z = np.multiply.outer(grid.poles, grid.frequency[entries] * step)
         share = np.where(in_plane, grid.mode_two[entries], 1.0 - grid.mode_two[entries])
@@ -150,7 +150,7 @@ def step_table(grid: Grid, step: float) -> tuple[Floats, Floats]:
 
 
 def explicit_tables(grid: Grid, step: float, table: Floats, response: Floats) -> ExplicitTables:
-    """Tables from `step_table` with arrays to work in, which belongs to one run."""
+    """Return the tables of `step_table` with the work arrays of a run."""
     modes, nodes = grid.entry.size, int(np.prod(grid.transform.shape))
     packed = zeros(blocks(grid.frequency.size) * grid.multiplicity * 2 * ENTRIES)
     spectra, fields = work_arrays(2, modes, complex), work_arrays(2, nodes, float)
@@ -159,7 +159,7 @@ def explicit_tables(grid: Grid, step: float, table: Floats, response: Floats) ->
 
 @jit_inside
 def pack(offset: Array, spectrum: Array, packed: Array) -> None:
-    """All modes of a transform but the mean into packed order."""
+    """Write all modes of a transform but the mean in packed order."""
     for q in range(1, spectrum.size):
         o = offset[q]
         packed[o] = spectrum[q].real
@@ -170,14 +170,14 @@ def pack(offset: Array, spectrum: Array, packed: Array) -> None:
 def advance_memory(
     memory: Array, table: Array, rate: Array, memory_sum: Array, pairs: int, multiplicity: int
 ) -> None:
-    """Step 1: y <- E y + V and memory_sum = Re sum w E B y, for all modes and pairs in one pass.
+    """Step 1: set y <- E y + V and memory_sum = Re sum w E B y, for all modes and pairs in a pass.
 
     `e` has four rows for each pair: the real and imaginary part of E, then of w E B.
     """
     size = pairs * FOUR_ROWS
     for table_block in range(table.size // size):
-        # Views that begin at zero: the compiler can then exclude negative indices. Each block has
-        # one view of each array and a pair has none: making a view costs as much as a few modes.
+        # Views begin at zero, so that the compiler can exclude negative indices. Make them once per
+        # block and not for each pair, since a view costs as much as a few modes.
         e = table[table_block * size :][:size]
         for copy in range(multiplicity):
             block = table_block * multiplicity + copy
@@ -210,7 +210,7 @@ def advance_memory(
 def to_explicit(
     grid: Grid, state: RuptureState, step: float, table: Floats, memory_sum: Floats
 ) -> None:
-    """Step 3: psi becomes psi/B of explicit steps h; put Re sum w E psi into `memory_sum`."""
+    """Step 3: divide psi by B of explicit steps h, and write Re sum w E psi to `memory_sum`."""
     _scale_memory(grid, state.memory, step, divide=True)
     count, pairs = blocks(grid.frequency.size), grid.poles.size
     rows = table.reshape(count, pairs, 4, ENTRIES)
@@ -222,7 +222,7 @@ def to_explicit(
 
 
 def to_implicit(grid: Grid, state: RuptureState, step: float) -> None:
-    """Step 3: psi/B of explicit steps h becomes psi."""
+    """Step 3: multiply psi/B of explicit steps h by B."""
     _scale_memory(grid, state.memory, step, divide=False)
     state.now["phase"] = Phase.IMPLICIT
 
@@ -243,7 +243,7 @@ def _scale_memory(grid: Grid, memory: Floats, step: float, *, divide: bool) -> N
 
 @jit_inside
 def _phi(z: Any) -> Any:
-    """(exp(z) - 1)/z near z = 0."""
+    """Return (exp(z) - 1)/z near z = 0, by a series."""
     value = 1.0 + 0.0j
     for k in range(6, 1, -1):  # part by part: complex division is slow to compile and to run
         value = 1.0 + complex(z.real / k, z.imag / k) * value
@@ -252,12 +252,12 @@ def _phi(z: Any) -> Any:
 
 @jit_inside
 def _ramp(z: Any) -> Any:
-    """int_0^1 exp(z (1 - t)) (t - 1/2) dt near z = 0."""
+    """Return int_0^1 exp(z (1 - t)) (t - 1/2) dt near z = 0, by a series."""
     return -z / 12.0 * (1.0 + z / 2.0 * (1.0 + z * 0.3 * (1.0 + z * (2.0 / 9.0))))
 
 
 def implicit_tables(grid: Grid) -> ImplicitTables:
-    """Tables that are not yet valid for any step."""
+    """Return tables that are not yet valid for any step."""
     count, pairs, entries = blocks(grid.frequency.size), grid.poles.size, grid.frequency.size
     modes, nodes = grid.entry.size, int(np.prod(grid.transform.shape))
     table, ramp = (zeros(count * pairs * rows * ENTRIES) for rows in (4, 2))
@@ -274,12 +274,12 @@ def implicit_tables(grid: Grid) -> ImplicitTables:
 
 @jit_inside
 def tabulate(grid: Grid, step: float, tables: ImplicitTables) -> None:
-    """Step 2: E, B and R of (4) for a step h, and their weighted sums.
+    """Step 2: write E, B and R of (4) for a step h, and their weighted sums.
 
-    `table`, [block][pair][4][64], gets E and B, `ramp`, [block][pair][2][64], gets R.
+    `table`, [block][pair][4][64], gets E and B, and `ramp`, [block][pair][2][64], gets R.
     `response` and `ramp_response` get Re sum w B and Re sum w R. On a line |k| c_s is j + 1
-    times the lowest, so that the exponentials of a pole are powers of one number. That
-    takes a product each, with a relative error of 1e-16 j.
+    times the lowest frequency, so the exponentials of a pole are powers of the same number. Each
+    takes a product, with a relative error of 1e-16 j.
     """
     table, ramp = tables.table, tables.ramp
     response, ramp_response = tables.response, tables.ramp_response
@@ -290,7 +290,7 @@ def tabulate(grid: Grid, step: float, tables: ImplicitTables) -> None:
         pole, weight = grid.poles[p], grid.weights[p]
         unit = pole * (grid.frequency[0] * step)
         base = np.exp(unit)
-        # On a plane the lowest frequency is zero, and z is taken entry by entry.
+        # On a plane the lowest frequency is zero, and z is computed entry by entry.
         inverse = 1.0 / unit if grid.multiplicity == 1 else 0.0j
         decay = 1.0 + 0.0j
         for j in range(response.size):
@@ -320,14 +320,14 @@ def tabulate(grid: Grid, step: float, tables: ImplicitTables) -> None:
 
 @jit_inside
 def fading_memory(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
-    """Step 2: put Re sum w E psi of all modes into `tables.memory_sum`."""
+    """Step 2: write Re sum w E psi of all modes to `tables.memory_sum`."""
     pairs, multiplicity, split = grid.poles.size, grid.multiplicity, grid.split
-    sums = tables.sums  # of the pairs before `split`, and of the pairs of mode III
+    sums = tables.sums  # over the pairs before `split`, and over the pairs of mode III
     for block in range(memory.size // (FOUR_ROWS * pairs)):
         for j in range(TWO_ROWS):
             sums[0, j] = sums[1, j] = 0.0
         for p in range(pairs):
-            # Views that begin at zero: the compiler can then exclude negative indices.
+            # Views begin at zero, so that the compiler can exclude negative indices.
             y = memory[(block * pairs + p) * FOUR_ROWS :][:FOUR_ROWS]
             e = tables.table[(block // multiplicity * pairs + p) * FOUR_ROWS :][:FOUR_ROWS]
             out = sums[0 if p < split else 1]
@@ -351,7 +351,7 @@ def fading_memory(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
 
 @jit_inside
 def advance_with_ramp(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
-    """Step 2: psi <- E psi + B V + R a, with V = `rate_hat` (m/s) and a = `past_hat` (m/s²)."""
+    """Step 2: set psi <- E psi + B V + R a with V = `rate_hat` (m/s) and a = `past_hat` (m/s²)."""
     pairs, multiplicity = grid.poles.size, grid.multiplicity
     pack(grid.offset, tables.rate_hat, tables.packed)
     pack(grid.offset, tables.past_hat, tables.second_packed)
@@ -379,9 +379,9 @@ def advance_with_ramp(grid: Grid, memory: Array, tables: ImplicitTables) -> None
 
 
 def grown_memory(grid: Grid, memory: Floats, rate_hat: Spectrum, growth: float) -> Spectrum:
-    """Set psi = V/(growth - s |k| c_s) of a slip rate that has always grown as exp(growth t).
+    """Set psi = V/(growth - s |k| c_s) for a slip rate that has always grown as exp(growth t).
 
-    Returned is Re sum w psi, (modes,).
+    Returns Re sum w psi, (modes,).
     """
     total = np.zeros(rate_hat.size, dtype=np.complex128)
     rate, entry, pairs = rate_hat[1:], grid.entry[1:], grid.poles.size

@@ -1,30 +1,28 @@
-"""A block in bilinear finite elements: 0 < x < L, 0 < y < H, with the nodes of its interface.
+"""A finite-element mesh of a block, 0 < x < L and 0 < y < H, on the nodes of its interface.
 
 Problem
 -------
-Elasticity of one block for waves (`waves`), on rows of nodes above the nodes of the
-interface, and its static response, which must agree with the closed form of
-`elasticity.blocks`.
+Discretise the elasticity of a block for waves (`waves`), on rows of nodes above the nodes of the
+interface. The static response must agree with the closed form of `elasticity.blocks`.
 
 Grid
 ----
 Columns lie at the nodes x = (i + 1/2) dx, so that each has a cell of the interface. Beyond
-the outer columns half a cell remains, in which s_xx and s_xy vanish: it is a strip that
-only resists to being stretched along y. Rows are dx apart at the interface and up to five
-times as much above.
+the outer columns half a cell remains, in which s_xx and s_xy vanish: a strip that only resists
+stretching along y. Rows are dx apart at the interface and up to five times as much above.
 
 Elements (`_elements`)
 ----------------------
-An element with the sides a and b has mean strains and two modes of an hourglass. Exact
-integration gives its energy as a b (s . e)/2 of the means, and (c_11 b/a + G a/b)/24 times
-the square of u_00 - u_10 - u_01 + u_11, likewise for v. In mode III there is only u: c_11
-is G, all else zero.
+Elements are bilinear. An element with the sides a and b has mean strains and two hourglass modes.
+Exact integration gives the energy of the means as a b (s . e)/2, and the energy of an hourglass as
+(c_11 b/a + G a/b)/24 times the square of u_00 - u_10 - u_01 + u_11, likewise for v. In mode III
+there is only u: c_11 is G, and the other coefficients are zero.
 
-Steps (`make_mesh`)
--------------------
+Algorithm (`make_mesh`)
+-----------------------
 1. Place the rows, and find elements, masses and the stencils that move nodes.
 2. Condense the static response: eliminate the rows from the top downwards (`condensed`).
-3. Correct it: what K of the closed form has beyond K of the mesh acts on the slip of the
+3. Correct it: the difference of K between the closed form and the mesh acts on the slip of the
    interface.
 4. Find the stable step of mesh, viscosity and correction (`_limit`).
 """
@@ -46,46 +44,47 @@ from stiction.problem.solid import Solid
 from stiction.problem.specimen import Blocks, Platen
 
 ROW_RATIO, MAX_ROW_HEIGHT = 1.08, 5.0
-"""Ratio of the heights of successive rows, and their largest height over dx."""
+"""Ratio of the heights of successive rows, and their largest height in units of dx."""
 GRID_VISCOSITY = 0.05
-"""Viscous time over dx/c_d: oscillations of the shortest waves lose stress in it."""
+"""Viscous time in units of dx/c_d, which damps oscillations of the shortest waves."""
 
 
 class Mesh(NamedTuple):
-    """A block, its drive and its step in time; forces and masses are per unit depth."""
+    """Block, its drive and its time step. Forces and masses are per unit depth."""
 
     spacing: float
     heights: Array
     """y of the rows, m."""
     mass: Array
-    """Of a node of each row, kg/m."""
+    """Mass of a node of each row, kg/m."""
     elements: Array
-    """Stiffness of the elements above each row but the last, (rows - 1, 2, 2, 2, 2, 2, 2), Pa: from
-    and to the lower and upper row, along x and y, on the left and on the right."""
+    """Stiffness of the elements above each row but the last, (rows - 1, 2, 2, 2, 2, 2, 2), Pa. The
+    indices are lower or upper row, x or y, left or right, for the force and then for the
+    displacement."""
     strips: Array
-    """Of the half cells at the ends, along x and y, (rows - 1, 2), Pa."""
+    """Stiffness of the half cells at the ends, along x and y, (rows - 1, 2), Pa."""
     stencils: Array
-    """What the neighbours of a node exert on it, (rows, 2, 5, 3); see `_stencils`."""
+    """Coefficients of the force on a node by its neighbours, (rows, 2, 5, 3); see `_stencils`."""
     anti_plane: bool
     push: Array
     """Share of the pusher's force on the left and on the right of each row, (rows, 2)."""
     platen: bool
     stiffness: float
-    """Of the machine, as one block sees it, Pa."""
+    """Stiffness of the machine for a block, half of the specimen, Pa."""
     drive_mass: float
-    """Of platen or pusher, kg/m."""
+    """Mass of platen or pusher, kg/m."""
     attenuation: float
-    """1/s: momentum is lost at this rate."""
+    """Rate at which momentum is lost, 1/s."""
     viscous_time: float = 0.0
     step: float = 0.0
     window: int = 0
-    """Steps in which a shear wave crosses the block and returns."""
+    """Number of steps in which a shear wave crosses the block and returns."""
     correction: Array = np.zeros((0, 0), np.float32)
-    """K of the closed form less that of the mesh, (n, n), Pa/m."""
+    """K of the closed form less K of the mesh, (n, n), Pa/m."""
 
 
 def make_mesh(problem: Problem, courant: float = 0.9) -> Mesh:
-    """Return the mesh of a block of a problem, its step being a share of the stability limit."""
+    """Return the mesh of a problem's block, whose step is `courant` times the stability limit."""
     assert problem.specimen is not None
     return _mesh(problem.specimen, problem.interface, problem.solid, problem.mode, courant)
 
@@ -144,7 +143,7 @@ def _mesh(
 
 
 def row_heights(height: float, spacing: float) -> Array:
-    """Return the y of the rows, the first two `spacing` apart."""
+    """Return the y of the rows, m. The first two are `spacing` apart."""
     steps = spacing * np.minimum(
         ROW_RATIO ** np.arange(int(2.0 * height / spacing) + 2), MAX_ROW_HEIGHT
     )
@@ -155,11 +154,11 @@ def row_heights(height: float, spacing: float) -> Array:
 
 
 def _elements(b: Array, a: float, solid: Solid, anti: bool) -> tuple[Array, Array]:
-    """Return the stiffness of elements of the heights b, and of the strips at their ends."""
+    """Return the stiffness of elements with the heights b, and of the strips at their ends."""
     shear = solid.shear_modulus
     c11 = shear * (1.0 if anti else solid.wave_speed_ratio**2)
     sign, axes = np.array([-1.0, 1.0]), np.eye(2)
-    # Weights of the corners (row, axis, column) in a mean strain, and in an hourglass.
+    # Weights of the corners (row, axis, column) in a mean strain, and in an hourglass mode.
     along = [np.multiply.outer([0.5, 0.5], np.outer(axis, sign)) for axis in axes]
     up = [0.5 * np.multiply.outer(sign, np.outer(axis, [1.0, 1.0])) for axis in axes]
     twist = [np.multiply.outer(sign, np.outer(axis, sign)) for axis in axes]
@@ -184,12 +183,13 @@ def _elements(b: Array, a: float, solid: Solid, anti: bool) -> tuple[Array, Arra
 def _stencils(elements: Array, strips: Array) -> Array:
     """Return the coefficients of the force on a node, (rows, axis, 5, 3).
 
-    The last index is the row below, of the node, and above. The five coefficients belong to
+    The last index is the row below, the row of the node, and the row above. The five coefficients
+    belong to
 
-    - the sum of both neighbours in the row, and the node itself,
+    - the sum of both neighbours in a row, and the node itself,
     - the difference of both neighbours in the other component,
-    - at the left end, where there is one neighbour, the node itself, and its other
-      component. At the right end the other component has the other sign.
+    - at the left end, with a single neighbour, the node itself, and its other component. At the
+      right end the other component has the opposite sign.
     """
     stencils = np.zeros((len(elements) + 1, 2, 5, 3))
     for row, (element, strip) in enumerate(zip(elements, strips, strict=True)):
@@ -206,7 +206,7 @@ def _stencils(elements: Array, strips: Array) -> Array:
 
 
 def _covered(heights: Array, middle: float, width: float) -> Array:
-    """Return the share of a uniform traction that each row takes, none of it the interface."""
+    """Return the share of a uniform traction on each row. The interface takes no share."""
     edges = np.concatenate([heights[:1], 0.5 * (heights[1:] + heights[:-1]), heights[-1:]])
     low, high = middle - 0.5 * width, middle + 0.5 * width
     share = np.maximum(np.minimum(edges[1:], high) - np.maximum(edges[:-1], low), 0.0)
@@ -218,7 +218,7 @@ def _covered(heights: Array, middle: float, width: float) -> Array:
 def _limit(
     speed: float, shear_speed: float, mesh: Mesh, correction: Array, viscous: float
 ) -> float:
-    """Return the largest stable step, s: that of the mesh, its viscosity and the correction."""
+    """Return the largest stable step of mesh, viscosity and correction together, s."""
     thin = min(mesh.spacing, float(np.diff(mesh.heights).min()))
     squares = max(4.0 * speed**2, 8.0 / 3.0 * (speed**2 + shear_speed**2)) / thin**2
     stiffest = float(
@@ -231,7 +231,7 @@ def _limit(
 
 
 def layer_matrix(mesh: Mesh, layer: int, nodes: int) -> sp.csr_matrix:
-    """Return the stiffness of a row of elements: u, v of the lower nodes, then the upper ones."""
+    """Return the stiffness of a row of elements, for u and v of the lower, then the upper nodes."""
     left, right = np.eye(nodes, nodes - 1), np.eye(nodes, nodes - 1, -1)
     columns = [sp.csr_matrix(left), sp.csr_matrix(right)]
     stiffness = sp.csr_matrix((4 * nodes, 4 * nodes))
@@ -247,8 +247,7 @@ def layer_matrix(mesh: Mesh, layer: int, nodes: int) -> sp.csr_matrix:
 def condensed(mesh: Mesh, nodes: int) -> tuple[Array, Array, float]:
     """Return K of the mesh under a given force (Pa/m), q, and C (Pa); see `elasticity.blocks`.
 
-    Motion that is even about the middle of the block and motion that is odd are
-    independent.
+    Even and odd motion about the middle of the block are independent, which halves the matrices.
     """
     static, force, compliance = np.zeros((nodes, nodes)), np.zeros(nodes), 0.0
     half = np.eye(nodes, nodes // 2)
@@ -264,16 +263,17 @@ def condensed(mesh: Mesh, nodes: int) -> tuple[Array, Array, float]:
 
 
 def _condensed(mesh: Mesh, folds: list[Array]) -> tuple[Array, Array, float]:
-    """Return stiffness, force and compliance of a half, its rows eliminated from the top downwards.
+    """Return stiffness, force and compliance of the even or the odd motion.
 
-    `folds` (nodes, half) give u and v of all nodes of a row.
+    Rows are eliminated from the top downwards. `folds`, (nodes, half), give u and v of all nodes of
+    a row.
     """
     nodes, size = folds[0].shape
     fold = sp.csr_matrix(scipy.linalg.block_diag(*folds, *folds))
     unknowns = size if mesh.anti_plane else 2 * size  # of a row: u, and v
     ends = folds[0][[0, -1]].T
     kept, above, force = sp.eye(size).tocsr(), np.zeros((size, size)), np.zeros(size)
-    if mesh.platen:  # it does not move where u is odd
+    if mesh.platen:  # rigid, so all of its nodes move alike, and it rests in odd motion
         kept = sp.csr_matrix(folds[0].sum(axis=0)[:, None])
         above, force = np.eye(1) * (kept.nnz == 0), np.ones(1) * (kept.nnz > 0)
     compliance = 0.0

@@ -1,4 +1,4 @@
-"""Elastodynamic rupture as a method: from the first slip to global sliding, sample by sample."""
+"""Ruptures with inertia as a method: options, solver, and thresholds of a run."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ from stiction.problem.sample import Sample, steepest_rate
 
 ShareUpToOne = Annotated[Real, Field(gt=0, le=1)]
 
-_EXPLICIT_STEPS_IN_IMPLICIT = 6.0  # in the smallest implicit step
+_EXPLICIT_STEPS_IN_IMPLICIT = 6.0  # size of the smallest implicit step
 _MIN_CALM_STEPS = 300
-# Z V that only an instability reaches, in units of the median of tau_p - tau_r: at least 0.106 in
-# those that were arrested, at most 0.054 in the waves after them (4 problems, 5e6 and 5e7 Pa/s).
+# Z V that only an instability reaches, in units of the median of tau_p - tau_r. Measured: at least
+# 0.106 in arrested events, at most 0.054 in the waves after them (4 problems, 5e6 and 5e7 Pa/s).
 _UNSTABLE_STRESS = 0.075
 
 Start = Literal["equilibrium", "rest"]
@@ -47,7 +47,7 @@ _UNKNOWN_AT_ONSET = (
 
 
 def _load_history(load: Any) -> PiecewiseLinear | None:
-    """Return times (s) and values (Pa) of tau_0 from samples (times, values), checked."""
+    """Return the load history of samples (times, values), in s and Pa, or raise an `InputError`."""
     if load is None:
         return None
     try:
@@ -56,7 +56,7 @@ def _load_history(load: Any) -> PiecewiseLinear | None:
         raise InputError("must be two arrays of numbers, (times, values)") from None
     if times.ndim != 1 or times.shape != values.shape or times.size < 2:
         shapes = f"{times.shape} and {values.shape}"
-        raise InputError(f"needs two 1-d arrays, equally long, of two or more; got {shapes}")
+        raise InputError(f"needs two 1-d arrays of equal length, two or more, got {shapes}")
     if not (np.all(np.isfinite(times)) and np.all(np.isfinite(values))):
         raise InputError("times and values must be finite")
     if times[0] != 0.0 or np.any(np.diff(times) <= 0.0):
@@ -75,52 +75,51 @@ LoadHistory = Annotated[Any, BeforeValidator(_load_history), PlainSerializer(_wr
 class Rupture:
     """Onset from an elastodynamic simulation under a slowly rising load.
 
-    Adaptive implicit steps follow the creeping interface, explicit steps its rupture.
-    The initial stress may be above the strength: such a patch breaks at once, at zero load.
+    Adaptive implicit steps follow the creeping interface, explicit steps its rupture. Initial
+    stress may be above the strength: such a patch breaks at once, at zero load.
 
     Parameters
     ----------
     loading_rate : float, optional
-        d tau_0/dt, Pa/s, positive. Between half-spaces either this or `load` must be given.
+        d tau_0/dt, Pa/s, positive. Between half-spaces, give either this or `load`.
     kernel_tolerance : float
-        Allowed error (1) of the memory kernel, a sum of exponentials. The sum is fitted
-        once for each solid and stored on disk, in 1 s at 1e-6 (22 pairs) or half a minute
-        at 1e-8 (35). From about 1e-3 on, waves may grow at any time step, which raises an
-        error.
+        Largest error (1) of the memory kernel, a sum of exponentials. The sum is fitted once for
+        each solid and stored on disk. The fit takes 1 s at 1e-6 (22 pairs) or half a minute at
+        1e-8 (35 pairs). Above about 1e-3 waves may grow at any time step, which raises an error.
     courant : float
         Explicit time step in units of the stability limit, in (0, 1].
     slip_step : float
-        Slip of any weakening node in one implicit step, in units of its d_c.
+        Largest slip of a weakening node in an implicit step, in units of its d_c.
     load_step : float
-        Rise of the load in one implicit step, in units of the stress scale (see Notes).
+        Largest rise of the load in an implicit step, in units of the stress scale (see Notes).
     start : {"equilibrium", "rest"}
-        "rest": at the first slip. "equilibrium": on the quasi-static path, as close below
-        the first instability as the estimated error allows; `start_load` is the load there,
-        and `start_error` (Pa) the estimate. The run still begins at the first slip with
-        `load`, if the loading rate is too high, if a node loses half of its strength
-        before, on planes, with laws that are not piecewise linear, and with barriers or
+        "rest" starts at the first slip. "equilibrium" starts on the quasi-static path, as close
+        below the first instability as the estimated error allows. `start_load` is the load at the
+        start, and `start_error` the estimated error (Pa). These runs always start at the first
+        slip: with `load`, if the loading rate is too high, if a node loses half of its strength
+        before the first instability, on planes, with curved friction laws, and with barriers or
         stress above the strength.
     end_time : float, optional
-        Time at which a run ends at the latest, s, but for a part of the last explicit step.
+        Latest end of a run, s. It may be exceeded by a part of the last explicit step.
     load : (times, values), optional
-        Samples of tau_0(t), Pa, from t = 0 s, instead of a constant rate, with linear
-        interpolation; the last slope continues.
+        Samples of tau_0(t), Pa, from t = 0 s, instead of a constant rate. They are interpolated
+        linearly, and the last slope continues.
     arrival : float
-        Share of tau_p - tau_r that a node has lost when the front arrives there, in (0, 1]:
-        0.5 is the middle of the cohesive zone, 1e-3 its tip.
+        Share of tau_p - tau_r that a node has lost when the front arrives, in (0, 1]. The middle
+        of the cohesive zone is 0.5, its tip 1e-3.
     stop : {"sliding", "onset", "rest", "time"}
-        When to end (see Notes), unless nothing slips and the load has stopped rising:
-        "sliding": every node that can break is at its residual strength and, if barriers of
-        infinite strength hold the interface, has come to rest. "onset": the first
-        instability has begun. "rest": nothing slips after an instability any more, except
-        as the load drives it; an interface that slides and is never unloaded ends there.
-        "time": at `end_time`; an interface that slides takes explicit steps until then.
+        End of a run. "sliding": every node that can break is at its residual strength and, if
+        barriers of infinite strength hold the interface, has come to rest. "onset": the first
+        instability has begun. "rest": after an instability, slip has ended or only follows the
+        load. An interface that slides and is never unloaded also ends there. "time": at
+        `end_time`. A sliding interface takes explicit steps until then. Every run but "time" also
+        ends when no node slips and the load has stopped rising.
     implicit : bool
-        False takes explicit steps only (slow loading then costs a million steps).
+        False takes explicit steps only. Slow loading then needs a million steps.
     max_steps : int
         Number of steps after which a run, or an event on a specimen, is abandoned.
     events : int
-        Of specimens, also return this number of arrested events, as `Equilibrium` does.
+        On specimens, also return this number of arrested events, as `Equilibrium` does.
 
     Raises
     ------
@@ -129,45 +128,46 @@ class Rupture:
 
     Notes
     -----
-    On specimens loading is slow: the path is that of `Equilibrium` up to each instability,
-    from which waves run through the blocks until they are at rest, and the path goes on
-    from there. Of the options `courant`, `arrival`, `max_steps` and `events` count, and the
-    attenuation and masses of the specimen (`Blocks.quality_factor`, `Platen.mass`,
-    `Pusher.mass`). Results are those of `Equilibrium`, and `rupture_speed` and
-    `median_rupture_speed` of the event that slides.
+    **Specimens.** Loading is slow. The path follows `Equilibrium` up to each instability. Then
+    waves run through the blocks until they are at rest, and the path continues from there. The
+    options `courant`, `arrival`, `max_steps` and `events` have an effect, and so do the attenuation
+    and the masses of the specimen (`Blocks.quality_factor`, `Platen.mass`, `Pusher.mass`). The
+    result has the variables of `Equilibrium`, and `rupture_speed` and `median_rupture_speed` of
+    the sliding event.
 
-    Between half-spaces, an instability is slip that the load does not drive. It begins at a
-    maximum of the mean shear stress after which waves lower it by 1e-4 of the stress scale,
-    not counting any fall of the load itself; at the start where the stress is above the
-    strength. `first_instability` is the mean stress at which the first one begins. The
-    highest one has `onset_time`, `critical_position`, `applied_load` (the load factor then)
-    and, if the interface slides, `critical_stress` and `critical_load`, the load factor
-    that carries that stress statically; what waves radiate is the difference. NaN is what
-    did not happen, with a warning, and an overstressed start has no `critical_load`.
+    **Instabilities between half-spaces.** An instability is slip that the load does not drive. It
+    begins at a maximum of the mean shear stress after which waves lower the stress by 1e-4 of the
+    stress scale, apart from any fall of the load. If the stress is above the strength at the start,
+    it begins there. `first_instability` is the mean stress at the beginning of the first
+    instability. The highest instability has `onset_time`, `critical_position` and `applied_load`
+    (the load factor at that time). If the interface slides, it also has `critical_stress` and
+    `critical_load`, the load factor that carries this stress statically. The two load factors
+    differ by the stress that waves radiate. Events that did not happen have the value NaN, with a
+    warning. An overstressed start has no `critical_load`.
 
-    `arrested_events` counts instabilities in which a node slips so fast that Z V exceeds
-    7.5 % of the median of tau_p - tau_r before the mean stress is as high again or all is
-    calm. `Equilibrium` also counts jumps too small for that. The stress scale is the mean
-    over nodes of tau_p - tau_r, or of three times the drop tau_0 p + tau_i - tau_r at the
-    largest load so far where that is less, so that unbroken barriers do not count.
-    `kinetic_stress` is the mean stress after the first step in which every node that can
-    break is at its residual strength. Energies and moment are those of the end of the run.
-    If that is this step, as in an interface that slides, radiated energy and moment grow by
-    about 2 % in it.
+    **Arrested events.** `arrested_events` counts instabilities in which Z V of a node exceeds 7.5 %
+    of the median of tau_p - tau_r before the mean stress is as high again or all is calm.
+    `Equilibrium` also counts smaller jumps.
 
-    The last nodes beside a barrier may creep to their residual strength under a load that
-    goes on to rise. That is no instability, and `critical_stress` stays the mean stress at
-    the highest instability before. It is NaN if everything that can break did so without an
-    instability.
+    **Stress scale.** At each node, it is the smaller of tau_p - tau_r and three times the drop
+    tau_0 p + tau_i - tau_r at the largest load so far, so that unbroken barriers do not count. The
+    stress scale is the mean over nodes.
 
-    With "onset" and "rest", critical values are those of the highest instability, which
-    need not end in sliding, and with "onset" what is not final is NaN: kinetic stress,
-    stress drop, moment, energies, rupture speeds and arrested events.
+    **End.** `kinetic_stress` is the mean stress after the first step in which every node that can
+    break is at its residual strength. Energies and moment refer to the end of the run. A sliding
+    interface ends with that step, in which radiated energy and moment grow by about 2 %. The last
+    nodes beside a barrier may creep to their residual strength while the load still rises. This is
+    no instability, and `critical_stress` remains the mean stress at the highest instability before.
+    It is NaN if all nodes that can break did so without an instability.
 
-    Slip never reverses: a node whose slip rate would become negative sticks, keeps its
-    weakened strength, and slips again only when the stress reaches it; a warning gives the
-    place if the stress fell below minus the strength. Boundary integral in Fourier space:
-    Breitenfeld and Geubelle (1998).
+    With "onset" and "rest", critical values belong to the highest instability, which need not end
+    in sliding. With "onset", all values that are not final are NaN: kinetic stress, stress drop,
+    moment, energies, rupture speeds and arrested events.
+
+    **No reverse slip.** A node whose slip rate would become negative sticks, keeps its weakened
+    strength, and slips again only when the stress reaches it. If the stress fell below minus the
+    strength, a warning gives the place. The boundary integral in Fourier space follows Breitenfeld
+    and Geubelle (1998).
     """
 
     loading_rate: Positive | None = None
@@ -184,6 +184,7 @@ class Rupture:
     max_steps: Count = 5_000_000
     events: Number = 0
     type: Literal["rupture"] = "rupture"
+    # Profiles that `Problem.sample` refuses for other methods.
     accepts: ClassVar[tuple[str, ...]] = ("overstress",)
     label: ClassVar[str] = "rupture"
     counted_only: ClassVar[bool] = True
@@ -197,7 +198,7 @@ class Rupture:
             problems.append("end_time: needed with stop='time', got None")
         if not self.implicit:
             problems += [
-                f"{name}: is of implicit steps and has no effect with implicit=False; leave it out"
+                f"{name}: has no effect with implicit=False, leave it out"
                 for name in ("slip_step", "load_step")
                 if getattr(self, name) != type(self).__dataclass_fields__[name].default
             ]
@@ -206,7 +207,7 @@ class Rupture:
         return self
 
     def seconds_per_sample(self, problem: Problem) -> float:
-        """Return the approximate time of a sample on one core, s."""
+        """Return the approximate time of a sample on a core, s."""
         shape = problem.interface.shape
         if problem.specimen is not None:
             drive = problem.specimen.drive
@@ -214,25 +215,28 @@ class Rupture:
         if len(shape) == 1:
             usual = 0.1 if self.start == "rest" else 0.05
             return 8e-3 + usual * (shape[0] / 1024) ** 2
-        # As many steps as the longer side has nodes, each in proportion to all nodes.
+        # The number of steps grows with the nodes of the longer side, the time of a step with all
+        # nodes.
         return 1.5 * (max(shape) / 128) * (problem.interface.size / 128**2)
 
     def supports(self, problem: Problem) -> list[str]:
-        """Return the reasons why the method cannot solve a problem; none if it can."""
+        """Return the reasons why the method cannot solve a problem, or an empty list."""
         if problem.specimen is not None:
             return specimens.refusals(self, problem)
         reasons = []
         if self.loading_rate is None and self.load is None:
             reasons.append("loading_rate: give either loading_rate or load")
         if self.events:
-            reasons.append("events: only those of specimens are known one by one; leave it out")
+            reasons.append(
+                "events: leave it out, arrested events are listed for specimens only"
+            )
         return reasons
 
     def bounded_by_strength(self, problem: Problem, event: str) -> tuple[bool, bool]:
         """Return whether strength bounds the stress of an event from below and from above.
 
-        A rupture begins at a largest mean stress, however the load moves: none is below the
-        stress of the first slip. Specimens are in equilibrium up to each event.
+        A rupture begins at a maximum of the mean stress, which is not below the stress of the first
+        slip. Specimens are in equilibrium up to each event.
         """
         if problem.specimen is None:
             return True, False
@@ -240,17 +244,17 @@ class Rupture:
         return certain, certain
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
-        """Return the variables that the solver computes for each sample."""
+        """Return the variables of the solver's results."""
         if problem.specimen is not None:
             return specimens.variables(self, problem)
         return onset_variables(problem.interface) | scalars(problem.interface)
 
     def medium(self, problem: Problem) -> Medium:
-        """Return kernel and tables for a problem."""
+        """Return memory kernel and tables of a problem between half-spaces."""
         return prepare_medium(problem, self.kernel_tolerance, self.courant)
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, NDArray[Any]]]:
-        """Return a solver for samples of this problem, with its kernel fitted once."""
+        """Return the solver of samples of a problem, with the memory kernel fitted once."""
         if problem.specimen is not None:
             return specimens.RuptureSolver(problem, self.events, self.program(problem))
         medium, rate = self.medium(problem), self.loading_rate
@@ -271,14 +275,14 @@ class Rupture:
         return solve
 
     def program(self, problem: Problem) -> specimens.RuptureProgram:
-        """Return what finds equilibria of a specimen, with waves between them."""
+        """Return the search for equilibria of a specimen, with waves between them."""
         if reasons := refusals(problem, self):
             raise InputError(reasons)
         return specimens.RuptureProgram(problem, self)
 
     def _summary_of(self, run: Run, state: RuptureState | None) -> dict[str, Any]:
         rest = checks.at_first_slip(run)
-        if rest is None:  # nothing slips: the state at the end of the load is the last
+        if rest is None:  # no node slips: the result is the state at rest at the end
             state = run.start(min(run.setting.load.at[-1], run.setting.thresholds.end_time))
         else:
             state = rest if state is None else state
@@ -288,7 +292,7 @@ class Rupture:
                 raise InputError(
                     f"max_steps: {self.max_steps} steps led to tau_0 = {state.now['load']:.6g} Pa,"
                     f" and {state.now['weakened_nodes']} nodes to their residual strength, but not"
-                    f" to stop={self.stop!r}; raise max_steps or the loading rate"
+                    f" to stop={self.stop!r}. Raise max_steps or the loading rate"
                 )
         checks.warn_of_slip(run, state)
         values = summary(run, state)
@@ -305,7 +309,7 @@ def make_run(
     sample: int,
     stations: NDArray[np.int64] | None = None,
 ) -> Run:
-    """Return the run of one sample, which records what happens at some nodes."""
+    """Return the run of a sample, which records every step at the nodes `stations`."""
     strength, residual = rows.strength[sample], rows.residual_strength[sample]
     weakening, initial = rows.weakening_rate[sample], rows.initial_stress[sample]
     friction, finite = medium.problem.friction, np.isfinite(strength)
@@ -313,8 +317,8 @@ def make_run(
         critical = friction.reach * friction.critical_slip_of(strength - residual, weakening)
     if not np.all(np.isfinite(critical[finite])):
         raise InputError(
-            f"friction: a weakening rate of {weakening.min():.3g} Pa/m takes infinitely much slip;"
-            " check its unit"
+            f"friction: a weakening rate of {weakening.min():.3g} Pa/m needs infinite slip."
+            " Check its unit"
         )
     profiles = (strength, residual, weakening, critical, rows.load_profile, initial)
     nodes = Nodes(*(np.array(values, dtype=np.float64).ravel() for values in profiles))
@@ -340,9 +344,9 @@ def make_run(
 
 
 def _least_load(medium: Medium, nodes: Nodes, steepest: float) -> float:
-    """Return the mean load, Pa, at which the weakest nodes of half a nucleation length slip."""
+    """Return the mean load at which the weakest nodes of half a nucleation length slip, Pa."""
     interface = medium.interface
-    # Of a line, or on a plane along x times along y.
+    # Half the nucleation length of a line. On a plane, half the lengths along x and y multiplied.
     half = float(np.prod(medium.problem.half_spaces.nucleation_lengths(2.0 * steepest)))
     weakens = np.isfinite(nodes.strength) & (nodes.critical > 0.0)
     loads = ((nodes.strength - nodes.initial) / nodes.profile)[weakens]
@@ -353,15 +357,14 @@ def _least_load(medium: Medium, nodes: Nodes, steepest: float) -> float:
 def _thresholds(
     method: Rupture, medium: Medium, nodes: Nodes, load: PiecewiseLinear
 ) -> Thresholds:
-    """When steps change or end.
+    """Return the thresholds at which steps change or end.
 
-    Calm: for as long as shear waves need to cross the interface, nothing slips faster than
-    a crack of half its length does when the load alone drives it, or nothing faster than
-    before.
+    A run is calm if, while shear waves cross the interface, no node slips faster than a crack of
+    half the length of the interface driven by the load alone, or no node faster than before.
     """
     friction, finite = medium.problem.friction, np.isfinite(nodes.strength)
     held = not finite.all()
-    stress = load.values[-1] * nodes.profile + nodes.initial  # at the end, and on from there
+    stress = load.values[-1] * nodes.profile + nodes.initial  # at the end of the samples
     unloaded = load.values[-1] < load.values[-2] or stress.mean() < nodes.residual.mean()
     rests_later = method.stop == "rest" and unloaded and not held
     frequency = medium.grid.frequency

@@ -1,4 +1,7 @@
-"""Stored results of a rupture: frames, the record of every step, and a folder on disk."""
+"""Stored results of a rupture: frames, the record of every step, and a folder on disk.
+
+A folder holds files of frames, a checkpoint from which the run resumes, and at the end a summary.
+"""
 
 from __future__ import annotations
 
@@ -40,14 +43,14 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MAX_FRAME_BYTES = 2**36
-"""Of a file of frames."""
+"""Largest file of frames, bytes."""
 FRAMES_PER_FILE = 64
-_MAX_STEPS_PER_FILE = 50_000  # recorded between frames that lie far apart
+_MAX_STEPS_PER_FILE = 50_000  # steps between frames that lie far apart
 _CHECKPOINT, _SUMMARY, _FRAME_FILES = "checkpoint.npz", "summary.nc", "frames-*.nc"
 
 
 def _over(*dims: str, **meanings: tuple[str, str]) -> dict[str, Variable]:
-    """Return variables with these dimensions, by name, from their units and meaning."""
+    """Return variables over dimensions, by name, from (units, meaning)."""
     return {name: Variable(*meaning, dims) for name, meaning in meanings.items()}
 
 
@@ -99,24 +102,24 @@ Place = Annotated[
 
 @model
 class Save:
-    """Results that `simulate_rupture` keeps, and where it stores them.
+    """Results that `simulate_rupture` keeps, and the place where it stores them.
 
     Parameters
     ----------
     fields : sequence of {"slip", "slip_rate", "shear_stress", "strength"}
         Fields to keep in frames.
     every : int
-        Explicit steps between frames; while the interface creeps, a tenth as many implicit
-        steps (at least one). Steps shorten as it accelerates, so that frames are dense in
-        time around the onset.
+        Explicit steps between frames. While the interface creeps, a frame follows after a tenth as
+        many implicit steps, at least one. Steps shorten as slip accelerates, so that frames are
+        dense in time around the onset.
     stations : mapping of str to float or (float, float)
-        Names and places x, on a plane (x, y), in m, where slip, slip rate and shear stress
-        (traction) are recorded after every step. The node nearest to a place is taken.
+        Names and places of stations, x or on a plane (x, y), m. Slip, slip rate and shear stress
+        (traction) are recorded after every step at the node nearest to the place.
     to : path, optional
-        Folder to write to during the run. Memory then stays bounded and the result holds no
-        fields; `stiction.methods.dynamics.save.open_rupture` reads them. If the folder
-        holds the same run, interrupted, it resumes from the last state written, and every
-        number is the same, to the bit, as without the interruption. A finished run is read.
+        Folder to write to during the run. Memory then stays bounded, and the result holds no
+        fields; read them with `stiction.methods.dynamics.save.open_rupture`. If the folder holds
+        the same run, interrupted, the run resumes from the last state written, with results equal
+        to the bit. If it holds the same run, finished, the run is read.
 
     Examples
     --------
@@ -137,14 +140,14 @@ class Save:
         return self
 
     def nodes(self, interface: Interface) -> NDArray[np.int64]:
-        """Return the numbers of the stations' nodes, flat; refuse those not on the interface."""
+        """Return the flat node numbers of the stations, which must lie on the interface."""
         lengths, numbers = interface.lengths, []
         for name, place in self.stations.items():
             x = np.array(place)
             if x.size != len(lengths) or not np.all((x >= 0.0) & (x <= lengths)):
                 reach = " x ".join(f"{length:g}" for length in lengths)
                 raise InputError(
-                    f"stations[{name!r}]: {place} is not on the interface of {reach} m; give"
+                    f"stations[{name!r}]: {place} is not on the interface of {reach} m. Give"
                     f" {' and '.join(interface.dims)} in m, from the first node"
                 )
             index = tuple(np.round(x / interface.spacings).astype(int) % interface.shape)
@@ -153,12 +156,12 @@ class Save:
 
 
 class Recorder:
-    """Frames and step records gathered so far, and their folder if there is one."""
+    """Frames and step records of a run, kept in memory or written to a folder."""
 
     def __init__(self, run: Run, save: Save, attributes: dict[str, Any]) -> None:
         self.run, self.save, self.attributes = run, save, attributes
         interface = run.medium.interface
-        self._saved = repr([save.fields, save.stations])  # a folder depends on it, too
+        self._saved = repr([save.fields, save.stations])  # part of the digest of a folder
         rows, stations = save.every, len(save.stations)
         self._record = StepRecord(
             np.empty(rows, DIAGNOSTICS), np.empty((rows, stations), STATION)
@@ -175,7 +178,7 @@ class Recorder:
         }
 
     def take_steps(self, state: RuptureState, count: int) -> tuple[int, int]:
-        """Take up to `count` steps and record them; return (steps taken, why it returned)."""
+        """Take up to `count` steps and record them. Return (steps taken, reason)."""
         record = StepRecord(*(rows[:count] for rows in self._record))
         taken, reason = self.run.take_steps(state, count, record)
         self._steps.append(
@@ -184,7 +187,7 @@ class Recorder:
         return taken, reason
 
     def add(self, state: RuptureState) -> None:
-        """Keep a frame of the state as it is now."""
+        """Keep a frame of the present state."""
         run, now, medium = self.run, state.now, self.run.medium
         frame: dict[str, Any] = {name: float(now[name]) for name in _FROM_DIAGNOSTICS}
         frame |= {
@@ -207,11 +210,11 @@ class Recorder:
         self._frames.append(frame)
 
     def take(self) -> xr.Dataset:
-        """Return the data gathered since the last call as a dataset."""
+        """Return the data since the last call as a dataset."""
         interface, save = self.run.medium.interface, self.save
         names = ("time", *SCALARS, *save.fields)
         data = {name: np.array([frame[name] for frame in self._frames]) for name in names}
-        shape = len(self._frames), *interface.shape  # also if there are none
+        shape = len(self._frames), *interface.shape  # also without frames
         data |= {name: data[name].reshape(shape) for name in save.fields}
         for name, column in self._columns.items():
             data[name] = np.concatenate([column[:0], *(steps[name] for steps in self._steps)])
@@ -228,9 +231,9 @@ class Recorder:
         return to_dataset(data, self.variables, coordinates, self.attributes)
 
     def begin(self, state: RuptureState) -> bool:
-        """Open the folder; return whether it holds this very run up to its end.
+        """Open the folder, and return whether it holds the same run, finished.
 
-        If it holds a part of the run, the state becomes that which was written last.
+        If it holds a part of the same run, the state takes the values that were written last.
         """
         folder = self.save.to
         if folder is None:
@@ -238,26 +241,27 @@ class Recorder:
         checkpoint = folder / _CHECKPOINT
         if not checkpoint.exists():
             present = folder.iterdir() if folder.is_dir() else [folder] * folder.exists()
-            # A run that was killed in its first write leaves a part of it.
+            # A run that was killed in its first write leaves a partial file.
             if any(path.suffix != PART for path in present):
                 raise InputError(
-                    f"to: {str(folder)!r} is not empty and holds no rupture; give a new folder"
+                    f"to: {str(folder)!r} is not empty and holds no rupture. Give a new folder"
                 )
             write_checkpoint(checkpoint, self.run, state, self._saved)
             return False
         read_checkpoint(checkpoint, self.run, state, self._saved)
         if (folder / _SUMMARY).exists():
             return True
+        # Frames after the checkpoint will be computed again.
         for path in folder.glob(_FRAME_FILES):
             if int(path.stem.removeprefix("frames-")) > state.steps:
                 path.unlink()
         return False
 
     def flush(self, state: RuptureState, *, at_once: bool = False, last: bool = False) -> None:
-        """Write what was gathered, if there is enough or at once, and the state to resume from.
+        """Write frames and steps, once there are enough or `at_once`, and the checkpoint.
 
-        The last state is not written: a run that goes on may have no frame where
-        `max_steps` ended it.
+        With `last` there is no checkpoint: a run that resumes with more steps may have no frame at
+        the step at which `max_steps` ended it.
         """
         folder, steps = self.save.to, sum(rows["step_time"].size for rows in self._steps)
         full = len(self._frames) >= FRAMES_PER_FILE or steps >= _MAX_STEPS_PER_FILE
@@ -268,7 +272,7 @@ class Recorder:
             write_checkpoint(folder / _CHECKPOINT, self.run, state, self._saved)
 
     def finish(self, dataset: xr.Dataset, stopped: str) -> None:
-        """Write the variables of the whole run beside its frames, unless it can go on."""
+        """Write the variables of the whole run beside its frames, unless the run can go on."""
         if self.save.to is not None and stopped != "max_steps":
             without_time = dataset.drop_dims(["time", "step"], errors="ignore")
             _write(self.save.to / _SUMMARY, without_time)
@@ -279,10 +283,10 @@ def _write(path: Path, dataset: xr.Dataset) -> None:
 
 
 def _digest(run: Run, saved: str) -> str:
-    """SHA-256 of all that a run depends on besides its state."""
+    """Return the SHA-256 of all that a run depends on besides its state."""
     medium, setting = run.medium, run.setting
     grid = medium.grid
-    slips = np.linspace(0.0, 5.0, 101)  # where laws are compared, in units of d_c
+    slips = np.linspace(0.0, 5.0, 101)  # at which laws are compared, in units of d_c
     law = np.concatenate([medium.problem.friction.fraction(slips), *map(np.ravel, setting.law)])
     texts = [medium.interface, float(medium.step), saved, DIAGNOSTICS]
     digest = hashlib.sha256(repr(texts).encode())
@@ -295,13 +299,13 @@ def _digest(run: Run, saved: str) -> str:
 
 
 def write_checkpoint(path: Path, run: Run, state: RuptureState, saved: str = "") -> None:
-    """Save the state of a run and a digest of all that it depends on, whole or not at all."""
+    """Write the state of a run and its digest, in a single operation."""
     digest = np.frombuffer(_digest(run, saved).encode(), np.uint8)
     write_arrays(path, {"digest": digest} | state._asdict())
 
 
 def read_checkpoint(path: Path, run: Run, state: RuptureState, saved: str = "") -> RuptureState:
-    """Fill a state of this very run with the content of a checkpoint, and return it."""
+    """Fill a state with a checkpoint of the same run, and return it."""
     try:
         arrays = read_arrays(path)
         digest = arrays["digest"].tobytes().decode()
@@ -311,28 +315,27 @@ def read_checkpoint(path: Path, run: Run, state: RuptureState, saved: str = "") 
     if digest != _digest(run, saved):
         raise InputError(
             f"to: {str(path.parent)!r} holds another run: the problem, the profiles, the load, "
-            "the method, or what is kept differs; give a new folder"
+            "the method or the saved results differ. Give a new folder"
         )
     for array, values in zip(state, stored, strict=True):
-        array[...] = values  # in place: the arrays lie where steps want them
+        array[...] = values  # in place, which keeps the alignment of the arrays
     return state
 
 
 @checked
 def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset:
-    """Read a run that `Save.to` names, also one that is still going on or was cut short.
+    """Read a run from the folder of `Save.to`, even if it is unfinished.
 
     Parameters
     ----------
     folder : path
     fields : sequence of str, optional
-        Fields over ('time', 'x'), or ('time', 'x', 'y'), to load; all that were kept if
-        left out.
+        Fields over ('time', 'x'), or ('time', 'x', 'y'), to load. By default all fields are loaded.
 
     Returns
     -------
     xarray.Dataset
-        As from `simulate_rupture`; what belongs to the run as a whole once it has ended.
+        The dataset of `simulate_rupture`. Variables of the whole run are there once it has ended.
 
     Raises
     ------
@@ -363,6 +366,6 @@ def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset
 
 
 def _read(path: Path, unwanted: Collection[str] = ()) -> xr.Dataset:
-    """Return a file of a folder, which may come from a stranger."""
+    """Return the dataset of a file, which may come from a stranger."""
     with prefixed(str(path)):
         return read_netcdf(content_of(path, max_bytes=MAX_FRAME_BYTES), unwanted)

@@ -1,4 +1,4 @@
-"""Ruptures as text of the SCEC code comparison: a file for each station, and rupture times."""
+"""Ruptures as text files of the SCEC code comparison: one for each station, and rupture times."""
 
 from pathlib import Path
 from typing import Any
@@ -8,9 +8,9 @@ import numpy as np
 from stiction.base.errors import InputError
 
 STATION_UNITS = {"slip": 1.0, "slip_rate": 1.0, "shear_stress": 1e6}
-"""Variables of a station, and the SI value of the unit in which a file has them."""
+"""Variables of a station, and their units in a file in SI."""
 UNBROKEN_TIME = 1e9
-"""Rupture time of nodes that do not break, s, in files of the comparison."""
+"""Rupture time of nodes that do not break in files of the comparison, s."""
 COLUMN_TITLES = ("slip (m)", "slip rate (m/s)", "shear stress (MPa)")
 COLUMN_NAMES = "t h-slip h-slip-rate h-shear-stress v-slip v-slip-rate v-shear-stress n-stress"
 
@@ -18,29 +18,29 @@ COLUMN_NAMES = "t h-slip h-slip-rate h-shear-stress v-slip v-slip-rate v-shear-s
 def write_scec(
     run: Any, folder: Any, *, origin: Any, normal_stress: float, benchmark: str = "TPV3"
 ) -> list[Path]:
-    """Write the stations and rupture times of a run as SCEC collects them (Harris et al., 2009).
+    """Write the stations and rupture times of a run in the format of SCEC (Harris et al., 2009).
 
-    Along strike is x, the direction of slip, and down-dip is y; on lines y is 0. Slip has
-    no vertical component.
+    The direction along strike is x, the direction of slip, and the direction down-dip is y. On
+    lines y is 0. Slip has no vertical component.
 
     Parameters
     ----------
     run : xarray.Dataset
-        From `simulate_rupture`, with slip, slip rate and shear stress kept, and stations.
+        Result of `simulate_rupture` with slip, slip rate and shear stress, and with stations.
     folder : path
     origin : float or (float, float)
-        Place on the interface, m, from which distances count.
+        Origin of distances on the interface, m.
     normal_stress : float
-        Pa, negative in compression.
+        Normal stress, Pa, negative in compression.
     benchmark : str
         Name of the problem, for the headers.
 
     Returns
     -------
     list of pathlib.Path
-        ``faultst075dp045.txt`` of a station 7.5 km along strike and 4.5 km down-dip, ...,
-        and ``cplot.txt`` with the distances j and k (m) and the rupture time t (s), 1e9 for
-        never.
+        A file for each station, such as ``faultst075dp045.txt`` for 7.5 km along strike and 4.5 km
+        down-dip, and ``cplot.txt`` with the distances j and k (m) and the rupture time t (s), 1e9
+        for nodes that do not break.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def write_scec(
     ]
     if lacking:
         raise InputError(
-            f"run: lacks {', '.join(lacking)}; give simulate_rupture save=st.Save("
+            f"run: lacks {', '.join(lacking)}. Give simulate_rupture save=st.Save("
             f"{list(STATION_UNITS)}, stations=...)"
         )
     dims = run.arrival_time.dims

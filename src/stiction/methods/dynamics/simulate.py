@@ -1,4 +1,4 @@
-"""simulate_rupture: one rupture in space and time."""
+"""`simulate_rupture`: a rupture in space and time."""
 
 from __future__ import annotations
 
@@ -41,53 +41,52 @@ def simulate_rupture(
     event: Number | None = None,
     progress: Progress = True,
 ) -> xr.Dataset:
-    """Simulate one interface from its first slip to global sliding, in space and time.
+    """Simulate an interface from its first slip to global sliding, in space and time.
 
-    On a specimen, one of its events: from an unstable equilibrium until all is at rest.
+    On a specimen, simulate an event from an unstable equilibrium until all is at rest.
 
     Parameters
     ----------
     problem : Problem
     profiles : array, mapping of arrays, xarray.Dataset or Sample
-        Peak strength (Pa) of one sample, infinite where nothing ever breaks, or several
-        profiles by name, as in `onset`. Where the initial stress is above the strength,
-        slip begins at once.
+        Peak strength (Pa) of a single sample, infinite at nodes that never break, or several
+        profiles by name, as in `onset`. If the initial stress is above the strength, slip begins
+        at once.
     method : Rupture
         Load, numerical options and end of the run. The run begins at the first slip,
         regardless of `start`, and keeps its results if `max_steps` ends it.
     save : Save, optional
-        Results to keep and where to store them: by default slip, slip rate and shear stress
-        every ten explicit steps, in memory.
+        Results to keep and the place to store them. By default, slip, slip rate and shear stress
+        are kept every ten explicit steps, in memory.
     event : int, optional
-        On specimens, the number of the event in its order, from 0; by default the one that
-        slides.
+        On specimens, the number of the event in order, from 0. By default it is the sliding event.
     progress : bool or callable
-        True shows progress on standard error after a second; a callable gets the steps taken
+        True shows progress on standard error after a second. A callable gets the steps taken
         and 0.
 
     Returns
     -------
     xarray.Dataset
-        Over ('time', 'x') the fields; over 'time' `load`, `mean_stress`, `mean_slip`,
-        `top_slip_rate`, `weakened_fraction`, `seismic_moment`, `work` and energies; over
-        'step' some of these at every step, with `step_time`; over ('step', 'station')
-        `station_slip`, `station_slip_rate` and `station_shear_stress`, and `station_x` (and
-        `station_y`), where their nodes are; over 'x' `peak_strength` and `arrival_time`;
-        and the scalars of `Rupture` for the run so far. The attribute `stopped` is the
-        reason why it ended.
+        Over ('time', 'x'): the fields. Over 'time': `load`, `mean_stress`, `mean_slip`,
+        `top_slip_rate`, `weakened_fraction`, `seismic_moment`, `work` and energies. Over 'step':
+        `step_time`, and some of the above after every step. Over ('step', 'station'):
+        `station_slip`, `station_slip_rate` and `station_shear_stress`. Over 'station':
+        `station_x` (and `station_y`), the places of the nodes. Over 'x': `peak_strength` and
+        `arrival_time`. The scalars of `Rupture` refer to the run so far. The attribute `stopped`
+        is the reason why the run ended.
 
-        On a specimen, over 'time' also `machine_stress` (with a thickness `machine_force`,
-        N), `drive_travel` and energies of their own, from the stress at which the event
-        began; and `block_velocity` over ('snapshot', 'height', 'x'), m/s along x in the
-        upper block at a few times. The lower block is its mirror image and moves the other
-        way. There is no 'step'.
+        On a specimen, there are also `machine_stress` (with a thickness `machine_force`, N) and
+        `drive_travel` over 'time', and energies relative to the stress at which the event began.
+        `block_velocity` over ('snapshot', 'height', 'x') is the velocity along x in the upper
+        block (m/s) at a few times. The lower block is its mirror image and moves the opposite way.
+        There is no 'step'.
 
     Raises
     ------
     InputError
-        If any argument is invalid; the message lists every problem.
+        If any argument is invalid. The message lists every mistake.
     StoreError
-        If `save.to` cannot be written; what was written stays readable.
+        If `save.to` cannot be written. Frames that were written stay readable.
 
     Examples
     --------
@@ -104,13 +103,13 @@ def simulate_rupture(
         raise InputError(refused)
     rows, measured = problem.placed_sample(profiles, method.accepts)
     if rows.samples != 1:
-        raise InputError(f"profiles: one sample at a time, got {rows.samples}")
+        raise InputError(f"profiles: must be one sample, got {rows.samples}")
     problem.doubt(rows)
     if problem.specimen is not None:
         result = simulate_event(problem, rows, method, save, event, progress)
         return with_gaps(problem, result, measured)
     if event is not None:
-        raise InputError("event: is of specimens only; leave it out")
+        raise InputError("event: leave it out, only specimens have numbered events")
     stations = save.nodes(problem.interface)
     checks.warn_if_coarse(problem, rows)
     run = make_run(method, method.medium(problem), rows, 0, stations)
@@ -118,7 +117,7 @@ def simulate_rupture(
     if state is None:
         raise InputError(
             f"load: does not reach the first slip, tau_0 = {run.first_load:.6g} Pa, before the run"
-            " ends; raise the load, Load.initial_stress where slip should begin, or end_time"
+            " ends. Raise the load, Load.initial_stress where slip should begin, or end_time"
         )
     attributes = study_attributes(problem=problem, method=method)
     recorder = Recorder(run, save, attributes | {"stopped": "running"})
@@ -143,7 +142,7 @@ def simulate_rupture(
 def _record_to_end(
     run: Run, state: RuptureState, recorder: Recorder, max_steps: int, meter: Meter
 ) -> str:
-    """Take steps and keep frames until the run ends; return the reason."""
+    """Take steps and keep frames until the run ends. Return the reason."""
     interval = recorder.save.every
     while state.steps < max_steps:
         count = interval if state.explicit else max(1, interval // 10)
@@ -171,7 +170,7 @@ def _record_to_end(
 def _complete(
     dataset: xr.Dataset, method: Rupture, run: Run, state: RuptureState
 ) -> xr.Dataset:
-    """Add the variables of the whole run."""
+    """Return a dataset with the variables of the whole run added."""
     problem, interface = run.medium.problem, run.medium.interface
     variables = {name: along(interface, variable) for name, variable in _ALONG.items()}
     for name, variable in method.variables(problem).items():
@@ -182,6 +181,6 @@ def _complete(
     }
     with np.errstate(over="ignore", invalid="ignore"):  # after a run that became non-finite
         values |= summary(run, state)
-    # Energies and moment are already there over 'time'; their last value is the total.
+    # Energies and moment are there already, over 'time'. Their last value is the total.
     added = {name: value for name, value in values.items() if name not in SCALARS}
     return dataset.merge(to_dataset(added, variables, {}, {}, interface))

@@ -1,4 +1,9 @@
-"""simulate_rupture on specimens: one event in space and time, and the block while it runs."""
+"""`simulate_rupture` on specimens: an event in space and time, and the velocity of the block.
+
+1. Follow the path of the sample to sliding, and choose the event.
+2. Run the event once as a trial, which shows how long it takes and how much slips.
+3. Run it again and keep frames, with pictures of the block spread evenly over the slip.
+"""
 
 from __future__ import annotations
 
@@ -31,21 +36,21 @@ if TYPE_CHECKING:
     import xarray as xr
 
 PICTURE_SHARES = (0.02, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95)
-"""Shares of the slip of an event at which the velocities of the whole block are kept."""
+"""Shares of an event's slip at which the velocities of the whole block are kept."""
 OVER_TIME: dict[str, Variable] = {
     name: SCALARS[name]
     for name in ("load", "mean_stress", "mean_slip", "top_slip_rate", "weakened_fraction")
 } | {
-    "machine_stress": Variable("Pa", "force of the machine over the interface", ("time",)),
+    "machine_stress": Variable("Pa", "force of the machine per area of interface", ("time",)),
     "drive_travel": Variable("m", "travel of both drives since the event began", ("time",)),
     "work": Variable("J/m", "work of the stress before the event on the slip", ("time",)),
     "friction_energy": Variable("J/m", "energy lost to friction", ("time",)),
     "strain_energy": Variable(
-        "J/m", "strain energy of what changed, and the machine's", ("time",)
+        "J/m", "strain energy of the changes in blocks and machine", ("time",)
     ),
     "kinetic_energy": Variable("J/m", "kinetic energy of blocks and drives", ("time",)),
     "attenuated_energy": Variable(
-        "J/m", "work less all of these: lost to attenuation", ("time",)
+        "J/m", "energy lost to attenuation, the rest of the work", ("time",)
     ),
 }
 OF_EVENT: dict[str, Variable] = {
@@ -60,31 +65,31 @@ BLOCK_DIMS = ("snapshot", "height", "x")
 def simulate_event(
     problem: Problem, rows: Sample, method: Any, save: Save, number: int | None, progress: Show
 ) -> xr.Dataset:
-    """Return one event of a specimen over time, by default the one that slides."""
+    """Return an event of a specimen over time, by default the sliding event."""
     if save.to is not None or save.stations:
         raise InputError(
-            "save: an event on a specimen is kept in memory, with all nodes; leave 'to' and"
-            " 'stations' out"
+            "save: leave 'to' and 'stations' out, as an event on a specimen is kept in memory with"
+            " all nodes"
         )
     refuse_overstress(rows)
     program: RuptureProgram = method.program(problem)
     sample = sample_of(rows, program.pieces, 0)
     with Meter("rupture", show=progress, unit="events") as meter:
-        path = follow_to_sliding(program, sample)
+        path = follow_to_sliding(program, sample)  # 1.
         states = [event.before for event in path.events]
         states += [path.last] if path.last.unstable else []
         meter.advance(len(states))
         if not states:
-            raise InputError("problem: nothing becomes unstable behind so stiff a machine")
+            raise InputError("problem: the machine is so stiff that no patch becomes unstable")
         if (number or 0) >= len(states):
             raise InputError(
-                f"event: there are {len(states)} here, counted from 0; got {number}"
+                f"event: must be below the number of events, {len(states)}, got {number}"
             )
         before = states[-1 if number is None else number]
-        trial = program.event(sample, before)
+        trial = program.event(sample, before)  # 2.
         trial.run(method.max_steps)
         steps = trial.steps + (trial.mesh.window // 2 if trial.slides else 0)
-        record = EventRecord(problem, rows, program.event(sample, before), save, trial)
+        record = EventRecord(problem, rows, program.event(sample, before), save, trial)  # 3.
         record.add()
         for _ in range(0, steps, save.every):
             record.event.take_steps(save.every, ends=False)
@@ -93,8 +98,10 @@ def simulate_event(
 
 
 class EventRecord:
-    """Frames of an event so far. A trial of it has shown how much slips, so that pictures of the
-    block can be spread evenly over the slip."""
+    """Frames of an event so far, with pictures of the block.
+
+    A trial of the event shows how much slips, so that the pictures are spread evenly over the slip.
+    """
 
     def __init__(
         self,
@@ -114,7 +121,7 @@ class EventRecord:
         self._begun = event.waves.slip.copy()
 
     def add(self) -> None:
-        """Keep the state as it is now."""
+        """Keep a frame of the present state, and a picture of the block if it is due."""
         problem, waves, sample = self.problem, self.event.waves, self.event.sample
         initial, load = self.rows.initial_stress[0], self.event.before.load
         pieces = present_pieces(sample, waves.slip)
@@ -144,7 +151,8 @@ class EventRecord:
             self.blocks.append((waves.now[NOW], waves.u_rate.copy()))
 
     def _energies(self) -> dict[str, float]:
-        """Energies of both blocks, J/m, in the middle of the last step, where rates are known."""
+        """Return the energies of both blocks, J/m, in the middle of the last step."""
+        # Rates are known in the middle of a step, and displacements at its end.
         mesh, waves = self.event.mesh, self.event.waves
         rates = np.hstack([waves.u_rate, waves.v_rate]).astype(float)
         lag = mesh.viscous_time + 0.5 * mesh.step

@@ -2,30 +2,29 @@
 
 Problem
 -------
-While the load tau_0 rises slowly at the rate R, slip follows the equilibria d(tau_0).
-Wanted is the state of the run at a load tau_c - D, a distance D below the onset tau_c,
-without the steps that lead there: slip, slip rate and memory variables. A run from it
-should have the same onset.
+While the load tau_0 rises slowly at the rate R, slip follows the equilibria d(tau_0). Find the
+state of the run (slip, slip rate and memory variables) at a load tau_c - D, a distance D below the
+onset tau_c, without the steps that lead there. A run from this state must have the same onset.
 
-Algorithm
----------
-Asymptotics of a fold: near the onset, the distance of slip from its limit falls as (tau_c -
-tau_0)^(1/2), so that the slip rate V = R dd/dtau_0 grows as exp(a t) with a = R/(2 D).
+Algorithm: our own
+------------------
+Asymptotics of a fold: near the onset, the distance of slip from its limit falls as
+(tau_c - tau_0)^(1/2), so the slip rate V = R dd/dtau_0 grows as exp(a t) with a = R/(2 D).
 
-1. Find the onset tau_c by equilibrium. Begin with a distance in which shear waves cross the
+1. Find the onset tau_c by equilibrium. Begin with a distance D in which shear waves cross the
    nucleation length `_CROSSINGS` times.
-2. At the distance D: find the equilibria at tau_c - D and a little before; their difference
-   gives the mean slip rate, and its growth the slip rate V at tau_c - D (`_state_at`).
-3. Slip that grows as exp(a t) leaves in each memory variable, psi' = z psi + V with
-   z = s_p |k| c_s, a permanent part psi = V/(a - z) (`memory.grown_memory`).
-4. The load is raised by what the mean slip rate radiates, Z <V>/<p>. Then stress that
-   follows V without delay needs no further force, and the remaining stress is inertia (the
-   kernel is even in a but for the radiation of the mean).
-5. The stress by which the state misses the strength where it slips estimates the error. It
-   is the error of the state and, as a stress, the amount by which the onset can be
-   misplaced. If it is more than `_MAX_ERROR` of the stress scale, try again from 2 further
-   away: V falls as D^(-1/2), its second derivative as D^(-5/2).
-6. Give up, and begin at rest, after `_MAX_TRIALS` or where no state is known well enough.
+2. Find the equilibria at tau_c - D and a little before. Their difference gives the mean slip rate,
+   and its growth the slip rate V at tau_c - D (`_state_at`).
+3. Slip that grows as exp(a t) leaves a permanent part psi = V/(a - z) in each memory variable,
+   psi' = z psi + V with z = s_p |k| c_s (`memory.grown_memory`).
+4. Raise the load by the radiation of the mean slip rate, Z <V>/<p>. Then stress that follows V
+   without delay needs no further force, and the remaining stress is inertia (the kernel is even
+   in a, except for the radiation of the mean).
+5. At the slipping nodes, the difference of stress and strength estimates the error of the state,
+   and as a stress the amount by which the onset may be misplaced. If it is more than `_MAX_ERROR`
+   of the stress scale, go to 2 with a larger D: V falls as D^(-1/2), its second derivative as
+   D^(-5/2).
+6. Give up after `_MAX_TRIALS`, or if no state is known well enough. The run then begins at rest.
 """
 
 import numpy as np
@@ -41,12 +40,12 @@ from stiction.problem.sample import Sample
 
 _MAX_ERROR = 2e-5  # share of the stress scale: a fifth of the fall that counts as an event
 _CROSSINGS = 10.0  # times shear waves cross h_n between the first trial and the onset
-_RATE_SHARE = 0.25  # of the distance to the onset, over which the mean rate is measured
+_RATE_SHARE = 0.25  # share of the distance to the onset over which the mean rate is measured
 _MAX_TRIALS = 5
 
 
 def static_program(problem: Problem) -> DenseProgram | None:
-    """Return the programme for equilibria of a problem; None where they are not followed."""
+    """Return the search for equilibria of a problem, or None on planes and for curved laws."""
     if problem.interface.is_plane or refused(problem.friction):
         return None
     return DenseProgram(problem)
@@ -55,7 +54,10 @@ def static_program(problem: Problem) -> DenseProgram | None:
 def slow_start(
     program: DenseProgram, run: Run, rows: Sample, number: int, rate: float
 ) -> RuptureState | None:
-    """Return the state closest to the onset whose error is small enough, None if there is none."""
+    """Return the state closest to the onset with a small error, or None if there is no such state.
+
+    `number` is the row of the sample, `rate` the loading rate (Pa/s).
+    """
     nodes = run.setting.nodes
     if not np.all(np.isfinite(nodes.strength)) or np.any(nodes.strength <= nodes.initial):
         return None
@@ -70,7 +72,7 @@ def slow_start(
     )
     distance = max(_CROSSINGS * crossing * rate, 1e-6 * allowed)
     for _ in range(_MAX_TRIALS):
-        if onset.load - (1.0 + _RATE_SHARE) * distance <= run.first_load:
+        if onset.load - (1.0 + _RATE_SHARE) * distance <= run.first_load:  # 6.
             return None
         state = _state_at(program, run, static, onset.load, distance, rate)
         # 5. Close enough, or a greater distance.
@@ -80,7 +82,7 @@ def slow_start(
             return state
         else:
             distance *= 1.2 * (state.now["start_error"] / allowed) ** 0.4
-    return None
+    return None  # 6.
 
 
 def _state_at(
@@ -91,11 +93,10 @@ def _state_at(
     distance: float,
     rate: float,
 ) -> RuptureState | None:
-    """Steps 2 to 5: the state at a distance (Pa) below the onset; None where it is not known.
+    """Steps 2 to 5: return the state at a distance (Pa) below the onset; None if it is unknown.
 
-    It is not known well enough where a node is beyond the first piece of its law, so that
-    the linear programme does not hold, or where a front has arrived at a time that would be
-    unknown.
+    It is unknown if a node is beyond the first piece of its law, where the linear programme does
+    not hold, or if a front has arrived, since the time of arrival is not known.
     """
     nodes, grid = run.setting.nodes, run.medium.grid
     # 2. Two equilibria, and the slip rate between them.
@@ -120,7 +121,7 @@ def _state_at(
     stress = run.elastic_stress(state.slip_hat, applied)
     stress += run.medium.interface.inverse_transform(grid.stiffness[1] * memory)
     stress -= run.medium.impedance * slip_rate
-    # 5. The stress that is missed estimates the error.
+    # 5. The difference of stress and strength estimates the error.
     missed = np.abs(stress - run.strength_after(present.slip))[present.slip > 0.0]
     state.rate[:], state.past[:], state.stress[:] = slip_rate, mean_rate, stress
     now = state.now
@@ -129,7 +130,7 @@ def _state_at(
     for name in ("mean_stress", "whole_stress", "maximum_stress", "maximum_breakable"):
         now[name] = stress.mean()
     now["maximum_radiated"] = now["previous_radiated"] = radiated
-    # The slow path has radiated nothing: that is the work that was done on it.
+    # The slow path radiates no energy. Set its work so that the balance gives zero.
     now["work"] -= energy_balance(run, state)["radiated_energy"]
     now["start_error"] = missed.max(initial=0.0)
     return state

@@ -1,21 +1,19 @@
-"""Ruptures on specimens: the path of equilibria, whose instabilities run with inertia.
+"""Ruptures on specimens: a path of equilibria whose instabilities run with inertia.
 
 Problem
 -------
-A specimen is loaded slowly: its slip follows the equilibria of `methods.equilibrium` until
-one of them becomes unstable. From there on waves run through the blocks (`waves`), until
-all is at rest or the whole interface slides. Then the path goes on from the state that they
-left.
+A specimen is loaded slowly. Its slip follows the equilibria of `methods.equilibrium` up to an
+instability. From there waves run through the blocks (`waves`), until all is at rest or the whole
+interface slides. Then the path continues from the final state of the waves.
 
-Steps of an event
------------------
-1. Begin at the static state that becomes unstable. The drive is raised a little, as it goes
-   on to rise, and slip has grown a little along the unstable direction (`begin`).
-2. Follow the waves. The block is at rest when nothing slips any more while shear waves
-   cross it and return (`DynamicEvent.run`).
-3. Slip that is still under way once the waves have died out, and nodes that were carried
-   beyond the next equilibrium, come to rest in a static state: the path counts the latter
-   as stopped (`RuptureProgram.jump`).
+Algorithm of an event
+---------------------
+1. Begin at the static state that becomes unstable. Raise the drive a little, as it goes on to rise,
+   and let slip grow a little along the unstable direction (`begin`).
+2. Follow the waves. The block is at rest when no node slips while shear waves cross the block and
+   return (`DynamicEvent.run`).
+3. Let slip that is still under way come to rest in a static state (`RuptureProgram.jump`). Nodes
+   that were carried beyond this equilibrium count as stopped.
 """
 
 from __future__ import annotations
@@ -49,22 +47,22 @@ from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
 
 OPTIONS = ("courant", "arrival", "max_steps", "events")
-"""Options of `Rupture` on specimens; the others are those of a load that rises in time."""
+"""Options of `Rupture` with an effect on specimens. The others need a load that rises in time."""
 LOAD_RISE = 1e-5
-"""Rise of the drive in an event, as a share of the mean fall of strength over its profile."""
+"""Rise of the drive in an event, as a share of the mean fall of strength."""
 INITIAL_GROWTH = 1e-3
-"""Growth of the slip at the start, as a share of d_c where it is largest."""
+"""Largest growth of the slip at the start, as a share of d_c."""
 RESTING_SLIP = 1e-4
 """Share of the largest slip of an event below which a node counts as resting."""
 CHECKS_PER_WINDOW = 8
-"""How often rest is checked while shear waves cross the block and return."""
+"""Number of checks for rest while shear waves cross the block and return."""
 
 
 def refusals(method: Any, problem: Problem) -> list[str]:
     """Return the reasons why a rupture cannot run on the specimen of a problem."""
     usual = type(method)()
     reasons = [
-        f"{name}: means nothing on a specimen, which is loaded slowly between events; leave it out"
+        f"{name}: leave it out, it has no effect on a specimen, which is loaded slowly"
         for name, value in vars(method).items()
         if name not in OPTIONS and value != getattr(usual, name)
     ]
@@ -74,13 +72,13 @@ def refusals(method: Any, problem: Problem) -> list[str]:
 
 
 def variables(method: Any, problem: Problem) -> dict[str, Variable]:
-    """Return the variables of a sample of a specimen."""
+    """Return the variables of the results on a specimen."""
     return Equilibrium(events=method.events).variables(problem) | SPEEDS
 
 
 @dataclass
 class DynamicEvent:
-    """One instability on its way.
+    """Instability of a specimen while its waves run.
 
     Attributes
     ----------
@@ -89,8 +87,7 @@ class DynamicEvent:
     start : (n,) array
         Stress of the static state at the start, less the initial stress, Pa.
     front : (n,) array
-        Slip with which the front arrives at a node, m; infinite where it was before the
-        event.
+        Slip with which the front arrives at a node, m. Infinite if it arrived before the event.
     slides : bool
         Whether every node has slipped.
     steps : int
@@ -107,7 +104,10 @@ class DynamicEvent:
     steps: int = 0
 
     def take_steps(self, count: int, ends: bool = True) -> bool:
-        """Take so many steps, or until all nodes have slipped; return whether they have not."""
+        """Take `count` steps, or with `ends` until all nodes have slipped.
+
+        Returns whether some node has not slipped.
+        """
         taken = wave_steps(
             self.sample, self.start, self.front, self.mesh, self.waves, count, ends
         )
@@ -116,7 +116,7 @@ class DynamicEvent:
         return not self.slides
 
     def run(self, max_steps: int) -> None:
-        """Step 2: go on until all is at rest or all nodes have slipped."""
+        """Step 2: take steps until all is at rest or all nodes have slipped."""
         slips = deque([self.waves.slip.copy()], maxlen=CHECKS_PER_WINDOW + 1)
         while self.take_steps(-(-self.mesh.window // CHECKS_PER_WINDOW)):
             slips.append(self.waves.slip.copy())
@@ -126,7 +126,7 @@ class DynamicEvent:
                 return
             if self.steps > max_steps:
                 raise InputError(
-                    f"max_steps: an event has not come to rest after {self.steps} steps; raise"
+                    f"max_steps: an event has not come to rest after {self.steps} steps. Raise"
                     " max_steps, or lower specimen.quality_factor"
                 )
 
@@ -136,7 +136,7 @@ def begin(
 ) -> DynamicEvent:
     """Step 1: return an event that is about to run.
 
-    `arrival` is the slip over d_c with which a front arrives at a node.
+    `arrival` is the slip with which a front arrives at a node, in units of d_c.
     """
     fall = sample.excess - sample.residual
     load = before.load + LOAD_RISE * float(fall.mean() / sample.profile.mean())
@@ -151,15 +151,15 @@ def begin(
 
 
 class RuptureProgram(DenseProgram):
-    """Equilibria of a specimen between which waves run through the blocks.
+    """Search for equilibria of a specimen, with waves between them.
 
-    Between events loading is slow. Where a wave carried slip beyond the next equilibrium,
-    nodes rest below their strength afterwards.
+    Between events loading is slow. Nodes that waves carried beyond the next equilibrium rest below
+    their strength afterwards.
 
     Parameters
     ----------
     problem : Problem
-        With a specimen.
+        A problem with a specimen.
     method : Rupture
     """
 
@@ -175,13 +175,13 @@ class RuptureProgram(DenseProgram):
         return begin(sample, self.mesh, self.problem.blocks.stiffness, unstable, self.arrival)
 
     def jump(self, sample: StaticSample, unstable: EquilibriumState) -> Jump:
-        """Step 3: let an unstable state run until it rests, or all of it slides."""
+        """Let an unstable state run until it rests or the interface slides (steps 1 to 3)."""
         event = self.event(sample, unstable)
         event.run(self.max_steps)
         slip = event.waves.slip
         stiff: Array = self.problem.blocks.stiffness @ slip
         outcome: int = Outcome.SLIDING
-        if not event.slides:  # slip still under way comes to rest
+        if not event.slides:  # 3.
             elastic, true = self._workspaces
             slip_state = SlipState(sample, slip, stiff, elastic, self.may_stop)
             outcome = jump(slip_state, unstable.load, np.inf, true)
@@ -199,7 +199,7 @@ class RuptureProgram(DenseProgram):
 
 
 class RuptureSolver(OnsetSolver):
-    """Solves samples of a specimen; safe in several threads."""
+    """Solver of the samples of a specimen with inertia; thread-safe."""
 
     program: RuptureProgram
 
@@ -207,7 +207,7 @@ class RuptureSolver(OnsetSolver):
         super().__init__(problem, Equilibrium(events=events), program)
 
     def __call__(self, rows: Sample) -> dict[str, NDArray[Any]]:
-        """Return the onset of each sample; see `Rupture`."""
+        """Return the variables of `Rupture`, each with the samples as first dimension."""
         refuse_overstress(rows)
         return super().__call__(rows)
 
@@ -221,11 +221,9 @@ class RuptureSolver(OnsetSolver):
 
 
 def refuse_overstress(rows: Sample) -> None:
-    """Refuse stress above the strength, which only half-spaces take."""
+    """Raise an `InputError` for stress above the strength, which only half-spaces accept."""
     if np.any(rows.strength < rows.initial_stress):
-        raise InputError(
-            "initial_stress: is above the strength, which is taken between half-spaces only"
-        )
+        raise InputError("initial_stress: must not be above the strength on specimens")
 
 
 def front_speeds(problem: Problem, steepest_rate: float, arrival: Array) -> dict[str, float]:

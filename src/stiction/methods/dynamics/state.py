@@ -1,8 +1,8 @@
-"""The state of a rupture: constants of a run, variables, and diagnostics of every step.
+"""State of a rupture: constants of a run, variables, and diagnostics of every step.
 
-A run takes steps of two kinds. Implicit steps of adaptive size follow an interface that
-creeps (`implicit`), explicit steps of one size follow its waves (`explicit`);
-`RuptureState.phase` says which kind comes next. Both solve, at every node,
+A run takes two kinds of steps. Implicit steps of adaptive size follow a creeping interface
+(`implicit`), and explicit steps of fixed size follow its waves (`explicit`). The diagnostic
+`phase` tells which kind comes next. Both solve, at every node,
 
     tau = tau_0 p + tau_i + f - Z V,   V = 0 or tau = strength(slip),   V >= 0.              (1)
 
@@ -12,9 +12,8 @@ that slip elsewhere transfers, mode by mode with the memory kernel C of
 
     f(k, t) = -K(k) slip(k, t) + (G|k|/2) int_0^t C(|k| c_s t') V(k, t - t') dt'.            (2)
 
-Fields of the interface and their transforms are flat, whatever its shape; `Grid.transform`
-knows the shape. Modes q = 0, 1, ... are those of the real transform in its order, q = 0 the
-mean.
+Fields of the interface and their transforms are flat, also on planes. `Grid.transform` knows the
+shape. Modes q = 0, 1, ... are in the order of the real transform, and q = 0 is the mean.
 """
 
 from enum import IntEnum
@@ -33,7 +32,7 @@ Floats = NDArray[np.float64]
 
 
 class PiecewiseLinear(NamedTuple):
-    """A piecewise linear function, continued beyond its last point with its last slope."""
+    """Piecewise linear function, continued beyond its last point with its last slope."""
 
     at: Floats  # times, s, or loads, Pa; rising
     values: Floats
@@ -41,7 +40,7 @@ class PiecewiseLinear(NamedTuple):
 
 @jit
 def value_at(history: PiecewiseLinear, t: float) -> Any:
-    """Value of a piecewise linear function."""
+    """Return the value of a piecewise linear function."""
     times, values = history
     low, high = 0, times.size - 1
     while high - low > 1:
@@ -61,10 +60,10 @@ Reason = IntEnum(
 
 
 class Phase(IntEnum):
-    """The kind of steps that comes next. It decides what `RuptureState.memory` holds."""
+    """Kind of the next steps, which decides the form of `RuptureState.memory`."""
 
     IMPLICIT = 0  # psi, the memory variables themselves
-    EXPLICIT = 1  # psi/B, the same divided by their response B to a unit slip rate
+    EXPLICIT = 1  # psi/B, divided by their response B to a unit slip rate
 
 
 DIAGNOSTICS = np.dtype(
@@ -77,10 +76,10 @@ DIAGNOSTICS = np.dtype(
         ("mean_slip", "f8"),  # m
         ("mean_stress", "f8"),  # of the nodes that can break, Pa, as all stresses here
         ("whole_stress", "f8"),  # mean stress of all nodes
-        ("top_slip_rate", "f8"),  # largest slip rate, m/s, and where
+        ("top_slip_rate", "f8"),  # largest slip rate, m/s, and its node
         ("top_node", "i8"),
         ("weakened_nodes", "i8"),  # number of nodes at the residual strength
-        ("non_finite_node", "i8"),  # after Reason.NOT_FINITE, the first whose slip rate is not
+        ("non_finite_node", "i8"),  # after Reason.NOT_FINITE, the first such node
         # The last maximum of the mean stress of all nodes.
         ("maximum_stress", "f8"),
         ("maximum_breakable", "f8"),  # mean stress of the nodes that can break at that time
@@ -88,45 +87,51 @@ DIAGNOSTICS = np.dtype(
         ("maximum_time", "f8"),
         ("maximum_load", "f8"),
         ("maximum_node", "i8"),  # the fastest
-        # Instabilities. Stresses, times and loads are NaN until they have happened.
-        ("instabilities", "i8"),  # how many have begun
-        ("in_event", "i8"),  # whether one has begun at the last maximum and has not ended
+        # Instabilities. Stresses, times and loads are NaN until the first instability.
+        ("instabilities", "i8"),  # number of instabilities so far
+        ("in_event", "i8"),  # whether an instability is under way
         ("event_slip_rate", "f8"),  # largest slip rate in it, m/s
         ("arrested_events", "i8"),
-        ("first_stress", "f8"),  # mean stress at the first one
-        ("onset_stress", "f8"),  # mean stress of all nodes at the highest one
-        ("critical_stress", "f8"),  # largest mean stress at any, of the nodes that can break
+        ("first_stress", "f8"),  # mean stress at the first instability
+        ("onset_stress", "f8"),  # mean stress of all nodes at the highest instability
+        ("critical_stress", "f8"),  # largest mean stress of breakable nodes at an instability
         ("onset_time", "f8"),
         ("onset_load", "f8"),
         ("onset_node", "i8"),
-        ("all_broken", "i8"),  # whether all that can break has been at its residual strength
+        (
+            "all_broken",
+            "i8",
+        ),  # whether all breakable nodes have been at their residual strength
         ("kinetic_stress", "f8"),  # mean stress when that happened
         # Choice of steps.
         ("phase", "i8"),  # a `Phase`
-        ("next_size", "f8"),  # that the next implicit step tries, s
-        ("two_step", "i8"),  # whether it knows the rate of an implicit step before it
+        ("next_size", "f8"),  # size that the next implicit step tries, s
+        ("two_step", "i8"),  # whether the next implicit step follows an implicit step
         ("previous_size", "f8"),  # of the last implicit step, s
         ("previous_radiated", "f8"),  # Z <V> after it
         ("explicit_steps", "i8"),
         ("implicit_steps", "i8"),
-        ("calm_steps", "i8"),  # in a row, and the largest slip rate when the row began, m/s
-        ("calm_rate", "f8"),
+        ("calm_steps", "i8"),  # calm steps in a row
+        ("calm_rate", "f8"),  # largest slip rate when the row began, m/s
         # The whole run so far.
         ("scale", "f8"),  # stress scale of the largest load
-        ("start_load", "f8"),  # where the run began, and the error that this may cause
-        ("start_error", "f8"),
-        ("reverse_margin", "f8"),  # smallest sum of stress and strength, and where:
-        ("reverse_node", "i8"),  # below zero, slip would reverse there
+        ("start_load", "f8"),  # load at the start of the run
+        ("start_error", "f8"),  # error of the onset due to the start
+        (
+            "reverse_margin",
+            "f8",
+        ),  # smallest sum of stress and strength; below 0 slip would reverse
+        ("reverse_node", "i8"),  # its node
     ]
 )
-"""Diagnostics of every step: one record, which compiled steps and checkpoints share."""
+"""Diagnostics of every step, in a record that compiled steps and checkpoints share."""
 
 STATION = np.dtype([("slip", "f8"), ("slip_rate", "f8"), ("shear_stress", "f8")])
 """Slip (m), slip rate (m/s) and stress (Pa) of a node."""
 
 
 class StepRecord(NamedTuple):
-    """Rows to keep every step in. Without rows, nothing is kept."""
+    """Rows to keep every step in. Without rows, no step is kept."""
 
     steps: NDArray[Any]  # (steps,) array of DIAGNOSTICS
     stations: NDArray[Any]  # (steps, stations) array of STATION
@@ -136,19 +141,21 @@ class Thresholds(NamedTuple):
     """Thresholds at which steps change or end, from the method and the problem."""
 
     slid_stop: float  # nodes at the residual strength at which to return
-    held: bool  # by nodes that never break: return only once the slip has come to rest, too
+    held: bool  # whether barriers hold the interface; then return only after slip came to rest
     event_stop: bool  # return at an event
     rest_stop: bool  # return when all is at rest after an event
     end_time: float  # s
-    breakable: int  # nodes that can break at all
-    calm_slip: float  # slip of calm steps over the rise of the load, m/Pa; see `explicit._calm`
+    breakable: int  # number of nodes that can break
+    calm_slip: float  # slip of a calm step per rise of the load, m/Pa; see `explicit._calm`
     calm_count: int  # calm steps in a row after which implicit steps take over
-    slip_step: float  # loss of strength of a node in one implicit step, in tau_p - tau_r
-    load_step: float  # largest rise of the load in one implicit step, in stress scales
+    slip_step: float  # weakening of a node in an implicit step, in units of tau_p - tau_r
+    load_step: (
+        float  # largest rise of the load in an implicit step, in units of the stress scale
+    )
     smallest_step: float  # of implicit steps, s; below it explicit steps take over
     unstable_rate: float  # slip rate, m/s, that only an instability reaches
     arrival: float  # slip at which a front has arrived, in units of `Nodes.critical`
-    curved: bool  # whether the law is other than linear, whose pieces are met to the bit
+    curved: bool  # whether the law is not linear; a linear law's pieces are met to the bit
     explicit_only: bool
 
 
@@ -159,23 +166,23 @@ class Grid(NamedTuple):
     impedance: float  # Z = G/(2 c_s), Pa s/m
     cell: float  # size of a node's cell: dx (m), on a plane dx dy (m²)
     stiffness: Array  # (2, modes): static stiffness K(k) and G|k|/2, Pa/m; zero for the mean
-    entry: Ints  # (modes,): which entry of the tables a mode uses
-    offset: Ints  # (modes,): where its real part is in packed arrays, see `memory`
+    entry: Ints  # (modes,): entry of the tables that a mode uses
+    offset: Ints  # (modes,): place of its real part in packed arrays, see `memory`
     multiplicity: int  # modes that share an entry of the tables: 2 on a plane, kx and -kx
     frequency: Array  # |k| c_s of each entry, rad/s
-    mode_two: Array  # share of mode II, (kx/k)²; 1 on a line, whatever its mode
-    poles: Spectrum  # of the sums of exponentials: first those that weigh with `mode_two`,
-    weights: Spectrum  # then, on a plane, those of mode III, which weigh with 1 - mode_two
-    split: int  # how many of the pairs weigh with `mode_two`
+    mode_two: Array  # share of mode II, (kx/k)²; 1 on a line of either mode
+    poles: Spectrum  # of the sums of exponentials: first the pairs that weigh with `mode_two`,
+    weights: Spectrum  # then, on a plane, the pairs of mode III, which weigh with 1 - mode_two
+    split: int  # number of pairs that weigh with `mode_two`
 
 
 class Nodes(NamedTuple):
     """Properties of the nodes that do not change in a run, each (nodes,)."""
 
-    strength: Array  # tau_p, Pa; infinite where nothing breaks
+    strength: Array  # tau_p, Pa; infinite at barriers
     residual: Array  # tau_r, Pa
     weakening: Array  # W at zero slip, Pa/m
-    critical: Array  # slip from which on a node counts as at its residual strength, m
+    critical: Array  # slip from which a node counts as being at its residual strength, m
     profile: Array  # p
     initial: Array  # tau_i, Pa
 
@@ -188,28 +195,28 @@ class Setting(NamedTuple):
     mean_profile: float  # <p>
     mean_initial: float  # <tau_i>, Pa
     load: PiecewiseLinear  # tau_0(t)
-    turning_times: Array  # when the load begins to fall or to rise again, s
-    scale: PiecewiseLinear  # stress scale against the load, Pa
+    turning_times: Array  # times at which the load begins to fall or to rise again, s
+    scale: PiecewiseLinear  # stress scale as a function of the load, Pa
     thresholds: Thresholds
     stations: Ints  # nodes that `StepRecord.stations` holds
 
 
 class RuptureState(NamedTuple):
-    """Variables of a run; two runs from equal states are the same run, bit by bit."""
+    """Variables of a run. Runs from equal states are equal to the bit."""
 
     slip: Floats  # (nodes,), m; flat, also on a plane
     rate: Floats  # m/s
     stress: Floats  # Pa
     slip_hat: Spectrum  # (modes,) real transform of the slip
     past: Floats  # mean slip rate in the last implicit step, m/s
-    memory: Floats  # memory variables, packed as in `memory`; `Phase` says in which form
+    memory: Floats  # memory variables, packed as in `memory`, in the form of `Phase`
     memory_sum: Floats  # weighted sum of the memory variables for the next explicit step
-    arrival: Floats  # when the front arrived, s; nan before
+    arrival: Floats  # arrival time of the front, s; NaN before
     diagnostics: NDArray[Any]  # (1,) array of DIAGNOSTICS
 
     @property
     def now(self) -> Any:
-        """The record of `diagnostics`, by its names."""
+        """Diagnostics, by name."""
         return self.diagnostics[0]
 
     @property
@@ -219,12 +226,12 @@ class RuptureState(NamedTuple):
 
     @property
     def steps(self) -> int:
-        """Number of steps taken so far, of both kinds."""
+        """Number of steps of both kinds so far."""
         return int(self.now["explicit_steps"] + self.now["implicit_steps"])
 
 
 class ExplicitTables(NamedTuple):
-    """Tables of one fixed explicit step h, with arrays to work in."""
+    """Tables of an explicit step h, with work arrays."""
 
     step: float  # h, s
     table: Array  # [block][pair][4][64]: E = exp(s |k| c_s h) and w E B, B = h phi(s |k| c_s h)
@@ -237,20 +244,20 @@ class ExplicitTables(NamedTuple):
 
 
 class ImplicitTables(NamedTuple):
-    """Tables of an implicit step of some size, with arrays to work in; belong to one run."""
+    """Tables of an implicit step of some size, with the work arrays of a run."""
 
-    valid_for: Array  # size (s) and ratio of the step that they are for; NaN before the first
-    table: Array  # this one to `ramp_response`: see `memory.tabulate`
+    valid_for: Array  # size (s) and ratio of the step of the tables; NaN before the first
+    table: Array  # from here to `ramp_response`, see `memory.tabulate`
     ramp: Array
     response: Array
     ramp_response: Array
     symbol: Array  # (modes,): eigenvalues of the matrix of a step, Pa/m
     inverse: Array
-    memory_sum: Spectrum  # (modes,), as the next three
+    memory_sum: Spectrum  # (modes,), like the next three
     past_hat: Spectrum
     rate_hat: Spectrum
     work: Spectrum
-    trial_stress: Array  # (nodes,), as the rest up to `slipping`
+    trial_stress: Array  # (nodes,), like the rest up to `slipping`
     increment: Array
     driving: Array
     falling: Array
@@ -259,6 +266,6 @@ class ImplicitTables(NamedTuple):
     product: Array
     cg_preconditioned: Array
     slipping: Ints  # 0 stuck, 1 slipping
-    packed: Array  # a Fourier array in packed order, as the next one
+    packed: Array  # a Fourier array in packed order, like `second_packed`
     second_packed: Array
     sums: Array  # (2, 128)

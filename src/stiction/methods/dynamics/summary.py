@@ -1,4 +1,4 @@
-"""The scalars of a run: loads, moment, energies, rupture speeds."""
+"""Scalars of a run: loads, moment, energies, rupture speeds."""
 
 from dataclasses import replace
 from typing import Any
@@ -19,7 +19,7 @@ SPEED_SPANS: dict[str, Any] = {
     "rupture_speed": (2.0, np.max),
     "median_rupture_speed": (0.5, np.median),
 }
-"""Length, in h_n, over which a speed is a mean, and the statistic over all places."""
+"""Length over which a speed is a mean, in units of h_n, and the statistic over all places."""
 _SCALARS: dict[str, Variable] = {
     "applied_load": Variable("Pa", "load factor applied at the onset"),
     "onset_time": Variable("s", "time from zero load to the onset"),
@@ -38,7 +38,7 @@ _SCALARS: dict[str, Variable] = {
 
 
 def per_area(interface: Interface, variable: Variable) -> Variable:
-    """Return a variable for a plane, where a quantity per length of a line is a total."""
+    """Return a variable with its units on planes, if a line has it per unit length."""
     if not interface.is_plane:
         return variable
     units = {"N": "N m", "J/m": "J"}.get(variable.units, variable.units)
@@ -47,10 +47,10 @@ def per_area(interface: Interface, variable: Variable) -> Variable:
 
 
 def scalars(interface: Interface) -> dict[str, Variable]:
-    """Return the additional variables of a run; on a plane, the median speeds along x and y.
+    """Return the additional variables of a run.
 
-    The largest speed is left out there: where a front arrives at an angle, it is above all
-    waves.
+    Planes have median speeds along x and y, and no largest speed: the apparent speed of a front
+    that arrives at an angle can exceed all wave speeds.
     """
     variables = {name: per_area(interface, variable) for name, variable in _SCALARS.items()}
     if interface.is_plane:
@@ -61,22 +61,22 @@ def scalars(interface: Interface) -> dict[str, Variable]:
 
 
 def seismic_moment(run: Run, state: RuptureState) -> float:
-    """Return the moment of the slip, N; on a plane N m."""
+    """Return the seismic moment of the slip, N per unit length, on a plane N m."""
     medium = run.medium
     return medium.problem.solid.shear_modulus * float(state.slip.sum()) * medium.grid.cell
 
 
 def energy_balance(run: Run, state: RuptureState) -> dict[str, float]:
-    """Return strain, fracture and radiated energy, J/m; on a plane J.
+    """Return strain, fracture and radiated energy, J/m, on a plane J.
 
-    The static strain energy is the sum over modes of K(k)|delta_k|²/2. Waves carry away the
-    work less friction less strain energy. The stress equals the strength wherever there is
-    slip rate, so that the work of friction follows from the slip alone.
+    The static strain energy is the sum over modes of K(k)|delta_k|²/2. Waves carry away the work
+    less friction and strain energy. The stress of a slipping node equals its strength, so the work
+    of friction follows from the slip alone.
     """
     nodes, grid, friction = run.setting.nodes, run.medium.grid, run.medium.problem.friction
     drop = np.where(np.isfinite(nodes.strength), nodes.strength - nodes.residual, 0.0)
     fracture = friction.dissipated(state.slip, drop, nodes.weakening)
-    share = np.full(grid.transform.half, 2.0)  # a mode and its conjugate, which is left out
+    share = np.full(grid.transform.half, 2.0)  # a mode stands for its conjugate, too
     share[..., 0] = share[..., -1] = 1.0  # modes without a conjugate
     power = share.ravel()[1:] * grid.stiffness[0, 1:] * np.abs(state.slip_hat[1:]) ** 2
     strain = float(0.5 * np.sum(power) * grid.cell / np.prod(grid.transform.shape))
@@ -89,7 +89,7 @@ def energy_balance(run: Run, state: RuptureState) -> dict[str, float]:
 
 
 def _axis_speeds(run: Run, state: RuptureState, name: str) -> list[float]:
-    """Return a speed of the front along each axis, on the lines through its origin, m/s."""
+    """Return a speed of the front along each axis, on the line through the onset, m/s."""
     interface = run.medium.interface
     nucleation = run.medium.problem.nucleation_lengths(run.steepest_rate)
     arrival = state.arrival.reshape(interface.shape)
@@ -102,7 +102,7 @@ def _axis_speeds(run: Run, state: RuptureState, name: str) -> list[float]:
 
 
 def _critical_load(run: Run, now: Any, stress: float) -> float:
-    """Return the load that carries the critical stress, Pa; nan if an overstressed start has it."""
+    """Return the load that carries the critical stress, Pa; NaN if it began overstressed."""
     nodes, margin = run.setting.nodes, 1e-6 * now["scale"]
     load = (stress - run.setting.mean_initial) / run.setting.mean_profile
     began = now["start_load"] * nodes.profile + nodes.initial
@@ -111,11 +111,11 @@ def _critical_load(run: Run, now: Any, stress: float) -> float:
 
 
 def summary(run: Run, state: RuptureState) -> dict[str, Any]:
-    """Return the scalars of a finished run; NaN is what did not happen."""
+    """Return the scalars of a finished run, with NaN for events that did not happen."""
     interface, now = run.medium.interface, state.now
     stresses = ("onset_stress", "critical_stress", "first_stress", "kinetic_stress")
     onset, critical, first, kinetic = (float(now[name]) for name in stresses)
-    # A run that goes on until the interface slides, or to its end time, may see it survive.
+    # In a run to sliding, or to an end time, the interface may have survived.
     if np.isnan(kinetic) and run.stop in ("sliding", "time"):
         critical = np.nan
     node = np.unravel_index(int(now["onset_node"]), interface.shape)
@@ -138,7 +138,7 @@ def summary(run: Run, state: RuptureState) -> dict[str, Any]:
     if not interface.is_plane:
         values["rupture_speed"] = _axis_speeds(run, state, "rupture_speed")
     for name in {"critical_position", "rupture_speed", "median_rupture_speed"} & values.keys():
-        # A number on a line; one along x and one along y on a plane.
+        # A number on a line, and on a plane a number along x and a number along y.
         along = np.where(np.isnan(onset), np.nan, values[name])
         values[name] = along if interface.is_plane else along[0]
     return values
@@ -147,12 +147,12 @@ def summary(run: Run, state: RuptureState) -> dict[str, Any]:
 def front_speed(
     name: str, interface: Interface, axis: int, arrival: Floats, nucleation: float
 ) -> float:
-    """Return one of `SPEEDS` of a front along a line of nodes, m/s; nan where none ran."""
+    """Return a speed of a front along a line of nodes, named as in `SPEEDS`, m/s; NaN without."""
     lengths, statistic = SPEED_SPANS[name]
     spacing = interface.spacings[axis]
     window = max(lengths * nucleation, 8.0 * spacing)
     window = min(window, 0.25 * interface.lengths[axis])
-    if interface.is_free:  # fronts do not run round
+    if interface.is_free:  # fronts do not pass from one end to the other
         arrival = np.append(arrival, np.full(round(window / spacing), np.nan))
     speeds = rupture_speed(arrival, spacing, window)
     speeds = speeds[np.isfinite(speeds)]
@@ -160,11 +160,11 @@ def front_speed(
 
 
 def rupture_speed(arrival: Floats, spacing: float, window: float) -> Floats:
-    """Return the apparent speed of the front at each node of a line, m/s; nan where none passed.
+    """Return the apparent speed of the front at each node of a line, m/s, or NaN.
 
-    `arrival` (s) is periodic and nan where the front never came. The speed is a mean over
-    `window` (m), where the arrival is strictly monotone over the window: the birth of
-    patches and the meeting of fronts do not count.
+    `arrival` (s) is periodic, and NaN at nodes that the front did not reach. The speed is a mean
+    over `window` (m). It is NaN unless the arrival is strictly monotone over the window, so that
+    the birth of patches and the meeting of fronts do not count.
     """
     half = max(1, round(0.5 * window / spacing))
     if 2 * half >= arrival.size:

@@ -1,31 +1,32 @@
-"""Waves in a block, with friction on its interface: central differences in time, row by row.
+"""Waves in a block with friction on its interface: central differences in time, row by row.
 
 Problem
 -------
-The blocks of `mesh`, from a static state on, M u'' + M alpha u' + K (u + theta u') =
-forces, with the masses M, the attenuation alpha (`Mesh.attenuation`) and the viscous time
-theta of the grid (`Mesh.viscous_time`). All displacements are counted from the static
-state. In the upper block u is half of the slip at y = 0. The lower block is its mirror
-image, so that no normal stress changes.
+Solve M u'' + M alpha u' + K (u + theta u') = forces for the block of `mesh`, starting from a static
+state. M are the masses, alpha the attenuation (`Mesh.attenuation`) and theta the viscous time of
+the grid (`Mesh.viscous_time`). Displacements are counted from the static state. In the upper block
+u is half of the slip at y = 0. The lower block is its mirror image, so the normal stress does not
+change.
 
 Algorithm (`wave_steps`)
 ------------------------
-Leapfrog: velocities in the middle of steps of size h, displacements at their ends,
-attenuation half implicit. With a = alpha h/2 and w = u + theta u', each step is, row by
-row,
+Leapfrog with steps of size h: velocities are known in the middle of a step, displacements at its
+end, and attenuation is half implicit. With a = alpha h/2 and w = u + theta u', each step goes
+through the rows:
 
-1. forces F on the row from its elements (`_force`), by w alone, so that only w is kept;
-2. u' <- ((1 - a) u' + h F/M)/(1 + a) and w <- w + (h + theta) u' - theta (u' before)
+1. Compute the forces F on the row from its elements (`_force`). They depend on w alone, so that
+   only w is stored.
+2. Move the row: u' <- ((1 - a) u' + h F/M)/(1 + a) and w <- w + (h + theta) u' - theta (u' before)
    (`_move`).
-3. On the interface, the same with friction (`_slide`): the node slips at the rate that its
-   strength leaves, and rests where that would be negative. `Mesh.correction`, K of the
-   closed form less K of the mesh, acts on the slip of the interface.
-4. The top moves with its platen (`_move_platen`), or the pusher acts on the ends
-   (`_move_pusher`). The spring of the machine is half implicit; an infinitely stiff machine
-   holds the drive.
+3. Move the interface in the same way, with friction (`_slide`): a node slips at the rate that its
+   strength leaves, and rests if this rate is negative. `Mesh.correction`, K of the closed form less
+   K of the mesh, acts on the slip of the interface.
+4. Move the top with its platen (`_move_platen`), or let the pusher act on the ends
+   (`_move_pusher`). The spring of the machine is half implicit. An infinitely stiff machine holds
+   the drive.
 
-Row j + 1 needs row j as it was, so the force on a row is found before the row below it
-moves.
+The force on row j + 1 needs row j before it moves, so the force on a row is computed before the
+row below it moves.
 """
 
 from typing import Any, NamedTuple
@@ -39,10 +40,10 @@ from stiction.methods.equilibrium.sample import StaticSample, strength_at
 
 
 class Waves(NamedTuple):
-    """Where a block is, and how fast. Single precision is enough for differences.
+    """Displacements and velocities of a block.
 
-    u and v are the sums w of displacement and viscous time times rate: elements only need
-    these.
+    Single precision is enough, as displacements are counted from the static state. u and v are the
+    sums w of displacement and viscous time times rate, which the elements need.
     """
 
     u: Array
@@ -53,23 +54,24 @@ class Waves(NamedTuple):
     slip: Array
     slip_rate: Array
     stress: Array
-    """Of the interface, (nodes,); stress is counted from the initial one."""
+    """Slip, slip rate and stress of the interface, (nodes,). Stress is counted from the initial
+    stress."""
     corrected: Array
     """Stress of the static correction, (nodes,), Pa."""
     arrival: Array
     """Time at which the front arrives, (nodes,), s."""
     now: Array
-    """As named by `NOW`."""
+    """Values in the order of `NOW`."""
 
 
 NOW = ("time", "travel", "speed", "force", "friction")
-"""Time (s), travel (m) and speed of the drive of one block, change of its force (N/m), and the
-energy that friction took from one block (J/m)."""
+"""Time (s), travel (m) and speed (m/s) of a block's drive, change of its force (N/m), and energy
+that friction took from a block (J/m)."""
 TIME, TRAVEL, SPEED, FORCE, FRICTION = range(5)
 
 
 def at_rest(mesh: Mesh, slip: Array) -> Waves:
-    """Return a block at rest whose interface has a slip, m."""
+    """Return a block at rest whose interface has a given slip (m)."""
     u, v, u_rate, v_rate = np.zeros((4, mesh.heights.size, slip.size), np.float32)
     slip_rate, stress, corrected = np.zeros((3, slip.size))
     arrival = np.full(slip.size, np.nan)
@@ -83,12 +85,16 @@ def at_rest(mesh: Mesh, slip: Array) -> Waves:
 def _force(
     stencil: Any, x0: Any, x1: Any, x2: Any, y0: Any, y1: Any, y2: Any, force: Any
 ) -> None:
-    """Step 1: the force on a row along an axis, by x of the rows around it, and by y across."""
+    """Step 1: write the force on a row along an axis.
+
+    x0, x1 and x2 are the displacements along the axis in the row below, the row and the row above;
+    y0, y1 and y2 are the other components.
+    """
     n = force.shape[0]
     a, b, c = stencil[0, 0], stencil[0, 1], stencil[0, 2]
     d, e, f = stencil[1, 0], stencil[1, 1], stencil[1, 2]
     g, h, k = stencil[2, 0], stencil[2, 1], stencil[2, 2]
-    for i in range(n - 2):  # a long line, but one loop without branches is what runs in vectors
+    for i in range(n - 2):  # a single loop without branches, so that it is vectorised
         force[i + 1] = (
             (a * (x0[i] + x0[i + 2]) + b * (x1[i] + x1[i + 2]) + c * (x2[i] + x2[i + 2]))
             + (d * x0[i + 1] + e * x1[i + 1] + f * x2[i + 1])
@@ -104,7 +110,7 @@ def _force(
 
 @jit_inside
 def _move(w: Any, rate: Any, force: Any, keep: Any, gain: Any, step: Any, lag: Any) -> None:
-    """Step 2: move a row of nodes by one step; `lag` is the viscous time."""
+    """Step 2: move a row of nodes by a step. `lag` is the viscous time."""
     for i in range(w.shape[0]):
         before = rate[i]
         after = keep * before + gain * force[i]
@@ -123,7 +129,7 @@ def _slide(
     keep: float,
     gain: float,
 ) -> int:
-    """Step 3: move the nodes of the interface; return how many never slipped."""
+    """Step 3: move the nodes of the interface. Return how many never slipped."""
     dx, step = mesh.spacing, mesh.step
     slip, rates, u, now = waves.slip, waves.u_rate[0], waves.u[0], waves.now
     never = 0
@@ -184,7 +190,7 @@ def _move_platen(mesh: Mesh, waves: Waves, force: Any) -> None:
 def _move_pusher(mesh: Mesh, waves: Waves, gains: Array) -> None:
     """Step 4: let the pusher act on the block, behind its spring, or hold it.
 
-    Its force F changes its speed from v to v + g F, with the mobility g of the pushed
+    The force F of the pusher changes its speed from v to v + g F, with the mobility g of the pushed
     nodes.
     """
     now, step, last = waves.now, mesh.step, waves.u.shape[1] - 1
@@ -216,10 +222,10 @@ def wave_steps(
     sample: StaticSample, start: Array, front: Array, mesh: Mesh, waves: Waves, steps: int,
     ends: bool,
 ) -> int:  # fmt: skip
-    """Take so many steps, or `ends` once all nodes have slipped; returns how many were taken.
+    """Take a number of steps, with `ends` until all nodes have slipped. Return the number taken.
 
-    `start` (Pa) is the stress of the static state less the initial stress; `front` (m) is
-    the slip with which the front arrives at a node.
+    `start` is the stress of the static state less the initial stress (Pa), and `front` the slip
+    with which the front arrives at a node (m).
     """
     rows, n = waves.u.shape
     step, lag = np.float32(mesh.step), np.float32(mesh.viscous_time)

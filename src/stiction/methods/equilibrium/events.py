@@ -1,6 +1,7 @@
-"""Arrested events: what is measured of each, and the travel of a machine on the way.
+"""Arrested events and their variables, and the travel of a machine on the way.
 
-Behind a machine the load is its drive, from which slip takes off some.
+Behind a machine the load is the drive: the mean stress that it would cause without slip. Slip
+relieves it.
 """
 
 from typing import Any, NamedTuple
@@ -26,7 +27,7 @@ OF_SPECIMENS = {
     "event_start": Variable("m", "left end of the patch that slipped", ("event",)),
 }
 MIN_ADDED_SLIP = 1e-3
-"""Share of the largest added slip above which a node belongs to the patch of an event."""
+"""Smallest added slip of the nodes in the patch of an event, as a share of the largest."""
 
 
 def event_variables(interface: Interface) -> dict[str, Variable]:
@@ -52,7 +53,7 @@ def event_variables(interface: Interface) -> dict[str, Variable]:
 
 
 class ArrestedEvent(NamedTuple):
-    """An instability that came to rest: the states before and after it."""
+    """States before and after an instability that came to rest."""
 
     before: EquilibriumState
     after: EquilibriumState
@@ -61,7 +62,7 @@ class ArrestedEvent(NamedTuple):
 def event_table(
     problem: Problem, rows: Sample, row: int, events: list[ArrestedEvent]
 ) -> dict[str, Array]:
-    """Return the variables of the arrested events of one sample, (events, ...) arrays."""
+    """Return the variables of the arrested events of a sample, (events, ...) arrays."""
     initial, profile = rows.initial_stress[row].mean(), rows.load_profile.mean()
     measured = [_measures(problem, initial, profile, *event) for event in events]
     return {
@@ -79,7 +80,7 @@ def _measures(
     before: EquilibriumState,
     after: EquilibriumState,
 ) -> dict[str, Any]:
-    """Return the variables of one event; initial stress and load profile are means."""
+    """Return the variables of an event; `initial` and `profile` are means over the interface."""
     interface = problem.interface
     added = (after.slip - before.slip).reshape(interface.shape)
     inside, patch = largest_patch(np.maximum(added, 0.0), interface, MIN_ADDED_SLIP)
@@ -110,20 +111,23 @@ def _measures(
 
 
 def relief_of(problem: Problem, slip: Array) -> float:
-    """Return by how much slip lowers the mean stress below the load, Pa: behind a machine."""
+    """Return by how much slip lowers the mean stress below the drive of a machine, Pa.
+
+    Without a machine it is 0.
+    """
     return 0.0 if problem.specimen is None else float(problem.blocks.mean_relief(slip))
 
 
 def travel_of(problem: Problem, load: float, slip: Array) -> float:
-    """Return the travel of both drives of a specimen together from the unloaded state, m."""
+    """Return the sum of the travels of a specimen's drives since the unloaded state, m."""
     force = (load - relief_of(problem, slip)) * problem.interface.measure
     return float(problem.blocks.travel(force, slip))
 
 
 def elongation_of(problem: Problem, stress: float) -> float:
-    """Return by how much the machine gives at a mean stress of the interface (Pa), m.
+    """Return the elongation of the machine at a mean stress of the interface (Pa), m.
 
-    NaN under dead load, whose far end is not defined.
+    It is NaN under a dead load, which has no far end.
     """
     assert problem.specimen is not None
     machine, area = problem.specimen.drive.stiffness, problem.area

@@ -49,49 +49,50 @@ class Equilibrium:
 
     A line of 1024 nodes takes under a millisecond, a plane of 128 x 128 nodes about 0.15 s.
 
-    The load is raised until no equilibrium is left. While strength falls linearly, this is a
-    linear programme, solved to round-off with a certificate; beyond the first instability, or
-    where the residual strength or another corner of a `PiecewiseWeakening` is reached before
-    it, events are followed one by one: exact too, at 5 times the cost for two pieces and 50
-    for 32. On planes the path between such events is followed in steps of the load. Weakening
-    rate, residual strength, initial stress and load profile may vary along the interface.
+    The load rises until no equilibrium is left. While strength falls linearly, this is a linear
+    programme, solved to round-off with a certificate. After the first instability, or after the
+    first corner of a `PiecewiseWeakening`, the equilibria are followed event by event. That is
+    exact, too, and costs 5 times as much for two pieces and 50 times for 32. On planes the path
+    between events is followed in steps of the load. Weakening rate, residual strength, initial
+    stress and load profile may vary along the interface.
 
-    On planes the programme is solved with transforms, to bounds that are `gap` of the load apart;
-    the loads returned are the lower one, at which there is an equilibrium.
+    On planes the programme is solved with Fourier transforms. Its bounds are a share `gap` of the
+    load apart, and the results give the lower bound, at which there is an equilibrium.
 
     Parameters
     ----------
     sensitivity : bool
-        Also return d first_instability / d tau_p at every node, at fixed weakening rates. NaN
-        where a law steepens and a node passes a corner before the first instability, or where
-        the turning point of a plane is not found. Where a node of a specimen stops before it,
-        difference quotients take as many paths to it as there are nodes.
+        Also return d first_instability / d tau_p at every node, at fixed weakening rates. It is
+        NaN if a law steepens and a node passes a corner before the first instability, and on
+        planes if the turning point is not found. If a node of a specimen stops before the first
+        instability, the derivatives are difference quotients, which take a path for every node.
     slip : bool
         Also return the slip at the first instability.
     events : int
-        Also return this number of arrested events of each sample over 'event', NaN where
-        there are fewer. They form a sequence: stress and slip continue from one to the
-        next. Their variables are those of `equilibrium_path`.
+        Also return this number of arrested events of each sample over 'event', padded with NaN.
+        They form a sequence: stress and slip continue from event to event. The variables are
+        described in `equilibrium_path`.
     gap : float
-        On planes, distance of the bounds as a share of the load, 1e-10 to 1e-2. Lines are
-        solved to round-off; where thousands of nodes slip, to 1e-9.
+        On planes, the distance of the bounds as a share of the load, 1e-10 to 1e-2. Lines are
+        solved to round-off, or to 1e-9 if thousands of nodes slip.
 
     Notes
     -----
-    Besides the variables of every method: `certificate_gap` (Pa) between rigorous bounds of
-    the first instability, `slip_patches` at that moment, `critical_patch_length` (m),
-    `arrested_events`, `residual_reached` (whether a node had reached its residual strength
-    before the interface slid), and `sliding_position` (m), which differs from
-    `critical_position` only after an arrested event. Arrest is decided by equilibrium:
-    inertia may carry a rupture through. Where a law steepens and a corner is passed before
-    the first instability, or on a specimen a node stops before it, there is no bound from
-    above, and `certificate_gap` is nan.
+    The result has these variables besides the variables of every method: `certificate_gap`, the
+    distance of rigorous bounds of the first instability (Pa), `slip_patches` at the first
+    instability, `critical_patch_length` (m), `arrested_events`, `residual_reached` (whether a node
+    reached its residual strength before the interface slid), and `sliding_position` (m), which
+    differs from `critical_position` only after an arrested event.
 
-    On planes positions have two components, along 'direction'; instead of a length there
-    are `critical_patch_extent` (m, along 'direction') and `critical_patch_area` (m²), and
-    `certified` is true if the bounds are rigorous: they are not where a node reaches its
-    residual strength before the first instability. Slipping nodes belong to one patch where
-    their cells share an edge, also across the borders.
+    Equilibrium decides about arrest; inertia may carry a rupture through. There is no upper bound,
+    and `certificate_gap` is NaN, if a law steepens and a node passes a corner before the first
+    instability, or if a node of a specimen stops before it.
+
+    On planes, positions have two components, along 'direction'. `critical_patch_extent` (m, along
+    'direction') and `critical_patch_area` (m²) replace the length. `certified` is true if the
+    bounds are rigorous, which requires that no node reaches its residual strength before the first
+    instability. Slipping nodes belong to the same patch if their cells share an edge, also across
+    the borders.
 
     Examples
     --------
@@ -114,7 +115,7 @@ class Equilibrium:
     label: ClassVar[str] = "equilibrium"
 
     def seconds_per_sample(self, problem: Problem) -> float:
-        """Return the approximate time of a sample on one core, s."""
+        """Return the approximate time of a sample on a core, s."""
         interface = problem.interface
         if interface.is_plane:
             return 1e-5 * interface.size
@@ -126,27 +127,27 @@ class Equilibrium:
         return 2e-4 + 5e-4 * more * (interface.size / 1024) ** 1.5
 
     def supports(self, problem: Problem) -> list[str]:
-        """Return the reasons why it cannot solve a problem; none if it can."""
+        """Return the reasons why it cannot solve a problem, or an empty list."""
         reasons = refused(problem.friction)
         if problem.interface.breakable is not None:
             reasons.append("interface.extent: is taken by st.Rupture() between half-spaces")
         if not problem.interface.is_plane and self.gap != type(self)().gap:
-            reasons.append("gap: is of planes; lines are solved to round-off, so leave it out")
+            reasons.append("gap: leave it out on lines, which are solved to round-off")
         return reasons
 
     def bounded_by_strength(self, problem: Problem, event: str) -> tuple[bool, bool]:
         """Return whether strength bounds the stress of an event from below and from above.
 
-        From below: nothing slips at a load below min (tau_p - tau_i)/p. Slip lowers the mean stress
-        only behind a machine, and then `critical_stress`, the largest on the way, is no lower.
-        From above: stress is nowhere above strength, nor is its mean above the mean strength.
-        Behind a machine the first instability need not happen, and has no bound.
+        From below: no node slips at a load below min (tau_p - tau_i)/p. Slip lowers the mean stress
+        only behind a machine, but `critical_stress` is the largest stress on the way.
+        From above: stress is at most strength at every node, so its mean is at most the mean
+        strength. Behind a machine the first instability need not happen, and has no bound.
         """
         certain = not (problem.has_machine and event == "first_instability")
         return certain, certain
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
-        """Return the variables that the solver computes for each sample."""
+        """Return the variables of the solver's results."""
         interface = problem.interface
         variables = onset_variables(interface) | VARIABLES
         variables |= OF_PLANES if interface.is_plane else OF_LINES
@@ -163,5 +164,5 @@ class Equilibrium:
         return variables
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, NDArray[Any]]]:
-        """Return a solver for samples of this problem."""
+        """Return the solver of samples of a problem."""
         return OnsetSolver(problem, self, make_program(problem, self.gap))

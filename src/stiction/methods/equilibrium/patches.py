@@ -1,7 +1,7 @@
-"""Patches on a line or plane: their number, and the position and width of one of them.
+"""Patches of slipping nodes on a line or plane: number, position and extent.
 
-Nodes of a plane are connected where their cells share an edge (four neighbours), also across the
-borders. The `interface` of these functions is an `Interface`; kernels do not depend on its file.
+Nodes of a plane are connected if their cells share an edge (four neighbours), also across the
+borders. The `interface` of these functions is an `Interface`. Kernels do not depend on its file.
 """
 
 from typing import Any, NamedTuple
@@ -20,8 +20,8 @@ Mask = NDArray[np.bool_]
 MIN_PATCH_WEIGHT = 0.1
 """Share of the largest weight above which a node of a plane belongs to the critical patch.
 
-Its border is where y falls off over some nodes: of half or twice the share areas differ by a sixth
-to a quarter, and nothing else does.
+At the border of a patch y falls off over a few nodes. Half or twice the share changes areas by a
+sixth to a quarter, and no other result.
 """
 
 
@@ -34,7 +34,7 @@ class Patch(NamedTuple):
 
 
 def count_patches(slip: Array) -> int:
-    """Return the number of runs of slipping nodes on the circle."""
+    """Return the number of runs of slipping nodes on a circle of nodes."""
     above = slip > 0.0
     starts = int(np.count_nonzero(above[1:] > above[:-1])) + int(above[0] > above[-1])
     return max(starts, int(above[0]))
@@ -42,9 +42,10 @@ def count_patches(slip: Array) -> int:
 
 @jit
 def main_patch(field: Array) -> tuple[int, int, float]:
-    """First node, length and centroid (in nodes, from 0 to n) of the run with the largest entry.
+    """Return first node, length and centroid (in nodes, from 0 to n) of the run with the peak.
 
-    Runs are where the field, which is not negative, is positive.
+    A run is a sequence of positive entries; the field is not negative. If all entries are positive,
+    the run is centred at the peak.
     """
     n = field.shape[0]
     peak = 0
@@ -63,7 +64,7 @@ def main_patch(field: Array) -> tuple[int, int, float]:
             break
         length += 1
     if length == n:
-        # Everything slips: a centre exists only with respect to the largest entry.
+        # The run has no ends: cut the circle opposite the peak.
         start = (peak + n // 2 + 1) % n
     weight = 0.0
     moment = 0.0
@@ -76,12 +77,12 @@ def main_patch(field: Array) -> tuple[int, int, float]:
 
 
 def with_ends(field: Array, interface: Any) -> Array:
-    """Return a field with a node at rest between its ends, where these do not meet."""
+    """Return a field with a zero appended if the interface has ends, so that they do not meet."""
     return np.append(field, 0.0) if interface.is_free else field
 
 
 def line_patch(field: Array, interface: Any) -> Patch:
-    """Return the measures of the run of `main_patch`."""
+    """Return the patch of a line that holds the largest entry of a field."""
     spacing = interface.spacing
     _, length, centre = main_patch(with_ends(field, interface))
     centre += interface.first
@@ -89,7 +90,7 @@ def line_patch(field: Array, interface: Any) -> Patch:
 
 
 def labelled_patches(mask: Mask) -> tuple[NDArray[np.int64], int]:
-    """Return the label of each node's patch, from 1 (0: none), and the number of patches."""
+    """Return the label of each node's patch (from 1, at rest 0), and the number of patches."""
     pieces, count = label(mask)
     if count == 0:
         return pieces.astype(np.int64), 0
@@ -98,16 +99,16 @@ def labelled_patches(mask: Mask) -> tuple[NDArray[np.int64], int]:
     meet = (first > 0) & (last > 0)
     graph = coo_array((np.ones(meet.sum()), (first[meet], last[meet])), (count + 1, count + 1))
     patches, numbers = connected_components(graph, directed=False)
-    # Node 0 of the graph, the background, is a component of its own.
+    # Node 0 of the graph is the background. Number the other components from 1.
     order = np.zeros(patches, dtype=np.int64)
     order[np.delete(np.arange(patches), numbers[0])] = np.arange(1, patches)
     return order[numbers][pieces], patches - 1
 
 
 def span(occupied: Mask, peak: int) -> tuple[int, int]:
-    """Return the first place and the length of the shortest arc that holds all places.
+    """Return the first place and the length of the shortest arc with all occupied places.
 
-    If none is empty it is the whole circle from the far side of the peak.
+    If every place is occupied, it is the whole circle, cut opposite the peak.
     """
     n = occupied.size
     places = np.flatnonzero(occupied)
@@ -135,10 +136,10 @@ def patch_of(mask: Mask, weight: Array, spacings: tuple[float, ...]) -> Patch:
 
 
 def largest_patch(weight: Array, interface: Any, share: float) -> tuple[Mask, Patch]:
-    """Return the patch around the largest weight: which nodes belong to it, and its measures.
+    """Return the nodes of the patch around the largest weight, and the patch.
 
-    The weight is not negative and not all zero; nodes belong to a patch where it is above a share
-    of its largest value.
+    The weight is not negative and not all zero. Nodes belong to a patch if their weight is above a
+    share of the largest.
     """
     above = weight > share * weight.max()
     if weight.ndim == 1:
@@ -155,9 +156,9 @@ def largest_patch(weight: Array, interface: Any, share: float) -> tuple[Mask, Pa
 def critical_patch(multiplier: Array, interface: Any) -> Patch:
     """Return the patch that becomes unstable, from its multiplier y >= 0, not all zero.
 
-    On a line it is the run with the largest y. On a plane it is where y is above a tenth of its
-    largest value, around that value. It is not all slipping nodes connected with it: on rough
-    strengths these reach across the plane, with a y close to zero.
+    On a line it is the run with the largest y. On a plane it is the connected area around the
+    largest y in which y is above a tenth of its largest value. Slipping nodes with a smaller y do
+    not count: on rough strengths they reach across the whole plane.
     """
     if interface.is_plane:
         return largest_patch(multiplier.reshape(interface.shape), interface, MIN_PATCH_WEIGHT)[

@@ -1,4 +1,13 @@
-"""The path of one sample: slip and stress at given loads, and arrested events on the way."""
+"""The path of a sample: slip and stress at given loads, and the arrested events on the way.
+
+Algorithm
+---------
+1. Follow the sample to global sliding, which gives its arrested events and the last load.
+2. For each load before sliding, start from the nearest known state: the equilibrium after the last
+   event, or the equilibrium at the load before.
+3. Follow the stable path from there to the load. If it fails beside an event, take the state that
+   is about to jump. If it fails elsewhere, the load is within round-off of sliding.
+"""
 
 from typing import Any
 
@@ -34,7 +43,7 @@ TRAVEL = {
 }
 EVENT = Variable("1", "event number", ("event",))
 LOAD_RTOL = 1e-9
-"""Relative distance of loads that count as the same."""
+"""Largest relative distance of two loads that count as equal."""
 
 
 def _check_loads(loads: Any) -> Array:
@@ -50,52 +59,54 @@ def _check_loads(loads: Any) -> Array:
 def equilibrium_path(
     problem: Problem, profiles: Any, loads: Any, *, method: Any = None
 ) -> xr.Dataset:
-    """Return slip and stress of one interface at rising loads, and its arrested events.
+    """Return slip and stress of an interface at rising loads, and its arrested events.
 
-    Patches grow, merge and become unstable; an instability that comes to rest is an event.
+    Patches grow, merge and become unstable. An instability that comes to rest is an arrested event.
 
     Parameters
     ----------
     problem : Problem
     profiles : array, mapping of arrays, xarray.Dataset or Sample
-        Peak strength (Pa) of one sample, or several profiles by name, as in `onset`.
+        Peak strength (Pa) of a single sample, or several profiles by name, as in `onset`.
     loads : (loads,) array
         Load factors tau_0, rising, Pa.
     method : Rupture, optional
-        On a specimen, lets its events run with inertia.
+        Compute the events of a specimen with inertia.
 
     Returns
     -------
     xarray.Dataset
-        Over 'load' and the nodes: `slip` (m) and `stress` (Pa); over 'load': `mean_stress` (Pa),
-        `arrested_events` so far, and `sliding`. From the onset of global sliding on slip and
-        stress are NaN and `sliding` is true.
+        Over 'load' and the nodes: `slip` (m) and `stress` (Pa). Over 'load': `mean_stress` (Pa),
+        `arrested_events` so far, and `sliding`. After the onset of global sliding, slip and stress
+        are NaN and `sliding` is true.
 
-        Over 'event', all arrested events up to global sliding, whatever the loads: `event_load`
-        (Pa, tau_0), `event_stress` (Pa, the mean on the interface), `event_position` (m),
-        `event_length` (m) of the patch that slipped, `event_mean_slip` (m, over that length) and
-        `event_moment` (N per unit depth: G times the slip added, integrated over the interface).
-        On specimens the load is the drive, the mean stress that it would cause if nothing slipped;
-        `travel` (m) is that of both drives together, and `crosshead_travel` (m) has on top of it
-        what the machine gives, its force over its stiffness (NaN under dead load); events have
-        `event_stress_drop` (Pa), `event_travel` and `event_crosshead_travel` (m, before it),
-        `event_travel_step` (m) and `event_start` (m), the left end of the patch. With a thickness,
-        width or area each mean stress is given as a force, too: `force`, `event_force` and
-        `event_force_drop` (N).
+        Over 'event', all arrested events up to global sliding, even beyond the given loads:
+        `event_load` (tau_0, Pa), `event_stress` (mean stress on the interface, Pa),
+        `event_position` (m), `event_length` of the patch that slipped (m), `event_mean_slip` over
+        that length (m), and `event_moment`, G times the integral of the added slip (N per unit
+        depth).
 
-        On planes positions have two components, along 'direction', `event_extent` (m) and
-        `event_area` (m²) take the place of the length, and the moment is in N m.
+        On specimens, `load` is the drive: the mean stress that it would cause without slip.
+        `travel` is the sum of the travels of both drives (m). `crosshead_travel` (m) adds the
+        deformation of the machine, force over stiffness, and is NaN under a dead load. Events also
+        have `event_stress_drop` (Pa), `event_travel` and `event_crosshead_travel` before the
+        event (m), `event_travel_step` (m) and `event_start`, the left end of the patch (m). With a
+        thickness, width or area, mean stresses are also given as forces: `force`, `event_force`
+        and `event_force_drop` (N).
+
+        On planes, positions have two components, along 'direction'. `event_extent` (m) and
+        `event_area` (m²) replace the length, and the moment is in N m.
 
     Raises
     ------
     InputError
-        If there is more than one profile or the loads do not rise, and as `onset` does.
+        If there are several samples, if the loads do not rise, or if `onset` would raise it.
 
     Notes
     -----
-    A patch jumps to the least equilibrium at the same load: an overdamped interface would stop
-    there. Inertia may carry a rupture through; only `Rupture` decides that, and on specimens can
-    be given as the method.
+    A patch jumps to the least equilibrium at the same load, where an overdamped interface would
+    stop. Inertia may carry a rupture through. Only `Rupture` decides that; pass it as `method` on
+    a specimen.
 
     Examples
     --------
@@ -119,7 +130,7 @@ def equilibrium_path(
     program = make_program(problem) if method is None else method.program(problem)
     warn_of_signs(problem)
     sample = sample_of(rows, program.pieces, 0)
-    path = follow_to_sliding(program, sample)
+    path = follow_to_sliding(program, sample)  # 1.
     passed, end, known = path.events, path.last.load, path.known
     slip, stress = np.full((2, given.size, interface.size), np.nan)
     travel, far = np.full((2, given.size), np.nan)
@@ -128,15 +139,15 @@ def equilibrium_path(
     sliding = given > end
     state = at_rest(sample)
     for i, load in enumerate(map(float, given[~sliding])):
-        if events[i]:
+        if events[i]:  # 2.
             after = passed[events[i] - 1].after
             state = max(after, state, key=lambda reached: reached.load)
-        state_there = program.at(sample, state, load)
+        state_there = program.at(sample, state, load)  # 3.
         next_event = passed[events[i]].before if events[i] < len(passed) else None
         is_at_event = next_event is not None and load > (1.0 - LOAD_RTOL) * next_event.load
         if state_there is None and is_at_event:
-            state_there = next_event  # the state about to jump
-        if state_there is None:  # within the accuracy of the load of sliding
+            state_there = next_event
+        if state_there is None:
             sliding[i:] = True
             break
         state = state_there
@@ -148,8 +159,8 @@ def equilibrium_path(
             far[i] = travel[i] + elongation_of(problem, stress[i].mean())
     if not known and sliding.any():
         warn_accuracy(
-            f"no equilibrium was found beyond {end:g} Pa, and none was ruled out; the"
-            " path ends there"
+            f"no equilibrium was found beyond {end:g} Pa, but sliding was not proved either: the"
+            " path ends at this load"
         )
     wide = (given.size, *interface.shape)
     values = {

@@ -1,8 +1,8 @@
-"""One sample as the solvers take it: strength excess, residual, and the pieces of its law.
+"""Samples, states and the program's protocol, as the solvers of equilibrium take them.
 
-Strength falls with slip along straight pieces. A law of M pieces has M corners; piece M is the
-residual strength. Between corners everything is linear, and a corner is an event. The linear law
-has one piece: its start is tau_p, to the bit.
+Strength falls with slip along straight pieces. A law of M pieces has M corners, and piece M is the
+residual strength. Between corners everything is linear, so solvers step from corner to corner. The
+linear law has a single piece, whose start is tau_p to the bit.
 """
 
 from dataclasses import dataclass, field
@@ -20,19 +20,20 @@ from stiction.problem.friction.parameters import Linear, Polygon
 from stiction.problem.sample import Sample
 
 CONSTANT_STRENGTH_RTOL = 1e-11
-"""Share of the mean strength by which a node must weaken to count as weakening. A smaller fall
-is within the round-off of K d; an instability of such nodes adds no slip and never ends."""
+"""Smallest fall of strength, as a share of the mean strength, with which a node counts as
+weakening. A smaller fall is within the round-off of K d: an instability of such nodes adds no slip
+and never ends."""
 
 
 class Pieces(NamedTuple):
-    """A falling piecewise linear function f of u = slip/d_c, the same at every node."""
+    """Falling, piecewise linear function f of u = slip/d_c, the same at every node."""
 
-    ends: Array  # u at the end of each piece, the last 1
-    starts: Array  # of each piece and the residual strength: f continued to u = 0 (1, ..., 0)
-    slopes: Array  # of these: -f' over the first (1, ..., 0)
+    ends: Array  # (M,): u at the end of each piece; the last is 1
+    starts: Array  # (M + 1,): f on each piece, continued to u = 0; from 1 to 0 (residual)
+    slopes: Array  # (M + 1,): -f' on each piece, relative to the first; from 1 to 0 (residual)
     first: float  # -f' on the first piece
     area: float  # integral of f
-    at_corner: float = 1.0 - 1e-12  # share of a corner's slip from which a node is beyond it
+    at_corner: float = 1.0 - 1e-12  # a node with this share of a corner's slip is beyond it
 
     @property
     def steepens(self) -> bool:
@@ -44,13 +45,13 @@ LINEAR = Pieces(np.array([1.0]), np.array([1.0, 0.0]), np.array([1.0, 0.0]), 1.0
 
 
 def refused(law: FrictionLaw) -> list[str]:
-    """Return the reasons why a law cannot be followed piece by piece; none if it can."""
+    """Return the reasons why a law cannot be followed piece by piece, or an empty list."""
     name, kind = type(law).__name__, type(law.parameters)
     if kind in (Linear, Polygon):
         return []
     return [
-        f"friction: equilibria are followed along straight pieces, and {name} has none;"
-        " use st.PiecewiseWeakening.from_law(friction, pieces=32), or, between half-spaces,"
+        f"friction: {name} is curved, but equilibria are followed along straight pieces. Use"
+        " st.PiecewiseWeakening.from_law(friction, pieces=32) or, between half-spaces,"
         " st.Rupture(...)"
     ]
 
@@ -67,7 +68,7 @@ def pieces_of(law: FrictionLaw) -> Pieces:
 
 
 class Outcome(IntEnum):
-    """What becomes of an interface that moves at a fixed load."""
+    """Fate of an interface that moves at a fixed load."""
 
     SLIDING = 0
     ARRESTED = 1
@@ -75,7 +76,7 @@ class Outcome(IntEnum):
 
 
 class StaticSample(NamedTuple):
-    """One strength profile; arrays (nodes,). Rate and d_c are 0 where strength is constant."""
+    """Strength profile; arrays (nodes,). Rate and d_c are 0 where strength is constant."""
 
     excess: Array  # tau_p - tau_i, Pa
     residual: Array  # tau_r - tau_i, Pa
@@ -88,9 +89,9 @@ class StaticSample(NamedTuple):
 def make_sample(
     excess: Array, residual: Array, profile: Array, rate: Array, pieces: Pieces
 ) -> StaticSample:
-    """Return one sample, or many over the first axis.
+    """Return a sample, or many over the first axis.
 
-    Nodes whose strength is residual, but for round-off, do not weaken.
+    Nodes whose fall of strength is within round-off get a constant strength.
     """
     fall = excess - residual
     largest = max(excess.max(), residual.max(), -excess.min(), -residual.min())
@@ -105,24 +106,24 @@ def make_sample(
 
 
 def sample_of(rows: Sample, pieces: Pieces, row: int | slice = slice(None)) -> StaticSample:
-    """Return one sample of a batch, or all of them, as the kernels take them."""
+    """Return a sample of a batch, or all samples, in the form that the kernels take."""
     initial = rows.initial_stress[row]
     shape = (*initial.shape[: initial.ndim - rows.load_profile.ndim], -1)
     excess = (rows.strength[row] - initial).reshape(shape)
     residual = (rows.residual_strength[row] - initial).reshape(shape)
-    # A copy: of a read-only array, as of a law, each kernel would be compiled a second time.
+    # Copy the rate: numba would compile each kernel again for a read-only array, as laws return.
     rate = rows.weakening_rate[row].reshape(shape).copy()
     return make_sample(excess, residual, rows.load_profile.flatten(), rate, pieces)
 
 
 def row_of(samples: StaticSample, row: int) -> StaticSample:
-    """Return one sample of a batch: together they take a tenth less time."""
+    """Return a sample of a batch made by `sample_of`, which takes a tenth less time together."""
     excess, residual, profile, rate, critical, pieces = samples
     return StaticSample(excess[row], residual[row], profile, rate[row], critical[row], pieces)
 
 
 class Present(NamedTuple):
-    """The piece on which each node is, its value at zero slip (Pa), and its slope (Pa/m)."""
+    """Present piece of each node, its value at zero slip (Pa) and its slope (Pa/m)."""
 
     piece: NDArray[np.int64]
     strength: Array
@@ -131,24 +132,24 @@ class Present(NamedTuple):
 
 @dataclass
 class EquilibriumState:
-    """An equilibrium on the path of one sample, by default one at which it is unstable."""
+    """Equilibrium on the path of a sample, by default an unstable equilibrium."""
 
     load: float  # tau_0, Pa
     slip: Array  # (n,): d, m
-    direction: Array  # (n,): in which it is unstable
+    direction: Array  # (n,): direction of the instability
     Kd: Array = field(default_factory=lambda: np.empty(0))  # (n,): K d, Pa; empty on planes
-    gap: float = np.nan  # distance to a load without equilibrium, Pa; NaN where none is known
+    gap: float = np.nan  # distance to a load without equilibrium, Pa; NaN if it is unknown
     certified: bool = True  # the gap is proved
     unstable: bool = True  # the path is unstable here
     known: bool = True  # the path could be followed so far
-    by_events: bool = False  # a programme failed to find the next instability before
+    by_events: bool = False  # a linear programme failed before to find the next instability
     jumped: bool = False  # an instability came to rest on the way
-    stopped: bool = False  # a node that slipped stopped
-    # Largest mean stress on the way here over the mean of the load profile, Pa: the load itself
-    # (None), unless a machine drives.
+    stopped: bool = False  # a slipping node stopped on the way
+    # Largest mean stress on the way here, divided by the mean of the load profile, Pa. Without a
+    # machine it is the load itself (None).
     peak: float | None = None
     K_direction: Array | None = None  # (n,): K times the direction, if it is known
-    # The exact y with <p, y> = 1, if the direction is that; else the direction stands for it.
+    # The exact y with <p, y> = 1, if the direction is exact; otherwise the direction replaces it.
     multiplier: Array | None = None
 
     @property
@@ -176,14 +177,14 @@ class Jump(NamedTuple):
     arrested: bool
     known: bool
     state: EquilibriumState
-    counts: bool = True  # false where the path was not seen to turn: a long step of it
-    arrival: Array | None = None  # when the front arrived at each node, with inertia, s
+    counts: bool = True  # false for a long step of a path that was not seen to turn
+    arrival: Array | None = None  # with inertia: arrival time of the front at each node, s
 
 
 class Program(Protocol):
-    """What finds equilibria of samples: `DenseProgram` or `PlaneProgram`; thread-safe.
+    """Protocol of the search for equilibria: `DenseProgram` or `PlaneProgram`; thread-safe.
 
-    `widest_gap` is the certificate gap, as a share of the load, above which there is a warning.
+    `widest_gap` is the largest certificate gap without a warning, as a share of the load.
     """
 
     pieces: Pieces
@@ -200,12 +201,13 @@ class Program(Protocol):
     def at(
         self, sample: StaticSample, state: EquilibriumState, load: float
     ) -> EquilibriumState | None:
-        """Return the equilibrium at a load from a state below, None if it is not found."""
+        """Return the equilibrium at a load above a state, or None if it is not found."""
 
     def gradient(self, sample: StaticSample, state: EquilibriumState) -> Array:
-        """Return the derivative of the mean stress at an instability by the strengths there.
+        """Return the derivative of the stress of an instability by the strengths there, (n,).
 
-        Over the mean of the load profile; the strengths are those continued to zero slip.
+        The stress is the mean stress divided by the mean of the load profile. The strengths are the
+        present pieces of the law, continued to zero slip.
         """
 
     def stress_released(self, state: EquilibriumState) -> Array:
@@ -219,7 +221,7 @@ def residual_nodes(sample: StaticSample, slip: Array) -> NDArray[np.bool_]:
 
 
 def exceeds(sample: StaticSample, slip: Array, piece: NDArray[np.int64] | None = None) -> bool:
-    """Whether a slip goes beyond the piece of each node that it rests on, by default the first."""
+    """Return whether any slip goes beyond the given piece of its node, by default the first."""
     pieces = sample.pieces
     end = pieces.ends[0] if piece is None else np.append(pieces.ends, 1e300)[piece]
     beyond: NDArray[np.bool_] = slip > (2.0 - pieces.at_corner) * (end * sample.critical)
@@ -228,7 +230,7 @@ def exceeds(sample: StaticSample, slip: Array, piece: NDArray[np.int64] | None =
 
 @jit_inside
 def piece_at(pieces: Pieces, critical: float, slip: float) -> int:
-    """The piece on which a node of this d_c is after a slip."""
+    """Return the piece on which a node with this d_c is after a slip."""
     piece = 0
     while piece < pieces.ends.shape[0] and slip >= pieces.at_corner * (
         pieces.ends[piece] * critical
@@ -239,14 +241,17 @@ def piece_at(pieces: Pieces, critical: float, slip: float) -> int:
 
 @jit_inside
 def start_of(sample: StaticSample, i: int, piece: int) -> float:
-    """Value of a piece of node i at zero slip, Pa: tau_p on the first, tau_r on the last."""
+    """Return the value of a piece of node i at zero slip, less the initial stress, Pa.
+
+    The first piece gives tau_p, the last tau_r.
+    """
     share = sample.pieces.starts[piece]
     return share * sample.excess[i] + (1.0 - share) * sample.residual[i]
 
 
 @jit_inside
 def strength_at(sample: StaticSample, slip: Array, i: int) -> float:
-    """Strength less initial stress of node i after some slip, Pa."""
+    """Return strength less initial stress of node i after some slip, Pa."""
     piece = piece_at(sample.pieces, sample.critical[i], slip[i])
     return start_of(sample, i, piece) - sample.pieces.slopes[piece] * sample.rate[i] * slip[i]
 
@@ -271,7 +276,10 @@ def present_pieces(sample: StaticSample, slip: Array) -> Present:
 def step_to_corner(
     sample: StaticSample, slip: Array, direction: Array, longest: float
 ) -> float:
-    """Move along a direction until the first node reaches a corner, at most `longest` of it."""
+    """Move slip along a direction to the first corner of any node, and return the step.
+
+    The step is at most `longest`. If it is infinite, slip stays.
+    """
     step = longest
     ends = sample.pieces.ends
     for i in range(slip.shape[0]):
@@ -288,7 +296,7 @@ def step_to_corner(
 
 @jit_inside
 def unsupported(sample: StaticSample, load: float, slip: Array) -> bool:
-    """Whether the whole interface, at its present strengths, cannot carry the load."""
+    """Return whether the load exceeds the present strengths of the whole interface."""
     balance = 0.0
     for i in range(slip.shape[0]):
         balance += load * sample.profile[i] - strength_at(sample, slip, i)

@@ -1,4 +1,13 @@
-"""The solver of the equilibrium method: samples in, onsets out, on lines and planes."""
+"""Onsets of samples by exact equilibrium, on lines, specimens and planes.
+
+Algorithm of a sample (`follow_to_sliding`), for which a `Program` supplies the two searches:
+
+1. Start from rest and raise the load to the next instability (`Program.next`).
+2. If the path ends without an instability, the interface slides stably: stop.
+3. Let the unstable patch jump at constant load (`Program.jump`). If no equilibrium stops it, the
+   interface slides: stop.
+4. The patch came to rest, which is an arrested event. Go to 1 from the new equilibrium.
+"""
 
 from typing import Any, NamedTuple
 
@@ -27,26 +36,26 @@ from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
 
 MIN_NODES_IN_NUCLEATION_LENGTH = 8.0
-"""Below, there is a warning with the expected error."""
+"""Fewest nodes in a nucleation length without a warning, which gives the expected error."""
 ERRORS_OF_COARSE_GRIDS = {  # by the number of dimensions
     1: "single onsets are off by 0.4 % at 9 nodes and 3 % at 4 if the correlation length is a"
     " quarter of it, by 3 and 9 % if it is a tenth",
     2: "single onsets are off by 0.15 % at 9 nodes along x and 6 along y, by 0.5 % at 6 and 4",
 }
 MIN_PEAK_HEIGHT = 0.02
-"""Height of the peak above the mean residual strength, as a share of the fall of strength, below
-which the peak is hardly more than the stress of sliding."""
+"""A peak that is hardly higher than the stress of sliding gets a warning. This is its smallest
+height above the mean residual strength, as a share of the fall of strength."""
 STRENGTH_STEP = 1e-7
-"""Rise of the strength of a node for a difference quotient, as a share of the mean."""
+"""Rise of a node's strength in a difference quotient, as a share of the mean strength."""
 
 
 class SamplePath(NamedTuple):
     """Course of one sample until it slides.
 
-    `first` is the first instability, `last` the last equilibrium, `known` is false where a jump
-    or a path did not come to its end: `last` is then a lower bound. `peak` is the largest mean
-    stress on the way, over the mean of the load profile. `arrival` (s) is when the front of the
-    event that slides arrived at each node, with inertia.
+    `first` is the first instability and `last` the last equilibrium. `known` is false if a jump or
+    a path was not followed to its end; the load of `last` is then a lower bound. `peak` is the
+    largest mean stress on the way, divided by the mean of the load profile (Pa). With inertia,
+    `arrival` is the time at which the front of the last event reached each node (s).
     """
 
     first: EquilibriumState
@@ -60,20 +69,22 @@ class SamplePath(NamedTuple):
 def follow_to_sliding(program: Program, sample: StaticSample) -> SamplePath:
     """Follow a sample from rest to global sliding.
 
-    Arrest is overdamped: the patch stops at the least equilibrium of the same load. Inertia may
-    carry it through.
+    Without inertia a patch stops at the least equilibrium of the same load. A program with inertia
+    may carry it through.
     """
+    # 1.
     state = program.next(sample)
     first: EquilibriumState | None = None
     events: list[ArrestedEvent] = []
     known, peak, arrival = state.known, state.highest, None
-    while state.unstable:
-        jump = program.jump(sample, state)
+    while state.unstable:  # 2.
+        jump = program.jump(sample, state)  # 3.
         if jump.counts:
             first = first or state
             if not jump.arrested:
                 known, arrival = jump.known, jump.arrival
                 break
+            # 4. A jump that does not count is a long step of a path that did not turn.
             events.append(ArrestedEvent(state, jump.state))
         state = program.next(sample, jump.state)
         known, peak = state.known, max(peak, state.highest)
@@ -90,23 +101,23 @@ def make_program(problem: Problem, gap: float = 1e-6) -> Program:
 
 
 def warn_of_signs(problem: Problem) -> None:
-    """Warn where it is not proved that equilibria are the least ones."""
+    """Warn if the signs of K do not prove that the equilibria found are the least."""
     if problem.specimen is not None and problem.blocks.positive:
         warn_accuracy(
             "the stiffness of these blocks has positive entries off its diagonal, up to"
-            f" {problem.blocks.positive:.1g} of the diagonal: that equilibria are the least ones,"
-            " and bounds rigorous, is then not proved (docs/specimens.md)"
+            f" {problem.blocks.positive:.1g} of the diagonal. Then there is no proof that the"
+            " equilibria are the least and the bounds rigorous (docs/specimens.md)"
         )
 
 
 class OnsetSolver:
-    """Solves samples of a problem with options of `Equilibrium`; safe in several threads."""
+    """Solver of the samples of a problem, with the options of `Equilibrium`; thread-safe."""
 
     def __init__(self, problem: Problem, options: Any, program: Program) -> None:
         self.problem, self.options, self.program = problem, options, program
 
     def __call__(self, rows: Sample) -> dict[str, NDArray[Any]]:
-        """Return the onset of each sample; see `Equilibrium`."""
+        """Return the variables of `Equilibrium`, each with the samples as first dimension."""
         warn_of_signs(self.problem)
         self.problem.warn_if_coarse(
             rows,
@@ -135,11 +146,12 @@ class OnsetSolver:
     def _values(
         self, rows: Sample, row: int, sample: StaticSample, path: SamplePath
     ) -> dict[str, Any]:
-        """Return the variables of one sample, the first instability as a load."""
+        """Return the variables of one sample; stresses are divided by the load profile."""
         interface, shape = self.problem.interface, rows.strength[row].shape
         first, last = path.first, path.last
         sliding_patch = patch = critical_patch(multiplier_of(sample, first), interface)
-        # On lines the multiplier is known of a programme, which passes no corner.
+        # On lines a known multiplier means that a linear programme found the instability, so no
+        # node has passed a corner before it.
         straight = last is first and first.multiplier is not None and not interface.is_plane
         if last is not first and last.direction.any():
             sliding_patch = critical_patch(last.direction, interface)
@@ -162,7 +174,8 @@ class OnsetSolver:
             values["certified"] = first.certified
         else:
             values["critical_patch_length"] = patch.area
-        stable = path.known and not first.unstable  # behind a stiff machine
+        # Behind a stiff machine an interface can slide without any instability.
+        stable = path.known and not first.unstable
         if stable:
             of_patch = ("first_instability", "critical_position", "critical_patch_length")
             values |= dict.fromkeys(of_patch, np.nan)
@@ -188,12 +201,13 @@ class OnsetSolver:
         certified: Mask,
         stopped: Mask,
     ) -> None:
-        """Warn of what is not as it mostly is: values are of all samples, stresses in Pa."""
+        """Warn of exceptional samples; `values` hold all samples, with stresses in Pa."""
         first, unproved = values["first_instability"], ~certified
         share = values["certificate_gap"] / np.maximum(np.abs(first), 1e-300)
         warn_of_samples(
             f"the bounds of the first instability did not close to {self.program.widest_gap:g} of"
-            " it in {samples}: they hold, and are up to {worst:.2g} of it apart; take more nodes",
+            " the load in {samples}: they hold, but are up to {worst:.2g} of it apart. Take more"
+            " nodes",
             ~unproved & ~(share <= self.program.widest_gap),
             share,
         )
@@ -201,24 +215,24 @@ class OnsetSolver:
             warn_of_samples(
                 "nodes reach a corner of the law or their residual strength before the first"
                 " instability in {samples}: it was found by following equilibria, to {worst:.2g}"
-                " of it, and has no certificate",
+                " of the load, and has no certificate",
                 unproved,
                 share,
             )
         warn_of_samples(
-            "no patch becomes unstable in {samples}: behind so stiff a machine their interface"
+            "no patch becomes unstable in {samples}: the machine is so stiff that the interface"
             " slides stably, and first_instability is NaN",
             np.isnan(first),
         )
         warn_of_samples(
-            "a jump was not followed to its end in {samples}: their critical load is the last with"
-            " a known equilibrium, a lower bound",
+            "a jump was not followed to its end in {samples}: the critical load is the last load"
+            " with a known equilibrium, a lower bound",
             ~known,
         )
         warn_of_samples(
-            "a node that slipped stops before the first instability in {samples}: its equilibria"
-            " are no longer the least ones, so that nothing bounds it from above, and"
-            " certificate_gap is NaN",
+            "a slipping node stops before the first instability in {samples}: equilibria are no"
+            " longer the least, so the first instability has no upper bound and certificate_gap is"
+            " NaN",
             stopped & np.isfinite(first),
         )
         residual = rows.residual_strength.mean(axis=rows.axes)
@@ -227,8 +241,8 @@ class OnsetSolver:
         above /= np.maximum(np.median(falls, axis=1), 1e-300)
         warn_of_samples(
             "all but the last nodes are at their residual strength before the peak in {samples}:"
-            " static friction is then the mean residual strength, to {worst:.2g} of what strength"
-            " falls by, and depends on little else",
+            " static friction then equals the mean residual strength, to {worst:.2g} of the fall of"
+            " strength, and depends on little else",
             values["residual_reached"] & (above < MIN_PEAK_HEIGHT),
             above,
         )
@@ -236,8 +250,8 @@ class OnsetSolver:
             unknown = np.isnan(values["sensitivity"]).reshape(rows.samples, -1).any(axis=1)
             warn_of_samples(
                 "the first instability has no known derivative in {samples}, so sensitivity is NaN:"
-                " nodes pass a corner from which their law falls more steeply, or the turning point"
-                " was not resolved",
+                " nodes pass a corner beyond which their law falls more steeply, or the turning"
+                " point was not resolved",
                 np.isfinite(first) & unknown,
             )
 
@@ -245,16 +259,17 @@ class OnsetSolver:
 def _sensitivity(
     problem: Problem, program: Program, sample: StaticSample, state: EquilibriumState
 ) -> Array:
-    """Derivative of the stress of an instability by the peak strengths.
+    """Return the derivative of the stress of an instability by the peak strengths, (n,).
 
-    NaN where a node passed a corner beyond which it weakens more steeply.
+    It is NaN if a law steepens and a node passed a corner before the instability.
     """
     pieces = sample.pieces
     if state.stopped:
         return _quotients(problem, program, sample, state)
     if pieces.steepens and not state.certified:
         return np.full(state.slip.size, np.nan)
-    # A piece starts from share tau_p + (1 - share) tau_r; the share of the last piece is 0.
+    # The program's derivative is by the present piece continued to zero slip, which is
+    # share tau_p + (1 - share) tau_r. The chain rule gives the derivative by tau_p.
     share = pieces.starts[present_pieces(sample, state.slip).piece]
     return program.gradient(sample, state) * np.where(sample.critical > 0.0, share, 1.0)
 
@@ -262,7 +277,10 @@ def _sensitivity(
 def _quotients(
     problem: Problem, program: Program, sample: StaticSample, first: EquilibriumState
 ) -> Array:
-    """Derivative of the stress of a first instability, node by node: paths are straight."""
+    """Return the derivative of a first instability by difference quotients, a path for each node.
+
+    Between events paths are straight, so a small step gives the exact derivative.
+    """
     stress_before = first.load - relief_of(problem, first.slip)
     step = STRENGTH_STEP * float(np.abs(sample.excess).mean())
     derivative = np.empty(sample.excess.size)

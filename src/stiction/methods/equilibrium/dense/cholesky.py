@@ -34,7 +34,7 @@ Departures from the textbook, all for speed:
 - Four rows are appended together, so that each row of L is read once for four new ones.
 - A pivot counts as not positive if its square is below `PIVOT_RTOL` of the diagonal entry.
 
-Node numbers are called `i`, `node` or `nodes`; `r`, `t` and `position` count rows of L.
+Node numbers are called `i`, `node` or `nodes`, and rows of L `r`, `t` and `position`.
 """
 
 import math
@@ -68,7 +68,7 @@ def row_start(row: int) -> int:
 
 @jit
 def forward_substitute(factor: Array, first: int, last: int, values: Array) -> None:
-    """Solve L x = values in place for the rows first..last-1; those before are solved."""
+    """Solve L x = values in place for the rows first..last-1, when earlier rows are solved."""
     for r in range(first, last):
         start = row_start(r)
         row = factor[start : start + r + 1]
@@ -208,9 +208,9 @@ def back_substitute(factor: Array, n_rows: int, values: Array) -> None:
 
 
 class Workspace(NamedTuple):
-    """L of the slipping nodes of one sample, with the arrays that go with it.
+    """Factor L on the slipping nodes of a sample, with the arrays that go with it.
 
-    Arrays have one entry for each node (n,), unless they are in S: one for each row of L.
+    Arrays have an entry for each node (n,), or in S an entry for each row of L.
     """
 
     stiffness: Any  # K as kernels take it: `elasticity.stiffness`
@@ -257,7 +257,7 @@ def make_workspace(stiffness: Any, n: int, max_slipping: int = MAX_SLIPPING) -> 
 
 
 class SlipState(NamedTuple):
-    """Slip of one sample, which moves along as the load rises or a patch jumps."""
+    """Slip of a sample, which moves along as the load rises or a patch jumps."""
 
     sample: StaticSample
     slip: Array  # d, m
@@ -320,7 +320,7 @@ def append(workspace: Workspace, n_slipping: int, count: int) -> int:
 
 @jit
 def remove(workspace: Workspace, n_slipping: int, position: int) -> int:
-    """Step 2: take the node at a position out of S and L; returns how many stay."""
+    """Step 2: take the node at a position out of S and L, and return how many stay."""
     factor, slipping = workspace.factor, workspace.slipping
     cosines, sines = workspace.rotations[0], workspace.rotations[1]
     for r in range(position + 1, n_slipping):
@@ -347,7 +347,7 @@ def remove(workspace: Workspace, n_slipping: int, position: int) -> int:
 
 @jit
 def factor_slipping(workspace: Workspace) -> int:
-    """Step 4: factor A on the nodes marked by `is_slipping`; returns as `append` does."""
+    """Step 4: factor A on the nodes marked by `is_slipping`. Returns as `append` does."""
     stiffness, diagonal = workspace.stiffness, workspace.diagonal
     slipping, queue, is_slipping = workspace.slipping, workspace.queue, workspace.is_slipping
     factored_diagonal, n_factored = workspace.factored_diagonal, workspace.n_factored[0]

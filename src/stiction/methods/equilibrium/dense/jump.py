@@ -82,7 +82,7 @@ MAX_ELASTIC_STEPS = 16
 
 
 class Support(IntEnum):
-    """What holds the interface after the overstressed nodes have joined S."""
+    """Support of the interface after the overstressed nodes have joined S."""
 
     RESTING_NODES = 0
     NONE = 1  # every node slips or has slipped
@@ -134,7 +134,7 @@ def _join(state: SlipState, load: float, n_slipping: int, tolerance: float) -> J
 
 @jit_inside
 def _remove_unloaded(state: SlipState, n_slipping: int, tolerance: float) -> int:
-    """Step 1: unmark the nodes that an elastic step would move back; returns how many stay."""
+    """Step 1: unmark the nodes that an elastic step would move back. Return how many stay."""
     workspace = state.workspace
     n_stay = n_slipping
     for t in range(n_slipping):
@@ -148,10 +148,10 @@ def _remove_unloaded(state: SlipState, n_slipping: int, tolerance: float) -> int
 
 @jit_inside
 def _elastic_step(state: SlipState, load: float, n_slipping: int, tolerance: float) -> Joined:
-    """Steps 1 and 3: one elastic step; the nodes that it overstresses join.
+    """Steps 1 and 3: make an elastic step, and let the nodes that it overstresses join.
 
-    The rows of L^-1 times the drive are kept for the leading nodes whose drive is that of the step
-    before: at the residual strength it does not change any more.
+    The rows of L^-1 times the drive are kept for the leading nodes whose drive has not changed
+    since the step before. At the residual strength it no longer changes.
     """
     sample, slip, Kd, workspace, may_stop = state
     solution, drive, K_resting = workspace.solution, workspace.rhs, workspace.K_resting
@@ -192,7 +192,7 @@ def _elastic_step(state: SlipState, load: float, n_slipping: int, tolerance: flo
 
 @jit_inside
 def _leave_out_reversed(workspace: Workspace, n_slipping: int, atol: float, rtol: float) -> int:
-    """Step 2: unmark the nodes whose solution is below zero; returns how many.
+    """Step 2: unmark the nodes whose solution is below zero. Return how many.
 
     A solution counts as below zero if K_ii times it is more than `atol` (Pa) below, or it is more
     than the share `rtol` of the largest below.
@@ -214,7 +214,7 @@ def _leave_out_reversed(workspace: Workspace, n_slipping: int, atol: float, rtol
 def _write_direction(
     state: SlipState, true_pieces: Workspace, n_marked: int, drive: Array, tolerance: float
 ) -> float:
-    """Step 2: write the direction of the step; returns the longest step along it.
+    """Step 2: write the direction of the step. Return the longest step along it.
 
     It is 1 if the direction leads to the solution of the linear problem, otherwise infinite.
     """
@@ -287,8 +287,8 @@ def _step_with_true_pieces(
 def jump(state: SlipState, load: float, unstoppable: float, true_pieces: Workspace) -> Outcome:
     """Follow an instability at a fixed load to the least equilibrium, or to sliding.
 
-    Slip and K d of the state are those of the instability, perhaps moved along the direction of the
-    instability to a corner; on return they are those of the equilibrium, or of a lower bound of it.
+    Slip and K d of the state belong to the instability, perhaps moved along its direction to a
+    corner. On return they belong to the equilibrium, or are a lower bound of it.
     A run of `unstoppable` nodes at their residual strength slides. `true_pieces` is a second
     workspace.
     """
@@ -316,7 +316,7 @@ def jump(state: SlipState, load: float, unstoppable: float, true_pieces: Workspa
         if joined.support == Support.UNKNOWN:
             return Outcome.UNDECIDED
         n_slipping = joined.n_slipping
-        # 5. Behind a machine slip lowers the load, so that the mean strength shows nothing.
+        # 5. Behind a machine slip lowers the load, so the mean strength does not decide.
         dead_load = mean_relief(workspace.stiffness, sample.profile, slip) == 0.0
         if joined.support == Support.NONE or (dead_load and unsupported(sample, load, slip)):
             return Outcome.SLIDING

@@ -79,7 +79,7 @@ def sort_by(keys: Array, nodes: NDArray[np.int64], count: int) -> None:
 
 @jit_inside
 def queue_overstressed(state: SlipState, load: float, tolerance: float) -> int:
-    """Write the resting nodes above their strength to `workspace.queue`; return how many.
+    """Write the resting nodes above their strength to `workspace.queue`. Return how many.
 
     The most overstressed node comes first. Overstresses within the tolerance (Pa) do not count.
     """
@@ -139,9 +139,9 @@ def _back_off(state: SlipState, load: float, n_slipping: int) -> None:
 
 @jit_inside
 def _remove_reversed(workspace: Workspace, n_slipping: int, load: float) -> int:
-    """Step 3: take the nodes that would slip backwards out of S; return how many stay.
+    """Step 3: take the nodes that would slip backwards out of S. Return how many stay.
 
-    L stays valid up to the first of them, so all nodes behind it leave, too. Those that belong to
+    L stays valid up to the first of them, so all nodes behind it leave, too. Nodes that belong to
     S are overstressed then, and come back.
     """
     slip = workspace.solution

@@ -50,15 +50,15 @@ MAX_WEAK_NODES = 1500
 TRANSFORMS_GAP_RTOL = 3e-10
 """Relative distance of the bounds by transforms, below `widest_gap`."""
 WIDEST_GAP_IF_NODES_STOP = 1e-4
-"""`widest_gap` where nodes may stop: positive entries of K leave bounds so far apart."""
+"""`widest_gap` if nodes may stop, since positive entries of K leave the bounds so far apart."""
 WEAKENING_RATE_RTOL = 1e-12
 """Relative distance of weakening rates that differ by round-off."""
 RESTING_MULTIPLIER_RTOL = 1e-9
-"""Share of the largest multiplier below which it is zero: nodes at rest have none."""
+"""Share of the largest multiplier below which it is zero, as at nodes at rest."""
 
 
 class DenseProgram:
-    """Equilibria of a line or a specimen; safe to use from several threads."""
+    """Search for equilibria of a line or a specimen; thread-safe."""
 
     widest_gap = 1e-9
     """Certificate gap, as a share of the load, above which there is a warning."""
@@ -82,7 +82,7 @@ class DenseProgram:
 
     @property
     def _workspaces(self) -> tuple[Workspace, Workspace]:
-        """The workspaces of the thread: for programmes and elastic steps, and for true pieces."""
+        """The thread's workspaces, for elastic steps (and programmes) and for true pieces."""
         if not hasattr(self._of_thread, "workspaces"):
             self._of_thread.workspaces = tuple(
                 make_workspace(self.elastic.entries, self.nodes) for _ in range(2)
@@ -91,7 +91,7 @@ class DenseProgram:
         return pair
 
     def bound(self, sample: StaticSample) -> tuple[float, Array]:
-        """Return the bound of the weakest window of one sample (Pa), and its multiplier."""
+        """Return the bound of a sample's weakest window (Pa), and its multiplier."""
         low, high = _rates(sample)
         windows = self.elastic.windows(low, high) if high > 0.0 else NONE
         workspace, multiplier = np.empty((2, self.nodes))
@@ -106,10 +106,10 @@ class DenseProgram:
         cap: float = np.inf,
         state: EquilibriumState | None = None,
     ) -> EquilibriumState | None:
-        """Return the critical load of one sample (below `cap`) with its proofs, None if it stalls.
+        """Return the critical load of a sample (below `cap`) with its proofs, or None if it stalls.
 
-        Only the first piece of the friction law counts: `excess` and `rate`. The state is an
-        equilibrium at a lower load, if one was found.
+        Only the first piece of the friction law counts: `excess` and `rate`. `state` is a known
+        equilibrium at a lower load.
         """
         bound, multiplier = self.bound(sample)
         if cap == np.inf and self.nodes > MAX_WEAK_NODES:
@@ -135,7 +135,7 @@ class DenseProgram:
     def _by_transforms(
         self, sample: StaticSample, state: EquilibriumState | None
     ) -> EquilibriumState | None:
-        """Solve a programme in which many nodes slip; None if its bounds stay apart."""
+        """Solve a programme in which many nodes slip, or return None if its bounds stay apart."""
         half_spaces = self.elastic.half_spaces
         if half_spaces is None:
             return None
@@ -145,7 +145,7 @@ class DenseProgram:
         )  # fmt: skip
         if not onset.closed:
             return None
-        # The multiplier was lifted everywhere to be feasible; that of nodes at rest is zero.
+        # The multiplier was lifted everywhere to be feasible. At nodes at rest it must be zero.
         multiplier = onset.multiplier - onset.multiplier.min()
         multiplier[multiplier < RESTING_MULTIPLIER_RTOL * multiplier.max()] = 0.0
         multiplier /= multiplier @ sample.profile
@@ -167,7 +167,7 @@ class DenseProgram:
         from_rest, by_events = not state.slip.any(), state.by_events or self.driven
         if from_rest:
             for workspace in self._workspaces:
-                workspace.n_factored[0] = 0  # the rows are those of another sample
+                workspace.n_factored[0] = 0  # the rows belong to another sample
         if target == np.inf and not by_events:
             instability = self._next_by_programme(sample, state, from_rest)
             if instability is not None:
@@ -183,7 +183,7 @@ class DenseProgram:
             peak=end.peak, by_events=by_events, jumped=state.jumped,
             stopped=end.stopped or state.stopped,
         )  # fmt: skip
-        # No multiplier bounds the load from above where a law steepens, or a node stopped.
+        # No multiplier bounds the load from above if a law steepens or a node stopped.
         reached.certified = reached.unstable and not (self.pieces.steepens or reached.stopped)
         if reached.certified and from_rest:
             present = present_sample(sample, slip)
@@ -193,7 +193,7 @@ class DenseProgram:
     def _next_by_programme(
         self, sample: StaticSample, state: EquilibriumState, from_rest: bool
     ) -> EquilibriumState | None:
-        """Return the next instability by a linear programme; None if a corner comes before it."""
+        """Return the next instability by a linear programme, or None if a corner comes first."""
         present = sample if from_rest else present_sample(sample, state.slip)
         solution = self.solve(present, state=None if from_rest else state)
         if solution is None or not (from_rest or solution.load >= state.load):
@@ -207,7 +207,7 @@ class DenseProgram:
     def _certify(
         self, present: StaticSample, instability: EquilibriumState, multiplier: Array
     ) -> Array:
-        """Write the distance of the bounds of an instability; return K times the multiplier."""
+        """Write the gap of an instability, and return K times the multiplier."""
         Ky = np.empty(self.nodes)
         instability.gap = certificate(
             present, instability.slip, instability.Kd, multiplier, self._workspaces[0], Ky
@@ -248,7 +248,7 @@ class DenseProgram:
     def _run(
         self, sample: StaticSample, instability: EquilibriumState, slip: Array
     ) -> tuple[int, float]:
-        """Test for sliding (step 4); return the outcome, and a length that is unstoppable.
+        """Test for sliding (step 4): return the outcome and an unstoppable length.
 
         The length is a number of residual nodes. Slip moves on to a lower bound of the next
         equilibrium.
@@ -274,8 +274,9 @@ class DenseProgram:
 
         With a relief of r (Pa/m) the mean stress is D - r <p, d>/n at a drive D, and y is the
         derivative of the largest D by the strengths s. Up to the instability (K - W) d = D p - s on
-        the slipping nodes, none of which rests. So d grows with D at the rate d' = (K - W)^-1 p,
-        the derivative of <p, d> by s is -d', and the mean stress has the derivative
+        the slipping nodes, and no node has stopped. So d grows with D at the rate
+        d' = (K - W)^-1 p, the derivative of <p, d> by s is -d', and the mean stress has the
+        derivative
 
             y - (r/n) (<p, d'> y - d').
         """

@@ -97,7 +97,7 @@ class Runs(NamedTuple):
 
 @lru_cache(maxsize=4)
 def runs_of(half_spaces: HalfSpaces, nodes: int) -> Runs:
-    """Return what the test needs of a line."""
+    """Return the properties of a line that the test needs."""
     (length,), (modulus,) = half_spaces
     column = line_of(half_spaces, nodes).entries.column
     longest = min(MAX_RUN, nodes - 1)
@@ -107,7 +107,7 @@ def runs_of(half_spaces: HalfSpaces, nodes: int) -> Runs:
 
 @jit
 def unstoppable_length(sample: StaticSample, load: float, runs: Runs) -> float:
-    """Return how many nodes in a row at their residual strength slide whatever surrounds them.
+    """Return the length of a run of residual nodes that no strength around it can stop, in nodes.
 
     Griffith's (1921) length with the least stress drop D and the largest fracture energy, which is
     (tau_p - tau_r) d_c times the area under the law. A crack of half-length a releases
@@ -137,8 +137,8 @@ def runs_away(
     """Return SLIDING if the patch of an instability certainly slides, otherwise UNDECIDED.
 
     The second value is the number of residual nodes in a row that would show sliding in `jump`.
-    Slip d and K d are those of the instability, and K times its direction stands beside it.
-    Afterwards slip is a lower bound of the least equilibrium.
+    Slip d, K d, the direction and K times the direction belong to the instability. Afterwards slip
+    is a lower bound of the least equilibrium.
     """
     n = slip.shape[0]
     griffith = unstoppable_length(sample, load, runs)

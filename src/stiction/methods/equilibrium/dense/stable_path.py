@@ -109,7 +109,7 @@ class PathEnd(NamedTuple):
 
 
 class PathEvent(NamedTuple):
-    """The next start or corner; NOBODY in both places if the target comes first."""
+    """Next start or corner, with NOBODY in both places if the target comes first."""
 
     step: float  # rise of the load, Pa
     starting_node: int
@@ -117,7 +117,7 @@ class PathEvent(NamedTuple):
 
 
 class Start(NamedTuple):
-    """What became of S when a node started to slip."""
+    """Slipping set S after a node started to slip."""
 
     bounded: bool  # whether rates of slip exist; if not, the path ends
     n_slipping: int
@@ -191,7 +191,7 @@ def _first_to_stop(
 def _move_rates(
     state: SlipState, n_slipping: int, v_nodes: Array, new: Array, share: float, endless: bool
 ) -> None:
-    """Move the rates by a share of the way to `new` (in S); see `_first_to_stop`."""
+    """Move the rates by a share of the way to `new` (in S), as in `_first_to_stop`."""
     slipping = state.workspace.slipping
     for t in range(n_slipping):
         i = slipping[t]
@@ -201,7 +201,7 @@ def _move_rates(
 
 @jit_inside
 def _stop(state: SlipState, n_slipping: int, position: int, v_nodes: Array) -> int:
-    """Take a node out of S; returns how many nodes slip on."""
+    """Take a node out of S, and return how many nodes slip on."""
     workspace = state.workspace
     node = workspace.slipping[position]
     workspace.is_slipping[node] = False
@@ -223,7 +223,7 @@ def _solve_rates(workspace: Workspace, n_slipping: int) -> None:
 def _stop_unloaded(
     state: SlipState, q: Array, n_slipping: int, v_nodes: Array
 ) -> tuple[int, bool]:
-    """Step 2, for (3): move the rates from `v_nodes` towards v; nodes on the way to which stop.
+    """Step 2, for (3): move the rates from `v_nodes` towards v, and stop nodes on the way.
 
     Returns the number of slipping nodes, and whether a node stopped. `workspace.v` and `v_nodes`
     are then the solution of (2) for them.
@@ -289,14 +289,14 @@ def _next_event(
 def _move_along_z(state: SlipState, n_factored: int, v_nodes: Array, direction: Array) -> int:
     """Step 5: write the direction z after a pivot failed, and move the rates along it.
 
-    Returns the position in S of the node whose rate reaches zero; NOBODY if nothing bounds z.
+    Returns the position in S of the node whose rate reaches zero, or NOBODY if z is unbounded.
     """
     workspace = state.workspace
     singular_direction(workspace, n_factored, direction)
     if not state.may_stop:
         return NOBODY
     # `direction` is z clipped at zero, by node. z itself is left in `solution`, in S, without its
-    # last entry; that is the failed node, which `append` left in `slipping[n_factored]`.
+    # last entry: the failed node, which `append` left in `slipping[n_factored]`.
     z = workspace.solution
     z[n_factored] = 1.0
     first, share = _first_to_stop(state, n_factored + 1, v_nodes, z, endless=True)

@@ -40,20 +40,20 @@ from stiction.elasticity.operator import (
 from stiction.methods.equilibrium.transforms.held_equilibrium import equilibrate
 
 MAX_HALVINGS = 60
-"""More than a double has digits."""
+"""Most halvings of the interval, more than a double has binary digits."""
 MIN_MAGNITUDE = 1e-2
 """Least load to which gaps refer, as a share of the mean ratio of strength to load."""
 LIFTING_SHARE = 0.4
-"""Share of g in the lifting field, below one half: then A z < 0 for any W."""
+"""Share of g in the lifting field. Below one half A z < 0 holds for any W."""
 EIGENVALUE_RTOL = 1e-4
 """Residual of the lowest eigenvector, as a share of the largest W."""
 MAX_EIGENVECTOR_ITERATIONS = 200
 
 
 def _lifting_field(operator: Operator) -> tuple[Array, Array]:
-    """A field z > 0 with A z < 0 at every node, and -A z (Pa/m), to make multipliers feasible.
+    """Return a field z > 0 with A z < 0 at every node, and -A z (Pa/m), to lift multipliers.
 
-    Where W > 0 everywhere it is uniform: K 1 = 0, so -A 1 = W. Otherwise z = 1 - 0.4 g with
+    If W > 0 everywhere, z is uniform: K 1 = 0, so -A 1 = W. Otherwise z = 1 - 0.4 g with
     (K + w) g = w where W = 0 and zero elsewhere, w the smallest positive W: for a Z-matrix
     0 <= g < 1, and -A z is 0.4 w (1 - g) where W = 0 and at least W - 0.4 (w + W) g > 0 elsewhere.
     """
@@ -70,7 +70,7 @@ def _lifting_field(operator: Operator) -> tuple[Array, Array]:
 
 
 class Bracket:
-    """Programme of one sample on a grid, with the bounds of its solution found so far.
+    """Programme of a sample on a grid, with the best bounds of its solution so far.
 
     They are rigorous bounds of the onset load (Pa), `lower` and `upper`, with the slip (m) and the
     multiplier, <p, y> = 1, that prove them: at first no node slips, or all slide at once. All of
@@ -142,7 +142,7 @@ class Bracket:
 
 
 def bisect(bracket: Bracket, gap: float, accuracy: float) -> Array:
-    """Narrow a bracket to a relative gap; return the last unstable direction, of unit norm.
+    """Narrow a bracket to a relative gap. Return the last unstable direction, of unit norm.
 
     The accuracy is the largest residual stress as a share of the mean strength.
     """

@@ -1,4 +1,4 @@
-"""The end of a stable path on a plane, followed from event to event: where it turns, and how.
+"""The turn of a stable path on a plane, found by following the path from event to event.
 
 Problem
 -------
@@ -32,7 +32,7 @@ from stiction.methods.equilibrium.sample import StaticSample, present_pieces
 from stiction.methods.equilibrium.transforms.relaxation import residual_tolerance, solve_pieces
 
 MAX_EVENTS = 300
-"""Events of a path to its turn, which is begun a step of the load before."""
+"""Most events up to the turn, in a path that begins a step of the load before it."""
 TURN_SLIP_RTOL = 1e-11
 """Residual stress of the slip, as a share of the mean strength or load."""
 SOLUTION_RTOL = 1e-9
@@ -42,9 +42,9 @@ MAX_PIECE_REVISIONS = 20
 
 
 class Turn(NamedTuple):
-    """Load (Pa), slip (m), and the direction y in which a path turns there, <p, y> = 1.
+    """Load (Pa) and slip (m) at a turn of a path, and its direction y with <p, y> = 1.
 
-    The direction is zero where the path goes on.
+    The direction is zero if the path goes on.
     """
 
     load: float
@@ -53,7 +53,7 @@ class Turn(NamedTuple):
 
 
 def _solution(operator: Operator, inside: Mask, right: Array) -> Array | None:
-    """Solution of A x = right on the nodes inside, None if A is not positive definite there."""
+    """Solve A x = right on the nodes inside; None if A is not positive definite there."""
     x, residual = np.zeros(right.size), np.where(inside, right, 0.0)
     tolerance = SOLUTION_RTOL * float(np.abs(residual).max())
     status, _ = solve_inside(operator, inside, x, residual, tolerance)
@@ -63,7 +63,7 @@ def _solution(operator: Operator, inside: Mask, right: Array) -> Array | None:
 def _equilibrium_near(
     operator: Operator, sample: StaticSample, load: float, slip: Array
 ) -> Array | None:
-    """Step 1: slip at a load from a rough one; None if there is none."""
+    """Step 1: improve a rough slip at a load; None if there is no equilibrium near it."""
     tolerance = residual_tolerance(sample, load, TURN_SLIP_RTOL)
     for _ in range(MAX_PIECE_REVISIONS):
         present = present_pieces(sample, slip)
@@ -79,9 +79,9 @@ def _equilibrium_near(
 def follow_to_turn(
     operator: Operator, sample: StaticSample, load: float, target: float, slip: Array
 ) -> Turn | None:
-    """Follow a stable path, from a slip that is roughly that at a load, up to a higher load.
+    """Follow a stable path from a rough slip at a load to its turn, or to the target load.
 
-    It ends at a turn before. None if it is not stable at the first load, or after too many events.
+    Returns None if the path is not stable at the first load, or after too many events.
     """
     # 1.
     start = _equilibrium_near(operator, sample, load, slip)
@@ -94,7 +94,7 @@ def follow_to_turn(
     for _ in range(MAX_EVENTS):
         if v is None:
             break
-        # 2. At nodes at rest A and K are the same but for W d = W v = 0.
+        # 2. At nodes at rest d = v = 0, so products with A stand for products with K.
         product(operator, slip, image)
         margin = np.maximum(strength + image - load * sample.profile, 0.0)
         product(operator, v, image)

@@ -71,7 +71,7 @@ def equilibrate(
     residual: Array,
     tolerance: float,
 ) -> tuple[int, int]:
-    """Solve (1) for right = load p - s + spring alpha phi; return the status and iterations.
+    """Solve (1) for right = load p - s + spring alpha phi. Return the status and iterations.
 
     The nodes `inside`, and their slip, are a guess, then the solution. If it is solved, the
     residual r is nowhere above the tolerance (Pa), and on the set within twice the tolerance.

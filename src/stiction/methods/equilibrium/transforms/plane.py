@@ -6,12 +6,12 @@
 2. On the coarsest grid, bisect the trivial bounds until Newton's method on the turning point
    succeeds (`_narrow`).
 3. On each finer grid start Newton's method (`turning_point.close`) from the slip and the multiplier
-   of the grid before; if it fails, go on as in step 2.
+   of the grid before. If it fails, go on as in step 2.
 
 `PlaneProgram` follows a sample from instability to instability:
 
 4. From rest, the next instability is the onset without corners, if no node reaches a corner of its
-   law before. A coarse grid shows most often whether one does.
+   law before. A coarse grid shows most often whether a node does.
 5. Otherwise, and after a jump, the path is followed in steps of the load, each of which is proved
    to be stable (`relaxation.stable_equilibrium`). A step that is not is shortened, until it is as
    short as the gap that was asked for.
@@ -50,25 +50,26 @@ from stiction.problem.problem import Problem
 MIN_STIFFNESS_RATIO = 8.0
 """Least ratio of the largest K(k) to W on a coarse grid: about six nodes in h_n."""
 MIN_COARSE_NODES = 8
-"""Least nodes along x and y on a coarse grid: below, none is faster than the next one."""
+"""Least nodes along x and y on a coarse grid. A smaller grid is not faster than the next."""
 COARSE_GAP = 1e-4
 """Relative gap on coarse grids, whose own error is larger."""
 START_RETREATS = (0.0, 1e-5, 1e-4)
 """Shares of the load below its lower bound from which a path is followed to its turn: the slip
 that proves the bound may be beyond it."""
 FIRST_LOAD_STEP = 1e-4
-"""Step of the load where the path is followed in steps, as a share of the load; it adapts."""
+"""First step of the load along a path, as a share of the load. Later steps adapt."""
 FIRST_SHARE_OF_ONSET = 0.9
 """Share of the way to the onset without corners that is tried at once. Corners mostly take off less
 than a tenth."""
 STEP_FACTOR_IF_FAILED, STEP_FACTOR = 0.3, 1.5
-"""Change of a step that failed, and of the next step after one that did not."""
+"""Factors of the next step, after a step that failed and after a step that succeeded."""
 MAX_EXTRAPOLATION = 3.0
 """Steps ahead to which slip is extrapolated as a guess."""
 STEP_RESIDUAL = 0.1
 """Largest residual stress after a step, as a share of the step."""
 MAX_STEP_RESIDUAL = 1e-5
-"""The same, as a share of the mean strength or load: a rougher slip may miss an event."""
+"""Largest residual stress after a step, as a share of the mean strength or load. A rougher slip may
+miss an event."""
 AT_CORNER = 1.0 - 1e-9
 """Share of the slip at a corner above which a node counts as beyond it, given `SLIP_RTOL`."""
 SLIP_RTOL = 1e-7
@@ -98,10 +99,10 @@ def doubled(coarse: Array) -> Array:
 
 
 class PlaneOnset(NamedTuple):
-    """Onset of one sample.
+    """Onset of a sample: rigorous bounds of the load, and their proofs.
 
-    Rigorous bounds of the load (Pa) with the slip (m) and the multiplier, (*shape), that prove
-    them; whether they are as close as required.
+    The bounds are loads (Pa). Slip (m) and multiplier, (*shape), prove them. `closed` tells whether
+    they are as close as required.
     """
 
     lower: float
@@ -139,10 +140,11 @@ def plane_onset(
 ) -> PlaneOnset:
     """Return the largest load with an equilibrium while no node has reached a corner of its law.
 
-    All fields are (nx, ny), of a line (nodes,): peak strength less initial stress (Pa), load
-    profile p > 0, weakening rate (Pa/m; zero where it is residual), slip (m) of an equilibrium at a
-    lower load to start from instead of coarse grids. The bounds are closed to a relative gap.
-    The onset of a coarse grid is returned if a node there slips beyond its corner (m; 0 for none).
+    All fields are (nx, ny), or on a line (nodes,): peak strength less initial stress (Pa), load
+    profile p > 0, weakening rate (Pa/m, zero at residual nodes), and the slip (m) of an equilibrium
+    at a lower load, from which the search starts instead of coarse grids. The bounds are closed to
+    a relative gap. If a node of a coarse grid slips beyond its corner (m, 0 without a corner), the
+    onset of this grid is returned.
     """
     # 1.
     corners = np.zeros_like(excess) if corner is None else corner
@@ -185,7 +187,7 @@ def plane_onset(
 
 
 class PlaneProgram:
-    """Equilibria of a plane, to a relative distance of bounds; safe to use from several threads."""
+    """Search for equilibria of a plane, to a relative distance of bounds; thread-safe."""
 
     def __init__(self, problem: Problem, gap: float = 1e-6) -> None:
         self.elastic = problem.half_spaces
@@ -200,7 +202,7 @@ class PlaneProgram:
         )
 
     def _onset(self, sample: StaticSample, corner: Array) -> PlaneOnset:
-        """Return the onset without corners, of a coarse grid if a node there passes its corner."""
+        """Return the onset without corners, or of a coarse grid on which a node passes a corner."""
         fields = (sample.excess, sample.profile, sample.rate, corner)
         excess, profile, rate, corner = (field.reshape(self.shape) for field in fields)
         return plane_onset(self.elastic, excess, profile, rate, self.requested, corner=corner)
@@ -285,7 +287,7 @@ class PlaneProgram:
     ) -> Turn | None:
         """Step 6: follow the end of the path event by event; None if it is not found.
 
-        A rough slip may be beyond the turn: then start from one step before, and so on.
+        A rough slip may be beyond the turn. Then start from the step before it, and so on.
         """
         for load, slip in reversed(passed):
             turn = follow_to_turn(operator, sample, load, load_beyond, slip)
@@ -294,7 +296,7 @@ class PlaneProgram:
         return None
 
     def gradient(self, sample: StaticSample, state: EquilibriumState) -> Array:
-        """Find the direction in which the path turns; NaN if that is not found."""
+        """Return the direction in which the path turns, (n,), or NaN if it is not found."""
         if state.multiplier is not None or state.gap == 0.0:
             return multiplier_of(sample, state)
         operator, load_beyond = self._operator(sample), state.load + 2.0 * state.gap
@@ -304,7 +306,7 @@ class PlaneProgram:
             turn = follow_to_turn(operator, sample, load, load_beyond, slip)
             if turn is not None and turn.direction.any():
                 return turn.direction
-            slip = np.zeros(slip.size)  # that which proves the bound may be beyond the turn
+            slip = np.zeros(slip.size)  # the slip that proves the bound may be beyond the turn
         return np.full(slip.size, np.nan)
 
     def jump(self, sample: StaticSample, instability: EquilibriumState) -> Jump:
@@ -315,7 +317,7 @@ class PlaneProgram:
             accuracy=0.1 * self.requested, is_unstable=True,
         )  # fmt: skip
         arrested = end.status == Outcome.ARRESTED
-        # Where no turn was found, and the rest is in order, a stable path was only hard to follow.
+        # Without a turn, an arrest only shows that a stable path was hard to follow.
         counts = not arrested or instability.multiplier is not None
         after = EquilibriumState(load_beyond, end.slip, instability.direction, jumped=True)
         return Jump(arrested, end.status != Outcome.UNDECIDED, after, counts)

@@ -12,7 +12,7 @@ For given pieces this is linear, and `held_equilibrium` solves it with A = K - d
 gradients, which also meet a direction of negative curvature if A is not positive definite. The
 pieces depend on the slip. Two questions are answered:
 
-(a) Does a stable path lead from an equilibrium at a lower load to one at this load
+(a) Does a stable path lead from an equilibrium at a lower load to an equilibrium at this load
     (`stable_equilibrium`)?
 (b) At which least equilibrium, not below a given slip, does an overdamped interface come to rest,
     or does it slide (`least_equilibrium`)? `dense.jump` answers this for lines.
@@ -27,11 +27,11 @@ Algorithm for (a): Newton's method
 
 Algorithm for (b): our own, steps that do not pass the least equilibrium
 ------------------------------------------------------------------------
-1. If the load exceeds the mean strength, the interface slides: stiffness adds nothing to the mean.
+1. If the load exceeds the mean strength, the interface slides, since the mean of K d is zero.
 2. Step with bounds (`_bound`). Let nodes weaken by a share of their present rate only, and no
-   further than to their next corner. As this strength is nowhere below the true one, the solution
-   of (1) with it is below the least equilibrium. The share is 1 - `omitted`. The larger it is, the
-   longer is the step.
+   further than to their next corner. As this strength is nowhere below the true strength, the
+   solution of (1) with it is below the least equilibrium. The share is 1 - `omitted`. The larger it
+   is, the longer is the step.
 3. If the share is 1 and all nodes are on the pieces that were assumed, the solution is the least
    equilibrium, and the interface is arrested.
 4. If the step has a solution, slip moves to it. If hardly any node moves, the next step has the
@@ -70,8 +70,8 @@ from stiction.methods.equilibrium.sample import (
 )
 from stiction.methods.equilibrium.transforms.held_equilibrium import equilibrate
 
-# Halved or doubled none of these changes a result by more than the gap, or the time by much more
-# than a tenth (planes of 64 and 96 squared, with and without arrests).
+# Half or twice any of these changes a result by less than the gap, and the time by hardly more than
+# a tenth (planes of 64 and 96 squared, with and without arrests).
 MAX_REVISIONS = 100
 """Revisions of the pieces in Newton's method, which ends by itself."""
 MAX_JUMP_STEPS = 2000
@@ -106,7 +106,7 @@ def residual_tolerance(sample: StaticSample, load: float, accuracy: float) -> fl
 def solve_pieces(
     operator: Operator, drive: Array, rate: Array, guess: Array, tolerance: float
 ) -> tuple[int, Array]:
-    """Solve (1) for given pieces, with drive = load p - q; return the status and the slip."""
+    """Solve (1) for given pieces, with drive = load p - q. Return the status and the slip."""
     slip = guess.copy()
     inside = (guess > 0.0) | (drive > 0.0)
     operator = operator._replace(rate=rate)
@@ -115,7 +115,7 @@ def solve_pieces(
 
 
 def _is_definite(operator: Operator, rate: Array, growth: Array, slip: Array) -> bool:
-    """(a) 2: whether K - `rate` on the nodes that slip shows no negative curvature.
+    """(a) 2: return whether K - `rate` on the nodes that slip shows no negative curvature.
 
     The search begins with the growth, which is close to the direction in which stability is lost,
     and goes on in the directions of conjugate gradients.
@@ -210,7 +210,7 @@ def _bound(
         is_beyond = start - rate * end < level
         if np.array_equal(is_beyond, is_level):
             passed = present_pieces(sample, end).piece > present.piece
-            # Beyond its last corner the strength of a node is level in truth.
+            # Beyond its last corner the true strength of a node is level, too.
             falls_on = passed & (present.piece < sample.pieces.ends.size - 1)
             is_equilibrium = omitted == 0.0 and not falls_on.any()
             return Bound(SOLVED, np.maximum(end, slip), is_equilibrium)
@@ -223,9 +223,9 @@ def _step_to_corner(
 ) -> Array:
     """(b) 5: move slip with the true pieces until the first node reaches a corner.
 
-    Only the nodes that slip or are overloaded move: towards their equilibrium or, if they have
-    none, along y >= 0 with A y = lambda y, lambda < 0. Both keep every node that moves overloaded
-    or balanced, so that the next equilibrium is not passed.
+    Only the nodes that slip or are overloaded move: towards their equilibrium or, without an
+    equilibrium, along y >= 0 with A y = lambda y, lambda < 0. Both keep every node that moves
+    overloaded or balanced, so that the next equilibrium is not passed.
     """
     present = present_pieces(sample, slip)
     operator = operator._replace(rate=present.rate)
@@ -248,7 +248,7 @@ def _step_to_corner(
 
 
 class Relaxed(NamedTuple):
-    """What becomes of the interface at the load, and its slip."""
+    """Fate of the interface at a load, and its slip."""
 
     status: Outcome
     slip: Array

@@ -18,7 +18,7 @@ hardly slips at the turning point, so that the error of this bound is of second 
 
 Algorithm
 ---------
-Our own: Newton's method for two equations, of which mu' falls in steps, as nodes join.
+Our own: Newton's method for two equations. As nodes join, mu' falls in steps.
 
 1. Hold the patch at the guess (load, a), solve (1) for d and d' (`_hold`), and take both bounds.
 2. If conjugate gradients meet negative curvature although the patch is held, another patch became
@@ -27,8 +27,8 @@ Our own: Newton's method for two equations, of which mu' falls in steps, as node
    little beyond the zero, to change its sign (`_step_across`).
 4. With states of both signs, guess a between them, alternately as if mu' were linear in a and as if
    it had one step (`_amplitude_between`).
-5. The next load is the one at which the spring would have no force at the next a (`_load_at`), and
-   below the upper bound.
+5. The next load is the load at which the spring would have no force at the next a (`_load_at`),
+   kept below the upper bound.
 6. End once the bounds are close enough, or if states in a row hardly narrow them.
 
 If it fails, `bracket.bisect` takes over, so that no result rests on the constants below.
@@ -59,7 +59,7 @@ IDLE_GAP_SHARE = 0.95
 PATCH_CHANGE_RETREAT = 2e-3
 """Share by which the load is lowered when another patch is held, twice as much each time."""
 MAX_STEP = 0.3
-"""Longest step, as a share of the amplitude: a patch twice as large is another one."""
+"""Longest step, as a share of the amplitude. A longer step may reach another patch."""
 NEWTON_FACTOR = 1.2
 """Length of a step as a multiple of Newton's, which falls short because mu' falls in steps."""
 STALLED_SHARE = 0.7
@@ -73,7 +73,7 @@ PATCH_EIGENVALUE_RTOL, MAX_PATCH_ITERATIONS = 1e-3, 12
 
 
 class Held(NamedTuple):
-    """A held equilibrium, or a guess of one."""
+    """Held equilibrium, or a guess."""
 
     load: float
     amplitude: float  # a
@@ -85,7 +85,7 @@ class Held(NamedTuple):
 
 
 def _hold(bracket: Bracket, phi: Array, guess: Held, accuracy: float) -> Held | None:
-    """Step 1: equilibrium with a patch phi held; None if another patch is unstable.
+    """Step 1: return the equilibrium with a patch phi held; None if another patch is unstable.
 
     The guess gives the amplitude at which the spring has no force; the accuracy is the largest
     residual stress as a share of the mean strength.
@@ -105,7 +105,7 @@ def _hold(bracket: Bracket, phi: Array, guess: Held, accuracy: float) -> Held | 
         return None
     slope = np.where(inside, guess.slope, 0.0)
     share = inner(phi, slope)
-    if not share > 0.0:  # no node of the patch slips any more
+    if not share > 0.0:  # all nodes of the patch have stopped
         return None
     slope *= 1.0 / (stiffness * share)
     residual_of(operator, phi, slope, bracket.residual)
@@ -124,7 +124,7 @@ def _hold(bracket: Bracket, phi: Array, guess: Held, accuracy: float) -> Held | 
 
 
 def _other_patch(bracket: Bracket) -> Array | None:
-    """Step 2: the patch that became unstable beside the held one, unit norm; None without one."""
+    """Step 2: return the unstable patch beside the held patch (unit norm); None without any."""
     vector = np.where(bracket.inside, np.abs(bracket.operator.direction), 0.0)
     if not vector.any():
         return None
@@ -149,7 +149,7 @@ def _load_at(state: Held, amplitude: float, curvature: float = 0.0) -> float:
 
 
 def _amplitude_between(below: Held, above: Held, turn: int) -> float:
-    """Step 4: guess of the turning point between a state with mu' > 0 and one with mu' < 0."""
+    """Step 4: guess the turning point between states with mu' > 0 and mu' < 0."""
     if turn % 2 == 0:  # mu' is linear in a, as where many nodes join one after the other
         share = below.slope_of_force / (below.slope_of_force - above.slope_of_force)
     else:  # mu' has one step, as where a single node joins: where the two `_load_at` agree
@@ -165,7 +165,7 @@ def _amplitude_between(below: Held, above: Held, turn: int) -> float:
 
 
 def _step_across(state: Held, step: float, last: float, curvature: float, moved: bool) -> float:
-    """Step 3: a step of the amplitude that is likely to change the sign of mu'.
+    """Step 3: return a step of the amplitude that is likely to change the sign of mu'.
 
     `step` and `last` are the step before and mu' before it. Since mu' falls in steps, as nodes
     join, it goes a little beyond Newton's, and twice as far as before if mu' hardly changed.
