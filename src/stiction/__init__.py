@@ -1,4 +1,4 @@
-"""The statistics of static friction: at which load, and where, does this interface let go?"""
+"""Statistics of static friction: the load and place at which a rough interface begins to slide."""
 
 import re
 from difflib import get_close_matches
@@ -8,8 +8,8 @@ from typing import Any
 
 __version__ = "0.1.0"
 
-# Public names stand in the stub, which editors read; each is imported on first use, so that
-# `import stiction` is quick.
+# The stub lists the public names, and editors read it, too. Each name is imported on first use, so
+# that `import stiction` is quick.
 _STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
 _HOMES = {
     name: home

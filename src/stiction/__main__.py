@@ -1,7 +1,8 @@
-"""``python -m stiction``.
+"""The command line as ``python -m stiction``.
 
-Python looks for modules in the current folder first, whose files may come from a stranger. The
-command ``stiction`` has no such entry in its path.
+Python looks for modules in the current folder first, and its files may come from a stranger. The
+current folder is therefore removed from the path, in which the command ``stiction`` does not have
+it either.
 """
 
 import os

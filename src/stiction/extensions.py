@@ -1,7 +1,7 @@
-"""What a package of your own needs to add a method, law, load, marginal or spectrum.
+"""Names for packages of your own that add a method, law, load, marginal or spectrum.
 
-`docs/plug-ins.md` has an example of each. These names stay where they are; the modules that
-they come from may move.
+`docs/plug-ins.md` has an example of each. Import these names from here, as the modules that define
+them may move.
 """
 
 from stiction.base.kinds import register

@@ -37,21 +37,21 @@ def simulator(
     Parameters
     ----------
     problem, random, method, seed
-        As in `infer`.
+        Arguments of `infer`.
     parameters : sequence of str
-        Keys as in the prior of `infer`: ``("correlation_length", "marginal.low")``.
+        Keys as in the prior of `infer`, for example ``("correlation_length", "marginal.low")``.
     samples : int
-        Number of tests that one call simulates.
+        Number of tests that a call simulates.
     load_cell_error : float
         Standard deviation of the error of a peak, Pa.
 
     Returns
     -------
     callable
-        ``simulate(theta)`` returns the peaks, Pa, of shape (samples,); theta has a
-        number for each parameter. ``simulate(theta, first=k)`` returns those of
-        samples k, k + 1, ..., independent of the first call if k >= samples. All theta
-        share the samples, so that peaks are smooth in theta.
+        ``simulate(theta)`` returns the peaks, (samples,), Pa, for an array theta with a number for
+        each parameter. ``simulate(theta, first=k)`` returns the peaks of samples k, k + 1, ...,
+        which are independent of the first call if k >= samples. All theta share the samples, so
+        that peaks are smooth in theta.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def simulator(
     """
     interface = as_random_interface(random)
     unknown: list[str] = []
-    for name in parameters:  # what else may be wrong depends on their values
+    for name in parameters:  # only unknown names are wrong for any values
         try:
             with_parameters(problem, interface, (name,), np.ones(1))
         except InputError as error:
@@ -82,7 +82,7 @@ def simulator(
         raise InputError(unknown)
 
     def simulated(theta: Any, *, first: int = 0) -> Array:
-        """Peaks of samples first, first + 1, ... at these parameters, Pa, (samples,)."""
+        """Return the peaks of samples first, first + 1, ... at theta, (samples,), Pa."""
         first = check("first", first, at_least(0))
         values = check("theta", theta, Numbers)
         if values.shape != (len(parameters),) or not np.isfinite(values).all():

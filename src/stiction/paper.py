@@ -1,6 +1,6 @@
 """The system of Albertini, Karrer, Grigoriu and Kammer (2020), for examples and tests.
 
-It is written in public names, which are imported on first use: a `Problem` needs no random field.
+It uses public names, which are imported on first use, as a `Problem` does not need random fields.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from stiction.base.model import Positive, checked
 
 
 def problem(nodes: int = 1024, plane: Literal["stress", "strain"] = "stress") -> st.Problem:
-    """Return the interface of Albertini, Karrer, Grigoriu and Kammer (2020).
+    """Return the problem of Albertini, Karrer, Grigoriu and Kammer (2020).
 
-    G = 1 GPa, nu = 0.33, rho = 1170 kg/m3, L = 0.1 m, W = 0.5 TPa/m, mode II. Only the
-    strength above the residual affects the onset, so the residual is zero.
+    It is in mode II, with G = 1 GPa, nu = 0.33, rho = 1170 kg/m3, L = 0.1 m and W = 0.5 TPa/m. Only
+    the strength above the residual strength affects the onset, so the residual strength is zero.
 
     Parameters
     ----------
@@ -36,15 +36,15 @@ def problem(nodes: int = 1024, plane: Literal["stress", "strain"] = "stress") ->
 def strength(problem: st.Problem, correlation_ratio: Positive = 0.5) -> st.RandomField:
     """Return the random strength of Albertini et al. (2020, Eqs. 2 to 7).
 
-    Beta(1.5, 3) on [0.66, 1.66] MPa; power-law spectrum (k^2 + lambda^2)^-4, truncated at
-    2.5 lambda, without the mean mode.
+    The marginal is Beta(1.5, 3) on [0.66, 1.66] MPa. The spectrum is the power law
+    (k^2 + lambda^2)^-4, truncated at 2.5 lambda, without the mean mode.
 
     Parameters
     ----------
     problem : Problem
-        Its nucleation length h_n sets the scale.
+        A problem, whose nucleation length h_n sets the scale.
     correlation_ratio : float
-        xi_0/h_n, positive; xi_0 = 2 pi/lambda.
+        Ratio xi_0/h_n, positive, with xi_0 = 2 pi/lambda.
     """
     length = correlation_ratio * problem.nucleation_length
     return st.RandomField(

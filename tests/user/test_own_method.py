@@ -37,8 +37,8 @@ class Broken:
 
 MARGIN = {"margin": Variable("Pa", "margin")}
 BROKEN = {
-    "broken must return ... , margin; got": Broken({}, MARGIN),
-    "broken must return ... ; got ... , margin": Broken({"margin": np.ones(3)}),
+    "broken must return ... , margin, but returned": Broken({}, MARGIN),
+    "broken must return ... , but returned ... , margin": Broken({"margin": np.ones(3)}),
     "'critical_load' of shape (3,) over (sample), got (2,)": Broken({"critical_load": [1.0, 1.0]}),
 }  # fmt: skip
 

@@ -1,11 +1,11 @@
-"""Response of two identical blocks to slip between them and to the drive that pushes them.
+"""Response of two identical blocks to slip between them and to the drive that loads them.
 
 Problem
 -------
 Blocks of length L and height H are mirror images at the interface, free at their ends and driven in
-opposite directions, so that slip d changes no normal stress. Per unit depth, with the force F of
-the drive on one block (N/m), its travel U (m), the distance dx of the nodes and the mean stress
-F/L,
+opposite directions, so that slip d does not change the normal stress. Per unit depth, with the
+force F of the drive on a block (N/m), its travel U (m), the distance dx of the nodes and the mean
+stress F/L,
 
     tau = (F/L) q - K d,    U = F/C + (dx/(2 L)) sum q d    (Betti's theorem).
 
@@ -15,16 +15,16 @@ Algorithm
 ---------
 1. Take K of two free ends that do not feel each other, averaged over the cells of the nodes
    (`stiffness_between_ends`).
-2. Add at the nodes what the top, on rollers, and the ends together add to it: a smooth function, in
-   closed form apart from a few harmonics (`_rollers_correction`).
-3. Below a pusher, q and C of a block on rollers have closed forms, too (`_pushed`).
-4. Below a platen, find the shear traction t that keeps the top where it is (`glued_top`). With the
+2. Add the effect of the top, on rollers, and of the other end. It is a smooth function, in closed
+   form apart from a few harmonics (`_rollers_correction`).
+3. With a pusher, q and C of a block on rollers have closed forms, too (`_pushed`).
+4. With a platen, find the shear traction t that holds the top in place (`glued_top`). With the
    compliance G of the top and the stress A t on the interface, A' d/2 is the displacement of the
-   top that slip d causes (Betti's theorem), and
+   top that slip d causes (Betti's theorem). For a platen that is held,
 
-       K = K_rollers + A G^-1 A'/2,    q = A G^-1 1 L/C,    C = 1' G^-1 1
+       K = K_rollers + A G^-1 A'/2,    q = A G^-1 1 L/C,    C = 1' G^-1 1.
 
-   for a platen that is held; take off the stress of its motion at a given force (`_glued`).
+   Subtract the stress of the platen's motion at a given force (`_glued`).
 5. Repeat steps 2 to 4 with a coarser resolution. The largest change is the `error`.
 
 Mode III has closed forms throughout.
@@ -46,27 +46,28 @@ Side: TypeAlias = Literal["left", "right"]
 
 
 class Resolution(NamedTuple):
-    """How finely the response is computed."""
+    """Resolution of the response."""
 
-    max_decay: float  # harmonics beyond exp(-max_decay) are left out
-    step: float  # between the points of a glued top
+    max_decay: float  # harmonics below exp(-max_decay) are left out
+    step: float  # distance of the points of a glued top, in z
     quadrature_rtol: float  # of the compliance below a pusher
 
 
 RESOLUTION, COARSER_RESOLUTION = Resolution(40.0, 0.28, 1e-11), Resolution(26.0, 0.42, 1e-6)
-"""Resolution of the response, and a coarser one to measure the error."""
+"""Resolution of the response, and a coarser resolution to measure the error."""
 LATTICE_CORRECTION = 1.0 / 12.0
 """Half of the 1/6 with which the symbol would be right to fourth order.
 
-The error that remains and the error of a border of slip between nodes, of the same order, have
-opposite signs: with 1/12 the mean error of onsets vanishes (measured with random strengths).
+The remaining error of the symbol and the error by a border of slip between nodes have the same
+order and opposite signs. With 1/12 the mean error of onsets vanishes, as measured with random
+strengths.
 """
 
 
 class Pushes(NamedTuple):
     """Uniform traction on a side, over a width (m) around a height (m) above the interface.
 
-    From both sides each block is pushed at one end and pulled at the other, by half of the force.
+    With two sides each block is pushed at one end and pulled at the other, by half of the force.
     """
 
     sides: tuple[Side, ...]
@@ -74,20 +75,19 @@ class Pushes(NamedTuple):
     width: float
 
     def edges(self, height: float) -> tuple[float, float]:
-        """Return the edges of the push on a side 0 <= y <= height, m, without round-off beyond."""
+        """Return the edges of the push, m, clipped to the side 0 <= y <= height."""
         low, high = self.height - 0.5 * self.width, self.height + 0.5 * self.width
         return max(low, 0.0), min(high, height)
 
 
 class BlockResponse(NamedTuple):
-    """What a method needs of two blocks; nodes at (i + 1/2) dx."""
+    """Response of two blocks with nodes at (i + 1/2) dx."""
 
     stiffness: Array  # (n, n): K at a given force, Pa/m; symmetric, its rows sum to zero
-    shear: Array  # (n,): q, shear stress of the drive over its mean
-    drive_stiffness: float  # C, force per unit depth over travel of a block without slip, Pa
-    error: float = (
-        0.0  # of q, of C over C, and of K over its diagonal; without that of the lattice
-    )
+    shear: Array  # (n,): q, shear stress of the drive, divided by its mean
+    drive_stiffness: float  # C, force per unit depth divided by travel, without slip, Pa
+    # Largest relative error of q, C and K (as a share of its diagonal), without the lattice's error
+    error: float = 0.0
 
 
 @lru_cache(maxsize=8)
@@ -101,10 +101,10 @@ def block_response(
 ) -> BlockResponse:
     """Return the response of two blocks to slip and to their drive.
 
-    Length L and height H are in m, the modulus is G (Pa), and kappa Kolosov's constant, 3 - 4 nu in
-    plane strain and (3 - nu)/(1 + nu) in plane stress, None for mode III. A platen (no `pushes`) is
-    glued to the top and moves along the interface; the top of a block that is pushed lies on
-    rollers (in mode III it is free).
+    Length L and height H are in m, and the modulus is G (Pa). kappa is Kolosov's constant, 3 - 4 nu
+    in plane strain and (3 - nu)/(1 + nu) in plane stress, or None for mode III. A platen (no
+    `pushes`) is glued to the top and moves along the interface. The top of a pushed block lies on
+    rollers, or is free in mode III.
     """
     with one_blas_thread():
         response, coarse = (
@@ -143,17 +143,17 @@ def _in_plane(
         top = GluedTop(harmonics, modulus, kappa, resolution.step)
         addition, shear, drive = _glued(top, nodes)
         stiffness += addition
-    # The discretised stress of a uniform slip, 1e-7 of the diagonal.
+    # Make uniform slip free of stress, from which it differs by 1e-7 of the diagonal.
     stiffness[np.diag_indices(nodes)] -= stiffness.sum(axis=1)
     return BlockResponse(stiffness, shear / shear.mean(), drive)
 
 
 def _rollers_correction(harmonics: Harmonics, effective: float, nodes: int) -> Array:
-    """Return what a block on rollers adds to K of two ends that do not feel each other, Pa/m².
+    """Step 2: return K of a block on rollers less K of two ends without a top, Pa/m².
 
-    Its kernel (1/4 of E*/H) is a sum over k of k (1 - k r) exp(-k r) at a distance r, less
-    k (1 - k (x + s) + 2 k² x s) exp(-k (x + s)) for the left end, and the same for the right one;
-    those of half-spaces, which are taken off, are its limits for large H.
+    The kernel of a block, in units of E*/(4 H), is a sum over k of k (1 - k r) exp(-k r) at a
+    distance r, less k (1 - k (x + s) + 2 k² x s) exp(-k (x + s)) for the left end, and the same for
+    the right end. The kernels of half-spaces, which are subtracted, are its limits for large H.
     """
     spacing, c = harmonics.length / nodes, 0.5 * np.pi / harmonics.height
     x, i = (np.arange(nodes) + 0.5) * spacing, np.arange(nodes)
@@ -173,7 +173,7 @@ def _rollers_correction(harmonics: Harmonics, effective: float, nodes: int) -> A
 
 
 def _glued(top: GluedTop, nodes: int) -> tuple[Array, Array, float]:
-    """Return what glue adds to K (Pa/m), the shear stress of a top moved by 1 m, and C."""
+    """Step 4: return the addition of glue to K (Pa/m), the shear stress of unit travel, and C."""
     spacing = top.harmonics.length / nodes
     on_interface = top.shear((np.arange(nodes) + 0.5) * spacing)
     tractions = top.solve(np.column_stack([np.ones(top.x.size), on_interface.T]))
@@ -186,7 +186,7 @@ def _glued(top: GluedTop, nodes: int) -> tuple[Array, Array, float]:
 def _pushed(
     harmonics: Harmonics, pushes: Pushes, nodes: int, resolution: Resolution
 ) -> tuple[Array, float]:
-    """Return the shear stress of a force of 1 N/m and 2 G* times the travel, of a pushed block.
+    """Step 3: return the shear stress of a pushed block at 1 N/m, and 2 G* times its travel.
 
     The push has the harmonics 2/H `mean_sine`, and phi = mean_sine 2/H/k² at the clamp.
     """
@@ -207,9 +207,10 @@ def _pushed(
 
 
 def _mean_logarithm(harmonics: Harmonics, low: float, high: float, rtol: float) -> float:
-    """Return the sum over k of the squared mean of sin(k y) over low < y < high, over k.
+    """Return the sum over k of m_k²/k, where m_k is the mean of sin(k y) over low < y < high.
 
-    It is a double integral of logarithms of y - y' and of y + y', hence a single one of each.
+    It is a double integral of logarithms of y - y' and of y + y', which a substitution reduces to a
+    single integral.
     """
     width = high - low
 
@@ -227,8 +228,7 @@ def _mean_logarithm(harmonics: Harmonics, low: float, high: float, rtol: float) 
 def _of_sides(pushes: Pushes, stress: Array, near: float, far: float) -> tuple[Array, float]:
     """Return stress and travel of a drive from the stress of a force at the left end.
 
-    `near` and `far` are the displacements where the force acts and at the same place of the other
-    end.
+    `near` and `far` are the displacements at the force and at the same height of the other end.
     """
     if len(pushes.sides) == 2:
         return 0.5 * (stress + stress[::-1]), 0.5 * (near + far)
@@ -236,10 +236,10 @@ def _of_sides(pushes: Pushes, stress: Array, near: float, far: float) -> tuple[A
 
 
 def glued_pressure(length: float, nodes: int, height: float, kappa: float) -> Array:
-    """Return pressure over its mean, (n,), between blocks whose tops are glued to rigid platens.
+    """Return the pressure between blocks glued to rigid platens, divided by its mean, (n,).
 
-    Below rollers it would be uniform, 1, and the top wider by (3 - kappa)/(8 G) of its length. Glue
-    takes the shear traction, without a resultant, that takes this back.
+    Below rollers the pressure would be uniform, 1, and the top would widen by (3 - kappa)/(8 G) of
+    its length. Glue prevents this by a shear traction without a resultant.
     """
     with one_blas_thread():
         harmonics = Harmonics(length, height, RESOLUTION.max_decay, pressed=True)
@@ -265,7 +265,7 @@ def _anti_plane(
     """Return the response in mode III: cosines on the interface, sines on the sides.
 
     K has the symbol (G/2) k coth(k H) below a platen, without k = 0 at a given force, and
-    (G/2) k tanh(k H) below a free top. The harmonics of a push are those of mode II on rollers.
+    (G/2) k tanh(k H) below a free top. A push has the same harmonics as in mode II on rollers.
     """
     spacing = length / nodes
     k = np.pi / length * np.arange(1, nodes)
@@ -280,7 +280,7 @@ def _anti_plane(
     low, high = pushes.edges(height)
     mean_sine = (np.cos(k * low) - np.cos(k * high)) / (k * (high - low))
     ends = harmonics.sums(x + 1j * low).inverse - harmonics.sums(x + 1j * high).inverse
-    # Waves between the ends, without the first one on its way, which the closed forms hold.
+    # Reflections between the ends. The closed forms hold the waves before the first reflection.
     once = -np.expm1(-2.0 * k * length)
     waves = np.exp(-np.outer(2.0 * length + x, k)) + np.exp(-np.outer(2.0 * length - x, k))
     stress = 2.0 / height * (ends.real / (high - low) + waves @ (mean_sine / once))
@@ -293,11 +293,12 @@ def _anti_plane(
 
 
 def lattice_symbol(angle: Array) -> Array:
-    """Return the symbol |k| dx of the lattice for angles k dx; all entries but one are negative.
+    """Return the symbol |k| dx of the lattice for angles k dx.
 
     |k| dx is 2 arcsin(s) = 2 s (1 + s²/6 + ...), with s = |sin(k dx/2)|. The exact symbol has a
-    kink at the shortest wave, and its entries are zero at every other distance; a smooth
-    correction, such as that of a finite block, would make them positive.
+    kink at the shortest wave, and its entries are zero at every other distance. A smooth
+    correction, as by a finite block, would make these entries positive. All entries of this symbol
+    but the diagonal are negative.
     """
     s = np.abs(np.sin(0.5 * angle))
     symbol: Array = 2.0 * s * (1.0 + LATTICE_CORRECTION * s * s)
@@ -319,9 +320,9 @@ def stiffness_between_ends(nodes: int, spacing: float, modulus: float) -> Array:
     """Return K of an interface with two free ends that do not feel each other, (n, n), Pa/m.
 
     Nodes lie at (i + 1/2) dx. A free end x = 0 adds (G*/2 pi)(12 x s/(x + s)^4 - 1/(x + s)²) to
-    the shear stress of slip at s (Muskhelishvili 1953, chapter 18). The lattice and its mirror
-    images at both ends hold 1/(x + s)² of it. The rest is averaged over the cells of x and s: it is
-    the mixed derivative of (G*/pi) x s/(x + s)².
+    the shear stress of slip at s (N. Muskhelishvili, Some Basic Problems of the Mathematical Theory
+    of Elasticity, 1953). The lattice and its mirror images at both ends hold 1/(x + s)² of it. The
+    rest is averaged over the cells of x and s: it is the mixed derivative of (G*/pi) x s/(x + s)².
     """
     entries, i = lattice_entries(2 * nodes), np.arange(nodes)
     mirrored = i[:, None] + i

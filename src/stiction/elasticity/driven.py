@@ -1,16 +1,16 @@
-"""Two blocks behind the machine that drives them: stiffness, shear profile, travel and force.
+"""Two blocks behind the machine that drives them: stiffness, shear profile, travel and windows.
 
-The block with its drive and the machine are springs in series. With the force F per unit depth, the
-travel U of the drive, the travel X of the machine's far end and the stiffness k of the machine,
+The block with its drive and the machine are springs in series. Let F be the force per unit depth, U
+the travel of the drive, X the travel of the machine's far end and k the stiffness of the machine:
 
     F = k (X - U),    U = F/C + (dx/2L) <q, d>.
 
-The second equation is Betti's theorem: C is the stiffness of the block against its drive if nothing
-slips, and slip d at the interface moves the drive by its average with q. Without U they read
+The second equation is Betti's theorem: C is the stiffness of the block against its drive without
+slip, and slip d at the interface moves the drive by its average with q. Eliminating U gives
 
     tau = D q - K d,   D = k C X/((k + C) L),   K = K_dead + h/n q q^T,   F/L = D - h <q, d>/n,
 
-with h = (k/(k + C)) C/(2 L). Under dead load h = 0, and for a rigid machine h = C/(2 L).
+with h = (k/(k + C)) C/(2 L). Under a dead load h = 0, and for a rigid machine h = C/(2 L).
 """
 
 from dataclasses import dataclass
@@ -25,23 +25,23 @@ from stiction.elasticity.blocks import Pushes, block_response, glued_pressure
 from stiction.elasticity.protocol import DenseEntries, HalfSpaces, Windows
 
 MAX_WINDOWS_PER_WIDTH = 32
-"""Windows that begin within the width of a window: weighted means change little between them."""
+"""Windows that begin within the width of a window. Weighted means hardly change between them."""
 POSITIVE_RTOL = 1e-12
-"""Share of the diagonal up to which a positive entry of K beside it is round-off."""
+"""Largest positive entry of K off its diagonal that is round-off, as a share of the diagonal."""
 MIN_SHEAR = 1e-9
-"""Share of its largest value that the profile of a drive has at least, far from a pusher."""
+"""Smallest value of the profile of a drive far from a pusher, as a share of the largest."""
 
 
 @dataclass(frozen=True, eq=False)
 class Driven:
-    """Two blocks behind their machine, an `Elasticity`; arrays are not to be written to."""
+    """Two blocks behind their machine, an `Elasticity`. Do not write to its arrays."""
 
     stiffness: Array  # (n, n): K, Pa/m
-    shear: Array  # (n,): q, of mean one
-    pressure: Array  # (n,): pressure of the normal load over its mean
-    relief: float  # h, Pa/m: stress that the mean of q d takes off the drive
+    shear: Array  # (n,): q, with mean 1
+    pressure: Array  # (n,): pressure of the normal load, divided by its mean
+    relief: float  # h, Pa/m: relief of the drive per mean of q d
     drive_stiffness: float  # C, Pa
-    error: float  # to which the entries of K are known, Pa/m
+    error: float  # largest error of the entries of K, Pa/m
     half_spaces: ClassVar[HalfSpaces | None] = None
 
     @cached_property
@@ -51,22 +51,22 @@ class Driven:
 
     @cached_property
     def positive(self) -> float:
-        """Largest positive entry of K off its diagonal, over the diagonal; 0 within the error."""
+        """Largest positive entry of K off its diagonal, as a share of it; 0 within the error."""
         off = self.stiffness - np.diag(np.diag(self.stiffness))
         diagonal, most = float(np.diag(self.stiffness).min()), float(off.max())
         return most / diagonal if most > max(self.error, POSITIVE_RTOL * diagonal) else 0.0
 
     def mean_relief(self, slip: Array) -> Array:
-        """Return h <q, d>/n, the stress that slip (..., n) takes off the mean stress, Pa."""
+        """Return h <q, d>/n, by which slip (..., n) lowers the mean stress, Pa."""
         mean: Array = self.relief * (slip * self.shear).mean(axis=-1)
         return mean
 
     def windows(self, low: float, high: float) -> Windows:
-        """Return the windows at the lowest of the weakening rates, Pa/m, with their places."""
+        """Return the windows at the lowest weakening rate (Pa/m), with their places."""
         return _windows_at(self, low)
 
     def travel(self, force: Any, slip: Array) -> Any:
-        """Return the travel of both drives together, m, at a force per unit depth, N/m."""
+        """Return the sum of the travels of both drives (m) at a force per unit depth (N/m)."""
         moved = 2.0 * force / self.drive_stiffness + (slip * self.shear).mean(axis=-1)
         return moved
 
@@ -80,24 +80,30 @@ def _unstable(matrix: Array, rate: float, begin: int, end: int) -> bool:
 def shortest_runs(matrix: Array, rate: float) -> list[tuple[int, int]]:
     """Return first node and end of the shortest unstable runs of K (n, n) at a rate, Pa/m.
 
-    The least eigenvalue of a block of K rises if the block shrinks. The later a shortest run
-    begins, the later it ends, so that one pass over the nodes finds all of them.
+    The lowest eigenvalue of a block of K rises if the block shrinks. Therefore a shortest run that
+    begins later also ends later, and a single pass over the nodes finds all of them:
+
+    1. Lengthen the run until it is unstable.
+    2. Shorten it from its end as long as it remains unstable, and keep it.
+    3. Move on by a share of its width, and go to 1. The last run ends with the specimen.
     """
     n, runs = len(matrix), []
     begin, end, step = 0, 1, 1
     while begin < n:
         end = min(max(end, begin + 1), n)
+        # 1. and 2.
         while not (unstable := _unstable(matrix, rate, begin, end)) and end < n:
             end += 1
         while unstable and end - begin > 1 and _unstable(matrix, rate, begin, end - 1):
             end -= 1
         if not unstable and step == 1:
             break
+        # 3.
         if unstable:
             runs.append((begin, end))
             step = max(1, (end - begin) // MAX_WINDOWS_PER_WIDTH)
             begin, end = begin + step, end + step
-        else:  # the last run ends with the specimen
+        else:  # too far: look for the last run node by node
             begin, end, step = begin - step + 1, n, 1
     return runs
 
@@ -131,8 +137,8 @@ def driven(
 ) -> Driven:
     """Return the response of blocks behind a machine, with the arguments of `block_response`.
 
-    The pressure is not uniform if the blocks are pressed `glued`. `machine` is the stiffness of the
-    machine per unit depth, Pa, as one block sees it.
+    If the blocks are `glued` while they are pressed, the pressure is not uniform. `machine` is the
+    stiffness of the machine for a block, half of the specimen, per unit depth (Pa).
     """
     kind = None if anti_plane else kappa
     response = block_response(length, nodes, height, modulus, kind, pushes)

@@ -1,26 +1,27 @@
-"""A block whose top is glued to a rigid platen, from the same block with its top on rollers.
+"""A block with its top glued to a rigid platen, from the same block with its top on rollers.
 
 Problem
 -------
-Rollers leave no v at the top, glue no u either. It takes a shear traction t(s) on the top that
-makes the given u there,
+On rollers the top has v = 0, and with glue u is given, too. This needs a shear traction t(s) on the
+top with
 
     int G(x, s) t(s) ds = u(x),   0 < x < L,                                                   (1)
 
 where G is the compliance of a block on rollers, known in closed form (`harmonics`). At the corners
-t has singularities x^(lambda - 1) of many exponents, most of them complex (M. L. Williams, Journal
-of Applied Mechanics 19, 1952).
+t has singularities x^(lambda - 1) with many exponents, most of them complex (M. L. Williams,
+Journal of Applied Mechanics 19, 1952).
 
 Algorithm
 ---------
 1. Map the line -inf < z < inf to the top so that x falls as exp(z) towards the corner and grows
-   evenly between corners (`GluedTop`). Then t dx/dz falls exponentially at both ends and is smooth,
-   whatever the exponents, and trapezoidal sums converge exponentially (F. Stenger, Numerical
-   Methods Based on Sinc and Analytic Functions, 1993).
+   evenly between corners (`GluedTop`). For any exponents t dx/dz is smooth and falls exponentially
+   at both ends, so that trapezoidal sums converge exponentially (F. Stenger, Numerical Methods
+   Based on Sinc and Analytic Functions, 1993).
 2. G has a logarithm at x = s. Split off log |2 sin(pi (z - z')/P)|, where P is the range of z. Its
    integrals with trigonometric polynomials are known (R. Kress, Linear Integral Equations, 2014,
    section 12.3).
-3. Solve (1) at the points: symmetric, and well conditioned as equations of the first kind go.
+3. Solve (1) at the points. The matrix is symmetric, and well conditioned for an equation of the
+   first kind.
 """
 
 from __future__ import annotations
@@ -33,21 +34,21 @@ from stiction.base.arrays import Array
 from stiction.elasticity.harmonics import CURVATURE, SLOPE, Harmonics
 
 MAX_EXPONENT = 36.0
-"""Points reach to exp(-MAX_EXPONENT) of the block's size from its corners."""
+"""Points reach to a distance of exp(-MAX_EXPONENT) sizes of the block from its corners."""
 HEIGHTS_PER_UNIT = 0.5
 """Length of the top, in heights of the block, that a unit of z covers between the corners."""
 
 
 class GluedTop:
-    """Points of the top, in z, and the response of the block to shear traction there.
+    """Points of a glued top, and the response of the block to shear traction there.
 
-    Between the corners dx/dz is `HEIGHTS_PER_UNIT` heights of a flat block: its kernels vary over
-    a height.
+    Between the corners of a flat block dx/dz is `HEIGHTS_PER_UNIT` heights, since its kernels vary
+    over a height.
 
     Parameters
     ----------
     harmonics : Harmonics
-        Of the block.
+        Harmonics of the block.
     modulus : float
         G, Pa.
     kappa : float
@@ -79,7 +80,7 @@ class GluedTop:
         self.compliance = self._compliance()
 
     def _compliance(self) -> Array:
-        """Return the matrix of (1) for values of t dx/dz at the points."""
+        """Return the matrix of (1), by which values of t dx/dz at the points are multiplied."""
         harmonics, kappa, count = self.harmonics, self.kappa, self.x.size
         distance = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
         apart = np.abs(np.subtract.outer(self.x, self.x))
@@ -113,7 +114,7 @@ class GluedTop:
         return scaled
 
     def solve(self, displacement: Array) -> Array:
-        """Return t dx/dz, Pa m, for displacements u (m) at the points, (points, cases)."""
+        """Step 3: return t dx/dz (Pa m) for displacements u (m) at the points, (points, cases)."""
         traction: Array = scipy.linalg.solve(self.compliance, displacement, assume_a="sym")
         return traction
 
@@ -138,7 +139,7 @@ class GluedTop:
     def normal(self, x: Array) -> Array:
         """Return s_yy on the interface of a pressed block per unit of t at a point, 1/m.
 
-        For tractions without a resultant.
+        It holds for tractions without a resultant.
         """
         harmonics, kappa = self.harmonics, self.kappa
         towards = np.subtract.outer(x, self.x)

@@ -2,16 +2,16 @@
 
 Problem
 -------
-Below a top on rollers (v = 0, s_xy given) lies an interface without s_yy, on which u is given. Both
-edges are mirrors, so that the stresses follow from Airy's function (Timoshenko and Goodier, Theory
-of Elasticity, article 24) as a sum of harmonics that do not feel each other,
+The top is on rollers (v = 0, s_xy given). On the interface u is given, and s_yy = 0. Both edges are
+mirrors, so that the stresses follow from Airy's function (S. Timoshenko and J. Goodier, Theory of
+Elasticity, article 24) as a sum of independent harmonics,
 
     phi = sum Phi_k(x) sin(k y),   s_xx = -k² Phi_k sin(k y),   s_yy = Phi_k'' sin(k y),
     s_xy = -k Phi_k' cos(k y),     k = pi/(2 H), 3 pi/(2 H), ...                               (1)
 
-If the block is `pressed`, its interface has no v and no s_xy instead; then sin and cos change
+If the block is `pressed`, its interface has v = 0 and s_xy = 0 instead. Then sin and cos change
 places, and k = pi/H, 2 pi/H, ... Free sides clamp Phi_k: it vanishes there with its slope. All
-fields follow from one function g_k(x, s), the deflection of a clamped beam,
+fields follow from a function g_k(x, s), the deflection of a clamped beam,
 
     (d²/dx² - k²)² g_k = delta(x - s),   g_k = dg_k/dx = 0 at x = 0 and at x = L.              (2)
 
@@ -20,15 +20,15 @@ it, with E* = 8 G/(kappa + 1).
 
 Algorithm
 ---------
-1. Write g_k as the beam without ends, (1 + k r) exp(-k r)/(4 k³) at a distance r, less what each
-   clamp reflects by itself, (1 + k (x + s) + 2 k² x s) exp(-k (x + s))/(4 k³) for the left one,
-   and less a `remainder`: what the clamps reflect to each other.
-2. Sums of the first two over k have closed forms (`sums`).
+1. Write g_k as the beam without ends, (1 + k r) exp(-k r)/(4 k³) at a distance r, less two parts:
+   the reflection of each clamp by itself, (1 + k (x + s) + 2 k² x s) exp(-k (x + s))/(4 k³) for the
+   left clamp, and a `remainder`, the reflections between the clamps.
+2. Sum the beam without ends and the single reflections over k in closed form (`sums`).
 3. The remainder falls as exp(-k L), so that few harmonics give it to round-off (`reflected`). It is
    a combination of the four solutions of (2) without a load, exp(-k x), k x exp(-k x) and the same
-   in L - x; step 1 fixes their coefficients at the clamps.
+   in L - x. The conditions at the clamps fix their coefficients.
 
-Derivatives of the four solutions are those of polynomials: an operator P(d/dx), in units of k,
+Derivatives of the four solutions follow from polynomials: an operator P(d/dx), in units of k,
 turns exp(-k x) into P(-1) exp(-k x), and k x exp(-k x) into (P'(-1) + k x P(-1)) exp(-k x).
 """
 
@@ -46,7 +46,7 @@ SLOPE, CURVATURE, THIRD = (Polynomial.basis(order) for order in (1, 2, 3))
 
 
 class Sums(NamedTuple):
-    """Sums over k of k^j exp(-k z), one array for each power j from -1 to 3."""
+    """Sums over k of k^j exp(-k z), with an array for each power j from -1 to 3."""
 
     inverse: Array
     plain: Array
@@ -56,18 +56,18 @@ class Sums(NamedTuple):
 
 
 class Harmonics:
-    """Harmonics of a block: their sums in closed form, and what its sides reflect to each other.
+    """Harmonics of a block: sums in closed form, and the reflections between its sides.
 
-    Of a pressed block the sums count half of the constant harmonic, k = 0.
+    In a pressed block the sums include half of the constant harmonic, k = 0.
 
     Parameters
     ----------
     length, height : float
         L and H, m.
     max_decay : float
-        The remainder leaves out harmonics whose exponent k L is larger.
+        Largest exponent k L of a harmonic in the remainder.
     pressed : bool
-        Whether the interface has no v and no s_xy, instead of no s_yy.
+        Whether the interface has v = 0 and s_xy = 0, instead of s_yy = 0.
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class Harmonics:
         """Coefficients of the solution that is 1, without a slope, at the left clamp."""
 
     def sums(self, z: Array) -> Sums:
-        """Return the sums over k of k^j exp(-k z), z complex or real with a positive real part."""
+        """Return the sums over k of k^j exp(-k z), for z with a positive real part."""
         c = 0.5 * np.pi / self.height
         q, w = np.exp(-c * z), -np.expm1(-2.0 * c * z)
         coth, square = (2.0 - w) / w, 4.0 * q * q / (w * w)  # and 1/sinh²
@@ -123,7 +123,7 @@ class Harmonics:
         )
 
     def sums_at_top(self, x: Array) -> Sums:
-        """Return the sums over k of +-k^j exp(-k x), with the signs `at_top` of harmonics there."""
+        """Return the sums over k of +-k^j exp(-k x), with the signs of harmonics at the top."""
         turn = 1.0 if self.pressed else 1j
         return Sums(*((turn * values).real for values in self.sums(x + 1j * self.height)))
 

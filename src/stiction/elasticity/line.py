@@ -7,10 +7,11 @@ its Fourier series gives, for an even number n of nodes, the first column
 
     K_0 = (G*/2)(2 pi/L) n/4,   K_j = -(G*/2)(2 pi/L)/(n sin^2(pi j/n)) for odd j,            (1)
 
-and K_j = 0 for even j > 0. Nodes of one parity act on nodes of the other only, which halves
-products. A window is a run of nodes on which the smallest eigenvalue of the block of K is at most
-the weakening rate W: with all other nodes held, it is unstable. Its eigenvector bounds the load of
-the first instability (`protocol.Windows`), and the narrowest window gives the closest bound.
+and K_j = 0 for even j > 0. Even nodes act on odd nodes only and the reverse, which halves the cost
+of products. A window is a run of nodes on which the smallest eigenvalue of the block of K is at
+most the weakening rate W: with all other nodes held, it is unstable. Its eigenvector bounds the
+load of the first instability (`protocol.Windows`), and the narrowest window gives the closest
+bound.
 
 Algorithm
 ---------
@@ -18,8 +19,8 @@ Algorithm
    width in the continuum, h_n = 2 lambda_0 G*/W (K. Uenishi and J. R. Rice, J. Geophys. Res. 108,
    2003), and move to the narrowest unstable width. If rates vary, use a ladder of widths.
 2. Compute the smallest eigenvalue of each width with its eigenvector (`window_mode`): by a dense
-   matrix up to `MAX_DENSE_WIDTH` nodes, beyond by inverse iteration with a solver for Toeplitz
-   matrices. Both are cached, as all samples use them.
+   matrix up to `MAX_DENSE_WIDTH` nodes, above by inverse iteration with a solver for Toeplitz
+   matrices. Cache them, as all samples use them.
 """
 
 import bisect
@@ -40,35 +41,39 @@ from stiction.elasticity.protocol import (
 )
 
 WIDTH_RATIO = 1.25
-"""Ratio of successive widths if the rate varies. Bounds are rough then anyway."""
+"""Ratio of successive widths if the rate varies, and bounds are rough anyway."""
 MAX_DENSE_WIDTH = 300
 """Nodes of the widest window for which a dense matrix is faster than inverse iteration."""
 MAX_WIDTH = 4096
-"""Nodes of the widest window. Beyond, its eigenvector takes longer than a solution without it."""
+"""Nodes of the widest window. The eigenvector of a wider window takes longer than it saves."""
 MAX_INVERSE_ITERATIONS = 60
-"""Each divides the error by more than two, so that a double has no digit left to gain."""
+"""Iterations, each of which more than halves the error, until a double gains no further digit."""
 MODE_RTOL = 1e-14
 """Change of an eigenvector in an iteration, as a share of its largest entry, that is round-off."""
 
 
 def stiffness_column(nodes: int, length: float, modulus: float) -> Array:
-    """First column of K, (nodes,), Pa/m: an even number of nodes, the period (m) and G* (Pa)."""
+    """Return the first column of K, (nodes,), Pa/m, for the period (m) and G* (Pa).
+
+    The number of nodes is even.
+    """
     scale = np.pi * modulus / length
     column = np.zeros(nodes)
     odd = np.arange(1, nodes, 2)
     column[odd] = -scale / (nodes * np.sin(np.pi * np.minimum(odd, nodes - odd) / nodes) ** 2)
-    column[0] = -column[odd].sum()  # equals scale * nodes / 4; this way a uniform slip is free
+    # Equal to scale * nodes / 4 up to round-off, so that uniform slip is exactly free of stress.
+    column[0] = -column[odd].sum()
     return column
 
 
 def circular_entries(column: Array) -> CircularEntries:
-    """Return K with a first column as kernels take it."""
+    """Return K with a given first column, as kernels take it."""
     return CircularEntries(column, np.ascontiguousarray(np.tile(column[1::2], 3)))
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """Half-spaces that meet on this number of nodes, an `Elasticity`; read-only."""
+    """Half-spaces that meet on a line of nodes, an `Elasticity`; read-only."""
 
     half_spaces: HalfSpaces
     nodes: int
@@ -92,9 +97,9 @@ def line_of(half_spaces: HalfSpaces, nodes: int) -> Line:
 
 @functools.lru_cache(maxsize=512)
 def window_mode(nodes: int, width: int) -> tuple[float, Array]:
-    """Step 2: smallest eigenvalue of a block of K with (G*/2)(2 pi/L) = 1, and its eigenvector.
+    """Step 2: return the smallest eigenvalue of a block of K, and its eigenvector.
 
-    The eigenvector is positive, with unit sum.
+    The unit of K is (G*/2)(2 pi/L). The eigenvector is positive, with unit sum.
     """
     column = stiffness_column(nodes, np.pi, 1.0)[:width]
     if width <= MAX_DENSE_WIDTH:
@@ -104,7 +109,7 @@ def window_mode(nodes: int, width: int) -> tuple[float, Array]:
         value, mode = float(values[0]), np.abs(vectors[:, 0])
         mode /= mode.sum()
     else:
-        # Inverse iteration; the next eigenvalue is more than twice as large.
+        # Inverse iteration converges fast, as the next eigenvalue is more than twice as large.
         mode = np.sqrt(np.arange(1.0, width + 1.0) * np.arange(width, 0.0, -1.0))
         mode /= mode.sum()
         for _ in range(MAX_INVERSE_ITERATIONS):
@@ -120,8 +125,8 @@ def window_mode(nodes: int, width: int) -> tuple[float, Array]:
 
 
 def _narrowest(nodes: int, widths: Sequence[int], rate: float) -> int:
-    """Step 1: index of the first of rising widths that is unstable; their number if none is."""
-    # The width in the continuum is a node or so off, more if it is a fair part of the circle.
+    """Step 1: return the index of the first unstable width, or the number of widths."""
+    # The width in the continuum is off by about a node, or more on a large part of the circle.
     i = min(bisect.bisect_left(widths, _continuous_width(nodes, rate)), len(widths) - 1)
     while i < len(widths) and window_mode(nodes, widths[i])[0] > rate:
         i += 1
@@ -131,17 +136,17 @@ def _narrowest(nodes: int, widths: Sequence[int], rate: float) -> int:
 
 
 def _continuous_width(nodes: int, rate: float) -> int:
-    """Nodes in h_n = 2 lambda_0 G*/W, the rate W in units of (G*/2)(2 pi/L)."""
+    """Return the nodes in h_n = 2 lambda_0 G*/W, for W in units of (G*/2)(2 pi/L)."""
     return int(min(2.0 * SMALLEST_EIGENVALUE / (np.pi * rate), 1.0) * nodes)
 
 
 @functools.lru_cache(maxsize=64)
 def widths_between(nodes: int, lowest: float, highest: float) -> tuple[int, ...]:
-    """Step 1: widths for weakening rates from `lowest` to `highest`.
+    """Step 1: return the widths for weakening rates from `lowest` to `highest`.
 
-    They end with the first that is unstable at `lowest`. At one rate there is a single width, or
-    none if it would be much wider than `MAX_WIDTH`. Otherwise the widths are from a ladder, the
-    same for all samples.
+    The last is the first width that is unstable at `lowest`. For a single rate there is a single
+    width, or no width if it would be much wider than `MAX_WIDTH`. Otherwise the widths come from a
+    ladder, which is the same for all samples.
     """
     widest = min(nodes - 1, MAX_WIDTH)
     widths: Sequence[int] = range(1, widest + 1)

@@ -1,10 +1,10 @@
-"""The elastodynamic memory kernel of a half-space, as a quadrature over arcs and as a short sum.
+"""The elastodynamic memory kernel of half-spaces, as a quadrature and as a short sum.
 
 Problem
 -------
-With T = |k| c_s t, the stress that a Fourier mode of slip D and slip rate V transfers along
-the interface between two identical half-spaces is (velocity form, M. S. Breitenfeld and P.
-H. Geubelle, International Journal of Fracture 93, 1998)
+Let T = |k| c_s t. A Fourier mode of slip D and slip rate V transfers this stress along the
+interface between two identical half-spaces (velocity form, M. S. Breitenfeld and P. H. Geubelle,
+International Journal of Fracture 93, 1998):
 
     F(k, t) = -(G*|k|/2) D(k, t) + (G|k|/2) int_0^t C(|k| c_s t') V(k, t - t') dt'.           (1)
 
@@ -15,29 +15,28 @@ s^2) in mode III, in mode II
 
     [(2 + s^2)^2 - 4 sqrt(1 + s^2) sqrt(1 + s^2/eta^2)] / (s^2 sqrt(1 + s^2)), eta = c_d/c_s. (2)
 
-Wanted are few pairs of poles s_p and weights w_p with C(T) = Re sum_p w_p exp(s_p T) to a
-tolerance on 0 <= T <= `T_MAX`: they turn the convolution with the whole history into one
-recursion a pair.
+Find few pairs of poles s_p and weights w_p with C(T) = Re sum_p w_p exp(s_p T) to a tolerance on
+0 <= T <= `T_MAX`. They turn the convolution with the whole history into a recursion for each pair.
 
-Steps (`fit_exponentials`)
---------------------------
-1. Take the inverse transform along arcs in Re s < 0 that join the branch points -i a and i
-   a, a = 1 and eta. The integrand is smooth there and decays, so that one set of tanh-sinh
-   nodes (H. Takahasi and M. Mori, 1974) is accurate for every T (`arc_quadrature`). The
-   closed forms by Bessel functions cancel badly beyond T of 7. This already is a sum of
-   exponentials, of some 280 terms.
-2. Shorten it by balanced truncation (B. C. Moore, IEEE Transactions on Automatic Control
-   26, 1981). Its Gramians are Cauchy matrices, factorised to high relative accuracy as in
-   J. Demmel (1999). All poles are damped by a common decay before, which is taken away
-   again afterwards (`balanced_truncation`).
-3. Polish the poles by variable projection: they move by Levenberg-Marquardt, and the
+Algorithm (`fit_exponentials`)
+------------------------------
+1. Take the inverse transform along arcs in Re s < 0 that join the branch points -i a and i a,
+   a = 1 and eta. The integrand is smooth there and decays, so that the same tanh-sinh nodes
+   (H. Takahasi and M. Mori, Publications of RIMS 9, 1974) are accurate for every T
+   (`arc_quadrature`). The result is a sum of some 280 exponentials. (The closed forms by Bessel
+   functions lose digits by cancellation above T = 7.)
+2. Shorten the sum by balanced truncation (B. C. Moore, IEEE Transactions on Automatic Control
+   26, 1981). Its Gramians are Cauchy matrices, which are factorised to high relative accuracy
+   (J. Demmel, Accurate Singular Value Decompositions of Structured Matrices, 1999). Before, all
+   poles are damped by a common decay, which is removed afterwards (`balanced_truncation`).
+3. Polish the poles by variable projection: the poles move by Levenberg-Marquardt, and the
    weights follow by linear least squares (G. H. Golub and V. Pereyra, SIAM Journal on
    Numerical Analysis 10, 1973).
-4. Level the error: raise the emphasis of times where it is large, in the way of C. L.
-   Lawson (1961), and polish again (`_attempt`).
-5. Accept the fit only if its error on another, denser set of times is below the tolerance,
-   and nothing in it cancels (`_acceptable`). Otherwise try another common decay, then a
-   pair more.
+4. Level the error: give more emphasis to times with a large error, as in Lawson's algorithm
+   (J. R. Rice and K. H. Usow, The Lawson Algorithm and Extensions, 1968), and polish again
+   (`_attempt`).
+5. Accept the fit only if its error on a denser set of times is below the tolerance, and its terms
+   do not cancel (`_acceptable`). Otherwise try another common decay, then a further pair.
 """
 
 import contextlib
@@ -62,33 +61,30 @@ from stiction.base.files import (
 Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
 
-_RULE_STEP = 0.025  # of the tanh-sinh rule; at 0.05 the kernel is off by 6e-11 at T = 1e5
-# End of the rule: its outermost node lies 1e-55 from the branch point, and its weight underflows.
+_RULE_STEP = 0.025  # of the tanh-sinh rule; with 0.05 the kernel is off by 6e-11 at T = 1e5
+# End of the rule: the outermost node lies 1e-55 from the branch point, and its weight underflows.
 _RULE_END = 4.4
 _TIMES_PER_CHUNK = 2048
-T_MAX = 1e5  # the error holds on 0 <= T <= T_MAX; beyond, the sum decays
-MAX_WEIGHT = 10.0  # larger ones cancel, and lose digits in the recursion
+T_MAX = 1e5  # the error holds on 0 <= T <= T_MAX; after T_MAX the sum decays
+MAX_WEIGHT = 10.0  # larger weights cancel, and lose digits in the recursion
 MAX_PAIRS = 60  # enough for 1e-9 in mode II
-MAX_LEVELLINGS = 14  # a fit that is not level by then is tried with one pair more
-_MIN_DECAY = (
-    0.3  # exponent that each pole has lost over T_MAX at least, so that sums decay beyond
-)
+MAX_LEVELLINGS = 14  # a fit that is not level by then gets a further pair
+# Smallest exponent by which each pole decays over T_MAX, so that sums decay after T_MAX.
+_MIN_DECAY = 0.3
 _MIN_DECAY_RATE = _MIN_DECAY / T_MAX
-# Common decay over T_MAX for balanced truncation, in the order tried: good starts for polishing at
-# loose and at tight tolerances.
+# Common decays over T_MAX for balanced truncation, in the order of trials. They are good starts for
+# polishing at loose and at tight tolerances.
 _LOOSE_DECAYS, _TIGHT_DECAYS = (10.0, 1.0), (1.0, 0.3)
-_FILE_FORMAT = (
-    2  # raise when the fit or the file layout changes, so that old files are left alone
-)
+_FILE_FORMAT = 2  # raise it when the fit or the file layout changes, to ignore old files
 
 
 def static_stiffness(mode: str, eta: float) -> float:
-    """D(0) = G*/G (1): 2 (1 - 1/eta^2) in mode II, 1 in mode III."""
+    """Return D(0) = G*/G (1): 2 (1 - 1/eta^2) in mode II, 1 in mode III."""
     return 1.0 if mode == "III" else 2.0 * (1.0 - 1.0 / eta**2)
 
 
 def _half_arc() -> tuple[Floats, Floats]:
-    """Step 1: angles from the upper branch point, and weights, of the upper half of an arc."""
+    """Step 1: return angles from the upper branch point, and weights, of half an arc."""
     t = np.arange(0.0, _RULE_END, _RULE_STEP)
     angle = np.pi / (1.0 + np.exp(np.pi * np.sinh(t)))
     weight = (np.pi**2 / 4.0) * _RULE_STEP * np.cosh(t) / np.cosh(0.5 * np.pi * np.sinh(t)) ** 2
@@ -97,14 +93,14 @@ def _half_arc() -> tuple[Floats, Floats]:
 
 
 def arc_quadrature(mode: str, eta: float) -> tuple[Complex, Complex]:
-    """Step 1: nodes s, Re s < 0, and weights w, some 140 an arc: C(T) = Re sum w exp(s T).
+    """Step 1: return nodes s, Re s < 0, and weights w with C(T) = Re sum w exp(s T).
 
-    Only the parts of the transform contribute that are odd across the arc |s| = 1 (the
-    shear root) and |s| = eta (the dilatational root).
+    An arc has some 140 nodes. Only the parts of the transform that are odd across an arc
+    contribute: the shear root at |s| = 1 and the dilatational root at |s| = eta.
     """
     angle, weight = _half_arc()
     rotation = np.exp(1j * angle)
-    # sqrt(1 + s^2) at s = i rotation, without cancellation beside the branch point.
+    # sqrt(1 + s^2) at s = i rotation, in a form without cancellation beside the branch point.
     root = np.sqrt(2.0 * np.sin(angle)) * np.exp(1j * (0.5 * angle - 0.25 * np.pi))
     factor = rotation * weight * (2.0 / (np.pi * 1j))
     s = 1j * rotation
@@ -124,29 +120,30 @@ def arc_quadrature(mode: str, eta: float) -> tuple[Complex, Complex]:
 
 
 def exponential_sum(time: ArrayLike, nodes: Complex, weights: Complex) -> Floats:
-    """Re sum_p w_p exp(s_p T) at the dimensionless times T (any shape)."""
+    """Return Re sum_p w_p exp(s_p T) at the dimensionless times T (any shape)."""
     t = np.asarray(time, dtype=np.float64)
     flat, result = t.ravel(), np.empty(t.size)
-    for start in range(0, t.size, _TIMES_PER_CHUNK):  # bounded memory for long lists of times
+    for start in range(0, t.size, _TIMES_PER_CHUNK):  # in chunks, to bound memory
         chunk = slice(start, start + _TIMES_PER_CHUNK)
         result[chunk] = (np.exp(np.multiply.outer(flat[chunk], nodes)) @ weights).real
     return result.reshape(t.shape)
 
 
 def memory_kernel(time: ArrayLike, mode: str, eta: float) -> Floats:
-    """The kernel C(T) of the velocity form at times T, any shape, to about 2e-15 for all T >= 0.
+    """Return the kernel C(T) of the velocity form at times T >= 0, any shape, to about 2e-15.
 
-    C(0) = G*/G; it falls like T^-1/2 (mode II) or T^-3/2 (mode III), so never truncate it.
+    C(0) = G*/G. The kernel falls so slowly, like T^-1/2 in mode II and T^-3/2 in mode III, that it
+    must not be truncated.
     """
     return exponential_sum(time, *arc_quadrature(mode, eta))
 
 
 @dataclasses.dataclass(frozen=True)
 class ExponentialSum:
-    """Poles and weights of a fit, with the errors that its validation measured.
+    """Poles and weights of a fit, with its measured error.
 
-    `poles` (Re s < 0) and `weights`, (pairs,) each, in units of |k| c_s; `error` is the
-    largest |C - sum| found on 0 <= T = |k| c_s t <= T_MAX.
+    `poles` (Re s < 0) and `weights` are (pairs,) arrays in units of |k| c_s. `error` is the largest
+    |C - sum| that was measured on 0 <= T = |k| c_s t <= T_MAX.
     """
 
     poles: Complex
@@ -154,12 +151,12 @@ class ExponentialSum:
     error: float
 
     def __call__(self, time: Floats) -> Floats:
-        """The sum at the dimensionless times T."""
+        """Return the sum at the dimensionless times T."""
         return exponential_sum(time, self.poles, self.weights)
 
 
 def _sample_times(per_decade: int, cluster: int, seed: int) -> Floats:
-    """Return times on [0, T_MAX]: dense at first, with random phases at every later scale."""
+    """Return times on [0, T_MAX], dense at first, and with random phases on later scales."""
     rng = np.random.default_rng(seed)
     scale = np.geomspace(0.3, T_MAX, round(per_decade * np.log10(T_MAX / 0.3)))
     late = scale[:, None] + 2.0 * np.pi * rng.random((scale.size, cluster))
@@ -168,7 +165,10 @@ def _sample_times(per_decade: int, cluster: int, seed: int) -> Floats:
 
 
 def _cauchy_cholesky(s: Complex, b: Complex, stop: float) -> Complex:
-    """Step 2: pivoted Cholesky factor of b_i conj(b_j) / -(s_i + conj(s_j)), by products only."""
+    """Step 2: return the pivoted Cholesky factor of b_i conj(b_j) / -(s_i + conj(s_j)).
+
+    Updates are products only, so that small pivots keep their relative accuracy.
+    """
     a, columns = b.copy(), []
     diagonal = np.abs(a) ** 2 / (-2.0 * s.real)
     largest = diagonal.max()
@@ -185,7 +185,7 @@ def _cauchy_cholesky(s: Complex, b: Complex, stop: float) -> Complex:
 
 
 def balanced_truncation(s: Complex, w: Complex, pairs: int) -> Complex:
-    """Step 2: poles of the best short model (in the Hankel sense) of sum w exp(s T), (pairs,)."""
+    """Step 2: return the poles of a short model of sum w exp(s T) by balanced truncation."""
     b = np.sqrt(w)
     factor = _cauchy_cholesky(s, b, 1e-24)
     left, sigma, right = np.linalg.svd(factor.T @ factor)
@@ -196,7 +196,7 @@ def balanced_truncation(s: Complex, w: Complex, pairs: int) -> Complex:
 
 
 class _Polish:
-    """Step 3: separable least squares. Poles are -exp(a) - `_MIN_DECAY_RATE` + i b."""
+    """Step 3: variable projection. Poles are -exp(a) - `_MIN_DECAY_RATE` + i b."""
 
     def __init__(self, times: Floats, values: Floats) -> None:
         self.times, self.values = times, values
@@ -214,7 +214,7 @@ class _Polish:
         target = q.T @ (self.values * emphasis)
         try:
             solution = np.linalg.solve(r, target)
-        except np.linalg.LinAlgError:  # two poles met: leave one of them without weight
+        except np.linalg.LinAlgError:  # two poles have met: let the least norm share the weight
             solution = np.linalg.lstsq(r, target, rcond=1e-14)[0]
         real, imaginary = np.split(solution, 2)
         weights = real + 1j * imaginary
@@ -251,7 +251,7 @@ class _Polish:
 
 
 def _acceptable(poles: Complex, weights: Complex) -> bool:
-    """Step 5: return whether no weight is large, no pole grows and no two terms nearly cancel."""
+    """Step 5: return whether weights are small, poles decay and no two terms nearly cancel."""
     if np.abs(weights).max() > MAX_WEIGHT or poles.real.max() >= 0.0:
         return False
     gap = np.abs(poles[:, None] - poles[None, :]) / np.abs(poles)[:, None]
@@ -262,7 +262,7 @@ def _acceptable(poles: Complex, weights: Complex) -> bool:
 def _attempt(
     arcs: tuple[Complex, Complex], pairs: int, fit: _Polish, tolerance: float, decay: float
 ) -> tuple[Complex, Complex]:
-    """Steps 2 to 4: return the best fit with this number of pairs and this common decay."""
+    """Steps 2 to 4: return the best fit with a number of pairs and a common decay."""
     # 2. The first poles.
     shift = _MIN_DECAY_RATE * decay / _MIN_DECAY
     poles = balanced_truncation(arcs[0] - shift, arcs[1], pairs) + shift
@@ -285,49 +285,47 @@ def _attempt(
 
 
 def fit_exponentials(mode: str, eta: float, tolerance: float) -> ExponentialSum:
-    """Return the shortest sum of exponentials found whose validated error is below the tolerance.
+    """Return a short sum of exponentials whose measured error is below the tolerance.
 
-    `eta` is c_d/c_s, not used in mode III; the tolerance is absolute, and C(0) = G*/G.
+    `eta` is c_d/c_s, which mode III does not use. The tolerance is absolute, and C(0) = G*/G.
     """
     if not 1e-9 <= tolerance <= 1e-2:
         raise InputError(f"kernel tolerance: must lie in [1e-09, 0.01], got {tolerance!r}")
-    # 1. The long sum, and times at which short ones are fitted and checked.
+    # 1. The long sum, and the times at which short sums are fitted and checked.
     arcs = arc_quadrature(mode, eta)
     fit_times = _sample_times(40 if tolerance > 3e-8 else 80, 8, seed=0)
     fit = _Polish(fit_times, exponential_sum(fit_times, *arcs))
     check_times = _sample_times(150, 12, seed=1)
     check = exponential_sum(check_times, *arcs)
-    # First number of pairs tried: found to be just below the need, for every Poisson's ratio.
+    # The first number of pairs, which proved to be just too small for every Poisson's ratio.
     digits = -np.log10(tolerance)
     pairs = max(3, round(1.7 * digits - 2.0 if mode == "III" else 5.3 * digits - 9.7))
     starts = _LOOSE_DECAYS if tolerance > 1e-7 else _TIGHT_DECAYS
-    with one_blas_thread():  # the matrices are small: more threads only wait for each other
+    with one_blas_thread():  # the matrices are so small that threads would only wait
         for count, decay in itertools.product(range(pairs, MAX_PAIRS + 1), starts):
             poles, weights = _attempt(arcs, count, fit, tolerance, decay)
-            # 5. Good enough?
+            # 5. Accept the fit, or try again.
             error = float(np.abs(check - exponential_sum(check_times, poles, weights)).max())
             if error < tolerance and _acceptable(poles, weights):
                 order = np.argsort(-poles.real)
                 return ExponentialSum(poles[order], weights[order], error)
     raise InputError(
         f"kernel tolerance: {tolerance!r} was not reached with {MAX_PAIRS} pairs of exponentials"
-        f" (mode {mode}, c_d/c_s = {eta:.6g}); use a larger tolerance"
+        f" (mode {mode}, c_d/c_s = {eta:.6g}). Use a larger tolerance"
     )
 
 
 @cache
 def kernel_sum(mode: str, eta: float, tolerance: float = 1e-6) -> ExponentialSum:
-    """Return the sum of `fit_exponentials`, from memory, from disk, or built now (about 1 s)."""
+    """Return the sum of `fit_exponentials` from memory, from disk, or by a fit (about 1 s)."""
     eta = 1.0 if mode == "III" else float(eta)
     text = f"{_FILE_FORMAT} {mode} {eta.hex()} {float(tolerance).hex()} {T_MAX.hex()}"
     folder = private_folder(cache_folder() / "fitted")
     path = folder / f"kernel-{hashlib.sha256(text.encode()).hexdigest()[:20]}.npz"
-    with contextlib.suppress(
-        *UNREADABLE
-    ):  # not there, or damaged: it is built and written again
+    with contextlib.suppress(*UNREADABLE):  # a missing or damaged file is written again
         data = read_arrays(path)
         return ExponentialSum(data["poles"], data["weights"], float(data["error"]))
     kernel = fit_exponentials(mode, eta, tolerance)
-    with contextlib.suppress(StoreError):  # where nothing can be written, it stays in memory
+    with contextlib.suppress(StoreError):  # without a writable folder it stays in memory
         write_arrays(path, vars(kernel))
     return kernel

@@ -3,29 +3,30 @@
 Problem
 -------
 K is given by its symbol (`protocol`), W >= 0 is the weakening rate of each node (Pa/m), and
-A = K - diag(W). `inside` marks a set S of nodes; x is zero outside. Two problems are solved, with
-no matrix in memory:
+A = K - diag(W). `inside` marks a set S of nodes, and x is zero outside. Two problems are solved
+without a matrix in memory:
 
     (A + spring phi phi')_SS x_S = right_S,                                                   (1)
     A_SS y_S = lambda y_S  for the smallest lambda, |y| = 1.                                  (2)
 
 In (1) a spring (stiffness in Pa/m) may hold a patch phi (|phi| = 1). With a stiff spring the matrix
-is positive definite also if A has one direction of negative curvature, close to phi. So states on
-and beyond the turning point of the load can be computed (`turning_point`). Kernels take flat
-arrays, so that the same code serves lines and planes.
+is positive definite even if A has a single direction of negative curvature, close to phi. States on
+and beyond the turning point of the load can be computed in this way (`turning_point`). Kernels take
+flat arrays, so that the same code serves lines and planes.
 
 Algorithm for (1), `solve_inside`
 ---------------------------------
 Preconditioned conjugate gradients (J. Nocedal and S. Wright, Numerical Optimization, 2006,
-algorithm 5.3) with the textbook's r, alpha, beta; z is the preconditioned residual.
+algorithm 5.3) with the textbook's r, alpha and beta. z is the preconditioned residual.
 
 1. Precondition the residual: z = M r, cut to S, with M = 1/(K(k) + W/2) on Fourier modes and the
-   mean W. If a soft mode y is given, with y'Ay about 1, add y y' to M. Close to a turning point A
-   has one eigenvalue that is much smaller than the others; with its eigenvector as y it costs no
+   mean W. If a soft mode y is given, with y'Ay about 1, add y y' to M. Close to a turning point an
+   eigenvalue of A is much smaller than the others. With its eigenvector as y it does not cost
    iterations.
 2. Take the direction z + beta times the former direction, and multiply it by the matrix.
 3. If the curvature along the direction is not positive, stop: A is not positive definite on S.
-4. Step to the minimum along the direction. Stop once no residual exceeds the tolerance.
+4. Step to the minimum along the direction, and go to 1. Stop once no residual exceeds the
+   tolerance.
 
 Departure: the residual is measured by its largest entry, which is a stress.
 
@@ -35,8 +36,8 @@ LOBPCG with a single vector (A. Knyazev, SIAM Journal on Scientific Computing 23
 
 1. The vector x has the Rayleigh quotient lambda = x'Ax. Stop if |A x - lambda x| is small.
 2. Make x, the preconditioned residual and the last direction orthonormal.
-3. Solve the eigenproblem in the space of these three; the combination with the smallest lambda is
-   the next x, and its part without x the next direction.
+3. Solve the eigenproblem in the space of these three. The combination with the smallest lambda is
+   the next x, and its part without x the next direction. Go to 1.
 """
 
 import math
@@ -55,9 +56,9 @@ NEGATIVE_CURVATURE = 1
 EXHAUSTED = 2
 
 MAX_ITERATIONS = 3000
-"""Iterations of conjugate gradients for one solution, or for one equilibrium."""
+"""Most iterations of conjugate gradients for a solution, or for an equilibrium."""
 MIN_NORM = 1e-14
-"""Norm of a unit vector, less its parts along others, below which it depends on these."""
+"""Smallest norm of a unit vector, less its parts along others, that is not round-off."""
 
 Mask = NDArray[np.bool_]
 
@@ -65,15 +66,15 @@ Mask = NDArray[np.bool_]
 class Transform(NamedTuple):
     """Shapes and axes of the transform of an interface; read-only, shared by threads."""
 
-    shape: tuple[int, int]  # of a profile; (1, nodes) on a line: one kernel serves both
+    shape: tuple[int, int]  # of a profile; (1, nodes) on a line, so that a kernel serves both
     half: tuple[int, int]  # of its real transform
-    all_axes: NDArray[np.int64]  # that are transformed, counted on flat arrays for a line
-    first_axes: NDArray[np.int64]  # all but the last
+    all_axes: NDArray[np.int64]  # axes of the transform, counted on flat arrays for a line
+    first_axes: NDArray[np.int64]  # all axes but the last
     last_axis: NDArray[np.int64]
 
 
 def make_transform(shape: tuple[int, ...]) -> Transform:
-    """Return the transform of profiles of this shape."""
+    """Return the transform of profiles with a shape."""
     rows, columns = shape if len(shape) == 2 else (1, *shape)
     axes = np.arange(len(shape))
     return Transform((rows, columns), (rows, columns // 2 + 1), axes, axes[:-1], axes[-1:])
@@ -81,8 +82,8 @@ def make_transform(shape: tuple[int, ...]) -> Transform:
 
 @jit_inside
 def forward(transform: Transform, field: Array, spectrum: Array) -> None:
-    """`spectrum` = the unscaled transform of a field; both flat."""
-    if transform.first_axes.size == 0:  # rows of one are a fifth slower than flat arrays
+    """Write the unscaled transform of a field to `spectrum`. Both are flat."""
+    if transform.first_axes.size == 0:  # a single row is a fifth slower than a flat array
         r2c(field, spectrum, transform.all_axes, True, 1.0, 1)
     else:
         modes = spectrum.reshape(transform.half)
@@ -91,7 +92,7 @@ def forward(transform: Transform, field: Array, spectrum: Array) -> None:
 
 @jit_inside
 def backward(transform: Transform, spectrum: Array, field: Array) -> None:
-    """`field` = the inverse transform of a spectrum, which is overwritten; both flat."""
+    """Write the inverse transform of a spectrum to `field`. The spectrum is overwritten."""
     if transform.first_axes.size == 0:
         c2r(spectrum, field, transform.last_axis, False, 1.0 / field.size, 1)
     else:
@@ -111,7 +112,7 @@ def backward(transform: Transform, spectrum: Array, field: Array) -> None:
 def convolve(
     transform: Transform, multiplier: Array, field: Array, spectrum: Array, out: Array
 ) -> None:
-    """`out` = a field with its Fourier modes multiplied; all flat; spectrum is a workspace."""
+    """Write a field with its Fourier modes multiplied to `out`. `spectrum` is a workspace."""
     forward(transform, field, spectrum)
     for i in range(spectrum.size):
         spectrum[i] *= multiplier[i]
@@ -119,23 +120,23 @@ def convolve(
 
 
 class Operator(NamedTuple):
-    """K - W of an interface with what solving takes; for one thread at a time."""
+    """K - W of an interface with the workspaces of its solvers, for one thread at a time."""
 
     transform: Transform
     symbol: Array  # (modes,): K(k), Pa/m
     inverse: Array  # (modes,): 1/(K(k) + W/2) with the mean W
-    rate: Array  # (nodes,): W, Pa/m, zero where the residual strength is reached
+    rate: Array  # (nodes,): W, Pa/m, zero at residual nodes
     spectrum: NDArray[np.complex128]  # (modes,): overwritten by each transform
-    z: Array  # (nodes,): overwritten by conjugate gradients, as are the next two
-    direction: Array  # in which curvature is negative, if they meet one
+    z: Array  # (nodes,): overwritten by conjugate gradients, like the next two
+    direction: Array  # last direction; of negative curvature, if the solver returns it
     image: Array  # A times the direction
     soft_mode: Array  # (nodes,): y with y'Ay about 1 that `inverse` lacks, or empty
-    spring: float  # stiffness of a spring that holds a patch, Pa/m; 0 for none
-    phi: Array  # (nodes,): the patch that it holds, of unit norm
+    spring: float  # stiffness of a spring that holds a patch, Pa/m; 0 without a spring
+    phi: Array  # (nodes,): patch that the spring holds, of unit norm
 
 
 def make_operator(symbol: Array, rate: Array | float, shape: tuple[int, ...]) -> Operator:
-    """Return the operator for a stiffness and a weakening rate (Pa/m), scalar or on the nodes."""
+    """Return the operator of a symbol and a weakening rate (Pa/m), a number or on the nodes."""
     rates = np.broadcast_to(np.asarray(rate, dtype=np.float64), shape).flatten()
     typical = float(rates[rates > 0.0].mean()) if (rates > 0.0).any() else float(symbol.max())
     flat = symbol.flatten()
@@ -149,13 +150,13 @@ def make_operator(symbol: Array, rate: Array | float, shape: tuple[int, ...]) ->
 
 @jit
 def filtered(operator: Operator, multiplier: Array, field: Array, out: Array) -> None:
-    """`out` = the field with its Fourier modes multiplied."""
+    """Write a field with its Fourier modes multiplied to `out`."""
     convolve(operator.transform, multiplier, field, operator.spectrum, out)
 
 
 @jit
 def product(operator: Operator, field: Array, out: Array) -> None:
-    """`out` = (K - W) field at every node; without a spring."""
+    """Write (K - W) field at every node, without a spring, to `out`."""
     filtered(operator, operator.symbol, field, out)
     rate = operator.rate
     for i in range(out.size):
@@ -164,7 +165,10 @@ def product(operator: Operator, field: Array, out: Array) -> None:
 
 @jit
 def dot(first: Array, second: Array, count: int) -> float:
-    """Sum of products in one thread; numpy's own depends on the number of its threads."""
+    """Return the sum of products of the first `count` entries, in a single thread.
+
+    The sum by numpy depends on the number of its threads.
+    """
     a = zeros()
     b = zeros()
     c = zeros()
@@ -192,20 +196,20 @@ def dot(first: Array, second: Array, count: int) -> float:
 
 @jit
 def inner(a: Array, b: Array) -> float:
-    """Sum of products over all nodes of two fields."""
+    """Return the sum of products of two fields over all nodes."""
     return dot(a, b, a.size)
 
 
 @jit
 def add_scaled(target: Array, factor: float, source: Array) -> None:
-    """`target` += factor * source."""
+    """Add factor * source to `target`."""
     for i in range(target.size):
         target[i] += factor * source[i]
 
 
 @jit
 def set_scaled(target: Array, factor: float, source: Array) -> None:
-    """`target` = factor * source; a slice on the left takes numba seconds to compile."""
+    """Set `target` to factor * source. (Numba takes seconds to compile a slice on the left.)"""
     for i in range(target.size):
         target[i] = factor * source[i]
 
@@ -220,7 +224,7 @@ def restrict(field: Array, inside: Mask) -> None:
 
 @jit
 def largest_inside(field: Array, inside: Mask) -> float:
-    """Largest absolute value of a field on a set of nodes."""
+    """Return the largest absolute value of a field on a set of nodes."""
     largest = 0.0
     for i in range(field.size):
         if inside[i]:
@@ -230,7 +234,7 @@ def largest_inside(field: Array, inside: Mask) -> float:
 
 @jit
 def residual_of(operator: Operator, right: Array, x: Array, out: Array) -> None:
-    """`out` = right - (A + spring phi phi') x at every node."""
+    """Write right - (A + spring phi phi') x at every node to `out`."""
     product(operator, x, out)
     for i in range(out.size):
         out[i] = right[i] - out[i]
@@ -248,7 +252,7 @@ def solve_inside(
 ) -> tuple[int, int]:
     """Solve (1) by conjugate gradients.
 
-    x is a guess, then the solution, with its residual, as from `residual_of`; both are zero
+    x is a guess, then the solution, and `residual` its residual, as by `residual_of`. Both are zero
     outside. Returns SOLVED (no residual above the tolerance, Pa), NEGATIVE_CURVATURE (along
     `operator.direction`) or EXHAUSTED, and the number of iterations.
     """
@@ -291,7 +295,11 @@ def solve_inside(
 
 @jit
 def _combine(basis: Array, weights: Array, count: int, out: Array) -> None:
-    """`out` = the second to last vectors of a basis with these weights; the first is scaled."""
+    """Step 3: combine the vectors of a basis into the next x and the next direction.
+
+    basis[0] becomes the combination of all vectors, basis[2] and `out` the combination without the
+    first.
+    """
     for i in range(out.size):
         total = 0.0
         for k in range(1, count):
@@ -306,14 +314,14 @@ def lowest_eigenvector(
 ) -> tuple[float, int]:
     """Solve (2): return the smallest eigenvalue of A on the nodes `inside` (Pa/m), and iterations.
 
-    The vector is a guess, then the eigenvector: unit norm, positive sum, zero outside. The search
-    stops once the norm of A y - lambda y is below the tolerance.
+    The vector is a guess, then the eigenvector, with unit norm, positive sum, and zero outside. The
+    search stops once the norm of A y - lambda y is below the tolerance.
     """
     nodes = vector.size
     basis = np.empty((3, nodes))  # x, the preconditioned residual, the last direction
     images = np.empty((3, nodes))  # A times these
     work = np.empty(nodes)
-    # A guess may be so small that its norm underflows: a power of two changes no digit.
+    # The norm of a small guess may underflow. Scaling by a power of two does not change its digits.
     exponent = math.frexp(largest_inside(vector, inside))[1]
     set_scaled(basis[0], math.ldexp(1.0, min(-exponent, 1000)), vector)
     restrict(basis[0], inside)

@@ -1,15 +1,16 @@
-"""What methods need of the solids on both sides of an interface.
+"""The elasticity that methods need of the solids on both sides of an interface.
 
-`Line` (half-spaces that meet on a line) and `Driven` (two blocks behind a machine) have all of it.
-`HalfSpaces` on a plane have the symbol of K, and slip relieves no load; K itself would not fit in
-memory. Records only: kernels that take them stand in `stiffness` and `weakest`.
+`Line` (half-spaces that meet on a line) and `Driven` (two blocks behind a machine) are complete.
+`HalfSpaces` on a plane have the symbol of K only, as K itself would not fit in memory, and slip
+does not relieve the load. This file holds records. Their kernels are in `stiffness` and `weakest`.
 
 Slip has one component, along x, the direction of the load. With a wave vector (kx, ky) of
 length k and a = (kx/k)^2 the stiffness between half-spaces is
 
     K(k) = (G* a + G (1 - a)) k/2,
 
-mode II along x and mode III along y (Geubelle and Rice 1995); a line has the modulus of its mode.
+mode II along x and mode III along y (P. Geubelle and J. Rice, Journal of the Mechanics and Physics
+of Solids 43, 1995). A line has the modulus of its mode.
 """
 
 import functools
@@ -21,15 +22,15 @@ from numpy.typing import NDArray
 from stiction.base.arrays import Array
 
 ANYWHERE = -1
-"""In the place of a first node: K is the same everywhere, and the interface is periodic."""
+"""Stands for the first node of a window that may begin anywhere on a periodic interface."""
 SMALLEST_EIGENVALUE = 0.5788869418506
 """lambda_0 in the nucleation length h_n = 2 lambda_0 G*/W (Uenishi and Rice, 2003)."""
 
 
 class HalfSpaces(NamedTuple):
-    """Periods (m) and moduli (Pa) along each direction.
+    """Half-spaces, by their periods (m) and moduli (Pa) along each direction.
 
-    The moduli are G* of the mode on a line, G* and G on a plane.
+    The modulus of a line is G* of its mode, and the moduli of a plane are G* and G.
     """
 
     lengths: tuple[float, ...]
@@ -63,14 +64,14 @@ def _symbol(
 class Windows(NamedTuple):
     """Runs of nodes that are just unstable by themselves.
 
-    The smallest eigenvalue of the block of K on a run is at most the weakening rate W in it. The
-    eigenvector y is positive where K has no positive entry off its diagonal, and K y <= W y: so
-    <s, y>/<p, y> bounds the load of the first instability from above, s being the strength less
-    initial stress and p the load profile. This is the criterion of Uenishi and Rice (2003) in the
+    The smallest eigenvalue of the block of K on a run is at most the weakening rate W in it. If K
+    has no positive entry off its diagonal, the eigenvector y is positive, and K y <= W y. Therefore
+    <s, y>/<p, y> bounds the load of the first instability from above, where s is the strength less
+    initial stress and p the load profile. This is the criterion of Uenishi and Rice (2003) in a
     form that is strict on the grid.
     """
 
-    rates: Array  # (count,): weakening rate from which each is unstable, Pa/m, never rising
+    rates: Array  # (count,): smallest unstable weakening rate of each, Pa/m, never rising
     starts: NDArray[np.int64]  # (count,): first node, or `ANYWHERE`
     widths: NDArray[np.int64]  # (count,): number of nodes
     modes: (
@@ -85,7 +86,7 @@ NONE = Windows(np.empty(0), _NO_NODES, _NO_NODES, np.empty((1, 1)))
 class CircularEntries(NamedTuple):
     """K of a periodic line: its first column (n,), and its odd entries three times in a row, Pa/m.
 
-    The strip spares products index arithmetic.
+    With the strip, products need no index arithmetic.
     """
 
     column: Array
@@ -93,9 +94,9 @@ class CircularEntries(NamedTuple):
 
 
 class DenseEntries(NamedTuple):
-    """K of two blocks, row by row in a flat array, and what slip takes off their drive.
+    """K of two blocks, row by row in a flat array, and the relief of their drive.
 
-    Slip d lowers the mean stress by relief <q, d>/n (Pa/m; 0 under dead load).
+    Slip d lowers the mean stress by relief <q, d>/n. `relief` is in Pa/m, and 0 under a dead load.
     """
 
     rows: Array
@@ -104,7 +105,7 @@ class DenseEntries(NamedTuple):
 
 
 class Elasticity(Protocol):
-    """Two solids that meet on nodes."""
+    """Protocol of the elasticity of two solids that meet on nodes."""
 
     @property
     def entries(self) -> Any:
@@ -112,18 +113,22 @@ class Elasticity(Protocol):
 
     @property
     def half_spaces(self) -> HalfSpaces | None:
-        """What gives the symbol of K; None for blocks, of which there is none."""
+        """The half-spaces, which give the symbol of K; None for blocks, which have no symbol."""
 
     @property
     def relief(self) -> float:
-        """h, Pa/m: how much stress the mean of p d takes off the load; 0 without a machine."""
+        """Relief h of the load per mean of p d, Pa/m; 0 without a machine."""
 
     @property
     def positive(self) -> float:
-        """Largest positive entry of K off its diagonal, over the diagonal: slip may stop others."""
+        """Largest positive entry of K off its diagonal, as a share of the diagonal.
+
+        If it is not zero, slip at one node can stop another.
+        """
 
     def windows(self, low: float, high: float) -> Windows:
         """Return the windows for weakening rates from `low` to `high`, Pa/m.
 
-        Exact if these are the same; else for a bound, and the same for all samples.
+        For a single rate they are exact. Otherwise they give a bound, and are the same for all
+        samples.
         """

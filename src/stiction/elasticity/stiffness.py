@@ -1,29 +1,29 @@
-"""Products with the stiffness K of a line or of two blocks, is_slipping kernels.
+"""Products with the stiffness K of a line or of two blocks, inside kernels.
 
 Problem
 -------
-K d for a slip d that is zero except at some nodes, and single entries K_ij (Pa/m), without knowing
-in the kernel what K is the stiffness of. numba compiles a kernel once for each type of entries
-(`CircularEntries` of a line, `DenseEntries` of blocks). `entry`, `mean_relief`, `apply` and
-`apply_outside` are placeholders whose Python bodies are never run: numba puts the overload for the
-type of entries in their place. A type without overloads is refused when a kernel is compiled.
+Kernels need K d for a slip d that is zero except at some nodes, and single entries K_ij (Pa/m), for
+lines and blocks alike. numba compiles a kernel for each type of entries (`CircularEntries` of a
+line, `DenseEntries` of blocks). `entry`, `mean_relief`, `apply` and `apply_outside` are
+placeholders whose Python bodies are never run: numba replaces them by the overload for the type of
+entries. If a type has no overload, the compilation of a kernel raises an error.
 
 Algorithm
 ---------
 `apply_circular` sums columns of K. On a line K_j = 0 for even j > 0 (`line`), so that nodes of even
 number act on nodes of odd number only, and the reverse.
 
-1. For each parity, take the slipping nodes of this parity. The nodes of the other parity at which
-   they act are n/2 targets.
+1. For each parity, take the slipping nodes of this parity. They act on n/2 targets, the nodes of
+   the other parity.
 2. The entries of K from a node to its targets are n/2 consecutive numbers of `strip`, the odd
    entries of the first column three times over. Add them, times the slip, for four nodes at once,
    so that each target is read and written once for four nodes.
-3. Put the two halves together, and add the diagonal.
+3. Join the two halves, and add the diagonal.
 
 `_apply_rows` does the same with rows of a dense matrix, which is symmetric.
 """
 
-# numba compares the names of arguments with their annotations, so functions by type have none.
+# numba compares the names of arguments with their annotations, so overloads have no annotations.
 # mypy: disable-error-code="no-untyped-def"
 
 from collections.abc import Callable
@@ -44,16 +44,16 @@ def entry(entries: Any, i: int, j: int) -> float:
 
 
 def mean_relief(entries: Any, profile: Array, slip: Array) -> float:
-    """Return by how much slip lowers the mean stress of the interface, Pa; 0 at a fixed force."""
+    """Return by how much slip lowers the mean stress of the interface, Pa; 0 under a dead load."""
     raise NotImplementedError
 
 
 def apply(
     entries: Any, nodes: Array, count: int, values: Array, halves: Array, product: Array
 ) -> None:
-    """`product` (n,) = K times a field that has `values` at the first `count` of the `nodes`.
+    """Multiply K by a field with `values` at the first `count` of the `nodes`, zero elsewhere.
 
-    `halves` (2, n/2) is a workspace.
+    The result is written to `product` (n,). `halves` (2, n/2) is a workspace.
     """
     raise NotImplementedError
 
@@ -67,9 +67,9 @@ def apply_outside(
     halves: Array,
     product: Array,
 ) -> None:
-    """Multiply as `apply` does, where K is dense only at the nodes that do not slip.
+    """Multiply as `apply` does, but for blocks write the nodes that do not slip only.
 
-    On a line, where one part of the product costs as much as all of it, it is written everywhere.
+    On a line a part of the product costs as much as all of it, so it is written at all nodes.
     """
     raise NotImplementedError
 
@@ -78,7 +78,7 @@ def apply_outside(
 def add_four(
     target: Array, strip: Array, places: tuple[int, int, int, int], values: tuple[float, ...]
 ) -> None:
-    """Add the contribution of four nodes to one half of a product."""
+    """Add the contribution of four nodes to half of a product."""
     half = target.shape[0]
     p0, p1, p2, p3 = places
     z0, z1, z2, z3 = values
@@ -110,7 +110,7 @@ def apply_circular(
         target = halves[1 - parity]
         for q in range(half):
             target[q] = 0.0
-        n_waiting = 0  # nodes p0, p1, ... with slip z0, z1, ... that wait until they are four
+        n_waiting = 0  # nodes p0, p1, ... with slip z0, z1, ... are added in groups of four
         p0 = p1 = p2 = p3 = ZERO
         z0 = z1 = z2 = z3 = 0.0
         for t in range(count):
@@ -144,7 +144,7 @@ def _apply_rows(
     start: int,
     target: Array,
 ) -> None:
-    """`target` = K times a field that has `values` at `nodes`, from the node `start` on."""
+    """Write K times a field with `values` at `nodes`, from the node `start` on, to `target`."""
     n = entries.n_nodes
     for q in range(target.shape[0]):
         target[q] = 0.0
@@ -166,7 +166,7 @@ def _apply_rows_outside(
     is_slipping: Array,
     product: Array,
 ) -> None:
-    """Multiply at each run of nodes that do not slip."""
+    """Write K times a field at the nodes that do not slip, run by run."""
     end = ZERO
     while end < entries.n_nodes:
         start = end
@@ -177,14 +177,14 @@ def _apply_rows_outside(
 
 
 def _by_type(entries: Any, circular: Callable[..., Any], dense: Callable[..., Any]) -> Any:
-    """Return what numba compiles for a type of entries, or refuse it."""
+    """Return the function that numba compiles for a type of entries, or raise an error."""
     kind = getattr(entries, "instance_class", None)
     if kind is CircularEntries:
         return circular
     if kind is DenseEntries:
         return dense
     raise TypingError(
-        f"entries: have no stiffness in kernels if they are {entries}; give CircularEntries or"
+        f"entries: kernels do not know the stiffness of {entries}; give CircularEntries or"
         " DenseEntries, or add a case to each overload of stiction.elasticity.stiffness"
     )
 

@@ -1,4 +1,4 @@
-"""The lowest upper bound of the load that critical windows give, with its proof.
+"""The lowest upper bound of the load by critical windows, with its multiplier.
 
 Problem
 -------
@@ -9,14 +9,14 @@ of these bounds over all windows and all places.
 
 Algorithm
 ---------
-1. Take the windows in turn, from the narrowest to the widest. Skip those that need a higher
-   weakening rate than any node has. Stop once a narrower window is unstable anywhere: wider ones
-   bound the load less closely.
+1. Take the windows in turn, from the narrowest to the widest. Skip windows that need a higher
+   weakening rate than any node has. Stop once a narrower window is unstable anywhere, since wider
+   windows bound the load less closely.
 2. If the rate varies, count for each node how many nodes in a row weaken fast enough.
-3. A window with a fixed place (of blocks) has one bound. A window that may lie anywhere (of a line)
-   is tried at every sixteenth of its width, because a weighted mean hardly changes over this
-   distance, and then at all nodes around the best place. The lowest minimum may be missed. The
-   result is a bound nevertheless, as each place gives one.
+3. A window with a fixed place (on blocks) has a single bound. A window that may lie anywhere (on a
+   line) is tried at every sixteenth of its width, because a weighted mean hardly changes over this
+   distance, and then at all nodes around the best place. The lowest minimum may be missed, but
+   every place gives a valid bound.
 4. Compare with sliding of the whole interface: y = 1 everywhere.
 """
 
@@ -26,21 +26,21 @@ from stiction.elasticity.operator import dot
 from stiction.elasticity.protocol import Windows
 
 PLACES_PER_WIDTH = 16
-"""Number of places within the width of a window at which it is tried first."""
+"""Number of first trials within the width of a window."""
 NO_WINDOW = -1  # no window gives the bound
 NOWHERE = -1  # no place is better
 
 
 @jit_inside
 def _window_sum(values: Array, mode: Array, width: int, start: int) -> float:
-    """Weighted sum of a field over a window, on the circle."""
+    """Return the weighted sum of a field over a window, on the circle."""
     first = min(width, values.shape[0] - start)
     return dot(values[start:], mode, first) + dot(values, mode[first:], width - first)
 
 
 @jit_inside
 def _count_fast(rate: Array, threshold: float, length: Array) -> None:
-    """Step 2: count the nodes in a row, from each node on, that weaken at least so fast."""
+    """Step 2: write how many nodes in a row, from each node on, weaken at the threshold rate."""
     n = rate.shape[0]
     run = 0.0
     for q in range(2 * n - 1, -1, -1):
@@ -53,10 +53,10 @@ def _count_fast(rate: Array, threshold: float, length: Array) -> None:
 def weakest_window(
     excess: Array, profile: Array, rate: Array, windows: Windows, bound: float, allowed: Array
 ) -> tuple[float, int, int]:
-    """Steps 1 to 3: return the lowest bound (Pa), its window and the first node of that.
+    """Steps 1 to 3: return the lowest bound (Pa), its window and the window's first node.
 
-    It is `bound`, with `NO_WINDOW` and 0, if no window gives a lower one. `allowed` (n,) is a
-    workspace.
+    If no window gives a lower bound than `bound`, it returns `bound`, `NO_WINDOW` and 0. `allowed`
+    (n,) is a workspace.
     """
     n = rate.shape[0]
     best, window, start = bound, NO_WINDOW, 0
@@ -88,7 +88,7 @@ def weakest_window(
                 if s_y < best * p_y:
                     best, window, start = s_y / p_y, c, first
             continue
-        # 3. Any place: with a stride, and then around the best one.
+        # 3. Any place: with a stride, and then around the best place.
         low, high, stride = 0, n, max(1, width // PLACES_PER_WIDTH)
         uniform_p_y = _window_sum(profile, mode, width, 0) if uniform else 0.0
         while True:
@@ -116,7 +116,7 @@ def weakest_window(
 def window_bound(
     excess: Array, profile: Array, rate: Array, windows: Windows, allowed: Array, y: Array
 ) -> float:
-    """Return the lowest bound of windows and of sliding as a whole, Pa, and write its multiplier.
+    """Return the lowest bound by windows and by sliding as a whole, Pa, and write its multiplier.
 
     The multiplier y (n,) has <p, y> = 1. `allowed` (n,) is a workspace.
     """

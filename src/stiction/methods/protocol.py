@@ -163,7 +163,7 @@ def _check_values(
     if values.keys() != variables.keys():
         raise InputError(
             f"method: the solver of {name} must return its variables {', '.join(variables)},"
-            f" got {', '.join(values)}"
+            f" but returned {', '.join(values)}"
         )
     sizes = dict(zip(("x", "y"), sample.shape, strict=False))
     sizes |= {"sample": sample.samples, DIRECTION: 2}

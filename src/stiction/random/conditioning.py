@@ -1,11 +1,11 @@
-"""A field that was measured in places: values with errors, and the field elsewhere.
+"""A field with measured values at some places: its draws, conditioned on these values.
 
 Problem
 -------
-A Gaussian field is a linear function of its draws, z(x) = phi(x)'a with standard normal a,
-and the property itself is v(x) = F^-1(Phi(z(x))) with its marginal F. Values v_k were
-measured at places x_k with normal errors of the standard deviation `noise`. With phi_k =
-phi(x_k), the posterior of the draws has a density proportional to
+A Gaussian field is a linear function of its draws, z(x) = phi(x)'a with standard normal a.
+The property is v(x) = F^-1(Phi(z(x))) with the marginal F. Values v_k were measured at places
+x_k, with normal errors of standard deviation `noise`. With phi_k = phi(x_k), the posterior of
+the draws has a density proportional to
 
     N(a) prod_k l_k(phi_k'a),   log l_k(z) = -(v_k - F^-1(Phi(z)))^2 / (2 noise^2).           (1)
 
@@ -14,35 +14,33 @@ negative, this is a linear regression. The posterior of the draws is then normal
 
     covariance P = (1 + sum_k p_k phi_k phi_k')^-1,   mean mu = P sum_k b_k phi_k.            (2)
 
-mu + P^(1/2) a with the symmetric root turns the usual draws into conditioned ones, of the
-distribution that Matheron's rule gives (A. G. Journel and C. J. Huijbregts, Mining
-Geostatistics, 1978; A. Doucet, 2010). So nothing changes for a caller but the draws.
+With the symmetric root, mu + P^(1/2) a turns the usual draws into conditioned draws, with the
+same distribution as by Matheron's rule (A. G. Journel and C. J. Huijbregts, Mining Geostatistics,
+1978). For a caller only the draws change.
 
 Algorithm (`conditioned`)
 -------------------------
-Expectation propagation (T. P. Minka, Uncertainty in Artificial Intelligence 17, 2001), then
-a map for the skewness that Gaussians miss:
+Expectation propagation (T. P. Minka, Uncertainty in Artificial Intelligence 17, 2001), then a
+map for the skewness that Gaussians miss:
 
-1. Begin with z ~ N(0, 1) at every place, as if nothing else had been measured.
-2. Replace each l_k by the Gaussian with which the product of l_k and the normal
-   distribution of z_k given all other values keeps its mean and variance
-   (`Measured.gaussian`, by quadrature).
-3. Find the regression (2) from a singular value decomposition (`_regression`). With the
-   rows |p_k|^(1/2) phi_k' = U s V' and positive p_k, P^(1/2) = 1 + V ((1 + s^2)^(-1/2) - 1)
-   V' is well conditioned however densely a smooth field was measured. Where some p_k are
-   negative, V is turned so that P is diagonal in it, and s^2 stands for the eigenvalues of
-   P^-1 - 1, which may be below zero.
-4. Take the Gaussian of each place out of the posterior again: z_k given all other values
+1. Begin with z ~ N(0, 1) at every place, as if no other value had been measured.
+2. Replace each l_k by a Gaussian. Choose it so that the product with the normal distribution of
+   z_k given all other values keeps its mean and variance (`Measured.gaussian`, by quadrature).
+3. Find the regression (2) from a singular value decomposition (`_regression`). With the rows
+   |p_k|^(1/2) phi_k' = U s V' and positive p_k, P^(1/2) = 1 + V ((1 + s^2)^(-1/2) - 1) V' is well
+   conditioned even if a smooth field was measured densely. If some p_k are negative, V is turned
+   so that P is diagonal in it, and s^2 stands for the eigenvalues of P^-1 - 1, which may be
+   negative.
+4. Remove the Gaussian of each place from the posterior, which gives z_k given all other values
    (`_from_others`).
 5. Repeat from 2 until these means stay, or for `MAX_UPDATES`.
-6. Map draws before the regression, so that they have the density (1) instead of its
-   Gaussian approximation (`stiction.random.transport`, which also estimates the remaining
-   error).
+6. Map draws before the regression, so that they have the density (1) instead of its Gaussian
+   approximation (`stiction.random.transport`, which also estimates the remaining error).
 7. Compare the misfit of values and draws at the mean with chi-square, for a warning.
 
-Departures from Minka: all places are updated at once; Gaussians that have no posterior (P
-not positive definite) are tempered, b and p by the same factor, and the precision that is
-left for a place in step 4 is at least half of that before any measurement.
+Departures from Minka: all places are updated at once. If the Gaussians have no posterior (P is not
+positive definite), b and p are reduced by a common factor. In step 4 a place keeps at least half of
+its precision before any measurement.
 """
 
 from collections.abc import Sequence
@@ -74,36 +72,41 @@ from stiction.random.transport import (
 )
 
 # Limits of errors and warnings
-MAX_CHI_SQUARE = 5.0  # standard deviations of chi-square above its mean: values suit the field
+MAX_CHI_SQUARE = (
+    5.0  # largest chi-square of suitable values, in standard deviations above its mean
+)
 MAX_POSTERIOR_ERROR = 0.1  # standard deviations of z by which a posterior may be off
 MAX_ERRORS_OUTSIDE = 4.0  # errors by which a measured value may lie beyond a bound
 
 # Quadrature of step 2
 MAX_Z = 37.0  # largest z whose tail of the normal distribution is a float
-HALF_WIDTH, RANGE_NODES = 8.0, 49  # of a Gaussian, in deviations, and nodes across the range
-MIN_END_FALL = 18.0  # of a log density from its peak to the ends of a range that holds it all
-MAX_NARROWINGS = 6  # of a range that holds a peak, each to two of its intervals at least
+HALF_WIDTH, RANGE_NODES = (
+    8.0,
+    49,
+)  # half a range in standard deviations, and nodes across the range
+MIN_END_FALL = 18.0  # fall of a log density from its peak to the ends of a complete range
+MAX_NARROWINGS = 6  # of a range around a peak, each to two of its intervals at least
 MIN_HALF_RANGE = 1e-12
 LOG_OF_IMPOSSIBLE = -1e9  # lowest logarithm of a likelihood
 
 # Regression and rounds, in units of z
 MAX_UPDATES = 8
 SETTLED_MEAN = 1e-3  # change of the means of step 4 that ends the updates
-MIN_SINGULAR_VALUE = 1e-8  # below, a direction of the draws stays as it is
-MIN_SCALE = 1e-10  # of |p_k| where it scales a row
-MIN_EIGENVALUE = -0.9  # of s^2: P^-1 has 1 + s^2
+MIN_SINGULAR_VALUE = 1e-8  # directions with a smaller value keep their draws
+MIN_SCALE = 1e-10  # smallest |p_k| that scales a row
+MIN_EIGENVALUE = -0.9  # smallest s^2; the eigenvalues of P^-1 are 1 + s^2
 MIN_VARIANCE = 1e-12
-MIN_DEVIATION = 1e-4  # of a measured z; below, the map is linear and needs no updates
+MIN_DEVIATION = 1e-4  # of a measured z; the map is linear across less, and needs no updates
 
 QUANTILE_SAMPLES = 1024  # for quantiles beyond the Gaussian
 
 
 class ReadPoints(np.ndarray):
-    """Places and values that were read before, unlike an array that a user gives."""
+    """Places and values that were checked before, unlike an array that a user gives."""
 
 
 def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
-    """Places (rows x, and y on a plane) and values (last row) of a measurement."""
+    """Return places (rows x, and y on a plane) and values (last row) of a measurement."""
     if isinstance(value, ReadPoints):
         return value
     context = info.context or {}
@@ -119,7 +122,7 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
                 "must be a DataArray over x (m), on a plane over x and y, with coordinates, as"
                 " st.read_profile(path) returns it"
             )
-        if MEASURED in value.coords:  # what was filled in was not measured
+        if MEASURED in value.coords:  # leave out values that only fill gaps
             value = value.where(value[MEASURED].astype(bool))
         axes = (in_si(value[name], name, "m") for name in names)
         rows = [*np.meshgrid(*axes, indexing="ij"), _values(value.transpose(*names))]
@@ -134,14 +137,12 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
 
 
 def _values(array: Any) -> Array:
-    """Values of a labelled array, in the SI unit of whichever property has the one it states."""
+    """Return the values of a labelled array in SI, by the property whose unit it states."""
     stated = unit_of(array)
     for quantity in QUANTITIES.values():
         if is_in(stated or "1", quantity.units):
             return np.asarray(in_si(array, "values", quantity.units if stated else "1"))
-    raise ValueError(
-        f"must be in SI or state a known unit, not {stated!r}, which no property has"
-    )
+    raise ValueError(f"must be in SI or state the unit of a property, got {stated!r}")
 
 
 def _table(points: Array) -> dict[str, list[float]]:
@@ -158,19 +159,19 @@ Points = Annotated[
 
 @model
 class Conditions:
-    """Measured values of a field and their error, in its unit (`RandomField.given`)."""
+    """Measured values of a field and their error, in the unit of the field."""
 
     profile: Points
     noise: Positive
 
     @property
     def places(self) -> Array:
-        """Where values were measured, m: (dimensions, points)."""
+        """Places of the measured values, m, (dimensions, points)."""
         return np.asarray(self.profile[:-1])
 
     @property
     def values(self) -> Array:
-        """The measured values, (points,)."""
+        """Measured values, (points,)."""
         return np.asarray(self.profile[-1])
 
     def check(self, marginal: Any, interface: Interface) -> None:
@@ -201,24 +202,24 @@ class Conditions:
 
 
 class Measured(NamedTuple):
-    """Measured values of one property: z at its places is phi @ draws, (points, dimension)."""
+    """Measured values of a property. z at their places is phi @ draws; phi (points, dimension)."""
 
     conditions: Conditions
     marginal: Any
     phi: Array
 
     def log_likelihood(self, places: NDArray[np.int64], z: Array) -> Array:
-        """Return log l_k at places (indices) and z (places, ...); -inf without a quantile."""
+        """Return log l_k at places (indices) and z (places, ...), or -inf without a quantile."""
         value = self.conditions.values[places].reshape(-1, *(1 for _ in z.shape[1:]))
         misfit = (value - from_normal(self.marginal, z)) * (1.0 / self.conditions.noise)
         # Far out in the tail scipy may have no quantile.
         return np.where(np.isnan(misfit), -np.inf, -0.5 * misfit**2)
 
     def gaussian(self, mean: Array, variance: Array) -> tuple[Array, Array]:
-        """Step 2: return b and p, (points,), given mean and variance of z from all other values."""
+        """Step 2: return b and p, (points,), for mean and variance of z given all other values."""
         law, noise = self.marginal.distribution, self.conditions.noise
         value = self.conditions.values
-        # The range of z in which neither the likelihood nor the normal distribution is negligible.
+        # The range of z in which likelihood and normal distribution both matter.
         edges = value + HALF_WIDTH * noise * np.array([[-1.0], [1.0]])
         likely = _normal_score(law.cdf(edges), law.sf(edges)).clip(-MAX_Z, MAX_Z)
         width = HALF_WIDTH * np.sqrt(variance)
@@ -234,8 +235,8 @@ class Measured(NamedTuple):
             return half_range, z, log_density
 
         half_range, z, log_density = evaluate()
-        # Where a value contradicts the others, their product peaks outside or at an end. Then look
-        # at all of both, and narrow the range around the peak.
+        # If a value contradicts the others, the product peaks outside the range or at its end. Then
+        # search both ranges, and narrow the search around the peak.
         ends = log_density[:, [0, -1]].max(axis=1)
         apart = ~overlap | (ends > log_density.max(axis=1) - MIN_END_FALL)
         if apart.any():
@@ -253,7 +254,7 @@ class Measured(NamedTuple):
                 low = np.where(apart, z[rows, first], low)
                 high = np.where(apart, z[rows, last], high)
                 half_range, z, log_density = evaluate()
-        # Mean and variance of the product, and the Gaussian that gives it the same.
+        # Mean and variance of the product, and the Gaussian that gives the same.
         weight = np.exp(log_density - log_density.max(axis=1, keepdims=True))
         total = weight.sum(axis=1)
         centre = (weight * z).sum(axis=1) / total
@@ -264,14 +265,14 @@ class Measured(NamedTuple):
 
 
 def _normal_score(below: Array, above: Array) -> Array:
-    """z of which these are the probabilities below and above, from the smaller one."""
+    """Return the z with these probabilities below and above, from the smaller probability."""
     return np.where(below < 0.5, ndtri(below), -ndtri(above))
 
 
 class Regression(NamedTuple):
     """Step 3: the posterior (2) of the draws, given Gaussians for the measured values."""
 
-    left: Array  # U s over |p|^(1/2), (points, directions)
+    left: Array  # U s / |p|^(1/2), (points, directions)
     power: Array  # s^2, (directions,)
     right: Array  # V, (dimension, directions)
     data: Array  # V' sum_k b_k phi_k, (1, directions)
@@ -279,7 +280,7 @@ class Regression(NamedTuple):
     def moments(self, phi: Array) -> tuple[Array, Array]:
         """Return mean and standard deviation of z = phi @ draws, (points,)."""
         along, gain = phi @ self.right, 1.0 + self.power
-        # Variance in directions of the draws that no measurement touches.
+        # Variance in directions that no measurement changes.
         free = (phi**2).sum(axis=1) - (along**2).sum(axis=1)
         variance = along**2 @ (1.0 / gain) + np.where(free > MIN_VARIANCE, free, 0.0)
         return along @ (self.data[0] / gain), np.sqrt(variance)
@@ -292,7 +293,7 @@ class Regression(NamedTuple):
 
 
 class Conditioning(NamedTuple):
-    """Standard normal draws, given what was measured of properties: see `conditioned`."""
+    """Map of standard normal draws to draws given measured values; see `conditioned`."""
 
     regression: Regression
     mapped: Transport  # of the draws, before the regression
@@ -308,13 +309,16 @@ class Conditioning(NamedTuple):
         return self.regression.apply(out)
 
     def quantile_at(self, phi: Array, probability: float) -> Array:
-        """Return the quantile of z = phi @ draws, (points,); beyond the regression, by samples."""
+        """Return the quantile of z = phi @ draws, (points,).
+
+        It is exact for the regression. The effect of the map is estimated by samples.
+        """
         mean, deviation = self.regression.moments(phi)
         quantile = mean + float(ndtri(probability)) * deviation
         if len(self.mapped.basis):
             draws = np.random.default_rng(0).standard_normal((QUANTILE_SAMPLES, phi.shape[1]))
             mapped, unmapped = self.draws(draws), self.regression.apply(draws.copy())
-            for i, row in enumerate(phi):  # the difference scatters less than either
+            for i, row in enumerate(phi):  # the difference scatters less than a quantile
                 with_map = np.quantile(mapped @ row, probability)
                 quantile[i] += with_map - np.quantile(unmapped @ row, probability)
         return quantile
@@ -331,27 +335,27 @@ class Conditioning(NamedTuple):
             mean, deviation = self.remaining_error
             warn_accuracy(
                 f"given: the field is approximate where it was measured: its mean is off by up to"
-                f" about {mean:.2g} of its standard deviation, and that by up to about"
-                f" {100.0 * deviation:.2g} %; average values at neighbouring places, with their"
-                " smaller noise"
+                f" about {mean:.2g} of its standard deviation, and its standard deviation by up to"
+                f" about {100.0 * deviation:.2g} %. Average values at neighbouring places, and give"
+                " their smaller noise"
             )
 
 
 def conditioned(measured: Sequence[Measured]) -> Conditioning:
     """Condition draws on measured values of properties, by the algorithm of this file."""
     phi = np.concatenate([values.phi for values in measured])
-    # 1. and 2. Gaussians as if each value was the only one.
+    # 1. and 2. Gaussians as if each value were the only one.
     cavity = np.zeros(len(phi)), np.ones(len(phi))
     shift, precision = _gaussians(measured, cavity)
     for update in range(1, MAX_UPDATES + 1):
-        # 3. and 4. Everything together, and z at each place from all other values.
+        # 3. and 4. All values together, and z at each place given all other values.
         regression, shift, precision = _regression(phi, shift, precision)
         previous_mean, cavity = cavity[0], _from_others(phi, regression, shift, precision)
-        # 5. The Gaussians of the regression are those that step 6 divides by.
+        # 5. End before new Gaussians: step 6 divides by the Gaussians of the regression.
         if np.abs(cavity[0] - previous_mean).max() < SETTLED_MEAN or update == MAX_UPDATES:
             break
         shift, precision = _gaussians(measured, cavity)
-    # 6. z = mean + (along / gain) w with standard normal w: the map from that to (1).
+    # 6. The regression gives z = mean + (along / gain) w with standard normal w. Map w to (1).
     along, gain = phi @ regression.right, np.sqrt(1.0 + regression.power)
     mean = along @ (regression.data[0] / gain**2)
     log_ratio = _log_ratio(measured, shift, precision, mean)
@@ -368,7 +372,7 @@ def conditioned(measured: Sequence[Measured]) -> Conditioning:
 def _gaussians(
     measured: Sequence[Measured], cavity: tuple[Array, Array]
 ) -> tuple[Array, Array]:
-    """Step 2 for all properties: b and p given mean and variance of z from all other values."""
+    """Step 2: return b and p of all properties, for mean and variance given all other values."""
     ends = np.cumsum([len(values.phi) for values in measured])[:-1]
     moments = zip(*(np.split(moment, ends) for moment in cavity), strict=True)
     gaussians = [
@@ -382,9 +386,9 @@ def _gaussians(
 def _log_ratio(
     measured: Sequence[Measured], shift: Array, precision: Array, mean: Array
 ) -> LogRatio:
-    """Logarithm of l_k over the Gaussian that replaced it, by place and z.
+    """Return the logarithm of l_k divided by its Gaussian, as a function of place and z.
 
-    The Gaussian is 1 at the `mean`; constants of a place do not matter.
+    The Gaussian is scaled to 1 at the `mean`, as constant factors of a place do not matter.
     """
 
     def log_ratio(places: NDArray[np.int64], z: Array) -> Array:
@@ -402,7 +406,7 @@ def _log_ratio(
 
 
 def _regression(phi: Array, shift: Array, precision: Array) -> tuple[Regression, Array, Array]:
-    """Step 3: the regression, and its b and p: as given, or tempered so that there is one."""
+    """Step 3: return the regression with its b and p, reduced if they have no posterior."""
     scale = np.sqrt(np.maximum(np.abs(precision), MIN_SCALE))
     left, singular, right = svd(phi * scale[:, None], full_matrices=False)
     kept = singular > MIN_SINGULAR_VALUE
@@ -423,11 +427,11 @@ def _regression(phi: Array, shift: Array, precision: Array) -> tuple[Regression,
 def _from_others(
     phi: Array, regression: Regression, shift: Array, precision: Array
 ) -> tuple[Array, Array]:
-    """Step 4: mean and variance of z at each place from what was measured at all others."""
+    """Step 4: return mean and variance of z at each place, given the values at all others."""
     mean, deviation = regression.moments(phi)
     least = 0.5 / (phi**2).sum(axis=1)
     remaining = np.maximum(deviation**-2 - precision, least)
-    # Over so small a deviation the map is linear, and the difference would be round-off.
+    # Across a small deviation the map is linear, and the difference would be round-off.
     sharp = deviation < MIN_DEVIATION
     cavity_mean = (mean / deviation**2 - shift) / remaining
     return np.where(sharp, 0.0, cavity_mean), np.where(sharp, 1.0, 1.0 / remaining)

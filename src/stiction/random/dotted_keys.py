@@ -1,4 +1,4 @@
-"""Dotted keys: parameters, however deep, to which values or distributions are given."""
+"""Dotted keys of parameters, such as ``random.strength.marginal.low``, and their values."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -20,10 +20,10 @@ MARGINAL_KEYS = ("mean", "cv", "low", "high", "scale", "alpha", "beta")
 
 
 def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
-    """Return a copy of a model object, or of each of a list, with dotted keys replaced at once.
+    """Return a copy of a model object, or of a list of them, with values at dotted keys.
 
-    Messages begin with `path`, the dotted key of the object itself. It is an `InputError`
-    if a key does not exist (the nearest valid one is named) or a value does not fit.
+    Messages begin with `path`, the dotted key of the object itself. Raises an `InputError` if a
+    key does not exist (with the nearest valid key) or a value is invalid.
     """
     if isinstance(owner, list):
         return [with_values(member, values, path) for member in owner]
@@ -39,7 +39,7 @@ def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
         owner = {"type": owner.type, **dict(owner.parameters)}
     table, begin = isinstance(owner, Mapping), f"{path}." if path else ""
     if not table and not (dataclasses.is_dataclass(owner) and not isinstance(owner, type)):
-        raise InputError(f"{path}: has no keys of its own, it is {describe(owner)}")
+        raise InputError(f"{path}: has no keys of its own, as it is {describe(owner)}")
     names = {} if table else keys_of(type(owner))
     unknown = [name for name in {**changes, **inside} if not table and name not in names]
     if unknown:
@@ -59,7 +59,7 @@ def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
 
 
 def full_key(key: str) -> str:
-    """Return a key as in a sweep; keys of the strength may be given without their prefix."""
+    """Return a key as in a sweep, with the prefix that keys of the strength may leave out."""
     first = key.split(".")[0]
     if first in ("problem", "random"):
         return key
@@ -73,7 +73,7 @@ def full_key(key: str) -> str:
 
 
 def distributions_of(given: Mapping[str, Any], begin: str = "") -> dict[str, Any]:
-    """Return frozen distributions by the keys given, or raise one `InputError`.
+    """Return frozen distributions by the given keys, or raise an `InputError` with all mistakes.
 
     Full keys must begin with `begin`.
     """
@@ -83,7 +83,7 @@ def distributions_of(given: Mapping[str, Any], begin: str = "") -> dict[str, Any
         try:
             full = full_key(str(key))
             if not full.startswith(begin):
-                problems.append(f"{full}: is not of what is random")
+                problems.append(f"{full}: is not a parameter of a random property")
             if full in map(full_key, distributions):
                 problems.append(f"{key} is given twice: it is the same parameter")
             distributions[str(key)] = distribution_of(str(key), value)
@@ -95,9 +95,9 @@ def distributions_of(given: Mapping[str, Any], begin: str = "") -> dict[str, Any
 
 
 def distribution_of(key: str, value: Any) -> Any:
-    """Return a frozen distribution, given one, two ends, or a table {low, high, spacing}.
+    """Return a frozen distribution from a distribution, two ends or a table {low, high, spacing}.
 
-    A marginal of a field, or its table, is one too.
+    A marginal of a field, or its table, is also accepted.
     """
     if isinstance(value, Marginal) or (isinstance(value, Mapping) and "type" in value):
         with prefixed(key):

@@ -1,4 +1,4 @@
-"""Several equally likely random interfaces as one: which of them holds is one more draw."""
+"""Equally likely random interfaces as a mixture: a first draw selects the member of a sample."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -29,29 +29,29 @@ from stiction.random.fields import RandomField, RandomInterface, as_random_inter
 from stiction.random.synthesis import SAMPLES_PER_BLOCK, Stream
 
 MEMBER_STREAM = Stream(2000, SAMPLES_PER_BLOCK, np.arange(0), mean_mode=True)
-"""The draw that selects a member."""
+"""Stream of the draw that selects a member."""
 MAX_DRAWS_OF_STREAM = 1 << 40
-"""More than any stream has."""
+"""Upper bound of the number of draws in a stream."""
 
 VARIANTS = 40
-"""Values of each uncertain constant of the problem."""
+"""Number of values of each uncertain constant of the problem."""
 SHARED_VALUES = 8
-"""Members of one field that share the value of an uncertain parameter, so that their strengths are
-in proportion."""
+"""Number of members of a field that share the value of an uncertain parameter, so that their
+strengths are in proportion."""
 FIRST_MEMBERS, MAX_MEMBERS = 1_000, 8_000
-"""Members that are drawn from a source at first, and at most."""
+"""Number of members drawn from a source at first, and at most."""
 
 
 @runtime_checkable
 class Source(Protocol):
-    """What draws any number of equally likely interfaces: a fit, a posterior, parameters."""
+    """Source of any number of equally likely interfaces: a fit, a posterior, parameters."""
 
     def interfaces(self, count: int, seed: int = 0) -> list[RandomInterface]:
-        """Return so many of them."""
+        """Return a number of equally likely interfaces."""
 
 
 def _known(given: Any) -> Any:
-    """Return what is random as it is, or name the first entry that is nothing of the kind."""
+    """Return random interfaces, or raise an `InputError` that names the first invalid entry."""
     if isinstance(given, RandomInterface | RandomField | Source):
         return given
     several = isinstance(given, list | tuple)
@@ -59,7 +59,7 @@ def _known(given: Any) -> Any:
         if not isinstance(entry, RandomInterface | RandomField):
             raise InputError(
                 f"{f'[{number}] ' * several}must be a RandomInterface or a RandomField, got"
-                f" {describe(entry)}; a profile goes into st.onset, and st.fit_field fits a field"
+                f" {describe(entry)}. A profile goes into st.onset, or st.fit_field fits a field"
                 " to it"
             )
     return given
@@ -71,23 +71,22 @@ if TYPE_CHECKING:
     )
 else:
     AnyRandom = Annotated[Any, BeforeValidator(_known), "RandomInterface | RandomField | list"]
-"""A random interface, a field that becomes one, or several equally likely ones or their source."""
+"""A random interface or field, a list of equally likely interfaces, or their source."""
 
 
 @dataclass(frozen=True, eq=False)
 class EquallyLikely:
-    """Random interfaces of which one holds, nobody knows which; it has the protocol of one.
+    """Mixture of equally likely random interfaces, with the protocol of a random interface.
 
-    The first draw of a sample selects its member. The others are those of the members,
-    which share a draw where it has the same property and mode: a sample that changes its
-    member keeps its form.
+    The first draw of a sample selects its member. Members share the other draws: a property and a
+    mode have the same draw in every member. A sample that changes its member keeps its form.
     """
 
     members: tuple[RandomInterface, ...]
-    order: tuple[int, ...] = ()  # of the members along the first draw; empty: as they are
-    source: Source | None = None  # that they were drawn from
-    complete: bool = False  # they are all there are, and no sample of more
-    fields: tuple[int, ...] = ()  # number of each member's field within, all of one mean
+    order: tuple[int, ...] = ()  # of the members along the first draw; empty keeps their order
+    source: Source | None = None  # from which the members were drawn
+    complete: bool = False  # whether the members are all possible interfaces, not a sample
+    fields: tuple[int, ...] = ()  # number of each member's field; equal if in proportion
     constants: tuple[Mapping[str, float], ...] = ()  # of the problem, taken in turn by members
 
     def __post_init__(self) -> None:
@@ -103,13 +102,13 @@ class EquallyLikely:
             if kind != kinds[0]:
                 raise InputError(
                     "random: equally likely interfaces need the same random properties, all as"
-                    f" stresses or all as coefficients; [0] has {_named(kinds[0])} and [{number}]"
-                    f" {_named(kind)}"
+                    f" stresses or all as coefficients. [0] has {_named(kinds[0])}, and [{number}]"
+                    f" has {_named(kind)}"
                 )
 
     @property
     def properties(self) -> dict[str, RandomField]:
-        """The random properties of the first member."""
+        """Random properties of the first member."""
         return self.members[0].properties
 
     @property
@@ -119,7 +118,7 @@ class EquallyLikely:
 
     @cached_property
     def kinds(self) -> NDArray[np.int64]:
-        """A number for each member, the same for those whose fields are equal, (members,)."""
+        """Number of each member's fields, the same for equal fields, (members,)."""
         known: dict[Any, int] = {}
         numbers = [
             known.setdefault(tuple(member.properties.items()), len(known))
@@ -129,7 +128,7 @@ class EquallyLikely:
 
     @cached_property
     def groups(self) -> NDArray[np.int64]:
-        """A number for each member, the same for those whose strengths are in proportion."""
+        """Number of each member's group; the strengths of a group are in proportion."""
         known: dict[Any, int] = {}
         strengths = [member.strength for member in self.members]
         fields = np.array(self.fields or [known.setdefault(s, len(known)) for s in strengths])
@@ -150,7 +149,10 @@ class EquallyLikely:
         return list(known), np.array(numbers)
 
     def factor_column(self, interface: Interface) -> int | None:
-        """Return the number of the draw of the factor of the strength; None if one has none."""
+        """Return the number of the draw of the strength's factor, or None.
+
+        It is None if any member has no factor.
+        """
         if None in self.factor_laws[0]:
             return None
         column = self.members[0].factor_column(interface)
@@ -163,7 +165,7 @@ class EquallyLikely:
         draws[rows, 0] = ndtri((place[members] + 0.5) / count)
 
     def uncertain(self, parameters: Mapping[str, Any]) -> "Uncertain":
-        """Return this as a source with uncertain parameters, as of `stiction.uncertain`."""
+        """Return a source with uncertain parameters, as by `stiction.uncertain`."""
         return uncertain(self, parameters)
 
     def variant(self, draws: Array) -> NDArray[np.int64]:
@@ -171,11 +173,11 @@ class EquallyLikely:
         return self.member(draws) % max(len(self.constants), 1)
 
     def interfaces(self, count: int, seed: int = 0) -> list[RandomInterface]:
-        """Return so many members, again from the first after the last."""
+        """Return a number of members, in a cycle."""
         return [self.members[number % len(self.members)] for number in range(count)]
 
     def larger(self, count: int, seed: int) -> "EquallyLikely":
-        """Return as many members from the same source."""
+        """Return a mixture of `count` members from the same source."""
         assert self.source is not None
         return drawn_from(self.source, count, seed)
 
@@ -213,16 +215,16 @@ class EquallyLikely:
 
 
 class Columns(NamedTuple):
-    """Columns of each member's draws among those of all, and members that have all of them."""
+    """Columns of each member's draws among the draws of a mixture."""
 
     of: list[NDArray[np.int64]]
     dimension: int
-    covering: list[int]
+    covering: list[int]  # members that have all draws together
 
 
 @lru_cache(maxsize=16)
 def _columns(random: EquallyLikely, interface: Interface) -> Columns:
-    # A draw is known by its stream and its number there, joined in one key.
+    # A draw is identified by its stream and its number there, combined in a key.
     keys_of_members = []
     for member in random.members:
         keys = []
@@ -246,7 +248,7 @@ def _named(kinds: Mapping[str, Any]) -> str:
 
 
 def drawn_from(source: Source, count: int, seed: int) -> EquallyLikely:
-    """Return so many equally likely interfaces from a source, grouped by field if it knows."""
+    """Return a mixture of `count` interfaces from a source, grouped by field if it is known."""
     grouped = getattr(source, "grouped", None)
     members, fields = grouped(count, seed) if grouped else (source.interfaces(count, seed), ())
     constants = source.constants(seed) if isinstance(source, Uncertain) else ()
@@ -257,7 +259,7 @@ def drawn_from(source: Source, count: int, seed: int) -> EquallyLikely:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Uncertain(Result):
-    """A source with distributions of parameters of what is random, and of the problem."""
+    """Source with distributions of parameters of the random properties and of the problem."""
 
     given: Any  # a random interface, several, or a source
     laws: Mapping[str, Any]  # by full key
@@ -270,7 +272,7 @@ class Uncertain(Result):
         return Summary("Uncertain parameters, means", rows, "90 % interval")
 
     def grouped(self, count: int, seed: int) -> tuple[list[RandomInterface], Sequence[int]]:
-        """Return equally likely interfaces, and the number of the field within each if known."""
+        """Return equally likely interfaces, and the numbers of their fields if they are known."""
         source = self.given if isinstance(self.given, Source) else None
         if isinstance(self.given, EquallyLikely):
             source = self.given.source
@@ -303,7 +305,7 @@ class Uncertain(Result):
         ], (fields * len(rows) + row).tolist() if shared > 1 else ()
 
     def interfaces(self, count: int, seed: int = 0) -> list[RandomInterface]:
-        """Return so many equally likely interfaces; constants of the problem are left out."""
+        """Return `count` equally likely interfaces, without the constants of the problem."""
         return self.grouped(count, seed)[0]
 
     def constants(self, seed: int) -> list[dict[str, float]]:
@@ -314,12 +316,12 @@ class Uncertain(Result):
 
 
 def uncertain(random: Any, parameters: Mapping[str, Any]) -> Uncertain:
-    """Make parameters uncertain: of what is random, and constants of the problem.
+    """Give distributions to parameters of the random properties and constants of the problem.
 
     Parameters
     ----------
     random : RandomInterface, RandomField, list of them, FieldFit or Posterior
-        What is random otherwise.
+        The random properties.
     parameters : mapping
         Distributions by dotted key, such as ``"problem.friction.residual_ratio"``,
         ``"problem.load.pressing_force"`` or ``"strength.spectrum.correlation_length"``, as in
@@ -328,8 +330,8 @@ def uncertain(random: Any, parameters: Mapping[str, Any]) -> Uncertain:
     Returns
     -------
     Uncertain
-        For `design_stress`, `failure_probability` and wherever a fit is taken. Constants of the
-        problem have forty values, evenly spread over their distributions.
+        Pass it to `design_stress`, `failure_probability` or any function that takes a fit.
+        Constants of the problem have forty values, evenly spread over their distributions.
 
     Examples
     --------
@@ -345,14 +347,14 @@ def uncertain(random: Any, parameters: Mapping[str, Any]) -> Uncertain:
         if not laws:
             raise InputError("must map keys to distributions, got none")
         if wrong := [k for k in laws if k.startswith("problem.interface.")]:
-            raise InputError(f"{wrong[0]}: samples are drawn on one interface; sweep over it")
+            raise InputError(f"{wrong[0]}: must be fixed, sweep over it instead")
     with prefixed("random"):
         _known(random)
     return Uncertain(random, laws)
 
 
 def hypercube(laws: Mapping[str, Any], count: int, seed: int) -> list[dict[str, float]]:
-    """Return values of independent distributions, one in every interval of probability 1/count."""
+    """Return a Latin hypercube: a value of each distribution in every interval of 1/count."""
     rng = np.random.default_rng([seed, 6])
     cells = rng.permuted(np.tile(np.arange(count), (len(laws), 1)), axis=1)
     shares = (cells + rng.random(cells.shape)) / count
@@ -363,13 +365,13 @@ def hypercube(laws: Mapping[str, Any], count: int, seed: int) -> list[dict[str, 
 def as_random(
     given: Any, seed: int = 0, mixture: bool = False
 ) -> RandomInterface | EquallyLikely:
-    """Return what is random; a list of one is that one, of several one that stands for them.
+    """Return a random interface, or a mixture for a list or a source of several.
 
-    In a `mixture` the list is complete: no other interface may be true.
+    With `mixture` the list is complete, and no other interface is possible.
     """
     if mixture and not (isinstance(given, list | tuple) and len(given) > 1):
         raise InputError(
-            "mixture: is of a list of two or more interfaces that are all there are; leave it out"
+            "mixture: give a list of two or more interfaces that are all there are, or leave it out"
         )
     if isinstance(given, EquallyLikely):
         return given

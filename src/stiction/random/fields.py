@@ -1,4 +1,4 @@
-"""Random fields, and the random interface: everything that is random along an interface."""
+"""Random fields, and the random interface that holds all random properties."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ FIRST_FACTOR_STREAM = 1000  # number of the stream of draws of the first propert
 MIN_PIVOT = 1e-12  # round-off of eigenvalues of a correlation matrix
 # Limits of warnings
 MAX_UNRESOLVED = 0.01  # share of the variance that the grid does not resolve
-DOUBTFUL_UNRESOLVED = 0.5  # the same share, above which a unit is doubted
+DOUBTFUL_UNRESOLVED = 0.5  # unresolved share above which the message doubts a unit
 MAX_MEAN_SHARE = 0.075  # share of the variance that the mean mode would hold
 MAX_CORRELATION_ERROR = 0.01
 
@@ -63,24 +63,24 @@ class RandomField:
     spectrum : PowerLawSpectrum, ..., CustomSpectrum
         Power spectral density of the Gaussian field z.
     mean_mode : bool
-        Whether z has the mode k = 0. Without it, as in Albertini et al. (2020), every
+        Whether z has the mean mode, k = 0. Without it, as in Albertini et al. (2020), every
         sample has the same mean of z, which is harmless only if the correlation length is
         short compared with the interface.
     anisotropy : float, optional
-        On a plane, the correlation length along y over that along x, which is that of the
-        spectrum; 1 if left out.
+        On a plane, the ratio of the correlation lengths along y and along x, by default 1. The
+        spectrum gives the correlation length along x.
     of : {"friction_coefficient"}, optional
-        The field holds friction coefficients. The strength (or the other stress that the
-        field represents) is their product with the normal pressure.
+        Declares that the field holds friction coefficients. The stress (strength, residual
+        strength or initial stress) is their product with the normal pressure.
     conditions : Conditions, optional
-        Measured values, as set by `given`; in a study file the table ``given``.
+        Measured values, as set by `given`, or in a study file by the table ``given``.
 
     Notes
     -----
-    On a plane, a line along x has the correlation of the field on a line, except that
-    truncation removes slightly more power. Translation process after Grigoriu (1995),
-    spectral representation after Shinozuka and Deodatis (1991); Albertini et al. (2020),
-    Eqs. 2 to 7.
+    The field is a translation process (Grigoriu, 1995), and z is sampled by its spectral
+    representation (Shinozuka and Deodatis, 1991), as in Albertini et al. (2020), Eqs. 2 to 7. On a
+    plane, a line along x has the correlation of the field on a line, except that truncation removes
+    slightly more power.
 
     Examples
     --------
@@ -112,11 +112,10 @@ class RandomField:
 
     @checked
     def modes(self, interface: Interface) -> Modes:
-        """Return the modes of this field on an interface; an `InputError` if there are none."""
+        """Return the modes of the field on an interface, or raise an `InputError` without modes."""
         if self.anisotropy is not None and not interface.is_plane:
             raise InputError(
-                "anisotropy: is a ratio of correlation lengths along y and x, and a line has no y;"
-                f" got {self.anisotropy:g}, leave it out"
+                f"anisotropy: leave it out on a line, which has no y, got {self.anisotropy:g}"
             )
         return make_modes(self.spectrum, self.mean_mode, self.anisotropy or 1.0, interface)
 
@@ -129,8 +128,8 @@ class RandomField:
         Parameters
         ----------
         profile : xarray.DataArray over x (m), on a plane over x and y
-            Measured values, in the unit of the field, at any places, such as
-            ``st.read_profile("scan.csv")``; NaN where nothing was measured.
+            Measured values at any places, in the unit of the field, such as
+            ``st.read_profile("scan.csv")``. NaN stands for a missing value.
         noise : float
             Standard deviation of the error of a value, in the same unit, positive.
 
@@ -147,12 +146,12 @@ class RandomField:
         True
         """
         if self.conditions is not None:
-            raise InputError("profile: the field already has one; join both into one")
+            raise InputError("profile: the field already has a profile, join both into one")
         stated = str(getattr(profile, "attrs", {}).get("units") or "")
         if stated and is_in(stated, "1") != (self.of is not None):
             raise InputError(
-                f"profile: is in the unit {stated}; one of friction coefficients conditions a field"
-                " with of='friction_coefficient', and no other does"
+                f"profile: has the unit {stated}. Only a field with of='friction_coefficient' takes"
+                " coefficients (unit 1), and it does not take other units"
             )
         conditions: Any = {"profile": profile, "noise": noise}
         return dataclasses.replace(self, conditions=conditions)
@@ -171,7 +170,9 @@ class RandomField:
     def sample(
         self, interface: Interface, *, samples: int = 1, seed: int = 0, first: int = 0
     ) -> Array:
-        """Sample profiles, (samples, *shape), in the field's unit; i depends on (seed, i) only.
+        """Sample profiles, (samples, *shape), in the unit of the field.
+
+        Sample i depends on the seed and on i only.
 
         Warns
         -----
@@ -185,7 +186,7 @@ class RandomField:
 
     @cached_property
     def _alone(self) -> RandomInterface:
-        """The interface whose only random property this is."""
+        """Random interface with this field as its only random property."""
         return RandomInterface(strength=self)
 
     def warn_if_inaccurate(self, interface: Interface) -> None:
@@ -201,7 +202,7 @@ class RandomField:
             warn_accuracy(
                 f"{doubt}the grid of {nodes} nodes is coarser than the spectrum: values at the"
                 f" nodes are exact, but {100.0 * lost:.2g} % of the variance lies at wavelengths"
-                f" that the grid does not resolve; with interface.nodes >= {enough} it is less than"
+                f" that the grid does not resolve. With interface.nodes >= {enough} it is less than"
                 f" {100.0 * MAX_UNRESOLVED:g} %, or end the spectrum there with"
                 f" power_kept={1.0 - lost:.3g}"
             )
@@ -212,7 +213,7 @@ class RandomField:
         if share > MAX_MEAN_SHARE:
             warn_accuracy(
                 "the field has no mean mode, which on so short an interface would hold"
-                f" {100.0 * share:.2g} % of the variance: all samples have nearly the same mean;"
+                f" {100.0 * share:.2g} % of the variance: all samples have nearly the same mean."
                 " RandomField(mean_mode=True) lets it vary"
             )
 
@@ -222,17 +223,17 @@ class RandomField:
     ) -> Array:
         """Compute the correlation at the lags ``interface.coordinates``, (*shape), periodic.
 
-        It is that of the mapped field (Hermite expansion; Grigoriu, 1995) or of z. An
-        `AccuracyWarning` gives its error if the tails of the marginal are too heavy.
+        `of` chooses the mapped field (by Hermite expansion; Grigoriu, 1995) or z. If the tails of
+        the marginal are too heavy, an `AccuracyWarning` gives the error.
         """
         modes = self.modes(interface)
         origin = np.zeros((len(interface.shape), 1))
-        rho = modes.gaussian(modes.basis(origin))[0]  # of z everywhere with z there
+        rho = modes.gaussian(modes.basis(origin))[0]  # correlation of z with z at the origin
         return rho if of == "z" else correlation_of_mapped(rho, self._map_coefficients())
 
     def _map_coefficients(self) -> Array:
         coefficients = hermite_coefficients(self.marginal)
-        # The last coefficient stands for what the expansion leaves out.
+        # The last coefficient stands for the terms that the expansion leaves out.
         error = float(coefficients[-1] ** 2 / np.sum(coefficients[1:] ** 2))
         if error > MAX_CORRELATION_ERROR:
             warn_accuracy(
@@ -244,8 +245,8 @@ class RandomField:
     def efolding_length(self) -> float:
         """Return the distance (m) at which the correlation of the field first falls to 1/e.
 
-        It is that on a line, on a plane along x; the one of z is
-        `spectrum.efolding_length`.
+        It holds on a line, and on a plane along x. `spectrum.efolding_length` is the distance for
+        z.
         """
         coefficients = self._map_coefficients()
 
@@ -257,7 +258,7 @@ class RandomField:
 
 
 def _pairs(value: Any) -> Any:
-    """{("a", "b"): rho} or {"a": {"b": rho}} as the latter, each pair once, in order of names."""
+    """Return {("a", "b"): rho} or {"a": {"b": rho}} as the latter, in the order of names."""
     if not isinstance(value, Mapping):
         return value
     pairs: dict[str, dict[str, Any]] = {}
@@ -279,13 +280,13 @@ Correlation = Annotated[dict[str, dict[str, Coefficient]], BeforeValidator(_pair
 
 
 def lower_factor(matrix: Array) -> Array:
-    """L with L L^T = matrix, lower triangular, of a matrix that may be singular."""
+    """Return the lower triangular L with L L^T = matrix, which may be singular."""
     size = matrix.shape[0]
     factor = np.zeros_like(matrix)
     for j in range(size):
         pivot = matrix[j, j] - float(factor[j, :j] @ factor[j, :j])
         if pivot <= MIN_PIVOT:
-            continue  # property j follows from those before it
+            continue  # the properties before it determine property j
         root = factor[j, j] = np.sqrt(pivot)
         factor[j + 1 :, j] = (matrix[j + 1 :, j] - factor[j + 1 :, :j] @ factor[j, :j]) / root
     return factor
@@ -293,32 +294,31 @@ def lower_factor(matrix: Array) -> Array:
 
 @model(kw_only=True)
 class RandomInterface:
-    """The random properties of an interface: the strength, and any others that vary.
+    """Random properties of an interface: the strength, and any others that vary.
 
     Parameters
     ----------
     strength : RandomField
-        Peak strength, Pa; or friction coefficients, with ``of="friction_coefficient"``,
-        which are multiplied by the normal pressure. The other stresses may be coefficients
-        too.
+        Peak strength, Pa. With ``of="friction_coefficient"`` it is a friction coefficient, which
+        is multiplied by the normal pressure.
     residual_strength, initial_stress, normal_pressure : RandomField, optional
-        Pa. What is random here is left out of the problem.
+        Other stresses, Pa. The first two may be coefficients, too. Leave random properties out of
+        the problem.
     weakening_rate, critical_slip, fracture_energy : RandomField, optional
-        At most one of them: Pa/m, m or J/m². The friction law then has none.
+        At most one of them, in Pa/m, m or J/m². Leave all three out of the friction law then.
     correlation : mapping, optional
         Correlation coefficients of the Gaussian fields of two properties, mode by mode:
         ``{("strength", "residual_strength"): 0.8}``, in a study file
         ``correlation.strength.residual_strength = 0.8``. Other pairs are independent.
     between : mapping, optional
-        Marginals of positive factors with mean 1 that differ from specimen to specimen and
-        are constant along each: ``{"strength": st.Lognormal(mean=1.0, cv=0.1)}``.
+        Marginals of positive factors with mean 1 that are constant along a specimen and differ
+        from specimen to specimen: ``{"strength": st.Lognormal(mean=1.0, cv=0.1)}``.
 
     Notes
     -----
-    Correlated translation fields after Grigoriu (1995): the draws of a property combine, by
-    the Cholesky factor of the correlation matrix, draws of its own and of the properties
-    before it in the list above. Where spectra differ, the correlation of the fields at a
-    point is a little less than that of the modes.
+    Correlated translation fields follow Grigoriu (1995). The Cholesky factor of the correlation
+    matrix combines the draws of a property with the draws of the properties before it in the list
+    above. If spectra differ, the fields at a point are a little less correlated than the modes.
 
     Examples
     --------
@@ -359,7 +359,7 @@ class RandomInterface:
     @model_validator(mode="after")
     def _consistent(self) -> RandomInterface:
         problems = [
-            f"{name}: of = 'friction_coefficient' is for stresses; leave it out"
+            f"{name}: leave out of = 'friction_coefficient', which is for stresses"
             for name, field in self.properties.items()
             if field.of is not None and name not in MAY_BE_COEFFICIENTS
         ]
@@ -383,7 +383,7 @@ class RandomInterface:
             if getattr(self.properties.get(name), "conditions", None) is not None:
                 problems.append(
                     f"between.{name}: scatters between specimens, but {name}.given was measured on"
-                    " one; leave one of them out"
+                    " a single specimen. Leave one of them out"
                 )
             mean, low = marginal.distribution.mean(), marginal.distribution.support()[0]
             if low < -1e-12 or abs(float(mean) - 1.0) > 1e-6:
@@ -394,7 +394,7 @@ class RandomInterface:
         if not problems and np.linalg.eigvalsh(self.matrix)[0] < -MIN_PIVOT:
             problems.append(
                 "correlation: these coefficients contradict each other (their matrix is not"
-                " positive definite); bring them nearer to 0"
+                " positive definite). Bring them nearer to 0"
             )
         if problems:
             raise InputError(problems)
@@ -402,12 +402,12 @@ class RandomInterface:
 
     @cached_property
     def properties(self) -> dict[str, RandomField]:
-        """The random properties by name, in the order of `stiction.base.variables.PROFILES`."""
+        """Random properties by name, in the order of `stiction.base.variables.PROFILES`."""
         return {name: getattr(self, name) for name in NAMES if getattr(self, name) is not None}
 
     @property
     def members(self) -> tuple[RandomInterface, ...]:
-        """Only itself; several of equally likely interfaces."""
+        """The interface itself, as a mixture with a single member."""
         return (self,)
 
     def member(self, draws: Array) -> NDArray[np.int64]:
@@ -423,7 +423,7 @@ class RandomInterface:
         return [(self.between or {}).get("strength")], np.zeros(1, np.int64)
 
     def factor_column(self, interface: Interface) -> int | None:
-        """Return the number of the draw of the factor of the strength; None without a factor."""
+        """Return the number of the draw of the strength's factor, or None without a factor."""
         if "strength" not in (self.between or {}):
             return None
         streams = layout(self, interface)[len(self.names) :]
@@ -432,7 +432,7 @@ class RandomInterface:
         )
 
     def select(self, draws: Array, rows: NDArray[np.int64], members: NDArray[np.int64]) -> None:
-        """Make rows of draws samples of given members: there is one only."""
+        """Do nothing: all draws are samples of the only member."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -451,7 +451,7 @@ class RandomInterface:
 
     @property
     def linked(self) -> Array:
-        """Whether properties are correlated, directly or through others."""
+        """Matrix of whether two properties are correlated, directly or through others."""
         return np.linalg.matrix_power(self.matrix != 0.0, len(self.names))
 
     def dimension(self, interface: Interface) -> int:
@@ -464,8 +464,8 @@ class RandomInterface:
     ) -> Array:
         """Draw the independent standard normal numbers of samples `first`, `first` + 1, ....
 
-        Draw j of a property of sample i depends on (seed, property, i, j) only. Returned
-        are (samples, dimension): each property in the order of `names`, then those of
+        Draw j of a property of sample i depends on (seed, property, i, j) only. The result is
+        (samples, dimension): the draws of each property in the order of `names`, then the draws of
         `between`.
         """
         streams = layout(self, interface)
@@ -485,7 +485,8 @@ class RandomInterface:
             )
         if not np.isfinite(draws).all():
             raise InputError("draws: must be finite")
-        # Draws given what was measured; then of each property, with the draws of those before it.
+        # First condition draws on measured values. Then combine the draws of each property with the
+        # draws of the properties before it.
         for columns, conditioning in _conditioned(self, interface):
             draws = draws.copy()
             draws[:, columns] = conditioning.draws(draws[:, columns])
@@ -497,7 +498,7 @@ class RandomInterface:
             of_property = np.ascontiguousarray(mixed[:, stream.of_property])
             z = field.modes(interface).gaussian(of_property)
             profiles[name] = from_normal(field.marginal, z)
-        # A factor between specimens is one number a sample.
+        # A factor between specimens is a single number for each sample.
         factors = zip((self.between or {}).items(), independent[len(profiles) :], strict=True)
         for (name, marginal), u in factors:
             factor = from_normal(marginal, u)
@@ -507,28 +508,30 @@ class RandomInterface:
     def profiles(
         self, interface: Interface, *, samples: int = 1, seed: int = 0, first: int = 0
     ) -> dict[str, Array]:
-        """Sample profiles by name, (samples, *shape) each; sample i depends on (seed, i) only."""
+        """Sample profiles by name, (samples, *shape) each.
+
+        Sample i depends on the seed and on i only.
+        """
         return self.from_draws(interface, self.draws(interface, samples, seed, first))
 
     @checked
     def uncertain(
         self, parameters: Mapping[str, Any], count: Count, seed: Number = 0
     ) -> list[RandomInterface]:
-        """Return equally likely random interfaces, whose parameters have these distributions.
+        """Return equally likely random interfaces whose parameters have given distributions.
 
-        For a failure probability under all of them. The parameters are independent; each
-        has one value in every interval of probability 1/count (Latin hypercube; McKay and
-        others, 1979).
+        Pass the list to a failure probability. The parameters are independent. Each has a value in
+        every interval of probability 1/count (a Latin hypercube; McKay and others, 1979).
 
         Parameters
         ----------
         parameters : mapping
-            Distributions by dotted key, as priors of `infer`: frozen ones of `scipy.stats`,
+            Distributions by dotted key, as priors of `infer`: frozen `scipy.stats` distributions,
             ranges (low, high), or tables as in a study file.
         count : int
-            Their number; 30 show a 90 % band.
+            Number of interfaces; 30 show a 90 % band.
         seed : int
-            Not negative.
+            Seed of the values, not negative.
 
         Examples
         --------
@@ -569,11 +572,11 @@ class RandomInterface:
 
 @lru_cache(maxsize=8192)
 def layout(random: RandomInterface, interface: Interface) -> list[Stream]:
-    """Draws of each property, and of each factor between specimens."""
+    """Return the streams of draws of each property, and of each factor between specimens."""
     fields = list(random.properties.values())
     streams, start, block = [], 0, block_of(len(interface.shape))
     for name, field, row in zip(random.names, fields, random.linked, strict=True):
-        # Correlated properties draw the same modes: all that one of them has.
+        # Correlated properties draw the same modes: all modes of any of them.
         group = [fields[j] for j in np.flatnonzero(row)]
         ranks = reduce(np.union1d, [linked.modes(interface).ranks for linked in group])
         mean_mode = any(linked.mean_mode for linked in group)
@@ -596,7 +599,7 @@ def layout(random: RandomInterface, interface: Interface) -> list[Stream]:
 def _conditioned(
     random: RandomInterface, interface: Interface
 ) -> list[tuple[NDArray[np.int64], Conditioning]]:
-    """Measured values of each group of correlated properties, with the columns of its draws."""
+    """Return the columns and the conditioning of each group of correlated properties."""
     fields = list(random.properties.values())
     if all(field.conditions is None for field in fields):
         return []
@@ -624,12 +627,12 @@ def _conditioned(
 
 
 def as_random_interface(given: Any) -> RandomInterface:
-    """Return a `RandomInterface`; a bare `RandomField` becomes the strength of one."""
+    """Return a `RandomInterface`, in which a bare `RandomField` becomes the strength."""
     if isinstance(given, RandomField):
         return RandomInterface(strength=given)
     if not isinstance(given, RandomInterface):
         raise InputError(
-            f"random: must be a RandomInterface or a RandomField, got {describe(given)}; a"
-            " profile goes into st.onset, and st.fit_field fits a field to it"
+            f"random: must be a RandomInterface or a RandomField, got {describe(given)}. A"
+            " profile goes into st.onset, or st.fit_field fits a field to it"
         )
     return given

@@ -1,5 +1,4 @@
-"""The map z -> F^-1(Phi(z)) from the Gaussian field to the marginal F, and its effect on
-correlation.
+"""The mapping of a Gaussian field to a marginal, z -> F^-1(Phi(z)), and its correlation.
 
 Problem
 -------
@@ -8,33 +7,31 @@ with
 
     g(z) = F^-1(Phi(z)),                                                                      (1)
 
-for millions of z. scipy's quantile F^-1 is a thousand times too slow for that. And if the
-correlation of z at a lag is rho, the correlation of v there is
+for millions of z. The quantile F^-1 of scipy is a thousand times too slow. If the correlation of z
+at a lag is rho, the correlation of v at this lag is
 
     sum_m c_m^2 rho^m / sum_m c_m^2, m >= 1,   c_m = E[g(Z) h_m(Z)],                          (2)
 
 with the orthonormal Hermite polynomials h_m of a standard normal Z.
 
-Steps of the map (`from_normal`)
---------------------------------
+Algorithm of the mapping (`from_normal`): our own
+-------------------------------------------------
 1. Reduce the marginal to its family at scale 1, so that all multiples share a table
    (`_standard`).
 2. Tabulate (1) as cubic Hermite pieces on a uniform grid of [-4, 4], with slopes by central
-   differences of fourth order. Check every piece at three points and mark those that miss
-   `TABLE_RTOL`, at a kink of the density, say (`quantile_table`).
-3. Interpolate (`interpolate`). z that the table does not serve go to a second table, of
-   [-8, 8], and z that this does not serve either go to scipy.
+   differences of fourth order. Check every piece at three points, and mark pieces that miss
+   `TABLE_RTOL`, for example at a kink of the density (`quantile_table`).
+3. Interpolate (`interpolate`). Values of z outside the table, or on a marked piece, go to a second
+   table of [-8, 8]. Values that it does not serve go to scipy.
 
-So the result is accurate everywhere: to 1e-9 of the value, or of a millionth of the
-standard deviation where the value is smaller than that.
+The result is accurate to 1e-9 of the value, or of a millionth of the standard deviation if that is
+larger.
 
-Steps of the correlation (`hermite_coefficients`)
--------------------------------------------------
-4. Sum (2) by the trapezoidal rule on [-8, 8], polynomial after polynomial by their
-   recursion.
-5. Stop after at least `MIN_TERMS`, once the rest of the variance is less than a share of
-   it.
-6. One last coefficient stands for that rest, so that the correlation is 1 at zero lag.
+Algorithm of the correlation (`hermite_coefficients`)
+-----------------------------------------------------
+4. Compute c_m of (2) by the trapezoidal rule on [-8, 8], and the polynomials by their recursion.
+5. Stop after at least `MIN_TERMS`, once the rest of the variance is a small share.
+6. Let a last coefficient stand for the rest, so that the correlation is 1 at zero lag.
 """
 
 from functools import lru_cache
@@ -48,31 +45,31 @@ from stiction.base.errors import InputError
 from stiction.base.jit import jit
 
 TABLE_END, SMALL_TABLE_END = 8.0, 4.0
-"""Largest |z| of a whole table, and of the table that serves most samples."""
+"""Largest |z| of a whole table, and of the small table that serves most samples."""
 PIECES_PER_UNIT = 256
-"""Pieces per unit of z."""
-TABLE_RTOL = 2e-10  # the promise is 1e-9
+"""Number of pieces per unit of z."""
+TABLE_RTOL = 2e-10  # at three points of a piece, so that 1e-9 holds everywhere
 MIN_TERMS, MAX_TERMS, HERMITE_STEP = 40, 1000, 0.0025
-MAX_REST = 1e-6  # share of the variance that one last coefficient may stand for
+MAX_REST = 1e-6  # share of the variance for which the last coefficient may stand
 
 
 def quantile_of_normal(distribution: Any, z: Array) -> Array:
     """Compute F^-1(Phi(z)) of a frozen scipy.stats distribution (Grigoriu, 1995).
 
-    Phi(z) rounds to 1 long before z = 8. The upper tail keeps its digits only through
-    Phi(-z), and only where scipy inverts the survival function of the family directly.
+    Phi(z) rounds to 1 long before z = 8. The upper tail therefore uses Phi(-z), which keeps its
+    digits if scipy inverts the survival function of the family directly.
     """
     tail, lower, value = ndtr(-np.abs(z)), z < 0.0, np.empty_like(z)
     value[lower], value[~lower] = distribution.ppf(tail[lower]), distribution.isf(tail[~lower])
-    # scipy's beta.isf may be NaN where the value is its upper end to round-off.
+    # scipy's beta.isf may be NaN if the value equals its upper end to round-off.
     return np.where(np.isnan(value) & (z > TABLE_END), distribution.support()[1], value)
 
 
 @jit
 def interpolate(z: Array, table: Array, out: Array) -> int:
-    """Step 3: fill `out` with the tabulated map of `z` (flat arrays); return how many are NaN.
+    """Step 3: write the tabulated mapping of `z` to `out` (flat arrays). Return how many are NaN.
 
-    NaN stands where the table ends or has no piece that is accurate enough.
+    Values are NaN outside the table and on marked pieces.
     """
     pieces = table.shape[0] - 1
     first = TABLE_END * PIECES_PER_UNIT - 0.5 * pieces  # counted as in a whole table
@@ -99,10 +96,10 @@ def interpolate(z: Array, table: Array, out: Array) -> int:
 
 @lru_cache(maxsize=8192)
 def quantile_table(marginal: Any, end: float = TABLE_END) -> Array:
-    """Step 2: return values of the map and slopes times the step, (nodes, 2).
+    """Step 2: return values of the mapping and slopes times the step, (nodes, 2).
 
-    Slopes are NaN where a piece is not accurate enough. Most tables have 32 KiB: as many
-    are kept as a long list of equally likely interfaces has.
+    The slopes of a marked piece are NaN. Most tables take 32 KiB, so that the cache can hold a
+    table for each of many equally likely interfaces.
     """
     distribution = marginal.distribution
     step, pieces = 1.0 / PIECES_PER_UNIT, round(2.0 * end * PIECES_PER_UNIT)
@@ -114,14 +111,15 @@ def quantile_table(marginal: Any, end: float = TABLE_END) -> Array:
     checks = z[2:-3, None] + step * np.array([0.25, 0.5, 0.75])
     exact = quantile_of_normal(distribution, checks)
     interpolated = np.empty(checks.size)
-    table.flags.writeable = False  # as it will be used: one signature, compiled once
+    # Read-only arrays have another type for numba: check with the type of later calls.
+    table.flags.writeable = False
     interpolate(checks.ravel(), table, interpolated)
-    # Relative to the value, but not to a zero crossing of it.
+    # Errors are relative to the value, but not at its zero crossing.
     scale = np.maximum(np.abs(exact), 1e-6 * distribution.std())
     wrong = ~(np.abs(interpolated.reshape(checks.shape) - exact) <= TABLE_RTOL * scale).all(
         axis=1
     )
-    # A NaN slope spoils exactly the two pieces that share its node.
+    # A NaN slope marks the piece, and the piece before it, which shares the node.
     result = table.copy()
     result[:-1][wrong, 1] = np.nan
     result.flags.writeable = False
@@ -151,23 +149,23 @@ def from_normal(marginal: Any, z: Array) -> Array:
 
 
 class Standard(NamedTuple):
-    """A family of scipy at scale 1 from 0, whose table serves all multiples."""
+    """Family of scipy from 0 at scale 1, whose table serves all multiples."""
 
     family: Any
     shapes: tuple[float, ...]
 
     @property
     def distribution(self) -> Any:
-        """The frozen distribution."""
+        """Frozen distribution of scipy."""
         return self.family(*self.shapes)
 
 
 def _standard(marginal: Any) -> tuple[Any, float, float]:
-    """Step 1: return a marginal that this one is a multiple of, its lower bound and scale.
+    """Step 1: return the marginal at scale 1, with the lower bound and scale of the given marginal.
 
-    Shapes are rounded to 12 digits: those of multiples are equal but for round-off. Below
-    zero a relative error of the multiple would be a larger one of the value: it keeps its
-    own table.
+    Shapes are rounded to 12 digits, as the shapes of multiples differ by round-off. A marginal with
+    a lower bound below zero keeps its own table, since subtraction would magnify the relative
+    error.
     """
     family = getattr(marginal, "scipy_family", None)
     if family is None or marginal.low < 0.0:
@@ -182,17 +180,18 @@ def hermite_coefficients(
 ) -> Array:
     """Return c_m = E[F^-1(Phi(Z)) h_m(Z)], h_m the orthonormal Hermite polynomials, m = 0, 1, ...
 
-    c_0 is the mean, and the sum of the squares of all others is the variance (Grigoriu,
-    1995). Fine steps are accurate where the map has kinks, too. The last coefficient stands
-    for the rest of the variance. An `InputError` if scipy's quantile and moments disagree.
+    c_0 is the mean, and the sum of the squares of all other coefficients is the variance (Grigoriu,
+    1995). The steps are so fine that the rule is accurate at kinks of the mapping, too. The last
+    coefficient stands for the rest of the variance. Raises an `InputError` if the quantile and the
+    moments of scipy disagree.
     """
     distribution, half = marginal.distribution, round(TABLE_END / step)
     z = np.arange(-half, half + 1) * step
-    # Without the mean, which would cost a narrow marginal its digits.
+    # Subtract the mean, as a narrow marginal would lose digits otherwise.
     mean, variance = float(distribution.mean()), float(distribution.var())
     if not variance > 0.0:
         raise InputError("marginal: its standard deviation is zero in double precision")
-    # 4. The rule, with the square root of its weight in both factors.
+    # 4. Both factors hold the square root of the weight, so that neither overflows.
     root = np.sqrt(step / np.sqrt(2.0 * np.pi)) * np.exp(-0.25 * z * z)
     value = (quantile_of_normal(distribution, z) - mean) * root
     coefficients, rest = [mean], variance
@@ -201,18 +200,17 @@ def hermite_coefficients(
         if m > 0:
             coefficients.append(float(np.sum(value * current)))
             rest -= coefficients[-1] ** 2
-        # 5. Enough terms?
+        # 5.
         if m >= MIN_TERMS - 1 and not rest > MAX_REST * variance:
             break
         following = (z * current - np.sqrt(m) * previous) / np.sqrt(m + 1.0)
         previous, current = current, following
-    if (
-        not rest > -max(MAX_REST, step**2) * variance
-    ):  # more than round-off and the rule's error
+    # A negative rest above round-off and the error of the rule shows inconsistent moments.
+    if not rest > -max(MAX_REST, step**2) * variance:
         raise InputError(
             "marginal: scipy's quantile of this distribution is not accurate enough"
         )
-    # 6. The rest.
+    # 6.
     with_rest = np.array([*coefficients, np.sqrt(max(rest, 0.0))])
     with_rest.flags.writeable = False
     return with_rest

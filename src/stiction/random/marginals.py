@@ -1,7 +1,7 @@
-"""Marginal distributions: how strength is distributed at a point.
+"""Marginals: distributions of a property at a point.
 
-To add a family, derive from `Marginal`, with a `distribution`, and `register` it; study
-files take every continuous distribution of `scipy.stats` by its name.
+To add a family, derive from `Marginal`, define `distribution`, and `register` the class. Study
+files also take every continuous distribution of `scipy.stats` by its name.
 """
 
 import math
@@ -34,7 +34,7 @@ class Marginal(ABC):
     @property
     @abstractmethod
     def distribution(self) -> Any:
-        """The same as a frozen `scipy.stats` distribution."""
+        """Frozen `scipy.stats` distribution of the marginal."""
 
 
 @register
@@ -80,8 +80,8 @@ class Beta(Marginal):
 class _ByMoments(Marginal):
     """Families above a lower bound, given by mean and coefficient of variation.
 
-    `scipy_family` is the family of scipy whose arguments are a shape, `low` and a scale.
-    Its marginals share the tables of `mapping`; None if there is no such family.
+    `scipy_family` is the family of scipy with the arguments shape, `low` and scale, or None. Its
+    marginals share the tables of `mapping`.
     """
 
     mean: Annotated[Positive, Field(gt=1e-18, lt=1e18)]
@@ -97,18 +97,18 @@ class _ByMoments(Marginal):
             )
         hint = (
             "cv: is a standard deviation over a mean, at most 10, got"
-            f" {self.cv:g}; for {self.cv:g} % give {self.cv / 100:g}"
+            f" {self.cv:g} (for {self.cv:g} % give {self.cv / 100:g})"
         )
         if self.cv > 10.0:
             raise InputError(hint)
-        _ = self.distribution  # which does not exist for all moments
+        _ = self.distribution  # raises an error if no distribution has these moments
         if self.cv > 1.0:
             warn_user(hint, UnitWarning)
         return self
 
     def _shape(self, ratio: float) -> tuple[float, float]:
-        """Shape of the family, and mean over scale, of a cv above `low`."""
-        raise NotImplementedError  # a family without one has a `distribution` of its own
+        """Return the shape, and mean divided by scale, for a cv of the values above `low`."""
+        raise NotImplementedError  # a family without a shape overrides `distribution`
 
     @cached_property
     def distribution(self) -> Any:
@@ -125,9 +125,9 @@ class Lognormal(_ByMoments):
     Parameters
     ----------
     mean, cv : float
-        Mean of the field, above `low`, and its standard deviation over the mean.
+        Mean of the field, above `low`, and coefficient of variation (standard deviation / mean).
     low : float
-        Lower bound, 0 if left out.
+        Lower bound, by default 0.
 
     Examples
     --------
@@ -143,7 +143,7 @@ class Lognormal(_ByMoments):
         return math.sqrt(math.log1p(ratio**2)), math.sqrt(1.0 + ratio**2)
 
     def of_normal(self, z: Array) -> Array:
-        """Return the values whose quantiles are those of standard normal numbers."""
+        """Return F^-1(Phi(z)), the mapping of standard normal numbers, in closed form."""
         above = self.mean - self.low
         shape, mean_over_scale = self._shape(self.cv * self.mean / above)
         return self.low + above / mean_over_scale * np.exp(shape * z)
@@ -152,7 +152,7 @@ class Lognormal(_ByMoments):
 @register
 @model(kw_only=True)
 class Weibull(_ByMoments):
-    """Weibull distribution (of minima) above `low`; parameters as for `Lognormal`."""
+    """Weibull distribution (of minima) above `low`, with the parameters of `Lognormal`."""
 
     type: Literal["weibull"] = "weibull"
     scipy_family: ClassVar[Any] = scipy.stats.weibull_min
@@ -176,7 +176,7 @@ class Weibull(_ByMoments):
 @register
 @model(kw_only=True)
 class Gamma(_ByMoments):
-    """Gamma distribution above `low`; parameters as for `Lognormal`."""
+    """Gamma distribution above `low`, with the parameters of `Lognormal`."""
 
     type: Literal["gamma"] = "gamma"
     scipy_family: ClassVar[Any] = scipy.stats.gamma
@@ -193,11 +193,11 @@ class TruncatedNormal(_ByMoments):
     Parameters
     ----------
     mean, cv : float
-        Mean of the field and its standard deviation over the mean, both after truncation.
-        It scatters less than an exponential distribution, between two bounds than a uniform
-        one.
+        Mean of the field and coefficient of variation (standard deviation / mean), both after
+        truncation. The scatter must be below the scatter of an exponential distribution or, with
+        two bounds, of a uniform distribution.
     low, high : float, optional
-        0 and no upper bound if left out.
+        Bounds, by default 0 and no upper bound.
 
     Examples
     --------
@@ -225,25 +225,25 @@ class TruncatedNormal(_ByMoments):
                 [(mean - self.mean) / deviation, np.sqrt(variance) / deviation - 1.0]
             )
 
-        # An exponential distribution, and between two bounds a uniform one, are the widest.
+        # The widest distributions: exponential, and with two bounds uniform.
         excess = self.mean - self.low
         room = min(excess**2, excess * max(high - self.mean, 0.0) / 2.0)
         solution = root(moments, [0.0, 0.0], tol=1e-12) if deviation**2 < room else None
         if solution is None or not np.abs(moments(solution.x)).max() < 1e-8:
             raise InputError(
                 f"cv: no normal distribution truncated at low={self.low:g} and high={high:g} has"
-                f" mean={self.mean:g} and cv={self.cv:g}: the mean must lie between the bounds, and"
-                " these limit the scatter; lower cv, or take st.Lognormal"
+                f" mean={self.mean:g} and cv={self.cv:g}: the mean must lie between the bounds,"
+                " which also limit the scatter. Lower cv, or take st.Lognormal"
             )
         return scipy.stats.truncnorm(*parameters(solution.x))
 
 
 @dataclass(frozen=True)
 class ScipyMarginal(Marginal):
-    """A continuous `scipy.stats` distribution by its name and parameters.
+    """Continuous `scipy.stats` distribution by its name and parameters.
 
-    One without a name in scipy is kept `frozen`: it exists in Python only and equals only
-    itself.
+    A distribution without a name in scipy is kept `frozen`. It exists in Python only, and equals
+    only itself.
     """
 
     type: str
@@ -266,7 +266,7 @@ class ScipyMarginal(Marginal):
         """Return the table of this marginal in a study file."""
         if self.frozen is not None:
             raise ValueError(
-                f"marginal is the Python distribution {self.type!r}, not a named one"
+                f"marginal is the Python distribution {self.type!r}, which has no name in scipy"
             )
         return {"type": self.type, **dict(self.parameters)}
 
@@ -280,9 +280,10 @@ FACTOR_FAMILIES: dict[str, Any] = {
 
 
 def affine_parameters(marginal: Any) -> tuple[tuple[str, ...], float, float]:
-    """Return the names of parameters that only shift or scale a marginal, and a and b.
+    """Return the names of parameters that only shift or scale a marginal, and shift a and scale b.
 
-    These are linear in the parameters, which do not change (tau_p - a)/b.
+    The distribution of (tau_p - a)/b does not depend on these parameters. a and b are linear in
+    them.
     """
     if isinstance(marginal, Beta):
         return ("low", "high"), marginal.low, marginal.high - marginal.low
@@ -296,13 +297,13 @@ def affine_parameters(marginal: Any) -> tuple[tuple[str, ...], float, float]:
 
 
 MARGINALS = Kinds("marginals")
-"""Families by their names in study files; 'beta' and 'gamma' also take scipy's parameters."""
+"""Families by their names in study files. 'beta' and 'gamma' also take parameters of scipy."""
 
 
 def marginal_of(value: Any) -> Marginal:
-    """Return the marginal given by itself, by a table {type, ...} or by a frozen distribution.
+    """Return the marginal given as a marginal, a table {type, ...} or a frozen distribution.
 
-    An `InputError` if it is none of them, or a moment is not finite.
+    Raises an `InputError` for any other value, or if a moment is not finite.
     """
     if isinstance(value, Marginal):
         return value
@@ -319,13 +320,13 @@ def marginal_of(value: Any) -> Marginal:
             f" distribution such as scipy.stats.lognorm(0.3, scale=1e6), got {type(value).__name__}"
         )
     name = str(getattr(family, "name", None))
-    if type(family) is not type(getattr(scipy.stats, name, None)):  # a histogram, say
+    if type(family) is not type(getattr(scipy.stats, name, None)):  # for example a histogram
         return ScipyMarginal(type(family).__name__, frozen=value)
     return _of_scipy(name, value.kwds, value.args)
 
 
 def _of_scipy(name: str, given: Mapping[str, Any], first: tuple[Any, ...] = ()) -> Marginal:
-    """Return the marginal of scipy's name of a family and parameters, the `first` in order."""
+    """Return the marginal of a scipy family by name and parameters, the `first` in order."""
     family = getattr(scipy.stats, name, None)
     if not isinstance(family, scipy.stats.rv_continuous):
         valid = [*MARGINALS, "lognorm", "weibull_min", "truncnorm", "uniform", "norm", "..."]

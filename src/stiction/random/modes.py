@@ -1,20 +1,19 @@
-"""The discrete spectrum of a field: the waves on an interface and their amplitudes.
+"""The modes of a field: waves on an interface, and their amplitudes.
 
 Problem
 -------
 On a periodic interface a field has the waves k = 2 pi (jx/Lx, jy/Ly). With the spectral
-density g(k) and its truncation K, their amplitudes have the standard deviations
+density g(k) and its truncation K, their amplitudes have the variances
 
     sigma_j^2 = g(k_j) / sum_i g(k_i),   |k_j| <= K.                                          (1)
 
-Steps (`make_modes`)
---------------------
-1. List the wave vectors among which the modes are, one of k and -k, in an order that
-   depends on the proportions of the interface only. The place of a mode in it is the number
-   of its draws (`_numbers`).
-2. Keep those up to the truncation.
-3. Find (1). The mean mode k = 0 stands for one wave vector, every other mode for k and -k:
-   it has half of g(0).
+Algorithm (`make_modes`)
+------------------------
+1. List candidate wave vectors, either k or -k, in an order that depends on the proportions of the
+   interface only. The place of a mode in this order is the number of its draws (`_numbers`).
+2. Keep the wave vectors up to the truncation.
+3. Compute (1). The mean mode k = 0 stands for a single wave vector, every other mode for k and -k.
+   The mean mode therefore has half of g(0).
 """
 
 import math
@@ -36,19 +35,19 @@ CUTOFF_RTOL = 1e-9  # round-off keeps a mode exactly at the truncation, such as 
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """The discrete spectrum on an interface: J modes, and the mean mode in front."""
+    """Modes of a field on an interface: the mean mode, and then J modes."""
 
     interface: Interface
-    sigma: Array  # standard deviations, (J + 1,), of unit sum of squares; 0 without a mean
-    numbers: NDArray[
-        np.int64
-    ]  # wave vectors over 2 pi/length, (dimensions, J + 1), one of k and -k
+    # Standard deviations, (J + 1,), with unit sum of squares; the first is 0 without a mean mode.
+    sigma: Array
+    # Wave vectors in units of 2 pi/length, (dimensions, J + 1), either k or -k.
+    numbers: NDArray[np.int64]
     ranks: NDArray[np.int64]  # places of modes 1..J in the order of draws, rising, (J,)
     has_mean: bool
 
     @property
     def dimension(self) -> int:
-        """Number of standard normal draws a sample."""
+        """Number of standard normal draws of a sample."""
         return 2 * self.ranks.size + int(self.has_mean)
 
     @property
@@ -58,10 +57,10 @@ class Modes:
         return float(np.sum(self.sigma[(np.abs(self.numbers) > limit).any(axis=0)] ** 2))
 
     def nodes_for(self, share: float) -> list[int]:
-        """Return how many nodes leave at most this share unresolved, at the proportions given."""
+        """Return the nodes that leave at most a share unresolved, in the present proportions."""
         shape = np.array(self.interface.shape)
         halves = np.array(self.interface.embedding.shape) / 2.0
-        # How much finer the grid must be than now, to resolve a mode.
+        # Refinement of the present grid that resolves each mode.
         refinement = (np.abs(self.numbers) / halves[:, None]).max(axis=0)
         order = np.argsort(refinement)
         last = np.searchsorted(np.cumsum(self.sigma[order] ** 2), 1.0 - share)
@@ -70,7 +69,7 @@ class Modes:
     def gaussian(self, draws: Array) -> Array:
         """Compute z(x) = sum_m sigma_m (A_m cos k_m.x + B_m sin k_m.x), (samples, *shape).
 
-        One inverse transform a sample, so that the numbers do not depend on the batch.
+        Each sample has its own inverse transform, so that the numbers do not depend on the batch.
         """
         numbers, shape = self.numbers, self.interface.embedding.shape
         if len(shape) == 1:
@@ -85,7 +84,10 @@ class Modes:
         return fields
 
     def _from_first_node(self, draws: Array) -> Array:
-        """Return the draws of the same waves counted from the first node, half a spacing on."""
+        """Return the draws of the same waves with the origin at the first node.
+
+        The first node of a specimen lies half a spacing from its end.
+        """
         phase = np.pi * self.interface.first * self.numbers[0, 1:] / self.interface.size
         start, shifted = int(self.has_mean), draws.copy()
         a, b = draws[:, start::2], draws[:, start + 1 :: 2]
@@ -109,10 +111,10 @@ class Modes:
 def make_modes(
     spectrum: Any, mean_mode: bool, anisotropy: float, interface: Interface
 ) -> Modes:
-    """Find the modes of a spectrum; `InputError` if there are too many, or none.
+    """Return the modes of a spectrum, or raise an `InputError` for too many or no modes.
 
-    A field on a specimen is one of twice its length, cut: with that period its correlation
-    along the specimen is that of an endless one.
+    A field on a specimen is half of a periodic field with twice its length. With this period, lags
+    along the specimen have the correlation of an infinite interface.
     """
     placed_on, interface = interface, interface.embedding
     dimensions = len(interface.shape)
@@ -123,11 +125,11 @@ def make_modes(
     if largest.max() < 1.0 and not mean_mode:
         raise InputError(
             f"spectrum: no mode is left on an interface of {max(interface.lengths):g} m: the first"
-            f" is at {units.min():.3g} rad/m, the spectrum is truncated at {cutoff:.3g} rad/m;"
-            " check the unit of the correlation length (m), shorten it, lengthen the interface or"
+            f" is at {units.min():.3g} rad/m, but the spectrum is truncated at {cutoff:.3g} rad/m."
+            " Check the unit of the correlation length (m), shorten it, lengthen the interface or"
             " raise the truncation"
         )
-    # 1. and 2. Waves.
+    # 1. and 2. Wave vectors.
     numbers = _numbers(interface, largest)
     wavenumbers = reduce(np.hypot, units[:, None] * numbers, np.zeros(1))
     kept = np.flatnonzero(wavenumbers <= cutoff * (1.0 + CUTOFF_RTOL))
@@ -136,7 +138,7 @@ def make_modes(
     power = np.zeros(kept.size)
     power[1:] = spectrum.density(wavenumbers[ranks], dimensions)
     if mean_mode:
-        # A mode j >= 1 stands for the wave vectors k and -k, the mean mode for one of them only.
+        # A mode j >= 1 stands for k and -k, the mean mode for a single wave vector.
         power[0] = 0.5 * float(spectrum.density(np.zeros(1), dimensions)[0])
     total = power.sum()
     if not 0.0 < total < np.inf:
@@ -151,11 +153,11 @@ def make_modes(
 
 
 def _numbers(interface: Interface, largest: Array) -> NDArray[np.int64]:
-    """Wave vectors over 2 pi/length among which the modes are, in the order of draws.
+    """Step 1: return candidate wave vectors in units of 2 pi/length, in the order of draws.
 
-    `largest` is the cutoff in these units, along each axis. On a plane the order is that of
-    growing rectangles of its proportions, so that a mode has the same draws whatever the
-    spectrum and the grid.
+    `largest` is the cutoff in these units, along each axis. On a plane the order follows growing
+    rectangles with the proportions of the interface, so that the draws of a mode do not depend on
+    the spectrum and the grid.
     """
     if largest.size == 1:
         _refuse_too_many(largest[0])
@@ -169,7 +171,7 @@ def _numbers(interface: Interface, largest: Array) -> NDArray[np.int64]:
     jx = np.arange(-along * shells, along * shells + 1)
     jy = np.arange(across * shells + 1)
     x, y = (grid.ravel() for grid in np.meshgrid(jx, jy, indexing="ij"))
-    half = (y > 0) | (x >= 0)  # one of k and -k, and the constant
+    half = (y > 0) | (x >= 0)  # either k or -k, and the constant
     x, y = x[half], y[half]
     shell = np.maximum(-(-np.abs(x) // along), -(-y // across))
     return np.stack([x, y])[:, np.lexsort((x, y, shell))]
@@ -179,5 +181,5 @@ def _refuse_too_many(modes: float) -> None:
     if not modes <= MAX_MODES:
         raise InputError(
             f"spectrum: has {modes:.10g} modes on this interface, at most {MAX_MODES} are"
-            " allowed; truncate it earlier, or check the units of the lengths"
+            " allowed. Truncate it earlier, or check the units of the lengths"
         )

@@ -4,15 +4,19 @@ With a density g(k), the correlation of z on a line at the lag x is
 
     rho(x) = int_0^K g(k) cos(k x) dk / int_0^K g(k) dk,                                      (1)
 
-K being the truncation. Samples have the truncated spectrum, and so correlations and lengths
-are those of it. (1) is integrated octave by octave (`_integrate`), because densities span
-decades, and by the rule of QUADPACK for a cosine (R. Piessens and others, 1983).
+K being the truncation. Samples have the truncated spectrum, so correlations and lengths refer to
+the truncated spectrum, too.
 
-On a plane the field is isotropic, and a line cut through it has the correlation of the
-field on a line: to the power of 1 + k^2 is added (D - 1)/2 in D dimensions, and a Gaussian
-keeps its form.
+1. Integrate (1) octave by octave, because densities span decades, by QUADPACK's rule for a cosine
+   (R. Piessens, E. de Doncker-Kapenga, C. Ueberhuber and D. Kahaner, QUADPACK, 1983)
+   (`_integrate`).
+2. Find the length at which the correlation falls to 1/e by marching and a search
+   (`lag_of_correlation`).
 
-To add a spectrum, derive from `ScaledSpectrum` and `register` it.
+On a plane the field is isotropic, and a line through it has the correlation of the field on a line.
+For this, the exponent of 1 + k^2 grows by (D - 1)/2 in D dimensions, and a Gaussian keeps its form.
+
+To add a spectrum, derive from `ScaledSpectrum` and `register` the class.
 """
 
 from __future__ import annotations
@@ -38,13 +42,13 @@ from stiction.base.model import Positive, Real, describe, model
 
 Share: TypeAlias = Annotated[Real, Field(gt=0, lt=1)]
 Magnitude: TypeAlias = Annotated[Positive, Field(gt=1e-15, lt=1e15)]
-"""A length or wavenumber, or a ratio of two, of which powers neither underflow nor overflow."""
+"""Length, wavenumber, or ratio of two, whose powers do not underflow or overflow."""
 Kept: TypeAlias = Annotated[Share, Field(gt=1e-6)]
-INTEGRAL_RTOL, MAX_INTEGRAL_ERROR = 1e-12, 1e-6  # shares of integrals: aimed at, and accepted
+INTEGRAL_RTOL, MAX_INTEGRAL_ERROR = 1e-12, 1e-6  # requested and accepted errors of integrals
 
 
 class SpectralDensity(ABC):
-    """Base class of spectra; `dimensions` is 1 on a line and 2 on a plane, both infinite."""
+    """Base class of spectra on infinite lines (`dimensions` = 1) and planes (2)."""
 
     family: ClassVar[str] = "spectra"
 
@@ -58,11 +62,11 @@ class SpectralDensity(ABC):
 
     @property
     def scale(self) -> float:
-        """Wavenumber (rad/m) at which integrals begin to go octave by octave."""
+        """Wavenumber (rad/m) from which integrals proceed octave by octave."""
         return 1e-6 * self.cutoff()
 
     def correlation(self, lag: Array) -> Array:
-        """Return the correlation of z at `lag` (m), truncation included, on a line."""
+        """Return the correlation of z at `lag` (m) on a line, with truncation."""
         edges, power = _truncated(self)
         lags = np.abs(np.ravel(lag)).tolist()
         integrals = [_integrate(self, edges, lag=lag, power=power) for lag in lags]
@@ -81,10 +85,9 @@ def _integrate(
     lag: float = 0.0,
     power: float = 0.0,
 ) -> float:
-    """Integrate g(k) k^order cos(k lag) over all pieces (QUADPACK's QAWO).
+    """Step 1: return the integral of g(k) k^order cos(k lag) over all pieces (QUADPACK's QAWO).
 
-    `power`, if known, decides which errors are small: 1e-12 of it, and of each piece
-    otherwise.
+    Errors are 1e-12 of `power` if it is known, otherwise of each piece.
     """
     options: dict[str, Any] = {"weight": "cos", "wvar": lag} if lag > 0.0 else {}
     options |= {
@@ -106,7 +109,7 @@ def _integrate(
 
 @lru_cache(maxsize=256)
 def _truncated(spectrum: SpectralDensity) -> tuple[Array, float]:
-    """Ends of octaves up to the cutoff, rad/m, and the power below it, up to a factor."""
+    """Return ends of octaves up to the cutoff, rad/m, and the power below the cutoff."""
     scale, end = spectrum.scale, spectrum.cutoff()
     octaves = scale * np.exp2(np.arange(-1, 1 + max(0, math.log2(end / scale))))
     edges = np.concatenate(([0.0], octaves[octaves < end], [end]))
@@ -115,10 +118,10 @@ def _truncated(spectrum: SpectralDensity) -> tuple[Array, float]:
 
 @lru_cache(maxsize=256)
 def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
-    """Return the first lag at which the correlation of z on a line falls to `target`, m."""
-    # The correlation falls no faster than by the mean wavenumber, and is nearly straight between
-    # lags that are close against the root mean square of the wavelengths: march in such steps until
-    # it has fallen below the target, then search between the last two lags.
+    """Step 2: return the first lag at which the correlation of z on a line falls to `target`, m."""
+    # The slope of the correlation is at most the mean wavenumber. Between lags that are close
+    # against the root mean square of the wavelengths, it is nearly straight. March in such steps
+    # until it is below the target, then search between the last two lags.
     edges, power = _truncated(spectrum)
     slope = _integrate(spectrum, edges, order=1) / power
     step = 0.25 * math.sqrt(power / _integrate(spectrum, edges, order=2))
@@ -140,17 +143,17 @@ def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
 
 @model
 class ScaledSpectrum(SpectralDensity):
-    """Base class of spectra with one length: g depends on k times it only.
+    """Base class of spectra with a single length: g depends only on k times this length.
 
-    One of your own has `density`, `power_within` and its inverse `quantile`, and the
-    `untruncated_correlation`, by which `stiction.fit_field` finds the correlation length.
+    Your own class defines `density`, `power_within` and its inverse `quantile`, and
+    `untruncated_correlation`, with which `stiction.fit_field` finds the correlation length.
     """
 
     correlation_length: Magnitude
     truncation: Magnitude | None = dataclasses.field(default=None, kw_only=True)
     power_kept: Kept | None = dataclasses.field(default=None, kw_only=True)
     default_power: ClassVar[float] = 0.9997
-    """Share of the power retained by truncation if nothing is given."""
+    """Share of the power retained by the default truncation."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Any:
@@ -172,7 +175,7 @@ class ScaledSpectrum(SpectralDensity):
 
     @property
     def scale(self) -> float:
-        """Wavenumber in units of which the density is one function, rad/m."""
+        """Wavenumber by which all spectra of a class scale, rad/m."""
         return 1.0 / self.correlation_length
 
     def cutoff(self, dimensions: int = 1) -> float:
@@ -182,12 +185,12 @@ class ScaledSpectrum(SpectralDensity):
 
     @property
     def efolding_length(self) -> float:
-        # Searched for once per shape: a sweep may hold a hundred thousand lengths.
+        # Search once for each shape, as a sweep may hold a hundred thousand lengths.
         unit = dataclasses.replace(self, correlation_length=1.0)
         return self.correlation_length * lag_of_correlation(unit, math.exp(-1.0))
 
     def with_efolding_length(self, length: float) -> Any:
-        """Return the same shape of spectrum whose correlation of z falls to 1/e at `length` (m)."""
+        """Return the spectrum of the same shape with an e-folding length of z of `length` (m)."""
         xi = self.correlation_length * length / self.efolding_length
         return dataclasses.replace(self, correlation_length=xi)
 
@@ -206,7 +209,7 @@ class _PowerOfWavenumber(ScaledSpectrum):
         return float(betainc(0.5 * dimensions, self.exponent - 0.5, ratio / (1.0 + ratio)))
 
     def quantile(self, share: float, dimensions: int = 1) -> float:
-        # 1 - t of the incomplete beta function above, without cancellation where t is nearly 1.
+        # The complement 1 - t of the incomplete beta function avoids cancellation for t near 1.
         complement = float(betaincinv(self.exponent - 0.5, 0.5 * dimensions, 1.0 - share))
         return self.scale * math.sqrt((1.0 - complement) / complement)
 
@@ -219,19 +222,18 @@ class PowerLawSpectrum(_PowerOfWavenumber):
     Parameters
     ----------
     correlation_length : float
-        xi_0 = 2 pi/lambda, m.
+        Correlation length xi_0 = 2 pi/lambda, m.
     exponent : float
-        In [0.6, 64]; 4 in Albertini et al. (2020, Eq. 4).
+        Exponent in [0.6, 64], 4 in Albertini et al. (2020, Eq. 4).
     truncation : float, optional
-        Truncation in multiples of lambda. If neither this nor `power_kept` is given it is
-        that which retains 0.99969 of the power on a line, at least 2.5: 2.5 at the exponent
-        4 (as in the paper), 11 at 2 and 2,100 at 1.
+        Truncation in multiples of lambda. By default it retains 0.99969 of the power on a line, and
+        is at least 2.5: 2.5 at the exponent 4 (as in the paper), 11 at 2 and 2,100 at 1.
     power_kept : float, optional
         Share of the power retained by truncation, in (0, 1).
 
     Notes
     -----
-    On an infinite line or plane this is a Matern covariance of smoothness exponent - 1/2.
+    On an infinite line or plane this is a Matern covariance with smoothness exponent - 1/2.
 
     Examples
     --------
@@ -247,7 +249,7 @@ class PowerLawSpectrum(_PowerOfWavenumber):
 
     @property
     def scale(self) -> float:
-        """lambda = 2 pi/xi_0, rad/m: the density falls as a power law above it."""
+        """Wavenumber lambda = 2 pi/xi_0 above which the density falls as a power law, rad/m."""
         return 2.0 * math.pi / self.correlation_length
 
     def cutoff(self, dimensions: int = 1) -> float:
@@ -261,22 +263,22 @@ class PowerLawSpectrum(_PowerOfWavenumber):
         with np.errstate(divide="ignore", invalid="ignore"):
             log_value = (1.0 - order) * math.log(2.0) - gammaln(order) + order * np.log(a)
             log_value = log_value + np.log(kve(order, a)) - a
-        # Where the Bessel function overflows, a is so small that the correlation is 1.
+        # If the Bessel function overflows, a is so small that the correlation is 1.
         return np.where(np.isfinite(log_value) & (a > 0.0), np.exp(log_value), 1.0)
 
 
 @register
 @model
 class SquaredExponentialSpectrum(ScaledSpectrum):
-    """Correlation exp(-(x/xi_0)^2): g(k) ~ exp(-(k xi_0/2)^2).
+    """Spectrum of the correlation exp(-(x/xi_0)^2): g(k) ~ exp(-(k xi_0/2)^2).
 
     Parameters
     ----------
     correlation_length : float
-        xi_0, m: without truncation the correlation of z is 1/e there.
+        Correlation length xi_0, m, at which the correlation of z is 1/e without truncation.
     truncation, power_kept : float, optional
-        Truncation in multiples of 2 pi/xi_0, or the share of the power that is retained:
-        0.9997 if left out.
+        Truncation in multiples of 2 pi/xi_0, or the share of the power that is retained, by default
+        0.9997.
     """
 
     type: Literal["squared_exponential"] = "squared_exponential"
@@ -299,10 +301,10 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
 @register
 @model
 class ExponentialSpectrum(_PowerOfWavenumber):
-    """Correlation exp(-|x|/xi_0): g(k) ~ 1/(1 + (k xi_0)^2). A rough field.
+    """Spectrum of the correlation exp(-|x|/xi_0), a rough field: g(k) ~ 1/(1 + (k xi_0)^2).
 
-    As `SquaredExponentialSpectrum`, but 0.99 of the power is retained by default: every
-    further nine takes ten times as many modes.
+    The parameters are those of `SquaredExponentialSpectrum`. By default 0.99 of the power is
+    retained, since every further digit 9 takes ten times as many modes.
     """
 
     type: Literal["exponential"] = "exponential"
@@ -314,18 +316,18 @@ class ExponentialSpectrum(_PowerOfWavenumber):
 
 def _refuse_to_write(function: Any) -> Any:
     name = getattr(function, "__name__", repr(function))
-    raise ValueError(f"spectrum.function is the Python function {name!r}; use a named spectrum")
+    raise ValueError(f"spectrum.function is the Python function {name!r}, use a named spectrum")
 
 
 @model
 class CustomSpectrum(SpectralDensity):
-    """User-defined spectrum: any g(k), up to a factor. It exists in Python only.
+    """Spectrum of your own: any g(k), up to a factor, in Python only.
 
     Parameters
     ----------
     function : callable
-        g(k): takes an array of wavenumbers (rad/m), returns an array, not negative. On a
-        plane it is the density there, at wave vectors of length k.
+        g(k), which takes an array of wavenumbers (rad/m) and returns an array without negative
+        values. On a plane it is the density at wave vectors of length k.
     max_wavenumber : float
         Truncation, rad/m.
     """
@@ -357,7 +359,7 @@ SPECTRA = Kinds("spectra")
 
 
 def spectrum_of(value: Any) -> SpectralDensity:
-    """Return the spectrum given by itself, or by a table {type, ...}."""
+    """Return the spectrum given as a spectrum or a table {type, ...}."""
     if isinstance(value, SpectralDensity):
         return value
     if isinstance(value, dict):
@@ -369,4 +371,4 @@ def spectrum_of(value: Any) -> SpectralDensity:
 
 
 Spectrum: TypeAlias = Annotated[Any, OneOf(SPECTRA, spectrum_of), "Spectrum"]
-"""Any of the spectra above."""
+"""Annotation of an argument that is a spectrum."""

@@ -1,4 +1,4 @@
-"""Random properties of a problem as stresses: friction coefficients times the normal pressure."""
+"""Random properties of a problem as stresses, also for friction coefficients under a pressure."""
 
 import math
 from collections.abc import Mapping
@@ -39,7 +39,7 @@ def profiles_in_stress(
 ) -> dict[str, Array]:
     """Return sampled profiles with coefficients multiplied by the pressure at each node.
 
-    A sampled pressure is multiplied by that of glued blocks over its mean.
+    A sampled pressure is multiplied by the shape of the pressure between glued blocks.
     """
     stresses, pressure = dict(profiles), problem.normal_pressure
     if "normal_pressure" in stresses:
@@ -50,10 +50,10 @@ def profiles_in_stress(
 def support_in_stress(
     problem: Problem, random: RandomInterface, name: str, chance: float = 0.0
 ) -> tuple[float, float]:
-    """Return the values between which a property lies, Pa, with its factor between specimens.
+    """Return the bounds of a property, Pa, with its factor between specimens.
 
-    With a `chance`, each of its random parts may lie outside with this probability on
-    either side.
+    With a `chance`, each of its random parts exceeds its bounds with this probability on either
+    side.
     """
     field, between = random.properties[name], random.between or {}
 
@@ -71,7 +71,7 @@ def support_in_stress(
     elif field.of is not None:
         pressure = problem.normal_pressure
         factors.append((np.min(pressure), np.max(pressure)))
-    for factor in factors:  # positive; 0 times infinity is 0 here
+    for factor in factors:  # factors are positive, and 0 times infinity counts as 0
         ends = [a * b if a and b else 0.0 for a in (low, high) for b in factor]
         low, high = min(ends), max(ends)
     return float(low), float(high)
@@ -82,7 +82,7 @@ def _equally_likely(marginal: Any, count: int) -> Array:
 
 
 def _pressures(problem: Problem, random: RandomInterface) -> Array:
-    """Pressures that a point may have, equally likely."""
+    """Return equally likely pressures of a point, Pa."""
     pressure = problem.normal_pressure
     if "normal_pressure" in random.names:
         levels = _equally_likely(
@@ -104,7 +104,7 @@ def mean_in_stress(problem: Problem, random: RandomInterface, name: str) -> floa
 def share_below_residual(problem: Problem, random: RandomInterface) -> float:
     """Return the probability that the strength at a point is not above the residual strength.
 
-    Properties are taken as independent, but for strength and residual strength.
+    Properties are assumed to be independent, except strength and residual strength.
     """
     fields, between = random.properties, random.between or {}
     pressed = coefficients_of(random)
@@ -129,9 +129,9 @@ def share_below_residual(problem: Problem, random: RandomInterface) -> float:
 
 
 def check_residual(problem: Problem, random: RandomInterface) -> None:
-    """Warn of a share of the strength, above 1e-6, that does not exceed the residual strength.
+    """Warn if a share of the strength above 1e-6 does not exceed the residual strength.
 
-    There a node does not weaken; a share above a half is an `InputError`.
+    Nodes with such a strength do not weaken. A share above a half raises an `InputError`.
     """
     share = share_below_residual(problem, random)
     if share <= MAX_SILENT_SHARE:
@@ -143,7 +143,7 @@ def check_residual(problem: Problem, random: RandomInterface) -> None:
     )
     if share > MAX_SHARE:
         raise InputError(
-            f"{text}: most of the interface would not weaken at all; raise the strength, lower"
+            f"{text}: most of the interface would not weaken at all. Raise the strength, lower"
             " the residual strength, or check the unit of both (Pa)"
         )
-    warn_accuracy(f"{text}, where the interface does not weaken; lower that if it should")
+    warn_accuracy(f"{text}, so that these nodes do not weaken. Lower it if they should")

@@ -2,29 +2,28 @@
 
 Problem
 -------
-The spectral representation (M. Shinozuka and G. Deodatis, Applied Mechanics Reviews 44,
+Compute the spectral representation (M. Shinozuka and G. Deodatis, Applied Mechanics Reviews 44,
 1991)
 
     z(x) = sigma_0 A_0 + sum_j sigma_j (A_j cos k_j.x + B_j sin k_j.x),                       (1)
 
-with standard normal A_j and B_j. Sample i must depend on the seed and i only, and draw j of
-it on mode j only, whatever the batch, the number of workers, the spectrum and the grid.
+with standard normal A_j and B_j. Sample i must depend on the seed and i only. Within a sample, a
+draw must depend on its property and mode only, not on the batch, the number of workers, the
+spectrum or the grid.
 
 Draws (`Stream.draw`)
 ---------------------
-1. Samples of a line come in blocks of 256, with one generator a block, because a generator
-   for each sample would cost more than the sample. A sample of a plane has so many modes
-   that it has a generator, a block of its own. The generator depends on seed, property and
-   number of the block.
-2. Inside a block the draws run mode after mode, A_j before B_j, so that a spectrum with
-   more modes extends the same field. Draws of modes that are not in the spectrum are left
-   out.
+1. Samples of a line come in blocks of 256 that share a generator, because a generator for each
+   sample would cost more than the sample. A sample of a plane has so many modes that it is a block
+   of its own. The generator depends on the seed, the property and the number of the block.
+2. Inside a block the draws run mode after mode, A_j before B_j, so that a spectrum with more modes
+   extends the same field. Draws of modes outside the spectrum are dropped.
 
 Field (`synthesise`)
 --------------------
-3. Put mode (jx, jy) with amplitude (A - i B)/2 at k, and its conjugate at -k, into the half
-   of the wave vectors that a real transform holds. Fold modes that the grid does not
-   resolve onto modes that it does: values at the nodes are exact on any grid.
+3. Put mode (jx, jy) with amplitude (A - i B)/2 at k, and its conjugate at -k, into the half of the
+   wave vectors that a real transform holds. Fold unresolved modes onto resolved modes, so that
+   values at the nodes are exact on any grid.
 4. Transform back, sample by sample, so that the numbers do not depend on the batch.
 """
 
@@ -40,22 +39,22 @@ SAMPLES_PER_BLOCK = 256
 
 
 def block_of(dimensions: int) -> int:
-    """Return how many samples share a generator on a line (1) or a plane (2)."""
+    """Return how many samples share a generator on a line (1 dimension) or a plane (2)."""
     return SAMPLES_PER_BLOCK if dimensions == 1 else 1
 
 
 class Stream(NamedTuple):
-    """The draws of one property, or of a factor between specimens, among all draws of a sample."""
+    """Draws of a property, or of a factor between specimens, among all draws of a sample."""
 
     number: int  # number of the stream; never changes
     block: int  # samples that share a generator
     ranks: NDArray[np.int64]  # modes drawn, rising
     mean_mode: bool  # whether the mean mode is drawn
     columns: slice = slice(None)  # of the vector of all draws
-    of_property: Any = None  # which of `columns` are modes of the property itself
+    of_property: Any = None  # those `columns` that are modes of the property itself
 
     def draw(self, seed: int, first: int, samples: int) -> Array:
-        """Draw samples `first`, `first` + 1, ...: A, B of one mode after the other, A_0 first."""
+        """Draw samples `first`, `first` + 1, ...: A_0, then A and B of mode after mode."""
         ranks, block = self.ranks, self.block
         modes = int(ranks[-1]) if ranks.size else 0
         kept: slice | NDArray[np.int64] = slice(2, None)
@@ -71,7 +70,7 @@ class Stream(NamedTuple):
             place = (self.number, number, block)[: 2 if block == SAMPLES_PER_BLOCK else 3]
             key = np.random.SeedSequence(entropy=seed, spawn_key=place)
             generator = np.random.Generator(np.random.PCG64DXSM(key))
-            # 2. A_j and B_j of all modes, of which those of the spectrum are kept.
+            # 2. Draw A_j and B_j of all modes, and keep the modes of the spectrum.
             rows = generator.standard_normal((2 * (modes + 1), block))
             draws[done : done + count] = rows[kept, offset : offset + count].T
             done += count
@@ -82,7 +81,7 @@ class Stream(NamedTuple):
 def synthesise(
     draws: Array, sigma: Array, numbers: NDArray[np.int64], has_mean: bool, out: Array
 ) -> None:
-    """Fill `out`, (samples, rows, columns), with fields (1); a line is a plane of one row."""
+    """Fill `out`, (samples, rows, columns), with fields (1). A line has a single row."""
     samples, rows, columns = out.shape
     half = columns // 2
     scale = 0.5 * rows * columns
@@ -106,7 +105,7 @@ def synthesise(
         # 4. Back.
         if rows == 1:
             row = np.fft.irfft(spectrum[0], columns)
-            for q in range(columns):  # a loop: slices of arrays take seconds to compile
+            for q in range(columns):  # a loop, since numba takes seconds to compile slices
                 out[i, 0, q] = row[q]
         else:
             field = np.fft.irfft2(spectrum, (rows, columns))
@@ -119,7 +118,10 @@ def synthesise(
 def condition(
     right: Array, transposed: Array, offsets: Array, factors: Array, out: Array
 ) -> None:
-    """Replace each row a of `out` by a + V (offset + factors V^T a), the draws given measured z."""
+    """Replace each row a of `out` by its draws given measured values, a + V (b + f V^T a).
+
+    V is `right`, b a row of `offsets`, and f are the `factors`.
+    """
     dimension, count = right.shape
     weights = np.empty(count)
     for i in range(out.shape[0]):

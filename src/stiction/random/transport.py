@@ -21,24 +21,24 @@ constant,
 
 Here e_1, ..., e_j-1 are moved already, and the mean is over w orthogonal to u_1, ..., u_j.
 Equation (2) treats places as independent given e_1 to e_j (B. Cseke and T. Heskes, Journal
-of Machine Learning Research 12, 2011). It is exact for one place, for independent places
-each of which has a direction, and for many places that measure one number.
+of Machine Learning Research 12, 2011). It is exact for a single place, for independent places
+with a direction each, and for many places that measure the same number.
 
 Preparation (`make_transport`):
 
 1. Expand log r_k in Hermite polynomials of the standardised z_k. The norm of the
-   coefficients says how far the posterior at a place is from the Gaussian. Ignore the
+   coefficients shows how far the posterior at a place is from the Gaussian. Ignore the
    places with the smallest norms, which together stay below `IGNORED_TOTAL`.
 2. Choose the directions greedily. The candidates are the a_k of the places that differ most
-   from the Gaussian, made orthogonal to the directions chosen before. The next direction is
-   the one on which the expansions of all places together have the largest projection.
+   from the Gaussian, made orthogonal to the directions chosen before. Choose the candidate
+   on which the expansions of all places together have the largest projection.
 3. Tabulate the factors of (2) along each direction. A place that depends noticeably on
    earlier coordinates has a table of its own, over its mean given e_1 to e_j. The other
    places share a table over e_j, with earlier coordinates at zero.
-4. Estimate the error that is left: map samples, weight them by (1) divided by the density
-   that they have, and compare weighted and plain moments of z.
+4. Estimate the remaining error: map samples, weight them by (1) divided by their density,
+   and compare weighted and plain moments of z.
 
-Map of one draw (`transport`), for each direction in turn:
+Map of a draw (`transport`), for each direction in turn:
 
 5. Add up the tables on a grid of e_j, which gives the logarithm of (2).
 6. Integrate the density over each cell, taking its logarithm as linear there.
@@ -65,12 +65,12 @@ N_TABLE_CELLS = 96  # the same for E[z_k | e_1, ..., e_j], standardised
 # Thresholds on the logarithm of a density
 MIN_DIRECTION_GAIN = 0.1  # a direction that explains less is not worth its time
 IGNORED_TOTAL = 0.005
-MIN_DEPENDENCE = 0.02  # a dependence on earlier coordinates that matters less is dropped
-MAX_LOG_RATIO = 4.0  # log r_k is clipped so far from its median before it is expanded
+MIN_DEPENDENCE = 0.02  # a smaller dependence on earlier coordinates is dropped
+MAX_LOG_RATIO = 4.0  # distance from its median at which log r_k is clipped before expansion
 
 # Shares of the standard deviation of a place
-MIN_UNSPANNED = 0.2  # no candidate if less lies outside the earlier directions
-MIN_SLOPE = 0.01  # a direction that moves a place by less does not concern it
+MIN_UNSPANNED = 0.2  # smallest part of a candidate outside the earlier directions
+MIN_SLOPE = 0.01  # smallest motion of a place by a direction for which it is tabulated
 
 # Accuracy of the preparation
 N_HERMITE, N_HERMITE_POINTS = 6, 97  # polynomials in an expansion, and points of its integrals
@@ -80,7 +80,7 @@ PLACES_PER_BLOCK = 256  # tabulated together, to bound memory
 N_CHECK_SAMPLES = 1024
 
 LOG_OF_ZERO = -700.0
-MAX_FALL = 600.0  # of a logarithm below its maximum: exp(-MAX_FALL) is a float
+MAX_FALL = 600.0  # of a logarithm below its maximum, so that exp(-MAX_FALL) is not zero
 
 LogRatio = Callable[[NDArray[np.int64], Array], Array]
 """log r_k, finite, at places (indices) and values z (places, ...)."""
@@ -113,7 +113,7 @@ def make_transport(
     log_ratio: LogRatio, mean: Array, slopes: Array
 ) -> tuple[Transport, ErrorEstimate]:
     """Prepare the map for z = mean + slopes @ w, (places,) and (places, dimension)."""
-    # 1. How far the posterior of each place is from the Gaussian.
+    # 1. The distance of the posterior from the Gaussian at each place.
     deviation = np.sqrt((slopes**2).sum(axis=1))
     coefficients = _hermite(log_ratio, mean, deviation)
     non_gaussianity = np.linalg.norm(coefficients, axis=0)
@@ -125,7 +125,7 @@ def make_transport(
 
     mean, slopes, coefficients = mean[kept], slopes[kept], coefficients[:, kept]
     basis = _choose_directions(coefficients, slopes / deviation[kept, None])
-    # Where log r_k is linear in z_k, earlier coordinates only multiply (2) by a constant.
+    # If log r_k is linear in z_k, earlier coordinates only multiply (2) by a constant.
     nonlinearity = np.linalg.norm(coefficients[1:], axis=0)
     tables = _tabulate(log_ratio_of_kept, mean, slopes, basis, nonlinearity)
     if not kept.size:
@@ -134,13 +134,13 @@ def make_transport(
 
 
 def _hermite(log_ratio: LogRatio, mean: Array, deviation: Array) -> Array:
-    """Step 1: coefficients in normalised Hermite polynomials 1, 2, ..., (N_HERMITE, places)."""
+    """Step 1: return coefficients of Hermite polynomials 1, 2, ..., (N_HERMITE, places)."""
     x = np.linspace(-Z_MAX, Z_MAX, N_HERMITE_POINTS)
     value = log_ratio(np.arange(mean.size), mean[:, None] + deviation[:, None] * x)
     weight = np.exp(-0.5 * x**2)
     weight /= weight.sum()
-    # Where the marginal has no quantile, log r_k is so low that it would decide a mean over all
-    # points. The median within a standard deviation does not feel it.
+    # Points without a quantile have a log r_k so low that they would decide a mean over all points.
+    # They do not affect the median within a standard deviation.
     typical = np.median(value[:, np.abs(x) <= 1.0], axis=1)
     value = (value - typical[:, None]).clip(-MAX_LOG_RATIO, MAX_LOG_RATIO)
     coefficients, previous, current = [], np.zeros_like(x), np.ones_like(x)
@@ -152,7 +152,7 @@ def _hermite(log_ratio: LogRatio, mean: Array, deviation: Array) -> Array:
 
 
 def _choose_directions(coefficients: Array, unit: Array) -> Array:
-    """Step 2: the directions, (directions, dimension), from the unit vectors a_k / |a_k|."""
+    """Step 2: return the directions, (directions, dimension), from unit vectors a_k / |a_k|."""
     by_non_gaussianity = np.argsort(-np.linalg.norm(coefficients, axis=0))
     unspanned = unit[by_non_gaussianity[:MAX_CANDIDATES]]
     basis = np.empty((0, unit.shape[1]))
@@ -170,7 +170,7 @@ def _choose_directions(coefficients: Array, unit: Array) -> Array:
         best = int(np.argmax(squared_gain))
         if not squared_gain[best] > MIN_DIRECTION_GAIN**2:  # NaN ends here, too
             break
-        # Orthogonal once more, against round-off.
+        # Make it orthogonal once more, against round-off.
         direction = candidates[best] - basis.T @ (basis @ candidates[best])
         direction /= np.linalg.norm(direction)
         basis = np.vstack([basis, direction])
@@ -181,7 +181,7 @@ def _choose_directions(coefficients: Array, unit: Array) -> Array:
 def _log_mean_ratio(
     log_ratio: LogRatio, places: NDArray[np.int64], mean: Array, variance: Array
 ) -> Array:
-    """log E[r_k(z_k)] up to a constant, for normal z_k of a mean (places, ...) and a variance."""
+    """Return log E[r_k(z_k)] up to a constant, for normal z_k with mean (places, ...)."""
     x = np.linspace(-Z_MAX, Z_MAX, N_QUADRATURE)
     deviation = np.sqrt(np.maximum(variance, 0.0))[:, None, None]
     value = log_ratio(places, mean[:, :, None] + deviation * x) - 0.5 * x**2
@@ -193,7 +193,7 @@ def _log_mean_ratio(
 def _tabulate(
     log_ratio: LogRatio, mean: Array, slopes: Array, basis: Array, nonlinearity: Array
 ) -> Transport:
-    """Step 3: the tables. `nonlinearity` says how far log r_k is from a straight line."""
+    """Step 3: return the tables. `nonlinearity` is the distance of log r_k from a line."""
     n_directions = len(basis)
     e_slopes = slopes @ basis.T  # of z_k by e_j
     variance = (slopes**2).sum(axis=1)
@@ -241,7 +241,8 @@ def _estimate_error(
     log_weight = log_ratio(np.arange(mean.size), mean[:, None] + z.T).sum(axis=0)
     log_weight -= log_density + 0.5 * ((draws @ tables.basis.T) ** 2).sum(axis=1)
     weight = np.exp(log_weight - log_weight.max())
-    weight = np.minimum(weight / weight.mean(), np.sqrt(N_CHECK_SAMPLES))  # truncated weights
+    # Truncated weights, so that a few samples do not dominate.
+    weight = np.minimum(weight / weight.mean(), np.sqrt(N_CHECK_SAMPLES))
     weight /= weight.sum()
     plain_mean, plain_deviation = z.mean(axis=0), z.std(axis=0)
     weighted_mean = weight @ z
@@ -323,7 +324,7 @@ def transport(
             share = min(remaining / mass[cell], 1.0)
             share = share if step == 1 else 1.0 - share
             rise = log_p[cell + 1] - log_p[cell]
-            if abs(rise) > 1e-5:  # below, the share of the width is that of the mass
+            if abs(rise) > 1e-5:  # otherwise the shares of width and mass are equal
                 share = math.log1p(share * math.expm1(rise)) / rise
             e[j] = (cell + share) * width - E_MAX
             log_density[row] += log_p[cell] + share * rise - highest - math.log(total * width)

@@ -1,9 +1,9 @@
 """Statistics of samples: densities, quantiles, agreement with tests.
 
-`densities` smooths a sample within its bounds, `estimates` has means, deviations and
-quantiles with their errors, `moments` the exact ones of the nucleation stress (public in
-`stiction.theory`); `agreement` is that of `stiction.inference`. Each is imported on first
-use.
+`densities` smooths a sample within its bounds. `estimates` has means, standard deviations and
+quantiles with their errors. `moments` has the exact moments of the nucleation stress, which are
+public in `stiction.theory`. `agreement` comes from `stiction.inference`. Each function is imported
+on first use.
 """
 
 from importlib import import_module

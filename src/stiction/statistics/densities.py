@@ -1,14 +1,16 @@
-"""Probability densities that keep to their bounds: a kernel reflected there.
+"""Probability densities within bounds, by a kernel that is reflected at the bounds.
 
-Steps (`density`), after B. W. Silverman, Density Estimation for Statistics and Data
+Problem: estimate the density of N independent values, without crossing given bounds.
+
+Algorithm (`density`), after B. W. Silverman, Density Estimation for Statistics and Data
 Analysis, 1986:
 
 1. Choose the ends of a grid: the bounds, or half a spread beyond the sample.
-2. Count the values in its cells.
+2. Count the values in the cells of the grid.
 3. Choose the bandwidth h by his Eq. 3.31, 0.9 min(standard deviation, interquartile
    range/1.34) N^(-1/5), at least half a cell.
-4. Smooth the counts by a Gaussian kernel of that deviation, reflected at the ends.
-5. The sampling error follows from the integral of the kernel squared, 1/(2 sqrt(pi) h).
+4. Smooth the counts by a Gaussian kernel with the standard deviation h, reflected at the ends.
+5. Compute the sampling error from the integral of the squared kernel, 1/(2 sqrt(pi) h).
 """
 
 import math
@@ -26,12 +28,12 @@ from stiction.statistics.estimates import as_sample
 
 GRID_CELLS = 4096
 KERNEL_END = 8.0
-"""Where the kernel is cut, in standard deviations."""
+"""End of the kernel, in standard deviations."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Density(Result):
-    """An estimated probability density.
+    """Estimated probability density.
 
     Attributes
     ----------
@@ -59,14 +61,14 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     ----------
     values : (samples,) array
     bounds : (float or None, float or None)
-        Lower and upper bound of the distribution, if any, in the unit of the values; for
-        strength, those of its marginal.
+        Lower and upper bound of the distribution, if any, in the unit of the values. Use the bounds
+        of the marginal for strength.
 
     Notes
     -----
-    A Gaussian kernel on a fine grid, reflected at the bounds, of the bandwidth of Silverman
-    (1986, Eq. 3.31): two peaks are smoothed more than they need, and at a bound the slope
-    is zero. Without a bound, the grid extends beyond the sample.
+    A Gaussian kernel with the bandwidth of Silverman (1986, Eq. 3.31) smooths the values on a fine
+    grid and is reflected at the bounds. It smooths a density with two peaks more than necessary,
+    and the slope at a bound is zero. Without a bound, the grid extends beyond the sample.
 
     Examples
     --------
@@ -84,7 +86,7 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
         np.minimum(((sample - low) / width * GRID_CELLS).astype(int), GRID_CELLS - 1),
         minlength=GRID_CELLS,
     )
-    # 3. Below a cell's width the grid, not the sample, would be resolved.
+    # 3. A narrower kernel would resolve the cells of the grid instead of the sample.
     bandwidth = max(_bandwidth(sample), 0.5 * width / GRID_CELLS)
     # 4. and 5. The smooth density and its error.
     smooth = gaussian_filter1d(
@@ -101,14 +103,14 @@ def _ends(sample: Array, bounds: tuple[float | None, float | None]) -> tuple[flo
     smallest, largest = float(sample.min()), float(sample.max())
     spread = largest - smallest
     if spread == 0.0:
-        raise InputError(f"values: all are equal to {smallest:g}; they have no density")
+        raise InputError(f"values: must differ to have a density, all are {smallest:g}")
     low = -math.inf if bounds[0] is None else bounds[0]
     high = math.inf if bounds[1] is None else bounds[1]
     if smallest < low:
         raise InputError(f"values: {smallest:g} is below the lower bound {low:g}")
     if largest > high:
         raise InputError(f"values: {largest:g} is above the upper bound {high:g}")
-    # A far bound only wastes grid cells; the kernel does not reach half a spread beyond the data.
+    # A bound far from the sample would waste cells, as the kernel never reaches half a spread.
     return max(low, smallest - 0.5 * spread), min(high, largest + 0.5 * spread)
 
 

@@ -17,7 +17,7 @@ from stiction.base.representation import Result, Row, Summary
 
 @dataclass(frozen=True)
 class WithError:
-    """An estimated number and its standard error, zero if exact."""
+    """Estimated number and its standard error, zero if it is exact."""
 
     value: float
     error: float = 0.0
@@ -30,7 +30,7 @@ def as_sample(values: Any, fewest: int = 2) -> Array:
         raise InputError(f"values: at least {fewest} are needed, got {array.size}")
     if not np.all(np.isfinite(array)):
         entry = int(np.argmin(np.isfinite(array)))
-        raise InputError(f"values: must be finite; entry {entry} is not")
+        raise InputError(f"values: must be finite, but entry {entry} is {array[entry]}")
     return array
 
 
@@ -43,8 +43,8 @@ def mean(values: Any) -> WithError:
 def standard_deviation(values: Any) -> WithError:
     """Estimate the standard deviation of independent values (samples,), in their unit.
 
-    Error by the delta method from the fourth moment: sqrt((m_4 - s^4)/N)/(2 s), without a
-    Gaussian assumption.
+    The error follows from the fourth moment by the delta method, sqrt((m_4 - s^4)/N)/(2 s). It does
+    not assume a Gaussian distribution.
     """
     sample = as_sample(values)
     s = float(sample.std(ddof=1))
@@ -61,12 +61,12 @@ class Quantiles(Result):
     ----------
     probability : (m,) array
     value : (m,) array
-        The sample quantiles, in the unit of the values.
+        Quantiles of the sample, in the unit of the values.
     lower, upper : (m,) arrays
-        Ends of the 95 % confidence interval of each; infinite where the sample is too small
-        to bound that quantile.
+        Ends of their 95 % confidence intervals. Infinite if the sample is too small to bound a
+        quantile.
     unit : str
-        Unit of the values, if they state one as an `xarray.DataArray` does.
+        Unit of the values, if they state a unit, as an `xarray.DataArray` does.
     """
 
     probability: Array
@@ -93,16 +93,15 @@ def quantiles(values: Any, probability: Numbers) -> Quantiles:
     Parameters
     ----------
     values : (samples,) array
-        For example the critical stress of a Monte Carlo ensemble, Pa.
+        Values of any quantity, for example the critical stress of a Monte Carlo ensemble, Pa.
     probability : float or (m,) array
-        Between 0 and 1, exclusive.
+        Probabilities of the quantiles, between 0 and 1, exclusive.
 
     Notes
     -----
-    The number of values below the p-quantile is binomial (N, p); the interval runs between
-    the order statistics whose ranks contain it with a probability of 95 % (David and
-    Nagaraja, 2003, Sec. 7.1). The coverage is exact for continuous distributions, rounded
-    up to whole ranks.
+    The number of values below the p-quantile is binomial (N, p). The interval ends at the order
+    statistics between whose ranks this number lies with a probability of 95 % (David and Nagaraja,
+    2003, Sec. 7.1). The coverage is exact for continuous distributions, rounded up to whole ranks.
 
     Examples
     --------

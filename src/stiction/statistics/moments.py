@@ -17,7 +17,7 @@ from stiction.random.fields import RandomField
 
 @dataclass(frozen=True, eq=False, repr=False)
 class NucleationStatistics(Result):
-    """Mean and variance of the nucleation stress tau_n, a load tau_0, at a point.
+    """Mean and variance of the nucleation stress tau_n at a point, as a load tau_0.
 
     Attributes
     ----------
@@ -54,25 +54,25 @@ def nucleation_statistics(problem: Problem, strength: RandomField) -> Nucleation
     Parameters
     ----------
     problem : Problem
-        With uniform weakening rate, load and initial stress.
+        A problem with uniform weakening rate, load and initial stress.
     strength : RandomField
-        Peak strength, Pa; or friction coefficients under a uniform normal pressure.
+        Peak strength, Pa, or friction coefficients under a uniform normal pressure.
 
     Raises
     ------
     InputError
         If the weakening rate, the load, the initial stress or the pressure of coefficients
-        varies along the interface, or a critical patch is larger than the interface.
+        varies along the interface, or if a critical patch is larger than the interface.
 
     Notes
     -----
-    On a plane tau_n is the average over the middle one of the ellipses of `LocalCriterion`;
-    the least over several shapes, which the method takes, has no closed-form moments.
+    Albertini et al. (2020, Eqs. B.2 and B.3): E[tau_n] = E[tau_p], and Var[tau_n] is the double
+    integral of the correlation of tau_p and the weights. On a periodic interface it is a sum over
+    wave vectors, the spectrum of tau_p times the squared transform of the weight. The correlation
+    of tau_p follows by Hermite expansion (Grigoriu, 1995).
 
-    Albertini et al. (2020, Eqs. B.2 and B.3): E[tau_n] = E[tau_p], and Var[tau_n] is the
-    double integral of the correlation of tau_p (by Hermite expansion; Grigoriu, 1995)
-    against the weights, on a periodic interface the sum over wave vectors of the spectrum
-    of tau_p times the squared transform of the weight.
+    On a plane tau_n is the average over the middle ellipse of `LocalCriterion`. The method takes
+    the least over several ellipses, which has no closed-form moments.
 
     Examples
     --------
@@ -85,7 +85,7 @@ def nucleation_statistics(problem: Problem, strength: RandomField) -> Nucleation
     """
     scale, load, initial = stationary(problem, strength)
     rate = problem.uniform_rate
-    assert rate is not None  # others are not stationary
+    assert rate is not None  # checked by `stationary`
     (window,) = windows_of(problem, rate, stretches=(1.0,))
     power = strength_spectrum(problem, strength) * np.abs(window.spectrum) ** 2
     mean, variance = scale * strength.mean, (scale * strength.standard_deviation) ** 2
@@ -106,9 +106,10 @@ def strength_spectrum(problem: Problem, strength: RandomField) -> Array:
 
 
 def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, float]:
-    """Return the unit of the strength (Pa), load profile and initial stress, all uniform.
+    """Return the unit of the strength (Pa), load profile and initial stress of a uniform problem.
 
-    The unit of friction coefficients is the normal pressure.
+    The unit of friction coefficients is the normal pressure. Raises an `InputError` if any of them
+    varies along the interface.
     """
     check_law(problem)
     problem.refuse_specimen("this", "sample the nucleation stress with st.monte_carlo")
@@ -125,7 +126,7 @@ def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, f
             problem.uniform_rate is None
         ),
     }
-    why = "so the nucleation stress is not stationary; sample it with st.monte_carlo instead"
+    why = "so the nucleation stress is not stationary. Sample it with st.monte_carlo instead"
     problems = [f"{what}, {why}" for what, varies in varying.items() if varies]
     if pressure is None:
         problems.append("load.normal_pressure: is missing, and strength is in coefficients")
