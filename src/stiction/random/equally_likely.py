@@ -281,7 +281,7 @@ class Uncertain(Result):
         ranks = np.arange(count)
         if len(keys) < len(
             self.laws
-        ):  # constants are taken in turn; members of one field share
+        ):  # members take constants in turn, and a field shares them
             turns = np.array_split(ranks, VARIANTS)
             ranks = np.array([turns[n % VARIANTS][n // VARIANTS] for n in range(count)])
         fields = np.resize(likely.groups, count)

@@ -6,8 +6,9 @@ Waves carry the stress that is out of balance, so the mean stress of the interfa
 
     <tau> = tau_0 <p> + <tau_i> - Z <V>.                                                      (1)
 
-With an extent it is the mean over all nodes, of which the nodes beyond take over stress without
-any waves (`whole_stress`); results are means over the nodes that can break (`mean_stress`).
+If the interface has an extent, <tau> is the mean over all nodes (`whole_stress`), and the nodes
+beyond the extent take over stress without any waves. Results are means over the nodes that can
+break (`mean_stress`).
 
 An instability is slip that the load does not drive: after a maximum of <tau>, waves lower
 <tau> by `EVENT_DROP` of the stress scale (`docs/theory.md`). The instability began at that
@@ -29,7 +30,7 @@ Algorithm, after each step of a run (`observe`)
    instability. The onset is the instability with the highest maximum so far.
 5. Note <tau> once all nodes that can break are at their residual strength. From then on no
    instability can begin. Reaching this state is no instability by itself, as the last nodes
-   beside a barrier may creep to it.
+   beside the end of an extent may creep to it.
 
 Two consequences. A maximum without such a fall after it, such as the largest load or the stress
 that returns when slip dies, is no instability. If the stress is above the strength at the start,
@@ -78,7 +79,7 @@ def stress_scale(nodes: Nodes) -> PiecewiseLinear:
         max(0, min(tau_p - tau_r, MAX_DROP_RATIO (tau_0 p + tau_i - tau_r))).
 
     The second term is the drop that the load provides. If strengths are similar, the scale is the
-    mean of tau_p - tau_r. Barriers far above the load, even infinite barriers, do not raise it. It
+    mean of tau_p - tau_r. Nodes far stronger than the load, or unbreakable, do not raise it. It
     grows with the load as the load comes to break them.
     """
     strength, residual = nodes.strength, nodes.residual

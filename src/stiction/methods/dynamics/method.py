@@ -97,7 +97,7 @@ class Rupture:
         below the first instability as the estimated error allows. `start_load` is the load at the
         start, and `start_error` the estimated error (Pa). These runs always start at the first
         slip: with `load`, if the loading rate is too high, if a node loses half of its strength
-        before the first instability, on planes, with curved friction laws, and with barriers or
+        before the first instability, on planes, with curved friction laws, with an extent, and with
         stress above the strength.
     end_time : float, optional
         Latest end of a run, s. It may be exceeded by a part of the last explicit step.
@@ -108,12 +108,12 @@ class Rupture:
         Share of tau_p - tau_r that a node has lost when the front arrives, in (0, 1]. The middle
         of the cohesive zone is 0.5, its tip 1e-3.
     stop : {"sliding", "onset", "rest", "time"}
-        End of a run. "sliding": every node that can break is at its residual strength and, if
-        barriers of infinite strength hold the interface, has come to rest. "onset": the first
-        instability has begun. "rest": after an instability, slip has ended or only follows the
-        load. An interface that slides and is never unloaded also ends there. "time": at
-        `end_time`. A sliding interface takes explicit steps until then. Every run but "time" also
-        ends when no node slips and the load has stopped rising.
+        End of a run. "sliding": every node that can break is at its residual strength and, if the
+        interface has an extent, has come to rest. "onset": the first instability has begun. "rest":
+        after an instability, slip has ended or only follows the load. An interface that slides and
+        is never unloaded also ends there. "time": at `end_time`. A sliding interface takes explicit
+        steps until then. Every run but "time" also ends when no node slips and the load has stopped
+        rising.
     implicit : bool
         False takes explicit steps only. Slow loading then needs a million steps.
     max_steps : int
@@ -150,15 +150,15 @@ class Rupture:
     `Equilibrium` also counts smaller jumps.
 
     **Stress scale.** At each node, it is the smaller of tau_p - tau_r and three times the drop
-    tau_0 p + tau_i - tau_r at the largest load so far, so that unbroken barriers do not count. The
-    stress scale is the mean over nodes.
+    tau_0 p + tau_i - tau_r at the largest load so far, so that nodes far stronger than the load do
+    not count. The stress scale is the mean over nodes.
 
     **End.** `kinetic_stress` is the mean stress after the first step in which every node that can
     break is at its residual strength. Energies and moment refer to the end of the run. A sliding
     interface ends with that step, in which radiated energy and moment grow by about 2 %. The last
-    nodes beside a barrier may creep to their residual strength while the load still rises. This is
-    no instability, and `critical_stress` remains the mean stress at the highest instability before.
-    It is NaN if all nodes that can break did so without an instability.
+    nodes beside the end of an extent may creep to their residual strength while the load still
+    rises. This is no instability, and `critical_stress` remains the mean stress at the highest
+    instability before. It is NaN if all nodes that can break did so without an instability.
 
     With "onset" and "rest", critical values belong to the highest instability, which need not end
     in sliding. With "onset", all values that are not final are NaN: kinetic stress, stress drop,

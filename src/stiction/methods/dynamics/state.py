@@ -117,10 +117,8 @@ DIAGNOSTICS = np.dtype(
         ("scale", "f8"),  # stress scale of the largest load
         ("start_load", "f8"),  # load at the start of the run
         ("start_error", "f8"),  # error of the onset due to the start
-        (
-            "reverse_margin",
-            "f8",
-        ),  # smallest sum of stress and strength; below 0 slip would reverse
+        # Smallest sum of stress and strength. Below 0 slip would reverse.
+        ("reverse_margin", "f8"),
         ("reverse_node", "i8"),  # its node
     ]
 )
@@ -141,7 +139,7 @@ class Thresholds(NamedTuple):
     """Thresholds at which steps change or end, from the method and the problem."""
 
     slid_stop: float  # nodes at the residual strength at which to return
-    held: bool  # whether barriers hold the interface; then return only after slip came to rest
+    held: bool  # whether unbreakable nodes hold the interface; return after slip came to rest
     event_stop: bool  # return at an event
     rest_stop: bool  # return when all is at rest after an event
     end_time: float  # s
@@ -179,7 +177,7 @@ class Grid(NamedTuple):
 class Nodes(NamedTuple):
     """Properties of the nodes that do not change in a run, each (nodes,)."""
 
-    strength: Array  # tau_p, Pa; infinite at barriers
+    strength: Array  # tau_p, Pa; infinite beyond the extent of the interface
     residual: Array  # tau_r, Pa
     weakening: Array  # W at zero slip, Pa/m
     critical: Array  # slip from which a node counts as being at its residual strength, m
