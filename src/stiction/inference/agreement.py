@@ -1,9 +1,30 @@
 """Whether measured peaks agree with a prediction: tests whose p-values hold for few peaks.
 
-A prediction that did not see the peaks is one more sample of theirs: under it every choice of as
-many values from all of them together is equally likely (a permutation test, exact for any number
-of either and where values are equal). The peaks of one campaign share the parameters, which a
-posterior leaves open: each simulated campaign is drawn from one point of it.
+Problem. n peaks have the empirical distribution F_n. The prediction has the distribution F, given
+by a sample or by a posterior. Find the probability that n peaks from F lie as far from F as the
+measured ones, for two distances:
+
+    Cramer-von Mises    W^2 = n int (F_n - F)^2 dF
+    Kolmogorov          D = sqrt(n) max |F_n - F|
+
+Sources. Permutation tests and their p-value (1 + number as far)/(1 + replicates) are in Davison and
+Hinkley, Bootstrap Methods and their Application (1997), sections 4.2 and 4.3. The sum for W^2 is in
+Anderson and Darling (1952), Annals of Mathematical Statistics 23, 193.
+
+Steps for a predicted sample:
+
+1. Under the hypothesis, each choice of n values from all measured and predicted values together is
+   equally likely. This is exact for any numbers of values, and for equal values. F is then the
+   distribution of the remaining values, and the integral is over all values.
+2. Choose n values at random, and compute both distances between them and the remaining values.
+3. The p-value is the share of choices that are at least as far apart as the measured choice.
+
+Steps for a posterior. The peaks of one campaign share the unknown parameters.
+
+4. Tabulate the distribution of a peak at `POSTERIOR_POINTS` draws of the posterior.
+5. Draw each simulated campaign from one of these distributions. Take distances from their mean.
+   Campaigns with several kinds of specimens add W^2 and take the largest D.
+6. The p-value is the share of campaigns that are at least as far away as the measured one.
 """
 
 from collections.abc import Mapping
@@ -23,22 +44,22 @@ from stiction.inference.posterior import Posterior
 from stiction.problem.load import NotNegative
 
 POSTERIOR_POINTS, LAW_VALUES = 1000, 400
-"""Parameters that stand for a posterior, and values at which the law of a peak is kept."""
+"""Draws that represent a posterior, and number of values in the table of a distribution."""
 RANGE_MARGIN = 0.25
-"""What is added on either side to the range of the predicted peaks, as a share of it."""
+"""Share of the range of predicted peaks that is added to it on either side."""
 OUTLYING_SHARE = 1e-3
-"""Share of the predicted peaks on either side that does not count for this range: it may have
-heavy tails."""
+"""Share of the predicted peaks on either side that is left out of this range, because their
+distribution may have heavy tails."""
 BAND_LEVEL = 0.9
 PRECURSORS = {"number": "number", "size": "largest", "first_load": "load of the first"}
-"""What is compared of precursors, in words."""
+"""Compared properties of precursors, with their names in printed text."""
 
 
 class Predicted(NamedTuple):
     """Distribution function of the predicted peaks of one kind of specimen."""
 
     values: Array  # rising, in the unit of the peaks
-    share: Array  # of peaks up to each
+    share: Array  # share of peaks up to each value
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,18 +71,19 @@ class Agreement(Result):
     peaks : Peaks
         The measured peaks.
     cramer_von_mises, largest_deviation : float
-        Sum over tests of the squared difference between the measured and the predicted share of
-        peaks, and the largest of these differences times the square root of the number of tests.
+        Both distances. W^2 sums the squared differences between measured and predicted shares over
+        the tests. The largest difference is multiplied by the square root of the number of tests.
     p_values : dict of str to float
-        By these two names: probability of a distance at least as large if the prediction is right.
+        Probability of a distance at least as large if the prediction is right, by the names of the
+        two distances.
     predicted : tuple of (values, share)
         Predicted distribution function of each kind of specimen.
     band : float
         Largest deviation that 90 % of campaigns do not exceed.
     precursors : dict of str to (measured, predicted) arrays
-        If curves were compared: ``number`` of precursors of each test, ``size`` of the
-        largest (N or Pa, 0 without any), and ``first_load``, the force at the first (the peak
-        without any). `p_values` has these names too.
+        Given if curves were compared, one value for each test: ``number`` of precursors, ``size``
+        (N or Pa) of the largest precursor or 0, and ``first_load``, the force at the first
+        precursor or else the peak. `p_values` has these names too.
     """
 
     peaks: Peaks
@@ -98,23 +120,24 @@ def agreement(
 ) -> Agreement:
     """Test whether measured peaks agree with a prediction.
 
-    Distributions are compared: the order of the tests does not count. Take off a trend first,
-    ``peaks - np.polyval(np.polyfit(time, peaks, 1), time) + peaks.mean()``, and say so.
+    The test compares distributions, so the order of the tests does not count. If peaks drift,
+    remove the trend first, ``peaks - np.polyval(np.polyfit(time, peaks, 1), time) + peaks.mean()``,
+    and report that you did.
 
     Parameters
     ----------
     prediction : Dataset or Posterior
-        From `stiction.monte_carlo`, or from `stiction.infer`, of whose parameters it takes the
-        uncertainty into account; in either case with parameters not fitted to these peaks.
+        Result of `stiction.monte_carlo`, or of `stiction.infer`, whose uncertainty then counts.
+        Neither may have been fitted to these peaks.
     peaks : array, mapping of arrays, Peaks or Curves
-        As in `stiction.infer`. With `Curves` and a prediction that has events, as by
-        ``Equilibrium(events=20)``, precursors are compared too.
+        As in `stiction.infer`. Precursors are compared too if curves are given and the prediction
+        has events, such as the events of ``Equilibrium(events=20)``.
     unit : str
         Unit of the peaks and the load-cell error.
     load_cell_error : float
-        Standard deviation of the error of a peak, for a dataset; a posterior has its own.
+        Standard deviation of the error of a peak, for a dataset. A posterior has its own.
     replicates : int
-        Number of simulated campaigns; p-values are at least 1/(replicates + 1).
+        Number of simulated campaigns. A p-value is at least 1/(replicates + 1).
     seed : int
         Not negative.
 
@@ -126,19 +149,20 @@ def agreement(
     Raises
     ------
     InputError
-        If the prediction lacks the quantity that was measured, is swept, or is of one kind
-        of specimen where several were tested; peaks are fifty times those predicted, or a
-        fiftieth; or the posterior was fitted to them, near which it then lies.
+        If the prediction lacks the measured quantity, is a sweep, or has one kind of specimen
+        although several were tested. If peaks differ from the prediction by a factor of fifty. If
+        the posterior was fitted to these peaks, because it then lies near them.
 
     Warns
     -----
     AccuracyWarning
-        If samples of the prediction have no peak; they are left out.
+        If samples of the prediction have no peak. They are left out.
 
     Notes
     -----
-    A p-value of 0.3 says that three of ten campaigns of as many tests would lie as far from a right
-    prediction; it does not say that the prediction is right. A few tests find gross errors only.
+    A p-value of 0.3 means that three of ten campaigns with as many tests would lie as far from a
+    right prediction. It does not mean that the prediction is right. Few tests find only gross
+    errors.
 
     Examples
     --------
@@ -156,12 +180,17 @@ def agreement(
     measured = make_peaks(peaks, unit)
     if isinstance(prediction, Posterior):
         if load_cell_error:
-            raise InputError("load_cell_error: the posterior has its own; leave it out")
+            raise InputError("load_cell_error: leave it out. The posterior has its own")
         return _with_posterior(prediction, measured, replicates, rng)
     values = _values(prediction, measured)
     factor = 1.0 if isinstance(peaks, Peaks | Curves) else factor_of(unit)
     values = values + factor * load_cell_error * rng.standard_normal(values.size)
-    result = _with_sample(values, measured, replicates, rng)
+    measured.refuse_far([values])
+    # 1. to 3.
+    distances = _permuted(measured.values[0], values, replicates, rng)
+    at = np.unique(np.concatenate([measured.values[0], values]))
+    share = np.searchsorted(np.sort(values), at, side="right") / values.size
+    result = _summary(measured, distances, (Predicted(at, share),))
     if isinstance(peaks, Curves) and "event" in prediction.dims:
         precursors = _precursors(prediction, peaks)
         for name, pair in precursors.items():
@@ -174,20 +203,20 @@ def agreement(
 def _precursors(prediction: xr.Dataset, curves: Curves) -> dict[str, tuple[Array, Array]]:
     """Return number, largest size and first load of precursors, measured and predicted.
 
-    Both are found in the same way, in the force before and after each predicted event, with the
-    largest threshold of the tests: drops that a load cell does not tell from noise do not count.
+    Both follow from the force before and after each event, with the largest threshold of the tests.
+    A smaller drop does not count, because the load cell would not tell it from noise.
     """
     names = {"N": ("event_force", "critical_force"), "Pa": ("event_stress", "critical_stress")}
     event, peak = names.get(curves.unit, ("", ""))
     if event not in prediction:
         raise InputError(
-            f"prediction: has no events in {curves.unit}, in which the curves are; give curves of"
+            f"prediction: has no events in {curves.unit}, the unit of the curves. Give curves of"
             " force, and the thickness of the specimen"
         )
     if int(prediction["arrested_events"].max()) > prediction.sizes["event"]:
         raise InputError(
             f"prediction: keeps {prediction.sizes['event']} of up to"
-            f" {int(prediction['arrested_events'].max())} events; predict with at least so many"
+            f" {int(prediction['arrested_events'].max())} events. Predict with at least so many"
         )
     high = prediction[event].transpose("sample", "event").values
     low = high - prediction[f"{event}_drop"].transpose("sample", "event").values
@@ -197,7 +226,7 @@ def _precursors(prediction: xr.Dataset, curves: Curves) -> dict[str, tuple[Array
     for row in np.flatnonzero(np.isfinite(peaks)):
         force = np.stack([high[row], low[row]], axis=1).ravel()
         force = np.append(force[np.isfinite(force)], peaks[row])
-        # The peak is where sliding begins, or an earlier event.
+        # The peak is the force at the onset, or at an earlier event.
         predicted.append(summary_of(force, threshold))
     measured = [summary_of(curve.force, threshold) for curve in curves]
     pairs = zip(np.transpose(measured), np.transpose(predicted), strict=True)
@@ -208,14 +237,14 @@ def _values(prediction: xr.Dataset, measured: Peaks) -> Array:
     name = measured.variable
     if name not in prediction:
         raise InputError(
-            f"prediction: has no {name}, which was measured; it holds"
+            f"prediction: lacks the measured quantity, {name}. It holds"
             f" {', '.join(map(str, prediction.data_vars))}"
         )
     if prediction[name].ndim != 1 or len(measured.values) > 1:
         raise InputError(
-            f"prediction: must be of one kind of specimen, got {name} over"
-            f" {', '.join(map(str, prediction[name].dims))} for {len(measured.values)} kinds;"
-            " choose a step of a sweep with isel, and compare kinds one by one"
+            f"prediction: must be for one kind of specimen, got {name} over"
+            f" {', '.join(map(str, prediction[name].dims))} for {len(measured.values)} kinds."
+            " Choose a step of a sweep with isel, and compare kinds in separate calls"
         )
     values = np.asarray(prediction[name].values, dtype=np.float64)
     if missing := int(np.isnan(values).sum()):
@@ -225,51 +254,37 @@ def _values(prediction: xr.Dataset, measured: Peaks) -> Array:
     return values[np.isfinite(values)]
 
 
-def _with_sample(values: Array, measured: Peaks, replicates: int, rng: Any) -> Agreement:
-    """Permutation test: which of all values are the measured ones?"""
-    (peaks,) = measured.values
-    measured.refuse_far([values])
-    distances = _permuted(peaks, values, replicates, rng)
-    at = np.unique(np.concatenate([peaks, values]))
-    share = np.searchsorted(np.sort(values), at, side="right") / values.size
-    return _summary(measured, distances, (Predicted(at, share),))
-
-
 def _permuted(peaks: Array, values: Array, replicates: int, rng: Any) -> Array:
-    """Return both distances, (1 + replicates, 2), of which the first are the measured ones."""
+    """Return both distances of the measured and of random choices, (1 + replicates, 2)."""
     at, place, counts = np.unique(
         np.concatenate([peaks, values]), return_inverse=True, return_counts=True
     )
-    share = counts / place.size
+    total, size, share = place.size, peaks.size, counts / place.size
     distances = np.empty((replicates + 1, 2))
     for row in range(replicates + 1):
-        chosen = (
-            rng.choice(place.size, peaks.size, replace=False) if row else np.arange(peaks.size)
-        )
-        reached = np.cumsum(np.bincount(place[chosen], minlength=at.size)) / peaks.size
-        # The others' share follows from that of all.
-        away = (reached - np.cumsum(share)) * place.size / values.size
-        distances[row] = (
-            peaks.size * (share @ away**2),
-            np.sqrt(peaks.size) * np.abs(away).max(),
-        )
+        # 2.
+        chosen = rng.choice(total, size, replace=False) if row else np.arange(size)
+        reached = np.cumsum(np.bincount(place[chosen], minlength=at.size)) / size
+        # The remaining values have the distribution of all values less the chosen ones.
+        away = (reached - np.cumsum(share)) * total / values.size
+        distances[row] = size * (share @ away**2), np.sqrt(size) * np.abs(away).max()
     return distances
 
 
 def _with_posterior(
     posterior: Posterior, measured: Peaks, replicates: int, rng: Any
 ) -> Agreement:
-    """Compare with campaigns drawn from the posterior, each at one point of it."""
+    """Compare with campaigns drawn from the posterior (steps 4 to 6)."""
     fitted = posterior.peaks
     if measured.unit != fitted.unit or not {*measured.lengths} <= {*fitted.lengths}:
         raise InputError(
-            f"peaks: the posterior predicts {fitted} in {fitted.unit}, got {measured} in"
+            f"peaks: the posterior predicts {fitted} in {fitted.unit}. Got {measured} in"
             f" {measured.unit}"
         )
     seen = np.concatenate(fitted.values)
     if np.isin(np.concatenate(measured.values), seen).all():
         raise InputError(
-            "peaks: the posterior was fitted to them, near which it lies; compare those of"
+            "peaks: the posterior was fitted to them and so lies near them. Compare peaks of"
             " further tests, or leave some out of the fit"
         )
     kinds = [fitted.lengths.index(length) for length in measured.lengths]
@@ -278,7 +293,9 @@ def _with_posterior(
     chosen = rng.integers(POSTERIOR_POINTS, size=replicates)
     distances, predicted = np.zeros((replicates + 1, 2)), []
     for kind, peaks in zip(kinds, measured.values, strict=True):
+        # 4.
         at, shares = _law(posterior, kind, u, peaks)
+        # 5.
         uniform = rng.random((replicates, peaks.size))
         drawn = [np.interp(p, shares[i], at) for p, i in zip(uniform, chosen, strict=True)]
         law = Predicted(at, shares.mean(axis=0))
@@ -290,7 +307,7 @@ def _with_posterior(
 
 
 def _law(posterior: Posterior, kind: int, u: Array, peaks: Array) -> tuple[Array, Array]:
-    """Return peaks, and the shares up to each at parameters u, (points, LAW_VALUES)."""
+    """Return peaks, and the share of peaks up to each at parameters u, (points, LAW_VALUES)."""
     ends = np.quantile(posterior.predicted[kind], [OUTLYING_SHARE, 1.0 - OUTLYING_SHARE])
     low, high = min(ends[0], peaks.min()), max(ends[1], peaks.max())
     margin = RANGE_MARGIN * (high - low)
@@ -302,24 +319,22 @@ def _law(posterior: Posterior, kind: int, u: Array, peaks: Array) -> tuple[Array
 
 
 def _distances(share: Array) -> tuple[Array, Array]:
-    """Return both distances of predicted shares at sorted peaks from a uniform distribution."""
+    """Return W^2 and D of sorted uniform numbers, (campaigns, tests)."""
     size = share.shape[1]
     steps = np.arange(size + 1) / size
-    squares = np.sum((0.5 * (steps[1:] + steps[:-1]) - share) ** 2, axis=1) + 1.0 / (
-        12.0 * size
-    )
+    squares = np.sum((0.5 * (steps[1:] + steps[:-1]) - share) ** 2, axis=1) + 1 / (12 * size)
     most = np.maximum((steps[1:] - share).max(axis=1), (share - steps[:-1]).max(axis=1))
     return squares, np.sqrt(size) * most
 
 
 def _p_values(distances: Array) -> list[float]:
-    """Return the shares of replicates whose distances are at least those of the first row."""
+    """Return the share of rows whose distances are at least the distances of the first row."""
     as_far = np.sum(distances[1:] >= distances[0] * (1.0 - 1e-9), axis=0)
     return ((1 + as_far) / len(distances)).tolist()
 
 
 def _summary(measured: Peaks, distances: Array, predicted: Any) -> Agreement:
-    """Summarise distances (1 + replicates, 2), of which the first are the measured ones."""
+    """Return the agreement from distances (1 + replicates, 2), the measured ones first."""
     observed, replicates = distances[0], distances[1:]
     names = ("cramer_von_mises", "largest_deviation")
     return Agreement(

@@ -1,4 +1,21 @@
-"""The scatter between specimens, and records without it."""
+"""The scatter between specimens, and records without it.
+
+Problem. Records k = 1, ..., n of different specimens have means with logarithms L_k. A field alone
+would give L_k the variance v_k. Estimate the variance s between specimens, and scale the records as
+if all came from one specimen.
+
+Sources. Paule and Mandel (1982), Journal of Research of the National Bureau of Standards 87, 377.
+Viechtbauer (2007), Statistics in Medicine 26, 37.
+
+Steps:
+
+1. With weights 1/(s + v_k), take the mean m(s) of the logarithms and
+   Q(s) = sum (L_k - m(s))^2/(s + v_k). At the true s it is chi-square distributed with n - 1
+   degrees of freedom.
+2. Estimate s by Q(s) = n - 1, the mean of this distribution. Take s = 0 if Q(0) is smaller.
+3. Draw the logarithms together until Q(0) = n - 1, and scale the records to these means. Equal
+   means would lack the variance that a field itself has from record to record.
+"""
 
 import math
 from collections.abc import Sequence
@@ -11,26 +28,24 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 
 MOST_SCATTER = math.log(2.0)
-"""Largest variance between specimens of the logarithm that is searched: a factor of cv 1."""
+"""Largest variance s of the search, of a log-normal factor with coefficient of variation 1."""
 
 
 def levels_of(rows: Sequence[Array]) -> Array:
-    """Return the means of records of different specimens, (records,)."""
+    """Return the means of the records of different specimens, (records,)."""
     levels = np.array([row.mean() for row in rows])
     if levels.min() <= 0.0:
         raise InputError(
-            f"between: needs records of positive mean, got means from {levels.min():g} to"
+            f"between: needs records of positive mean. Got means from {levels.min():g} to"
             f" {levels.max():g}"
         )
     return levels
 
 
 def as_of_one(rows: Sequence[Array], within: Array) -> list[Array]:
-    """Return the records, scaled as if all came from one specimen.
+    """Return the records, scaled as if all came from one specimen (step 3).
 
-    Equal means would lack the part of the variance that a field itself has from record to record.
-    So the logarithms of the means are drawn together until Q(0) of `variance_between` is what it is
-    without scatter between specimens; `within` are their variances from the field alone.
+    `within` holds the variances v_k, (records,).
     """
     levels = levels_of(rows)
     if levels.size < 2:
@@ -44,42 +59,27 @@ def as_of_one(rows: Sequence[Array], within: Array) -> list[Array]:
     return [row * factor for row, factor in zip(rows, factors, strict=True)]
 
 
-def _weighed(values: Array, within: Array, s: float) -> tuple[float, float, float]:
-    """Mean of values at a variance s between records, its variance, and Q(s)."""
+def _q(values: Array, within: Array, s: float) -> float:
+    """Return Q(s) of values (step 1)."""
     weight = 1.0 / (s + within)
     middle = float(weight @ values / weight.sum())
-    return middle, 1.0 / float(weight.sum()), float(weight @ (values - middle) ** 2)
+    return float(weight @ (values - middle) ** 2)
 
 
 def chance_of_scatter(levels: Array, variances: Array) -> float:
-    """Return how likely records of one field scatter at least as much about a common mean."""
-    return float(chi2.sf(_weighed(levels, variances, 0.0)[2], levels.size - 1))
-
-
-def variance_between(logarithms: Array, within: Array, level: float) -> float:
-    """Return the variance s between records at which Q(s) is as large as `level`.
-
-    Q(s) = sum (L - m(s))^2/(s + v) is chi-square distributed with one degree of freedom
-    less than records at the true variance s of the logarithms L (Viechtbauer, 2007),
-    whatever their number. `within` are the variances v of the logarithms from the field
-    alone, (records,).
-    """
-
-    def excess(s: float) -> float:
-        return _weighed(logarithms, within, s)[2] - level
-
-    if excess(0.0) <= 0.0:
-        return 0.0
-    if excess(MOST_SCATTER) >= 0.0:
-        return MOST_SCATTER
-    return float(brentq(excess, 0, MOST_SCATTER))
+    """Return the probability that records of one field scatter as much about a common mean."""
+    return float(chi2.sf(_q(levels, variances, 0.0), levels.size - 1))
 
 
 def scatter_between(logarithms: Array, within: Array) -> float:
-    """Estimate the coefficient of variation of a log-normal factor between records.
+    """Estimate the coefficient of variation of a log-normal factor between records (step 2).
 
-    It is where Q is as large as expected (Paule and Mandel, 1982); 0 of a single record.
+    It is 0 for a single record.
     """
-    if logarithms.size < 2:
+    freedom = logarithms.size - 1
+    if _q(logarithms, within, 0.0) <= freedom:
         return 0.0
-    return math.sqrt(math.expm1(variance_between(logarithms, within, logarithms.size - 1)))
+    if _q(logarithms, within, MOST_SCATTER) >= freedom:
+        return math.sqrt(math.expm1(MOST_SCATTER))
+    variance = brentq(lambda s: _q(logarithms, within, s) - freedom, 0, MOST_SCATTER)
+    return math.sqrt(math.expm1(variance))

@@ -1,4 +1,28 @@
-"""Intervals of a fit, and fits as likely as it, from fits to simulated records."""
+"""Intervals of a fit, and fields as likely as the fit, from fits to simulated records.
+
+Problem. A fit estimates parameters theta from records. Find intervals that contain the true theta
+with a given probability, and fields that are as likely as the estimate.
+
+Sources. Studentised intervals: Davison and Hinkley, Bootstrap Methods and their Application (1997),
+section 5.2. Ends by test inversion: Carpenter (1999), Journal of the Royal Statistical Society B
+61,
+159.
+
+Steps:
+
+1. Simulate records from the estimate, and fit each of them from the estimate as a start.
+2. Bring each parameter to a scale on which its error is about normal (`Scale`).
+3. The error of a repetition is (estimate of the repetition - estimate)/width. The width is in
+   proportion to the square root of the correlation length, because a record holds few of these.
+4. Subtract the quantiles of the error, times the width, from the estimate: a first interval.
+5. Repeat steps 1 and 3 for fields whose correlation length lies at either end of its first
+   interval. Take the upper end of each interval from the longer one, and the lower end from the
+   shorter one. Exchange them for parameters whose estimates fall with the correlation length.
+6. Bounds of the marginal end outside of the values, and other parameters at their ranges.
+7. A likely field is the estimate less the error of one repetition, times the width.
+
+Departures. One step of the inversion is made, with the correlation length for all parameters.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -19,13 +43,12 @@ from stiction.random.fields import RandomField
 from stiction.random.marginals import Beta
 
 MIN_REPETITIONS = 20
-"""Number of repetitions that determine a tail of errors."""
+"""Fewest repetitions that determine a tail of errors."""
 LOCATION_PARAMETERS = ("mean", "marginal.mean", "marginal.loc")
-"""Parameters of location."""
 SIDES = {"marginal.low": -1.0, "marginal.high": 1.0}
 """Side of the mean on which a bound lies."""
 MIN_WIDTH = 1e-3
-"""Distance within which an interval is uninformative, as a share of an end of a range."""
+"""Least width of an interval, over its upper end. A narrower one is replaced by the whole range."""
 
 
 class Repetitions(NamedTuple):
@@ -36,12 +59,12 @@ class Repetitions(NamedTuple):
 
 
 class NotRepeated(InputError):
-    """A family that cannot be fitted to most records that are simulated from it."""
+    """A family that cannot be fitted to most of the records that are simulated from it."""
 
     def __init__(self, family: Family, fits: int, count: int) -> None:
         super().__init__(
             f"marginal: {family.label!r} could be fitted to only {fits} of {count} records"
-            " that were simulated from its fit; take another marginal"
+            " that were simulated from its fit. Take another marginal"
         )
         self.family = family
 
@@ -55,10 +78,10 @@ def bootstrapped(
     workers: int | None = None,
     further: Sequence[tuple[Estimate, int]] = (),
 ) -> tuple[list[Repetitions], list[Repetitions]]:
-    """Fit records simulated from an estimate, and from it `at_ends` of its correlation length.
+    """Fit records simulated from an estimate, and from fields `at_ends` (steps 1 and 5).
 
-    Also from `further`, each with its own number of repetitions. Those to which the family
-    cannot be fitted are missing.
+    The second list holds the fits from `further` estimates, with their own numbers of repetitions.
+    Records to which the family cannot be fitted are left out.
     """
 
     def repeat(truth: Estimate, count: int = count) -> Repetitions:
@@ -87,7 +110,7 @@ def bootstrapped(
 
 
 def at_ends(around: Repetitions, confidence: float) -> list[Estimate]:
-    """Return the field with its correlation length at either end of a first interval."""
+    """Return the field with its correlation length at both ends of a first interval (step 5)."""
     fitted, family = around.truth, around.truth.setting.spectrum
     place = family.free.index("correlation_length")
     moved = []
@@ -101,10 +124,10 @@ def at_ends(around: Repetitions, confidence: float) -> list[Estimate]:
 
 
 class Scale(NamedTuple):
-    """Scale on which the error of a parameter is about normal: a logarithm, unless `linear`.
+    """Scale on which the error of a parameter is about normal: its logarithm, unless `linear`.
 
-    For bounds of a marginal it is the logarithm of the distance from the mean; for the noise it is
-    the variance, which may be negative: estimates at zero would all have an error of zero.
+    A bound of a marginal is given by the logarithm of its distance from the mean. Noise is given by
+    its variance, which may be negative, because all estimates at zero would have an error of zero.
     """
 
     name: str
@@ -131,7 +154,7 @@ class Scale(NamedTuple):
         return values["mean"] + SIDES[name] * away if name in SIDES else origin(name) + away
 
     def of(self, fitted: Estimate) -> tuple[float, float]:
-        """Return an estimate on this scale, and a quantity to which its error is in proportion."""
+        """Return an estimate on this scale, and the width of step 3."""
         if self.name == "noise":
             return fitted.noise
         width = math.sqrt(fitted.parameters["efolding_length"])
@@ -140,17 +163,15 @@ class Scale(NamedTuple):
         return self.to(fitted.parameters), width
 
     def less(self, fitted: Estimate, repeated: Repetitions) -> Array:
-        """Return an estimate less the error of each repetition, in proportion to its width."""
+        """Return an estimate less the error of each repetition (steps 3 and 7)."""
         at, width = self.of(fitted)
-        true, refitted = (
-            self.to(repeated.truth.parameters),
-            np.array([*map(self.of, repeated.fits)]),
-        )
+        true = self.to(repeated.truth.parameters)
+        refitted = np.array([self.of(fit) for fit in repeated.fits])
         return at - width * (refitted[:, 0] - true) / refitted[:, 1]
 
 
 def scale_of(name: str, repeated: Sequence[Repetitions]) -> Scale:
-    """Return the scale of a parameter, linear if it was found negative."""
+    """Return the scale of a parameter. It is linear if an estimate is negative."""
     least = min(one.parameters[name] for own in repeated for one in (own.truth, *own.fits))
     return Scale(name, name in LOCATION_PARAMETERS or (name not in SIDES and least < 0.0))
 
@@ -158,13 +179,7 @@ def scale_of(name: str, repeated: Sequence[Repetitions]) -> Scale:
 def intervals(
     repeated: Sequence[Repetitions], confidence: float, values: Array
 ) -> dict[str, tuple[float, float]]:
-    """Return studentised bootstrap intervals (Davison and Hinkley, 1997, section 5.2).
-
-    Errors are in units of the root of the correlation length, of which a record holds few. Upper
-    and lower ends come from fields of longer and shorter correlation, `at_ends` (one step of a test
-    inversion; Carpenter, 1999): the longer one at the upper end of parameters whose estimates rise
-    with the correlation length. Intervals of bounds end outside of `values` without noise.
-    """
+    """Return the interval of each parameter (steps 2 to 6). `values` are measured, with noise."""
     around, *moved = repeated
     fitted, estimated = around.truth, around.truth.parameters
     tail = 0.5 * (1.0 - confidence)
@@ -179,25 +194,27 @@ def intervals(
             float(np.quantile(scale.less(fitted, repetitions), share, method="weibull"))
             for repetitions, share in ((shorter, tail), (longer, 1.0 - tail))
         )
-        if name == "noise" and high <= 0.0:  # by chance: as wide as of an estimate of zero
+        if (
+            name == "noise" and high <= 0.0
+        ):  # negative by chance: as wide as for an estimate of 0
             high -= fitted.noise[0]
         first, last = sorted(scale.back(end, estimated) for end in (low, high))
         result[name] = first, last
+    # 6.
     noise = result["noise"][1] if "noise" in result else fitted.model.noise
     limits = limits_of(fitted, values, noise)
     for name in limits.keys() & result.keys():
         ends = limits[name]
         low, high = np.clip(result[name], *ends).tolist()
-        if high - low <= (
-            MIN_WIDTH * high if np.isfinite(ends).all() else 0.0
-        ):  # nothing is left
+        least = MIN_WIDTH * high if np.isfinite(ends).all() else 0.0
+        if high - low <= least:
             low, high = (end if math.isfinite(end) else estimated[name] for end in ends)
         result[name] = low, high
     return result
 
 
 def limits_of(fitted: Estimate, values: Array, noise: float) -> dict[str, tuple[float, float]]:
-    """Return the limits of parameters, with bounds of the marginal outside of all values."""
+    """Return the limits of parameters. Bounds of the marginal lie outside of all values."""
     estimated = fitted.parameters
     quiet = fitted.setting.marginal.quiet(values, noise)
     bottom, top = (float(end) for end in fitted.marginal.distribution.support())
@@ -211,7 +228,7 @@ def limits_of(fitted: Estimate, values: Array, noise: float) -> dict[str, tuple[
         "marginal.high": above,
     }
     loc, extent = estimated.get("marginal.loc"), estimated.get("marginal.scale")
-    if loc in (bottom, top):  # else it is inside, such as a mean
+    if loc in (bottom, top):  # otherwise loc is not a bound, such as a mean
         limits["marginal.loc"] = below if loc == bottom else above
     if extent is not None and math.isclose(extent, top - bottom):
         limits["marginal.scale"] = (most - least, math.inf)
@@ -219,7 +236,7 @@ def limits_of(fitted: Estimate, values: Array, noise: float) -> dict[str, tuple[
 
 
 def likely(repeated: Repetitions, measured: Array, quantity: str) -> list[RandomField]:
-    """Return fields as likely as the one found: it less the error of each repetition."""
+    """Return fields as likely as the estimate, one for each repetition (step 7)."""
     fitted = repeated.truth
     field, limits = fitted.field(quantity), limits_of(fitted, measured, fitted.model.noise)
     free: dict[str, list[float]] = {}
@@ -227,7 +244,7 @@ def likely(repeated: Repetitions, measured: Array, quantity: str) -> list[Random
         if name == "mean" or name.startswith("marginal.") or name in NAMES.values():
             scale = scale_of(name, [repeated])
             places = scale.less(fitted, repeated).tolist()
-            means = free.get("mean", places)  # bounds lie at distances from them
+            means = free.get("mean", places)  # bounds are given by their distance from the mean
             pairs = zip(places, means, strict=True)
             free[name] = [scale.back(at, {"mean": mean}) for at, mean in pairs]
     del free["mean"]
@@ -238,7 +255,7 @@ def likely(repeated: Repetitions, measured: Array, quantity: str) -> list[Random
             n: float(np.clip(values[n], *limits[n])) for n in values.keys() & limits.keys()
         }
         member = with_values(field, values | within)
-        if isinstance(member.marginal, Beta):  # of the same mean and scatter between its limits
+        if isinstance(member.marginal, Beta):  # the limits keep mean and scatter
             bounds = {n: values[n] for n in values.keys() & SIDES.keys()}
             before = with_values(field, values | within | bounds)
             ends = member.marginal.low, member.marginal.high

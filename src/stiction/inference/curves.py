@@ -1,17 +1,22 @@
 """Measured curves of force against travel or time: peak, precursors and plateau of each test.
 
-Readings F_i carry white noise of standard deviation s. Wanted are the peak, the drops before it,
-in each of which a part of the interface slips and comes to rest, and the plateau after it.
+Problem. Readings F_i carry white noise of standard deviation s. Find the peak, the drops before it
+(precursors: a part of the interface slips and comes to rest) and the plateau after it.
 
-1. Noise. Second differences F_(i-1) - 2 F_i + F_(i+1) vanish where the force is a straight line,
-   and have the variance 6 s^2. Their median gives s; drops are too rare to change it. A cell that
-   reads in steps q has at least s = q/sqrt(12).
-2. Threshold. n readings of a constant force have a range of about 2 s sqrt(2 ln n) (David and
-   Nagaraja, Order Statistics, 2003, section 10.5). Only a larger fall is a drop.
-3. Turning points. From the last lowest reading on, the highest is kept until the force lies more
-   than the threshold below it: there a drop begins. The lowest is then kept until the force lies
-   more than the threshold above it: there the drop has ended.
-4. The peak is the largest force. Drops that begin before it are precursors. The plateau is what
+Source. The range of white noise is in David and Nagaraja, Order Statistics (2003), section 10.5.
+The choice of thresholds and turning points is our own.
+
+Steps:
+
+1. Noise. Second differences F_(i-1) - 2 F_i + F_(i+1) vanish on a straight line, and have the
+   variance 6 s^2. Their median gives s, because drops are too rare to change a median. A load cell
+   that reads in steps q has at least s = q/sqrt(12).
+2. Threshold. n readings of a constant force have a range of about 2 s sqrt(2 ln n). Only a larger
+   fall is a drop.
+3. Turning points. Keep the highest reading since the last drop. A drop begins at this reading when
+   the force lies more than the threshold below it. Then keep the lowest reading. The drop ends at
+   this reading when the force lies more than the threshold above it.
+4. The peak is the largest force. Drops that begin before the peak are precursors. The plateau
    follows the drop at the peak.
 """
 
@@ -29,45 +34,31 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed, warn_accuracy
 from stiction.base.model import Number, Positive, checked, describe, real_array
 from stiction.base.representation import Result, Row, Summary
-from stiction.base.units import factor_to, in_words, is_in, parse
+from stiction.base.units import factor_to, in_words, is_in
 from stiction.problem.profiles.reading import Missing, reading_options, with_stated_unit
-from stiction.problem.profiles.tables import (
-    EXCEL,
-    TEXT,
-    Options,
-    column_of,
-    read_table,
-    table_of_frame,
-)
+from stiction.problem.profiles.tables import EXCEL, TEXT, column_of, read_table, table_of_frame
 
 FORCE = ("force", "load", "kraft", "standardkraft", "friction", "stress", "coefficient", "mu")
 TRAVEL = (
-    "travel",
-    "displacement",
-    "extension",
-    "position",
-    "crosshead",
-    "weg",
-    "standardweg",
-    "x",
-)
+    "travel", "displacement", "extension", "position", "crosshead", "weg", "standardweg", "x",
+)  # fmt: skip
 TIME = ("time", "zeit", "t")
 TEST = ("test", "specimen", "run", "probe", "versuch")
-"""First words of headings: of the force, the travel, the time and the number of the test."""
+"""First words of the headings of force, travel, time and test number."""
 FORCE_UNITS, TRAVEL_UNITS = ("N", "Pa", "1"), ("m", "s")
-"""Units of what is measured, and of what it is measured over."""
+"""SI units of the measured quantity, and of travel or time."""
 MIN_READINGS = 8
-"""Readings of a test."""
+"""Fewest readings of a test."""
 MAX_BACKWARD_SHARE = 0.05
-"""Share of its range by which travel may go back: more is another cycle."""
+"""Largest share of its range by which travel may go back. A larger one begins another cycle."""
 ROUND_OFF = 1e-12
 """Share of the largest force below which differences of readings are round-off."""
 MIN_DROP_SHARE = 1e-6
-"""Share of the peak below which a fall is round-off, without any noise."""
+"""Share of the peak below which a fall is round-off if there is no noise."""
 
 
 class Drops(NamedTuple):
-    """Falls of the force: where each begins, from which force, and by how much it falls."""
+    """Falls of the force: travel and force at the beginning, and size of each fall."""
 
     travel: Array
     force: Array
@@ -76,26 +67,26 @@ class Drops(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Curve(Result):
-    """The curve of one test, and what it says.
+    """The curve of one test with its peak, precursors and plateau.
 
     Attributes
     ----------
     name : str
         File, and number of the test if the file holds several.
     travel, force : (readings,) arrays
-        In SI; travel is the time of tests without a travel.
+        Readings in SI. `travel` is the time if the test has no travel.
     unit, travel_unit : str
-        "N", "Pa" or "1" of the force, "m" or "s" of the travel.
+        Unit of the force, "N", "Pa" or "1", and of the travel, "m" or "s".
     noise : float
         Standard deviation of a reading.
     threshold : float
-        Fall of the force from which on it is a drop.
+        Smallest fall of the force that counts as a drop.
     peak, peak_travel : float
-        Largest force, and where it was reached.
+        Largest force and its travel.
     drops : Drops
-        Drops before the peak: precursors. Each size is uncertain by about twice the noise.
+        Precursors: drops before the peak. The error of each size is about twice the noise.
     plateau, plateau_deviation : float
-        Mean and standard deviation of the force after the drop at the peak; NaN if the record
+        Mean and standard deviation of the force after the drop at the peak. NaN if the record
         ends there.
     """
 
@@ -114,12 +105,11 @@ class Curve(Result):
 
     def __str__(self) -> str:
         count = self.drops.size.size
+        place = in_words(self.travel_unit, self.peak_travel)
         text = (
-            f"{self.name}: peak {in_words(self.unit, self.peak)} at"
-            f" {in_words(self.travel_unit, self.peak_travel)}, {count} precursor"
-            + "s"
-            * (count != 1)
+            f"{self.name}: peak {in_words(self.unit, self.peak)} at {place}, {count} precursor"
         )
+        text += "s" * (count != 1)
         if count:
             first = in_words(self.unit, self.drops.force[0])
             text += f" from {first} on, of up to {in_words(self.unit, self.drops.size.max())}"
@@ -139,7 +129,7 @@ class Curve(Result):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Curves(Result):
-    """Curves of repeated tests: a sequence of `Curve`, for `read_peaks`, `infer` and figures."""
+    """Curves of repeated tests, for `read_peaks`, `infer` and figures."""
 
     tests: tuple[Curve, ...]
 
@@ -190,26 +180,28 @@ def read_curve(
     Parameters
     ----------
     source : path, DataFrame or (travel, force)
-        A text file or workbook with a column of force, stress or friction coefficient and one
-        of travel or time; a folder of them; a table of pandas; or two arrays. One file may
-        hold several tests: in a column ``test``, or separated by empty lines.
+        A text file or workbook, a folder of such files, a pandas table, or two arrays. A table
+        needs a column with force, stress or friction coefficient and a column with travel or time.
+        A file may hold several tests, either numbered in a column ``test`` or separated by empty
+        lines.
     force, travel : str or int, optional
-        Column: name, heading or number from 0. By default the one called force, load,
-        friction, ..., and travel, displacement, extension, position, ... or else time.
+        Column, given by its name, heading or number from 0. By default the force is the column
+        called force, load, friction, ... and the travel is the column called travel, displacement,
+        extension, position, ... or else time.
     unit, travel_unit : str, optional
-        Their units if the source states none.
+        Units of force and travel if the source states no units.
     speed : float, optional
-        Speed of the crosshead, m/s: turns time into travel.
+        Speed of the crosshead, m/s. It turns time into travel.
     noise : float, optional
         Standard deviation of a reading of the load cell, in SI. By default it is estimated
-        from neighbouring readings, which needs a cell without a filter.
+        from neighbouring readings, which needs a load cell without a filter.
     missing, decimal, skip, sheet
         As in `stiction.read_profile`.
 
     Returns
     -------
     Curves
-        A sequence of one `Curve` for each test.
+        A sequence with a `Curve` for each test.
 
     Raises
     ------
@@ -242,19 +234,19 @@ def read_curve(
                     tests.append(_curve(full, columns, chosen, noise))
     if len({(curve.unit, curve.travel_unit) for curve in tests}) > 1:
         raise InputError(
-            "source: tests differ in what they measure, such as force over travel and stress over"
-            " time; read them apart"
+            "source: tests measure different quantities, such as force over travel and stress over"
+            " time. Read them in separate calls"
         )
     if ends := [curve.name for curve in tests if math.isnan(curve.plateau)]:
         warn_accuracy(
             f"the record ends at its peak in {', '.join(ends[:3])} ({len(ends)} of {len(tests)}"
-            " tests): the interface may not have slid as a whole, and its peak may be higher"
+            " tests). The interface may not have slid as a whole, and its peak may be higher"
         )
     return Curves(tuple(tests))
 
 
 class Columns(NamedTuple):
-    """Readings of a file in SI, their units, and the lines where they stand."""
+    """Readings of a file in SI, their units, and their line numbers."""
 
     travel: Array
     force: Array
@@ -263,8 +255,8 @@ class Columns(NamedTuple):
     lines: Array
 
 
-def _tables(source: Any, options: Options) -> Iterator[tuple[str, Any]]:
-    """Yield each file of a folder, or the one source, as a table with its name."""
+def _tables(source: Any, options: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the name and the table of each file in a folder, or of the only source."""
     if isinstance(source, str | Path):
         path = Path(source)
         files = [path]
@@ -275,7 +267,7 @@ def _tables(source: Any, options: Options) -> Iterator[tuple[str, Any]]:
             )  # fmt: skip
             if not files:
                 raise InputError(
-                    f"{path}: holds no file that ends in {', '.join((*TEXT, EXCEL))}"
+                    f"{path}: has no file that ends in {', '.join((*TEXT, EXCEL))}"
                 )
         for file in files:
             with prefixed(str(file)):
@@ -287,7 +279,7 @@ def _tables(source: Any, options: Options) -> Iterator[tuple[str, Any]]:
         yield "test", source
     else:
         raise InputError(
-            f"source: must be a path, a DataFrame or (travel, force), got {describe(source)}"
+            f"source: must be a path, a DataFrame or (travel, force). Got {describe(source)}"
         )
 
 
@@ -301,11 +293,10 @@ def _columns(
 ) -> Columns:
     """Return the force and the travel of a table, in SI."""
     if isinstance(table, tuple | list):
-        pairs = [
-            with_stated_unit(v, u)
-            for v, u in zip(table, (TRAVEL_UNITS, FORCE_UNITS), strict=True)
-        ]
-        (at, at_unit), (values, value_unit) = pairs
+        (at, at_unit), (values, value_unit) = (
+            with_stated_unit(column, units)
+            for column, units in zip(table, (TRAVEL_UNITS, FORCE_UNITS), strict=True)
+        )
         lines = np.arange(np.size(at))
     else:
         column = column_of(table, FORCE, FORCE_UNITS, force)
@@ -315,8 +306,8 @@ def _columns(
             missing = "force" if column is None else "travel or time"
             names = ", ".join(map(repr, table.data_vars))
             raise InputError(
-                f"no column is clearly the {missing}; found {names}. Pass force= and travel= with"
-                " their names or numbers"
+                f"no column is clearly the {missing}. Pass force= and travel= with names or numbers"
+                f" of these columns: {names}"
             )
         if texts := [c.attrs["text"] for c in (along, column) if c.attrs.get("text")]:
             raise InputError(texts)
@@ -333,32 +324,30 @@ def _columns(
 
 
 def _in_si(
-    values: Any, stated: str | None, given: str | None, units: tuple[str, ...], what: str
+    values: Any, stated: str | None, given: str | None, units: tuple[str, ...], quantity: str
 ) -> tuple[Array, str]:
-    """Return values in the SI unit of their kind, by the unit that they or the caller state."""
-    option = "unit" if what == "force" else "travel_unit"
+    """Return values in SI, and their SI unit, from the unit in the source or of the caller."""
+    option = "unit" if quantity == "force" else "travel_unit"
     if stated and given and stated != given:
         raise InputError(f"{option}: is {given!r}, but the source states {stated!r}")
     name = stated or given
     if name is None:
         raise InputError(
-            f"the unit of the {what} is not stated; pass {option}=, such as 'mm' or 'N'"
+            f"the unit of the {quantity} is not stated. Pass {option}=, such as 'mm' or 'N'"
         )
     si = next((si for si in units if is_in(name, si)), None)
     if si is None:
-        if parse(name) is None:
-            factor_to(units[0], name)  # says that it is unknown
         raise InputError(
-            f"the {what} is in {name}; it must be in {', '.join(units)} or a multiple"
+            f"the {quantity} is in {name}. It must be in {', '.join(units)} or a multiple"
         )
     try:
         return real_array(values) * factor_to(si, name), si
     except TypeError as error:
-        raise InputError(f"{what}: must be numbers; {error}") from None
+        raise InputError(f"{quantity}: must be numbers; {error}") from None
 
 
 def _tests_of(table: Any, columns: Columns) -> Iterator[tuple[str, Any]]:
-    """Yield the label of each test in a table, and which of its rows belong to the test."""
+    """Yield the label of each test in a table, and a mask of its rows."""
     number = None if isinstance(table, tuple | list) else column_of(table, TEST)
     if number is not None and np.isfinite(number.values).all():
         for label in dict.fromkeys(number.values.tolist()):
@@ -367,17 +356,16 @@ def _tests_of(table: Any, columns: Columns) -> Iterator[tuple[str, Any]]:
     blocks = np.zeros(columns.travel.size)
     if not isinstance(table, tuple | list) and "blocks" in table.attrs:
         blocks = np.asarray(table.attrs["blocks"])
-    # An empty line inside a test separates nothing: only one after which travel begins again.
-    begins = (np.diff(blocks, prepend=blocks[:1]) > 0) & (
-        np.diff(columns.travel, prepend=0.0) < 0
-    )
+    # A new test begins after an empty line only if the travel goes back there.
+    restarts = np.diff(columns.travel, prepend=0.0) < 0
+    begins = (np.diff(blocks, prepend=blocks[:1]) > 0) & restarts
     block = np.cumsum(begins)
     for label in range(int(block[-1]) + 1):
         yield f"{label + 1}" if block[-1] else "", block == label
 
 
 def _curve(name: str, columns: Columns, chosen: Array, noise: float | None) -> Curve:
-    """Return what one test says (steps 1 to 4)."""
+    """Return the curve of one test (steps 1 to 4)."""
     travel, force, lines = columns.travel[chosen], columns.force[chosen], columns.lines[chosen]
     known = np.isfinite(travel) & np.isfinite(force)
     if not known.all():
@@ -390,40 +378,37 @@ def _curve(name: str, columns: Columns, chosen: Array, noise: float | None) -> C
     if back.size:
         raise InputError(
             f"line {lines[back[0]]}: travel or time goes back to {travel[back[0]]:.6g}"
-            f" {columns.travel_unit}; read one test or cycle at a time, with a column 'test' or an"
-            " empty line between tests"
+            f" {columns.travel_unit}. Read one cycle at a time. Separate tests by an empty line or"
+            " number them in a column 'test'"
         )
     if -force.min() > force.max():
-        warn_accuracy(f"{name}: forces are negative; their signs are changed")
+        warn_accuracy(f"{name}: forces are negative. Their signs are changed")
         force = -force
     if not force.max() > 0.0:
         raise InputError("all forces are zero")
     top = int(np.argmax(force))
-    rising = force[: top + 1] if top >= MIN_READINGS else force
+    # 1.
     if noise is None:
-        noise = noise_of(rising)
-    threshold = max(
-        2.0 * noise * math.sqrt(2.0 * math.log(force.size)), MIN_DROP_SHARE * force[top]
-    )
+        noise = noise_of(force[: top + 1] if top >= MIN_READINGS else force)
+    # 2.
+    white_range = 2.0 * noise * math.sqrt(2.0 * math.log(force.size))
+    threshold = max(white_range, MIN_DROP_SHARE * force[top])
+    # 3. and 4.
     starts, ends = turning_points(force, threshold)
-    before = starts < top
-    after = ends[starts == top]
-    rest = force[after[0] :] if after.size else force[:0]
+    after = force[ends[starts == top].min(initial=force.size) :]
+    starts, ends = starts[starts < top], ends[starts < top]
     return Curve(
         name, travel, force, columns.unit, columns.travel_unit, noise, threshold,
         peak=float(force[top]),
         peak_travel=float(travel[top]),
-        drops=Drops(
-            travel[starts[before]], force[starts[before]],
-            force[starts[before]] - force[ends[before]],
-        ),
-        plateau=float(rest.mean()) if rest.size else math.nan,
-        plateau_deviation=float(rest.std()) if rest.size else math.nan,
+        drops=Drops(travel[starts], force[starts], force[starts] - force[ends]),
+        plateau=float(after.mean()) if after.size else math.nan,
+        plateau_deviation=float(after.std()) if after.size else math.nan,
     )  # fmt: skip
 
 
 def summary_of(force: Array, threshold: float) -> tuple[float, float, float]:
-    """Return number of precursors, size of the largest, and force at the first (else the peak)."""
+    """Return number of precursors, largest size, and force at the first one or else the peak."""
     starts, ends = turning_points(force, threshold)
     before = starts < int(np.argmax(force))
     sizes = force[starts[before]] - force[ends[before]]

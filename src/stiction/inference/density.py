@@ -1,14 +1,28 @@
-"""Density of the measured peak: that of the onset, with the error of the load cell.
+"""Density of a measured peak: the density of the onset, with the error of the load cell.
 
-No onset is below the least possible strength, and where the correlation length is long many
-are just above it. A kernel density of the onsets would leak below, and find any strength
-possible whose bound is not far above the least peak. So the kernels stand on v = log(onset
-- bound) (Wand, Marron and Ruppert, 1991); where there is no bound, on one so far below that
-the logarithm is straight. Their width is Silverman's (1986, section 3.4.2), and what it
-adds to the variance is taken from the sample (section 6.1.2). Densities are tabulated in
-units in which v has mean 0 and variance 1, where they hardly change from node to node. The
-error of the load cell is integrated over v by the midpoint rule, which converges faster
-than any power of the step once that is below the narrower of error and density.
+Problem. Onsets T_1, ..., T_N were simulated, none of them below the bound b. Wanted is the density
+
+    p(y) = int f(T) phi((y - T)/e)/e dT
+
+of a peak y = T + error, with the density f of onsets, the standard deviation e of the load cell and
+the standard normal density phi.
+
+Sources. Transformed kernels: Wand, Marron and Ruppert (1991), Journal of the American Statistical
+Association 86, 343. Kernel width: Silverman, Density Estimation (1986), section 3.4.2. Kernels that
+keep the variance: section 6.1.2.
+
+Steps:
+
+1. Take v = log(T - b). Where the correlation length is long, many onsets lie just above b, and
+   kernels on T itself would leak below b. Without a bound, take one so far below the onsets that
+   the logarithm is straight.
+2. Standardise v to mean 0 and variance 1. Its density then hardly changes between nodes.
+3. Replace the sorted sample by means of at most `GROUPS` groups, which are smaller in the tails.
+4. Sum normal kernels of Silverman's width w = 1.06 N^(-1/5), with centres drawn together by
+   sqrt(1 - w^2), so that the sum keeps variance 1. Tabulate the logarithm in steps of `STEP`.
+5. Interpolate this logarithm between steps and nodes. Beyond the table it falls like a parabola.
+6. Integrate over v by the midpoint rule. It converges faster than any power of the step, once the
+   step is below the narrower one of error and density.
 """
 
 import math
@@ -22,22 +36,22 @@ from stiction.base.arrays import Array
 from stiction.base.jit import jit
 
 GROUPS = 256
-"""Largest number of groups of neighbouring sorted samples, whose means stand for the sample."""
+"""Largest number of groups of neighbouring sorted samples."""
 TABLE_REACH = 10.0
 STEP = 0.05
 BOUND_DEVIATIONS = 1e5
-"""Distance of a bound, in standard deviations, from onsets that have none."""
+"""Distance of the bound below the onsets, in standard deviations, if the onsets have no bound."""
 ERRORS, SPREADS = 4.0, 6.0
-"""Half range of the integration, in standard deviations of the load cell, and of v."""
+"""Half range of the integration in standard deviations of the load cell, and of v."""
 
 
 class Densities(NamedTuple):
     """Densities of standardised v at nodes."""
 
-    onsets: Array  # (nodes, samples): of the same samples at every node
-    bound: Array  # (nodes,): least possible onset
+    onsets: Array  # (nodes, samples), of the same samples at every node
+    bound: Array  # least possible onset, (nodes,)
     mean: Array  # of v, (nodes,)
-    spread: Array
+    spread: Array  # standard deviation of v, (nodes,)
     table: Array  # logarithms in steps of `STEP` from -`TABLE_REACH`, (nodes, steps)
 
     def standardised(self) -> Array:
@@ -45,16 +59,16 @@ class Densities(NamedTuple):
         return (to_v(self.onsets, self.bound) - self.mean[:, None]) / self.spread[:, None]
 
     def between(self, index: NDArray[np.int64], weight: Array) -> Array:
-        """Return bound, mean and spread at points, (3, points), linear between nodes."""
+        """Return bound, mean and spread at points, (3, points), by interpolation."""
         values = np.stack([self.bound, self.mean, self.spread])
         return np.ascontiguousarray(np.einsum("pc,kpc->kp", weight, values[:, index]))
 
 
 def grouped(ordered: Array) -> tuple[Array, Array]:
-    """Means and shares of groups of neighbouring sorted values, ever smaller ones in the tails.
+    """Return means and shares of groups of neighbouring sorted values (step 3).
 
-    Ends of groups are at equal steps of a normal variable, so that no group of a sample
-    that is nearly normal is wide against the kernel. Values on an end are shared out.
+    Groups end at equal steps of a normal variable, so that every group of a nearly normal sample
+    is narrow beside the kernel. A value at an end is shared between both groups.
     """
     size = ordered.size
     reach = float(ndtri(1.0 - 0.5 / size))
@@ -65,21 +79,22 @@ def grouped(ordered: Array) -> tuple[Array, Array]:
     means: Array = np.diff(np.interp(ends, np.arange(size + 1), sums)) / share
     share /= size
     means -= share @ means
-    means /= math.sqrt(share @ means**2)  # groups hide a little of the spread
+    means /= math.sqrt(share @ means**2)  # groups hide a small part of the variance
     return means, share
 
 
 def to_v(onsets: Array, bound: Array) -> Array:
-    """v of onsets (nodes, samples) above the bounds (nodes,)."""
+    """Return v of onsets (nodes, samples) above the bounds (nodes,) (step 1)."""
     above = onsets - bound[:, None]
     # Round-off may put an onset on its bound.
     return np.log(np.maximum(above, 1e-9 * above.mean(axis=1, keepdims=True)))
 
 
 def tabulate(onsets: Array, bound: Array) -> Densities:
-    """Densities of onsets (nodes, samples) that cannot be below `bound` (nodes,)."""
+    """Return densities of onsets (nodes, samples) that cannot lie below `bound` (nodes,)."""
     if not np.isfinite(bound).all():
         bound = onsets.mean(axis=1) - BOUND_DEVIATIONS * onsets.std(axis=1).max()
+    # 1. and 2.
     v = to_v(onsets, bound)
     mean, spread = v.mean(axis=1), v.std(axis=1)
     spread = np.maximum(spread, 1e-12 * np.maximum(np.abs(mean), 1.0))
@@ -87,6 +102,7 @@ def tabulate(onsets: Array, bound: Array) -> Densities:
     width = 1.06 * onsets.shape[1] ** -0.2  # Silverman's
     densities = Densities(onsets, bound, mean, spread, np.empty((mean.size, z.size)))
     for row, values in zip(densities.table, densities.standardised(), strict=True):
+        # 3. and 4.
         centres, share = grouped(np.sort(values))
         away = (z[:, None] - math.sqrt(1.0 - width**2) * centres) / width
         powers = -0.5 * away**2
@@ -98,7 +114,7 @@ def tabulate(onsets: Array, bound: Array) -> Densities:
 
 @jit
 def _interpolated(table: Array, index: NDArray[np.int64], weight: Array, z: float) -> float:
-    """Logarithm of the standardised density, linear between nodes and steps."""
+    """Return the logarithm of the standardised density at z (step 5)."""
     inside = min(max(z, -TABLE_REACH), TABLE_REACH)
     at = (inside + TABLE_REACH) / STEP
     k = min(int(at), table.shape[1] - 2)
@@ -120,15 +136,15 @@ def _with_error(
     near: Any,
     share: Array,
 ) -> float:
-    """Logarithm of the density of an onset and the error of the load cell together, at y.
+    """Return the logarithm of the density of onset plus error at y (step 6).
 
-    `of_v` are its bound, mean and spread.
+    `of_v` holds bound, mean and spread.
     """
     bound, mean, spread = of_v
     low, high = y - ERRORS * error - bound, max(y, bound) + ERRORS * error - bound
     low, high = math.log(low) if low > 0.0 else -np.inf, math.log(high)
     first, last = max(low, mean - SPREADS * spread), min(high, mean + SPREADS * spread)
-    if first >= last:  # all that the error reaches is far out
+    if first >= last:  # the error reaches only onsets far out in the tail
         first, last = max(low, high - 2.0 * SPREADS * spread), high
     count = 7 + int(2.0 * (last - first) / spread)
     step = (last - first) / count
@@ -156,10 +172,9 @@ def log_likelihoods(
     peaks: Array,
     out: Array,
 ) -> None:
-    """Logarithm of the density of each peak at each point, (points, peaks), 1/Pa.
+    """Write the logarithms of the densities of peaks at points to `out`, (points, peaks), 1/Pa.
 
-    The logarithm of the standardised density is linear between nodes, as `of_v` is, see
-    `Densities.between`. `scales` are shift and stretch at the points, (2, points).
+    `of_v` comes from `Densities.between`. `scales` has shift and stretch at points, (2, points).
     """
     for i in range(index.shape[0]):
         bound, mean, spread = of_v[0, i], of_v[1, i], of_v[2, i]

@@ -1,4 +1,23 @@
-"""Designs of tests: the information expected from each before any test is made."""
+"""Designs of tests: the expected information before any test is made.
+
+Problem. Parameters theta have a prior. Compute how much a design, such as ten tests, is expected to
+tell about each parameter: the mean over campaigns of the divergence of posterior from prior,
+
+    I = E int p(theta_i | y) log (p(theta_i | y)/p(theta_i)) dtheta_i.
+
+Source. Lindley (1956), Annals of Mathematical Statistics 27, 986, by nested Monte Carlo.
+
+Steps, for each design and each simulated campaign:
+
+1. Draw the parameters from the prior.
+2. Draw the peaks from the same simulated onsets that give the likelihood.
+3. Compute the posterior of the unknown parameters on a grid (`stiction.inference.grid`). Known
+   parameters keep their drawn values. If the posterior lies between the points of a coarse grid,
+   draw the box closer around the true parameters.
+4. Take the divergence of each marginal posterior. I is the mean over campaigns.
+
+`stiction.inference.widths` answers the same question for a fit or a posterior.
+"""
 
 from collections.abc import Mapping
 from typing import Any
@@ -23,17 +42,13 @@ from stiction.problem.results import to_dataset
 from stiction.random.spectra import Share
 
 CAMPAIGN_GRID_POINTS = 8_000
-"""Number of points of the grid of each posterior."""
+"""Points of the grid of each posterior."""
 MIN_BOX_WIDTH = 1e-12
-"""Width of a box, as a share of the prior, in which rounding hides the posterior."""
+"""Width of a box, as a share of the prior, below which rounding hides the posterior."""
 USUAL_DESIGNS = {f"{n} tests": n for n in (5, 10, 20, 40)} | {
     f"{n} profiles": {"profiles": n} for n in (2, 5, 10)
 }
-"""Further tests and profiles, by default."""
-VARIABLES = {
-    "information": "expected information about a parameter, nats",
-    "standard_error": "standard error of the information, nats",
-}
+"""Further tests and profiles by default."""
 
 
 @checked
@@ -53,51 +68,50 @@ def design_of_tests(
     workers: Count | None = None,
     progress: Progress = True,
 ) -> xr.Dataset:
-    """Estimate what each design of tests will tell: narrower intervals, or information.
+    """Estimate how much each design of tests will tell: narrower intervals, or information.
 
-    With a fit or a posterior of `infer`: the expected widths of the intervals of mean and scatter
-    between specimens, and of the design force. With a `prior` of other parameters: the expected
-    information on each.
+    If `random` is a fit or a posterior of `infer`, the result holds the expected widths of the
+    intervals of mean and scatter between specimens, and the expected design stress. If a `prior`
+    of other parameters is given, the result holds the expected information about each parameter.
 
     Parameters
     ----------
     problem, random, prior, method, samples, seed, workers, progress
         As in `infer`.
     designs : mapping
-        Designs by name: a number of tests, a mapping of lengths (m) to numbers of tests, or
-        a table ``{"tests": ..., "known": [...]}`` in which ``known`` lists parameters of
-        the prior that are known from elsewhere, such as a marginal that was measured. With a
-        fit or a posterior ``{"tests": ..., "profiles": ...}``, further ones of either; by
-        default 5, 10, 20 or 40 tests, or 2, 5 or 10 profiles.
+        Designs by name. A design is a number of tests, a mapping of lengths (m) to numbers of
+        tests, or a table ``{"tests": ..., "known": [...]}``, in which ``known`` lists parameters of
+        the prior that are known from other measurements. For a fit or a posterior, a design is
+        ``{"tests": ..., "profiles": ...}``, with numbers of further tests and profiles. The default
+        is 5, 10, 20 or 40 tests, or 2, 5 or 10 profiles.
     probability : float
-        Of the design, with a fit or a posterior.
+        Probability of the design stress for a fit or a posterior.
     load_cell_error : float
         Standard deviation of the error of a peak, in `unit`.
     unit : str
-        Unit of what the tests measure, as in `infer`: "N" where the prior varies the area.
+        Unit of the peaks, as in `infer`. Take "N" if the prior varies the area.
     repetitions : int
-        Simulated campaigns of each design.
+        Simulated campaigns for each design.
 
     Returns
     -------
     xarray.Dataset
-        Over 'design' and 'parameter': `information`, the expected divergence of the
-        posterior of a parameter from its prior (nats; NaN where it is known), and its
-        `standard_error`. With a fit or a posterior: `width`, the expected width of the 90 %
-        interval, with its `standard_error`; and over 'design' `design_stress`, the expected
-        design, and `design_low` and `design_high`, between which 90 % of the designs will lie,
-        Pa. The first design, 'now', is of what was measured already.
+        Over 'design' and 'parameter': `information`, the expected divergence of the posterior of a
+        parameter from its prior (nats, NaN if the parameter is known), and its `standard_error`.
+        For a fit or a posterior: `width`, the expected width of the 90 % interval, with its
+        `standard_error`. Then `design_stress` over 'design' is the expected design stress, Pa, and
+        90 % of the designs will lie between `design_low` and `design_high`. The first design,
+        'now', stands for the present measurements.
 
     Raises
     ------
     InputError
-        If any argument is invalid; the message lists every problem.
+        If any argument is invalid. The message lists every problem.
 
     Notes
     -----
-    Expected information gain (Lindley, 1956) by nested Monte Carlo: parameters are drawn from the
-    prior, peaks from the same onsets that serve the likelihood, and the posterior is that of
-    `infer` on a coarser grid. Known parameters are drawn and then held at what was drawn.
+    The information is the expected information gain of Lindley (1956). See
+    `stiction.inference.design` for the steps.
 
     Examples
     --------
@@ -143,7 +157,10 @@ def design_of_tests(
                 _expected(likelihood, list(tests.values()), free, repetitions, seed, meter)
             )
     dims = ("design", "parameter")
-    variables = {name: Variable("1", text, dims) for name, text in VARIABLES.items()}
+    variables = {
+        "information": Variable("1", "expected information about a parameter, nats", dims),
+        "standard_error": Variable("1", "standard error of the information, nats", dims),
+    }
     values = dict(zip(variables, np.stack(rows, axis=1), strict=True))
     coordinates = {
         "design": (np.array(list(designs)), Variable("", "design of tests", ("design",))),
@@ -155,13 +172,13 @@ def design_of_tests(
 def _plans(
     designs: dict[str, Any], names: tuple[str, ...]
 ) -> list[tuple[dict[float | None, int], list[int]]]:
-    """Return numbers of tests by length, m, and the places of parameters that are not known."""
+    """Return the numbers of tests by length, m, and the places of the unknown parameters."""
     problems = [] if designs else ["designs: must not be empty"]
     plans = []
     for name, design in designs.items():
-        table = (
-            design if isinstance(design, Mapping) and "tests" in design else {"tests": design}
-        )
+        table: Any = design
+        if not (isinstance(design, Mapping) and "tests" in design):
+            table = {"tests": design}
         given = table["tests"]
         tests = dict(given) if isinstance(given, Mapping) else {None: given}
         known = check("known", table.get("known", ()), Names)
@@ -190,9 +207,11 @@ def _expected(
     seed: int,
     meter: Meter,
 ) -> Array:
+    """Return the expected information about each parameter and its standard error, (2, ...)."""
     rng, dimension = np.random.default_rng([seed, 2]), simulated.prior.dimension
     gains = np.full((repetitions, dimension), np.nan)
     for row in range(repetitions):
+        # 1. and 2.
         truth, start = rng.random(dimension), int(rng.integers(2**32))
         peaks = [
             simulated.predicted(kind, np.tile(truth, (count, 1)), start + kind)
@@ -206,11 +225,12 @@ def _expected(
             u[:, free] = v
             return of(u)
 
-        while (grid := grid_of(given, box, CAMPAIGN_GRID_POINTS)) is None and np.ptp(
-            box, axis=0
-        ).min() > MIN_BOX_WIDTH:
-            # The posterior lies between the points of a coarse grid, and the truth in it.
+        # 3.
+        grid = grid_of(given, box, CAMPAIGN_GRID_POINTS)
+        while grid is None and np.ptp(box, axis=0).min() > MIN_BOX_WIDTH:
             box = 0.75 * truth[free] + 0.25 * box
+            grid = grid_of(given, box, CAMPAIGN_GRID_POINTS)
+        # 4.
         if grid is not None:
             gains[row, free] = [grid.information(place) for place in range(len(free))]
         meter.advance()

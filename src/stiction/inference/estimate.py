@@ -1,4 +1,25 @@
-"""One fit of a marginal, a spectrum and noise to records, and the comparison of families."""
+"""One fit of a marginal, a spectrum and noise to records, and the comparison of families.
+
+Problem. Values y = v(z) + e were measured along records. z is a Gaussian field with a correlation,
+v a map to a marginal, and e white normal noise. Find the marginal, the spectrum and the noise.
+
+Sources. Composite likelihood: Varin, Reid and Firth (2011), Statistica Sinica 21, 5. The criterion
+of Akaike (1974), IEEE Transactions on Automatic Control 19, 716. Steps 3, 5 and 6 are our own.
+
+Steps:
+
+1. Fit the marginal to the values, as if they were independent (`marginal_fit`).
+2. Fit spectrum and noise to the periodograms with the map of this marginal (`whittle`). The noise
+   widens the values, so repeat both steps once with the noise that was found.
+3. Widen the marginal by the variance that mean and trend have taken from the values on average.
+4. Score a family by its mean log likelihood times the number of independent values (step 5), less
+   the number of estimated parameters.
+5. Families fitted to the same values agree in mean and variance. The logarithm of the ratio of
+   their densities then has Hermite orders of z from 3 on. Its sum over N values with correlations
+   rho_ij has mean and variance of a sum over N^2/sum rho_ij^3 independent values.
+6. If records are of different specimens, scale them as if they came from one specimen (`between`).
+   This needs the field's own share in the scatter of means, so repeat the fit `ROUNDS` times.
+"""
 
 import math
 from collections import Counter
@@ -27,23 +48,23 @@ from stiction.random.fields import RandomField
 from stiction.random.mapping import from_normal
 
 NEGLIGIBLE_CHANGE = 1e-4
-"""Share of noise that does not change a marginal."""
+"""Change of the noise variance, as a share of the variance, that does not change a marginal."""
 LAGS = np.concatenate(([0.0], np.geomspace(0.01, 4.0, 400)))
-"""Lags in correlation lengths; the correlation of every spectrum falls to 1/e within them."""
+"""Lags in correlation lengths. The correlation of every spectrum falls to 1/e within them."""
 NAMES = {name: f"spectrum.{name}" for name in ("correlation_length", "exponent")}
 NAMES["anisotropy"] = "anisotropy"
 """Estimated parameters of a spectrum, by their names in study files."""
 LEAST_LEFT = 0.2
-"""Least share of the variance that is taken to be left by mean and trend."""
+"""Least share of the variance that mean and trend are assumed to leave."""
 ROUNDS = 2
-"""In each, the error of the field's share in the scatter of means falls to that share of it."""
+"""Rounds of step 6. The error of the field's share falls to this share of itself in each round."""
 DRAWN = 5.0
-"""Difference of scores from which a family is not drawn any more."""
+"""Difference of scores above which no field of the lower family is drawn."""
 
 
 @dataclass(frozen=True, eq=False)
 class FitSetting:
-    """Families to fit, and a window for each record (equal windows are shared)."""
+    """Families to fit, and a window for each record. Records of equal geometry share a window."""
 
     windows: tuple[RecordWindow, ...]
     marginal: Family
@@ -59,14 +80,14 @@ class Estimate:
     marginal: Any  # of the field
     own: Any  # of the values, from which mean and trend have taken variance
     model: Model
-    distance: float  # Kolmogorov's, between values and marginal
+    distance: float  # Kolmogorov's distance between values and marginal
     roughness: float  # mean square of log(periodogram/expectation), both averaged over bands
-    noise: tuple[float, float]  # its variance, which may be negative, and the error of that
+    noise: tuple[float, float]  # variance of the noise, which may be negative, and its error
     between: float = 0.0  # coefficient of variation of the factor between specimens
 
     @cached_property
     def parameters(self) -> dict[str, float]:
-        """All estimated parameters, and what follows from them, by name."""
+        """All estimated parameters and derived numbers, by name."""
         spectrum = self.model.spectrum
         if self.model.end_seen or not hasattr(spectrum, "untruncated_correlation"):
             efolding = spectrum.efolding_length
@@ -96,7 +117,7 @@ class Estimate:
         )
 
     def simulate(self, rng: np.random.Generator) -> list[Array]:
-        """Simulate records with their noise: measured values (points,) of each."""
+        """Simulate the measured values (points,) of each record, with noise."""
         windows = self.setting.windows
         power = {window: self.model.power(window) for window in dict.fromkeys(windows)}
         rows = []
@@ -112,7 +133,7 @@ class Estimate:
 
     @property
     def of_means(self) -> Array:
-        """Variance of the mean of each record from the field alone."""
+        """Variance of the mean of each record by the field alone."""
         windows, model = self.setting.windows, self.model
         shares = {w: w.variance_of_mean(model.correlation(w)) for w in set(windows)}
         deviation = self.parameters["standard_deviation"]
@@ -120,17 +141,12 @@ class Estimate:
 
     @property
     def within(self) -> Array:
-        """Variance of the logarithm of the mean of each record from the field alone."""
+        """Variance of the logarithm of the mean of each record by the field alone."""
         return np.log1p(self.of_means / self.parameters["mean"] ** 2)
 
     @property
     def independent(self) -> float:
-        """Number of independent values that tell families of the marginal apart as well.
-
-        Families fitted to the same values agree in about mean and variance; the logarithm of the
-        ratio of their densities then has Hermite orders of z from 3 on. Its sum over N values with
-        correlations rho_ij has mean and variance of that over N^2/sum rho_ij^3 independent ones.
-        """
+        """Number of independent values that distinguish families equally well (step 5)."""
         points, alike = 0.0, 0.0
         for window, count in Counter(self.setting.windows).items():
             rho = (1.0 - self.model.noise_share) * self.model.correlation(window)
@@ -141,7 +157,7 @@ class Estimate:
 
     @property
     def lengths_held(self) -> float:
-        """Number of correlation lengths, or on a plane areas, that the windows hold together."""
+        """Number of correlation lengths, or areas on a plane, in all records together."""
         windows, length = self.setting.windows, self.model.spectrum.correlation_length
         area = sum(float(one.measured.sum()) * math.prod(one.spacings) for one in windows)
         if windows[0].measured.ndim == 1:
@@ -149,17 +165,16 @@ class Estimate:
         return area / (length * length * self.model.anisotropy)
 
     def as_of_one(self, rows: Sequence[Array]) -> list[Array]:
-        """Return records without the scatter between specimens, if that is estimated."""
+        """Return records without the scatter between specimens, if it is estimated."""
         return as_of_one(rows, self.within) if self.setting.between else list(rows)
 
 
 def estimate(
     rows: Sequence[Array], setting: FitSetting, start: Estimate | None = None
 ) -> Estimate:
-    """Fit measured values (points,) of each record, without trend; from a start if there is one.
+    """Fit measured values (points,) of each record without trend, from a start if it is given.
 
-    Records of several specimens are scaled by what the fit itself finds of the field's own
-    share in the scatter of their means, in a few rounds. Fitted numbers raise no doubts of units.
+    Fitted numbers raise no doubts of units.
     """
     with collect_warnings() as caught:
         result = _estimate_in_rounds(rows, setting, start)
@@ -172,6 +187,7 @@ def estimate(
 def _estimate_in_rounds(
     rows: Sequence[Array], setting: FitSetting, start: Estimate | None
 ) -> Estimate:
+    """Fit records of one or several specimens (step 6)."""
     if not setting.between:
         return _estimate(rows, setting, start)
     equal = as_of_one(rows, np.zeros(len(rows)))
@@ -183,10 +199,7 @@ def _estimate_in_rounds(
 
 
 def _estimate(rows: Sequence[Array], setting: FitSetting, start: Estimate | None) -> Estimate:
-    """Fit records of one field.
-
-    The noise is found with the marginal of the values, which it widens; then both are fitted again.
-    """
+    """Fit records of one field (steps 1 to 3)."""
     family = setting.spectrum
     values = np.concatenate(rows)
     observed = observe(rows, setting.windows)
@@ -196,11 +209,13 @@ def _estimate(rows: Sequence[Array], setting: FitSetting, start: Estimate | None
         vector = family.vector_of(start.model)
         marginal, noise = start.marginal, start.model.noise
     for _ in range(2):
+        # 1.
         marginal = of_values = setting.marginal.fit(values, noise, marginal)
+        # 2.
         likelihood = Whittle(family, hermite_shares(marginal), observed)
         vector = likelihood.fit(likelihood.coarse() if vector is None else vector)
         model = family.model(vector, likelihood.shares)
-        if model.noise_share < 0.0:  # zero is the best possible
+        if model.noise_share < 0.0:  # the best possible noise is zero
             without = likelihood._replace(family=replace(family, noise=0.0))
             model = without.family.model(without.fit(vector[:-1]), likelihood.shares)
         if abs(model.noise**2 - noise**2) < NEGLIGIBLE_CHANGE * model.variance:
@@ -211,6 +226,7 @@ def _estimate(rows: Sequence[Array], setting: FitSetting, start: Estimate | None
         for group in observed
         for _, measured, predicted in bands(group, model.expectation(group.window))
     ]
+    # 3.
     return Estimate(
         setting=setting,
         marginal=setting.marginal.widened(of_values, _left(setting.windows, model) ** -0.5),
@@ -225,8 +241,8 @@ def _estimate(rows: Sequence[Array], setting: FitSetting, start: Estimate | None
 def _left(windows: Sequence[RecordWindow], model: Model) -> float:
     """Return the share of its variance that a field is expected to show about mean and trend.
 
-    Of N values v with correlation R it is tr(M R)/N, with M the projection that takes the
-    trend of each record, and the mean of all, from them.
+    For N values with correlation R it is tr(M R)/N. The projection M takes the trend of each record
+    and the mean of all records from the values.
     """
     taken, mean, points = 0.0, 0.0, 0.0
     for window, count in Counter(windows).items():
@@ -251,13 +267,11 @@ def bands(group: Observed, expected: Array, per_octave: int = 3) -> Array:
 class Goodness(NamedTuple):
     """Quality of a family of marginals: its best member, and two measures of the fit.
 
-    `distance` is Kolmogorov's. `score` is the log likelihood of so many independent values
-    as tell families apart as well as the correlated ones of the records do, less the number
-    of estimated parameters (Akaike, 1974), less that of the best family: 0 for the best,
-    negative for the others. Differences below 2 do not tell families apart. `weight` is the
-    share of members that `FieldFit.interfaces` draws from the family, in proportion to the
-    likelihood of its members: they scatter about the estimate, and the logarithm of theirs
-    is on average half a unit for each parameter below the greatest.
+    `distance` is Kolmogorov's distance. `score` is the score of step 4 less the score of the best
+    family: 0 for the best family, negative for others. Differences below 2 do not distinguish
+    families. `weight` is the share of fields that `FieldFit.interfaces` draws from the family. It
+    is in proportion to the likelihood of its fields, whose logarithm is on average half a unit for
+    each parameter below the greatest one, because the fields scatter about the estimate.
     """
 
     marginal: Any
@@ -269,7 +283,7 @@ class Goodness(NamedTuple):
 def windowed(
     records: Sequence[Record], degree: int
 ) -> tuple[tuple[RecordWindow, ...], list[Array]]:
-    """Return a window for each record, which those of one geometry share, and trendless values."""
+    """Return a window for each record, shared by equal geometries, and values without trend."""
     made: dict[Any, RecordWindow] = {}
     windows, rows = [], []
     for values, spacings in records:
@@ -285,9 +299,9 @@ def windowed(
 def compare(
     settings: Sequence[FitSetting], rows: Sequence[Array]
 ) -> tuple[list[Estimate], dict[str, Goodness], float]:
-    """Return estimates with each family, the best first, how good each is, and for how many values.
+    """Return the estimates, best family first, their qualities, and the number of values (step 5).
 
-    Those to which the values cannot be fitted are missing; an `InputError` if that is so of all.
+    Families that cannot be fitted are left out. An `InputError` says so if none can be fitted.
     """
     fitted: list[tuple[float, Estimate]] = []
     problems: list[str] = []

@@ -1,16 +1,19 @@
 """The posterior on a grid that closes in on its mass, and draws from it.
 
-Problem: the density L(u)/Z of parameters u whose prior is uniform in the unit cube, with the
-likelihood L and the evidence Z, the integral of L over the cube. L may be narrow.
+Problem. The prior is uniform in the unit cube. Compute the posterior density L(u)/Z of the
+parameters u from the likelihood L, with the evidence Z = int L du. L may be narrow.
+
+Source. Posteriors on a grid: Gelman and others, Bayesian Data Analysis (2013), section 10.1.
+Closing in is our own.
 
 Steps:
 
-1. Divide a box into equal cells, and compute log L in the middle of each.
-2. Take the mass of a cell as L over the sum of L, and Z as the sum of L times the volume of a cell
-   (midpoint rule). What lies outside of the box is neglected.
-3. Close in on the cells that hold all but `OUTSIDE_MASS` on either side of each parameter, and one
-   cell more on either side.
-4. Repeat, at most `MAX_GRID_ZOOMS` times in all, until no side of the box shrinks by a tenth.
+1. Divide a box into equal cells, and compute log L in the middle of each cell.
+2. The mass of a cell is L over the sum of L. Z is the sum of L times the volume of a cell (midpoint
+   rule). The outside of the box is neglected.
+3. Close in on the cells that hold all but `OUTSIDE_MASS` on either side of each parameter, and keep
+   one more cell on either side.
+4. Repeat until no side of the box shrinks by a tenth, at most `MAX_GRID_ZOOMS` times.
 """
 
 from collections.abc import Callable
@@ -24,19 +27,21 @@ from stiction.base.arrays import Array
 GRID_POINTS = 100_000
 """Approximate number of points of a grid."""
 MOST_ALONG = 512
+"""Most points along a parameter."""
 MAX_GRID_ZOOMS = 6
 OUTSIDE_MASS = 1e-6
-"""Mass left outside on either side of a parameter when the grid closes in."""
+"""Posterior mass outside on either side of a parameter when the grid closes in."""
 MAX_BATCH = 5_000
+"""Points at which the likelihood is computed at once."""
 
 
 @dataclass(frozen=True, eq=False)
 class PosteriorGrid:
-    """Cells of equal prior mass in a box, each with its share of the posterior."""
+    """Cells of equal prior mass in a box, and their share of the posterior."""
 
-    box: Array  # (2, parameters): its corners, as u
-    mass: Array  # (n_1, ..., n_parameters): of the cells; sums to 1
-    log_evidence: float  # logarithm of the mean of the likelihood over the whole prior
+    box: Array  # corners, as u, (2, parameters)
+    mass: Array  # of the cells, (n_1, ..., n_parameters); sums to 1
+    log_evidence: float  # logarithm of the mean likelihood over the whole prior
 
     def marginal(self, axis: int) -> Array:
         """Return the mass of the cells along one parameter."""
@@ -62,12 +67,10 @@ def grid_of(
     box: Array,
     points: int = GRID_POINTS,
 ) -> PosteriorGrid | None:
-    """Return a density, given by its logarithm at points (points, parameters), in a box.
+    """Return the density with this logarithm at points (points, parameters) in a box, or None.
 
-    None if it is zero. The first grid covers all of it; each next one the box that holds all
-    but a millionth of the last, until it no longer shrinks by a tenth in any direction. The
-    midpoint rule converges faster than any power of the step once a cell is narrower than the
-    density.
+    The result is None if the density is zero at all points. The midpoint rule converges faster than
+    any power of the step once a cell is narrower than the density.
     """
     dimension = box.shape[1]
     along = int(min(MOST_ALONG, max(8, points ** (1.0 / dimension))))
@@ -84,7 +87,7 @@ def grid_of(
         mass, cell = np.exp(values - top), (high - low) / along  # 2.
         evidence = top + float(np.log(mass.sum() * np.prod(cell)))
         grid = PosteriorGrid(box, mass / mass.sum(), evidence)
-        # 3. Cells on either side that hold almost no mass, less one of margin.
+        # 3. Leave one cell of almost no mass as a margin.
         rows = [grid.marginal(axis) for axis in range(dimension)]
         empty = [[np.sum(np.cumsum(r) <= OUTSIDE_MASS) - 1 for r in (o, o[::-1])] for o in rows]
         below, above = np.maximum(empty, 0).T * cell

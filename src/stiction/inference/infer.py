@@ -27,7 +27,7 @@ from stiction.inference.likelihood import (
     variable_of,
 )
 from stiction.inference.peaks import Peaks, factor_of, make_peaks
-from stiction.inference.posterior import POSTERIOR_DRAWS, Posterior, posterior_of
+from stiction.inference.posterior import POSTERIOR_DRAWS, Posterior
 from stiction.inference.prior import Prior, make_prior
 from stiction.inference.specimens import MEAN_KEY, SCATTER_KEY
 from stiction.methods.criterion.local import LocalCriterion
@@ -234,7 +234,17 @@ def infer(
             " load-cell error if they are not exact"
         )
     error = math.sqrt(sum(map(np.size, measured.values)) / likelihood.samples)
-    return posterior_of(likelihood, grid, measured, error, _notes(likelihood, error, u), seed)
+    return Posterior(
+        peaks=measured,
+        draws=dict(zip(parameters.names, parameters.theta(u).T, strict=True)),
+        information={name: grid.information(i) for i, name in enumerate(parameters.names)},
+        log_evidence=grid.log_evidence,
+        monte_carlo_error=error,
+        notes=tuple(_notes(likelihood, error, u)),
+        likelihood=likelihood,
+        u=u,
+        seed=seed,
+    )
 
 
 def _check_reach(prior: Prior, method: Any, measured: Peaks, error: float) -> None:

@@ -1,4 +1,25 @@
-"""Likelihood of measured peaks: simulated onsets on a grid of parameters, and their densities."""
+"""Likelihood of measured peaks: simulated onsets on a grid of parameters, and their densities.
+
+Problem. Parameters theta of a random interface are unknown. Peaks y_j = T + error were measured on
+specimens with onset T. Compute the likelihood L(theta) = prod_j p(y_j | theta) for any theta, where
+each density p needs hundreds of simulated onsets.
+
+Sources. Steps 1 to 3 and 5 are our own. Step 4 is a control variate (Hammersley and Handscomb,
+Monte Carlo Methods, 1964, section 5.5), applied to quantiles in place of a mean.
+
+Steps:
+
+1. Find the parameters that only shift and stretch the onset (`stiction.inference.scaling`). They
+   need no simulation.
+2. Place nodes along each other parameter, at most four, in the box of the prior that matters.
+3. Simulate onsets at every node of the product grid with the same draws, so that L is smooth.
+4. If the method is expensive and the local criterion applies, simulate by the method only at the
+   corners and few nodes between them (`COARSE`), and by the local criterion at all nodes. Move
+   onsets by the local criterion by the difference of both quantile functions. Do so only if the
+   onsets by both methods have a correlation above `MIN_CORRELATION`.
+5. Tabulate the density at each node (`stiction.inference.density`). Between nodes the logarithm of
+   the standardised density, its bound, mean and spread are linear in each parameter.
+"""
 
 import itertools
 import math
@@ -27,38 +48,40 @@ from stiction.random.synthesis import SAMPLES_PER_BLOCK
 
 NODES = {0: 1, 1: 25, 2: 11, 3: 7, 4: 5}
 COARSE = {0: 1, 1: 5, 2: 4, 3: 3, 4: 2}
-"""Nodes along each simulated parameter, by the number of these parameters; and along each where the
-local criterion is simulated at those, and another method only at these."""
+"""Nodes along each simulated parameter, by the number of these parameters. An expensive method that
+the local criterion guides is simulated at the coarse nodes only."""
 LOG = 3.0
-"""Ratio of the ends of a prior from which a parameter is interpolated in its logarithm."""
+"""Ratio of the ends of a prior from which on a parameter is interpolated in its logarithm."""
 MIN_CORRELATION = 0.8
-"""Correlation of the onsets by two methods above which one helps the other."""
+"""Correlation of the onsets by two methods above which step 4 is worthwhile."""
 SPECIMEN = 2**20
-"""Samples of a specimen of another length begin at multiples of this."""
+"""Samples of each further kind of specimen begin at the next multiple of this number."""
 WARN_SECONDS = 60.0
-"""Seconds from which on it is said beforehand how long the simulation takes."""
+"""Seconds of simulation above which a warning states the time before it begins."""
 REACH_SPREADS = 2.0
-"""Spreads beyond the extremes of these at which a peak is out of reach."""
+"""Standard deviations beyond all simulated onsets at which a peak is out of reach."""
 
 
 class Axis(NamedTuple):
     """Nodes of one simulated parameter."""
 
-    parameter: int  # its place in the prior
+    parameter: int  # place in the prior
     values: Array  # rising
-    scale: Callable[[Array], Array]  # on which the parameter is interpolated
+    scale: Callable[
+        [Array], Array
+    ]  # function of the parameter in which interpolation is linear
 
 
 def make_axes(
     prior: Prior, scaling: Scaling, box: Array, along: Mapping[int, int] = NODES
 ) -> tuple[Axis, ...]:
-    """Place the nodes of the parameters that need simulation in a box of the prior."""
+    """Place the nodes of the simulated parameters in a box of the prior (step 2)."""
     simulated = [i for i in range(prior.dimension) if i not in scaling.keys]
     if len(simulated) not in along:
         names = ", ".join(prior.names[i] for i in simulated)
         raise InputError(
             f"prior: {len(simulated)} parameters would have to be simulated on a grid,"
-            f" {names}; at most {max(along)} are possible: fix the best-known ones"
+            f" {names}. At most {max(along)} are possible. Fix the best-known parameters"
         )
     axes = []
     for i, (first, last) in enumerate(prior.theta(box).T):
@@ -70,7 +93,7 @@ def make_axes(
 
 
 def nodes_of(axes: Sequence[Axis], reference: Array) -> Array:
-    """Return the parameters at all nodes, (nodes, parameters); those that scale at `reference`."""
+    """Return the parameters at all nodes, (nodes, parameters). Scaling ones are at `reference`."""
     steps = np.array(list(itertools.product(*(axis.values for axis in axes))))
     result = np.tile(reference, (len(steps), 1))
     result[:, [axis.parameter for axis in axes]] = steps
@@ -78,7 +101,7 @@ def nodes_of(axes: Sequence[Axis], reference: Array) -> Array:
 
 
 def corners(axes: Sequence[Axis], theta: Array) -> tuple[NDArray[np.int64], Array]:
-    """Return nodes around points (points, parameters) and their weights, (points, 2^axes) each."""
+    """Return the nodes around points (points, parameters), and their weights (points, 2^axes)."""
     count = theta.shape[0]
     index, weight = np.zeros((count, 1), dtype=np.int64), np.ones((count, 1))
     for i, values, scale in axes:
@@ -95,7 +118,7 @@ def experiments_at(
 ) -> list[Experiment]:
     """Return the experiments at points (points, parameters), on specimens of a length, m.
 
-    The node spacing is that of the problem.
+    The node spacing is the spacing of the problem.
     """
     experiments = []
     for theta in np.atleast_2d(thetas):
@@ -108,17 +131,17 @@ def experiments_at(
 def experiment_on(
     problem: Problem, random: Any, method: Any, length: float | None
 ) -> Experiment:
-    """Return an experiment on specimens of a length, m; None stands for the problem's own."""
+    """Return an experiment on specimens of a length, m. None keeps the length of the problem."""
     interface = problem.interface
     if length is not None and interface.is_plane:
         raise InputError(
-            "peaks: specimen lengths apply to lines only; the interface is a plane"
+            "peaks: specimen lengths apply to lines only, but the interface is a plane"
         )
     if length is not None and not np.isclose(length, interface.measure, rtol=1e-9):
         if problem.load.pressing_force is not None:
             raise InputError(
-                "peaks: on specimens of another length the pressing force is another"
-                " pressure; give Load(normal_pressure=...) in Pa"
+                "peaks: on specimens of another length the same pressing force is another"
+                " pressure. Give Load(normal_pressure=...) in Pa"
             )
         nodes = 2 * max(4, round(0.5 * length / interface.spacing))
         problem = replace(problem, interface=replace(interface, length=length, nodes=nodes))
@@ -126,24 +149,25 @@ def experiment_on(
 
 
 class Simulation(NamedTuple):
-    """How onsets are simulated."""
+    """How onsets are simulated.
+
+    `done` holds the onsets of an interrupted call by experiment and samples. New ones are added.
+    """
 
     method: Any
-    samples: int | None  # at each point; by default as many as the method needs
+    samples: int | None  # at each node; by default as many as the method needs
     seed: int
     workers: int | None = None  # threads; all cores by default
     meter: Meter = SILENT
-    done: dict[Any, Array] | None = (
-        None  # onsets of an interrupted call, to which these are added
-    )
+    done: dict[Any, Array] | None = None
 
 
 def simulate(
     experiments: Sequence[Experiment], simulation: Simulation, first: int, variable: str
 ) -> Array:
-    """Return onsets of samples first, ... of some experiments, (experiments, samples).
+    """Return onsets of samples first, first + 1, ... of experiments, (experiments, samples).
 
-    Sample i has the same draws in each experiment.
+    Sample i has the same draws in each experiment (step 3).
     """
     done = {} if simulation.done is None else simulation.done
     samples: Any = simulation.samples
@@ -172,8 +196,8 @@ def simulate(
 class Area(NamedTuple):
     """Area of one kind of specimen, m², in proportion to some parameters."""
 
-    unit: float  # where all of them are 1
-    sides: list[int]  # their places in the prior
+    unit: float  # area if these parameters are 1
+    sides: list[int]  # places of these parameters in the prior
 
     def at(self, theta: Array) -> Array:
         """Return the area at points (points, parameters)."""
@@ -181,7 +205,7 @@ class Area(NamedTuple):
 
 
 def area_of(prior: Prior, method: Any, length: float | None) -> Area:
-    """Return the area of specimens of a length, m; None stands for the problem's own."""
+    """Return the area of specimens of a length, m. None keeps the length of the problem."""
 
     def areas(points: Array) -> list[Any]:
         return [own.problem.area for own in experiments_at(prior, points, method, length)]
@@ -197,17 +221,17 @@ def area_of(prior: Prior, method: Any, length: float | None) -> Area:
 
 
 def variable_of(problem: Problem, random: Any, unit: str) -> str:
-    """Return the name of what tests measure in a unit, if the problem says enough for it."""
+    """Return the variable that tests measure in a unit, or refuse what the problem lacks for it."""
     variable = VARIABLES[si_of(unit)]
     if variable == "critical_force" and problem.area is None:
         raise InputError(
-            "peaks: are forces, which need the area of the interface: give"
-            " Blocks(thickness=...), or Interface(width=...) of a line"
+            "peaks: are forces, which need the area of the interface. Give Blocks(thickness=...),"
+            " or Interface(width=...) for a line"
         )
     pressed = problem.given_pressure is not None or "normal_pressure" in random.names
     if variable == "friction_coefficient" and not pressed:
         raise InputError(
-            "peaks: are coefficients of friction, which need a normal pressure: give"
+            "peaks: are friction coefficients, which need a normal pressure. Give"
             " Load(normal_pressure=...) in Pa, or peaks as stresses with their unit"
         )
     return variable
@@ -215,27 +239,27 @@ def variable_of(problem: Problem, random: Any, unit: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Likelihood:
-    """Simulated onsets, and the likelihood of measured peaks; forces are onsets times areas."""
+    """Simulated onsets, and the likelihood of measured peaks. A force is an onset times an area."""
 
     prior: Prior
     method: Any
     scaling: Scaling
-    axes: tuple[Axis, ...]  # of the parameters that are simulated
+    axes: tuple[Axis, ...]  # of the simulated parameters
     error: float  # standard deviation of the load cell
-    densities: Sequence[Densities]  # for every kind of specimen
-    areas: Sequence[Area]  # of every kind, if peaks are forces; else of 1
-    samples: float  # effective number: of independent ones that serve as well
-    box: Array  # (2, parameters): corners, as u, between which onsets are simulated
+    densities: Sequence[Densities]  # for each kind of specimen
+    areas: Sequence[Area]  # for each kind if peaks are forces, or else 1
+    samples: float  # number of independent samples with the same information
+    box: Array  # corners, as u, of the simulated part of the prior, (2, parameters)
     peaks: Sequence[Array] = ()
 
     def of(self, peaks: Sequence[Array], kinds: Sequence[int] | None = None) -> Self:
-        """Return the same of other peaks, of some kinds of specimens if not of all."""
+        """Return the likelihood of other peaks, for all or some kinds of specimens."""
         kinds = range(len(self.densities)) if kinds is None else kinds
         densities, areas = [self.densities[k] for k in kinds], [self.areas[k] for k in kinds]
         return replace(self, peaks=peaks, densities=densities, areas=areas)
 
     def scales(self, kind: int, theta: Array) -> Array:
-        """Return by what simulated onsets are shifted and stretched, (2, points)."""
+        """Return shift and stretch of the simulated onsets, (2, points)."""
         return self.scaling.of(theta) * self.areas[kind].at(theta)
 
     def parts(self, u: Array) -> Array:
@@ -252,7 +276,7 @@ class Likelihood:
     def __call__(self, u: Array) -> Array:
         """Return the logarithm of the likelihood at points u (points, parameters).
 
-        -inf outside the box that was simulated.
+        It is -inf outside the simulated box.
         """
         inside = np.all((u >= self.box[0]) & (u <= self.box[1]), axis=1)
         result = np.full(u.shape[0], -np.inf)
@@ -261,7 +285,7 @@ class Likelihood:
         return result
 
     def predicted(self, kind: int, u: Array, seed: int) -> Array:
-        """Draw a peak of a kind of specimen at each of some points u (points, parameters)."""
+        """Draw a peak of a kind of specimen at each point u (points, parameters)."""
         rng = np.random.default_rng([seed, 1, kind])
         theta = self.prior.theta(u)
         shift, stretch = self.scales(kind, theta)
@@ -293,7 +317,7 @@ class Likelihood:
 def out_of_reach(
     prior: Prior, points: Array, reach: Array, error: float, peaks: Array
 ) -> list[str]:
-    """Return a message on peaks outside the `reach` (2, points) of all points of a prior."""
+    """Return a message on peaks outside the `reach` (2, points) of all points in the prior."""
     low, high = reach[0].min() - ERRORS * error, reach[1].max() + ERRORS * error
     far = (peaks < low) | (peaks > high)
     if not far.any():
@@ -304,11 +328,9 @@ def out_of_reach(
         for point in points[[reach[0].argmin(), reach[1].argmax()]]
     )
     return [
-        f"peaks: {far.sum()} of {far.size} are out of reach, such as {value:g}, which lies"
-        f" {'below' if value < low else 'above'} all that the prior can produce, {low:g} to"
-        f" {high:g} (the lowest come from {lowest}, the highest come from {highest}); widen the"
-        " prior, state the unit of the peaks (unit='kPa'), or leave out tests of another kind of"
-        " specimen"
+        f"peaks: {far.sum()} of {far.size} are out of reach, such as {value:g}. The prior can"
+        f" produce peaks from {low:g} ({lowest}) to {high:g} ({highest}). Widen the prior, state"
+        " the unit of the peaks (unit='kPa'), or leave out tests of another kind of specimen"
     ]
 
 
@@ -321,19 +343,17 @@ def make_likelihood(
     error: float,
     variable: str,
 ) -> Likelihood:
-    """Simulate the onsets that the likelihood needs.
+    """Simulate the onsets that the likelihood needs (steps 1 to 5).
 
-    `lengths` are those of the specimens, m, None for the problem's own; `variable` is the
-    name of the peaks among the results, with the standard `error` of the load cell. `box`
-    is the part of the prior that matters, (2, parameters) as u; all of it if left out.
+    `lengths` holds the length of each kind of specimen, m, or None for the length of the problem.
+    `variable` names the peaks among the results, and `error` is the standard deviation of the load
+    cell. `box` is the part of the prior that matters, (2, parameters) as u, by default all of it.
     """
-    box, method, meter = (
-        prior.whole if box is None else box,
-        simulation.method,
-        simulation.meter,
-    )
+    box = prior.whole if box is None else box
+    method, meter = simulation.method, simulation.meter
     forces = variable == "critical_force"
     variable = "critical_stress" if forces else variable
+    # 1. and 2.
     scaling = find_scaling(prior, method, variable)
     axes = make_axes(prior, scaling, box)
     thetas = nodes_of(axes, scaling.reference)
@@ -352,9 +372,11 @@ def make_likelihood(
         experiments = experiments_at(prior, thetas, method, length)
         for end in (experiments[0], experiments[-1]):
             end.random.warn_if_inaccurate(end.problem.interface)
+        # 3.
         at_coarse = experiments_at(prior, coarse, method, length)
         first = number * SPECIMEN
         onsets = simulate(at_coarse, simulation, first, variable)
+        # 4.
         if guided:
             by_local = [one.by(LocalCriterion()) for one in at_coarse]
             known = simulate(by_local, simulation._replace(meter=SILENT), first, variable)
@@ -371,23 +393,22 @@ def make_likelihood(
                 warn_if_long(experiments[0], len(thetas) * count, simulation.workers)
                 meter.stage("simulated onsets", len(thetas) * count)
                 onsets = simulate(experiments, simulation, first, variable)
+        # 5.
         bounds = [bounds_of(own, variable)[0] for own in experiments]
         densities.append(tabulate(onsets, np.array(bounds)))
-    none = Area(1.0, [])
-    areas = [area_of(prior, method, length) if forces else none for length in lengths]
+    areas = [area_of(prior, method, length) if forces else Area(1.0, []) for length in lengths]
     return Likelihood(prior, method, scaling, axes, error, densities, areas, effective, box)
 
 
 def moved(
     many: Array, few: Array, known: Array, index: NDArray[np.int64], weight: Array
 ) -> Array:
-    """Move many onsets by the local criterion, (points, many), to those by another method.
+    """Return onsets by an expensive method from many onsets by the local criterion (step 4).
 
-    A control variate: as many onsets by the other method would cost more.
-
-    At coarse nodes a `few` onsets by it and those of the same samples by the local criterion are
-    `known`, (nodes, few). Their quantiles differ little. This difference, both as shares of the
-    spread, is interpolated between the nodes around each point, `index`, by their `weight`.
+    `many` are onsets by the local criterion, (points, many). At coarse nodes a `few` onsets by the
+    method are there, and `known` ones of the same samples by the local criterion, (nodes, few). The
+    difference of their quantiles, over the standard deviation, changes little between nodes. It is
+    interpolated between the nodes around each point, `index`, with their `weight`.
     """
     mean, spread = known.mean(axis=1, keepdims=True), known.std(axis=1, keepdims=True)
     standardised = (np.sort(known) - mean) / spread
@@ -404,18 +425,19 @@ def moved(
 
 
 def effective_samples(alike: float, many: int, few: int) -> float:
-    """Return how many independent samples serve as well as onsets that were moved."""
+    """Return the number of independent samples with the information of moved onsets."""
     return 1.0 / (alike**2 / many + (1.0 - alike**2) / few)
 
 
 def warn_if_long(experiment: Experiment, samples: int, workers: int | None) -> None:
+    """Warn if the simulation takes more than `WARN_SECONDS`."""
     per_onset = experiment.seconds
     seconds = samples * per_onset / (workers or usable_cores())
     if seconds > WARN_SECONDS:
         warn_user(
             f"the likelihood takes about {duration(seconds)}: {samples:,} onsets by"
-            f" {experiment.method.label} of {duration(per_onset)} each; fewer samples, nodes or"
-            " unknown parameters take less, and LocalCriterion() takes seconds where it holds",
+            f" {experiment.method.label} of {duration(per_onset)} each. Fewer samples, nodes or"
+            " unknown parameters take less. LocalCriterion() takes seconds if it applies",
             UserWarning,
         )
 
@@ -423,7 +445,7 @@ def warn_if_long(experiment: Experiment, samples: int, workers: int | None) -> N
 def bounds_of(
     experiment: Experiment, variable: str, negligible: float = 0.0
 ) -> tuple[float, float]:
-    """Return the least and greatest possible peak, but for a share that is negligible."""
+    """Return the least and greatest possible peak. A `negligible` share may lie outside."""
     low, high = LimitState(experiment).likely_bounds(negligible)
     if variable == "critical_force":
         area = experiment.problem.area or math.nan

@@ -1,10 +1,26 @@
-"""Marginals by maximum likelihood, with the measurement noise that values carry.
+"""Marginals by maximum likelihood, with the measurement noise of the values.
 
-Without noise the likelihood is the density at the values. Values with noise are counted in
-bins; the probability of a bin is that of the marginal, its distribution function convolved
-with that of the noise, so that values beyond a bound of the marginal are no trouble. Values
-along a record are correlated; the likelihood takes them for independent, which leaves the
-estimate consistent (a composite likelihood) and its error to the bootstrap.
+Problem. Values y = x + e carry normal noise e of standard deviation s. Find the parameters of the
+distribution F of x within a family that maximise the likelihood of y.
+
+Sources. The climb is Fisher's scoring with damping (Levenberg, 1944, Quarterly of Applied
+Mathematics 2, 164; Marquardt, 1963, SIAM Journal 11, 431). Values are taken for independent, which
+leaves the estimate consistent (a composite likelihood: Varin, Reid and Firth, 2011, Statistica
+Sinica 21, 5). The bootstrap gives its error.
+
+Steps:
+
+1. If the noise is negligible, the likelihood is the density at the values. Otherwise count the
+   values in `BINS` bins. The probability of a bin comes from F convolved with the noise, so that
+   values may lie beyond a bound of F.
+2. Search scale and shape as logarithms. For 'beta' search both shapes, and the distances of free
+   bounds from the mean. A shape at a free bound is at least 1, because the likelihood would grow
+   without limit as the bound nears a value.
+3. Climb by steps (M + damping diag(M))^-1 g with score g and information M. Divide the damping by
+   10 after a step that raises the likelihood, and multiply it by 10 otherwise. Hold parameters that
+   push against their limits. Stop after a small gain.
+4. Families of `scipy.stats` are fitted by scipy to the values, drawn together to the variance that
+   they would have without noise.
 """
 
 import math
@@ -24,24 +40,24 @@ from stiction.random.marginals import MARGINALS, Beta, ScipyMarginal, marginal_o
 
 BINS = 160
 NOISE_DEVIATIONS = 5.0
-"""Standard deviations of the noise to which its distribution is integrated."""
+"""Standard deviations of the noise up to which its distribution is summed."""
 LEAST = 1e-12
 """Least probability of a bin."""
 MARGINAL_STEP = 1e-5
 WIDEST = 10.0
-"""Largest distance of free bounds from the values, in their ranges: more has no effect."""
+"""Largest distance of free bounds from the values, in ranges of the values."""
 NEGLIGIBLE_NOISE = 1e-4
-"""Share of noise that does not change a marginal."""
+"""Share of noise in the variance that does not change a marginal."""
 BOUND_MARGIN = 1e-2
 """Least distance of noisy values from a bound for a first guess, as a share of their range."""
 MOST_NOISE = 0.95
 LEAST_TOTAL = 0.2
-"""Least sum of the shapes of 'beta' where moments determine them."""
+"""Least sum of the shapes of 'beta' that follow from moments."""
 SCALED = {"mean", "low", "high", "loc", "scale"}
 """Parameters that grow with the values."""
 MAX_CLIMB_STEPS = 40
 HIGHEST = 1e8
-"""Damping at which no step raises the likelihood any more."""
+"""Damping above which no step raises the likelihood."""
 
 
 def _positive(u: Array) -> Array:
@@ -70,14 +86,14 @@ KINDS: dict[str, tuple[Any, Callable[..., Array], Callable[..., Array]]] = {
         lambda u, a, b: (a - 1.0) * np.log(u) + (b - 1.0) * np.log1p(-u) - betaln(a, b),
     ),
 }
-"""Families fitted here: scipy's, its distribution function and its log density, both of
-(value - loc)/scale."""
+"""Families that are fitted here: distribution of scipy, and distribution function and log density
+of (value - loc)/scale."""
 SCIPYS = {"normal": "norm"}
-"""Our names of families of scipy."""
+"""Names of scipy for our names of families."""
 
 
 class Search(NamedTuple):
-    """Where to begin, between which limits, and scipy's parameters of a vector."""
+    """Start and limits of the search, and a function from its vector to parameters of scipy."""
 
     start: Array
     limits: Sequence[tuple[float, float]]
@@ -86,28 +102,27 @@ class Search(NamedTuple):
 
 @dataclass(frozen=True)
 class Family:
-    """A family of marginals, and those of its parameters that are fixed."""
+    """A family of marginals with its fixed parameters."""
 
     name: str
     fixed: dict[str, float]
 
     @property
     def label(self) -> str:
-        """Name, with what was fixed."""
+        """Name with the fixed parameters."""
         fixed = {k: v for k, v in self.fixed.items() if (k, v) != ("low", 0.0)}
         return ", ".join([self.name, *(f"{key} {value:g}" for key, value in fixed.items())])
 
     def fit(self, values: Array, noise: float = 0.0, start: Any = None) -> Any:
-        """Return the marginal of values that carry noise of this deviation, from a first guess."""
+        """Return the marginal of values with noise of this standard deviation (steps 1 to 4)."""
         quiet = self.quiet(values, noise)
         if self.name not in KINDS:
             return self._by_scipy(quiet)
         if noise**2 <= NEGLIGIBLE_NOISE * values.var():
             noise, values = 0.0, quiet
         family, distribution, log_density = KINDS[self.name]
-        search = (_beta if self.name == "beta" else _by_scale)(
-            self, values, quiet, noise, start
-        )
+        search_of = _beta if self.name == "beta" else _by_scale
+        search = search_of(self, values, quiet, noise, start)
         limits = np.array(search.limits)
         counts, at = np.ones(values.size), values
         if noise:
@@ -143,11 +158,11 @@ class Family:
         fixed = {places.get(key, f"fix_{key}"): value for key, value in self.fixed.items()}
         try:
             return marginal_of(family(*family.fit(values, **fixed)))
-        except Exception as error:  # every family of scipy has its own
+        except Exception as error:  # families of scipy raise many kinds of errors
             raise InputError(f"marginal: scipy cannot fit {self.name!r}: {error}") from None
 
     def quiet(self, values: Array, noise: float) -> Array:
-        """Return values drawn together to the variance that they would have without noise."""
+        """Return values drawn together to their variance without noise, within the bounds."""
         mean, variance = float(values.mean()), float(values.var())
         share = min(noise**2 / variance, MOST_NOISE)
         low, high = self.bounds
@@ -157,13 +172,13 @@ class Family:
         return np.where(values >= high, high - margin, values)
 
     def parameters(self, marginal: Any) -> dict[str, float]:
-        """Return what was estimated, by name."""
+        """Return the estimated parameters by name."""
         return {n: v for n, v in _all_parameters(marginal).items() if n not in self.fixed}
 
     def widened(self, marginal: Any, factor: float) -> Any:
-        """Return the marginal of the same mean with `factor` times the standard deviation.
+        """Return the marginal with the same mean and `factor` times the standard deviation.
 
-        What is fixed stays; one of scipy stays as it is if its loc or scale is fixed.
+        Fixed parameters stay. A distribution of scipy with a fixed loc or scale stays as it is.
         """
         free, mean = self.parameters(marginal), float(marginal.distribution.mean())
         moved: dict[str, Any] = {
@@ -193,14 +208,14 @@ class Family:
         if outside := int(((values <= low) | (values >= high)).sum()):
             raise InputError(
                 f"marginal: {outside} of {values.size} values, from {values.min():.6g} to"
-                f" {values.max():.6g}, do not lie between the bounds of {self.name!r}, {low:.6g}"
-                f" and {high:.6g}; give others, as in {{'type': {self.name!r}, 'low': ...}}, or"
+                f" {values.max():.6g}, lie outside the bounds of {self.name!r}, {low:.6g} and"
+                f" {high:.6g}. Give other bounds, as in {{'type': {self.name!r}, 'low': ...}}, or"
                 " noise=True if measurement noise carries them there"
             )
 
 
 def beta_of(mean: float, deviation: float, low: float, high: float) -> Beta:
-    """Return the beta distribution of these moments, or of less scatter than its bounds allow."""
+    """Return the beta distribution of these moments, with as much scatter as its bounds allow."""
     u, extent = (mean - low) / (high - low), high - low
     total = max(u * (1.0 - u) / (deviation / extent) ** 2 - 1.0, LEAST_TOTAL)
     return Beta(alpha=total * u, beta=total * (1.0 - u), low=low, high=high)
@@ -213,20 +228,20 @@ def _all_parameters(marginal: Any) -> dict[str, float]:
 
 
 def multiplied(marginal: Any, factor: float) -> Any:
-    """Return the marginal of values times a factor."""
+    """Return the marginal of the values times a factor."""
     parameters = _all_parameters(marginal)
     larger = {name: factor * parameters[name] for name in parameters.keys() & SCALED}
     return marginal_of(with_values(marginal, larger))
 
 
 def table_of(given: Any) -> dict[str, Any]:
-    """Return a table {type, ...} of what may also be a name."""
+    """Return a name or a table as a table {type, ...}."""
     if isinstance(given, Mapping):
         return dict(given)
     if not isinstance(given, str):
         raise InputError(
             "must be a name, or a table such as {'type': 'beta', 'low': 0.0} with the parameters"
-            f" to keep, got {describe(given)}"
+            f" to keep. Got {describe(given)}"
         )
     return {"type": given}
 
@@ -250,7 +265,7 @@ def family_of(given: Any) -> Family:
 
 
 def _by_scale(family: Family, values: Array, quiet: Array, noise: float, start: Any) -> Search:
-    """Return the search of scale and shape above a known lower bound, as logarithms."""
+    """Return the search of scale and shape above a known lower bound (step 2)."""
     low, mean = family.fixed["low"], float(quiet.mean())
     first = start or MARGINALS[family.name](mean=mean, cv=float(quiet.std()) / mean, low=low)
     shape, _, scale = first.distribution.args
@@ -261,7 +276,7 @@ def _by_scale(family: Family, values: Array, quiet: Array, noise: float, start: 
 
 
 def _beta(family: Family, values: Array, quiet: Array, noise: float, start: Any) -> Search:
-    """Return the search of shapes and distances of free bounds from the mean, as logarithms."""
+    """Return the search of shapes and distances of free bounds from the mean (step 2)."""
     fixed = family.fixed
     mean, unit = float(values.mean()), float(values.std())
     sides = {name: side for name, side in (("low", -1.0), ("high", 1.0)) if name not in fixed}
@@ -278,23 +293,22 @@ def _beta(family: Family, values: Array, quiet: Array, noise: float, start: Any)
     if start is None:
         ends = ends_at(1.1 * room[name] for name in sides)
         start = beta_of(float(quiet.mean()), float(quiet.std()), **ends)
-    # Below 1 a shape makes the likelihood grow without bound as its bound nears a value.
     limits = [(math.log(0.05) if end in fixed else 0.0, 12.0) for end in ("low", "high")]
     first = [start.alpha, start.beta]
     for name, side in sides.items():
         first.append(max(side * (getattr(start, name) - mean) / unit, 1e-3))
         least = 0.5 if noise else room[name] / unit * (1.0 + 1e-9)
         most = (room[name] + WIDEST * float(np.ptp(values))) / unit
-        if name == "low" and values.min() > 0.0:  # of positive values it is not negative
+        if name == "low" and values.min() > 0.0:  # positive values have no negative bound
             most = max(min(most, mean / unit * (1.0 - 1e-12)), least)
         limits.append((math.log(least), math.log(most)))
     return Search(np.log(first), limits, parameters)
 
 
 def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], Array]]:
-    """Counts of values in bins, places of the distribution without noise, and a map to bins.
+    """Return counts of values in bins, points for F, and a function from F there to the bins.
 
-    Its convolution with that of the noise is a sum in steps of half a deviation or less.
+    The convolution with the noise is a sum in steps of half a standard deviation or less (step 1).
     """
     counts, edges = np.histogram(values, bins=BINS)
     width = float(edges[1] - edges[0])
@@ -316,8 +330,8 @@ def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], 
 def mean_log_likelihood(marginal: Any, values: Array, noise: float) -> float:
     """Return the mean logarithm of the density of values that carry noise.
 
-    With noise it is the probability of a bin over its width. A family to which a value is
-    all but impossible has a low one, and not none.
+    With noise it is the probability of a bin over its width. It stays finite if a value is all but
+    impossible in the family.
     """
     if noise**2 <= NEGLIGIBLE_NOISE * values.var():
         least = math.log(LEAST / float(np.ptp(values)))
@@ -341,17 +355,17 @@ def climb(
     longest: float,
     settled: float,
 ) -> Array:
-    """Return the parameters of the greatest likelihood, by damped steps of at most `longest`.
+    """Return the parameters of the greatest likelihood by steps of at most `longest` (step 3).
 
-    `value_of` returns the log likelihood and what `derivatives` needs for the score and
-    Fisher's information. A gain below `settled` ends the search.
+    `value_of` returns the log likelihood, and a state from which `derivatives` returns score and
+    information. A gain below `settled` ends the search.
     """
     at = np.clip(at, limits[:, 0], limits[:, 1])
     value, state = value_of(at)
     damping = 1e-3
     for _ in range(MAX_CLIMB_STEPS):
         score, information = derivatives(at, state)
-        # A parameter that pushes against its limit is held there, or the others could not move.
+        # The others could not move if a parameter pushed against its limit.
         held = ((at <= limits[:, 0]) & (score < 0.0)) | ((at >= limits[:, 1]) & (score > 0.0))
         free = np.flatnonzero(~held)
         information, score = information[np.ix_(free, free)], score[free]

@@ -23,15 +23,15 @@ from stiction.problem.profiles.reading import (
 from stiction.problem.profiles.tables import Options, column_of, read_table, table_of_frame
 
 MIN_PEAKS = 3
-"""Fewest peaks in all: of two numbers, one may be a mistake."""
+"""Fewest different peaks in all: of two numbers, one may be a mistake."""
 MAX_PEAK_RATIO = 50.0
-"""Ratio of measured and predicted peaks that no experiment explains: their unit is wrong."""
+"""Ratio of measured and predicted peaks above which their unit must be wrong."""
 MIN_CURVE_LINES = 100
-"""Fewest lines of a table in which a time or travel that only rises makes it a curve."""
+"""Fewest lines of a table that is taken for a curve if its time or travel only rises."""
 PEAK_COLUMNS = ("peak", "tau", "stress", "strength", "force", "friction")
 LENGTH_COLUMNS = ("length", "specimen")
 VARIABLES = {"Pa": "critical_stress", "N": "critical_force", "1": "friction_coefficient"}
-"""What is measured in each unit, by its name among the results of a method."""
+"""Variable of a method that each unit measures."""
 
 
 class _Peaks(NamedTuple):
@@ -48,21 +48,21 @@ class Peaks(Result, _Peaks):
     Attributes
     ----------
     lengths : tuple of float or None
-        Length of each kind of specimen, m; None for that of the problem.
+        Length of each kind of specimen, m. None stands for the length of the problem.
     values : tuple of arrays
-        Peaks of each kind, in that unit.
+        Peaks of each kind, in `unit`.
     unit : str
-        Of the peaks: "Pa", "N" of forces, or "1" of coefficients of friction.
+        "Pa", "N" for forces, or "1" for friction coefficients.
     """
 
     def refuse_far(self, predicted: Sequence[Array]) -> None:
-        """Refuse peaks so far from those predicted of each kind that their unit must be wrong."""
+        """Refuse peaks that differ so much from predictions that their unit must be wrong."""
         for values, predictions in zip(self.values, predicted, strict=True):
             measured, expected = np.median(values), np.median(predictions)
             if not 1.0 / MAX_PEAK_RATIO < measured / expected < MAX_PEAK_RATIO:
                 raise InputError(
-                    f"peaks: are about {measured:.3g} {self.unit}, predictions {expected:.3g}"
-                    f" {self.unit}: another unit? state it, as in unit='kPa' or unit='N'"
+                    f"peaks: are about {measured:.3g} {self.unit}, but predictions are about"
+                    f" {expected:.3g} {self.unit}. State the unit, as in unit='kPa' or unit='N'"
                 )
 
     @property
@@ -91,12 +91,12 @@ class Peaks(Result, _Peaks):
 
 
 def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
-    """Validate an array, or a mapping of arrays by length; `Peaks` are returned as they are."""
+    """Return valid peaks from an array, a mapping of arrays by length, a table or curves."""
     if isinstance(peaks, Peaks):
         return peaks
     if isinstance(peaks, Curves):
         return make_peaks(peaks.peaks, peaks.unit)
-    if hasattr(peaks, "columns") and hasattr(peaks, "to_xarray"):
+    if hasattr(peaks, "columns"):
         with prefixed("peaks"):
             return _of_table(table_of_frame(peaks), None, reading_options(None))
     groups: dict[Any, Any] = dict(peaks) if isinstance(peaks, Mapping) else {None: peaks}
@@ -109,53 +109,52 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
     groups = {magnitude(length, "m"): values for length, values in groups.items()}
     if not all(key is None or (is_finite(key) and key > 0.0) for key in groups):
         raise InputError(
-            "peaks: for several specimens, map each length (m) to its peaks, such"
-            f" as {{0.1: [...], 0.2: [...]}}, got the lengths {describe(list(groups))}"
+            "peaks: for several specimens, map each length (m) to its peaks, such as"
+            f" {{0.1: [...], 0.2: [...]}}. Got the lengths {describe(list(groups))}"
         )
     lengths = tuple(None if length is None else float(length) for length in groups)
     values = tuple(_values(given, unit) for given in groups.values())
-    all_values = np.concatenate([np.zeros(0), *values])
-    if np.unique(all_values).size < MIN_PEAKS:
+    different = np.unique(np.concatenate([np.zeros(0), *values])).size
+    if different < MIN_PEAKS:
         raise InputError(
-            f"peaks: at least {MIN_PEAKS} different values are needed, got"
-            f" {np.unique(all_values).size} in {all_values.size} peaks; fewer than about ten"
-            " constrain little: see st.design_of_tests"
+            f"peaks: at least {MIN_PEAKS} different values are needed, got {different}. Fewer than"
+            " about ten constrain little. See st.design_of_tests"
         )
     return Peaks(lengths, values, si_of(unit))
 
 
 def si_of(unit: str) -> str:
-    """Return the SI unit of what has a unit: "1", "N", else "Pa"."""
+    """Return the SI unit of a quantity by its unit: "1", "N", else "Pa"."""
     return next((one for one in VARIABLES if is_in(unit, one)), "Pa")
 
 
 def factor_of(unit: str) -> float:
-    """Return the factor from a unit of stress, of force or of a pure number to SI."""
+    """Return the factor from a unit of stress, of force or of a friction coefficient to SI."""
     try:
         return factor_to(si_of(unit), unit)
     except InputError as error:
         raise InputError(
-            f"unit: {error}; give a stress, a force (N), or a coefficient of friction (unit = '1')"
+            f"unit: {error}. Give a stress, a force (N), or a friction coefficient (unit = '1')"
         ) from None
 
 
 def _values(given: Any, unit: str) -> Array:
-    """Return the peaks of one kind of specimen, in SI, by the unit that they state themselves."""
+    """Return the peaks of one kind of specimen in SI. A unit of the values themselves counts."""
     with prefixed("peaks"):
         numbers, stated = with_stated_unit(given, VARIABLES)
     if si_of(stated or unit) != si_of(unit):
-        raise InputError(f"peaks: are in {stated}, but unit = {unit!r}; pass unit={stated!r}")
+        raise InputError(f"peaks: are in {stated}, but unit = {unit!r}. Pass unit={stated!r}")
     values: Array = check("peaks", numbers, Numbers)
     if values.ndim != 1:
         raise InputError(
-            f"peaks: must be one list of numbers for one kind of specimen, got {describe(given)};"
-            " for several, map each length (m) to its peaks: {0.1: [...], 0.2: [...]}"
+            f"peaks: must be one list of numbers for one kind of specimen, got {describe(given)}."
+            " For several, map each length (m) to its peaks: {0.1: [...], 0.2: [...]}"
         )
     bad = np.flatnonzero(~(values > 0.0) | np.isinf(values))
     if bad.size:
         raise InputError(
-            f"peaks: must be positive numbers; number {bad[0]} is {values[bad[0]]:g}; leave out"
-            " tests that gave no peak, or pass missing= to st.read_peaks"
+            f"peaks: must be positive numbers, but number {bad[0]} is {values[bad[0]]:g}. Leave out"
+            " tests without a peak, or pass missing= to st.read_peaks"
         )
     return values * factor_of(stated or unit)
 
@@ -172,17 +171,18 @@ def read_peaks(
 ) -> Peaks:
     """Read the peaks of repeated tests from a text file or a workbook (.xlsx).
 
-    Peaks that drift from test to test are no sample of one distribution: look at them in order.
+    Plot the peaks in the order of the tests first. Peaks that drift are not a sample of one
+    distribution.
 
     Parameters
     ----------
     source : path or Curves
-        Curves of `stiction.read_curve`, whose peaks are taken; or a table, separated by
-        commas, semicolons, tabs or blanks, one test a line, with a
-        heading. One column is called peak, stress, strength, force or friction, with its
-        unit: ``peak [MPa]``; a coefficient of friction has the unit 1 or -, a force N or
-        kN. Without such a name, it is the only column in a unit of these. Another may be
-        the length of the specimen: ``length [mm]``. Other columns are not read.
+        Curves from `stiction.read_curve`, or a table with a heading and one test in each line,
+        separated by commas, semicolons, tabs or blanks. The peaks are the column called peak,
+        stress, strength, force or friction, with its unit: ``peak [MPa]``. Forces have the unit N
+        or kN, friction coefficients the unit 1 or -. Without such a name, the peaks are the only
+        column with a suitable unit. A column ``length [mm]`` may hold the length of the specimen.
+        Other columns are not read.
     unit : str, optional
         Unit of the peaks if the file states none.
     missing, decimal, skip, sheet
@@ -217,17 +217,13 @@ def read_peaks(
 
 
 def _refuse_curve(table: Any, read: set[str]) -> None:
-    """Refuse a long table with a time or a travel that only rises: the record of one test."""
+    """Refuse a long table whose time or travel only rises, because it is the curve of a test."""
     for name, column in table.items():
         timed = any(is_in(column.attrs.get("units"), si) for si in ("m", "s"))
-        if (
-            timed
-            and name not in read
-            and len(column) >= MIN_CURVE_LINES
-            and np.all(np.diff(column) >= 0)
-        ):
+        long = name not in read and len(column) >= MIN_CURVE_LINES
+        if timed and long and np.all(np.diff(column) >= 0):
             raise InputError(
-                f"{name!r} only rises over {len(column)} lines, as in the curve of one test; read"
+                f"{name!r} only rises over {len(column)} lines, as in the curve of one test. Read"
                 " curves with st.read_curve, and pass them to st.read_peaks"
             )
 
@@ -237,13 +233,13 @@ def _of_table(table: Any, unit: str | None, options: Options) -> Peaks:
     length, peak = column_of(table, LENGTH_COLUMNS), column_of(table, PEAK_COLUMNS, VARIABLES)
     if peak is None:
         names = ", ".join(map(str, table.data_vars))
-        raise InputError(f"no column has a name like 'peak [MPa]'; found {names}")
+        raise InputError(f"no column has a name like 'peak [MPa]'. The columns are {names}")
     _refuse_curve(table, {column.name for column in (length, peak) if column is not None})
     stated = peak.attrs.get("units", unit)
     if stated is None or stated != (unit or stated):
         raise InputError(
             f"the unit of the peaks is {'not stated' if stated is None else stated}, and"
-            f" unit = {unit!r}; write it into the heading, 'peak [MPa]', or give unit="
+            f" unit = {unit!r}. Write it into the heading, 'peak [MPa]', or give unit="
         )
     texts = [column.attrs["text"] for column in (length, peak) if column is not None]
     if any(texts):
@@ -253,12 +249,10 @@ def _of_table(table: Any, unit: str | None, options: Options) -> Peaks:
     if length is None:
         return make_peaks(peak.values[kept], stated)
     if "units" not in length.attrs:
-        raise InputError("the unit of the length is not stated; write 'length [mm]'")
+        raise InputError("the unit of the length is not stated. Write 'length [mm]'")
     lengths = length.values[kept] * factor_to("m", length.attrs["units"])
     if np.isnan(lengths).any():
         row = int(np.argmax(np.isnan(lengths)))
-        raise InputError(
-            f"length: missing in row {row}; specimens of unknown length are mixed in"
-        )
+        raise InputError(f"length: missing in row {row}. Give the length of each specimen")
     groups = {size: peak.values[kept][lengths == size] for size in np.unique(lengths)}
     return make_peaks(groups, stated)

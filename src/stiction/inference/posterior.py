@@ -1,6 +1,6 @@
-"""The posterior: draws, intervals, information gained, and how accurate they are."""
+"""The posterior: draws, intervals, gained information, and accuracy."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -13,8 +13,6 @@ from stiction.base.model import Count, Number, Numbers, check, checked
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.units import as_texts
 from stiction.base.variables import unit_of_key
-from stiction.inference.grid import PosteriorGrid
-from stiction.inference.likelihood import Likelihood
 from stiction.inference.peaks import Peaks
 from stiction.inference.prior import Prior
 from stiction.problem.problem import Problem
@@ -24,7 +22,7 @@ from stiction.random.fields import RandomInterface
 from stiction.random.spectra import Share
 
 POSTERIOR_DRAWS, CHAINS = 4000, 4
-"""Number of draws, and of chains into which these independent ones are cut for ArviZ."""
+"""Number of draws, and of the chains into which ArviZ expects them to be cut."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -34,19 +32,19 @@ class Posterior(Result):
     Attributes
     ----------
     names : tuple of str
-        The keys of the prior.
+        Keys of the prior.
     draws : dict of (draws,) arrays
         Draws of each parameter, in its own unit.
     information : dict of float
-        Kullback-Leibler divergence of the posterior of each parameter alone from its prior,
+        Kullback-Leibler divergence of the marginal posterior of each parameter from its prior,
         nats. Halving a uniform range gives ln 2 = 0.69.
     log_evidence : float
-        Logarithm of the density of the peaks under the prior, for comparing models.
+        Logarithm of the density of the peaks under the prior, to compare models.
     monte_carlo_error : float
-        Standard error of a posterior mean that is due to the number of simulated samples, as a
-        share of its standard deviation: about the root of measured over simulated peaks.
+        Standard error of a posterior mean from the finite number of simulated samples, over the
+        posterior standard deviation. It is about the square root of measured over simulated peaks.
     method : str
-        Method that found the onset.
+        Method that computed the onset.
     peaks : Peaks
         The measured peaks.
     notes : tuple of str
@@ -66,17 +64,17 @@ class Posterior(Result):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The keys of the prior."""
+        """Keys of the prior."""
         return tuple(self.draws)
 
     @property
     def method(self) -> str:
-        """Method that found the onset."""
+        """Method that computed the onset."""
         return str(self.likelihood.method.label)
 
     @property
     def prior(self) -> Prior:
-        """The prior: `theta(u)` and `u(theta)` map the unit cube to the parameters and back."""
+        """Prior, whose `theta(u)` and `u(theta)` map the unit cube to the parameters and back."""
         prior: Prior = self.likelihood.prior
         return prior
 
@@ -105,24 +103,24 @@ class Posterior(Result):
         return float(low), float(high)
 
     def at(self, draw: int) -> tuple[Problem, RandomInterface]:
-        """Return the problem and what is random at one draw, to compute with."""
+        """Return the problem and the random interface at a draw."""
         return self.prior.at(np.array([own[draw] for own in self.draws.values()]))
 
     @checked
     def interfaces(self, count: Count, seed: Number = 0) -> list[RandomInterface]:
-        """Return equally likely random interfaces, for a failure probability under all of them.
+        """Return equally likely random interfaces, for the failure probability under all of them.
 
         Parameters
         ----------
         count : int
-            Their number; 30 show a 90 % band.
+            Number of interfaces. A 90 % band needs about 30.
         seed : int
             Not negative.
 
         Raises
         ------
         InputError
-            If a parameter belongs to the problem and not to what is random on it.
+            If a parameter belongs to the problem and not to the random interface.
 
         Examples
         --------
@@ -139,19 +137,19 @@ class Posterior(Result):
         of_problem = [name for name in self.names if full_key(name).startswith("problem.")]
         if of_problem:
             raise InputError(
-                f"interfaces: {', '.join(of_problem)} belong to the problem, which interfaces do"
-                " not hold; take `at(draw)`, a problem and an interface for each draw"
+                f"interfaces: {', '.join(of_problem)} belong to the problem, not to an interface."
+                " Take `at(draw)`, which returns a problem and an interface for each draw"
             )
         total = self.u.shape[0]
         draws = np.random.default_rng([seed, 4]).choice(total, count, replace=count > total)
         return [self.at(int(draw))[1] for draw in draws]
 
     def uncertain(self, parameters: Mapping[str, Any]) -> Uncertain:
-        """Return this as a source with uncertain parameters, as of `stiction.uncertain`."""
+        """Return a source with these uncertain parameters too, as `stiction.uncertain` does."""
         return uncertain(self, parameters)
 
     def prior_transform(self, u: Any) -> Array:
-        """Return the parameters at points u of the unit cube, in which the prior is uniform.
+        """Return the parameters at points u of the unit cube, where the prior is uniform.
 
         Parameters
         ----------
@@ -166,7 +164,7 @@ class Posterior(Result):
         Parameters
         ----------
         theta : (parameters,) or (points, parameters) array
-            In the order of `names`.
+            Parameters in the order of `names`.
 
         Returns
         -------
@@ -182,21 +180,21 @@ class Posterior(Result):
         wanted = len(self.names)
         if points.ndim not in (1, 2) or points.shape[-1] != wanted:
             raise InputError(
-                f"{name}: must have shape ({wanted},) or (points, {wanted}), got {points.shape}"
+                f"{name}: must have shape ({wanted},) or (points, {wanted}). Got {points.shape}"
             )
         return points
 
     @cached_property
     def predicted(self) -> tuple[Array, ...]:
-        """Peaks of further tests, one for each draw, for every kind of specimen."""
+        """Peaks of further tests: one for each draw, for each kind of specimen."""
         kinds = range(len(self.peaks.values))
         return tuple(self.likelihood.predicted(i, self.u, self.seed) for i in kinds)
 
     def to_arviz(self) -> Any:
-        """Return posterior, prior, log-likelihood, prediction and data as ArviZ has them.
+        """Return posterior, prior, log-likelihood, prediction and data for ArviZ.
 
-        An `arviz.InferenceData`, or a `DataTree` from ArviZ 1 on. The draws are
-        independent; they are cut into four chains only because ArviZ compares chains.
+        The result is an `arviz.InferenceData`, or a `DataTree` from ArviZ 1 on. The draws are
+        independent. They are cut into four chains because ArviZ compares chains.
 
         Raises
         ------
@@ -207,7 +205,7 @@ class Posterior(Result):
             import arviz
         except ImportError:
             raise InputError(
-                "to_arviz: needs the package arviz; pip install 'stiction[inference]'"
+                "to_arviz: needs the package arviz. Run: pip install 'stiction[inference]'"
             ) from None
         measured = np.concatenate(self.peaks.values)
         name = "friction_coefficient" if self.peaks.unit == "1" else "peak"
@@ -224,7 +222,7 @@ class Posterior(Result):
         return arviz.from_dict(groups, **of)
 
     def _campaigns(self) -> Array:
-        """Draw as many independent tests as were made for each draw, (draws, tests)."""
+        """Draw a campaign with as many tests as measured for each draw, (draws, tests)."""
         parts = [
             self.likelihood.predicted(kind, np.repeat(self.u, peaks.size, axis=0), self.seed)
             for kind, peaks in enumerate(self.peaks.values)
@@ -244,29 +242,6 @@ class Posterior(Result):
             rows.append(Row(name, self.mean(name), self.interval(name), unit, remark))
         title = f"{self.peaks}; onset by {self.method}, posterior means"
         return Summary(title, rows, "90 % interval", self.notes)
-
-
-def posterior_of(
-    likelihood: Likelihood,
-    grid: PosteriorGrid,
-    peaks: Peaks,
-    error: float,
-    notes: Sequence[str],
-    seed: int,
-) -> Posterior:
-    """Return draws from a grid; `error` is that by Monte Carlo."""
-    u, prior = grid.draws(POSTERIOR_DRAWS, seed), likelihood.prior
-    return Posterior(
-        peaks=peaks,
-        draws=dict(zip(prior.names, prior.theta(u).T, strict=True)),
-        information=prior.information(grid),
-        log_evidence=grid.log_evidence,
-        monte_carlo_error=error,
-        notes=tuple(notes),
-        likelihood=likelihood,
-        u=u,
-        seed=seed,
-    )
 
 
 def _in_chains(values: Array) -> Array:

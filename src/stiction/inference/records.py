@@ -1,4 +1,8 @@
-"""Records: measured values at equal distances, on a line or a plane, with their gaps."""
+"""Records: measured values at equal distances, on a line or a plane, with their gaps.
+
+A test for white noise is from Box and Pierce (1970), Journal of the American Statistical
+Association 65, 1509, see `refuse_uncorrelated`.
+"""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -22,44 +26,41 @@ UNEVEN = 0.02
 OUTLYING = 8.0
 """Distance of an outlier from the median, in robust standard deviations."""
 CORRELATED = 2.5
-"""Standard deviations by which the correlation of neighbours exceeds that of white noise."""
+"""Standard deviations by which neighbours must be more correlated than white noise."""
 JUMPING = 10.0
 """Difference of a dropout from its neighbours, in robust standard deviations of differences."""
 
 
 class Record(NamedTuple):
-    """Values (SI) at points `spacings` (m) apart, (n,) or (nx, ny); NaN where none was measured."""
+    """Values (SI) at points `spacings` (m) apart, (n,) or (nx, ny), with NaN at gaps."""
 
     values: Array
     spacings: tuple[float, ...]
 
 
 def records_of(profiles: Any, interface: Interface | None, quantity: str) -> list[Record]:
-    """Return all profiles as records, see `stiction.fit_field`; errors name the profile."""
-    several = isinstance(profiles, list | tuple) and not (
-        profiles and all(map(_is_scalar, profiles))
-    )
+    """Return all profiles as records, see `stiction.fit_field`. Errors name the profile."""
+    several = isinstance(profiles, list | tuple)
+    several = several and not (profiles and all(map(_is_scalar, profiles)))
     records: list[Record] = []
     problems: list[str] = []
     for number, profile in enumerate(profiles if several else [profiles]):
         try:
             with prefixed(f"profiles[{number}]" if several else "profiles"):
-                records += [
-                    _checked(record, quantity)
-                    for record in _records(profile, interface, quantity)
-                ]
+                made = _records(profile, interface, quantity)
+                records += [_checked(record, quantity) for record in made]
         except InputError as error:
             problems += error.problems
     if not records and not problems:
         problems.append("profiles: must not be empty")
     if len({record.values.ndim for record in records}) > 1:
-        problems.append("profiles: lines and planes are mixed; fit them separately")
+        problems.append("profiles: lines and planes are mixed. Fit them in separate calls")
     if problems:
         raise InputError(problems)
     if (again := len(records) - len({one.values.tobytes() for one in records})) > 0:
         warn_accuracy(
-            f"{again} of {len(records)} profiles repeat another one, value by value: they count as"
-            " further measurements, and make intervals too narrow; leave them out"
+            f"{again} of {len(records)} profiles repeat another profile, value by value. They count"
+            " as further measurements and make intervals too narrow. Leave them out"
         )
     return records
 
@@ -74,7 +75,7 @@ def _records(source: Any, interface: Interface | None, quantity: str) -> list[Re
     places: dict[str, Array] = {}
     if is_labelled(values):
         values, places, measured = points_of(labelled(values, quantity))
-        values = np.where(measured, values, np.nan)  # what was filled in is no measurement
+        values = np.where(measured, values, np.nan)  # filled values were not measured
     if not places:
         return _of_array(values, interface)
     index, spacings = [], []
@@ -92,20 +93,20 @@ def _records(source: Any, interface: Interface | None, quantity: str) -> list[Re
 
 
 def _of_array(values: Any, interface: Interface | None) -> list[Record]:
-    """Records of values at the nodes of an interface, (*shape) or (samples, *shape)."""
+    """Return records of values at the nodes of an interface, (*shape) or (samples, *shape)."""
     try:
         array = real_array(values)
     except TypeError as error:
         raise InputError(f"must be numbers or a DataArray; {error}") from None
     if interface is None:
         raise InputError(
-            f"an array of shape {array.shape} has no point spacing; give the interface, or a"
+            f"an array of shape {array.shape} has no point spacing. Give the interface, or a"
             " DataArray over 'x' (m)"
         )
     shape = interface.shape
     if shape not in (array.shape, array.shape[1:]):
         samples = f"(samples, {', '.join(map(str, shape))})"
-        raise InputError(f"must have shape {shape} or {samples}, got {array.shape}")
+        raise InputError(f"must have shape {shape} or {samples}. Got {array.shape}")
     return [Record(row, interface.spacings) for row in array.reshape(-1, *shape)]
 
 
@@ -117,7 +118,7 @@ def _spacing(x: Array, name: str) -> float:
     spacing = float(np.median(steps))
     if not steps.min() > 1e-6 * spacing:
         raise InputError(f"{name} repeats: there are two values at {x[steps.argmin()]:.9g} m")
-    # Each step is a whole number of spacings, even where few printed digits make them uneven.
+    # Each step is a whole number of spacings, although few printed digits make it uneven.
     spacing = float((x[-1] - x[0]) / np.maximum(np.round(steps / spacing), 1.0).sum())
     place = (x - x[0]) / spacing
     off = np.abs(place - np.round(place))
@@ -125,8 +126,8 @@ def _spacing(x: Array, name: str) -> float:
     if uneven or np.diff(np.round(place)).min() < 1:
         raise InputError(
             f"{name} is not equally spaced: the point at {x[off.argmax()]:.6g} m is off by"
-            f" {off.max():.2g} of the mean spacing; first st.read_profile(..., interface=...,"
-            " interpolate=True, gaps='skip')"
+            f" {off.max():.2g} of the mean spacing. First interpolate, as in"
+            " st.read_profile(..., interface=..., interpolate=True, gaps='skip')"
         )
     return spacing
 
@@ -136,20 +137,20 @@ def _checked(record: Record, quantity: str) -> Record:
     values = record.values[~np.isnan(record.values)]
     if np.isinf(values).any():
         first = int(np.argmax(np.isinf(record.values.ravel())))
-        raise InputError(f"must be finite; entry {first} is not")
+        raise InputError(f"must be finite, but entry {first} is not")
     if values.size < MIN_RECORD_POINTS or min(record.values.shape) < NARROWEST:
         raise InputError(
-            f"holds {values.size} measured points, too short for a spectrum: at least"
-            f" {MIN_RECORD_POINTS} are needed, {NARROWEST} in each direction, and about ten"
+            f"holds {values.size} measured points, too few for a spectrum. It needs at least"
+            f" {MIN_RECORD_POINTS}, at least {NARROWEST} in each direction, and about ten"
             " correlation lengths"
         )
     if np.ptp(values) <= 1e-12 * np.abs(values).max():
-        raise InputError(f"is constant, {values[0]:g} everywhere; there is nothing to fit")
+        raise InputError(f"is constant, {values[0]:g} everywhere. A fit needs scatter")
     if quantity in POSITIVE and (values <= 0.0).any():
         entry = int(np.argmax(record.values.ravel() <= 0.0))
         raise InputError(
-            f"{quantity} must be positive, entry {entry} is {record.values.flat[entry]:.6g} ("
-            f"{int((values <= 0.0).sum())} such values); make missing values NaN, or read the file"
+            f"{quantity} must be positive, but entry {entry} is {record.values.flat[entry]:.6g} ("
+            f"{int((values <= 0.0).sum())} such values). Make missing values NaN, or read the file"
             " with st.read_profile(..., missing=...)"
         )
     aside = np.abs(values - np.median(values))
@@ -157,8 +158,8 @@ def _checked(record: Record, quantity: str) -> Record:
     if np.median(aside) > 0.0 and far.any():
         warn_accuracy(
             f"{int(far.sum())} of {values.size} values are outliers, more than {OUTLYING:g} robust"
-            f" standard deviations from the median, such as {values[aside.argmax()]:.4g}; if they"
-            " are not real, make them NaN: missing values are left out"
+            f" standard deviations from the median, such as {values[aside.argmax()]:.4g}. If they"
+            " are not real, make them NaN, which leaves them out"
         )
     else:
         _doubt_jumps(record)
@@ -168,9 +169,9 @@ def _checked(record: Record, quantity: str) -> Record:
 def refuse_uncorrelated(windows: Sequence[RecordWindow], rows: Sequence[Array]) -> None:
     """Refuse records of white noise, whose correlation length lies below their spacing.
 
-    For white noise the sum of the products v_i v_(i+j) over all lags j up to k, over the variance,
-    has mean 0 and a variance equal to the number of products (Box and Pierce, 1970, in which
-    squares are summed). It is compared for k = 1, 2, 4, ..., pooled over records and directions.
+    The sum of products v_i v_(i+j) over all lags j up to k, over the variance, has mean 0 for white
+    noise, and a variance equal to the number of products (Box and Pierce, 1970, who sum squares).
+    The test takes k = 1, 2, 4, ..., and pools records and directions.
     """
     lags = 2 ** np.arange(max(int(np.log2(max(windows[0].measured.shape) / 4)), 1))
     sums, counts = np.zeros(lags[-1]), np.zeros(lags[-1])
@@ -187,15 +188,15 @@ def refuse_uncorrelated(windows: Sequence[RecordWindow], rows: Sequence[Array]) 
         raise InputError(
             f"profiles: neighbouring points, {max(windows[0].spacings):.4g} m apart, are not"
             f" correlated: {sums[0] / counts[0]:.2g} +- {counts[0] ** -0.5:.2g}. The correlation"
-            " length lies below the spacing, or noise hides it; measure at a smaller spacing, or"
+            " length lies below the spacing, or noise hides it. Measure at a smaller spacing, or"
             " take the values as independent"
         )
 
 
 def _doubt_jumps(record: Record) -> None:
-    """Warn of values that lie much further from both neighbours than others do.
+    """Warn of values that differ from both neighbours much more than usual.
 
-    In a smooth record with a dropout these are far from their neighbours, not from the median.
+    A dropout in a smooth record is far from its neighbours, but may be near the median.
     """
     middle = record.values[1:-1]
     jumps = middle - 0.5 * (record.values[:-2] + record.values[2:])
@@ -210,6 +211,6 @@ def _doubt_jumps(record: Record) -> None:
         warn_accuracy(
             f"{int(far.sum())} of {record.values.size} values differ from their neighbours by more"
             f" than {JUMPING:g} times the usual difference, such as {middle.flat[entry]:.4g} beside"
-            f" {record.values[:-2].flat[entry]:.4g}: neither the field nor the noise of the record"
-            " explains them; if they are dropouts, make them NaN: missing values are left out"
+            f" {record.values[:-2].flat[entry]:.4g}. The field and the noise of the record do not"
+            " explain them. If they are dropouts, make them NaN, which leaves them out"
         )

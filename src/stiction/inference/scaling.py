@@ -1,24 +1,31 @@
 """Parameters that shift and stretch the strength, and so the onset, without simulation.
 
-Let the strength be tau_p = a + b s with b > 0 and a profile s of one and the same distribution. If
-the load profile and the initial stress are uniform and the weakening rate W is given, the smallest
-load at which the linear problem A d + tau_p - tau_0 >= 0, d >= 0 has no solution is
+Problem. The strength is tau_p = a + b s, with b > 0 and a profile s whose distribution does not
+depend on a and b. When is onset(a + b s) = a + b onset(s), sample by sample?
 
-    min {<tau_p, y> : y >= 0, <1, y> = 1, A y <= 0} = a + b min {<s, y> : ...},
+Source. Duality of linear programmes (Farkas, 1902). The application is our own.
 
-because neither A = K - W nor the set of y depends on the strength; the local criterion is
-the same with y restricted to one weight. So onset(a + b s) = a + b onset(s), sample by
-sample, as long as no node has reached its residual strength. The local criterion takes no
-residual strength into account, so there it always holds. Equilibrium does: with slip in
-units of b, strength is a + b max(s - W d, (tau_r - a)/b), the same problem only if
-(tau_r - a)/b is: if a = 0 and tau_r is zero or in proportion to tau_p. A rupture also
-depends on the loading rate, which would have to scale with b. Where W follows from a
-critical slip or a fracture energy, it changes with b, and the nucleation length with it:
-nothing scales.
+Derivation:
 
-Friction coefficients mu = a + b s are a strength sigma_n (a + b s). The shift sigma_n a is the same
-everywhere only if the normal pressure is; where it varies, a must be zero. So it must where the
-load profile p varies, as on specimens, without initial stress: <b s, y>/<p, y> only stretches.
+1. Let the load profile and the initial stress be uniform, and the weakening rate W be given. The
+   onset is the smallest load at which A d + tau_p - tau_0 >= 0, d >= 0 has no solution, with
+   A = K - W. By duality it is
+
+       min {<tau_p, y> : y >= 0, <1, y> = 1, A y <= 0} = a + b min {<s, y> : ...},
+
+   because A and the set of y do not depend on the strength. The equation holds as long as no node
+   has reached its residual strength.
+2. The local criterion is the same minimum with y restricted to one weight. It ignores the residual
+   strength, so the equation always holds.
+3. In equilibrium, with slip in units of b, the strength is a + b max(s - W d, (tau_r - a)/b). The
+   problem is the same only if (tau_r - a)/b is: if a = 0 and tau_r is zero or in proportion to
+   tau_p.
+4. A rupture also depends on the loading rate, which would have to scale with b.
+5. If W follows from a critical slip or a fracture energy, W and the nucleation length change with
+   b. The equation does not hold.
+6. A friction coefficient mu = a + b s is a strength sigma_n (a + b s). The shift sigma_n a is
+   uniform only if the normal pressure is. Otherwise a must be zero. The same holds if the load
+   profile p varies without initial stress, as on specimens, where <b s, y>/<p, y> only stretches.
 """
 
 from typing import Any, NamedTuple
@@ -35,15 +42,15 @@ from stiction.random.marginals import affine_parameters
 MARGINAL = "random.strength.marginal."
 PRESSURE = {"problem.load.normal_pressure", "problem.load.pressing_force"}
 SLOPES = {"low": (1, -1), "high": (0, 1), "loc": (1, 0), "scale": (0, 1), "mean": (0, 1)}
-"""Derivatives of location and scale of a marginal, see `affine_parameters`."""
+"""Derivatives of location and scale of a marginal by its parameters, see `affine_parameters`."""
 
 
 class Scaling(NamedTuple):
-    """Parameters that shift and stretch the onset, and how: linear in the parameters."""
+    """Parameters that shift and stretch the onset linearly."""
 
-    keys: tuple[int, ...]  # their places in the prior
-    reference: Array  # (parameters,): where shift is 0 and stretch 1
-    slopes: Array  # (keys, 2): of shift (unit of the peaks) and stretch
+    keys: tuple[int, ...]  # places of these parameters in the prior
+    reference: Array  # point with shift 0 and stretch 1, (parameters,)
+    slopes: Array  # derivatives of shift (unit of the peaks) and stretch, (keys, 2)
 
     def of(self, theta: Array) -> Array:
         """Return shift (unit of the peaks) and stretch at points, (2, points)."""
@@ -52,22 +59,27 @@ class Scaling(NamedTuple):
 
 
 def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
-    """Find the parameters of a prior that scale the onset; `variable` names the peaks."""
+    """Find the parameters of a prior that scale the onset. `variable` names the peaks."""
     middle = prior.middle
     problem, random = prior.at(middle)
-    none = Scaling((), middle, np.zeros((0, 2)))
-    field, full = random.strength, [full_key(name) for name in prior.names]
-    if not scales_with_strength(problem, random, method) or PRESSURE & {*full}:
+    none, changed = (
+        Scaling((), middle, np.zeros((0, 2))),
+        [full_key(name) for name in prior.names],
+    )
+    field = random.strength
+    if not scales_with_strength(problem, random, method) or PRESSURE & {*changed}:
         return none
-    of_area = [
-        key for key in full if key.startswith(("problem.interface.", "problem.specimen."))
-    ]
+    of_area = any(
+        key.startswith(("problem.interface.", "problem.specimen.")) for key in changed
+    )
     if of_area and problem.load.pressing_force is not None:
-        return none  # a force over an area that varies
+        return none  # the pressure changes with the area
     names, location, scale = affine_parameters(field.marginal)
-    if "mean" in names and {MARGINAL + "low", MARGINAL + "high"} & set(full):
+    if "mean" in names and {MARGINAL + "low", MARGINAL + "high"} & {*changed}:
         return none  # a bound of such a marginal changes its shape
-    places = {full.index(MARGINAL + name): name for name in names if MARGINAL + name in full}
+    places = {
+        changed.index(MARGINAL + name): name for name in names if MARGINAL + name in changed
+    }
     slopes = np.array([SLOPES[name] for name in places.values()], dtype=float).reshape(-1, 2)
     pressure = problem.normal_pressure
     varies = field.of is not None and np.ndim(pressure) > 0

@@ -1,15 +1,30 @@
-"""Whittle likelihood of records whose field is mapped from a Gaussian one, with noise on top.
+"""Whittle likelihood of records whose field is mapped from a Gaussian field, with noise on top.
 
-The likelihood is in terms of the measured values themselves: their correlation follows from
-that of the Gaussian field z by the Hermite expansion of the marginal's map, and white noise
-of the measurement, which is added to values and not to z, adds its share at zero lag. The
-variance is free, so that what a short record does to it does not disturb the shape of the
-spectrum.
+Problem. A record y = v(z) + e has periodogram I_k. For a spectrum of z, a map v and a noise
+variance its expectation is E_k. Find the parameters with the greatest likelihood
 
-A spectrum that is cut off, or falls fast, has almost no power at high wavenumbers, where a
-likelihood would weigh the logarithm of what is left: higher orders of the map, rounding of
-the data. A floor of a thousandth of the highest power is therefore added to periodogram and
-expectation alike. The score stays unbiased; what lies below the floor ceases to count.
+    L = -sum_k w_k (log E_k + I_k/E_k).
+
+Sources. Whittle (1953), Arkiv foer Matematik 2, 423. With the exact expectation for a finite window
+it is the debiased likelihood of Sykulski, Olhede, Guillaumin, Lilly and Early (2019), Biometrika
+106, 251, and on planes of Guillaumin, Sykulski, Olhede and Simons (2022), Journal of the Royal
+Statistical Society B 84, 1526. Correlations of mapped fields: Grigoriu, Applied Non-Gaussian
+Processes (1995), section 3.1.
+
+Steps:
+
+1. Average the periodograms of all records of one geometry (`window`).
+2. The correlation of the values is a power series in the correlation of z, whose coefficients are
+   the squared Hermite coefficients of the map. White noise adds its share at zero lag.
+3. E_k follows from this correlation exactly for the window. The variance is a free parameter, so
+   that its error in a short record does not disturb the shape of the spectrum.
+4. Add a floor of a thousandth of the highest power to I_k and E_k. A spectrum that is cut off has
+   almost no power at high wavenumbers, where rounding and higher orders of the map would decide.
+   The score stays unbiased, and power below the floor ceases to count.
+5. Take the best point of a coarse grid of parameters, and climb by scoring (`marginal_fit.climb`).
+   Fisher's information is sum w d d^T with d = d log E/d theta.
+
+Departures. The map v, the noise and the floor are our own.
 """
 
 import itertools
@@ -33,42 +48,43 @@ RANGES = {
     "variance": (1e-200, 1e200),
     "exponent": (0.65, 16.0),  # above, a power law looks like a squared exponential
     "anisotropy": (0.05, 20.0),
-    # A negative share stands for less at high wavenumbers than the field alone would have, by
-    # chance; were it cut at zero, the errors of small noises could not be estimated.
+    # A negative share means less power at high wavenumbers than the field alone has, by chance. If
+    # it were cut at zero, the errors of small noises could not be estimated.
     "noise_share": (-0.5, 0.95),
 }
-"""Ends of the searched range of each parameter; for noise, of its share of the variance."""
+"""Ends of the searched range of each parameter. The noise is given by its share of the variance."""
 TRIED = {
     "variance": [1.0],
     "exponent": [1.0, 2.0, 4.0],
     "anisotropy": [0.5, 1.0, 2.0],
     "noise_share": [0.0, 0.01, 0.1, 0.4],
 }
-"""Values from which a search may begin."""
+"""Values of the coarse grid of step 5."""
 FLOOR = 1e-3
-"""Floor as a share of the highest power, averaged over records and neighbours."""
+"""Floor as a share of the highest power, which is averaged over records and neighbours."""
 NEIGHBOURS = 5
 ORDERS, COARSE = 10, 0.1
-"""Hermite orders of a marginal's map, and steps of z by which they are found to 1e-4."""
+"""Hermite orders of the map of a marginal, and steps of z that give them to 1e-4."""
 REPORTED = ("correlation_length", "exponent", "anisotropy")
 AT_END = 1e-3
-"""Distance from an end of a range, as a share of it, within which an estimate is at it."""
+"""Largest distance of an estimate at an end of a range, as a share of the range."""
 LOG_STEP = 1e-4
 SETTLED = 1e-3
-"""Gain of log likelihood below which scoring ends; a standard error is worth a half."""
+"""Gain of log likelihood below which scoring ends. A standard error is worth one half."""
 LONGEST = 1.5
-"""Longest step, on the scale on which parameters are searched for."""
+"""Longest step of scoring, on the scale of the search."""
 
 
 def hermite_shares(marginal: Any) -> Array:
-    """Return the shares of the variance in the Hermite orders 0, 1, ..., the last for the rest."""
+    """Return the shares of the variance in Hermite orders 0, 1, ..., and a last one for the
+    rest."""
     shares = hermite_coefficients(marginal, COARSE, ORDERS) ** 2
     shares[0] = 0.0
     return shares / shares.sum()
 
 
 class Observed(NamedTuple):
-    """Periodograms of all records of one geometry: their number, their average, and its floor."""
+    """Average periodogram of all records of one geometry, their number, and the floor."""
 
     window: RecordWindow
     records: int
@@ -77,7 +93,7 @@ class Observed(NamedTuple):
 
 
 def observe(rows: Sequence[Array], windows: Sequence[RecordWindow]) -> list[Observed]:
-    """Return the periodograms of measured values (points,), by geometry."""
+    """Return the periodograms of measured values (points,) by geometry (step 1)."""
     powers: dict[RecordWindow, list[Array]] = {}
     for row, window in zip(rows, windows, strict=True):
         powers.setdefault(window, []).append(window.periodogram(row))
@@ -92,15 +108,15 @@ def observe(rows: Sequence[Array], windows: Sequence[RecordWindow]) -> list[Obse
 class Model(NamedTuple):
     """Prediction of records from a spectrum, the Hermite shares of a marginal and noise.
 
-    The truncation of a spectrum is a property of the field only if it was given
-    (`end_seen`): at a multiple of 1/xi_0 it would, among the wavenumbers of a record,
-    determine the correlation length.
+    `end_seen` says whether the truncation of the spectrum was given. Otherwise it is left out: it
+    lies at a multiple of 1/xi_0, and would determine the correlation length if it fell among the
+    wavenumbers of a record.
     """
 
     spectrum: Any
     anisotropy: float
-    noise_share: float  # of the variance; negative only on the way to an estimate
-    variance: float  # of the values, noise included
+    noise_share: float  # of the variance; negative only during the search
+    variance: float  # of the values with noise
     shares: Array
     end_seen: bool
 
@@ -110,32 +126,32 @@ class Model(NamedTuple):
         return math.sqrt(self.noise_share * self.variance)
 
     def power(self, window: RecordWindow) -> Array:
-        """Return the variance of z in each mode of a period of a window's grid."""
+        """Return the variance of z in each mode of the period of a window."""
         return window.power(self.spectrum, self.anisotropy, end_seen=self.end_seen)
 
     def correlation(self, window: RecordWindow) -> Array:
-        """Return the correlation of values without noise, at all lags."""
+        """Return the correlation of values without noise at all lags (step 2)."""
         rho = window.correlation(self.power(window))
         return np.polynomial.polynomial.polyval(rho, self.shares)
 
     def signal(self, window: RecordWindow) -> Array:
-        """Return the expected periodogram of values of unit variance without noise, (*half)."""
+        """Return the expected periodogram, (*half), of values without noise and of variance 1."""
         return window.expectation(self.correlation(window))
 
     def expectation(self, window: RecordWindow, signal: Array | None = None) -> Array:
-        """Return the expected periodogram, (*half), from that without noise if it is there."""
+        """Return the expected periodogram, (*half), from the `signal` if it is known (step 3)."""
         signal = self.signal(window) if signal is None else signal
         share = self.noise_share
         return self.variance * ((1.0 - share) * signal + share * window.white)
 
 
 def origin(name: str) -> float:
-    """Return the origin of the logarithm on which the error of a parameter is about normal."""
+    """Return the origin of the logarithm in which the error of a parameter is about normal."""
     return 0.5 if name.endswith("exponent") else 0.0
 
 
 def spectrum_of(given: Any) -> tuple[str, dict[str, float]]:
-    """Return the name of a family of spectra and the parameters to keep, checked."""
+    """Return the name of a family of spectra and its fixed parameters, checked."""
     table = table_of(given)
     name = from_table(SPECTRA, {"correlation_length": 1.0} | table).type
     return name, {key: float(value) for key, value in table.items() if key != "type"}
@@ -143,17 +159,17 @@ def spectrum_of(given: Any) -> tuple[str, dict[str, float]]:
 
 @dataclass(frozen=True, eq=False)
 class SpectrumFamily:
-    """A family of spectra with fixed parameters, and what else is estimated (None) with it."""
+    """A family of spectra with fixed parameters. Parameters with the value None are estimated."""
 
     name: str
     fixed: dict[str, float]
     anisotropy: float | None
     noise: float | None  # standard deviation
-    lengths: tuple[float, float]  # m: between which correlation lengths are searched
+    lengths: tuple[float, float]  # range of the searched correlation lengths, m
 
     @cached_property
     def free(self) -> tuple[str, ...]:
-        """Names of the free parameters, in the order of the vector of parameters."""
+        """Names of the free parameters in the order of the vector."""
         known: dict[str, Any] = self.fixed | {"anisotropy": self.anisotropy}
         known["noise_share"] = self.noise
         absent = ("exponent",) if self.name != "power_law" else ()
@@ -162,7 +178,7 @@ class SpectrumFamily:
 
     @cached_property
     def limits(self) -> Array:
-        """Ends of the searched ranges on the scale of the search, (parameters, 2)."""
+        """Ends of the ranges on the scale of the search, (parameters, 2)."""
         ranges = RANGES | {"correlation_length": self.lengths}
         ends = zip(*[ranges[name] for name in self.free], strict=True)
         return np.transpose([self.vector(end) for end in ends])
@@ -200,24 +216,22 @@ class SpectrumFamily:
         return {name: float(getattr(owners.get(name, model), name)) for name in self.free}
 
     def at_end(self, model: Model) -> dict[str, float]:
-        """Return the parameters of a spectrum that lie at an end of their range."""
+        """Return the parameters of the spectrum that lie at an end of their range."""
         aside = np.abs(self.limits - self.vector_of(model)[:, None]).min(axis=1)
         near = aside < AT_END * np.ptp(self.limits, axis=1)
-        values = zip(self.of(model).items(), near, strict=True)
-        return {
-            name: value for (name, value), is_near in values if is_near and name in REPORTED
-        }
+        pairs = zip(self.of(model).items(), near, strict=True)
+        return {name: value for (name, value), end in pairs if end and name in REPORTED}
 
 
 class Whittle(NamedTuple):
-    """The likelihood of periodograms, in terms of the vector of a family."""
+    """The likelihood of periodograms as a function of the vector of a family."""
 
     family: SpectrumFamily
     shares: Array
     observed: Sequence[Observed]
 
     def of(self, expected: Sequence[Array]) -> float:
-        """Return the log likelihood; -inf where less than nothing is expected."""
+        """Return the log likelihood. It is -inf if an expectation is negative (step 4)."""
         value = 0.0
         for group, e in zip(self.observed, expected, strict=True):
             lifted = e + group.floor
@@ -228,7 +242,7 @@ class Whittle(NamedTuple):
         return value
 
     def coarse(self) -> Array:
-        """Return the best of a grid of parameters, as a start."""
+        """Return the best point of a coarse grid of parameters (step 5)."""
         lengths = np.geomspace(*self.family.lengths, 17)[:-2].tolist()
         tried = TRIED | {"correlation_length": lengths}
         windows = [one.window for one in self.observed]
@@ -251,12 +265,12 @@ class Whittle(NamedTuple):
         return best
 
     def fit(self, start: Array) -> Array:
-        """Return the vector of the greatest likelihood, from a start."""
+        """Return the vector of the greatest likelihood from a start (step 5)."""
         limits = self.family.limits
         return climb(start, limits, self.value, self.score, longest=LONGEST, settled=SETTLED)
 
     def value(self, at: Array) -> tuple[float, tuple[Model, list[Array]]]:
-        """Return the log likelihood, and what its derivatives need."""
+        """Return the log likelihood, and model and signals for its derivatives."""
         model = self.family.model(at, self.shares)
         signals = [model.signal(one.window) for one in self.observed]
         pairs = zip(self.observed, signals, strict=True)
@@ -264,7 +278,7 @@ class Whittle(NamedTuple):
         return value, (model, signals)
 
     def score(self, at: Array, state: tuple[Model, list[Array]]) -> tuple[Array, Array]:
-        """Return sum w d (I/E - 1) and Fisher's information sum w d d^T, d = d log E/d theta."""
+        """Return the score sum w d (I/E - 1) and Fisher's information sum w d d^T (step 5)."""
         family, limits = self.family, self.family.limits
         model, signals = state
         moved = {}
@@ -276,7 +290,7 @@ class Whittle(NamedTuple):
         result, information = np.zeros(at.size), np.zeros((at.size, at.size))
         for group, signal in zip(self.observed, signals, strict=True):
             expected = model.expectation(group.window, signal)
-            # Of a known noise the share falls as the variance grows.
+            # If the noise is known, its share falls as the variance grows.
             slopes = {
                 "variance": expected if family.noise is None else model.variance * signal,
                 "noise_share": model.variance * (group.window.white - signal),
@@ -294,7 +308,7 @@ class Whittle(NamedTuple):
     def noise_variance(self, at: Array) -> tuple[float, float]:
         """Return the variance of the noise, which may be negative, and its standard error.
 
-        The error takes ordinates for independent: too small, but in proportion to the true one.
+        The error assumes independent ordinates. It is too small, but in proportion to the true one.
         """
         state = self.value(at)[1]
         model, (_, information) = state[0], self.score(at, state)

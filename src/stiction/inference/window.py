@@ -1,15 +1,29 @@
 """The exact effect of a finite window on a spectrum: taper, gaps and removal of a trend.
 
-A record is no period of the interface. Its periodogram, tapered and with a trend removed,
-has an expectation that is linear in the correlation,
+Problem. A record is not a period of the interface. Find the expectation of its periodogram after
+taper h (zero at gaps) and removal of a trend by the projection P. It is linear in the correlation
+C:
 
     E |sum_m u_k(m) y(m)|^2 = sum_l C(l) a_k(l),    u_k = P (h exp(-i k x)),
 
-with h the taper (zero where nothing was measured), P the projection that removes the trend
-and a_k the autocorrelation of u_k. Leakage, gaps, aliasing and the loss of low wavenumbers
-to the trend are all in it (the debiased Whittle likelihood of Sykulski, Olhede, Guillaumin,
-Lilly and Early, 2019, and of Guillaumin, Sykulski, Olhede and Simons, 2022, here with the
-trend as well).
+with the autocorrelation a_k of u_k. The equation contains leakage, gaps, aliasing and the loss of
+low wavenumbers to the trend.
+
+Sources. Sykulski, Olhede, Guillaumin, Lilly and Early (2019), Biometrika 106, 251, section 3, for a
+line without a trend. Guillaumin, Sykulski, Olhede and Simons (2022), Journal of the Royal
+Statistical Society B 84, 1526, for planes with gaps.
+
+Steps:
+
+1. Fit orthonormal polynomials to the measured points: P is one less their projection.
+2. For most wavenumbers the taper hides the trend, and a_k is the autocorrelation of h. One
+   transform gives the expectation at all of them.
+3. For the lowest wavenumbers (`EXACT`), compute a_k with the trend.
+4. The correlation comes from a transform of the spectrum on a period of `ROOM` records. Add the
+   density at all wavenumbers that look alike on the grid, the nearest exactly and the farther ones
+   at few wavenumbers, because they are smooth.
+
+Departures. The trend in step 3 is our own, as is the treatment of aliases in step 4.
 """
 
 import itertools
@@ -26,22 +40,23 @@ from stiction.base.arrays import Array
 TAPERED = 0.5
 """Share of a record over which the cosine taper rises and falls."""
 EXACT = {1: 16, 2: 2}
-"""Wave numbers up to which the expectation includes the trend; the taper hides it beyond."""
+"""Wavenumbers, as numbers of modes, up to which the expectation contains the trend."""
 ROOM = {1: 4, 2: 2}
 """Period of the grid on which a correlation is computed, in lengths of the record."""
 EDGE = 2.0
-"""Modes of a period over which a spectrum fades out at its end: a sharper end would move in steps
-along with the correlation length."""
+"""Modes over which a spectrum fades out at its end. The likelihood would move in steps with the
+correlation length if the end were sharper."""
 LEFT_OUT = 1e-4
-"""Share of the variance above the end of a spectrum that is not truncated."""
+"""Share of the variance above the end of a spectrum without truncation."""
 FOLDS = 6
-"""Multiples of the sampling wavenumber that are folded back one by one."""
+"""Multiples of the sampling wavenumber whose aliases are added one by one."""
 NEAR, FEW = 1, {1: 65, 2: 33}
-"""Multiples that need all wavenumbers, and number of wavenumbers in a direction of the others."""
+"""Multiples that need all wavenumbers, and number of wavenumbers per direction for the others."""
 
 
 class Edge(NamedTuple):
-    """Wavenumber at which a spectrum ends, rad/m, and over how many it fades out."""
+    """Wavenumber at the end of a spectrum, and width of the range over which it fades out,
+    rad/m."""
 
     at: float
     width: float
@@ -50,8 +65,8 @@ class Edge(NamedTuple):
 class RecordWindow:
     """Points of records of one geometry, `spacings` (m) apart: taper, gaps, and degree of trend.
 
-    Lags are 0, 1, ..., n - 1, -n, ..., -1 in each direction; (*half) is the shape of a real
-    transform.
+    Lags in each direction are 0, 1, ..., n - 1, -n, ..., -1. The shape of a real transform is
+    (*half).
     """
 
     def __init__(
@@ -63,17 +78,19 @@ class RecordWindow:
         self._lags = np.ix_(
             *[np.r_[:n, m - n : m] for n, m in zip(self.shape, self._period, strict=True)]
         )
-        # Orthonormal polynomials of the trend, (points, terms).
+        # 1. orthonormal polynomials of the trend, (points, terms)
         self.basis = _polynomials(measured, degree)
         ones = np.ones(int(measured.sum()))
-        self.pairs = self._pairs(ones)  # of measured points, by their lag
+        self.pairs = self._pairs(ones)  # number of pairs of measured points by lag
         trend = np.zeros_like(self.pairs)
         self._of_trend = sum((self._pairs(one) for one in self.basis.T[1:]), start=trend)
+        # 2.
         tapers = np.ix_(*[tukey(2 * n + 1, TAPERED)[1::2] for n in self.shape])  # nowhere zero
         self.taper = np.prod(np.broadcast_arrays(measured, *tapers), axis=0)
         self.taper /= np.sqrt(np.sum(self.taper**2))
         lags = tuple(2 * n for n in self.shape)
         self._spread = fft.irfftn(np.abs(fft.rfftn(self.taper, lags)) ** 2, lags)
+        # 3.
         most = [min(exact, (n - 1) // 2) for n in self.shape]
         numbers = [np.arange(-m, m + 1) for m in most]
         numbers[-1] = np.arange(min(exact, self.shape[-1] // 2) + 1)
@@ -83,19 +100,19 @@ class RecordWindow:
         unit = np.zeros(lags)
         unit[(0,) * unit.ndim] = 1.0
         self.white = self.expectation(unit)  # of white noise
-        # A half where k and -k are both there or k is its own opposite, and 0 for the mean.
+        # One half if both k and -k are there or k is its own opposite, and 0 for the mean.
         self.weights = np.ones(self.white.shape)
         self.weights[..., [0, -1] if self.shape[-1] % 2 == 0 else 0] = 0.5
         self.weights[(0,) * unit.ndim] = 0.0
 
     def _pairs(self, weights: Array) -> Array:
-        """Sum of w_i w_j over pairs of measured points at each lag, for weights (points,)."""
+        """Return the sum of w_i w_j over pairs of measured points at each lag."""
         field, lags = np.zeros(self.shape), tuple(2 * n for n in self.shape)
         field[self.measured] = weights
         return fft.irfftn(np.abs(fft.rfftn(field, lags)) ** 2, lags)
 
     def _autocorrelation(self, wave: NDArray[np.int64]) -> Array:
-        """a_k at all lags, flat."""
+        """Return a_k at all lags, flat (step 3)."""
         turns = [number * np.arange(n) / n for number, n in zip(wave, self.shape, strict=True)]
         phase = 2.0 * np.pi * sum(np.ix_(*turns))
         carried = (self.taper * np.exp(-1j * phase))[self.measured]
@@ -106,13 +123,13 @@ class RecordWindow:
 
     @property
     def wave_vectors(self) -> tuple[Array, ...]:
-        """Components of the wave vectors of `periodogram`, rad/m; they broadcast."""
+        """Components of the wave vectors of `periodogram`, rad/m, in shapes that broadcast."""
         axes = [fft.fftfreq(n, d) for n, d in zip(self.shape, self.spacings, strict=True)]
         axes[-1] = fft.rfftfreq(self.shape[-1], self.spacings[-1])
         return tuple(2.0 * np.pi * axis for axis in np.ix_(*axes))
 
     def without_trend(self, values: Array) -> Array:
-        """Remove the trend of measured values (points,) but not their mean."""
+        """Remove the trend of measured values (points,), and keep their mean."""
         if self.basis.shape[1] == 1:
             return values
         return values - self.basis @ (self.basis.T @ values) + values.mean()
@@ -124,18 +141,18 @@ class RecordWindow:
         return np.abs(fft.rfftn(self.taper * field)) ** 2
 
     def expectation(self, covariance: Array) -> Array:
-        """Return the expected periodogram, (*half), from the covariance at all lags."""
+        """Return the expected periodogram, (*half), from the covariance at all lags (2. and 3.)."""
         every_other = tuple(slice(None, None, 2) for _ in self.shape)
         result = fft.rfftn(self._spread * covariance).real[every_other].copy()
         result[self._low] = self._exact @ covariance.ravel()
         return result
 
     def power(self, spectrum: Any, anisotropy: float = 1.0, *, end_seen: bool = True) -> Array:
-        """Return the variance of z in each mode of a period of the grid; it sums to 1 over all.
+        """Return the variance of z in each mode of a period of the grid. The sum is 1 (step 4).
 
-        Power above the sampling wavenumber is folded back, above `FOLDS` times that evenly.
-        The spectrum fades out at its truncation, and has none if `end_seen` is false: what
-        it leaves out of a rough spectrum would be taken for noise.
+        Power above `FOLDS` sampling wavenumbers is spread evenly. The spectrum fades out at its
+        truncation. It has no truncation if `end_seen` is false, because the missing power of a
+        rough spectrum would be taken for noise.
         """
         dimensions = len(self.shape)
         stretch = (1.0, anisotropy)[:dimensions]
@@ -155,7 +172,7 @@ class RecordWindow:
         if end < cutoff:
             kept = [spectrum.power_within(k, dimensions) for k in (end, cutoff)]
             missed = 1.0 - kept[0] / kept[1]
-        # Most modes of a real transform stand for two of a whole one.
+        # Most modes of a real transform count twice, for k and -k.
         all_modes = 2.0 * total.sum() - total[..., 0].sum()
         if self._period[-1] % 2 == 0:
             all_modes -= total[..., -1].sum()
@@ -177,14 +194,14 @@ class RecordWindow:
         return whole[self._lags]
 
     def sample(self, power: Array, rng: np.random.Generator) -> Array:
-        """Sample z at the points that were measured, (points,): a piece of a period."""
+        """Sample z at the measured points, (points,), as a piece of a period."""
         white = fft.rfftn(rng.standard_normal(self._period))
         whole = fft.irfftn(white * np.sqrt(power * math.prod(self._period)), self._period)
         return whole[tuple(slice(n) for n in self.shape)][self.measured]
 
 
 def _polynomials(measured: NDArray[np.bool_], degree: int) -> Array:
-    """Orthonormal polynomials of a total degree on the measured points, (points, terms)."""
+    """Return orthonormal polynomials of a total degree at the measured points, (points, terms)."""
     axes = np.ix_(*[np.linspace(-1.0, 1.0, n) for n in measured.shape])
     terms = [
         np.prod(np.broadcast_arrays(*[x**p for x, p in zip(axes, powers, strict=True)]), axis=0)
@@ -201,7 +218,7 @@ def _fade(k: Array, end: Edge) -> Array:
 def _folded_line(
     spectrum: Any, axes: list[Array], folds: list[int], sampling: list[float], end: Edge
 ) -> Array:
-    """The density at all wavenumbers that look alike on the grid, added up."""
+    """Return the sum of the density over all wavenumbers that look alike on the grid."""
 
     def added(at: Array, multiples: Array) -> Array:
         k = np.abs(at + multiples[:, None] * sampling[0])
@@ -209,7 +226,7 @@ def _folded_line(
 
     near = min(folds[0], NEAR)
     line = added(axes[0], np.arange(-near, near + 1))
-    if folds[0] > near:  # smooth by then
+    if folds[0] > near:  # smooth from there on
         far = np.arange(near + 1, folds[0] + 1)
         few = np.linspace(0.0, axes[0][-1], FEW[1])
         line += np.interp(axes[0], few, added(few, np.concatenate([-far, far])))
