@@ -149,7 +149,7 @@ def test_what_joining_refuses():
         "did you mean 'weibull'",
         lambda: st.infer(PROBLEM, EVEN, PEAKS, between="weibul", **LOCAL),
     )
-    refuses("prior_transform: needs", lambda: found.prior_transform([0.5] * 4))
+    refuses("need parameters with a prior", lambda: found.prior_transform([0.5] * 4))
 
 
 def test_a_single_specimen_leaves_the_scatter_to_its_prior():

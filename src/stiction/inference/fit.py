@@ -1,4 +1,26 @@
-"""A random field from measured profiles, and reasons not to trust it."""
+"""A random field from measured profiles, with intervals and doubts.
+
+Problem. Records are samples of one random field with noise. Find the field, and how well the
+records determine it.
+
+Sources. The parts are in `records`, `window`, `whittle`, `marginal_fit`, `estimate`, `bootstrap`,
+`between` and `specimens`, with their sources.
+
+Steps:
+
+1. Turn profiles into records at equal distances, and refuse white noise (`records`, `window`).
+2. Fit each family of marginals together with the spectrum, and order them by their scores
+   (`estimate`).
+3. Fit records that are simulated from the best family, and from others that may be true
+   (`bootstrap`). Leave out a family that cannot be fitted to its own records, and go on with 2.
+4. Take intervals from the repetitions. If records are of different specimens, take the intervals of
+   mean and scatter from the posterior by the levels of the records (`specimens`).
+5. Compare the distances of the data from marginal and spectrum with the distances of the
+   repetitions. Logarithms of these distances are about normal, which gives p-values by Student's
+   distribution.
+6. Draw likely fields from the families in proportion to their weights, evenly by a sequence of
+   Niederreiter (Random Number Generation and Quasi-Monte Carlo Methods, 1992, chapter 3).
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -27,7 +49,7 @@ from stiction.inference.bootstrap import (
 )
 from stiction.inference.estimate import Estimate, FitSetting, Goodness, compare, windowed
 from stiction.inference.marginal_fit import Family, family_of
-from stiction.inference.records import records_of, refuse_uncorrelated
+from stiction.inference.records import records_of
 from stiction.inference.specimens import (
     MEAN_KEY,
     SCATTER_KEY,
@@ -48,24 +70,24 @@ from stiction.random.spectra import Share
 
 MARGINALS = ("lognormal", "weibull", "gamma", "beta")
 ENOUGH_LENGTHS = 10.0
-"""Correlation lengths below which a record constrains no parameter well."""
+"""Correlation lengths that a record must hold to constrain parameters well."""
 FIXED = {"exponent": ", as in spectrum={'type': 'power_law', 'exponent': 4}"}
 MIN_P_VALUE = 0.01
 """p-value below which a family does not fit."""
 ADVICE = {
-    "marginal": "the values are far from its family; compare families",
-    "spectrum": "the periodogram is far from its family; take another spectrum or a higher detrend",
-    "level": "means of records scatter more than those of one field, which designs under the fit"
-    " leave out; pass between=True if records are of different specimens",
+    "marginal": "The values are far from its family. Compare families",
+    "spectrum": "The periodogram is far from its family. Take another spectrum or a higher detrend",
+    "level": "Means of records scatter more than means of one field, which designs under the fit"
+    " leave out. Pass between=True if records are of different specimens",
 }
 TOLD = 2.0
-"""Difference of scores from which data tell two families apart."""
+"""Difference of scores above which data distinguish two families."""
 FEW_SPECIMENS = 5
-"""Specimens below which the scatter between them decides what is rare."""
+"""Fewest specimens whose scatter decides about rare failures."""
 EVENLY = 0.5 * (math.sqrt(5.0) - 1.0)
-"""Step of a sequence that fills [0, 1) evenly, however long it is (Niederreiter, 1992)."""
+"""Step of a sequence modulo 1 that fills [0, 1) evenly."""
 INTERVAL_DRAWS = 4000
-"""Draws of the posterior from which intervals are taken."""
+"""Draws of the posterior for intervals."""
 
 
 def _families(given: Any) -> list[Family]:
@@ -94,31 +116,31 @@ class FieldFit(Result):
     field : RandomField
         The fitted field for simulation, without measurement noise and with the mean mode.
     parameters : dict of str to float
-        Estimates, in SI: ``efolding_length`` (m), at which the correlation of z falls to 1/e;
-        ``mean`` and ``standard_deviation`` of the field; ``marginal.*`` and ``spectrum.*`` by
-        the names that study files use; ``anisotropy``; ``noise``, the standard deviation of the
-        measurement noise; and ``between``, the coefficient of variation between specimens.
+        Estimates in SI. ``efolding_length`` (m) is the lag at which the correlation of z falls to
+        1/e. ``mean`` and ``standard_deviation`` belong to the field. ``marginal.*``, ``spectrum.*``
+        and ``anisotropy`` have their names in study files. ``noise`` is the standard deviation of
+        the measurement noise, and ``between`` the coefficient of variation between specimens.
     interval : dict of str to (float, float)
-        Bootstrap interval of each parameter. The interval of the noise may begin at zero;
-        those of bounds of the marginal end outside the values; those of an exponent and of an
-        anisotropy end at the searched ranges, 0.65 to 16, 0.05 to 20. With `between` the
-        intervals of ``mean`` and ``between`` are of the posterior by the levels of the records.
+        Bootstrap interval of each parameter. The interval of the noise may begin at zero. Intervals
+        of the bounds of the marginal end outside of the values. Intervals of exponent and
+        anisotropy end at the searched ranges, 0.65 to 16 and 0.05 to 20. With `between`, the
+        intervals of ``mean`` and ``between`` come from the posterior by the levels of the records.
     confidence : float
         Confidence level of the intervals.
     repetitions : tuple of RandomField
-        The fits to records simulated from `field`: what another measurement might have given.
+        Fits to records simulated from `field`, as another measurement might have given them.
     families : dict of str to Goodness
-        Quality of every requested family of marginals, the best first.
+        Quality of each requested family of marginals, the best family first.
     independent : float
         Number of independent values in the scores of families.
     p_values : dict of str to float
-        Probability of records as far from their own marginal, and spectrum, as the data are
-        from the fitted ones, from the repetitions; small if a family does not fit. Of several
-        records without `between` also that of means that scatter as much (``level``).
+        Probability that records of the fitted ``marginal`` and ``spectrum`` lie as far from their
+        fits as the data do. A small one means that the family does not fit. For several records
+        without `between`, ``level`` is the probability that their means scatter as much.
     missing : (int, int)
-        Number of points without a value, which are left out, and of all points.
+        Number of points without a value, which are left out, and number of all points.
     doubts : tuple of str
-        Reasons not to trust the fit; empty if there are none.
+        Reasons not to trust the fit. Empty if there are none.
     """
 
     field: RandomField
@@ -135,7 +157,7 @@ class FieldFit(Result):
     _repeated: Sequence[Repetitions]  # of the field, and of other families that may be drawn
     _rows: Sequence[Array]
     _levels: Array
-    _families: tuple[str, ...]  # of the factor between specimens; none without
+    _families: tuple[str, ...]  # of the factor between specimens; empty without a factor
     _prior: FactorPrior
 
     @property
@@ -144,12 +166,12 @@ class FieldFit(Result):
 
     @property
     def lengths_held(self) -> float:
-        """Number of correlation lengths, or on a plane areas, that the records hold together."""
+        """Number of correlation lengths, or areas on a plane, in all records together."""
         return self._estimate.lengths_held
 
     @property
     def tied(self) -> tuple[str, ...]:
-        """Names of the families that the records do not tell from the best, and of this one."""
+        """Names of the families that the records do not distinguish from the best one."""
         return tuple(name for name, one in self.families.items() if one.score > -TOLD)
 
     @cached_property
@@ -159,17 +181,18 @@ class FieldFit(Result):
 
     @checked
     def interfaces(self, count: Count, seed: Number = 0) -> list[RandomInterface]:
-        """Return equally likely random interfaces, for a failure probability under all of them.
+        """Return equally likely random interfaces, for the failure probability under all of them.
 
-        Each is the estimate less the error of one repetition, so that bias and scatter are those
-        of the intervals. Families of the marginal have shares by their `weight`. With `between`,
-        each has a mean, and a factor with a family and a scatter, drawn from their posterior
-        (`stiction.inference.specimens`). A longer list of one seed begins with a shorter one.
+        Each is the estimate less the error of a repetition, with the bias and scatter of the
+        intervals. Families of the marginal are drawn in proportion to their `weight`. With
+        `between`, each interface has a mean and a factor between specimens, drawn from their
+        posterior (`stiction.inference.specimens`). A longer list begins with a shorter one of the
+        same seed.
 
         Parameters
         ----------
         count : int
-            Their number; of each family at most as many differ as it has repetitions.
+            Number of interfaces. A family has at most as many different ones as repetitions.
         seed : int
             Not negative.
 
@@ -192,7 +215,7 @@ class FieldFit(Result):
         return self.grouped(count, seed)[0]
 
     def grouped(self, count: int, seed: int) -> tuple[list[RandomInterface], list[int]]:
-        """Return equally likely interfaces, and the number of the field within each."""
+        """Return equally likely interfaces and the number of the field within each."""
         chosen = self._chosen(count, seed)
         place = {own: number for number, own in enumerate(self._every)}
         numbers = [place[field] for field in chosen]
@@ -202,12 +225,12 @@ class FieldFit(Result):
         return self._posterior.grouped(self._posterior.draws(count, rng, numbers))
 
     def _chosen(self, count: int, seed: int) -> list[RandomField]:
-        """Return likely fields, of each family in proportion to its weight."""
+        """Return likely fields from all families in proportion to their weights (step 6)."""
         if self.quantity not in ("strength", "friction_coefficient"):
             raise InputError(
-                f"interfaces: need a strength, and the fit is of {self.quantity}; fit one of"
-                " quantity='strength' or 'friction_coefficient', or put the `repetitions` of this"
-                " into random interfaces of your own"
+                f"interfaces: need a strength, but the fit is of {self.quantity}. Fit"
+                " quantity='strength' or 'friction_coefficient', or put the `repetitions` into"
+                " random interfaces"
             )
         rng = np.random.default_rng([seed, 5])
         ends = np.cumsum([one.weight for one in self.families.values() if one.weight > 0.0])
@@ -218,7 +241,7 @@ class FieldFit(Result):
 
     @cached_property
     def _every(self) -> list[RandomField]:
-        """All likely fields, which the posterior numbers."""
+        """All likely fields. The posterior numbers them in this order."""
         return list(dict.fromkeys(field for own in self._likely for field in own))
 
     @cached_property
@@ -227,16 +250,17 @@ class FieldFit(Result):
         return grid_of_profiles(self._with_levels(self._every))[0]
 
     def profiles(self, count: int, seed: int) -> Profiles:
-        """Return likely fields and the levels of the records, for the posterior with peaks."""
+        """Return likely fields and the levels of the records for the posterior with peaks."""
         return self._with_levels(list(dict.fromkeys(self._chosen(count, seed))))
 
     def _with_levels(self, fields: Sequence[RandomField]) -> Profiles:
+        """Return fields with the levels of the records and their variances by each field."""
         truth, levels = self._estimate, self._levels
         mean, deviation = (truth.parameters[k] for k in ("mean", "standard_deviation"))
         length = truth.field(self.quantity).spectrum.efolding_length
         cvs = np.array([one.standard_deviation / one.mean for one in fields])
         lengths = np.array([one.spectrum.efolding_length for one in fields])
-        # The variance of a mean grows with that of the field and with its correlation length.
+        # The variance of a mean grows with the variance of the field and its correlation length.
         share = np.minimum(cvs**2 * lengths / ((deviation / mean) ** 2 * length), 1e3)
         within = np.minimum(np.outer(share, truth.within), np.log1p(cvs**2)[:, None])
         if not self._families:  # all records are of one specimen
@@ -248,7 +272,7 @@ class FieldFit(Result):
         return Profiles(members, mean, levels, within, families, self._prior)
 
     def uncertain(self, parameters: Mapping[str, Any]) -> Uncertain:
-        """Return this as a source with uncertain parameters, as of `stiction.uncertain`."""
+        """Return a source with these uncertain parameters too, as `stiction.uncertain` does."""
         return uncertain(self, parameters)
 
     def _summary(self) -> Summary:
@@ -300,63 +324,62 @@ def fit_field(
     Parameters
     ----------
     profiles : DataArray, array, or list of them
-        Lines over 'x' or maps over 'x' and 'y' (m), such as `stiction.read_profile`
-        returns, with equally spaced points. Missing values (NaN, missing points, filled
-        values) are left out. Plain arrays, of shape (nodes,) or (samples, nodes), on a
-        plane (nx, ny) or (samples, nx, ny), in SI, have a value at each node of
-        `interface`. Several profiles, also of different lengths, are samples of one field.
+        Lines over 'x' or maps over 'x' and 'y' (m) with equally spaced points, such as
+        `stiction.read_profile` returns. Missing values (NaN, missing points, filled values) are
+        left out. Plain arrays in SI have a value at each node of `interface`, and shape (nodes,) or
+        (samples, nodes), on a plane (nx, ny) or (samples, nx, ny). Several profiles are samples of
+        one field and may differ in length.
     interface : Interface, optional
         Needed for arrays without coordinates. A warning is issued if it is too short, or
         its nodes too coarse, for the fitted field.
     marginal : str, dict or sequence of them
-        Family: 'beta', 'lognormal', 'weibull', 'gamma', 'normal' or any
-        continuous distribution of `scipy.stats`. Of several, the best is chosen, and
-        `families` in the result compares them. A table fixes parameters: ``{"type": "beta",
-        "low": 0, "high": 2e6}``. Both bounds of 'beta' are estimated unless they are given;
-        the lower bound of the others is 0 unless it is given.
+        Family: 'beta', 'lognormal', 'weibull', 'gamma', 'normal' or any continuous distribution of
+        `scipy.stats`. The best of several is chosen, and `families` in the result compares them. A
+        table fixes parameters: ``{"type": "beta", "low": 0, "high": 2e6}``. By default both bounds
+        of 'beta' are estimated, and the lower bound of the others is 0.
     spectrum : str or dict
-        'power_law', 'squared_exponential' or 'exponential'; a table fixes parameters, such
-        as ``{"type": "power_law", "exponent": 4.0}``. Its end is seen in the record only if
-        ``"truncation"`` or ``"power_kept"`` is given; the field has the usual one otherwise.
+        'power_law', 'squared_exponential' or 'exponential'. A table fixes parameters, such
+        as ``{"type": "power_law", "exponent": 4.0}``. If it has ``"truncation"`` or
+        ``"power_kept"``, the spectrum of the record ends there. Otherwise only the field has its
+        usual end.
     detrend : int
-        Degree of the polynomial trend that is removed, 0 to 3. The mean is always kept. The
-        scatter that mean and trend take with them on average is added to the estimate (not
-        to families of `scipy.stats` whose loc or scale is fixed).
+        Degree of the removed polynomial trend, 0 to 3. The mean is kept. The scatter that mean and
+        trend take from the values on average is added to the estimate, except for families of
+        `scipy.stats` with a fixed loc or scale.
     noise : bool or float
-        Whether to estimate white, normal measurement noise along with the field; or its
-        standard deviation, if known (SI).
+        Whether to estimate white, normal measurement noise along with the field, or its standard
+        deviation (SI) if it is known.
     anisotropy : bool or float
-        Ratio of the correlation lengths of maps along y and x. False: 1; True: estimated.
+        Ratio of the correlation lengths of maps along y and x. False stands for 1, and True
+        estimates it.
     between : bool, str or sequence of str
         Whether records come from different specimens, each with its own factor of mean 1. The
-        coefficient of variation ``between`` of this factor is then estimated. The family of
-        the factor is one of those named: 'lognormal', 'normal' (above zero), 'weibull'; True
-        stands for all three, which are averaged. Fewer than five specimens say little of the
-        scatter between them, which a warning states.
+        coefficient of variation ``between`` of this factor is then estimated. Its family is one of
+        'lognormal', 'normal' (above zero) and 'weibull'. Several families, or True for all, are
+        averaged. A warning states that fewer than five specimens determine the scatter poorly.
     prior : mapping, optional
         Priors of the mean, ``"strength.mean"``, and of the coefficient of variation,
-        ``"between.strength"``, as of `infer`. By default the first is flat in its logarithm, and
+        ``"between.strength"``, as in `infer`. By default the first is flat in its logarithm, and
         the second half-Cauchy of scale 0.1.
     quantity : str
-        Measured quantity, for its unit: 'strength', 'normal_pressure',
-        'friction_coefficient', ... The fitted field of friction coefficients has
-        ``of="friction_coefficient"``.
+        Measured quantity, for its unit: 'strength', 'normal_pressure', 'friction_coefficient', ...
+        A fitted field of friction coefficients has ``of="friction_coefficient"``.
     bootstrap : int
-        Number of repetitions, at least 20, from the fitted field, and from each of two
-        fields with the correlation lengths at the ends of a first interval.
+        Number of repetitions, at least 20, for the fitted field and for each of two fields with the
+        correlation lengths at the ends of a first interval.
     confidence : float
-        Of the intervals.
+        Confidence level of the intervals.
     seed : int
         Seed of the repetitions.
     workers : int, optional
-        Number of threads; all cores if left out. Results do not depend on it.
+        Number of threads, by default all cores. Results do not depend on it.
     progress : bool or callable
         As in `stiction.monte_carlo`.
 
     Returns
     -------
     FieldFit
-        With `field`, `parameters` and `interval`; `stiction.plot.fit` draws it.
+        With `field`, `parameters` and `interval`. `stiction.plot.fit` draws it.
 
     Raises
     ------
@@ -368,23 +391,23 @@ def fit_field(
     Warns
     -----
     AccuracyWarning
-        If values are outliers or dropouts, a family cannot be fitted to records simulated
-        from it and is left out, profiles repeat others, and for each reason in `doubts`:
-        records hold fewer than ten correlation lengths, a p-value is below 1 % (of
-        ``level``: records of different specimens without `between`), the noise hides the
-        cut-off of the spectrum, a parameter lies at the end of the range that is searched,
-        or fewer than five specimens are to tell the scatter between them.
+        If values are outliers or dropouts, profiles repeat others, or a family is left out because
+        it cannot be fitted to records simulated from it. Also for each of the `doubts`: records
+        hold fewer than ten correlation lengths, a p-value is below 1 % (of ``level`` if records of
+        different specimens lack `between`), the noise hides the cut-off of the spectrum, a
+        parameter lies at the end of the searched range, or fewer than five specimens shall
+        determine the scatter between them.
 
     Notes
     -----
-    The marginal is found by maximum likelihood, of values and noise together. The spectrum
-    comes from a Whittle likelihood whose expectation is exact for the window: it includes
-    taper, gaps, detrending, aliasing, and a truncation of the spectrum if one is given
-    (Sykulski et al., 2019; Guillaumin et al., 2022). Correlations of values follow from
-    those of the Gaussian field z by Hermite expansion (Grigoriu, 1995).
+    The marginal maximises the likelihood of values with noise. The spectrum maximises a Whittle
+    likelihood with the exact expectation for the window, which contains taper, gaps, detrending,
+    aliasing, and a given truncation of the spectrum (Sykulski et al., 2019; Guillaumin et al.,
+    2022). Correlations of values follow from correlations of the Gaussian field z by Hermite
+    expansion (Grigoriu, 1995).
 
-    Families are compared by Akaike's criterion for one number of independent values: of N
-    with correlations rho_ij as many as N^2/sum rho_ij^3.
+    Families are compared by Akaike's criterion for a number of independent values. N values with
+    correlations rho_ij count as N^2/sum rho_ij^3.
 
     Intervals come from a studentised bootstrap (Davison and Hinkley, 1997, section 5.2), their
     upper and lower ends from fields of longer and shorter correlation (Carpenter, 1999).
@@ -402,11 +425,12 @@ def fit_field(
     """
     if quantity not in QUANTITIES:
         raise InputError(unknown_name("quantity", quantity, QUANTITIES))
+    # 1.
     records = records_of(profiles, interface, quantity)
     ratio = None if anisotropy is True else float(anisotropy or 1.0)
     if ratio != 1.0 and records[0].values.ndim == 1:
         raise InputError(
-            "anisotropy: applies to maps only; the profiles are lines, leave it out"
+            "anisotropy: applies to maps only, but the profiles are lines. Leave it out"
         )
     spacing = max(max(record.spacings) for record in records)
     longest = max(max(np.multiply(one.values.shape, one.spacings)) for one in records)
@@ -415,14 +439,15 @@ def fit_field(
     windows, rows = windowed(records, detrend)
     with prefixed("fit_field"):
         factor_prior = FactorPrior.of(prior)
-    refuse_uncorrelated(windows, rows)
     settings = [FitSetting(windows, one, family, bool(between)) for one in marginal]
     while True:
+        # 2.
         estimates, families, independent = compare(settings, rows)
         weights = [one.weight for one in families.values() if one.weight > 0.0]
         counts = [
             max(MIN_REPETITIONS, round(bootstrap * w / max(weights))) for w in weights[1:]
         ]
+        # 3.
         try:
             repeated, further = bootstrapped(
                 estimates[0], bootstrap, confidence, seed, progress, workers,
@@ -434,8 +459,9 @@ def fit_field(
             if not settings:
                 raise
             warn_accuracy(
-                f"{error}: the family is left out, as records like these are too far from it"
+                f"{error}: the family is left out, because such records are far from it"
             )
+    # 4. and 5.
     points = sum(record.values.size for record in records)
     fit = FieldFit(
         **_judged(repeated, rows, confidence, bootstrap, between, factor_prior),
@@ -468,7 +494,7 @@ def _judged(
     families: tuple[str, ...],
     prior: FactorPrior,
 ) -> dict[str, Any]:
-    """Return parameters, their intervals, p-values and doubts; `count` repetitions were tried."""
+    """Return parameters, intervals, p-values and doubts, after `count` repetitions each."""
     fitted, fits = repeated[0]
     parameters = dict(fitted.parameters)
     ends = intervals(repeated, confidence, np.concatenate(fitted.as_of_one(rows)))
@@ -487,7 +513,7 @@ def _judged(
         grid, _ = grid_of_profiles(profiles)
         draws = grid.described(grid.draws(INTERVAL_DRAWS, np.random.default_rng(0)))
         tails = 0.5 - 0.5 * confidence, 0.5 + 0.5 * confidence
-        for name in {"mean", "marginal.mean"} & parameters.keys():  # of other specimens, too
+        for name in {"mean", "marginal.mean"} & parameters.keys():
             ends[name] = tuple(np.quantile(draws[MEAN_KEY], tails).tolist())
         parameters["between"] = float(np.median(draws[SCATTER_KEY]))
         low, high = ends["between"] = tuple(np.quantile(draws[SCATTER_KEY], tails).tolist())
@@ -495,7 +521,7 @@ def _judged(
             doubts.append(
                 f"{len(rows)} specimen(s) leave the coefficient of variation between specimens at"
                 f" {low:.2g} to {high:.2g}, mostly by its prior, and it decides small"
-                f" probabilities: measure at least {FEW_SPECIMENS}, or state it, as in"
+                f" probabilities. Measure at least {FEW_SPECIMENS}, or state it, as in"
                 " RandomInterface(strength=fit.field, between={'strength': Lognormal(mean=1.0,"
                 " cv=0.1)})"
             )
@@ -505,38 +531,35 @@ def _judged(
 
 
 def _p_value(name: str, truth: Estimate, fits: Sequence[Estimate]) -> float:
-    """P-value of data from their model: logarithms of distances are about normal."""
-    value, repeats = (
-        math.log(getattr(truth, name)),
-        np.log([getattr(one, name) for one in fits]),
-    )
-    away = (value - repeats.mean()) / (
-        repeats.std(ddof=1) * math.sqrt(1.0 + 1.0 / repeats.size)
-    )
+    """Return the p-value of a distance of the data, with the distances of repetitions (step 5)."""
+    repeats = np.log([getattr(fit, name) for fit in fits])
+    error = repeats.std(ddof=1) * math.sqrt(1.0 + 1.0 / repeats.size)
+    away = (math.log(getattr(truth, name)) - repeats.mean()) / error
     return float(student.sf(away, repeats.size - 1))
 
 
 def _doubts(fitted: Estimate, p_values: Mapping[str, float]) -> list[str]:
+    """Return the reasons not to trust a fit."""
     doubts = []
     held, noise = fitted.lengths_held, fitted.model.noise
     if held < ENOUGH_LENGTHS:
         doubts.append(
-            f"the records hold {held:.2g} correlation lengths, too few for reliable intervals:"
-            f" measure a longer profile, or several, of at least {ENOUGH_LENGTHS:g}"
+            f"the records hold {held:.2g} correlation lengths, too few for reliable intervals."
+            f" Measure a longer profile, or several, of at least {ENOUGH_LENGTHS:g}"
         )
     left = max(_power_at_cutoff(fitted, window) for window in set(fitted.setting.windows))
     if left <= noise**2:
         doubts.append(
             f"the noise ({noise:.3g}) hides the cut-off of the spectrum, where the field has"
-            f" {math.sqrt(left):.3g} left: the correlation length depends on the family"
+            f" {math.sqrt(left):.3g} left. The correlation length then depends on the family"
         )
     doubts += [
-        f"{name} {value:.3g} lies at an end of the searched range: the data do not determine it;"
-        f" fix its value{FIXED.get(name, '')}"
+        f"{name} {value:.3g} lies at an end of the searched range. The data do not determine it."
+        f" Fix its value{FIXED.get(name, '')}"
         for name, value in fitted.setting.spectrum.at_end(fitted.model).items()
     ]
     doubts += [
-        f"the p-value of the {name} is {p:.2g}, below {MIN_P_VALUE:g}: {ADVICE[name]}, or look at"
+        f"the p-value of the {name} is {p:.2g}, below {MIN_P_VALUE:g}. {ADVICE[name]}, or look at"
         " st.plot.fit"
         for name, p in p_values.items()
         if p <= MIN_P_VALUE
@@ -545,7 +568,7 @@ def _doubts(fitted: Estimate, p_values: Mapping[str, float]) -> list[str]:
 
 
 def _power_at_cutoff(fitted: Estimate, window: RecordWindow) -> float:
-    """What is left of the field's power where it has fallen to a quarter, beside white noise."""
+    """Return the power of the field at which it has fallen to a quarter, beside white noise."""
     model = fitted.model
     if model.noise_share <= 0.0:
         return math.inf

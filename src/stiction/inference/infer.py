@@ -1,4 +1,19 @@
-"""Parameters of a random interface from the peaks of repeated tests."""
+"""Parameters of a random interface from the peaks of repeated tests.
+
+Problem. Find the posterior p(theta | y) of parameters theta with a prior from measured peaks y.
+
+Source. Bayes' theorem on a grid, as in Gelman and others, Bayesian Data Analysis (2013), section
+10.1. The choice of the box is our own.
+
+Steps:
+
+1. If only mean and scatter between specimens are unknown, go to `stiction.inference.joined`.
+2. Refuse peaks that lie beyond the bounds of the onset everywhere in the prior.
+3. For an expensive method, find the posterior by the local criterion first, if it applies. Its box,
+   slightly widened, is the relevant part of the prior. Otherwise take the whole prior.
+4. Simulate onsets in this box (`likelihood`), and sum the posterior on a grid (`grid`).
+5. If the posterior reaches an end of the box, widen the box on this side, and repeat step 4.
+"""
 
 import itertools
 import math
@@ -38,28 +53,29 @@ from stiction.random.equally_likely import AnyRandom
 from stiction.random.stresses import mean_in_stress
 
 TOLERABLE = 0.25
-"""Monte Carlo error over the posterior's standard deviation above which it is reported."""
+"""Monte Carlo error over the standard deviation of the posterior above which a note reports it."""
 NEVER = 1e-9
-"""Probability of a peak beyond the strengths that are thought possible."""
+"""Neglected probability of a peak outside the bounds of the onset."""
 WIDEN = 0.1
-"""Width of the first posterior that is added to the box of the second on either side."""
+"""Share of the width of the first posterior by which its box is widened on either side."""
 BOX_END_SHARE, HELD = 0.05, 1e-3
-"""Share of the box at either end, and mass of the posterior there above which the box grows."""
+"""Share of the box at either end, and posterior mass there above which the box grows."""
 PRIOR_END, PILED = 0.02, 4.0
-"""Share of a prior at its ends, and its multiple at which the posterior piles up there."""
+"""Share of a prior at either end, and multiple of this share above which the posterior piles up."""
 
 UNFINISHED: dict[Any, Array] = {}
-"""Onsets of a call that was interrupted; an equal one takes them up."""
+"""Onsets of an interrupted call. The next equal call takes them."""
 
 
 @contextmanager
 def _simulating(
     method: Any, samples: int | None, seed: int, workers: int | None, progress: Show
 ) -> Iterator[Simulation]:
+    """Give a simulation that keeps its onsets after Ctrl-C, and forgets them otherwise."""
     with Meter("infer", show=progress) as meter:
         try:
             yield Simulation(method, samples, seed, workers, meter, UNFINISHED)
-        except Exception:  # after Ctrl-C the next call goes on with these onsets
+        except Exception:
             UNFINISHED.clear()
             raise
         UNFINISHED.clear()
@@ -83,60 +99,62 @@ def infer(
 ) -> Posterior:
     """Infer parameters of the random strength from the peak stresses of repeated tests.
 
+    There are two uses. With a fit, or with interfaces and no `prior` of other parameters, the
+    mean strength and its scatter between specimens are inferred. With a `prior` of other
+    parameters, these parameters are inferred.
+
     Parameters
     ----------
     problem : Problem
         One specimen.
     random : RandomInterface, RandomField, a fit, or a list of interfaces
-        The random properties. With priors of other parameters than the two of specimens
-        below, one interface with known parameters, of which `prior` replaces some. Otherwise
-        a fit, whose records are joined with the peaks, or one or several equally likely
-        interfaces, of which only the field within a specimen counts: mean and scatter between
-        specimens are inferred.
+        For mean and scatter: a fit, whose records are joined with the peaks, or equally likely
+        interfaces, whose fields within a specimen count. For other parameters: one interface, in
+        which the parameters of `prior` are replaced.
     peaks : array, mapping of arrays, or Peaks
-        Mean shear stress, or force, at which each specimen slid, in `unit`; for specimens
-        of several lengths a mapping of each length (m) to its peaks,
-        ``{0.1: [...], 0.2: [...]}``, with the node spacing of the problem. Or the result of
-        `read_peaks`.
+        Mean shear stress or force at which each specimen slid, in `unit`. For specimens of
+        several lengths, map each length (m) to its peaks, ``{0.1: [...], 0.2: [...]}``. The node
+        spacing is the spacing of the problem. The result of `read_peaks` is accepted too.
     prior : mapping, optional
-        Of specimens: ``"strength.mean"``, by default flat in its logarithm, and
+        For mean and scatter: ``"strength.mean"``, by default flat in its logarithm, and
         ``"between.strength"``, the coefficient of variation between specimens, by default
-        half-Cauchy of scale 0.1. Or other parameters and the prior of each: a frozen
+        half-Cauchy of scale 0.1. For other parameters, their independent priors: a frozen
         continuous `scipy.stats` distribution, a range ``(low, high)``, or
-        ``{"low": ..., "high": ..., "spacing": "log"}``. Priors are independent. Keys are those
-        of a sweep: for the strength, ``"correlation_length"`` or ``"marginal.low"``; for others,
+        ``{"low": ..., "high": ..., "spacing": "log"}``. Keys are the keys of a sweep, such as
+        ``"correlation_length"`` or ``"marginal.low"`` for the strength, and
         ``"residual_strength.marginal.high"`` or ``"problem.friction.weakening_rate"``.
     between : str or sequence of str, optional
-        Families of the factor between specimens, as in `fit_field`; those of the fit, or all,
-        by default, with equal prior weights.
+        Families of the factor between specimens, as in `fit_field`, with equal prior weights. By
+        default the families of the fit, or all families.
     method : LocalCriterion, Equilibrium or any other
-        The method that finds the onset. For all but the local criterion, that one, if applicable,
-        first finds the relevant part of the prior, which grows until it contains the posterior.
+        Method that computes the onset. An expensive method is guided by the local criterion, which
+        first finds the relevant part of the prior. This part grows until it contains the posterior.
     load_cell_error : float
-        Standard deviation of the error of a peak, in `unit`; with `Peaks` in Pa, in N, or
-        as a coefficient.
+        Standard deviation of the error of a peak, in `unit`. If `Peaks` are given, it is in Pa, in
+        N, or a friction coefficient.
     unit : str
-        Unit of peaks and load-cell error: a unit of stress; of force, which needs a
-        specimen's ``thickness``, a line's ``width`` or a plane; or "1" for friction
-        coefficients, which need ``Load(normal_pressure=...)``.
+        Unit of peaks and load-cell error. A unit of force needs the ``thickness`` of a specimen,
+        the ``width`` of a line, or a plane. The unit "1" stands for friction coefficients, which
+        need ``Load(normal_pressure=...)``.
     samples : int, optional
-        Simulated specimens at each point: by default 2000 by the local criterion, 500 by
-        equilibrium. Of each field within a specimen: 200 by the local criterion, 100 by others.
+        Simulated specimens at each point, by default 2000 by the local criterion and 500 by
+        equilibrium. For mean and scatter, simulated specimens for each field, by default 200 by the
+        local criterion and 100 by other methods.
     seed : int
-        Not negative. The same samples are used at every point, so that the likelihood is smooth.
+        Not negative. All points share the samples, so that the likelihood is smooth.
     workers, progress
         As in `monte_carlo`.
 
     Returns
     -------
     Posterior
-        With `draws`, `mean`, `interval` and `information` (nats); ArviZ draws and compares
+        With `draws`, `mean`, `interval` and `information` (nats). ArviZ draws and compares
         `to_arviz()`.
 
     Raises
     ------
     InputError
-        If any argument is invalid, or no parameters in the prior can produce the peaks; the
+        If any argument is invalid, or no parameters in the prior can produce the peaks. The
         message then names the bound that must move.
 
     Warns
@@ -146,22 +164,21 @@ def infer(
         or few samples are simulated for the number of peaks. If profiles and peaks contradict
         each other, with the p-value of `stiction.statistics.agreement`.
     UserWarning
-        Beforehand, if the simulation will take more than a minute: how long, and what takes less.
+        Before a simulation of more than a minute, with its time and with faster alternatives.
 
     Notes
     -----
-    The likelihood is a kernel density of simulated onsets, combined with the error of the
-    load cell. Parameters that only shift and stretch the strength need no simulation: see
-    `stiction.inference.scaling` for when the onset follows them exactly. The others are
-    simulated on a grid with the same draws everywhere, and interpolated. The posterior is summed
-    on a grid, for up to about four parameters; for more, give `log_likelihood` and
-    `prior_transform` of the result to emcee or dynesty. After an interruption, or an error in one
-    sample, an equal call in the same session goes on with the onsets that are there.
+    The likelihood is a kernel density of simulated onsets with the error of the load cell
+    (`stiction.inference.likelihood`). Parameters that only shift and stretch the strength need no
+    simulation (`stiction.inference.scaling`). At most four others are simulated on a grid with the
+    same draws everywhere, and interpolated. The posterior is summed on a grid. For more parameters,
+    give `log_likelihood` and `prior_transform` of the result to emcee or dynesty. After an
+    interruption by Ctrl-C, an equal call in the same session goes on with the finished onsets.
 
-    Mean and scatter between specimens are integrated on a grid, with sixty fields within a
-    specimen from the repetitions of the fit: see `stiction.inference.specimens`. The families
-    of the factor between specimens are averaged; `families` of the result has their
-    probabilities, and `agreement` the comparison of the peaks with the profiles alone.
+    Mean and scatter between specimens are integrated on a grid, with sixty fields within a specimen
+    from the repetitions of the fit (`stiction.inference.specimens`). The families of the factor
+    between specimens are averaged. `families` of the result has their probabilities, and
+    `agreement` compares the peaks with the profiles alone.
 
     Examples
     --------
@@ -192,9 +209,10 @@ def infer(
     error = load_cell_error * (1.0 if isinstance(peaks, Peaks | Curves) else factor_of(unit))
     if error > np.concatenate(measured.values).max():
         raise InputError(
-            f"load_cell_error: {load_cell_error:g} {unit} is more than the largest peak; it is a"
+            f"load_cell_error: {load_cell_error:g} {unit} is more than the largest peak. Give the"
             " standard deviation in the unit of the peaks"
         )
+    # 1.
     if not (prior and {*prior} - {MEAN_KEY, SCATTER_KEY}):
         with _simulating(method, samples, seed, workers, progress) as simulation:
             return join(
@@ -206,6 +224,7 @@ def infer(
     experiment.problem.warn_of_units(
         mean_in_stress(experiment.problem, experiment.random, "strength")
     )
+    # 2.
     _check_reach(parameters, method, measured, error)
     with _simulating(method, samples, seed, workers, progress) as simulation:
 
@@ -213,12 +232,14 @@ def infer(
             given: Any = {"lengths": measured.lengths, "error": error, "variable": variable}
             return make_likelihood(parameters, simulation, box, **given).of(measured.values)
 
+        # 3.
         whole = box = parameters.whole
         approximate = optional_member(method, "exact_method") is not None
         if not approximate and not no_single_length(experiment.problem, experiment.random):
             local = simulation._replace(method=LocalCriterion(), samples=None)
             box = _first_box(likelihood_of(local, whole))
         while True:
+            # 4. and 5.
             likelihood = likelihood_of(simulation, box)
             grid = grid_of(likelihood, box)
             u = None if grid is None else grid.draws(POSTERIOR_DRAWS, seed)
@@ -230,8 +251,8 @@ def infer(
         raise InputError(refused)
     if grid is None or u is None:
         raise InputError(
-            "peaks: no point of the prior can produce all of them; widen the prior, or give the"
-            " load-cell error if they are not exact"
+            "peaks: no point of the prior can produce all of them. Widen the prior, or give"
+            " load_cell_error= if they are not exact"
         )
     error = math.sqrt(sum(map(np.size, measured.values)) / likelihood.samples)
     return Posterior(
@@ -248,7 +269,7 @@ def infer(
 
 
 def _check_reach(prior: Prior, method: Any, measured: Peaks, error: float) -> None:
-    """Refuse peaks that no method can find anywhere in the prior, such as those in another unit."""
+    """Refuse peaks that no point of the prior can produce, such as peaks in another unit (2.)."""
     points = np.array(list(itertools.product(*prior.ends.T)))
     problems = []
     for length, peaks in zip(measured.lengths, measured.values, strict=True):
@@ -260,10 +281,10 @@ def _check_reach(prior: Prior, method: Any, measured: Peaks, error: float) -> No
 
 
 def _first_box(likelihood: Likelihood) -> Array:
-    """Return the box in which the local criterion finds the posterior.
+    """Return the box of the posterior by the local criterion, slightly widened (step 3).
 
-    All of the prior if it cannot produce the peaks: where nodes reach their residual
-    strength before the onset, the other methods may.
+    It is the whole prior if the local criterion cannot produce the peaks. Other methods may, if
+    nodes reach their residual strength before the onset.
     """
     grid = None if likelihood.refusals() else grid_of(likelihood, likelihood.box)
     if grid is None:
@@ -273,7 +294,7 @@ def _first_box(likelihood: Likelihood) -> Array:
 
 
 def _grown(box: Array, u: Array | None) -> Array:
-    """Return the box, wider by its width where draws (draws, parameters) reach its end."""
+    """Return the box, wider by its width at ends that draws (draws, parameters) reach (step 5)."""
     width, touched = np.ptp(box, axis=0), np.ones(box.shape, dtype=np.bool_)
     if u is not None:
         low, high = box[0] + BOX_END_SHARE * width, box[1] - BOX_END_SHARE * width
@@ -292,7 +313,7 @@ def _notes(likelihood: Likelihood, error: float, u: Array) -> list[str]:
     if error > TOLERABLE:
         notes.append(
             f"the means are uncertain by about {error:.0%} of their standard deviations because"
-            " few samples were simulated at each point; give more samples"
+            " few samples were simulated at each point. Give more samples"
         )
     for text in notes:
         warn_accuracy(text)
@@ -300,7 +321,7 @@ def _notes(likelihood: Likelihood, error: float, u: Array) -> list[str]:
 
 
 def _piled_up(prior: Prior, u: Array) -> list[str]:
-    """Return the ends of the prior at which draws (draws, parameters) of the posterior pile up."""
+    """Return a note on ends of the prior at which draws (draws, parameters) pile up."""
     texts = [
         f"the {side} end of {name}, {end:g}, holds {np.mean(near):.0%} of the draws"
         for name, draws, ends in zip(prior.names, u.T, prior.ends.T, strict=True)
@@ -313,7 +334,7 @@ def _piled_up(prior: Prior, u: Array) -> list[str]:
     if not texts:
         return []
     return [
-        f"the posterior piles up at the ends of the prior: {'; '.join(texts)} within"
-        f" {PRIOR_END:.0%} of the prior; check the unit of the peaks, and widen the prior"
-        " where its end is a guess"
+        f"the posterior piles up at the ends of the prior: {', and '.join(texts)} within"
+        f" {PRIOR_END:.0%} of the prior. Check the unit of the peaks, and widen the prior if its"
+        " end is a guess"
     ]

@@ -1,7 +1,7 @@
 """Profiles and peaks joined: onsets of the fields within, their posterior, and its agreement.
 
-Read `stiction.inference.specimens` first: it has the model, its source and the steps. Here are the
-simulation (step 1), the result, and what is said about it.
+See `stiction.inference.specimens` for the model, its sources and the steps. This file has step 1,
+the simulation, and the result with its notes.
 """
 
 import math
@@ -51,14 +51,14 @@ from stiction.random.equally_likely import Source, as_random
 from stiction.random.fields import RandomInterface
 
 LIKELY_FIELDS = 60
-"""Fields within a specimen that stand for all that are likely."""
+"""Fields within a specimen that represent all likely fields."""
 ONSETS = {"local_criterion": 200}
 FEW_ONSETS = 100
-"""Simulated onsets of each field, by other methods."""
+"""Simulated onsets of each field by other methods."""
 DOUBT = 0.05
 """P-value of agreement below which a warning says that peaks and profiles contradict."""
 LOG_STRENGTH_MARGIN = 0.3
-"""Logarithm of the strength beyond what the peaks need at which onsets are simulated too."""
+"""Distance in the logarithm of the strength by which simulated means exceed the range of peaks."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -70,7 +70,7 @@ class SpecimenPosterior(Posterior):
     families : dict of str to float
         Posterior probability of each family of the factor between specimens.
     agreement : Agreement or None
-        Of the peaks with what the profiles alone predict; None without profiles.
+        Agreement of the peaks with the prediction by the profiles alone. None without profiles.
     """
 
     grid: Grid = field(repr=False, compare=False)
@@ -89,33 +89,32 @@ class SpecimenPosterior(Posterior):
         return self.by_profiles.described(self.by_profiles.draws(POSTERIOR_DRAWS, rng))
 
     def at(self, draw: int) -> tuple[Problem, RandomInterface]:
-        """Return the problem and what is random at one draw, to compute with."""
+        """Return the problem and the random interface at a draw."""
         return self.problem, self.grid.interface(self.u[draw])
 
     @checked
     def interfaces(self, count: Count, seed: Number = 0) -> list[RandomInterface]:
-        """Return equally likely random interfaces: draws from the posterior.
+        """Return equally likely random interfaces, which are draws from the posterior.
 
         Parameters
         ----------
         count : int
-            Their number. A longer list does not begin with a shorter one.
+            Number of interfaces. A longer list does not begin with a shorter one.
         seed : int
             Not negative.
         """
         return self.grouped(count, seed)[0]
 
     def grouped(self, count: int, seed: int) -> tuple[list[RandomInterface], list[int]]:
-        """Return equally likely interfaces, and the number of the field within each."""
+        """Return equally likely interfaces and the number of the field within each."""
         return self.grid.grouped(self.grid.draws(count, np.random.default_rng([seed, 4])))
 
-    def prior_transform(self, u: Any) -> Array:
-        """Raise an `InputError`: fields within a specimen are no parameters."""
-        raise InputError("prior_transform: needs parameters with a prior={...} of `infer`")
-
-    def log_likelihood(self, theta: Any) -> Array | float:
-        """Raise an `InputError`: fields within a specimen are no parameters."""
-        raise InputError("log_likelihood: needs parameters with a prior={...} of `infer`")
+    @property
+    def prior(self) -> Any:
+        """Raise an `InputError`, because fields within a specimen are not parameters."""
+        raise InputError(
+            "prior: `prior_transform` and `log_likelihood` need parameters with a prior of `infer`"
+        )
 
     def _summary(self) -> Summary:
         summary = super()._summary()
@@ -128,15 +127,15 @@ class SpecimenPosterior(Posterior):
 
 
 def profiles_of(random: Any, prior: Any, families: Any, seed: int) -> Profiles:
-    """Return what is known from profiles of a fit, or fields of anything else without levels."""
+    """Return the profiles of a fit, or the fields of any other source without levels."""
     more: dict[str, Any] = {} if prior is None else {"prior": FactorPrior.of(prior)}
     more |= {} if families is None else {"families": families_of(families)}
     if isinstance(random, FieldFit):
         return random.profiles(LIKELY_FIELDS, seed)._replace(**more)
     if isinstance(random, Posterior):
         raise InputError(
-            "random: is a posterior, which holds its peaks already; give what it was made from,"
-            " and all peaks together"
+            "random: is a posterior, which contains its peaks. Give its profiles or interfaces, and"
+            " all peaks together"
         )
     given = random.interfaces(LIKELY_FIELDS, seed) if isinstance(random, Source) else random
     members = as_random(given).members
@@ -154,7 +153,7 @@ def join(
     between: Any,
     error: float,
 ) -> SpecimenPosterior:
-    """Return the posterior of mean and scatter between specimens, from profiles and peaks."""
+    """Return the posterior of mean and scatter between specimens from profiles and peaks."""
     profiles = profiles_of(random, prior, between, simulation.seed)
     variable = variable_of(problem, profiles.fields[0], measured.unit)
     pairs = zip(measured.lengths, measured.values, strict=True)
@@ -205,10 +204,10 @@ def simulated_onsets(
     error: float,
     variable: str,
 ) -> Onsets:
-    """Return onsets of all fields on one kind of specimen (step 1 of `specimens`)."""
+    """Return the onsets of all fields on one kind of specimen (step 1)."""
     method, meter, workers = simulation.method, simulation.meter, simulation.workers
     samples = simulation.samples or ONSETS.get(method.type, FEW_ONSETS)
-    simulation = simulation._replace(samples=samples, workers=1)  # a thread for each field
+    simulation = simulation._replace(samples=samples, workers=1)  # fields run in threads
     first = experiment_on(problem, profiles.fields[0], method, length)
     forces = variable == "critical_force"
     area = (first.problem.area or math.nan) if forces else 1.0
@@ -223,8 +222,8 @@ def simulated_onsets(
         relative = simulate(experiments, simulation, start, of) / strengths[:, None]
         if not np.isfinite(relative).all() or relative.min() <= 0.0:
             raise InputError(
-                "method: some simulated specimens have no positive onset, so that their peaks say"
-                " nothing of the strength"
+                "method: some simulated specimens have no positive onset, so their peaks do not"
+                " depend on the strength"
             )
         bounds = np.array([bounds_of(one, of)[0] for one in experiments]) / strengths
         return relative, tabulate(relative, np.maximum(bounds, 0.0))
@@ -240,14 +239,14 @@ def simulated_onsets(
     by_field = in_threads(
         lambda place: onsets(place, at), range(fields), workers or usable_cores()
     )
-    # Standardised densities differ little between fields: their mean has a smaller error.
+    # Standardised densities differ little between fields. Their mean has a smaller error.
     table = np.log(np.mean([np.exp(known.table) for _, known in by_field], axis=0))
     densities = tuple(known._replace(table=table) for _, known in by_field)
     return Onsets(at, np.stack([ratios for ratios, _ in by_field]), densities, area)
 
 
 def _information(grid: Grid, before: Grid, proper: bool) -> dict[str, float]:
-    """Return the divergence of mean and scatter from what they were without peaks, nats."""
+    """Return the divergence of mean and scatter from their distribution without peaks, nats."""
     axes = {SCATTER_KEY: (0, 1, 3)} | ({MEAN_KEY: (0, 1, 2)} if proper else {})
     return {
         name: float(entropy(grid.mass.sum(axis=of), before.mass.sum(axis=of)))
@@ -256,15 +255,14 @@ def _information(grid: Grid, before: Grid, proper: bool) -> dict[str, float]:
 
 
 def _notes(profiles: Profiles, tests: int, comparison: Agreement | None) -> list[str]:
+    """Return the reasons to doubt the posterior."""
     notes = []
     if comparison is not None and (p := min(comparison.p_values.values())) < DOUBT:
         notes.append(
-            f"the peaks contradict the profiles, p = {p:.2g} of their agreement: the tests, the"
-            " profiles or the model miss something, and so does a force by both; check units,"
-            " method and surfaces, and design by the lower of both alone"
+            f"the peaks contradict the profiles, p = {p:.2g} of their agreement. Tests, profiles or"
+            " model miss something, and a force by both does, too. Check units, method and"
+            " surfaces, and design by the lower force of profiles alone and tests alone"
         )
     if profiles.levels.size + tests < 2:
-        notes.append(
-            "one specimen says nothing of the scatter between specimens: its prior decides"
-        )
+        notes.append("one specimen has no scatter between specimens: its prior decides")
     return notes

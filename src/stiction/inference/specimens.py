@@ -2,28 +2,28 @@
 
 Problem. Specimen k has strength m b_k f(x): a mean m, a factor b_k of mean 1 and coefficient of
 variation s, and a field f of mean 1 within the specimen. Measured are the levels (means) of some
-profiles, m b_k (1 + e_k), and the peaks of some tests, T(m b_k), where T(c) is the onset of a
-specimen of mean strength c. Each measured specimen has a factor of its own. Wanted is the
-posterior of m, s and the family of b, for some equally likely fields within.
+specimen of mean strength c. Each measured specimen has its own factor. Find the posterior of m, s
+and the family of b, averaged over equally likely fields within.
 
-Sources. Hierarchical models are integrated in Gelman and others, Bayesian Data Analysis (2013),
-chapter 5; the half-Cauchy prior of a scatter is Gelman's (2006, Bayesian Analysis 1, 515).
+Sources. Integration of hierarchical models: Gelman and others, Bayesian Data Analysis (2013),
+chapter 5. Half-Cauchy prior of a scatter: Gelman (2006), Bayesian Analysis 1, 515.
 
 Steps, with x = log(m b/reference), the logarithm of the strength of one specimen:
 
-1. Simulate onsets T of each field at the reference mean. If T(c)/c does not depend on c, this is
-   all; otherwise simulate at `ONSET_MEANS` means and interpolate T(c)/c, sample by sample.
-2. Tabulate the likelihood of each measured number as a function of x: the normal density of a level
-   about it, or the density of simulated onsets at a peak (`stiction.inference.density`).
+1. Simulate onsets T of each field at the reference mean. This is sufficient if T(c)/c does not
+   depend on c. Otherwise simulate at `ONSET_MEANS` means and interpolate T(c)/c, sample by sample.
+2. Tabulate the likelihood of each measured number as a function of x: the normal density of the
+   logarithm of a level, or the density of simulated onsets at a peak
+   (`stiction.inference.density`).
 3. Take `SCATTER_CELLS` values of s at equal shares of its prior, and `MEAN_CELLS` values of log m.
    The likelihood of a number at (family, s, m) is the integral of step 2 over the density of x,
-   that of log b shifted by log m: a convolution.
-4. Multiply over the numbers, and close in on the means that hold the mass.
-5. Fields are equally likely given the profiles. The peaks then change their shares by the mean of
-   the likelihood over (family, s, m).
+   which is the density of log b shifted by log m: a convolution.
+4. Multiply over the numbers, and close in on the means with posterior mass.
+5. Fields are equally likely given the profiles. The peaks change their shares by the mean of the
+   likelihood over (family, s, m).
 
-Departure: the levels are a factor in the likelihood of (m, s) only; the field within is what
-`fit_field` finds from the same profiles without their levels.
+Departure. The levels enter the likelihood of (m, s) only. The fields within come from `fit_field`
+of the same profiles without their levels.
 """
 
 import math
@@ -46,73 +46,67 @@ from stiction.random.fields import RandomInterface
 from stiction.random.marginals import FACTOR_FAMILIES
 
 MEAN_KEY, SCATTER_KEY = "strength.mean", "between.strength"
-"""Keys of the two parameters, in a prior and among the draws."""
+"""Keys of the two parameters in a prior and among the draws."""
 PRIOR_SCALE = 0.1
 """Scale of the half-Cauchy prior of s."""
 LEAST_CV, MOST_CV = 2e-3, 0.9
 """Smallest and largest s."""
 SCATTER_CELLS, MEAN_CELLS, ONSET_MEANS = 40, 48, 5
-"""Values of s and of log m on the grid, and means at which onsets are simulated where T(c)/c
-depends on c."""
+"""Values of s and of log m on the grid, and means at which onsets are simulated if T(c)/c depends
+on c."""
 LOG_MEAN_MARGIN = 1.0
-"""Range of log m beyond that of x at first."""
+"""Distance by which the first range of log m exceeds the range of x."""
 LOWEST, PREDICTED = 3.0, 1_000
-"""Range of x below that of log m, and points of x, of a predictive distribution."""
+"""Distance of the lowest x below log m, and points of x, for a predictive distribution."""
 OUTER_MASS = 1e-6
-"""Mass on either side of log m that is left out."""
+"""Neglected mass on either side of log m."""
 MAX_MEAN_ZOOMS = 4
 FINE, MAX_X_POINTS = 4.0, 2_000
-"""Points of x for the least deviation of a number, and at most in all. Cells of x add a twelfth of
-their square to a variance: 0.5 % of the least one."""
+"""Points of x for the least standard deviation of a number, and most points in all. Cells of x add
+a twelfth of their square to a variance, which is 0.5 % of the least variance."""
 LOWEST_FACTOR, TABULATED = 6.0, 2_401
-"""Range of log b on either side of zero, and values at which its distribution is tabulated."""
+"""Range of log b on either side of zero, and number of values in the table of its distribution."""
 TABULATED_DEVIATIONS = 6.0
-"""Standard deviations to which the likelihood of a number is tabulated."""
+"""Standard deviations up to which the likelihood of a number is tabulated."""
 LEAST_DEVIATION = 1e-3
 """Least standard deviation of the logarithm of a level or a peak that the grid resolves."""
 
 
 @lru_cache(maxsize=1024)
 def factor_of_family(family: str, cv: float) -> Any:
-    """Return the marginal of a factor of mean 1."""
+    """Return the marginal of a factor with mean 1."""
     return FACTOR_FAMILIES[family](mean=1.0, cv=cv)
 
 
 def families_of(given: Any) -> tuple[str, ...]:
-    """Return the families of factors named by True (all), a name or several."""
+    """Return families of factors: all for True, or the named ones."""
     names = (given,) if isinstance(given, str) else given
     names = tuple(FACTOR_FAMILIES) if given is True else names
     if not isinstance(names, list | tuple) or not names:
         raise InputError(f"must be True, False, or some of {', '.join(FACTOR_FAMILIES)}")
-    unknown = [name for name in names if name not in FACTOR_FAMILIES]
-    if unknown:
-        raise InputError(
-            [unknown_name("family", str(name), FACTOR_FAMILIES) for name in unknown]
-        )
+    if unknown := [str(name) for name in names if name not in FACTOR_FAMILIES]:
+        raise InputError([unknown_name("family", name, FACTOR_FAMILIES) for name in unknown])
     return tuple(dict.fromkeys(names))
 
 
 class FactorPrior(NamedTuple):
-    """Priors of the scatter s between specimens and of the mean; None: flat in its logarithm."""
+    """Priors of the scatter s and the mean. A mean of None is flat in its logarithm."""
 
     scatter: Any = scipy.stats.halfcauchy(scale=PRIOR_SCALE)
     mean: Any = None
 
     @classmethod
     def of(cls, given: Any) -> Self:
-        """Return the prior of a mapping of `MEAN_KEY` and `SCATTER_KEY` to distributions."""
-        priors = distributions_of(given or {})
-        if unknown := [key for key in priors if key not in (MEAN_KEY, SCATTER_KEY)]:
-            raise InputError(
-                [unknown_name("prior", key, (MEAN_KEY, SCATTER_KEY)) for key in unknown]
-            )
-        default = cls()
-        prior = cls(priors.get(SCATTER_KEY, default.scatter), priors.get(MEAN_KEY))
+        """Return the prior from a mapping of `MEAN_KEY` and `SCATTER_KEY` to distributions."""
+        priors, keys = distributions_of(given or {}), (MEAN_KEY, SCATTER_KEY)
+        if unknown := [key for key in priors if key not in keys]:
+            raise InputError([unknown_name("prior", key, keys) for key in unknown])
+        prior = cls(priors.get(SCATTER_KEY, cls().scatter), priors.get(MEAN_KEY))
         low, high = prior.scatter.cdf([0.0, MOST_CV])
         if not low < high:
             raise InputError(
                 f"prior: {SCATTER_KEY}: is a coefficient of variation between 0 and {MOST_CV:g},"
-                " where this distribution has no mass"
+                " but this distribution has no mass there"
             )
         return prior
 
@@ -124,10 +118,10 @@ class FactorPrior(NamedTuple):
 
 
 class Profiles(NamedTuple):
-    """What profiles say: equally likely fields within a specimen, and a level of each specimen."""
+    """Equally likely fields within a specimen, and the level of each measured specimen."""
 
-    fields: tuple[RandomInterface, ...]  # all of the reference mean
-    reference: float  # Pa, or a coefficient
+    fields: tuple[RandomInterface, ...]  # with the reference mean
+    reference: float  # Pa, or a friction coefficient
     levels: Array  # (specimens,), in the unit of the reference; empty without profiles
     within: Array  # variance of the logarithm of a level by the field, (fields, specimens)
     families: tuple[str, ...] = tuple(FACTOR_FAMILIES)
@@ -135,14 +129,14 @@ class Profiles(NamedTuple):
 
     @classmethod
     def of_interfaces(cls, members: Sequence[RandomInterface], **more: Any) -> Self:
-        """Return fields without levels; means and factors of the strength are left out."""
+        """Return fields without levels. Means and factors of the strength are left out."""
         reference = float(np.mean([one.strength.mean for one in members]))
         fields = tuple(dict.fromkeys(of_mean(one, reference) for one in members))
         return cls(fields, reference, np.zeros(0), np.zeros((len(fields), 0)), **more)
 
 
 def of_mean(random: RandomInterface, mean: float, factor: Any = None) -> RandomInterface:
-    """Return a random interface of another mean strength, and another factor of the strength."""
+    """Return a random interface with another mean and another factor of the strength."""
     factors = {k: v for k, v in (random.between or {}).items() if k != "strength"}
     between = factors | ({} if factor is None else {"strength": factor})
     field = random.strength
@@ -152,20 +146,20 @@ def of_mean(random: RandomInterface, mean: float, factor: Any = None) -> RandomI
 
 @dataclass(frozen=True, eq=False)
 class Onsets:
-    """Onsets of one kind of specimen per mean strength, by field, and their densities."""
+    """Onsets of one kind of specimen over mean strength by field, and their densities."""
 
     at: Array  # logarithms of c over the reference, (steps,)
     ratios: Array  # T(c) over c/reference, (fields, steps, samples)
     densities: tuple[Densities, ...]  # of each field
-    area: float = 1.0  # of peaks per onset
+    area: float = 1.0  # ratio of peaks and onsets
 
     def of(self, order: Any) -> Self:
-        """Return the onsets of some fields, by their numbers."""
+        """Return the onsets of some fields by their numbers."""
         densities = tuple(self.densities[k] for k in order)
         return replace(self, ratios=self.ratios[order], densities=densities)
 
     def tabulated(self, field: int, peaks: Array, error: float, x: Array) -> Array:
-        """Return the density of each peak at x, (peaks, points), up to a factor of each peak."""
+        """Return the logarithm of the density of each peak at x by a field, (peaks, points)."""
         last = self.at.size - 1
         place = np.interp(x, self.at, np.arange(last + 1))
         first = np.minimum(place.astype(np.int64), max(last - 1, 0))
@@ -179,7 +173,7 @@ class Onsets:
         return out.T
 
     def ranges(self, peaks: Array, error: float) -> tuple[float, float, float]:
-        """Return the range of x that such peaks leave, and the least deviation of x."""
+        """Return the range of x with these peaks, and the least standard deviation of x."""
         logs = np.log(self.area * self.ratios)
         deviation = max(float(logs.std(axis=2).min()), LEAST_DEVIATION)
         away = TABULATED_DEVIATIONS * np.hypot(float(logs.std()), error / peaks.min())
@@ -188,7 +182,7 @@ class Onsets:
 
 
 def points_between(ranges: Sequence[tuple[float, float, float]]) -> Array:
-    """Return points of x that cover ranges in steps of a quarter of the least deviation."""
+    """Return points of x over all ranges, in steps of a quarter of the least deviation."""
     lows, highs, deviations = zip(*ranges, strict=True)
     low, high = min(lows), max(highs)
     count = int(np.clip(np.ceil(FINE * (high - low) / min(deviations)), 64, MAX_X_POINTS))
@@ -197,10 +191,10 @@ def points_between(ranges: Sequence[tuple[float, float, float]]) -> Array:
 
 @lru_cache(maxsize=1024)
 def _tabulated(family: str, cv: float) -> tuple[Array, Array]:
-    """Return values of log b, close where it is likely, and the probability below each."""
+    """Return values of log b, dense near the mean, and the probability below each value."""
     end = math.asinh(LOWEST_FACTOR / cv)
     logs = cv * np.sinh(np.linspace(-end, end, TABULATED))
-    with np.errstate(over="ignore"):  # a power of what is far above
+    with np.errstate(over="ignore"):  # powers of values far above the mean
         return logs, factor_of_family(family, cv).distribution.cdf(np.exp(logs))
 
 
@@ -213,7 +207,7 @@ def masses(family: str, cv: float, means: Array, x: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Posterior mass of field, family, s and log m, and how likely what made it was before."""
+    """Posterior mass of field, family, s and log m, and its evidence."""
 
     profiles: Profiles
     means: Array  # log m over the reference, (means,), equidistant
@@ -227,8 +221,9 @@ class Grid:
         return dict(zip(self.profiles.families, masses, strict=True))
 
     def draws(self, count: int, rng: np.random.Generator, fields: Any = None) -> Array:
-        """Draw field, family, s and log m, (count, 4); of given fields if there are some."""
-        cells, (rng, mean_rng) = self.mass[0].size, rng.spawn(2)  # a draw depends on its number
+        """Draw field, family, s and log m, (count, 4), also for given `fields`."""
+        # Draw number i is the same in a longer list.
+        cells, (rng, mean_rng) = self.mass[0].size, rng.spawn(2)
         if fields is None:
             places = rng.choice(self.mass.size, count, p=self.mass.ravel())
         else:
@@ -242,18 +237,18 @@ class Grid:
         return np.stack([field, family, self.profiles.prior.cells()[cell], logs], axis=1)
 
     def interface(self, drawn: Array) -> RandomInterface:
-        """Return the random interface of one draw (4,)."""
+        """Return the random interface of a draw (4,)."""
         (field, family), profiles = drawn[:2].astype(int), self.profiles
         factor = factor_of_family(profiles.families[family], float(drawn[2]))
         mean = profiles.reference * math.exp(drawn[3])
         return of_mean(profiles.fields[field], mean, factor)
 
     def grouped(self, drawn: Array) -> tuple[list[RandomInterface], list[int]]:
-        """Return the interfaces of draws (draws, 4), and the numbers of their fields."""
+        """Return the interfaces of draws (draws, 4) and the numbers of their fields."""
         return [self.interface(row) for row in drawn], drawn[:, 0].astype(np.int64).tolist()
 
     def described(self, drawn: Array) -> dict[str, Array]:
-        """Return draws (draws, 4) as columns of parameters."""
+        """Return draws (draws, 4) as parameters by name."""
         field, scale = drawn[:, 0].astype(np.int64), np.exp(drawn[:, 3])
         strengths = [one.strength for one in self.profiles.fields]
         deviations = np.array([one.standard_deviation for one in strengths])
@@ -267,7 +262,7 @@ class Grid:
 
 
 def grid_of_profiles(profiles: Profiles, tables: "Tables | None" = None) -> tuple[Grid, Grid]:
-    """Return the posterior of profiles alone, and of profiles and peaks (steps 2 to 5)."""
+    """Return the posteriors of profiles alone and of profiles and peaks (steps 2 to 5)."""
     levels = np.log(profiles.levels / profiles.reference) + 0.5 * profiles.within
     deviations = np.maximum(np.sqrt(profiles.within), LEAST_DEVIATION)
     ranges = [] if tables is None else tables.ranges()
@@ -275,7 +270,7 @@ def grid_of_profiles(profiles: Profiles, tables: "Tables | None" = None) -> tupl
         reach = TABULATED_DEVIATIONS * deviations
         ranges.append(((levels - reach).min(), (levels + reach).max(), deviations.min()))
     x = points_between(ranges)
-    # 2. the likelihood of each number as a function of x
+    # 2.
     of_levels = -0.5 * ((x - levels[..., None]) / deviations[..., None]) ** 2
     of_levels -= np.log(deviations[..., None])
     of_peaks = np.zeros((len(profiles.fields), 0, x.size)) if tables is None else tables(x)
@@ -295,7 +290,7 @@ def grid_of_profiles(profiles: Profiles, tables: "Tables | None" = None) -> tupl
         evidence = float(logsumexp(after))
         if not math.isfinite(evidence):
             raise InputError(
-                "peaks: no mean and scatter give the peaks and what is known before"
+                "peaks: no mean and scatter give the peaks and the profiles or prior"
             )
         mass = np.exp(after - evidence)
         along = [mass.sum(axis=(0, 1, 2))]
@@ -313,7 +308,7 @@ def grid_of_profiles(profiles: Profiles, tables: "Tables | None" = None) -> tupl
 def _products(kernel: Array, tables: Array) -> Array:
     """Return the sum over numbers of log likelihoods, (fields, families, cells, means).
 
-    `tables` are log likelihoods at x of numbers by field, (fields, numbers, points).
+    `tables` holds log likelihoods of the numbers at x, (fields, numbers, points) (steps 3 and 4).
     """
     flat = kernel.reshape(-1, kernel.shape[-1]).T
     total = np.zeros((len(tables), flat.shape[1]))
@@ -325,7 +320,7 @@ def _products(kernel: Array, tables: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Tables:
-    """Likelihood of measured peaks by field and x; what a posterior predicts from."""
+    """Likelihood of measured peaks by field and x, and predictions from a posterior."""
 
     profiles: Profiles
     method: Any
@@ -334,17 +329,17 @@ class Tables:
     peaks: tuple[Array, ...]
 
     def of(self, peaks: Sequence[Array], kinds: Sequence[int] | None = None) -> Self:
-        """Return the same of other peaks, of some kinds of specimens if not of all."""
+        """Return the tables of other peaks, for all or some kinds of specimens."""
         chosen = range(len(self.onsets)) if kinds is None else kinds
         return replace(self, peaks=tuple(peaks), onsets=tuple(self.onsets[k] for k in chosen))
 
     def ranges(self) -> list[tuple[float, float, float]]:
-        """Return the ranges of x of all kinds of peaks."""
+        """Return the ranges of x for all kinds of peaks."""
         pairs = zip(self.onsets, self.peaks, strict=True)
         return [kind.ranges(peaks, self.error) for kind, peaks in pairs if peaks.size]
 
     def of_field(self, field: int, x: Array) -> Array:
-        """Return log likelihoods of all peaks at x by one field, (peaks, points)."""
+        """Return log likelihoods of all peaks at x by a field, (peaks, points)."""
         pairs = zip(self.onsets, self.peaks, strict=True)
         return np.concatenate([k.tabulated(field, peaks, self.error, x) for k, peaks in pairs])
 
@@ -353,7 +348,7 @@ class Tables:
         return np.stack([self.of_field(f, x) for f in range(len(self.profiles.fields))])
 
     def parts(self, u: Array) -> Array:
-        """Return logarithms of the density of each peak at draws (draws, 4), (draws, peaks)."""
+        """Return the logarithm of the density of each peak at draws (draws, 4), (draws, peaks)."""
         x = points_between(self.ranges())
         rows = np.empty((len(u), x.size))
         for family, cv, places in _laws(self.profiles, u):
@@ -366,7 +361,7 @@ class Tables:
         return densities
 
     def predicted(self, kind: int, u: Array, seed: int) -> Array:
-        """Draw a peak of a kind of specimen at each of some draws (draws, 4)."""
+        """Draw a peak of a kind of specimen for each draw (draws, 4)."""
         rng = np.random.default_rng([seed, 1, kind])
         known, share = self.onsets[kind], rng.random(len(u))
         x = u[:, 3].copy()
@@ -378,9 +373,9 @@ class Tables:
         return known.area * np.exp(x) * ratio + self.error * rng.standard_normal(len(u))
 
     def quantile(self, grid: Grid, probabilities: Array, kind: int = 0) -> Array:
-        """Return the peaks below which another one lies with these probabilities.
+        """Return the quantiles of a further peak.
 
-        The predictive distribution: the mean over field, onset and grid, without draws.
+        The predictive distribution is the mean over field, onset and grid, without draws.
         """
         profiles, known = self.profiles, self.onsets[kind]
         x = np.linspace(grid.means[0] - LOWEST, grid.means[-1] + LOG_MEAN_MARGIN, PREDICTED)
@@ -389,7 +384,7 @@ class Tables:
             for cell, cv in enumerate(profiles.prior.cells()):
                 below += grid.mass[:, family, cell] @ masses(name, cv, grid.means, x)
         below = np.cumsum(below, axis=1)
-        # T(c) rises with c: where it is t, for every field and sample
+        # T(c) rises with c. Find the c at which it is t, for each field and sample.
         logs = np.log(known.area * known.ratios) + known.at[:, None]
 
         def excess(log_peak: float, probability: float) -> float:
@@ -406,7 +401,7 @@ class Tables:
 
 
 def _laws(profiles: Profiles, u: Array) -> list[tuple[str, float, Any]]:
-    """Return family, s and places of all draws (draws, 4) that share both."""
+    """Return family, s, and the places of the draws (draws, 4) with both."""
     pairs, group = np.unique(u[:, 1:3], axis=0, return_inverse=True)
     return [
         (profiles.families[int(family)], float(cv), np.flatnonzero(group.ravel() == number))

@@ -1,13 +1,20 @@
-"""What further tests or profiles will tell: expected widths of intervals and of the design.
+"""Expected widths of intervals and of the design after further tests or profiles.
+
+Problem. Specimens were measured, and their mean, scatter and fields have a posterior. How wide will
+the intervals and the design stress be after further measurements?
+
+Source. Expectations over simulated campaigns, as in Lindley (1956), Annals of Mathematical
+Statistics 27, 986, with a width in place of information.
 
 Steps, for each design and each simulated campaign:
 
-1. Draw a truth (field, family, s and mean) from the posterior of what was measured.
-2. Draw the further peaks and levels of profiles from it.
+1. Draw a truth (field, family, s and mean) from the posterior of the present measurements.
+2. Draw further peaks and levels of profiles from this truth.
 3. Compute the posterior of all measurements together (`stiction.inference.specimens`).
-4. Take the width of the 90 % interval of each parameter, and the design of its predictive
-   distribution. Their means over campaigns are what to expect (Lindley, 1956, with a width in place
-   of information).
+4. Take the width of the 90 % interval of each parameter, and the design stress of the predictive
+   distribution. The result holds their means over campaigns.
+
+Departure. Only the `MAX_FIELDS` fields with the largest mass are kept.
 """
 
 from collections.abc import Mapping
@@ -27,7 +34,6 @@ from stiction.inference.specimens import (
     MEAN_KEY,
     SCATTER_KEY,
     Grid,
-    Profiles,
     Tables,
     factor_of_family,
     grid_of_profiles,
@@ -35,9 +41,9 @@ from stiction.inference.specimens import (
 from stiction.problem.problem import Problem
 
 MAX_FIELDS = 12
-"""Fields within a specimen that stand for all, those with the largest mass."""
+"""Fields within a specimen that represent all of them."""
 WIDTH_DRAWS = 2_000
-"""Draws of a posterior from which an interval is taken."""
+"""Draws of a posterior for an interval."""
 
 
 def expected_widths(
@@ -50,7 +56,7 @@ def expected_widths(
     unit: str,
     repetitions: int,
 ) -> xr.Dataset:
-    """Return widths of intervals and designs after further tests, see `design_of_tests`."""
+    """Return widths of intervals and design stresses after further tests, see `design_of_tests`."""
     seed, method, meter = simulation.seed, simulation.method, simulation.meter
     plans = {"now": (0, 0)} | {name: _plan(name, given) for name, given in designs.items()}
     if isinstance(random, SpecimenPosterior):
@@ -59,8 +65,8 @@ def expected_widths(
         profiles = profiles_of(random, None, None, seed)
         if not profiles.levels.size:
             raise InputError(
-                "prior: is left out, so random must be a fit or a posterior of `infer`, which"
-                " hold measurements"
+                "random: must be a fit or a posterior of `infer`, which hold measurements, if prior"
+                " is left out"
             )
         variable = variable_of(problem, profiles.fields[0], si_of(unit))
         onsets = simulated_onsets(
@@ -69,7 +75,7 @@ def expected_widths(
         tables, mass = Tables(profiles, method, (onsets,), error, (np.zeros(0),)), np.ones(1)
     if any(levels for _, levels in plans.values()) and not tables.profiles.levels.size:
         raise InputError(
-            "designs: profiles: need a fit, whose profiles say how long further ones are"
+            "designs: profiles: need a fit, whose profiles tell how long further ones are"
         )
     tables = _fewer(tables, mass)
     _, now = grid_of_profiles(tables.profiles, tables)
@@ -79,8 +85,11 @@ def expected_widths(
     stresses = np.empty((len(plans), repetitions))
     for row, (tests, levels) in enumerate(plans.values()):
         for number in range(repetitions):
+            # 1.
             truth = now.draws(1, rng)
+            # 2. and 3.
             grid, both = _after(tables, truth, tests, levels, rng) if row else (now, tables)
+            # 4.
             drawn = grid.described(grid.draws(WIDTH_DRAWS, rng))
             ends = [np.quantile(drawn[name], [0.05, 0.95]) for name in (MEAN_KEY, SCATTER_KEY)]
             widths[row, number] = np.ptp(ends, axis=1)
@@ -104,34 +113,33 @@ def expected_widths(
 
 
 def _plan(name: str, given: Any) -> tuple[int, int]:
-    """Return numbers of further tests and profiles."""
+    """Return the numbers of further tests and profiles."""
     table = dict(given) if isinstance(given, Mapping) else {"tests": given}
     if unknown := [str(key) for key in table if key not in ("tests", "profiles")]:
         raise InputError(unknown_name(f"designs: {name}", unknown[0], ("tests", "profiles")))
     numbers = table.get("tests", 0), table.get("profiles", 0)
     if not all(is_whole(number, 0) for number in numbers) or not sum(numbers):
         raise InputError(
-            f"designs: {name}: tests and profiles must be whole numbers, one of them >= 1"
+            f"designs: {name}: tests and profiles must be whole numbers, at least one of them >= 1"
         )
     return numbers
 
 
 def _fewer(tables: Tables, mass: Array) -> Tables:
-    """Return the tables of some fields only, those with the largest mass."""
+    """Return the tables of the fields with the largest mass."""
     profiles = tables.profiles
     order = np.argsort(-np.broadcast_to(mass, len(profiles.fields)), kind="stable")[:MAX_FIELDS]
     fields = tuple(profiles.fields[k] for k in order)
     fewer = profiles._replace(fields=fields, within=profiles.within[order])
-    return replace(
-        tables, profiles=fewer, onsets=tuple(kind.of(order) for kind in tables.onsets)
-    )
+    onsets = tuple(kind.of(order) for kind in tables.onsets)
+    return replace(tables, profiles=fewer, onsets=onsets)
 
 
 def _after(
     tables: Tables, truth: Array, tests: int, levels: int, rng: np.random.Generator
 ) -> tuple[Grid, Tables]:
-    """Return the posterior after further tests and profiles of a truth (1, 4)."""
-    profiles: Profiles = tables.profiles
+    """Return the posterior after further tests and profiles of a truth (1, 4) (steps 2 and 3)."""
+    profiles = tables.profiles
     peaks = tables.predicted(0, np.repeat(truth, tests, axis=0), int(rng.integers(2**31)))
     field, family, cv, log_mean = truth[0]
     law = factor_of_family(profiles.families[int(family)], float(cv)).distribution
