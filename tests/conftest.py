@@ -139,7 +139,7 @@ def runs(command):
         ended, out, errors = command(*line.split(" "))
         assert ended == code, errors
         for word in words:
-            assert word in out + errors
+            assert word.lower() in (out + errors).lower()
         return out + errors
 
     return runs

@@ -98,19 +98,8 @@ def mutated_workbook(data, chance):
 def mutated_json(given, chance):
     """Plain content with one value replaced, anywhere."""
     values = (
-        None,
-        -1,
-        2**63,
-        1e308,
-        "x",
-        "\x1b[2J",
-        [],
-        {},
-        [[]],
-        True,
-        "9" * 5000,
-        {"a": [1]},
-    )
+        None, -1, 2**63, 1e308, "x", "\x1b[2J", [], {}, [[]], True, "9" * 5000, {"a": [1]}
+    )  # fmt: skip
     if isinstance(given, dict | list) and given and chance.random() < 0.8:
         given = copy.copy(given)
         key = chance.choice(list(given) if isinstance(given, dict) else range(len(given)))

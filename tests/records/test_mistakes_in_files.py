@@ -1,7 +1,6 @@
 """Recorded refusals and doubts of profiles, tables, studies, fits and laws of others."""
 
 import dataclasses
-import os
 import struct
 from collections import namedtuple
 from functools import partial
@@ -58,21 +57,6 @@ def peaks(text):
     with inside():
         Path("peaks.csv").write_text(text)
         return st.read_peaks("peaks.csv")
-
-
-def irregular(name):
-    """What is no file of some size: a pipe, a device, a folder, a terabyte, nothing."""
-    with inside():
-        if name.startswith("pipe"):  # opening it in the ordinary way would wait for ever
-            os.mkfifo(name)
-        elif name.startswith("zero"):
-            Path(name).symlink_to("/dev/zero")
-        elif name.startswith("folder"):
-            Path(name).mkdir()
-        elif name.startswith("huge"):
-            with Path(name).open("wb") as file:
-                file.truncate(2**40)
-        st.read_profile(name)
 
 
 def npy(shape, payload=b"", dtype="<f8", version=b"\x01\x00", extra=""):
@@ -360,11 +344,6 @@ table_of(calls, {
         lambda: with_law(own_law(exponential, logarithm, exponential_area)),
     ],
 })
-if hasattr(os, "mkfifo"):
-    table_of(calls, {"irregular files": [
-        partial(irregular, f"{name}.{ending}")
-        for name in ("pipe", "zero", "folder", "huge", "none") for ending in ("csv", "npy", "nc")
-    ]})
 # fmt: on
 
 test_outputs_are_as_recorded = compared(calls, __file__)

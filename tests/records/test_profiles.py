@@ -15,7 +15,6 @@ from crooked import (
     PLANE_GAP,
     PLANE_STRENGTH,
     as_measured,
-    write_table,
 )
 from recording import Calls, compared, inside, refusal
 from setups import EXACT, LOCAL, without
@@ -28,36 +27,12 @@ calls = Calls()
 BACK = "values written out above, tests/oracle/test_crooked.py and tests/user/test_profiles.py"
 SMALL = st.Interface(0.016, 8)
 EIGHT = (0.81, 1.02, 0.97, 1.13, 0.88, 1.05, 0.93, 1.21)
-TABLES = {
-    "semicolons and commas": "x [mm];Festigkeit [MPa]\n"
-    + "\n".join(f"{2 * i:d},0;{v:.2f}".replace(".", ",") for i, v in enumerate(EIGHT)),
-    "comments and three columns": "# rig 4\n# force in kN\nstation\tx (cm)\tstrength (kPa)\n"
-    + "\n".join(f"{i}\t{0.2 * i:.1f}\t{1e3 * v:.0f}" for i, v in enumerate(EIGHT)),
-    "blanks without a heading": "# rig 4 of May\n"
-    + "\n".join(f"{2e-3 * i:.4f} {1e6 * v:.0f}" for i, v in enumerate(EIGHT)),
-    "comments and a first row without a value": "# rig 4, 12 bar\n# x (mm);strength (MPa)\n"
-    + "\n".join(f"{2 * i};{'-' if i == 0 else v}" for i, v in enumerate(EIGHT)),
-    "rows without values": "strength [MPa];run\n-;3\n-;-\n"
-    + "\n".join(f"{v};{i}" for i, v in enumerate(EIGHT[2:])),
-    "one column": "strength [MPa]\n" + "\n".join(f"{v}" for v in EIGHT),
-    "unsorted with empty cells": "x (mm),strength (MPa),note\n"
-    + "\n".join(f"{2 * i},{'' if i == 3 else EIGHT[i]},n{i}" for i in (4, 0, 7, 2, 1, 6, 5, 3)),
-}
 
 
 def table(text, **options):
     with inside():
         Path("scan.csv").write_text(text, encoding="utf-8")
         return st.read_profile("scan.csv", **options)
-
-
-@calls(BACK)
-def tables_of_a_laboratory():
-    found = {}
-    for name, text in TABLES.items():
-        options = {"x": "x (cm)", "value": "strength (kPa)"} if "three" in name else {}
-        found[name] = table(text, interface=SMALL, gaps="fill", **options)
-    return found
 
 
 @calls(BACK)
@@ -119,20 +94,6 @@ def gaps_across_the_seam():
     of_plane = as_measured(PLANE.interface, np.where(PLANE_GAP, np.nan, PLANE_STRENGTH))
     read = st.read_profile(of_plane, interface=PLANE.interface, gaps="skip")
     return {"line": of_line, "plane": {"read": read}}
-
-
-@calls(BACK)
-def arrays_and_files_of_a_plane():
-    measured = as_measured(PLANE.interface, PLANE_STRENGTH, unit="kPa", scale=1e3)
-    with inside():
-        measured.rename("strength").to_netcdf("scan.nc")
-        np.save("scan.npy", PLANE_STRENGTH)
-        write_table(Path("scan.csv"), measured)
-        sources = {one: f"scan.{one}" for one in ("nc", "npy", "csv")}
-        return {
-            name: st.read_profile(source, interface=PLANE.interface)
-            for name, source in (sources | {"transposed": measured.transpose()}).items()
-        }
 
 
 @calls(BACK)

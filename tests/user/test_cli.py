@@ -60,7 +60,7 @@ def test_interrupted_from_outside(runs, study):
         err = process.communicate(timeout=60.0)[1]
     assert process.returncode == 130
     assert "interrupted:" in err
-    assert "what is done is in run; rerun the command to resume" in err
+    assert "results are in run. Rerun the command to resume" in err
     assert "Traceback" not in err
     runs("status run", "of 9000000", code=1)
 
@@ -85,7 +85,7 @@ def test_an_interruption_whose_exception_is_lost(runs, monkeypatch, where, done,
     signal.signal(signal.SIGINT, signal.default_int_handler)
     with monkeypatch.context() as patch:
         patch.setattr(Store, where, lose)
-        words = "interrupted: what is done is in run"
+        words = "interrupted: results are in run"
         runs("run study.toml --out run --workers 1", words, code=130)
     runs("status run", done, code=int(not done.startswith("300")))
     runs("run study.toml --out run", "300 of 300")

@@ -126,7 +126,7 @@ def test_a_table_on_another_sheet(tmp_path):
 def test_one_of_several_records(tmp_path):
     block = "\n".join(["x (mm);strength (MPa)", *ROWS])
     later = block.replace("1.25", "1.5")
-    refuses("record=0 to 1", lambda: read(tmp_path, f"{block}\n\n{later}\n"))
+    refuses("x repeats ... record=", lambda: read(tmp_path, f"{block}\n\n{later}\n"))
     assert is_read(read(tmp_path, f"{block}\n\n{later}\n", record=0))
     assert read(tmp_path, f"{block}\n\n{later}\n", record=1)[1] == 1.5e6
     refuses("record: must be 0 to 1", lambda: read(tmp_path, f"{block}\n\n{later}", record=2))
@@ -172,6 +172,9 @@ def test_a_large_table_is_read_as_a_small_one(tmp_path, monkeypatch):
     ):
         lines[30_000] = wrong
         refuses(words, lambda: read(tmp_path, "\n".join([head, *lines])))
+    lines[30_000] = "30.000;1.5;2"  # cells too many between blanks, too
+    blank = "\n".join(lines).replace(";", " ")
+    refuses("line", lambda: read(tmp_path, blank, x=0, value=1))
     lines[30_000] = "30.000;"
     assert np.flatnonzero(np.isnan(read(tmp_path, "\n".join([head, *lines])))) == [30_000]
 
@@ -209,14 +212,15 @@ def test_binary_files_of_instruments(tmp_path, monkeypatch):
     refuses("holds heights ... strength=", lambda: st.read_profile(path))
     strength = st.read_profile(path, strength=lambda h: 1e6 + 1e11 * h)
     np.testing.assert_allclose(strength, 1e6 + 1e11 * heights.T, rtol=1e-12)
-    refuses("one strength for each", lambda: st.read_profile(path, strength=lambda h: h[0]))
+    refuses("a strength for each", lambda: st.read_profile(path, strength=lambda h: h[0]))
     refuses("must be positive", lambda: st.read_profile(path, strength=lambda h: h))
     line = surfaces.UniformLineScan(heights[0] * 1e6, 2.0, unit="µm")
     read_line = st.read_profile(line, quantity="height")
     np.testing.assert_allclose(read_line, heights[0], rtol=1e-12)
     np.testing.assert_allclose(read_line.x, 5e-7 * np.arange(4), rtol=1e-12)
     path.with_suffix(".sur").write_bytes(b"no surface")
-    refuses("is damaged", lambda: st.read_profile(path.with_suffix(".sur"), quantity="height"))
+    broken = path.with_suffix(".sur")
+    refuses("SurfaceTopography", lambda: st.read_profile(broken, quantity="height"))
     monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
     refuses("stiction[instruments]", lambda: st.read_profile(path, quantity="height"))
 

@@ -1,6 +1,7 @@
-"""What every other part rests on, and what knows nothing of friction.
+"""The foundation of all other parts, which contains no friction.
 
-`model` makes validated frozen objects and checked functions, `errors` holds what a user is told,
-`kinds` tells classes apart by their `type`, `variables` and `units` name quantities. Kernels need
-`arrays`, `lanes` and `jit` only; `files` writes whole files; `progress` reports long work.
+`model` makes validated frozen objects and checked functions. `errors` holds errors and warnings,
+`kinds` tells classes apart by their `type`, and `variables` and `units` name quantities. Kernels
+need `arrays`, `lanes` and `jit` only. `files` and `netcdf` read and write files, and `progress`
+reports long work.
 """

@@ -1,4 +1,4 @@
-"""Arrays: their type, and BLAS with one thread."""
+"""Arrays: their type, and BLAS with a single thread."""
 
 import threading
 from collections.abc import Iterator
@@ -18,10 +18,10 @@ _limit: Any = None
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """Keep BLAS at one thread from the first user's entry to the last user's exit.
+    """Keep BLAS at a single thread from the first user's entry to the last user's exit.
 
-    The number of threads belongs to the process: of two overlapping limits, the one that ends last
-    would otherwise restore what the other one had set.
+    The number of threads belongs to the process. If two limits overlapped, the later exit would
+    otherwise restore the limit of the other user.
     """
     global _users, _limit
     from threadpoolctl import threadpool_limits

@@ -23,17 +23,17 @@ _NUMBER = re.compile(rf"(?<![\w.]){_FIGURES}(?: to {_FIGURES})?")
 
 
 class InputError(ValueError):
-    """Invalid input: one message that lists every problem.
+    """Invalid input: a single message that lists every problem.
 
     Parameters
     ----------
     problems : str or iterable of str
-        One text for each mistake; each names the key or argument, what was given and what is valid.
+        A text for each mistake, with the key or argument, the value given and the valid values.
 
     Attributes
     ----------
     problems : tuple of str
-        The same texts, one by one.
+        The same texts.
     """
 
     def __init__(self, problems: str | Iterable[str]) -> None:
@@ -52,15 +52,15 @@ def printable(text: str) -> str:
 
 
 class AccuracyWarning(UserWarning):
-    """A result is valid but less accurate than it could be; the message gives the error."""
+    """A result is valid but less accurate than it could be. The message gives the error."""
 
 
 class UnitWarning(UserWarning):
-    """A value that no solid has; it is probably in another unit than assumed."""
+    """A value that no solid has. It is probably in another unit than assumed."""
 
 
 class RunError(RuntimeError):
-    """A run cannot continue; stored results are kept, and the message gives the remedy."""
+    """A run cannot continue. Stored results are kept, and the message gives the remedy."""
 
 
 class StoreError(RunError):
@@ -72,7 +72,7 @@ class WorkerError(RunError):
 
 
 def unknown(given: str, valid: Iterable[str]) -> str:
-    """Return a text that refuses a name and offers the nearest valid one."""
+    """Return a text that refuses a name and offers the nearest valid name."""
     names = list(valid)
     shown = repr(given) if len(given) <= 60 else f"{given[:57]!r}..."
     near = nearest(given, names)
@@ -81,20 +81,20 @@ def unknown(given: str, valid: Iterable[str]) -> str:
 
 
 def nearest(given: str, valid: Sequence[str]) -> str:
-    """Return the valid name that is most like a given name, in any case; '' if none is."""
+    """Return the valid name that is most like a given name, in any case, or ''."""
     by_case = {name.lower(): name for name in reversed(valid)}
     near = get_close_matches(given.lower(), by_case, n=1, cutoff=0.5)
     return by_case[near[0]] if near else _SYMBOLS.get(given, "")
 
 
 def unknown_name(what: str, given: str, valid: Iterable[str]) -> str:
-    """Return the same text, which begins with what the name is for."""
+    """Return the same text after the purpose of the name."""
     return f"{what}: {unknown(given, valid)}"
 
 
 @contextmanager
 def prefixed(name: str, mark: str = ": ") -> Iterator[None]:
-    """Let the mistakes that are found meanwhile begin with a name."""
+    """Put a name before all mistakes that are found inside."""
     try:
         yield
     except InputError as error:
@@ -107,9 +107,9 @@ def warn_accuracy(message: str) -> None:
 
 
 class Warned(NamedTuple):
-    """A warning that was collected instead of issued: one of samples has a `total` above zero."""
+    """A collected warning. It concerns samples if its `total` is above zero."""
 
-    text: str  # with {samples} and {worst} if it is one of samples
+    text: str  # with {samples} and {worst} if it concerns samples
     category: type[Warning]
     total: int = 0
     affected: int = 0
@@ -125,11 +125,11 @@ class Warned(NamedTuple):
         return self.text.format(samples=shown, worst=self.worst)
 
     def after(self, first: int) -> Warned:
-        """Return it with the numbers that its samples have if the first has this one."""
+        """Return the warning with the numbers of its samples, where `first` is the first number."""
         return self._replace(numbers=tuple(first + number for number in self.numbers))
 
     def unnumbered(self) -> Warned:
-        """Return it without numbers of samples, which count within a part only."""
+        """Return the warning without numbers of samples, which count within a part only."""
         return self._replace(numbers=())
 
 
@@ -152,7 +152,7 @@ def collect_warnings() -> Iterator[list[Warned]]:
 
 @contextmanager
 def merge_warnings() -> Iterator[list[Warned]]:
-    """Collect warnings and issue them at the end, those of one doubt as one."""
+    """Collect warnings and issue them at the end, a single warning for each doubt."""
     caught: list[Warned] = []
     try:
         with collect_warnings() as caught:
@@ -163,9 +163,10 @@ def merge_warnings() -> Iterator[list[Warned]]:
 
 
 def merged(caught: Iterable[Warned]) -> list[Warned]:
-    """Return warnings without repetition: texts that differ only in numbers are one, with ranges.
+    """Return warnings without repetition.
 
-    Those of samples are one that counts the samples of all.
+    Texts that differ only in numbers become a single text with ranges. Warnings about samples
+    become a single warning that counts all samples.
     """
     groups: dict[tuple[str, type[Warning], bool], list[Warned]] = {}
     for warning in caught:
@@ -203,18 +204,18 @@ def _with_ranges(texts: Sequence[str]) -> str:
 
 
 def warn_of_samples(text: str, which: Any, sizes: Any = ()) -> None:
-    """Issue an `AccuracyWarning` of some of the samples that are computed together.
+    """Issue an `AccuracyWarning` about some of the samples that are computed together.
 
-    Call it even if it concerns none of them: samples are counted over all that are computed.
+    Call it even if it concerns no sample, because all computed samples are counted.
 
     Parameters
     ----------
     text : str
-        With ``{samples}`` for '3 of 40 samples (1, 4, 7)'; ``{worst}`` is the largest size.
+        With ``{samples}`` for '3 of 40 samples (1, 4, 7)' and ``{worst}`` for the largest size.
     which : array of bool
-        Whether it concerns each sample.
+        Whether the warning concerns each sample.
     sizes : array, optional
-        Of the error of each sample.
+        Size of the error of each sample.
     """
     affected = [bool(flag) for flag in which]
     numbers = [number for number, flag in enumerate(affected) if flag]

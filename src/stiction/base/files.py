@@ -1,4 +1,4 @@
-"""Files that are whole or not there, archives of arrays, and the folders of the cache.
+"""Files that are whole or absent, archives of arrays, and the folders of the cache.
 
 Files may come from strangers. Every reader of the package takes its bytes from `read_regular` or
 from `content_of`, and looks at the size of its result before it takes memory.
@@ -15,8 +15,8 @@ import uuid
 import warnings
 import zipfile
 import zlib
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -30,7 +30,7 @@ from stiction.base.errors import InputError, StoreError, warn_user
 PART = ".part"
 MAX_FILE_BYTES = 2**30
 MAX_HEADER_BYTES = 2**16
-"""Of the description of an array, which numpy takes apart by Python's own parser."""
+"""Size of the description of an array, which numpy reads with Python's own parser."""
 
 UNREADABLE = (
     OSError, ValueError, EOFError, KeyError, NotImplementedError, RuntimeError,
@@ -42,13 +42,14 @@ UNREADABLE = (
 def read_regular(
     path: Path, *, max_bytes: int = MAX_FILE_BYTES, follow_links: bool = True
 ) -> bytes:
-    """Return the content of a regular file; an `InputError` if it is of another kind or too large.
+    """Return the content of a regular file.
 
-    Other errors of the system (an OSError) pass. Steps:
+    An `InputError` refuses a file of another kind, or a file that is too large. Other errors of the
+    system (an OSError) pass. The steps are:
 
-    1. Look at the kind of the file before it is opened: opening a device may act on it.
-    2. Open it without waiting, look at what was opened, and refuse what took its place meanwhile.
-    3. Read the bytes that it had then. Files that the system makes up, as in /proc, have none.
+    1. Look at the kind of the file before it is opened, because opening a device may act on it.
+    2. Open the file without waiting, and look again, because another file may have taken its place.
+    3. Read as many bytes as the file had then. Files that the system makes up, as in /proc, have 0.
     """
     extra = getattr(os, "O_NONBLOCK", 0)
     if not follow_links:
@@ -80,7 +81,7 @@ def content_of(path: Path, *, max_bytes: int = MAX_FILE_BYTES) -> bytes:
 
 
 def _near_file(path: Path) -> str:
-    """Return a question after the file of that name in another case; '' if there is none."""
+    """Return a question that offers a file of the same name in another case, or ''."""
     with suppress(OSError):
         for name in os.listdir(path.parent):
             if name.casefold() == path.name.casefold():
@@ -89,18 +90,30 @@ def _near_file(path: Path) -> str:
 
 
 def check_unpacked(size: int, content: bytes, least: int, times: int) -> None:
-    """Refuse what would unpack to more than `least` and more than `times` the size of its file."""
+    """Refuse content that would unpack to more than `least` and `times` the size of its file."""
     limit = max(least, times * len(content))
     if size > limit:
         raise InputError(f"would unpack to {size}, more than the limit of {limit} for its size")
 
 
-def write_whole(path: Path, content: bytes | Callable[[Path], object]) -> None:
-    """Write a file aside, sync it and rename it: an older one stays until the new one is whole.
+@contextmanager
+def refuse_damage(kind: str) -> Iterator[None]:
+    """Turn every error that a library raises on a broken file into an `InputError`."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:  # libraries raise all kinds of errors on a broken file
+        text = (str(error) or type(error).__name__).splitlines()[0]
+        raise InputError(f"is not {kind}: {text}") from None
 
-    The new file has the permissions of the older one from the first byte on. The content is
-    bytes, or a function that writes to the path that it is given. If it fails (a `StoreError`),
-    nothing is left behind.
+
+def write_whole(path: Path, content: bytes | Callable[[Path], object]) -> None:
+    """Write a file aside, sync it and rename it, so that an old file stays until the new is whole.
+
+    The new file has the permissions of the old file from the first byte on. The content is
+    bytes, or a function that writes to a given path. If writing fails (a `StoreError`), the
+    unfinished file is removed.
     """
     aside = path.with_name(f"{path.name}.{uuid.uuid4().hex[:12]}{PART}")
     try:
@@ -134,7 +147,7 @@ def cannot(what: str, path: Path, error: BaseException) -> StoreError:
 
 
 def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
-    """Write an .npz archive, whole or not at all; for errors see `write_whole`."""
+    """Write an .npz archive, whole or not at all, with the errors of `write_whole`."""
 
     def write(aside: Path) -> None:
         with open(aside, "wb") as stream:  # np.savez would append .npz to a path
@@ -146,9 +159,9 @@ def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
 
 
 def arrays_in(content: bytes) -> dict[str, NDArray[Any]]:
-    """Return the arrays of an .npz as `write_arrays` writes it; else one of `UNREADABLE`.
+    """Return the arrays of an .npz as `write_arrays` writes it, or raise an error in `UNREADABLE`.
 
-    Compressed members, and members that are larger than the archive together, are refused.
+    Compressed members are refused, and members that together are larger than the archive.
     """
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         members = archive.infolist()
@@ -165,7 +178,7 @@ def arrays_in(content: bytes) -> dict[str, NDArray[Any]]:
 
 
 def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """Return the arrays of an .npz; one of `UNREADABLE` or FileNotFoundError if it is not one."""
+    """Return the arrays of an .npz file, or raise FileNotFoundError or an error in `UNREADABLE`."""
     return arrays_in(read_regular(path))
 
 
@@ -187,14 +200,15 @@ def _warn_of_no_cache(folder: Path, reason: str) -> None:
 
 
 def private_folder(folder: Path) -> Path:
-    """Return a folder, made if need be, in which nobody else can have put or can put anything.
+    """Return a folder in which only this user can have put anything, and make it if needed.
 
-    Compiled kernels are pickles: who can write or replace one can run code as whoever loads it.
-    If the folder is not private, a warning says why, and a temporary one of this process stands in.
+    Compiled kernels are pickles, so whoever can replace a kernel can run code as the user who loads
+    it. If the folder is not private, a warning says why, and a temporary folder of this process
+    takes its place. The steps are:
 
-    1. Resolve links, as their owners could let them lead elsewhere.
-    2. Make all missing folders with mode 0700, whatever the umask.
-    3. Check all that lies in the folder, the folder, and all folders above it.
+    1. Resolve links, because their owners could let them lead elsewhere.
+    2. Make all missing folders with mode 0700, for any umask.
+    3. Check the content of the folder, the folder, and all folders above it.
     """
     if not folder.is_absolute():
         return _stand_in(f"{folder} is not an absolute path", folder.name)
@@ -210,7 +224,7 @@ def private_folder(folder: Path) -> Path:
 
 
 def _weakness(folder: Path) -> str:
-    """Return who but this user and root could have put something into a folder; '' if nobody."""
+    """Return who besides this user and root could write into a folder, '' if nobody could."""
     inside = {
         Path(top) / name for top, *names in os.walk(folder) for name in (*names[0], *names[1])
     }
@@ -228,7 +242,7 @@ def _weakness(folder: Path) -> str:
 
 @cache
 def _stand_in(weakness: str, name: str) -> Path:
-    """Return a temporary folder of this process, and say why it is needed."""
+    """Return a temporary folder of this process, and warn why it is needed."""
     _warn_of(weakness)
     folder = _temporary_folder() / name
     folder.mkdir(mode=0o700, exist_ok=True)
@@ -238,7 +252,7 @@ def _stand_in(weakness: str, name: str) -> Path:
 @cache
 def _warn_of(weakness: str) -> None:
     warn_user(
-        f"cache: {weakness}, so that others could put compiled code there that runs as you; kernels"
+        f"cache: {weakness}, so that others could put compiled code there that runs as you. Kernels"
         " are compiled again in each process. Take write access from others (chmod go-w), or set"
         " STICTION_CACHE_DIR to an absolute path of a folder of your own",
         UserWarning,

@@ -21,9 +21,10 @@ def register(kind: T) -> T:
     """Class decorator: let study files name a class by its `type`.
 
     The class is a method, or derives from `FrictionLaw`, `LoadShape`, `Marginal` or
-    `SpectralDensity`; its `type` is a field such as ``type: Literal["band"] = "band"``. Files that
-    name it can be read once its module is imported. An entry point of the same name, in the group
-    ``stiction.methods``, ``.laws``, ``.loads``, ``.marginals`` or ``.spectra``, does without.
+    `SpectralDensity`. Its `type` is a field such as ``type: Literal["band"] = "band"``. Files that
+    name it can be read once its module is imported. No import is needed if the package has an entry
+    point of the same name in the group ``stiction.methods``, ``.laws``, ``.loads``,
+    ``.marginals`` or ``.spectra``.
     """
     name = getattr(getattr(kind, "__dataclass_fields__", {}).get("type"), "default", None)
     if not isinstance(name, str):
@@ -33,16 +34,16 @@ def register(kind: T) -> T:
     known = _registered.setdefault(getattr(kind, "family", "methods"), {})
     holder = known.setdefault(name, kind)
     if (holder.__module__, holder.__qualname__) != (kind.__module__, kind.__qualname__):
-        raise InputError(f"{kind.__name__}: the type {name!r} is that of {holder}; rename it")
+        raise InputError(f"{kind.__name__}: the type {name!r} belongs to {holder}. Rename it")
     known[name] = kind
     return kind
 
 
 class Kinds(Mapping[str, Any]):
-    """The classes of a family by their `type`: of the package, registered, and of entry points.
+    """The classes of a family by `type`: in the package, registered, and in entry points.
 
-    `places` ("module:name") are of classes of the package, which are imported when they are named,
-    as classes of entry points are.
+    `places` ("module:name") lead to classes in the package. Like classes of entry points, they
+    are imported when they are named.
     """
 
     def __init__(self, family: str, places: Mapping[str, str] | None = None) -> None:
@@ -76,7 +77,7 @@ class Kinds(Mapping[str, Any]):
     def _load(self, name: str, points: Sequence[EntryPoint]) -> None:
         try:
             if len(points) > 1:
-                raise ImportError("two packages offer it; uninstall one of them")
+                raise ImportError("two packages offer it, uninstall either")
             kind = register(points[0].load())
             if self._registered.get(name) is not kind:
                 raise ImportError(f"{kind} is no such class of this type")
@@ -91,11 +92,12 @@ class Kinds(Mapping[str, Any]):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class OneOf:
-    """Annotation of a field that holds an object of one of several classes.
+    """Annotation of a field whose value belongs to a family of classes.
 
-    `kinds` are the classes by `type`, `default` is the type of a table that names none. `convert`
-    maps what was given to such an object, or returns NotImplemented to leave it: a table to its
-    class, anything else to the annotated type; `untyped` leaves tables without a type to that.
+    `kinds` are the classes by `type`, and `default` is the type of a table without a `type`.
+    `convert` maps a value to such an object. If it returns NotImplemented, a table goes to
+    its class and any other value to the annotated type. With `untyped`, a table without a type goes
+    to the annotated type too.
     """
 
     kinds: Kinds
@@ -125,8 +127,8 @@ class OneOf:
         plain = to_plain(value)
         if self.kinds.get(plain.get("type")) is not type(value):
             raise ValueError(
-                f"{type(value).__name__} is a class of your own that study files cannot name;"
-                " decorate it with stiction.extensions.register"
+                f"{type(value).__name__} is a class of your own that study files cannot name."
+                " Decorate it with stiction.extensions.register"
             )
         return plain
 

@@ -1,6 +1,6 @@
 """Frozen, validated parameter objects, and public functions that check their arguments.
 
-One definition serves Python, TOML and JSON. All mistakes come at once, as one `InputError`.
+The same definition serves Python, TOML and JSON. An `InputError` lists all mistakes at once.
 """
 
 import dataclasses
@@ -31,8 +31,8 @@ from pydantic.dataclasses import dataclass as pydantic_dataclass
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, nearest, unknown
 from stiction.base.progress import Show
-from stiction.base.quantities import is_quantity, magnitude_in_one_of, units_of_argument
 from stiction.base.representation import brief, equal, hash_of, html_of
+from stiction.base.units import is_quantity, magnitude_in_one_of, units_of_argument
 
 T = TypeVar("T")
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -42,7 +42,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def as_number(value: Any) -> float:
-    """A number of any library, but no text and no truth value, which pydantic would convert."""
+    """Return a number of any library as a float. Texts and truth values are refused."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if not isinstance(value, numbers.Real) or isinstance(value, bool):
@@ -54,12 +54,12 @@ def as_number(value: Any) -> float:
 
 
 def _real(value: Any, info: pydantic.ValidationInfo) -> float:
-    """A number in SI: of a quantity with a unit, by the name of the argument."""
+    """Return a number in SI. The name of the argument gives the unit for a quantity."""
     return as_number(in_si(value, info.field_name or ""))
 
 
 def in_si(value: Any, name: str) -> Any:
-    """Return the number of a quantity, in the SI unit of the argument; anything else as it is."""
+    """Return the number of a quantity in the SI unit of the argument, and other values as given."""
     if not is_quantity(value):
         return value
     try:
@@ -69,7 +69,7 @@ def in_si(value: Any, name: str) -> Any:
 
 
 def as_count(value: Any) -> int:
-    """A whole number of any library; 1e4 counts as one."""
+    """Return a whole number of any library as an int. 1e4 is a whole number."""
     if isinstance(value, numbers.Integral) and not isinstance(value, bool):
         return int(value)
     if isinstance(value, bool | np.ndarray) or not is_finite(value) or value % 1:
@@ -78,7 +78,7 @@ def as_count(value: Any) -> int:
 
 
 def is_whole(value: Any, least: int) -> bool:
-    """Whether a value is a whole number (1e4 too), and not less than `least`."""
+    """Return whether a value is a whole number, such as 1e4, and not less than `least`."""
     try:
         return as_count(value) >= least
     except ValueError:
@@ -86,7 +86,7 @@ def is_whole(value: Any, least: int) -> bool:
 
 
 def is_finite(value: Any) -> bool:
-    """Whether a value is a finite number, and neither text nor a truth value."""
+    """Return whether a value is a finite number, not a text or a truth value."""
     try:
         return math.isfinite(as_number(value))
     except ValueError:
@@ -94,7 +94,7 @@ def is_finite(value: Any) -> bool:
 
 
 def real_array(value: Any) -> Array:
-    """Return `value` as a float64 array, or raise a TypeError that names what it is instead."""
+    """Return `value` as a float64 array, or raise a TypeError that names its kind."""
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
         raise TypeError("got a masked array; fill it, as in np.ma.filled(values, np.nan)")
     try:
@@ -116,21 +116,21 @@ def as_numbers(value: Any) -> Array:
 
 
 def is_unplaced(value: Any) -> bool:
-    """Whether a profile has coordinates or units of its own, which its problem resolves."""
+    """Return whether a profile has its own coordinates or units, which its problem resolves."""
     return is_quantity(value) or any(hasattr(value, name) for name in ("dims", "to_xarray"))
 
 
 def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
-    """A number, a read-only float64 array of shape (*shape), or what a problem will place.
+    """Return a number, a read-only float64 array (*shape), or labelled values for the problem.
 
-    In a study file also what its reader takes: a path, or a table {file, ...} with options.
+    A study file may also give a path, or a table {file, ...} with options of the reader.
     """
     read = (info.context or {}).get("read")
     if isinstance(value, str | Path | dict) and read is not None:
         value = read(value, str(info.field_name))
     if isinstance(value, str | Path | dict):
         raise ValueError(
-            "files, and tables with the key 'file', belong in a study file; in Python give a"
+            "files, and tables with the key 'file', belong in a study file. In Python give a"
             " number, an array or st.read_profile(path)"
         )
     if is_unplaced(value):
@@ -146,7 +146,7 @@ def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
     if array.ndim not in (1, 2) or array.size == 0:
         raise ValueError(f"must have shape (nodes,) or (nx, ny), got shape {array.shape}")
     if not np.all(np.isfinite(array)):
-        raise ValueError(f"must be finite; entry {int(np.argmin(np.isfinite(array)))} is not")
+        raise ValueError(f"must be finite. Entry {int(np.argmin(np.isfinite(array)))} is not")
     array.flags.writeable = False
     return array
 
@@ -184,7 +184,7 @@ def _path(value: Any) -> Path:
 
 @functools.cache
 def at_least(least: int) -> Any:
-    """Return the annotation of a whole number not below `least`; 1e4 counts as one."""
+    """Return the annotation of a whole number, such as 1e4, that is not below `least`."""
     return Annotated[int, Field(ge=least), BeforeValidator(as_count)]
 
 
@@ -201,14 +201,14 @@ Profile: TypeAlias = Annotated[
     "float | array",
 ]
 OptionalProfile: Any = Profile | None
-"""A number, or a read-only array of shape (nodes,); or None for 'not given'."""
+"""A number, a read-only array of shape (nodes,), or None for 'not given'."""
 Flag: TypeAlias = Annotated[bool, BeforeValidator(_flag)]
 Progress: TypeAlias = Annotated[Show, BeforeValidator(_show), "bool | Callable"]
 """True, False, or a function of (done, total)."""
 Text: TypeAlias = Annotated[str, Field(strict=True, min_length=0)]
-"""Text in valid UTF-8; pydantic looks at it only if its length is limited."""
+"""Text in valid UTF-8. Pydantic looks at it only if its length is limited."""
 Names: TypeAlias = Annotated[tuple[str, ...], BeforeValidator(_names)]
-"""One name or several, as a tuple."""
+"""A name or several, as a tuple."""
 FilePath: TypeAlias = Annotated[Path, BeforeValidator(_path)]
 Mode: TypeAlias = Literal["II", "III"]
 
@@ -217,7 +217,7 @@ Mode: TypeAlias = Literal["II", "III"]
 
 
 MISSING = "missing"
-"""What is said of a key that is not there, unless it is misspelt."""
+"""Text about a key that is absent, unless it is misspelt."""
 
 
 class Mistakes(InputError):
@@ -229,7 +229,7 @@ class Mistakes(InputError):
 
 
 def describe(value: Any) -> str:
-    """Return a short form of what was given, for messages."""
+    """Return a short form of a given value, for messages."""
     if isinstance(value, np.ndarray):
         return f"an array of shape {value.shape}"
     text = repr(value)
@@ -255,10 +255,10 @@ MAX_MISTAKES = 100
 def mistakes(
     error: pydantic.ValidationError, valid: Sequence[str], call: bool
 ) -> list[tuple[str, str]]:
-    """Return the mistakes that pydantic found in one model or call, each with its path.
+    """Return the mistakes that pydantic found in a model or call, each with its path.
 
-    `valid` are the names of its keys or arguments. What lies inside another model was explained
-    there. Pydantic adds the members of a union to the path of a `call`; they are left out.
+    `valid` are the names of the keys or arguments. Mistakes inside another model were explained
+    there. Pydantic adds the members of a union to the path of a `call`, and they are left out.
     """
     texts: dict[tuple[str, str, str], list[str]] = {}  # a union has an item for each member
     shown = [name for name in valid if name != "self"]
@@ -304,7 +304,7 @@ def _joined(*steps: str, by: str = ".") -> str:
 
 
 def explain(error: pydantic.ValidationError, root: str = "") -> list[str]:
-    """List the mistakes that pydantic found, one text each, with its path below `root`."""
+    """Return a text for each mistake that pydantic found, with its path below `root`."""
     places = mistakes(error, (), True)
     return [_joined(_joined(root, path), text, by=": ") for path, text in places]
 
@@ -313,7 +313,7 @@ def explain(error: pydantic.ValidationError, root: str = "") -> list[str]:
 
 
 def _explained(cls: Any, given: Any, handler: Callable[[Any], Any]) -> Any:
-    """Validate a model, whose mistakes it explains itself: it has the names of its keys."""
+    """Validate a model, which explains its own mistakes because it knows the names of its keys."""
     try:
         return handler(given)
     except pydantic.ValidationError as error:
@@ -361,9 +361,9 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
 
 
 def to_plain(value: Any) -> Any:
-    """Return the object as plain dicts, lists and numbers: what TOML and JSON hold.
+    """Return the object as plain dictionaries, lists and numbers for TOML and JSON.
 
-    It is an `InputError` if something in it exists in Python only, such as a function.
+    An `InputError` refuses parts that exist in Python only, such as a function.
     """
     try:
         return pydantic.TypeAdapter(type(value)).dump_python(
@@ -380,8 +380,8 @@ def to_plain(value: Any) -> Any:
 def checked(function: Function) -> Function:
     """Decorator of a public function: check its arguments by their annotations.
 
-    A class in an annotation takes its own instances only, not the tables of a study file. All that
-    is wrong comes as one `InputError`.
+    A class in an annotation takes its own instances only, not the tables of a study file. An
+    `InputError` lists all mistakes.
     """
     written = function.__annotations__
     function.__annotations__ = {
@@ -421,7 +421,7 @@ class _Plain:
 
 
 def plain_name(hint: Any) -> str:
-    """Return what an annotation asks for in plain words: the text among its metadata, if any."""
+    """Return an annotation in plain words: the text among its metadata, else the type."""
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     metadata = getattr(hint, "__metadata__", ())
     if metadata:
@@ -438,7 +438,7 @@ def plain_name(hint: Any) -> str:
 def plain_signature(owner: Any, hints: Mapping[str, Any]) -> inspect.Signature:
     """Return the signature of a function or class with the plain names of annotations.
 
-    That None is allowed shows in the default.
+    The default shows whether an argument may be left out.
     """
     signature = inspect.signature(owner)
     parameters = [
@@ -464,9 +464,9 @@ def _instances(hint: Any) -> Any:
 
 
 def check(name: str, value: Any, annotation: Any) -> Any:
-    """Return a value as an annotation has it, or raise an `InputError` that begins with `name`.
+    """Validate a value by an annotation, or raise an `InputError` that begins with `name`.
 
-    For what `checked` does not see, such as entries of a mapping or options of a command.
+    It serves values that `checked` does not see, such as entries of a mapping.
     """
     try:
         return _adapter(annotation).validate_python(value)

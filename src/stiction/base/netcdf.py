@@ -1,19 +1,19 @@
 """NetCDF files from anywhere: only numbers that the file itself holds, and no more than expected.
 
-A NetCDF-4 file is an HDF5 file. HDF5 follows names of other files (external storage, external
-links, virtual datasets) while it reads, and unpacks whatever a filter says. The steps are:
+A NetCDF-4 file is an HDF5 file. While HDF5 reads, it follows names of other files (external
+storage, external links, virtual datasets), and it unpacks data without a limit. The steps are:
 
-1. The bytes of the file were read already, so that nobody changes it between a look and a use.
-2. Walk through all groups. Links must be hard; data must lie in the file, have few values for its
-   size, and be packed by zlib, once, if at all.
-3. Read the attributes of the root and of its variables, and lists of texts, which are no larger
-   together than the file, and the numeric variables. Chunks are inflated here, within the size that
-   their shape states: HDF5 inflates until it has no memory.
+1. Take the bytes of the file, so that nobody can change the file between a look and a use.
+2. Walk through all groups. Refuse links that are not hard, data outside the file, too many values
+   for the size of the file, filters other than shuffle, zlib and checksum, and chunks that unpack
+   to more than their shape states.
+3. Read the attributes, lists of texts and numeric variables of the root. All attributes and texts
+   together may be as large as the file.
 4. Name the dimensions as NetCDF does.
-5. Decode them as xarray does: missing values, scale and offset, but no times.
+5. Decode the variables as xarray does: missing values, scale and offset, but no times.
 
-One library, h5py, looks and reads, so that a file cannot mean two things. Files of classic NetCDF
-hold no names of files; scipy reads them.
+The same library, h5py, looks and reads, so that a file has a single meaning. Files of classic
+NetCDF contain no names of files, and scipy reads them.
 """
 
 from __future__ import annotations
@@ -27,33 +27,36 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stiction.base.errors import InputError
-from stiction.base.files import check_unpacked
+from stiction.base.files import check_unpacked, refuse_damage
 
 if TYPE_CHECKING:
     import xarray as xr
 
 MAX_OBJECTS = 1_000
 MAX_VALUES = 2**23
-"""Values of a file of fewer bytes than this; larger files may hold one value a byte."""
+"""Values of a file of fewer bytes than this. A larger file may hold one value per byte."""
 SHUFFLE, DEFLATE, CHECKSUM, VIRTUAL = 2, 1, 3, 3
-"""HDF5's numbers of the filters that are read, and of the layout of virtual datasets."""
+"""HDF5's numbers of the accepted filters, and of the layout of virtual datasets."""
+PACKED: tuple[list[int], ...] = ([], [SHUFFLE], [DEFLATE], [SHUFFLE, DEFLATE])
+"""Orders of filters, without the checksum, which may stand anywhere."""
+CHECKSUM_BYTES = 4
 UNREAD = {"DIMENSION_LIST", "REFERENCE_LIST", "_NCProperties", "_nc3_strict"}
 HIDDEN = {"CLASS", "NAME", "_Netcdf4Dimid", "_Netcdf4Coordinates"}
 """Attributes by which NetCDF describes its own file."""
 SCALE, NO_VARIABLE = "DIMENSION_SCALE", "This is a netCDF dimension but not a netCDF variable"
 NOT_A_SCALE = "_nc4_non_coord_"
-"""Begins the HDF5 name of a variable that has the name of a dimension, and is not along it."""
+"""Prefix in HDF5 of a variable that has the name of a dimension but another dimension."""
 
 
 def read_netcdf(content: bytes, unwanted: Collection[str] = ()) -> xr.Dataset:
-    """Return the numbers and texts of the root of a NetCDF file, or raise an `InputError`.
+    """Return the numbers and texts at the root of a NetCDF file, without `unwanted` names.
 
-    Those of `unwanted` names are left out.
+    An `InputError` says why a file cannot be read.
     """
     import xarray as xr
 
     options: Any = {"decode_times": False, "decode_timedelta": False}
-    try:
+    with refuse_damage("a NetCDF file of numbers"):
         if content.startswith(b"CDF"):
             with xr.open_dataset(io.BytesIO(content), engine="scipy", **options) as opened:
                 numeric = [name for name, one in opened.items() if one.dtype.kind in "fiu"]
@@ -64,24 +67,21 @@ def read_netcdf(content: bytes, unwanted: Collection[str] = ()) -> xr.Dataset:
         )
         data = xr.Dataset(decoded, attrs=attributes)
         return data.set_coords(coordinates & {*decoded}).load()
-    except InputError:
-        raise
-    except Exception as error:  # libraries let through whatever a broken file leads to
-        text = (str(error) or type(error).__name__).splitlines()[0]
-        raise InputError(f"is not a NetCDF file of numbers: {text}") from None
 
 
 def _from_hdf5(content: bytes, unwanted: Collection[str]) -> tuple[dict[str, Any], Any]:
-    """Return the variables of an HDF5 file as they are stored, and attributes of the file."""
+    """Return the variables of an HDF5 file as they are stored, and the attributes of the file."""
     import h5py
     import xarray as xr
 
     with h5py.File(io.BytesIO(content)) as file:
         values = 0
         for dataset in _datasets(file):
-            _check_storage(dataset)
             values += _padded_size(dataset)
             check_unpacked(values, content, MAX_VALUES, 1)
+            _check_storage(dataset)
+            if dataset.name.lstrip("/") not in unwanted:
+                _check_chunks(dataset)
         budget = [len(content)]
         at_root = {
             name: (item, _attributes(item, budget))
@@ -96,7 +96,7 @@ def _from_hdf5(content: bytes, unwanted: Collection[str]) -> tuple[dict[str, Any
         variables = {
             name.removeprefix(NOT_A_SCALE): xr.Variable(
                 _dims(item, name, about, scales),
-                _values(item) if item.dtype.kind in "fiu" else _texts(item, budget),
+                item[()] if item.dtype.kind in "fiu" else _texts(item, budget),
                 {key: value for key, value in about.items() if key not in HIDDEN},
             )
             for name, (item, about) in at_root.items()
@@ -109,7 +109,7 @@ def _from_hdf5(content: bytes, unwanted: Collection[str]) -> tuple[dict[str, Any
 
 
 def _datasets(file: Any) -> Iterator[Any]:
-    """Yield all datasets, in all groups; everything must be reached by hard links."""
+    """Yield the datasets of all groups, and refuse links that are not hard."""
     import h5py
 
     waiting, seen, count = [file], {h5py.h5o.get_info(file.id).addr}, 0
@@ -121,7 +121,7 @@ def _datasets(file: Any) -> Iterator[Any]:
         for name in group:
             if not isinstance(group.get(name, getlink=True), h5py.HardLink):
                 raise InputError(
-                    f"{name!r} is a link to another place; copy the data into the file itself"
+                    f"{name!r} is a link to another place. Copy the data into the file itself"
                 )
             item = group[name]
             if isinstance(item, h5py.Dataset):
@@ -133,67 +133,54 @@ def _datasets(file: Any) -> Iterator[Any]:
                     waiting.append(item)
 
 
+def _padded_size(dataset: Any) -> int:
+    """Return the number of values in all chunks, which may reach beyond the ends."""
+    sizes = zip(dataset.shape or (), dataset.chunks or dataset.shape or (), strict=True)
+    return math.prod(-(-size // chunk) * chunk for size, chunk in sizes)
+
+
 def _check_storage(dataset: Any) -> None:
-    """Refuse data that lie outside the file, or that HDF5 would unpack without a limit."""
+    """Refuse data that lie outside the file or are packed by other filters."""
     kept = dataset.id.get_create_plist()
     if kept.get_layout() == VIRTUAL or kept.get_external_count():
         raise InputError(
-            f"{dataset.name!r} takes its values from another file; copy them into the file itself"
+            f"{dataset.name!r} takes its values from another file. Copy them into the file itself"
         )
-    filters = _filters(kept)
-    if not {*filters} <= {SHUFFLE, DEFLATE, CHECKSUM} or len({*filters}) < len(filters):
-        raise InputError(f"{dataset.name!r} is packed in an unusual way; write it with zlib")
+    filters = _filters(dataset)
+    packing = [number for number in filters if number != CHECKSUM]
+    if packing not in PACKED or len(filters) - len(packing) > 1:
+        raise InputError(f"{dataset.name!r} is packed in an unusual way. Write it with zlib")
 
 
-def _filters(kept: Any) -> tuple[int, ...]:
-    return tuple(kept.get_filter(number)[0] for number in range(kept.get_nfilters()))
+def _filters(dataset: Any) -> list[int]:
+    kept = dataset.id.get_create_plist()
+    return [kept.get_filter(number)[0] for number in range(kept.get_nfilters())]
 
 
-def _padded_size(dataset: Any) -> int:
-    """Return the number of values in all chunks, which may reach over the ends."""
-    return math.prod(
-        -(-size // chunk) * chunk
-        for size, chunk in zip(
-            dataset.shape or (), dataset.chunks or dataset.shape, strict=True
-        )
-    )
-
-
-def _values(dataset: Any) -> Any:
-    """Return the values; chunks are inflated within their size, for which HDF5 knows no limit."""
-    filters = _filters(dataset.id.get_create_plist())
+def _check_chunks(dataset: Any) -> None:
+    """Refuse chunks that unpack to another size than their shape states: HDF5 has no limit."""
+    filters, chunks = _filters(dataset), list[Any]()
     if DEFLATE not in filters:
-        return dataset[()]
-    chunks: list[Any] = []
+        return
     dataset.id.chunk_iter(chunks.append)
-    size = math.prod(dataset.chunks) * dataset.dtype.itemsize
-    if len(chunks) * size > _padded_size(dataset) * dataset.dtype.itemsize:
+    values = math.prod(dataset.chunks)
+    if len(chunks) * values > _padded_size(dataset):
         raise InputError(f"{dataset.name!r} has more chunks than its shape")
-    values = np.full(dataset.shape, dataset.fillvalue, dataset.dtype)
-    for start in (chunk.chunk_offset for chunk in chunks):
-        skipped, data = dataset.id.read_direct_chunk(start)
-        for number in reversed([n for n in range(len(filters)) if not skipped >> n & 1]):
-            if filters[number] == DEFLATE:
-                data = zlib.decompressobj().decompress(data, size + 5)
-            elif filters[number] == SHUFFLE:
-                end = len(data) // dataset.dtype.itemsize * dataset.dtype.itemsize
-                bytewise = np.frombuffer(data[:end], np.uint8)
-                data = bytewise.reshape(dataset.dtype.itemsize, -1).T.tobytes() + data[end:]
-            else:  # the checksum, of four bytes, is for HDF5 itself
-                data = data[:-4]
-        if len(data) != size:
+    size = values * dataset.id.get_type().get_size()
+    for chunk in chunks:
+        skipped, data = dataset.id.read_direct_chunk(chunk.chunk_offset)
+        inside = filters  # written before the data that are looked at
+        if not skipped >> filters.index(DEFLATE) & 1:
+            inside = filters[: filters.index(DEFLATE)]
+            data = zlib.decompressobj().decompress(data, size + CHECKSUM_BYTES + 1)
+        if len(data) != size + CHECKSUM_BYTES * (CHECKSUM in inside):
             raise InputError(f"{dataset.name!r} unpacks to another size than its chunks have")
-        block = np.frombuffer(data, dataset.dtype).reshape(dataset.chunks)
-        room = [slice(at, at + n) for at, n in zip(start, dataset.chunks, strict=True)]
-        part = values[tuple(room)]
-        part[...] = block[tuple(slice(0, n) for n in part.shape)]
-    return dataset[()] if CHECKSUM in filters else values
 
 
 def _texts(dataset: Any, budget: list[int]) -> Any:
     """Return a list of texts, such as names of stations, within the budget of the attributes.
 
-    They are read one by one, because many of them may name the same long text of the file.
+    Texts are read one by one, because many of them may refer to one long text in the file.
     """
     texts: list[str] = []
     for number in range(dataset.shape[0]):
@@ -208,22 +195,19 @@ def _texts(dataset: Any, budget: list[int]) -> Any:
 def _dims(
     dataset: Any, name: str, about: dict[str, Any], scales: dict[int, str]
 ) -> tuple[str, ...]:
-    """Return the names of the dimensions of a dataset at the root."""
+    """Return the names of the dimensions of a dataset at the root (step 4)."""
     if "_Netcdf4Coordinates" in about:
         return tuple(scales[number] for number in np.ravel(about["_Netcdf4Coordinates"]))
     if about.get("CLASS") == SCALE and dataset.ndim == 1:
         return (name,)
-    attached = [dim[0].name if len(dim) == 1 else None for dim in dataset.dims]
-    return tuple(
-        scale.lstrip("/") if scale else f"{name}_{number}"
-        for number, scale in enumerate(attached)
-    )
+    attached = [dim[0].name.lstrip("/") if len(dim) == 1 else "" for dim in dataset.dims]
+    return tuple(scale or f"{name}_{number}" for number, scale in enumerate(attached))
 
 
 def _attributes(item: Any, budget: list[int]) -> dict[str, Any]:
-    """Return the attributes that are a text or numbers; their size is taken from the budget.
+    """Return the attributes that are a text or numbers, and take their size from the budget.
 
-    A list of texts may name one text of the file many times: it is left out.
+    Lists of texts are left out, because they may refer to one long text many times.
     """
     import h5py
 

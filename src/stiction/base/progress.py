@@ -1,7 +1,7 @@
-"""Progress of long work: one mechanism for everything that takes long.
+"""Progress of long work, by the same mechanism everywhere.
 
-A terminal has a bar (rich), a notebook one output that is updated, and a pipe a line now and then;
-all of it only after a second. The code that works reports what is done (`advance`).
+After a second, a terminal shows a bar (rich), a notebook shows an output that is updated, and a
+pipe gets a line now and then. The working code reports its progress with `advance`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from functools import cache
 from typing import Any, TypeAlias
 
 Show: TypeAlias = bool | Callable[[int, int], None]
-"""True shows progress once work takes long; a callable gets (done, total); False is silent."""
+"""True shows progress once work takes long, False is silent, a callable gets (done, total)."""
 
 AFTER, TICK = 1.0, 0.25
 """Seconds of silence, for work that needs no bar, and seconds between updates."""
@@ -36,7 +36,7 @@ def duration(seconds: float) -> str:
 
 
 class Meter:
-    """Progress of a computation, of `total` units if that is known; a context manager."""
+    """Context manager for the progress of a computation, of `total` units if that is known."""
 
     def __init__(
         self, what: str, total: int | None = None, show: Show = True, *, unit: str = "samples"
@@ -46,16 +46,16 @@ class Meter:
         self._begun = time.monotonic()
 
     def stage(self, what: str, total: int | None = None) -> None:
-        """Begin another part of the work; the clock goes on."""
+        """Begin another part of the work. The clock goes on."""
         self.what, self.total, self.done, self.note = what, total, 0, ""
         self._first: tuple[float, int] | None = None
 
     def advance(self, count: int = 1) -> None:
-        """Report that `count` more are done; end an interrupted run."""
+        """Report that `count` more are done, and end an interrupted run."""
         if interrupted.is_set():
             raise KeyboardInterrupt
         self.done += count
-        if self._first is None:  # the rate is that of what follows: preparations come first
+        if self._first is None:  # preparations before the first unit do not count in the rate
             self._first = time.monotonic(), self.done
         if callable(self._show):
             self._show(self.done, self.total or 0)
@@ -154,7 +154,7 @@ def _display() -> Callable[[Meter, bool], None]:
 
 
 def _in_terminal() -> Callable[[Meter, bool], None]:
-    """Show a bar, which goes away at the end; what is printed meanwhile appears above it."""
+    """Show a bar, which goes away at the end. Printed lines appear above it."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress
 
@@ -175,7 +175,7 @@ def _in_terminal() -> Callable[[Meter, bool], None]:
 
 
 def _in_notebook() -> Callable[[Meter, bool], None]:
-    """Show one output, which is updated, and empty at the end; rich would need ipywidgets."""
+    """Show an output that is updated, and empty at the end. Rich would need ipywidgets."""
     from IPython.display import display
 
     handle = display({}, raw=True, display_id=True)

@@ -1,13 +1,19 @@
-"""Units that measured data state, and their factors to SI: nothing is converted by guessing."""
+"""Units of measured data, their factors to SI, and quantities of other packages.
+
+A unit is read from its text, and no unit is guessed. The page `docs/measured-profiles.md` has a
+table of the values that users may pass.
+"""
 
 import math
 import re
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from stiction.base.errors import InputError, UnitWarning, warn_user
+from stiction.base.variables import OF_THE_FIELD, UNITS
 
 
 class Unit(NamedTuple):
@@ -75,9 +81,9 @@ def _symbol(text: str) -> str:
 
 
 def parse(text: str) -> Unit | None:
-    """Return the unit that `text` names (``MPa``, ``N/mm^2``, ``Pa m-1``), None if it is unknown.
+    """Return the unit that `text` names (``MPa``, ``N/mm^2``, ``Pa m-1``), if it is known.
 
-    Powers of known units are separated by blanks or dots. After each slash, one is divided by.
+    Blanks or dots separate powers of known units. The first unit after a slash is a divisor.
     """
     text = text.strip()
     if text in _UNITS:
@@ -105,7 +111,7 @@ def is_in(text: str | None, si: str) -> bool:
 
 
 def factor_to(si: str, text: str) -> float:
-    """Return what a value in the unit `text` is multiplied by to be in the SI unit `si`."""
+    """Return the factor from the unit `text` to the SI unit `si`."""
     wanted, given = parse(si), parse(text)
     assert wanted is not None
     if given is None:
@@ -151,8 +157,84 @@ def as_texts(units: str, values: Sequence[float]) -> tuple[list[str], str]:
     return [f"{value * factor:.{digits}g}" for value in values], unit
 
 
+# -- quantities ---------------------------------------------------------------------------------
+
+
+def is_quantity(value: Any) -> bool:
+    """Return whether a value, or an array, has a unit of pint or astropy."""
+    pint = hasattr(value, "magnitude") and hasattr(value, "to")
+    return pint or (hasattr(value, "to_value") and hasattr(value, "unit"))
+
+
+def magnitude(value: Any, si: str) -> Any:
+    """Return the number of a quantity in an SI unit, and other values as given."""
+    if not is_quantity(value):
+        return value
+    text = re.sub(r"(-\d)", r"**\1", si).replace(" ", "*")  # Pa m-1: Pa*m**-1
+    text = "" if text == "1" else text
+    try:
+        if hasattr(value, "to_value"):
+            return value.to_value(text)
+        return value.to(text).magnitude
+    except Exception as error:  # each library has its own for 'no such unit'
+        raise InputError(f"cannot be converted to {si}: {error}") from None
+
+
+def magnitude_in_one_of(value: Any, units: Iterable[str]) -> tuple[Any, str | None]:
+    """Return the number of a quantity in the first SI unit that fits, and that unit.
+
+    A value without a unit is returned as given.
+    """
+    if not is_quantity(value):
+        return value, None
+    for si in units:
+        try:
+            return magnitude(value, si), si
+        except InputError:
+            continue
+    stated = getattr(value, "unit", None) or getattr(value, "units", "another unit")
+    raise InputError(f"is in {stated}, which cannot be converted to {' or '.join(units)}")
+
+
+def units_of_argument(name: str) -> tuple[str, ...]:
+    """Return the SI units that a quantity for this argument may have."""
+    if name in UNITS:
+        return (UNITS[name],)
+    return ("Pa", "1", "m") if name in OF_THE_FIELD else ("1",)
+
+
+def plain(value: Any, units: Iterable[str]) -> tuple[Any, str | None]:
+    """Return numbers in SI, with NaN for missing values, and the unit that they state.
+
+    A list of quantities becomes an array. Other values are returned as given.
+    """
+    units = tuple(units)
+    if isinstance(value, list | tuple) and value and all(map(is_quantity, value)):
+        pairs = [magnitude_in_one_of(item, units) for item in value]
+        if len({unit for _, unit in pairs}) > 1:
+            raise InputError(
+                "holds quantities of several kinds: give all of them in the same unit"
+            )
+        return np.array([number for number, _ in pairs], dtype=np.float64), pairs[0][1]
+    if isinstance(value, list | tuple) and any(map(is_quantity, value)):
+        raise InputError("holds quantities and numbers without a unit: give all of them a unit")
+    number, unit = magnitude_in_one_of(value, units)
+    if isinstance(number, np.ma.MaskedArray):
+        if number.size and np.ma.getmaskarray(number).all():
+            raise InputError("has no value: its mask covers all entries")
+        number = np.ma.filled(number.astype(np.float64), np.nan)
+    has_none = isinstance(number, list | tuple) and any(item is None for item in number)
+    if has_none or (isinstance(number, np.ndarray) and number.dtype == object):
+        with suppress(TypeError, ValueError):  # texts are refused where numbers are checked
+            number = np.array(number, dtype=np.float64)  # None becomes NaN
+    return number, unit
+
+
+# -- doubts -------------------------------------------------------------------------------------
+
+
 class Doubt(NamedTuple):
-    """A ratio of two values that shows whether both are in the units assumed."""
+    """A ratio that shows whether two values are in the assumed units."""
 
     text: str
     ratio: float
@@ -161,9 +243,9 @@ class Doubt(NamedTuple):
 
 
 def doubt_units(doubts: Iterable[Doubt]) -> bool:
-    """Warn of the first ratio that is not usual, and return whether there is one.
+    """Warn about the first unusual ratio, and return whether there is any.
 
-    If one is not possible, all that are not usual are an `InputError`.
+    If a ratio is impossible, an `InputError` lists all unusual ratios.
     """
     unusual = [doubt for doubt in doubts if not doubt.usual[0] <= doubt.ratio <= doubt.usual[1]]
     if any(not one.possible[0] <= one.ratio <= one.possible[1] for one in unusual):

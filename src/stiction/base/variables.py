@@ -1,4 +1,4 @@
-"""Names, units and meaning of what is given, drawn and computed along an interface."""
+"""Names, units and meaning of given, drawn and computed quantities."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ class Variable:
     Attributes
     ----------
     units : str
-        SI; "1" for a pure number.
+        In SI, "1" for a pure number.
     long_name : str
     dims : tuple of str
         The first is 'sample' for all variables of a method.
@@ -24,7 +24,7 @@ class Variable:
 
     @property
     def wide(self) -> bool:
-        """Whether a sample has one value a node, and not one or one a direction."""
+        """Whether a sample has a value for each node, not just a number or a vector."""
         return not set(self.dims[1:]) <= {DIRECTION}
 
 
@@ -37,8 +37,8 @@ PROFILES: dict[str, Variable] = {
     "fracture_energy": Variable("J m-2", "fracture energy"),
     "normal_pressure": Variable("Pa", "normal pressure"),
 }
-"""What may be given or sampled along an interface, with its unit; the order is that of the streams
-of random draws and never changes."""
+"""Profiles that may be given or sampled. Their order numbers the streams of random draws, and never
+changes."""
 FRICTION_COEFFICIENT = Variable("1", "static friction coefficient")
 QUANTITIES = PROFILES | {
     "residual_ratio": Variable("1", "residual ratio"),
@@ -47,7 +47,7 @@ QUANTITIES = PROFILES | {
     "friction_coefficient": FRICTION_COEFFICIENT,
     "height": Variable("m", "height"),
 }
-"""What may be read as a profile."""
+"""Quantities that may be read as a profile."""
 
 UNITS = {name: variable.units for name, variable in PROFILES.items()} | {
     "length": "m",
@@ -65,9 +65,9 @@ UNITS = {name: variable.units for name, variable in PROFILES.items()} | {
     "pressing_force": "N",
     "end_time": "s",
 }
-"""Units of parameters by the ends of their keys; others are pure numbers."""
+"""Units of parameters by the ends of their keys. Other parameters are pure numbers."""
 OF_THE_FIELD = ("mean", "standard_deviation", "low", "high", "loc", "scale", "noise")
-"""Parameters of a marginal, and of what was measured, in the unit of their field."""
+"""Parameters of a marginal or a measurement in the unit of their field."""
 
 
 def unit_of_key(key: str, of_field: str) -> str:
@@ -100,17 +100,18 @@ FORCES: dict[str, tuple[str, str]] = {
     "mean_stress": ("force", "shear force"),
     "machine_stress": ("machine_force", "force of the machine"),
 }  # fmt: skip
-"""Mean stresses that are given as forces, too, where the area is known: their names and texts."""
+"""Names and texts of the forces that accompany mean stresses if the area is known."""
 
 
 def force_variables(variables: Mapping[str, Variable]) -> dict[str, Variable]:
-    """Return the forces, N, of the stresses among some variables."""
+    """Return the variables of the forces, N, that accompany the stresses among some variables."""
     dims = {name: known.dims for name, known in variables.items() if name in FORCES}
     return {FORCES[name][0]: Variable("N", FORCES[name][1], dims[name]) for name in dims}
 
 
 def forces(values: Mapping[str, Any], area: float) -> dict[str, Any]:
-    """Return the forces, N, of the stresses among some values; the area is in m²."""
+    """Return the forces, N, of the stresses among some values, for an area in m²."""
+
     return {FORCES[name][0]: one * area for name, one in values.items() if name in FORCES}
 
 

@@ -29,11 +29,11 @@ from stiction.base.errors import (
 from stiction.base.progress import Meter, duration, interrupted
 
 MAX_SHOWN_FAILURES = 12
-"""Points, failures or damaged chunks that are listed."""
+"""Points, failures or damaged chunks in a list."""
 RUPTURE = (
     "critical_stress", "stress_drop", "onset_time", "critical_position", "median_rupture_speed"
 )  # fmt: skip
-"""What is printed of a rupture."""
+"""Printed variables of a rupture."""
 
 StudyFile = Annotated[
     Path, Argument(metavar="STUDY.toml", help="`stiction example` writes one to start from.")
@@ -52,14 +52,14 @@ Part = Annotated[
     str | None, Option(metavar="K/N", help="Compute the K-th of N parts, into one folder RUN.")
 ]
 LOADING_RATE = 2e7
-"""Pa/s, of a rupture if the method of the study is another one."""
+"""Loading rate of a rupture, Pa/s, if the study has another method."""
 
 
 # -- what commands share -------------------------------------------------------------------------
 
 
 def echo(text: Any = "", *, err: bool = False) -> None:
-    """Print what may come from a file, with escapes for all that could steer the terminal."""
+    """Print a text that may come from a file, and escape all letters that steer a terminal."""
     typer.echo(printable(str(text)), err=err)
 
 
@@ -117,7 +117,7 @@ def _interrupt(*_: object) -> None:
 
 @contextmanager
 def _resumable(out: Path) -> Iterator[None]:
-    """Let an interruption end a run as Ctrl-C does: what is done is stored."""
+    """Let an interruption end a run like Ctrl-C, which keeps stored results."""
     signal.signal(signal.SIGTERM, _interrupt)  # of a batch system
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else it is ignored
         signal.signal(signal.SIGINT, _interrupt)
@@ -126,7 +126,7 @@ def _resumable(out: Path) -> Iterator[None]:
         if interrupted.is_set():
             raise KeyboardInterrupt
     except KeyboardInterrupt:
-        echo(f"interrupted: what is done is in {out}; rerun the command to resume", err=True)
+        echo(f"interrupted: results are in {out}. Rerun the command to resume", err=True)
         raise typer.Exit(130) from None
     finally:
         interrupted.clear()
@@ -134,7 +134,7 @@ def _resumable(out: Path) -> Iterator[None]:
 
 @contextmanager
 def _executor(scheduler: str | None) -> Iterator[Any]:
-    """The executor of a Dask scheduler; None without one."""
+    """Yield the executor of a Dask scheduler, or None."""
     if scheduler is None:
         yield None
         return
@@ -158,11 +158,11 @@ def run(
 ) -> None:
     """Run the study in a file, or the missing part of it.
 
-    Rerunning the command resumes an interrupted run, computes failed samples again, and new ones
-    if `samples` was raised. The results do not depend on workers, machines or interruptions.
+    Rerunning the command resumes an interrupted run, computes failed samples again, and adds
+    samples if `samples` was raised. Results do not depend on workers, machines or interruptions.
 
-    Exit code 0: complete; 1: samples failed or the run could not continue; 2: errors in the study
-    or the command; 130: interrupted.
+    The exit code is 0 if the run is complete, 1 if samples failed or the run could not continue, 2
+    if the study or the command has errors, and 130 after an interruption.
 
     \b
     Examples:
@@ -194,8 +194,9 @@ def run(
 def status(run: RunPath) -> None:
     """Show the completed, failed and damaged parts of a run.
 
-    Checksums find damage, not forgery. Exit code 0: complete; 1: samples are missing, failed or
-    damaged, or the run cannot be read; 2: links, pipes or folders lie in place of its files.
+    Checksums find damage, not forgery. The exit code is 0 if the run is complete, 1 if samples are
+    missing, failed or damaged or the run cannot be read, and 2 if links, pipes or folders lie in
+    place of its files.
 
     \b
     Examples:
@@ -230,14 +231,14 @@ def export(
     run: RunPath,
     out: Annotated[Path, Argument(metavar="RESULT", help=".nc (NetCDF) or .csv.")],
     partial: Annotated[
-        bool, Option("--partial", help="Write what is there of a run that is not complete.")
+        bool, Option("--partial", help="Write the stored part of an incomplete run.")
     ] = False,
 ) -> None:
-    """Write a run as one file over the sweep and the samples.
+    """Write a run as a file over the sweep and the samples.
 
-    A table (.csv) has one row for each sample and columns named `name (unit)`; it leaves out
-    profiles along the interface and events. Exit code 1: samples are missing, and nothing is
-    written; with --partial they are NaN.
+    A table (.csv) has a row for each sample and columns named `name (unit)`. It leaves out
+    profiles along the interface and events. If samples are missing, no file is written and the exit
+    code is 1. With --partial, missing samples are NaN.
 
     \b
     Examples:
@@ -257,9 +258,9 @@ def report(
     run: RunPath,
     out: Annotated[Path | None, Option(help="HTML file; RUN/report.html by default.")] = None,
 ) -> None:
-    """Write one self-contained HTML page: figures, tables, failures, the study and versions.
+    """Write a self-contained HTML page: figures, tables, failures, the study and versions.
 
-    Exit code 0: complete; 1: samples are missing, and the page is of those that are there.
+    The exit code is 0 if the run is complete. It is 1 if samples are missing from the page.
 
     \b
     Examples:
@@ -275,7 +276,7 @@ def report(
     echo(f"report: {path}")
     state = stored.status()
     if not state.complete:
-        echo(f"it is of {state.done} of {state.samples} {stored.counted}", err=True)
+        echo(f"it shows {state.done} of {state.samples} {stored.counted}", err=True)
         raise typer.Exit(1)
 
 
@@ -297,8 +298,8 @@ def example() -> None:
 def check(study: StudyFile) -> None:
     """Check a study file as `run` does, and estimate time and size.
 
-    All errors come at once, and the warnings of a run before its first sample. Files outside the
-    study's folder that it reads are listed: their numbers go into the run.
+    All errors appear at once, with the warnings of a run before its first sample. Files outside the
+    folder of the study are listed, because their numbers go into the run.
 
     \b
     Examples:
@@ -315,9 +316,9 @@ def check(study: StudyFile) -> None:
     for name, text in lines.items():
         echo(f"  {name:20s} {text}")
     folder = study.resolve().parent
-    outside = dict.fromkeys(one.resolve() for one in files)
-    for file in (one for one in outside if not one.is_relative_to(folder)):
-        echo(f"  {'file outside':20s} {file}")
+    for file in dict.fromkeys(path.resolve() for path in files):
+        if not file.is_relative_to(folder):
+            echo(f"  {'file outside':20s} {file}")
 
 
 def description(study: Any) -> dict[str, str]:
@@ -342,21 +343,15 @@ def description(study: Any) -> dict[str, str]:
         unit = f" {variable.units}".removesuffix(" 1")
         text = f"{keys}: {len(values)} values, {values[0]} to {values[-1]}{unit}"
         lines[f"axis {number}"] = text
-    numbers = pd.DataFrame(
-        [
-            _numbers(point.problem, member)
-            for point in different
-            for member in point.random.members
-        ]
-    )
-    for (title, unit), column in numbers.items():
+    pairs = [(point.problem, member) for point in different for member in point.random.members]
+    for (title, unit), column in pd.DataFrame([_numbers(*pair) for pair in pairs]).items():
         ends = dict.fromkeys(f"{value:.5g}" for value in (column.min(), column.max()))
         lines[title] = f"{' to '.join(ends)} {unit}".rstrip()
     return lines
 
 
 def _numbers(problem: Any, random: Any) -> dict[tuple[str, str], float]:
-    """Return key numbers of a point and what is random there, by title and unit."""
+    """Return key numbers of a point and its random properties, by title and unit."""
     field = random.strength
     unit = "Pa" if field.of is None else "(friction coefficient)"
     numbers = {
@@ -372,7 +367,7 @@ def _numbers(problem: Any, random: Any) -> dict[tuple[str, str], float]:
 
 
 def _cost(study: Any) -> dict[str, str]:
-    """Return about how long a study takes, and the size of its result."""
+    """Return the approximate time that a study takes, and the size of its result."""
     from stiction.ensemble.batches import usable_cores
 
     points, samples, cores = study.experiments, study.ensemble.samples, usable_cores()
@@ -392,7 +387,7 @@ def _cost(study: Any) -> dict[str, str]:
 def onset(
     study: StudyFile,
     strength: Annotated[Path, Option(metavar="PROFILE", help="File of the peak strength.")],
-    method: Annotated[list[str] | None, Option(help="Use only this one (repeatable).")] = None,
+    method: Annotated[list[str] | None, Option(help="Only this method (repeatable).")] = None,
     unit: Annotated[
         str | None, Option(help="Unit of the values in PROFILE, such as MPa.")
     ] = None,
@@ -401,7 +396,7 @@ def onset(
     x: Annotated[str | None, Option(help="Column of x: name, or number from 0.")] = None,
     quantity: Annotated[
         Literal["strength", "friction_coefficient"],
-        Option(help="What PROFILE holds; coefficients need a normal pressure."),
+        Option(help="Content of PROFILE. Coefficients need a normal pressure."),
     ] = "strength",
     interpolate: Annotated[bool, Option("--interpolate", help="Interpolate to nodes.")] = False,
     gaps: Annotated[Literal["refuse", "fill"], Option(help="Missing values.")] = "refuse",
@@ -417,12 +412,13 @@ def onset(
         str, Option(help="Added to x, in m; or 'centre' for the centre of the interface.")
     ] = "0",
 ) -> None:
-    """Compute the load and position at which one interface of given strength begins to slide.
+    """Compute the load and position at which an interface of given strength begins to slide.
 
     The study file needs the problem only. PROFILE is .npy, text (.csv, .txt, ...) or NetCDF, with
-    or without x; on a plane it is .npy of shape (nx, ny). Values are in Pa and m unless the file
-    states units, as in 'x (mm); strength (MPa)'. Every applicable method is used: that of the
-    study with its options, the others with their defaults, and `rupture` at 2e7 Pa/s.
+    or without x. On a plane it is an .npy file of shape (nx, ny) or a map. Values are in Pa and m
+    unless the file states units, such as 'x (mm), strength (MPa)'. Every applicable method is used.
+    The method of the study keeps its options. Other methods have their defaults, and `rupture` has
+    a loading rate of 2e7 Pa/s.
 
     \b
     Examples:
@@ -499,13 +495,13 @@ def rupture(
     ] = None,
     film: Annotated[bool, Option("--film", help="Also write rupture.gif.")] = False,
 ) -> None:
-    """Simulate one interface from its first slip to global sliding, or as its study stops it.
+    """Simulate an interface from its first slip to global sliding, or until its study stops it.
 
-    The strength is a sample of the study (of a sweep, at its first point) or a profile of your
-    own, with or without x. The command writes `rupture.nc` (slip, slip rate and stress over time
-    and x) and a figure of the slip rate in space and time (PNG and PDF). The loading rate is that
-    of the study's method `rupture`, else 2e7 Pa/s. On a specimen it is the event that slides,
-    with a figure of the blocks.
+    The strength is a sample of the study (at the first point of a sweep) or your own profile, with
+    or without x. The command writes `rupture.nc` (slip, slip rate and stress over time and x) and a
+    figure of the slip rate in space and time (PNG and PDF). The loading rate comes from the method
+    `rupture` of the study, else it is 2e7 Pa/s. On a specimen the command simulates the event in
+    which the whole interface slides, and draws the blocks too.
 
     \b
     Examples:
@@ -523,7 +519,7 @@ def rupture(
     out.mkdir(parents=True, exist_ok=True)
     profiles: Any
     if strength is not None and sample is not None:
-        raise InputError("--sample: has no effect beside --strength; leave one of them out")
+        raise InputError("--sample: has no effect beside --strength. Leave one of them out")
     if strength is None:
         loaded = Study.from_toml(study)
         point, save = loaded.experiments[0], loaded.save
@@ -548,7 +544,7 @@ def rupture(
 
 
 def _summary(result: Any) -> str:
-    """Return the numbers of a rupture, one a line, without those that are NaN."""
+    """Return the numbers of a rupture, a line for each variable, without NaN."""
     lines = []
     for name in filter(result.__contains__, RUPTURE):
         numbers = [f"{number:.5g}" for number in result[name].values.reshape(-1)]
@@ -583,20 +579,20 @@ def reliability(
     scheduler: Scheduler = None,
     part: Part = None,
 ) -> None:
-    """Compute how likely a study's interface is to slide below a demand, or its design.
+    """Compute the probability that an interface slides below a demand, or its design.
 
-    One line answers at each point of the sweep: to `--force`, `--stress` or
-    `--friction-coefficient` with a probability, to `--probability` with the design; without an
-    option, to the table [reliability] of the study. `--page` writes a design as a page that prints
-    on A4: characteristic value, partial factor, inputs, doubts and what moves it. With `--out` it
-    is the whole curve, decade by decade.
+    The answer is a line for each point of the sweep. `--force`, `--stress` and
+    `--friction-coefficient` ask for a probability, `--probability` for a design. Without these
+    options, the table [reliability] of the study asks. `--page` writes a design as a page that
+    prints on A4, with its characteristic value, partial factor, inputs, doubts and sensitivities.
+    `--out` computes the whole curve, decade by decade.
 
-    Problem, strength, method, seed and sweep come from the study file; its number of samples is
-    not used. The stress is the mean shear stress on the interface; failure means that the
-    interface as a whole slides below it. With a table [uncertain] the probability is the mean over
-    equally likely interfaces, and the band that holds 90 % of them is beside it. Rerunning the
-    command resumes an interrupted run, and computes more if there are to be more repetitions.
-    `stiction export` writes the curve as a table, `stiction report` a page with its figure.
+    Problem, strength, method, seed and sweep come from the study file, whose number of samples is
+    not used. The stress is the mean shear stress on the interface. Failure means that the whole
+    interface slides below that stress. With a table [uncertain], the probability is the mean over
+    equally likely interfaces, and a band contains 90 % of them. Rerunning the command resumes an
+    interrupted run and adds repetitions if `--repetitions` was raised. `stiction export` writes the
+    curve as a table, and `stiction report` writes a page with its figure.
 
     \b
     Examples:
@@ -612,22 +608,20 @@ def reliability(
         "force": force, "stress": stress, "friction_coefficient": friction_coefficient,
         "probability": probability,
     }  # fmt: skip
-    asked = {name: one for name, one in options.items() if one is not None}
+    asked = {name: value for name, value in options.items() if value is not None}
     of_curve = {
         "smallest": smallest, "repetitions": repetitions, "part": part, "scheduler": scheduler,
     }  # fmt: skip
     if out is None:
         given = [name for name, value in of_curve.items() if value is not None]
         if given:
-            raise InputError(
-                f"{_options_of(given)}: of a whole curve; give its folder by --out"
-            )
+            raise InputError(f"{_options_of(given)}: belongs to a whole curve. Give --out too")
         _answer(loaded, asked, workers, page)
         return
     if page is not None:
         asked["page"] = 0.0
     if asked:
-        raise InputError(f"--out: is for the whole curve; leave it or {_options_of(asked)} out")
+        raise InputError(f"--out: is for the whole curve. Leave it or {_options_of(asked)} out")
     with _resumable(out), _executor(scheduler) as executor:
         curve = loaded.failure_curve(
             out=out, workers=workers, executor=executor, part=part,
@@ -638,8 +632,8 @@ def reliability(
     if "members" in curve:
         echo(
             f"probability: the mean over {curve.sizes['member']} equally likely interfaces, to"
-            " decide with; probability_low, _high: its 95 % interval; band_low, _high: 90 % of the"
-            " interfaces"
+            " decide with. probability_low and _high: its 95 % interval. band_low and _high: 90 %"
+            " of the interfaces"
         )
     state = open_run(out).status()
     echo(
@@ -655,7 +649,7 @@ def _options_of(names: Iterable[str]) -> str:
 def _answer(
     study: Any, asked: dict[str, float], workers: int | None, page: Path | None = None
 ) -> None:
-    """Print the answer to what was asked, or else to the question of the study, at each point."""
+    """Print the answer to the question of the command or of the study, at each point."""
     from stiction.study.study import Question
 
     question = study.reliability
@@ -668,7 +662,7 @@ def _answer(
             raise InputError(texts) from None
     if question is None:
         raise InputError(
-            "--out: give the folder of a curve, or ask for one answer with --force, --stress,"
+            "--out: give the folder of a curve, or ask a question with --force, --stress,"
             " --friction-coefficient or --probability, or in the table [reliability] of the study"
         )
     for point, experiment in zip(study.points, study.experiments, strict=True):
@@ -712,7 +706,7 @@ def _options(
 
 
 def _command(function: Callable[..., None]) -> Callable[..., None]:
-    """Messages in the words of the command; Ctrl-C ends with exit code 130, as shells expect."""
+    """Word messages for the command. Ctrl-C ends with exit code 130, as shells expect."""
 
     def show(message: Warning | str, *args: Any, **kwargs: Any) -> None:
         echo(f"warning: {in_options(str(message), function)}", err=True)
@@ -738,7 +732,7 @@ for _function in (example, check, run, status, export, report, onset, rupture, r
 
 
 def main() -> None:
-    """Run the command line: invalid input and a full disk give a message, not a traceback.
+    """Run the command line. Invalid input or a full disk gives a message, not a traceback.
 
     The exit code is 2 for invalid input and 1 for failures of the run.
     """

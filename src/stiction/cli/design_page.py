@@ -1,4 +1,4 @@
-"""A design as one self-contained HTML page to file; it prints on A4."""
+"""A design as a self-contained HTML page to file, which prints on A4."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -32,7 +32,7 @@ def write_design_page(
     sources: Mapping[str, str] | None = None,
     title: str = "Design of a joint",
 ) -> Path:
-    """Write a design as one HTML page: force, inputs with units, evidence, doubts, what moves it.
+    """Write a design as an HTML page: force, inputs with units, evidence, doubts, sensitivities.
 
     Parameters
     ----------
@@ -41,13 +41,13 @@ def write_design_page(
     path : path
         HTML file.
     problem : Problem
-        That of the design; its constants are the inputs.
+        The problem of the design. Its constants are the inputs.
     evidence : sequence
-        What the design rests on, as printed: a fit, a posterior, an agreement. Their doubts and
-        notes are listed as doubts.
+        Results behind the design, which are printed: a fit, a posterior, an agreement. Their doubts
+        and notes are listed as doubts.
     sources : mapping, optional
-        Where each input comes from, by its dotted key, such as ``{"load.pressing_force":
-        "drawing 12"}``. Others are said to be assumed.
+        The source of each input by its dotted key, such as ``{"load.pressing_force":
+        "drawing 12"}``. Inputs without a source are called assumed.
     title : str
 
     Returns
@@ -91,7 +91,7 @@ def write_design_page(
             count = design.sensitivities.sizes["source"]
             figure = Figure(figsize=(0.75 * PAGE, 1.2 + 0.3 * count), layout="constrained")
             plot.sensitivities(design, ax=figure.subplots())
-            page.figure(figure, "What moves the design; the band is its interval.")
+            page.figure(figure, "What moves the design. The band is its interval.")
         page.table("What moves the design", *_moves(design))
     page.table("Inputs", ["input", "value", "unit", "source"], _inputs(problem, sources or {}))
     doubts = [*design.warnings]
@@ -182,5 +182,5 @@ def _inputs(problem: Problem, sources: Mapping[str, str]) -> list[list[Any]]:
     add(plain, "")
     keys = {row[0] for row in rows}
     if unknown := [key for key in sources if key not in keys]:
-        raise InputError(f"sources: {unknown[0]}: is no input; inputs are {', '.join(keys)}")
+        raise InputError(f"sources: {unknown[0]!r} is no input. Inputs are {', '.join(keys)}")
     return rows

@@ -1,4 +1,4 @@
-"""A result as one self-contained HTML page: text, figures and tables."""
+"""A result as a self-contained HTML page: text, figures and tables."""
 
 import base64
 import io
@@ -41,7 +41,7 @@ SPREAD = ("mean", "standard deviation")
 CONTROLS = {
     code: "\N{REPLACEMENT CHARACTER}" for code in (*range(9), *range(11, 32), *range(127, 160))
 }
-"""Letters that steer terminals, which may print a page, too."""
+"""Letters that steer terminals, because a terminal may print a page."""
 
 
 @dataclass
@@ -63,7 +63,7 @@ class Page:
         self.parts.append({"kind": "figure", "caption": caption, "data": data})
 
     def table(self, title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-        """Add a table; numbers are shown to five digits."""
+        """Add a table, whose numbers are shown to five digits."""
         cells = [[shown(entry) for entry in row] for row in rows]
         self.parts.append({"kind": "table", "title": title, "columns": columns, "rows": cells})
 
@@ -85,7 +85,7 @@ class Page:
 
 
 def shown(entry: Any) -> str:
-    """Return a table entry as text: numbers to five digits, a dash for what is missing."""
+    """Return a table entry as text: numbers to five digits, a dash for a missing value."""
     if entry is None or (isinstance(entry, float | np.floating) and np.isnan(entry)):
         return "\N{EN DASH}"
     if isinstance(entry, int | np.integer):
@@ -173,7 +173,8 @@ def add_figures(page: Page, result: xr.Dataset, dims: list[str]) -> None:
 
 
 def _where(part: xr.Dataset, dims: list[str]) -> str:
-    """Return ' at NAME = VALUE' of what is held fixed."""
+    """Return ' at NAME = VALUE' for the dimensions that are held fixed."""
+
     values = []
     for dim in dims:
         factor, unit, _ = scaled(part[dim])

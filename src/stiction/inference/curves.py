@@ -35,8 +35,9 @@ from stiction.base.errors import InputError, prefixed, warn_accuracy
 from stiction.base.model import Number, Positive, checked, describe, real_array
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.units import factor_to, in_words, is_in
-from stiction.problem.profiles.reading import Missing, reading_options, with_stated_unit
-from stiction.problem.profiles.tables import EXCEL, TEXT, column_of, read_table, table_of_frame
+from stiction.problem.profiles.labels import column_of, with_stated_unit
+from stiction.problem.profiles.reading import Missing
+from stiction.problem.profiles.tables import EXCEL, TEXT, Options, read_table, table_of_frame
 
 FORCE = ("force", "load", "kraft", "standardkraft", "friction", "stress", "coefficient", "mu")
 TRAVEL = (
@@ -223,7 +224,7 @@ def read_curve(
     >>> print(st.read_curve((travel, force), unit="N", travel_unit="m"))
     test: peak 80 N at 501 µm, 1 precursor from 59.7 N on, of up to 19.6 N, plateau 70 N, noise 0 N
     """
-    options = reading_options(missing, decimal, skip, sheet)
+    options = Options(skip, sheet, missing, decimal)
     tests: list[Curve] = []
     for name, table in _tables(source, options):
         with prefixed(name):

@@ -10,17 +10,12 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed
 from stiction.base.model import FilePath, Number, Numbers, check, checked, describe, is_finite
-from stiction.base.quantities import magnitude
 from stiction.base.representation import Result, Row, Summary
-from stiction.base.units import factor_to, is_in
+from stiction.base.units import factor_to, is_in, magnitude
 from stiction.inference.curves import Curves
-from stiction.problem.profiles.reading import (
-    Missing,
-    reading_options,
-    with_stated_unit,
-    without_missing,
-)
-from stiction.problem.profiles.tables import Options, column_of, read_table, table_of_frame
+from stiction.problem.profiles.labels import column_of, with_stated_unit, without_missing
+from stiction.problem.profiles.reading import Missing
+from stiction.problem.profiles.tables import Options, read_table, table_of_frame
 
 MIN_PEAKS = 3
 """Fewest different peaks in all: of two numbers, one may be a mistake."""
@@ -98,7 +93,7 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
         return make_peaks(peaks.peaks, peaks.unit)
     if hasattr(peaks, "columns"):
         with prefixed("peaks"):
-            return _of_table(table_of_frame(peaks), None, reading_options(None))
+            return _of_table(table_of_frame(peaks), None, Options())
     groups: dict[Any, Any] = dict(peaks) if isinstance(peaks, Mapping) else {None: peaks}
     if curves := [given for given in groups.values() if isinstance(given, Curves)]:
         unit = curves[0].unit
@@ -209,7 +204,7 @@ def read_peaks(
     >>> print(st.read_peaks(path))
     3 peaks
     """
-    options = reading_options(missing, decimal, skip, sheet)
+    options = Options(skip, sheet, missing, decimal)
     if isinstance(source, Curves):
         return make_peaks(source)
     with prefixed(str(source)):

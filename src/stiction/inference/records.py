@@ -14,8 +14,8 @@ from stiction.base.errors import InputError, prefixed, warn_accuracy
 from stiction.base.model import real_array
 from stiction.inference.window import RecordWindow
 from stiction.problem.interface import Interface
+from stiction.problem.profiles.labels import POSITIVE, is_labelled, labelled, simplified
 from stiction.problem.profiles.placing import points_of
-from stiction.problem.profiles.reading import POSITIVE, is_labelled, labelled, simplified
 
 MIN_RECORD_POINTS = 64
 """Fewest measured points from which a spectrum can be estimated."""

@@ -1,12 +1,12 @@
 """Plots of results.
 
-A plot of one panel draws on `ax`, or on new axes, and returns the axes. A plot of several
+A plot with a single panel draws on `ax`, or on new axes, and returns the axes. A plot with several
 panels (`block`, `fit`, `precursors`, `specimen`) makes a new figure and returns an array of axes.
-New figures have the style of a printed page, whatever style is set. On axes of the user, lines and
-texts keep a contrast of 4.5 to 1 to the background. `film` writes a file and returns its path.
+New figures always have the style of a printed page. On axes of the user, lines and texts keep a
+contrast of 4.5 to 1 to the background. `film` writes a file and returns its path.
 
-Units follow the size of what is drawn: mm and µs, or km and s. Where the problem has a normal
-pressure, friction coefficients are drawn too. `axes` and `style` are what all files share;
+Units follow the size of the numbers, such as mm and µs, or km and s. If the problem has a normal
+pressure, friction coefficients are drawn too. All files share `axes` and `style`. The files
 `fields`, `specimens`, `ruptures`, `distributions` and `fits` draw a kind of result each.
 """
 

@@ -25,7 +25,7 @@ def with_unit(name: str, unit: str) -> str:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Return a figure that notebooks and galleries show; sizes in inches.
+    """Return a figure that notebooks and galleries show, with sizes in inches.
 
     It is made outside `paper_style`, because a backend that is loaded here sets parameters too.
     """
@@ -40,11 +40,11 @@ def new_figure(width: float, height: float) -> Figure:
 def on_axes(
     ax: Axes | None, width: float = 1.35 * COLUMN, height: float = 2.8
 ) -> Iterator[Axes]:
-    """Yield the caller's axes as they are, or new ones in the style of a printed page."""
+    """Yield the caller's axes as they are, or new axes in the style of a printed page."""
     if ax is not None:
         if not isinstance(ax, Axes):
             raise InputError(
-                f"ax: must be matplotlib axes, got {type(ax).__name__}; of several, choose one"
+                f"ax: must be a matplotlib Axes, such as axes[0], got {type(ax).__name__}"
             )
         given = set(ax.get_children())
         yield ax
@@ -56,7 +56,7 @@ def on_axes(
 
 
 def problem_of(result: Any, problem: Problem | None = None) -> Problem:
-    """Return the given problem, or the one in the attributes of a result."""
+    """Return the given problem, or the problem in the attributes of a result."""
     if problem is not None:
         return check("problem", problem, Problem)
     try:
@@ -64,24 +64,24 @@ def problem_of(result: Any, problem: Problem | None = None) -> Problem:
         return pydantic.TypeAdapter(Problem).validate_python(plain)
     except (KeyError, TypeError, ValueError, InputError):
         raise InputError(
-            "problem: the result does not hold all of it (a part exists in Python only, or was"
-            " swept); give problem=..."
+            "problem: is not complete in the result, because a part exists in Python only or was"
+            " swept. Give problem=..."
         ) from None
 
 
 def need(result: Any, *names: str, hint: str = "") -> None:
-    """Refuse a result without these variables: an `InputError` that ends with the hint."""
+    """Refuse a result without these variables, in a message that ends with the hint."""
     check("result", result, xr.Dataset)
     missing = [name for name in names if name not in result]
     if missing:
         raise InputError(
-            f"result: has no {', '.join(missing)}; it holds"
+            f"result: has no {', '.join(missing)}. It holds"
             f" {', '.join(map(str, result.data_vars))}{hint}"
         )
 
 
 def named(results: Any) -> dict[str, xr.Dataset]:
-    """Return one or several results by name: that of the method where none is given."""
+    """Return results by name. If no names are given, they are the names of the methods."""
     if isinstance(results, xr.Dataset):
         results = [results]
     if not isinstance(results, Mapping):
@@ -93,12 +93,12 @@ def named(results: Any) -> dict[str, xr.Dataset]:
             by_name[f"{name}, result {number}" if name in by_name else name] = result
         results = by_name
     if not results:
-        raise InputError("result: is empty; give one result or several")
+        raise InputError("result: is empty. Give a result or several")
     return dict(results)
 
 
 def shown_quantity(result: xr.Dataset, quantity: str | None = None) -> str:
-    """Return what of an onset is drawn: the force, else the coefficient, else the stress.
+    """Return the variable of an onset to draw: force, else coefficient, else stress.
 
     On a plane, whose area is always known, forces are drawn on request only.
     """
@@ -111,8 +111,8 @@ def shown_quantity(result: xr.Dataset, quantity: str | None = None) -> str:
 
 
 def scaled(variable: xr.DataArray, *others: xr.DataArray) -> tuple[float, str, str]:
-    """Return factor, unit and label, 'critical stress (MPa)', of variables of a kind."""
-    values = np.concatenate([one.values.ravel() for one in (variable, *others)])
+    """Return factor, unit and label, such as 'critical stress (MPa)', of like variables."""
+    values = np.concatenate([part.values.ravel() for part in (variable, *others)])
     factor, unit = unit_for(str(variable.attrs.get("units", "1")), values)
     name = str(variable.name).replace("_", " ")
     if variable.name == "friction_coefficient":
@@ -121,9 +121,9 @@ def scaled(variable: xr.DataArray, *others: xr.DataArray) -> tuple[float, str, s
 
 
 def add_friction_scale(axes: Axes, problem: Problem, which: str, factor: float) -> None:
-    """Add a scale on the other side: stress over the mean normal pressure, if any.
+    """Add a scale of stress over mean normal pressure on the other side, if there is a pressure.
 
-    `which` is the scale of stresses, "x" or "y", and `factor` that of its unit.
+    `which` is the scale of stresses, "x" or "y", and `factor` the factor of its unit.
     """
     if problem.given_pressure is None:
         return
@@ -132,7 +132,7 @@ def add_friction_scale(axes: Axes, problem: Problem, which: str, factor: float) 
 
 
 def add_scale(axes: Axes, which: str, ratio: float, label: str) -> None:
-    """Add a second scale on the other side: that of the values times a ratio."""
+    """Add a scale of the values times a ratio on the other side."""
     convert = (lambda value: value * ratio, lambda value: value / ratio)
     if which == "y":
         axes.secondary_yaxis("right", functions=convert).set_ylabel(label)

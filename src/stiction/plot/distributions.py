@@ -31,30 +31,30 @@ from stiction.statistics.estimates import quantiles as estimate_quantiles
 
 MAX_CURVES = 6
 FEWEST = 20
-"""Values from which on a density is estimated; fewer are marked one by one."""
+"""Values above which a density is estimated. Fewer values are marked separately."""
 DRAWN_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 TINY = 1e-300
-"""Probability that stands for none on a logarithmic scale."""
+"""Probability that stands for zero on a logarithmic scale."""
 
 
 def monte_carlo(
     result: Any, *, quantity: str | None = None, measured: Any = None, ax: Axes | None = None
 ) -> Axes:
-    """Draw the density of the onset of one or several ensembles, or along a sweep.
+    """Draw the density of the onset in an ensemble or several, or along a sweep.
 
     Parameters
     ----------
     result : Dataset, or list or mapping of Dataset
-        From `monte_carlo` or `Study.run`. Give several as a list, or by name. For a sweep
-        over one parameter, up to six steps are drawn.
+        From `monte_carlo` or `Study.run`. Give several results as a list, or by name. Up to six
+        steps of a sweep over a single parameter are drawn.
     quantity : str, optional
-        A variable of the result; by default `critical_force` of a line or specimen whose
-        area is known, else `friction_coefficient` if there is a pressure, else
+        A variable of the result. The default is `critical_force` if the area of a line or
+        specimen is known, else `friction_coefficient` if there is a pressure, else
         `critical_stress`. `critical_position` is drawn as a histogram.
     measured : Peaks, Curves or array, optional
-        Peaks of tests, in SI or with a unit, marked one by one.
+        Peaks of tests, in SI or with a unit, which are marked separately.
     ax : matplotlib.axes.Axes, optional
-        Axes to draw on; new ones by default.
+        Axes to draw on. By default new axes are made.
 
     Returns
     -------
@@ -84,7 +84,7 @@ def monte_carlo(
         along = _swept(dataset[quantity])
         if len(along) > 1:
             raise InputError(
-                f"result: is swept over {', '.join(along)}; choose steps of all but one with"
+                f"result: is swept over {', '.join(along)}. Choose a step of each but the last with"
                 f" result.isel({along[0]}=0)"
             )
         curves += _steps(dataset[quantity], along[0]) if along else [(name, dataset[quantity])]
@@ -107,12 +107,12 @@ def monte_carlo(
 
 
 def _peaks_of(measured: Any, quantity: str, variable: xr.DataArray) -> NDArray[np.float64]:
-    """Return measured peaks of the quantity that is drawn, in SI."""
+    """Return measured peaks of the drawn quantity, in SI."""
     peaks = make_peaks(measured, str(variable.attrs.get("units", "1")))
     if peaks.unit != variable.attrs.get("units", "1"):
         raise InputError(
-            f"measured: peaks are in {peaks.unit}, {quantity} in {variable.attrs.get('units')};"
-            f" draw quantity={peaks.variable!r}"
+            f"measured: peaks are in {peaks.unit}, {quantity} in {variable.attrs.get('units')}."
+            f" Draw quantity={peaks.variable!r}"
         )
     return np.concatenate(peaks.values)
 
@@ -120,7 +120,7 @@ def _peaks_of(measured: Any, quantity: str, variable: xr.DataArray) -> NDArray[n
 def _draw_values(
     axes: Axes, variable: xr.DataArray, factor: float, label: str | None, number: int
 ) -> None:
-    """Draw the density of a variable; of positions a histogram, of few values marks."""
+    """Draw the density of a variable, a histogram of positions, or marks of a few values."""
     values, style = _finite(variable) * factor, {"label": label} | series(number)
     if variable.attrs.get("units") == "m" and values.size:
         cells = int(np.clip(values.size / 50, 5, 40))
@@ -145,20 +145,21 @@ def quantiles(
     Parameters
     ----------
     result : Dataset, or list or mapping of Dataset
-        From `Study.run` with a sweep over one parameter or two; the second makes curves. Several
-        results, as a list or by name, are compared along the same sweep over one parameter.
+        From `Study.run` with a sweep over a parameter or two. The second parameter makes curves.
+        Several results, as a list or by name, are compared along the same sweep over a single
+        parameter.
     quantity : str, optional
         As in `monte_carlo`.
     along : str, optional
-        Dimension along the abscissa; the longest by default.
+        Dimension along the abscissa. The default is the longest.
     ax : matplotlib.axes.Axes, optional
-        Axes to draw on; new ones by default.
+        Axes to draw on. By default new axes are made.
 
     Returns
     -------
     matplotlib.axes.Axes
-        Medians with their 95 % confidence intervals; bands between quartiles; for a single
-        curve, a paler band between the 5 % and 95 % quantiles.
+        Medians with their 95 % confidence intervals, and bands between quartiles. A single curve
+        has a paler band between the 5 % and 95 % quantiles too.
 
     Raises
     ------
@@ -170,8 +171,8 @@ def quantiles(
         dims = sorted(_swept(variable), key=lambda dim: -variable.sizes[dim])
         if not 1 <= len(dims) <= 2 or (along is not None and along not in dims):
             raise InputError(
-                f"result: quantiles are drawn along a sweep over one or two parameters, got"
-                f" {', '.join(dims) or 'none'}" + (f" and along={along!r}" if along else "")
+                f"result: quantiles need a sweep over a parameter or two, got"
+                f" {', '.join(dims) or 'no sweep'}" + (f" and along={along!r}" if along else "")
             )
         along = along or dims[0]
         within = next((dim for dim in dims if dim != along), None)
@@ -222,8 +223,8 @@ def _compared(
         first = curves[0][1] if curves else result[quantity]
         if len(swept) != 1 or not first[swept[0]].equals(result[swept[0]]):
             raise InputError(
-                "result: several results are compared along the same sweep over one parameter;"
-                f" {name!r} is swept over {', '.join(swept) or 'none'}"
+                "result: several results need the same sweep over a single parameter, but"
+                f" {name!r} is swept over {', '.join(swept) or 'no parameter'}"
             )
         curves.append((name, result[quantity]))
     return curves
@@ -234,7 +235,7 @@ def _swept(variable: xr.DataArray) -> list[str]:
 
 
 def _steps(variable: xr.DataArray, along: str) -> list[tuple[str | None, xr.DataArray]]:
-    """Return at most `MAX_CURVES` steps of a sweep, spread evenly, each with its name."""
+    """Return at most `MAX_CURVES` evenly spread steps of a sweep, each with its name."""
     last, names = variable.sizes[along] - 1, _step_texts(variable[along])
     steps = np.unique(np.linspace(0, last, min(MAX_CURVES, last + 1)).round().astype(int))
     return [(names[step], variable.isel({along: step})) for step in steps]
@@ -286,17 +287,17 @@ def failure_curve(
     stress : float, optional
         Demand, Pa: the mean shear stress to carry. It is marked, with its probability.
     force : float, optional
-        Instead of `stress`: demand, N.
+        Demand as a force, N, instead of `stress`.
     ax : matplotlib.axes.Axes, optional
-        Axes to draw on; new ones by default.
+        Axes to draw on. By default new axes are made.
 
     Returns
     -------
     matplotlib.axes.Axes
-        At the top are forces where the area of the interface is known, else friction
+        The scale at the top shows forces if the area of the interface is known, else friction
         coefficients if there is a normal pressure. A dotted line marks the lower bound of
-        the strength. Of a list of equally likely interfaces the line is their mean, and a
-        wider band holds 90 % of them.
+        the strength. For equally likely interfaces, the line is their mean, and a wider band
+        contains 90 % of them.
 
     Raises
     ------
@@ -312,7 +313,7 @@ def failure_curve(
     if force is not None:
         if area is None or stress is not None:
             raise InputError(
-                "force: give force or stress; a force needs a curve of an interface whose area is"
+                "force: give force or stress. A force needs a curve of an interface whose area is"
                 " known: Blocks(thickness=...), or Interface(width=...) of a line"
             )
         stress, shown = force / area, in_words("N", force)
@@ -351,20 +352,20 @@ def failure_curve(
 
 
 def sensitivities(design: Answer, *, ax: Axes | None = None) -> Axes:
-    """Draw what moves a design, the widest at the top.
+    """Draw the sensitivities of a design, with the widest at the top.
 
     Parameters
     ----------
     design : Answer
         From `stiction.design_stress`, with `sensitivities`.
     ax : matplotlib.axes.Axes, optional
-        Axes to draw on; new ones by default.
+        Axes to draw on. By default new axes are made.
 
     Returns
     -------
     matplotlib.axes.Axes
-        Each bar reaches from the design at one end of a range to that at the other; the line is
-        the design, and the band its interval.
+        Each bar connects the designs at both ends of a range. The line is the design, and the band
+        its interval.
 
     Raises
     ------
@@ -374,7 +375,7 @@ def sensitivities(design: Answer, *, ax: Axes | None = None) -> Axes:
     table = design.sensitivities
     if not table.sizes.get("source"):
         raise InputError(
-            "design: has no sensitivities; st.design_stress(..., sensitivities=True)"
+            "design: has no sensitivities, pass sensitivities=True to st.design_stress"
         )
     quantity = "force" if np.isfinite(design.area) else "stress"
     area = design.area if quantity == "force" else 1.0

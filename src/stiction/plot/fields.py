@@ -25,8 +25,8 @@ from stiction.plot.axes import (
 from stiction.plot.style import INK, PAGE, PALE, QUIET, color, series
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
+from stiction.problem.profiles.labels import is_coefficient
 from stiction.problem.profiles.placing import IN_GAP, MEASURED
-from stiction.problem.profiles.reading import is_coefficient
 from stiction.random.fields import RandomField
 
 Array = NDArray[np.float64]
@@ -40,20 +40,22 @@ def field(
     quantity: str | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw a profile or a partly measured field: lines along x, on a plane a map.
+    """Draw a profile or a partly measured field, as lines along x or as a map of a plane.
 
     Parameters
     ----------
     where : Problem or Interface
     profile : array or RandomField
-        Shape (nodes,) or (samples, nodes); the first six samples are drawn. On a plane,
-        (nx, ny) or (samples, nx, ny); the first is drawn. For a field, its median, on a
-        line its central 90 % band, and the measured values (`RandomField.given`) are drawn.
+        An array of shape (nodes,) or (samples, nodes), of which the first six samples are drawn.
+        On a plane, (nx, ny) or (samples, nx, ny), of which the first sample is drawn. A field is
+        drawn as its median with the measured values (`RandomField.given`), and on a line with its
+        central 90 % band.
     quantity : str, optional
-        Name of the property, as `RandomInterface` uses it, or 'friction_coefficient'. By default
-        'friction_coefficient' of a field of such, or a DataArray in the unit 1, else 'strength'.
+        Name of the property, as `RandomInterface` uses it, or 'friction_coefficient'. The default
+        is 'friction_coefficient' for a field of coefficients or a DataArray in the unit 1, else
+        'strength'.
     ax : matplotlib.axes.Axes, optional
-        Axes to draw on; new ones by default.
+        Axes to draw on. By default new axes are made.
 
     Returns
     -------
@@ -79,7 +81,7 @@ def field(
         pure = profile.of if of_field else is_coefficient(profile)
         quantity = "friction_coefficient" if pure else "strength"
     if quantity not in (known := (*PROFILES, "friction_coefficient")):
-        raise InputError(f"quantity: must be one of {', '.join(known)}, got {quantity!r}")
+        raise InputError(f"quantity: must be in {', '.join(known)}, got {quantity!r}")
     si = QUANTITIES[quantity].units
     rows = rows_of(interface, profile.quantile(interface, 0.5) if of_field else profile)
     factor, unit = unit_for(si, rows)
@@ -110,7 +112,7 @@ def field(
 
 
 def rows_of(interface: Interface, profile: Any) -> Array:
-    """Return a profile as (samples, *shape); one of another shape is an `InputError`."""
+    """Return a profile as (samples, *shape), or raise an `InputError` for another shape."""
     values = np.asarray(getattr(profile, "values", profile), dtype=np.float64)
     shape = interface.shape
     if values.shape[-len(shape) :] != shape or values.ndim > len(shape) + 1 or values.size == 0:
@@ -148,7 +150,7 @@ def draw_map(
 
 
 def map_height(interface: Interface, more: float = 1.0) -> float:
-    """Return the height of a figure, inches, with one map and `more` for the rest."""
+    """Return the height of a figure, inches, with a map and `more` for the rest."""
     x, y = interface.lengths
     return more + 4.0 * float(np.clip(y / x, 0.2, 2.0))
 
@@ -161,21 +163,21 @@ def onset(
     sample: int = 0,
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw a strength profile and the position of its onset, by one or several methods.
+    """Draw a strength profile and the position of its onset, by a method or several.
 
     Parameters
     ----------
     result : Dataset, or list or mapping of Dataset
         From `stiction.onset` with this strength. Give several methods as a list, or by name.
     strength : array
-        tau_p, Pa, of shape (nodes,) or (samples, nodes); on a plane (nx, ny) or (samples, nx, ny).
+        tau_p, Pa, of shape (nodes,) or (samples, nodes), on a plane (nx, ny) or (samples, nx, ny).
         A DataArray of friction coefficients (unit 1) is multiplied by the normal pressure.
     problem : Problem, optional
         Needed only if the result does not hold it.
     sample : int
         Number of the sample, counted from 0.
     ax : matplotlib.axes.Axes, optional
-        Axes to draw on; new ones by default.
+        Axes to draw on. By default new axes are made.
 
     Returns
     -------
@@ -207,7 +209,7 @@ def onset(
     if len(counts) > 1 or not 0 <= sample < min(counts):
         raise InputError(
             f"sample: {sample} of results and strength with {', '.join(map(str, sorted(counts)))}"
-            " samples; they must have the same number"
+            " samples. They must have the same number"
         )
     chosen = {
         name: dataset.isel(sample=slice(sample, sample + 1))
@@ -217,7 +219,7 @@ def onset(
     size = {"height": map_height(problem.interface, 2.0)} if is_plane else {"width": PAGE}
     with on_axes(ax, **size) as axes:
         (_draw_plane if is_plane else _draw_line)(axes, problem, rows[sample], chosen)
-        if ax is None:  # below new axes; inside those of the caller, whose layout stays
+        if ax is None:  # below new axes, but inside axes of the caller, whose layout stays
             axes.figure.legend(loc="outside lower center", ncols=2)
         else:
             axes.legend(fontsize="small")
@@ -260,7 +262,7 @@ def _draw_plane(
 def _mark(
     axes: Axes, interface: Interface, results: Mapping[str, xr.Dataset], factor: float
 ) -> None:
-    """Mark the positions of onsets, on a line at their loads in the unit of that factor."""
+    """Mark the positions of onsets, on a line at their loads, in the unit of the factor."""
     length, length_unit = unit_for("m", interface.lengths)
     for number, (name, result) in enumerate(results.items()):
         place = np.atleast_1d(result["critical_position"].values[0]) * length
@@ -269,7 +271,7 @@ def _mark(
         text = f"{name}: {load * factor_of_load:.4f} {unit}"
         if "friction_coefficient" in result:
             text += f" (coefficient {float(result['friction_coefficient'][0]):.4f})"
-        text += f" at {', '.join(f'{one:.2f}' for one in place)} {length_unit}"
+        text += f" at {', '.join(f'{part:.2f}' for part in place)} {length_unit}"
         text += " (in a gap)" if IN_GAP in result and bool(result[IN_GAP][0]) else ""
         style: dict[str, Any] = {"linestyle": "none", "color": color(number + 1), "label": text}
         style |= {"marker": "os^DvP"[number % 6], "markersize": max(9.0 - 3.5 * number, 2.0)}

@@ -27,7 +27,7 @@ from stiction.plot.style import (
 Array = NDArray[np.float64]
 
 SHOWN = 100
-"""Repetitions, or simulated records, that a band is drawn from: it holds 90 % of them."""
+"""Repetitions, or simulated records, behind a band that contains 90 % of them."""
 LAGS = 2.5
 """Correlation lengths that the panel of the correlation shows."""
 PER_OCTAVE = 4
@@ -45,10 +45,11 @@ def fit(field_fit: FieldFit) -> NDArray[Any]:
     Returns
     -------
     (4,) array of matplotlib.axes.Axes
-        (a) Values and the fitted marginal; (b) quantiles of the data against those of the
-        fit; (c) correlation, with the effect of the window; (d) spectrum. Shaded in (a) and
-        (b): 90 % of the fits to records simulated from the fitted field; in (c) and (d): 90
-        % of such sets of records. Each panel is of all records together.
+        (a) Values and the fitted marginal, (b) quantiles of the data against quantiles of the
+        fit, (c) correlation, with the effect of the window, and (d) spectrum, each for all records
+        together. The bands show records that were simulated from the fitted field. They contain
+        90 % of the fits to such records in (a) and (b), and 90 % of the sets of such records in (c)
+        and (d).
     """
     estimate, rng = field_fit._estimate, np.random.default_rng(0)
     windows = estimate.setting.windows
@@ -107,9 +108,9 @@ def _powers(observed: list[Observed]) -> list[Array]:
 
 
 def _pooled_correlation(lag: Array, observed: list[Observed], powers: list[Array]) -> Array:
-    """Return the correlation in the windows at lags (m), weighted by the values in each.
+    """Return the correlation in the windows at lags (m), weighted by the number of values.
 
-    A record counts at lags up to half of its length: beyond, its own period repeats them.
+    A record counts at lags up to half of its length, because its own period repeats them beyond.
     """
     total, variance = np.zeros(lag.size), np.zeros(lag.size)
     for (window, records, *_), power in zip(observed, powers, strict=True):
@@ -185,7 +186,7 @@ def _spectrum(
 def _compare(
     axes: Axes, at: Any, measured: Any, fitted: Any, spread: Any, *labels: str
 ) -> None:
-    """Draw data as points, the fit as a line, and 90 % of what repetitions give."""
+    """Draw data as points, the fit as a line, and a band with 90 % of the repetitions."""
     of_data, of_fit = labels or (None, None)
     _band(axes, at, spread)
     axes.plot(at, fitted, color=color(1), label=of_fit)
@@ -205,13 +206,13 @@ def agreement(result: Agreement, *, ax: Axes | None = None) -> Axes:
     result : Agreement
         From `stiction.statistics.agreement`.
     ax : matplotlib.axes.Axes, optional
-        Axes to draw on; new ones by default.
+        Axes to draw on. By default new axes are made.
 
     Returns
     -------
     matplotlib.axes.Axes
-        The shaded band holds all steps of 90 % of campaigns of so many tests, if the
-        prediction is right. Specimens of several lengths have a color each.
+        If the prediction is right, all steps of 90 % of campaigns with so many tests lie in the
+        shaded band. Each length of specimens has its own colour.
 
     Examples
     --------

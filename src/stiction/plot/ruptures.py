@@ -1,4 +1,4 @@
-"""One rupture: slip rate in space and time, its front on a plane, its film."""
+"""A rupture: slip rate in space and time, its front on a plane, its film."""
 
 from pathlib import Path
 from typing import Any
@@ -24,20 +24,20 @@ from stiction.problem.problem import Problem
 
 Array = NDArray[np.float64]
 Moving = list[tuple[Any, str, Any]]
-"""What moves in a figure: an artist, the name of its data, and these by frame."""
+"""Moving parts of a figure: an artist, the name of its data, and the data by frame."""
 
 COLORS = "inferno_r"
 FRAME_TIME = 50
 """Milliseconds that a film shows each frame."""
 DECADES = 7.0
-"""Of slip rate below the largest that are drawn."""
+"""Drawn decades of slip rate below the largest."""
 BEFORE = 0.11
-"""Time before the onset that is drawn, in units of L/c_s."""
+"""Drawn time before the onset, in units of L/c_s."""
 KEEP = "; keep them with simulate_rupture(save=st.Save(['slip_rate', 'shear_stress']))"
 
 
 def rupture(run: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None = None) -> Axes:
-    """Draw slip rate in space and time; on a plane the advance of the front.
+    """Draw slip rate in space and time, or the advance of the front on a plane.
 
     Parameters
     ----------
@@ -46,15 +46,15 @@ def rupture(run: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None 
     problem : Problem, optional
         Needed only if the run does not hold it.
     ax : matplotlib.axes.Axes, optional
-        Axes to draw on; new ones by default.
+        Axes to draw on. By default new axes are made.
 
     Returns
     -------
     matplotlib.axes.Axes
-        A dot marks the onset, where time is zero, if anything became unstable. On a line,
-        time begins shortly before it and ends shortly after the last slip, and points that
-        slip seven decades slower than the fastest one are white. On a plane, the front is
-        drawn at equal intervals of time on a map of the strength.
+        If a patch became unstable, a dot marks the onset, at time zero. On a line, time begins
+        shortly before the onset and ends shortly after the last slip, and points that slip seven
+        decades slower than the fastest point are white. On a plane, the front is drawn at equal
+        intervals of time on a map of the strength.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def film(
     path : path
         Ends in .gif.
     frames : int
-        Maximum number of frames, evenly spaced over those of the run, which lie closer in
+        Maximum number of frames, evenly spaced over the frames of the run, which lie closer in
         time as the interface accelerates.
     progress : bool or callable
         As in `stiction.monte_carlo`.
@@ -116,7 +116,7 @@ def film(
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
         figure.set_layout_engine("none")  # the panels must not move between frames
-        for artist, _, _ in moving:  # only these are drawn for each frame: 40 times as fast
+        for artist, _, _ in moving:  # to draw only these for each frame is 40 times as fast
             artist.set_animated(True)
         canvas.draw()
         background = canvas.copy_from_bbox(figure.bbox)
@@ -135,7 +135,7 @@ def film(
 
 
 def _since_onset(run: xr.Dataset, times: str = "time") -> tuple[Array, str]:
-    """Return times of a run, s, and from when they count: the onset, if any."""
+    """Return times of a run, s, and their beginning in words: the onset, if any."""
     onset = float(run["onset_time"])
     if np.isfinite(onset):
         return run[times].values - onset, " since the onset"

@@ -29,7 +29,7 @@ def specimen(
     *,
     sample: int = 0,
 ) -> NDArray[Any]:
-    """Draw the blocks with their drive, and the shear and pressure that it causes.
+    """Draw the blocks with their drive, and the shear and pressure from the drive.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def specimen(
 
 
 def _draw_blocks(axes: Axes, problem: Problem, scale: float) -> None:
-    """Two blocks, and arrows where the drive acts on them; heights have their own scale."""
+    """Draw two blocks, and arrows for the drive. Heights have their own scale."""
     blocks, length = problem.specimen, problem.interface.measure * scale
     assert blocks is not None  # `problem.blocks` has refused it
     height, drive = blocks.height * scale, blocks.drive
@@ -124,39 +124,40 @@ def force_travel(
     measured: Curves | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw the force over the travel of the drives, with its drops: the curve of a machine.
+    """Draw the curve of a machine: force against the travel of the drives, with its drops.
 
     Parameters
     ----------
-    result : Dataset, or sequence of them
-        From `stiction.equilibrium_path` of a specimen, at many loads. Several, of samples of one
-        field, are drawn as a band that holds 90 % of them at each travel, with their median.
+    result : Dataset, or sequence of Dataset
+        From `stiction.equilibrium_path` of a specimen, at many loads. Several paths, of samples
+        from the same field, are drawn as their median, with a band that contains 90 % of them at
+        each travel.
     measured : Curves, optional
-        From `stiction.read_curve`: drawn over the prediction, with their precursors.
+        From `stiction.read_curve`. They are drawn over the prediction, with their precursors.
     ax : matplotlib.axes.Axes, optional
-        Axes to draw on; new ones by default.
+        Axes to draw on. By default new axes are made.
 
     Returns
     -------
     matplotlib.axes.Axes
-        The mean stress where the thickness of the blocks is unknown.
+        If the thickness of the blocks is unknown, mean stresses are drawn.
 
     Examples
     --------
-    As of `precursors`, which draws the events below it.
+    See `precursors`, which draws the events below this curve.
     """
     results = [result] if isinstance(result, xr.Dataset) else list(result)
     if not results:
-        raise InputError("result: is empty; give one path or several")
+        raise InputError("result: is empty. Give a path or several")
     paths = [curve_of(path) for path in results]
     _, _, name, event = paths[0]
     if any(path[2] != name for path in paths):
-        raise InputError("result: some paths are forces, others stresses; draw them apart")
+        raise InputError("result: some paths are forces, others stresses. Draw them apart")
     units = str(results[0][name].attrs["units"])
     if measured is not None and (measured.unit, measured[0].travel_unit) != (units, "m"):
         raise InputError(
             f"measured: curves are {measured.unit} over {measured[0].travel_unit}, the prediction"
-            f" is {units} over m; pass speed= to st.read_curve to turn time into travel"
+            f" is {units} over m. Pass speed= to st.read_curve to turn time into travel"
         )
     length, length_unit = unit_for("m", np.concatenate([path[0] for path in paths]))
     factor, unit = unit_for(units, np.concatenate([path[1] for path in paths]))
@@ -193,7 +194,7 @@ def force_travel(
 
 
 def _draw_band(axes: Axes, paths: Sequence[Any], length: float, factor: float) -> None:
-    """Draw the range of 90 % of several curves at each travel, up to where half of them slide."""
+    """Draw a band with 90 % of several curves, up to the travel at which half of them slide."""
     known = [np.isfinite(travel) & np.isfinite(force) for travel, force, *_ in paths]
     ends = [travel[there].max() for (travel, *_), there in zip(paths, known, strict=True)]
     grid = np.linspace(0.0, float(np.median(ends)), 400)
@@ -223,8 +224,8 @@ def block(run: xr.Dataset, *, problem: Problem | None = None) -> NDArray[Any]:
     Returns
     -------
     (rows, columns) array of matplotlib.axes.Axes
-        Velocity along the interface, in one scale of colours whose ends are passed by one
-        value in a hundred, when 2 to 95 % of the slip have happened. Time counts from the
+        Velocity along the interface, at times when 2 to 95 % of the slip have happened. All panels
+        share a scale of colours, and 1 % of the values lie beyond its ends. Time counts from the
         first arrival of the front.
     """
     need(run, "block_velocity", hint="; it is kept of specimens")
@@ -261,9 +262,9 @@ def block(run: xr.Dataset, *, problem: Problem | None = None) -> NDArray[Any]:
 
 
 def curve_of(result: xr.Dataset) -> tuple[Array, Array, str, str]:
-    """Return travel (m) and force (N) of a machine, its name, and that at events.
+    """Return travel (m), force (N), its name, and the name of the force at events.
 
-    The mean stress (Pa) where no thickness is known.
+    If the thickness is unknown, the force is the mean stress (Pa).
     """
     need(result, "travel", "event_start", hint="; give the path of a specimen")
     name = "force" if "force" in result else "mean_stress"
@@ -283,22 +284,23 @@ def precursors(
     problem: Problem | None = None,
     measured: Curves | None = None,
 ) -> NDArray[Any]:
-    """Draw the curve of a machine, and where the interface slips in arrested events.
+    """Draw the curve of a machine, and the places that slip in arrested events.
 
     Parameters
     ----------
-    result : Dataset, or sequence of them
+    result : Dataset, or sequence of Dataset
         As in `force_travel`.
     problem : Problem, optional
         Needed only if the result does not hold it.
     measured : Curves, optional
-        From `stiction.read_curve`: drawn over the prediction; marks at the upper edge of the
-        extents show where the precursors of the tests begin.
+        From `stiction.read_curve`. They are drawn over the prediction. Marks at the upper edge of
+        the lower panel show the travel at which precursors of the tests begin.
 
     Returns
     -------
     (2,) array of matplotlib.axes.Axes
-        Above as by `force_travel`; below, at its travel, the extent of each event.
+        The upper panel is the plot of `force_travel`. The lower panel shows the extent of each
+        event at its travel.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""One style for every figure: column widths of a journal, and lines distinct in grey."""
+"""The style of every figure: column widths of a journal, and lines distinct in grey."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,7 +13,7 @@ from matplotlib.text import Text
 
 COLUMN = 3.375
 PAGE = 6.75
-"""Widths of one column and of a page, inches."""
+"""Widths of a column and of a page, inches."""
 
 MIN_CONTRAST = 4.5
 MID_LUMINANCE = 0.18
@@ -64,7 +64,7 @@ _RC: dict[str, Any] = {
 def paper_style() -> Iterator[None]:
     """Set fonts, widths and ticks of a printed page for the figures drawn inside.
 
-    A style that the user has set, such as a dark one, does not act inside.
+    A style of the user, such as a dark style, has no effect inside.
     """
     with matplotlib.style.context(["default", _RC]):
         yield
@@ -73,7 +73,7 @@ def paper_style() -> Iterator[None]:
 def readable(color: Any, background: Any) -> Any:
     """Return a colour of the same hue with a contrast of at least 4.5 to 1 to a background.
 
-    The contrast is that of the Web Content Accessibility Guidelines 2.1, 1.4.3.
+    The contrast is defined in the Web Content Accessibility Guidelines 2.1, 1.4.3.
     """
 
     def luminance(colour: Any) -> float:
@@ -92,7 +92,7 @@ def readable(color: Any, background: Any) -> Any:
 
 
 def keep_contrast(axes: Axes, given: set[Any]) -> None:
-    """Make lines and texts on a user's axes readable, but for the artists that were there."""
+    """Make new lines and texts on a user's axes readable, and leave `given` artists alone."""
     background = axes.get_facecolor()
     if background[3] == 0.0:
         background = axes.figure.get_facecolor()
@@ -102,7 +102,7 @@ def keep_contrast(axes: Axes, given: set[Any]) -> None:
 
 
 def series(index: int, *, marker: bool = False) -> dict[str, Any]:
-    """Colour, dashes and (on request) marker of series number `index`, as plot keywords."""
+    """Return colour, dashes and (on request) marker of series `index` as plot keywords."""
     color, dashes, symbol = _SERIES[index % len(_SERIES)]
     style: dict[str, Any] = {"color": color, "linestyle": dashes}
     if marker:
@@ -111,12 +111,12 @@ def series(index: int, *, marker: bool = False) -> dict[str, Any]:
 
 
 def color(index: int) -> str:
-    """Colour of series number `index`."""
+    """Return the colour of series number `index`."""
     return str(series(index)["color"])
 
 
 def panel(axes: Axes, letter: str) -> None:
-    """Letter a panel, above its upper left corner."""
+    """Write the letter of a panel above its upper left corner."""
     axes.text(
         0.0, 1.02, f"({letter})", transform=axes.transAxes, fontweight="bold", va="bottom"
     )

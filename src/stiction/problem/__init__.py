@@ -1,6 +1,6 @@
-"""What is not random: the interface, its solids, friction and load, and a sample's profiles.
+"""The deterministic parts: the interface, its solids, friction and load, and a sample's profiles.
 
-Read `interface`, `solid`, `load`, `specimen` and `friction`, each a part of a problem; then
+Read `interface`, `solid`, `load`, `specimen` and `friction`, each a part of a problem. Then read
 `problem`, which puts them together, and `sample`, the profiles that every method starts from.
-`profiles` reads those from files and places them at the nodes; `results` labels what comes out.
+`profiles` reads profiles from files and places them at the nodes. `results` labels results.
 """

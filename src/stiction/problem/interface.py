@@ -25,7 +25,7 @@ SHORTEST = 1e-30
 
 
 def _one_or_two(value: Any, read: Callable[[Any], Any]) -> Any:
-    """Return what was given, entry by entry: one of a line, two of a plane."""
+    """Return the entries of a given value: a single entry for a line, two for a plane."""
     value = in_si(value, "length")
     if isinstance(value, np.ndarray):
         value = value.tolist()
@@ -133,33 +133,33 @@ Extent = Annotated[
 
 @model
 class Interface:
-    """Interface with equally spaced nodes, periodic: a line, or a plane; or that of a specimen.
+    """Interface with equally spaced nodes: a periodic line or plane, or a line in a specimen.
 
     Parameters
     ----------
     length : float or (float, float)
-        Period, m. One number gives a line, two give a plane: along x, the direction of load
-        and slip, and along y, across it.
+        Period, m. A number gives a line, and two numbers give a plane: along x, the direction of
+        load and slip, and along y.
     nodes : int or (int, int)
         Number of nodes in each direction, even and at least 8, at most 2^24 in all. Powers of two
         are fastest.
     width : float, optional
-        Of a line, m: turns its stresses into forces, N. A plane has its area, and a specimen its
-        thickness.
+        Width of a line, m, which turns its stresses into forces, N. A plane has its area, and a
+        specimen its thickness.
     ends : {"periodic", "free"}
         Set by a `Problem`: "free" if it has a `specimen`. The nodes are then the centres of cells,
-        x_i = (i + 1/2) length/nodes, and nothing is continued beyond the ends.
+        x_i = (i + 1/2) length/nodes, and the interface stops at its ends.
     extent : (float, float), ((float, float), (float, float)), Ellipse or mask, optional
-        Where the interface can break; by default everywhere. Beyond, both solids are one piece, and
-        nothing ever slips. A line takes its two ends (m, or text such as "0.5 km"), a plane two
-        pairs (along x and y), an `Ellipse`, or both a mask: a boolean array of shape (*shape), in a
-        study file the path of a ``.npy``. Nodes at the ends can break.
+        Part of the interface that can break, by default all of it. Beyond, both solids are a single
+        piece, which never slips. A line takes its two ends (m, or text such as "0.5 km"), a plane
+        two pairs (along x and y) or an `Ellipse`. Both take a mask: a boolean array of shape
+        (*shape), in a study file the path of a ``.npy``. Nodes at the ends can break.
 
     Notes
     -----
-    With an extent, mean stresses, friction coefficients, forces and mean strengths are those of the
-    nodes that can break. Periodic images of the extent interact: results depend on the period
-    through the square of extent over period only, once this is small.
+    With an extent, mean stresses, friction coefficients, forces and mean strengths belong to the
+    nodes that can break. Periodic images of the extent interact. If the extent is small compared
+    with the period, results depend on the period through the square of their ratio only.
 
     Examples
     --------
@@ -183,14 +183,14 @@ class Interface:
     def _one_geometry(self) -> Interface:
         if isinstance(self.length, tuple) != isinstance(self.nodes, tuple):
             raise InputError(
-                "length and nodes: give one number each for a line or two each for a plane, got"
+                "length and nodes: give a number each for a line or two each for a plane, got"
                 f" length = {self.length}, nodes = {self.nodes}"
             )
         if self.width is not None and self.is_plane:
-            raise InputError("width: a plane has its area; leave the width out")
+            raise InputError("width: a plane has its area. Leave the width out")
         if self.is_free and self.is_plane:
             raise InputError(
-                "ends: a plane is periodic in both directions; only lines have free ends"
+                "ends: a plane is periodic in both directions. Only lines have free ends"
             )
         if self.size > MOST_NODES:
             raise InputError(
@@ -199,7 +199,7 @@ class Interface:
         if min(self.spacings) < SHORTEST:
             raise InputError(
                 f"length: the nodes must be at least {SHORTEST:g} m apart, got"
-                f" {min(self.spacings):g} m; check its unit"
+                f" {min(self.spacings):g} m. Check its unit"
             )
         if problem := self._wrong_extent():
             raise InputError(f"extent: {problem}")
@@ -261,7 +261,7 @@ class Interface:
 
     @cached_property
     def breakable(self) -> Mask | None:
-        """Which nodes can break, (*shape), read-only; None if all can."""
+        """Read-only mask of the nodes that can break, (*shape), unless all can."""
         inside = np.ones(1, dtype=bool) if self.extent is None else self._inside
         inside.flags.writeable = False
         return None if inside.all() else inside
@@ -276,13 +276,14 @@ class Interface:
 
     @property
     def breakable_measure(self) -> float:
-        """Length of the nodes of a line that can break (m); area on a plane (m²)."""
+        """Length (m), or area on a plane (m²), of the nodes that can break."""
+
         mask = self.breakable
         return self.measure if mask is None else np.count_nonzero(mask) * self.cell
 
     @property
     def is_free(self) -> bool:
-        """Whether the interface ends, as that of a specimen, instead of being periodic."""
+        """Whether the interface ends, as in a specimen, instead of being periodic."""
         return self.ends == "free"
 
     @property
@@ -292,7 +293,7 @@ class Interface:
 
     @property
     def embedding(self) -> Interface:
-        """The periodic interface on which its random fields live: itself, or one twice as long."""
+        """The periodic interface of its random fields: itself, or twice as long with free ends."""
         if not self.is_free:
             return self
         return Interface(2.0 * self.measure, 2 * self.size)
@@ -334,7 +335,7 @@ class Interface:
 
     @property
     def cell(self) -> float:
-        """Length (m) that a node represents; on a plane, its area (m²)."""
+        """Length (m), or area on a plane (m²), that a node represents."""
         return self.measure / self.size
 
     @property
@@ -344,7 +345,7 @@ class Interface:
 
     @property
     def spacing(self) -> float:
-        """Distance between nodes, m; on a plane the larger of the two."""
+        """Distance between nodes, m. On a plane it is the larger distance."""
         return max(self.spacings)
 
     @property
@@ -362,11 +363,11 @@ class Interface:
     def y(self) -> Array:
         """Node positions along y of a plane, shape (nodes,), m."""
         if not self.is_plane:
-            raise InputError("y: the interface is a line along x; only a plane has y")
+            raise InputError("y: the interface is a line along x. Only a plane has y")
         return self.coordinates["y"]
 
     def describe_node(self, node: int) -> str:
-        """Return the position of a node of the flat profile in words."""
+        """Return the position of a node in the flat profile, in words."""
         entry = np.unravel_index(int(node), self.shape)
         places = zip(self.dims, entry, self.spacings, strict=True)
         return ", ".join(
@@ -377,8 +378,8 @@ class Interface:
     def wave_vectors(self) -> tuple[Array, ...]:
         """Components of the wave vectors of `transform`, rad/m.
 
-        They broadcast against each other to the shape of a transformed profile: (n//2 + 1,) on a
-        line; (nx, 1) and (1, ny//2 + 1) on a plane.
+        They broadcast to the shape of a transformed profile: (n//2 + 1,) on a line, (nx, 1) and
+        (1, ny//2 + 1) on a plane.
         """
         *first, last = (2.0 * np.pi / length for length in self.lengths)
         along = last * np.arange(self.shape[-1] // 2 + 1)
@@ -395,9 +396,9 @@ class Interface:
 
     @property
     def in_plane_share(self) -> Array:
-        """Share of mode II, (kx/k)², at each wave vector of a plane; the rest is mode III.
+        """Share of mode II, (kx/k)², at each wave vector of a plane. The rest is mode III.
 
-        The constant mode counts as mode II. One on a line, where the problem sets the mode.
+        The constant mode counts as mode II. On a line, where the problem sets the mode, it is 1.
         """
         k = self.wavenumbers
         k.flat[0] = 1.0

@@ -25,11 +25,10 @@ NotNegative = Annotated[Real, Field(ge=0.0)]
 
 
 class LoadShape(ABC):
-    """A load profile given by a formula, scaled to a mean of one: tau_0 is then the mean stress.
+    """A load profile by a formula. Its mean is scaled to 1, so that tau_0 is the mean stress.
 
-    To add one, decorate a class that derives from it with `stiction.extensions.model`, so that its
-    parameters are checked, and with `stiction.extensions.register`, so that study files accept
-    its `type`.
+    To add a shape, derive a class. Decorate it with `stiction.extensions.model`, which checks its
+    parameters, and with `stiction.extensions.register`, after which study files accept its `type`.
     """
 
     family: ClassVar[str] = "loads"
@@ -40,7 +39,7 @@ class LoadShape(ABC):
         """Return the profile at the nodes, of any mean, broadcasting to ``interface.shape``."""
 
     def on(self, interface: Interface) -> Array:
-        """Return the profile p at the nodes, (*shape), with a mean of one."""
+        """Return the profile p at the nodes, (*shape), with a mean of 1."""
         values = np.asarray(self.values(interface), dtype=np.float64)
         values = values / values.mean()
         if not np.all(values > 0.0):
@@ -56,7 +55,7 @@ LOADS = Kinds("loads")
 
 
 def distance(interface: Interface, centre: float) -> Array:
-    """Return the distance (m) along x from a share of the length, (nx,); (nx, 1) on a plane."""
+    """Return the distance (m) along x from a share of the length, (nx,), on a plane (nx, 1)."""
     length = interface.lengths[0]
     x = np.arange(interface.shape[0]) * length / interface.shape[0]
     away = np.mod(x - centre * length + 0.5 * length, length) - 0.5 * length
@@ -131,8 +130,8 @@ class Load:
     normal_pressure : float or (nodes,) array, optional
         Pa, positive on average. Every onset then has a `friction_coefficient`.
     pressing_force : float, optional
-        Instead of `normal_pressure`: N, positive. Over the area of the interface, which must be
-        known, it is the pressure, uniform or the mean between glued plates.
+        Force instead of `normal_pressure`, N, positive. Divided by the area of the interface,
+        which must be known, it is the pressure: uniform, or the mean between glued plates.
 
     Examples
     --------

@@ -46,14 +46,14 @@ if TYPE_CHECKING:
 MIN_NODES_IN_NUCLEATION = 4
 """Nodes in a nucleation length."""
 HARDLY_RESOLVED = 0.04
-"""Nodes in a nucleation length below which a unit is doubted: a hundred times more are needed."""
+"""Nodes in a nucleation length below which a unit is doubted. Hundred times more are needed."""
 MAX_STRENGTH_RATIO = 1e8
 """Strength of a node over the median beyond which others are lost in round-off."""
 RIGIDITY = (1e-8, 1.0), (0.0, math.inf)
-"""Strength over shear modulus that is usual, and what is possible; steel (8e10 Pa) under 10 kPa at
-a coefficient of 0.1 has 1e-8."""
+"""Usual and possible ratios of strength and shear modulus. Steel (8e10 Pa) under 10 kPa at a
+coefficient of 0.1 has 1e-8."""
 SLIP = (1e-8, math.inf), (1e-10, math.inf)
-"""Slip over which strength falls, m; an atom measures 1e-10 m."""
+"""Usual and possible slips over which strength falls, m. An atom measures 1e-10 m."""
 MIN_LENGTHS_IN_LINE = 4.0
 """Nucleation lengths: on shorter lines free ends change the mean onset by more than about 1 %."""
 MIN_MACHINE_RATIO = 1e-4
@@ -61,12 +61,12 @@ MIN_MACHINE_RATIO = 1e-4
 MIN_HEIGHT_RATIO, MAX_HEIGHT_RATIO = 0.025, 10.0
 """Height of blocks over their length between which their response takes seconds and below 1 GB."""
 AT_END = {"II": 0.445 / 1.158, "III": 0.5}
-"""Nucleation length at a free end as a share of that in the middle."""
+"""Nucleation length at a free end as a share of the length in the middle."""
 NO_AREA = (
     "a force needs the area of the interface: give the thickness of the specimen, or"
     " interface.width of a line (m)"
 )
-"""What to do with a force where the area is unknown."""
+"""Advice for a force if the area is unknown."""
 
 
 REPLACED = {
@@ -75,7 +75,7 @@ REPLACED = {
     "normal_pressure": ("load.normal_pressure", "load.pressing_force"),
     **dict.fromkeys(SCALES, tuple(f"friction.{name}" for name in SCALES)),
 }
-"""What a profile, or a random property, of each name would replace."""
+"""Parameters that a profile, or a random property, of each name would replace."""
 
 
 @model
@@ -90,17 +90,17 @@ class Problem:
     load : Load, optional
         By default uniform and without initial stress.
     mode : {"II", "III"}
-        In-plane or anti-plane shear; a plane is in-plane along x and anti-plane along y.
+        In-plane or anti-plane shear. A plane is in-plane along x and anti-plane along y.
     specimen : Blocks, optional
         Finite blocks instead of half-spaces. Their drive makes the load profile, the interface ends
-        with them (`interface.ends` is "free"), and tau_0 is the drive: the mean stress that it
-        would cause if nothing slipped.
+        with them (`interface.ends` is "free"), and tau_0 is the drive: the mean stress that the
+        drive would cause without slip.
 
     Raises
     ------
     InputError
         If an array has another shape than the interface, fewer than four nodes span the
-        nucleation length, or another argument is invalid; the message lists every problem.
+        nucleation length, or another argument is invalid. The message lists every problem.
 
     Examples
     --------
@@ -129,10 +129,10 @@ class Problem:
             self.load.profile.on(self.interface)  # refuses one that is not positive
         if self.interface.is_plane and self.solid.plane != "strain":
             problems.append(
-                "solid.plane: solids beside a plane interface are three-dimensional; leave 'strain'"
+                "solid.plane: solids beside a plane interface are three-dimensional. Leave 'strain'"
             )
         if self.interface.is_plane and self.mode != "II":
-            problems.append(f"mode: a plane has both modes; leave 'II', got {self.mode!r}")
+            problems.append(f"mode: a plane has both modes. Leave 'II', got {self.mode!r}")
         if self.load.pressing_force is not None and self.area is None:
             problems.append(f"load.pressing_force: {NO_AREA}, or load.normal_pressure in Pa")
         problems += [f"friction: {text}" for text in contradictions(self.friction)]
@@ -147,10 +147,12 @@ class Problem:
         return self
 
     def _of_specimen(self) -> list[str]:
-        """Let the interface end with the specimen; return what does not go with one."""
+        """Let the interface end with the specimen, and return what does not fit a specimen."""
         interface, specimen = self.interface, self.specimen
         if specimen is None:
-            text = "interface.ends: free ends are those of a specimen: give specimen=st.Blocks(...)"
+            text = (
+                "interface.ends: free ends belong to a specimen, give specimen=st.Blocks(...)"
+            )
             return [text] * interface.is_free
         if interface.is_plane:
             return ["specimen: blocks meet on a line; give length and nodes one number each"]
@@ -159,51 +161,50 @@ class Problem:
         if interface.width is not None:
             problems.append("interface.width: give the thickness of a specimen instead")
         if not (isinstance(self.load.profile, float) and self.load.profile == 1.0):
-            problems.append(
-                "load.profile: that of a specimen comes from its drive; leave it out"
-            )
+            problems.append("load.profile: comes from the drive of a specimen. Leave it out")
         if specimen.pressing == "glued" and np.ndim(self.load.normal_pressure or 0.0):
             problems.append(
-                "load.normal_pressure: with pressing = 'glued' blocks make its profile; give the"
+                "load.normal_pressure: with pressing = 'glued' blocks make its profile. Give the"
                 " mean"
             )
         if specimen.height < 2.0 * interface.spacing:
             problems.append(
                 f"specimen.height: {specimen.height:g} m is less than two spacings of the nodes,"
-                f" {interface.spacing:.3g} m; take more nodes"
+                f" {interface.spacing:.3g} m. Take more nodes"
             )
         high = specimen.height / interface.measure
         if self.mode == "II" and not MIN_HEIGHT_RATIO <= high <= MAX_HEIGHT_RATIO:
             problems.append(
                 f"specimen.height: must be {MIN_HEIGHT_RATIO:g} to {MAX_HEIGHT_RATIO:g} times the"
-                f" length in mode II, is {high:.3g} times; check the units, or take a"
+                f" length in mode II, is {high:.3g} times. Check the units, or take a"
                 " shorter piece of flat blocks"
             )
         return problems
 
     def _check_drive(self) -> None:
-        """Refuse blocks that open; doubt a machine that is as good as none."""
+        """Refuse blocks that open, and doubt a machine whose stiffness has no effect."""
         pressure = self.blocks.pressure
         if not pressure.min() > 0.0:
             place = self.interface.describe_node(int(np.argmin(pressure)))
             raise InputError(
                 f"specimen.pressing: opens the interface at {place} ({pressure.min():.3g} of the"
-                " mean pressure); press frictionless"
+                " mean pressure). Press frictionless"
             )
         assert self.specimen is not None  # else there is no drive
         machine, depth = self.specimen.drive.stiffness, self.specimen.thickness or 1.0
         blocks = 0.5 * depth * self.blocks.drive_stiffness  # of both, in series
         if machine > 0.0:
             text = (
-                f"specimen.drive.stiffness: {machine:.3g} N/m is {machine / blocks:.1g} of that of"
-                f" the blocks, {blocks:.3g} N/m: as good as dead load, 0; check its unit (N/m)"
+                f"specimen.drive.stiffness: {machine:.3g} N/m is {machine / blocks:.1g} of the"
+                f" stiffness of the blocks, {blocks:.3g} N/m, and hardly differs from dead load,"
+                " 0. Check its unit (N/m)"
             )
             doubt_units(
                 [Doubt(text, machine / blocks, (MIN_MACHINE_RATIO, math.inf), (0.0, math.inf))]
             )
 
     def _place_profiles(self) -> list[str]:
-        """Put profiles with coordinates of their own on the nodes; return what does not fit."""
+        """Put profiles with coordinates of their own on the nodes, and return misfits."""
         problems: list[str] = []
         shape = self.interface.shape
         for part in ("friction", "load"):
@@ -232,7 +233,7 @@ class Problem:
         if self.specimen is None and patch >= length:
             warn_user(
                 f"the critical patch (nucleation length {patch:.3g} m) fills the interface"
-                f" ({length:.3g} m); if this is not intended, check the units of length, shear"
+                f" ({length:.3g} m). If this is not intended, check the units of length, shear"
                 " modulus and weakening rate",
                 UnitWarning,
             )
@@ -266,8 +267,8 @@ class Problem:
     ) -> None:
         """Doubt mean peak and residual strengths (Pa) that do not fit the rest of the problem.
 
-        It is an `InputError` if they cannot, or if scales of slip by name are not resolved at these
-        strengths. The `pressure` is the problem's own if left out.
+        An `InputError` refuses strengths that cannot fit, and scales of slip by name that are not
+        resolved at these strengths. The default `pressure` is the problem's own.
         """
         friction, modulus = self.friction, self.solid.shear_modulus
         pressure = self.given_pressure if pressure is None else pressure
@@ -279,9 +280,9 @@ class Problem:
             compared.append(("residual_strength", residual, "shear modulus", modulus, RIGIDITY))
         doubts = [
             Doubt(
-                f"{name}: its mean, {mean:.4g} Pa, is {mean / of:.2g} of the {what}; check the"
-                " units of both (all in Pa; coefficients are fractions, not percentages, and need"
-                " of='friction_coefficient')",
+                f"{name}: its mean, {mean:.4g} Pa, is {mean / of:.2g} of the {what}. Check the"
+                " units of both. All are in Pa. Coefficients are fractions, not percentages, and"
+                " need of='friction_coefficient'",
                 mean / of,
                 *limits,
             )
@@ -291,8 +292,8 @@ class Problem:
         if friction.weakening_rate is not None and drop > 0.0:
             slip = drop / float(np.median(friction.weakening_rate))
             text = (
-                f"strength: its mean, {strength:.4g} Pa, falls within a slip of {slip:.2g} m, that"
-                " of a few atoms; check the units of strength or normal pressure (Pa) and"
+                f"strength: its mean, {strength:.4g} Pa, falls within a slip of {slip:.2g} m, the"
+                " size of a few atoms. Check the units of strength or normal pressure (Pa) and"
                 " weakening_rate (Pa/m)"
             )
             doubts.append(Doubt(text, slip, *SLIP))
@@ -308,9 +309,9 @@ class Problem:
 
     @property
     def blocks(self) -> Driven:
-        """Stiffness and profiles of the specimen, which must not be None."""
+        """Stiffness and profiles of the specimen, which must be given."""
         if self.specimen is None:
-            raise InputError("problem.specimen: is not given; the solids are half-spaces")
+            raise InputError("problem.specimen: is not given. The solids are half-spaces")
         interface = self.interface
         return self.specimen.driven(interface.measure, interface.size, self.solid, self.mode)
 
@@ -321,7 +322,7 @@ class Problem:
 
     @property
     def half_spaces(self) -> HalfSpaces:
-        """The solids, if they were half-spaces: what gives K(k) and nucleation lengths."""
+        """The solids as half-spaces, which give K(k) and nucleation lengths."""
         lengths = self.interface.lengths
         moduli = (self.effective_modulus, self.solid.shear_modulus)
         return HalfSpaces(lengths, moduli[: len(lengths)])
@@ -336,35 +337,35 @@ class Problem:
         return None if depth is None else interface.breakable_measure * depth
 
     def stress_of(self, name: str, force: float) -> float:
-        """Return a force, N, over the area of the interface, Pa; `name` begins its refusal."""
+        """Return a force, N, over the area of the interface, Pa. `name` begins a refusal."""
         if self.area is None:
             raise InputError(f"{name}: {NO_AREA}")
         return force / self.area
 
     @property
     def given_pressure(self) -> Any:
-        """Normal pressure as given, Pa, a force over the area: a number, an array or None."""
+        """Given normal pressure, or force over area, Pa: a number or an array, if any."""
         force = self.load.pressing_force
         if force is None:
             return self.load.normal_pressure
         return self.stress_of("load.pressing_force", force)
 
     def refuse_specimen(self, what: str, instead: str) -> None:
-        """Raise an `InputError` if the problem has a specimen, with what to do instead."""
+        """Raise an `InputError` with advice, `instead`, if the problem has a specimen."""
         if self.specimen is not None:
             raise InputError(
-                f"problem.specimen: {what} holds for half-spaces, not for finite blocks; {instead}"
+                f"problem.specimen: {what} holds for half-spaces, not for finite blocks: {instead}"
             )
 
     @property
     def normal_pressure(self) -> Any:
-        """Normal pressure, Pa: a number, an array at the nodes, or None."""
+        """Normal pressure, Pa: a number or an array at the nodes, if any."""
         pressure = self.given_pressure
         return pressure if pressure is None else pressure * self.pressing
 
     @property
     def pressing(self) -> Any:
-        """Normal pressure at the nodes over the given one: 1, but of glued blocks (nodes,)."""
+        """Normal pressure at the nodes over the given pressure: 1, or (nodes,) if glued."""
         glued = self.specimen is not None and self.specimen.pressing == "glued"
         return self.blocks.pressure if glued else 1.0
 
@@ -378,43 +379,42 @@ class Problem:
 
     @property
     def effective_modulus(self) -> float:
-        """Static modulus G* of the plane state and mode, Pa; on a plane that along x."""
+        """Static modulus G* of the plane state and mode, Pa, on a plane along x."""
         return self.solid.effective_modulus(self.mode)
 
     @property
     def uniform_rate(self) -> float | None:
-        """The problem's weakening rate, Pa/m, if it is the same at all nodes, else None."""
+        """The problem's weakening rate, Pa/m, if it is the same at all nodes."""
         rate = self.friction.weakening_rate
         return None if rate is None or np.ptp(rate) > 0.0 else float(np.max(rate))
 
     @property
     def nucleation_length(self) -> float:
-        """h_n = 2 lambda_0 G*/W, m (Uenishi and Rice, 2003), of a uniform weakening rate.
+        """h_n = 2 lambda_0 G*/W, m (Uenishi and Rice, 2003), for a uniform weakening rate.
 
-        If the law steepens, W is the steepest rate.
-        It raises an `InputError` if the rate varies along the interface or follows from
-        other parameters.
+        If the law steepens, W is the steepest rate. An `InputError` says that the rate varies along
+        the interface or follows from other parameters.
         """
         if self.uniform_rate is None:
             raise InputError(
-                "friction.weakening_rate: a nucleation length needs a uniform one, about"
-                " (strength - residual_strength)/critical_slip; st.Equilibrium() needs none"
+                "friction.weakening_rate: must be uniform for a nucleation length, about"
+                " (strength - residual_strength)/critical_slip. st.Equilibrium() works without it"
             )
         return self.nucleation_lengths(self.uniform_rate * self.friction.steepening)[0]
 
     def nucleation_lengths(self, rate: float) -> tuple[float, ...]:
         """Return h_n of a uniform weakening rate (Pa/m) in each direction, m.
 
-        On a plane, the length along x is that of mode II, along y that of mode III.
+        On a plane, the length along x belongs to mode II, and the length along y to mode III.
         """
         if not rate > 0.0:
             raise InputError(f"rate: must be a positive number, got {describe(rate)}")
         return self.half_spaces.nucleation_lengths(rate)
 
     def nodes_in_nucleation_length(self, rate: float) -> tuple[float, ...]:
-        """Return how many nodes the nucleation length of a weakening rate (Pa/m) spans.
+        """Return the number of nodes in the nucleation length of a weakening rate (Pa/m).
 
-        It returns one number per direction. If the law steepens, the steepest rate counts.
+        There is a number for each direction. If the law steepens, the steepest rate counts.
         """
         lengths = self.nucleation_lengths(rate * self.friction.steepening)
         return tuple(np.divide(lengths, self.interface.spacings).tolist())
@@ -428,13 +428,13 @@ class Problem:
         if min(resolution) < HARDLY_RESOLVED:
             raise InputError(
                 f"solid.shear_modulus, interface.length, friction: the nucleation length is"
-                f" {length:.3g} m, and the nodes are {self.interface.spacing:.3g} m apart; check"
+                f" {length:.3g} m, and the nodes are {self.interface.spacing:.3g} m apart. Check"
                 f" the units of the modulus, {self.solid.shear_modulus:g} Pa, of the lengths, of"
                 f" the weakening rate, {steepest:.3g} Pa/m at its steepest, and of strengths"
             )
         raise InputError(
             f"interface.nodes: the nucleation length {length:.3g} m spans"
-            f" {min(*resolution, MIN_NODES_IN_NUCLEATION - 0.01):.3g} nodes; at least"
+            f" {min(*resolution, MIN_NODES_IN_NUCLEATION - 0.01):.3g} nodes. At least"
             f" {MIN_NODES_IN_NUCLEATION} are needed, that is"
             f" interface.nodes >= {self._finer(resolution, MIN_NODES_IN_NUCLEATION)}, got"
             f" {' x '.join(map(str, self.interface.shape))}"
@@ -453,12 +453,12 @@ class Problem:
                 raise InputError(
                     f"interface.extent: its {width * spacing:.3g} m along {dim} are narrower than"
                     f" the nucleation length, {resolution[axis] * spacing:.3g} m, so that it cannot"
-                    " become unstable; widen it, or check the units of lengths, shear modulus and"
+                    " become unstable. Widen it, or check the units of lengths, shear modulus and"
                     " weakening rate"
                 )
 
     def _finer(self, resolution: tuple[float, ...], wanted: int) -> str:
-        """Return the nodes with which the nucleation length would span `wanted` of them."""
+        """Return the number of nodes with which the nucleation length would span `wanted`."""
         growth = wanted / np.maximum(resolution, 1e-300)
         halves = np.ceil(0.5 * np.array(self.interface.shape) * growth)
         return " x ".join(f"{2 * n:.10g}" for n in halves)
@@ -474,7 +474,7 @@ class Problem:
                 spanned += f", {AT_END[self.mode] * resolution[0]:.1f} at a free end"
             wanted = 16 if enough <= 12.0 else 32
             warn_accuracy(
-                f"the nucleation length spans {spanned}; {wanted} are recommended"
+                f"the nucleation length spans {spanned}, and {wanted} are recommended"
                 f" (interface.nodes = {self._finer(resolution, wanted)}): {cost}"
             )
 
@@ -484,34 +484,35 @@ class Problem:
         Parameters
         ----------
         profiles : array, mapping of arrays, xarray.Dataset or Sample
-            Peak strength tau_p (Pa), of shape (samples, *shape) or (*shape); or profiles by
-            name: 'strength' and any others of `PROFILES`, but only one of 'weakening_rate',
-            'critical_slip' and 'fracture_energy'. Give each here or in the problem, not in both.
-            All but the strength may also be (samples, 1) or a number: of 'normal_pressure' the
-            mean, which glued blocks distribute. A 'friction_coefficient' in the place of the
-            strength, or a DataArray that states the unit 1, is multiplied by the pressure.
+            Peak strength tau_p (Pa), of shape (samples, *shape) or (*shape), or profiles by
+            name: 'strength' and any others in `PROFILES`, but only 'weakening_rate',
+            'critical_slip' or 'fracture_energy'. Give each profile here or in the problem, not in
+            both. All but the strength may also be (samples, 1) or a number. Such a
+            'normal_pressure' is a mean, which glued blocks distribute. A 'friction_coefficient' in
+            place of the strength, or a DataArray that states the unit 1, is multiplied by the
+            pressure.
         accept : collection of {"overstress"}
-            What the method accepts: initial stress above the strength.
+            Extreme profiles that the method accepts: initial stress above the strength.
 
         Raises
         ------
         InputError
             If a name, shape or value is invalid, a strength is not above the initial stress, no
-            strength is above the residual strength, or a `Sample` was made by another problem;
-            the message lists every problem.
+            strength is above the residual strength, or a `Sample` was made by another problem.
+            The message lists every problem.
 
         Notes
         -----
         A node whose strength is not above its residual strength does not weaken: its strength is
-        constant. An `AccuracyWarning` gives the share of such nodes, and that of nodes where the
-        initial stress is below minus the strength.
+        constant. An `AccuracyWarning` gives the share of such nodes, and the share of nodes at
+        which the initial stress is below minus the strength.
         """
         return self.placed_sample(profiles, accept)[0]
 
     def placed_sample(
         self, profiles: Any, accept: Collection[str] = (), gaps: Gaps = "refuse"
     ) -> tuple[Sample, Any]:
-        """Return a sample of users' data, and a mask of where all were measured, or True."""
+        """Return a sample of users' data, and a mask of the measured nodes, or True."""
         friction, interface = self.friction, self.interface
         problems: list[str] = []
         ready = isinstance(profiles, Sample)
@@ -562,7 +563,7 @@ class Problem:
         if constant.any() and not ready:
             warn_accuracy(
                 f"strength is not above residual_strength at {100.0 * constant.mean():.2g}"
-                " % of the nodes; these do not weaken: their strength is constant"
+                " % of the nodes. These do not weaken: their strength is constant"
             )
         self._check_resolution(sample.steepest_rate)
         return sample, reduce(np.logical_and, measured)
@@ -570,8 +571,8 @@ class Problem:
     def own_sample(self, profiles: Mapping[str, Array], accept: Collection[str] = ()) -> Sample:
         """Return a sample of arrays by name that the package made, (samples, *shape) in SI.
 
-        Only their values are checked, as those of some samples may not fit the problem. Whoever
-        makes the arrays looks at the resolution, and at nodes that do not weaken, for all samples.
+        Only values are checked here, because some samples may not fit the problem. The caller
+        checks the resolution, and nodes that do not weaken, for all samples.
         """
         problems: list[str] = []
         for name, rows in profiles.items():
@@ -601,7 +602,7 @@ class Problem:
         self, strength: Array, residual: Array, initial: Array, scale: str, value: Array,
         pressure: Array, accept: Collection[str],
     ) -> Sample:  # fmt: skip
-        """Return a sample of rows whose values are valid one by one, if they go together."""
+        """Return a sample of rows with valid values, if the rows fit together."""
         breakable = self.interface.breakable
         if breakable is not None:
             strength = np.where(breakable, strength, np.inf)
@@ -618,7 +619,7 @@ class Problem:
         if initial.min() < 0.0 and (reversed_at := initial < -strength).any():
             warn_accuracy(
                 f"initial_stress is below minus the strength at {100.0 * reversed_at.mean():.2g} %"
-                " of the nodes; they would slip in reverse, which is not modelled, and are held"
+                " of the nodes. They would slip in reverse, which is not modelled, and are held"
             )
         shape = self.interface.shape
         load_profile = np.array(np.broadcast_to(self.load_profile, shape), dtype=float)
@@ -627,11 +628,11 @@ class Problem:
     def given_twice(self, names: Collection[str], owner: str) -> list[str]:
         """Return refusals of values that profiles, or random properties, would replace.
 
-        They also tell what is missing in both. The `owner` of the names begins each text.
+        They also name values that are missing in both. The `owner` of the names begins each text.
         """
         twice = [
-            f"problem.{key}: has no effect beside {owner}.{name}, which replaces it; leave one of"
-            " them out"
+            f"problem.{key}: has no effect beside {owner}.{name}, which replaces it. Leave either"
+            " out"
             for name in names
             for key in REPLACED.get(name, ())
             if (value := attrgetter(key)(self)) is not None and np.any(value)
@@ -639,25 +640,25 @@ class Problem:
         if self.friction.scale is None and not {*SCALES} & {*names}:
             twice.append(
                 f"problem.friction: give one of {', '.join(SCALES)}, or {owner}.{SCALES[0]} and so"
-                " on where it varies from sample to sample; got none"
+                " on where it varies from sample to sample. Got none"
             )
         glued = self.specimen is not None and self.specimen.pressing == "glued"
         if glued and self.given_pressure is None and "normal_pressure" not in names:
             twice.append(
-                "problem.specimen.pressing: 'glued' has no effect without a normal pressure; give"
+                "problem.specimen.pressing: 'glued' has no effect without a normal pressure. Give"
                 " load.normal_pressure (Pa) or load.pressing_force (N), or leave it out"
             )
         return twice
 
     def _given_sample(self, sample: Sample) -> dict[str, Array]:
-        """Return the profiles of a ready-made sample by name; refuse one of another problem."""
+        """Return the profiles of a ready-made sample by name, or refuse a foreign sample."""
         if sample.shape != self.interface.shape:
             shapes = f"shape {sample.shape}, the interface {self.interface.shape}"
             raise InputError(f"profiles: the sample has {shapes}")
         alike = np.allclose(sample.load_profile, self.load_profile, rtol=1e-6)
         if not alike or sample.problem not in (None, self):
             raise InputError(
-                "profiles: the sample was made by another problem; make it with"
+                "profiles: the sample was made by another problem. Make it with"
                 " problem.sample(strength)"
             )
         given = {name: rows for name, rows in sample._asdict().items() if name in PROFILES}
@@ -669,7 +670,7 @@ class Problem:
     def _impossible(
         self, strength: Array, residual: Array, initial: Array, accept: Collection[str]
     ) -> list[str]:
-        """Return what is wrong with profiles that are in order one by one."""
+        """Return why profiles with valid values do not fit together."""
         along, problems = self.interface.axes, []
         over = (strength <= initial).reshape(len(strength), -1)
         if "overstress" not in accept and over.any():
@@ -678,7 +679,7 @@ class Problem:
             most, least = initial[number].flat[node], strength[number].flat[node]
             further = int(over.any(axis=1).sum()) - 1
             problems.append(
-                f"strength: must be above initial_stress everywhere; it is not at"
+                f"strength: must be above initial_stress everywhere. It is not at"
                 f" {over[number].sum()} of {over.shape[1]} nodes of sample {number}, the first at"
                 f" {self.interface.describe_node(node)}: {least:g} against {most:g} Pa"
                 f"{f', and in {further} more samples' * (further > 0)}; st.Rupture() accepts this"
@@ -695,21 +696,21 @@ class Problem:
                     f"strength: {strength[number].flat[node]:g} Pa at"
                     f" {self.interface.describe_node(node)} of sample {number} is more than"
                     f" {MAX_STRENGTH_RATIO:g} times the median, {middle[number].item():g} Pa,"
-                    " which is lost beside it in round-off; less is as good where nothing breaks"
+                    " which is lost beside it in round-off. Less is as good where nothing breaks"
                 )
         nowhere = ~((strength > residual) & np.isfinite(strength)).any(axis=along)
         if nowhere.any():
             number = int(np.argmax(nowhere))
             least, most = strength[number].min(), strength[number].max()
             problems.append(
-                "strength: must be finite and above residual_strength at one node or more; in"
+                "strength: must be finite and above residual_strength at one node or more. In"
                 f" sample {number} strength is {least:g} to {most:g} Pa and residual_strength"
                 f" {residual[number].min():g} to {residual[number].max():g} Pa: check their units"
             )
         return problems
 
     def _rates(self, strength: Array, residual: Array, scale: str, value: Array) -> Array:
-        """Return weakening rates, Pa/m, from whichever scale of slip is given."""
+        """Return weakening rates, Pa/m, from the given scale of slip."""
         rates = self.friction.rate(strength - residual, scale, value)
         barriers = np.isinf(strength)
         if barriers.any() and scale != "weakening_rate":  # any rate will do: nothing weakens
@@ -720,7 +721,7 @@ class Problem:
 
 
 def refusals(problem: Problem, method: Any) -> list[str]:
-    """Return why a method does not take a problem; no texts if it does."""
+    """Return why a method does not take a problem, an empty list if it does."""
     return [
         f"method: the {method.label} cannot take this: {reason}"
         for reason in method.supports(problem)

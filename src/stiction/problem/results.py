@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def study_attributes(**parts: Any) -> dict[str, Any]:
-    """Return the problem, the method, ... by name in plain form, or why they have none."""
+    """Return the problem, the method, ... by name in plain form, or why that is impossible."""
     try:
         return {"study": {name: to_plain(part) for name, part in parts.items()}}
     except InputError as error:
@@ -30,7 +30,7 @@ def study_attributes(**parts: Any) -> dict[str, Any]:
 
 
 def along(interface: Interface, variable: Variable) -> Variable:
-    """Return the same variable with one value a node."""
+    """Return the same variable with a value for each node."""
     return replace(variable, dims=(*variable.dims, *interface.dims))
 
 
@@ -69,7 +69,7 @@ def to_dataset(
     attributes: Mapping[str, Any],
     interface: Interface | None = None,
 ) -> xr.Dataset:
-    """Label arrays with dimensions, coordinates (those of an `interface` too), units and names.
+    """Label arrays with dimensions, coordinates (of an `interface` too), units and names.
 
     Attributes other than strings and numbers are written as JSON.
     """

@@ -14,8 +14,8 @@ from stiction.base.representation import Result, Row, Summary
 from stiction.base.variables import PROFILES, QUANTITIES
 from stiction.problem.friction import SCALES
 from stiction.problem.interface import Interface
+from stiction.problem.profiles.labels import is_coefficient
 from stiction.problem.profiles.placing import turned
-from stiction.problem.profiles.reading import is_coefficient
 
 LARGEST = 1e100
 """Of a profile, in SI units; sums and products of larger numbers overflow."""
@@ -27,9 +27,9 @@ nodes that weaken."""
 
 
 def steepest_rate(strength: Array, residual: Array, rate: Array) -> float:
-    """Return the largest weakening rate of nodes that may break, Pa/m; arrays (samples, *shape).
+    """Return the largest weakening rate of nodes that may break, Pa/m, from (samples, *shape).
 
-    Barriers are left out: with a uniform critical slip they weaken steeply, but never slip.
+    Barriers are left out, because with a uniform critical slip they weaken steeply but never slip.
     """
     drop = strength - residual
     if drop.max() <= BARRIER * drop.min() or rate.max() == rate.min():
@@ -57,20 +57,21 @@ class _Profiles(NamedTuple):
 
 
 class Sample(Result, _Profiles):
-    """One interface or many: the profiles that every method starts from.
+    """The profiles of an interface or many, from which every method starts.
 
     Attributes
     ----------
     strength, residual_strength, weakening_rate, initial_stress : (samples, *shape) arrays
-        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa); not to be written to. Strength is
+        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa). Do not write to them. Strength is
         infinite beyond the extent of the interface. Where it is at or below the residual
         strength, both are equal and W has no effect.
     load_profile : (*shape) array
         p, dimensionless, positive.
     normal_pressure : (samples, *shape) array
-        Pa; NaN where the problem has none.
+        In Pa, NaN if the problem has no pressure.
     problem : Problem, optional
-        That made it, and the only one that takes it; None if it was put together by hand.
+        The problem that made the sample, and the only problem that takes it. A sample made by hand
+        has no problem.
     """
 
     def _summary(self) -> Summary:
@@ -135,8 +136,8 @@ class Sample(Result, _Profiles):
 def rows_of(name: str, value: Any, interface: Interface, samples: int | None) -> Array:
     """Return `value` as a (samples, *shape) float64 array, or raise an `InputError`.
 
-    A single profile (*shape) is one sample. Where `samples` is given, a number, a profile
-    or one number a sample, of shape (samples, 1), is broadcast to all.
+    A single profile (*shape) is a sample. If `samples` is given, a number, a profile
+    or a number for each sample, of shape (samples, 1), is broadcast to all.
     """
     shape, array = interface.shape, as_numbers(value)
     valid = f"{shape} or ({samples or 'samples'}, {', '.join(map(str, shape))})"
@@ -167,7 +168,7 @@ def check_values(name: str, array: Array, interface: Interface) -> None:
         given = f"{array[entry]:g} (at most {LARGEST:g})"
         if name == "strength" and array[entry] == np.inf:
             given += "; give interface.extent, beyond which nothing breaks, instead"
-        raise InputError(f"must be finite; entry {entry} is {given}")
+        raise InputError(f"must be finite. Entry {entry} is {given}")
     given = f"{least:g} {QUANTITIES[name].units}"
     if name in SCALES and least <= 0.0:
         raise InputError(f"must be positive, got {given}")
@@ -176,12 +177,12 @@ def check_values(name: str, array: Array, interface: Interface) -> None:
     if name == "normal_pressure":
         means = np.atleast_1d(interface.mean(array) if array.ndim else array)
         if means.min() <= 0.0:
-            worst = f"that of sample {int(np.argmin(means))} is {means.min():g} Pa"
+            worst = f"the mean of sample {int(np.argmin(means))} is {means.min():g} Pa"
             raise InputError(f"must be positive on average, {worst}")
 
 
 def no_coefficients(values: Array, pressure: Array) -> list[str]:
-    """Return why values are no friction coefficients, or what they lack."""
+    """Return why values cannot be friction coefficients here."""
     if np.isnan(pressure).all():
         return [
             "friction_coefficient: needs a normal pressure (load.normal_pressure, Pa, or"
@@ -197,11 +198,11 @@ def no_coefficients(values: Array, pressure: Array) -> list[str]:
 def named_profiles(given: Any) -> dict[str, Any]:
     """Return profiles by name: of a mapping or dataset, or of the strength alone.
 
-    The strength may be given as friction coefficients: by this name, or by the unit that it states.
+    The strength may be friction coefficients, by that name or by the unit that it states.
     """
     if hasattr(given, "marginal") or hasattr(given, "members"):
         raise InputError(
-            f"profiles: must be numbers, got a {type(given).__name__}; pass its sample(interface),"
+            f"profiles: must be numbers, got a {type(given).__name__}. Pass its sample(interface),"
             " or call st.monte_carlo"
         )
     if not isinstance(given, Mapping):  # a Dataset is one too

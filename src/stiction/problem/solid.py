@@ -14,23 +14,23 @@ from stiction.base.model import Mode, Positive, Real, check, is_finite, model
 from stiction.base.units import Doubt, doubt_units
 
 POSSIBLE_SPEED = (0.3, 2e4)
-"""m/s; shear waves run at 1 m/s in the softest gels and at 12 km/s in diamond."""
+"""Shear wave speed, m/s: 1 m/s in the softest gels, and 12 km/s in diamond."""
 
 
 @model
 class Solid:
-    """One of two identical linear-elastic half-spaces.
+    """The material of two identical linear-elastic half-spaces.
 
     Parameters
     ----------
     shear_modulus : float
-        G, Pa. Alternatively, pass `youngs_modulus`, E in Pa; then G = E/(2 (1 + nu)) is stored.
+        G, Pa. Alternatively, pass `youngs_modulus`, E in Pa. Then G = E/(2 (1 + nu)) is stored.
     poisson_ratio : float
         nu, in (-1, 0.5).
     density : float
         rho, kg/m3.
     plane : {"strain", "stress"}
-        Plane state of the in-plane problem (mode II); mode III does not depend on it.
+        Plane state of the in-plane problem (mode II). Mode III does not depend on it.
 
     Examples
     --------

@@ -37,7 +37,7 @@ NotNegative = Annotated[Real, Field(ge=0.0)]
 
 @model(kw_only=True)
 class Platen:
-    """The top face is glued to a rigid platen that moves along the interface only.
+    """A rigid platen that is glued to the top face and moves along the interface only.
 
     Parameters
     ----------
@@ -45,8 +45,8 @@ class Platen:
         Stiffness of the machine between the grips of the two blocks, N/m. 0 is dead load (the force
         is controlled), ``float("inf")`` a rigid machine (the travel is controlled).
     mass : float
-        Mass of the platen and the grip that move with one block, kg. It counts in ruptures with
-        inertia only. The default, 0, leaves it out.
+        Mass of the platen and the grip that move with a block, kg. It counts in ruptures with
+        inertia only.
     """
 
     stiffness: Stiffness = 0.0
@@ -56,7 +56,7 @@ class Platen:
 
 @model(kw_only=True)
 class Pusher:
-    """A uniform traction on a side of each block; the top face lies on rollers.
+    """A uniform traction on a side of each block, whose top face lies on rollers.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class Pusher:
     stiffness : float
         Stiffness of the machine between the grips of the two blocks, N/m (see `Platen`).
     mass : float
-        Mass that moves with the pushers of one block, kg (see `Platen`).
+        Mass that moves with the pushers of a block, kg (see `Platen`).
     """
 
     height: Positive
@@ -100,15 +100,15 @@ class Blocks:
     height : float
         Height of each block, m. Its length is the length of the interface.
     thickness : float, optional
-        Depth, m: turns stresses into forces, N. A machine of finite stiffness needs it.
+        Depth, m, which turns stresses into forces, N. A machine of finite stiffness needs it.
     drive : Platen or Pusher
     pressing : {"frictionless", "glued"}
         How the blocks are pressed: by a uniform pressure, or between plates on which the top faces
-        do not slide; then ``Load(normal_pressure=...)`` is the mean.
+        do not slide. Between plates, ``Load(normal_pressure=...)`` is the mean.
     quality_factor : float
-        Q of the slowest shear wave along a block, of the frequency f = c_s/(2 L): momentum is lost
+        Q of the slowest shear wave along a block, at the frequency f = c_s/(2 L). Momentum is lost
         at the rate 2 pi f/Q, in ruptures with inertia only. 25 is the inverse of the loss tangent
-        of acrylic at some 10 kHz, 0.04; ``float("inf")`` is no attenuation: waves echo for ever.
+        of acrylic at some 10 kHz, 0.04. With ``float("inf")``, waves echo for ever.
 
     Examples
     --------
@@ -143,7 +143,7 @@ class Blocks:
 
     @property
     def pushes(self) -> Pushes | None:
-        """Sides, height and width (m) of the pushers; None for a platen."""
+        """Sides, height and width (m) of pushers. A platen has no pushers."""
         drive = self.drive
         if isinstance(drive, Platen):
             return None

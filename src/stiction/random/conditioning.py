@@ -59,8 +59,8 @@ from stiction.base.model import Positive, model
 from stiction.base.units import is_in
 from stiction.base.variables import QUANTITIES
 from stiction.problem.interface import Interface
+from stiction.problem.profiles.labels import in_si, unit_of
 from stiction.problem.profiles.placing import MEASURED
-from stiction.problem.profiles.reading import in_si, unit_of
 from stiction.random.mapping import from_normal
 from stiction.random.synthesis import condition
 from stiction.random.transport import (

@@ -33,7 +33,7 @@ def export(result: xr.Dataset, path: Path) -> None:
 
 
 def write_result(result: xr.Dataset, path: Path) -> None:
-    """Write a result as one NetCDF file with checksums, whole or not at all."""
+    """Write a result as a NetCDF file with checksums, whole or not at all."""
     with suppress(OSError):
         free = shutil.disk_usage(path.parent).free
         # NetCDF does not report a full disk, and keeps its unfinished file open.
@@ -50,12 +50,12 @@ def write_result(result: xr.Dataset, path: Path) -> None:
 
 
 def table_of(result: xr.Dataset) -> pd.DataFrame:
-    """Return one column a variable, one row a sample at each point of the sweep.
+    """Return a table with a column for each variable and a row for each sample and point.
 
-    Columns are named ``name (unit)``: what is swept, the sample number, what was found. The curves
-    of equally likely interfaces are left out, their band is not.
+    Columns are named ``name (unit)``: swept keys, the sample number, results. The curves of
+    equally likely interfaces are left out, but their band stays.
     """
-    result = result.drop_dims("member", errors="ignore")  # their band stays
+    result = result.drop_dims("member", errors="ignore")
     wide = sorted(
         str(name)
         for name, values in result.data_vars.items()
@@ -64,8 +64,8 @@ def table_of(result: xr.Dataset) -> pd.DataFrame:
     )
     if wide:
         warn_accuracy(
-            f"{', '.join(wide)}: more than one number a sample does not fit into a table with one"
-            " row a sample and is left out; .nc holds it"
+            f"{', '.join(wide)}: has several numbers for each sample and does not fit into a table."
+            " Export a .nc file to keep it"
         )
     narrow = result.drop_vars(wide)
     for name, values in narrow.data_vars.items():

@@ -68,7 +68,7 @@ def repetition_of(state: LimitState, smallest: float, number: int) -> Descent:
 
 
 def solve_repetition(smallest: float, state: LimitState, span: Span) -> Table:
-    """Return the repetition that is the first of a span, as a table of a store."""
+    """Return the first repetition of a span as a table of a store."""
     begin, (point, number, _) = time.perf_counter(), span
     with collect_warnings() as warned:
         descent = repetition_of(state, smallest, number)
@@ -105,9 +105,9 @@ def repetitions_in(rows: NDArray[Any]) -> Iterator[tuple[int, int, Descent]]:
 
 
 class Repetitions:
-    """The repetitions that are there at all points of a sweep, and their curves."""
+    """The stored repetitions at all points of a sweep, and their curves."""
 
-    failed = ()  # none does
+    failed = ()  # a repetition does not fail
 
     def __init__(
         self,
@@ -118,7 +118,7 @@ class Repetitions:
     ) -> None:
         if any(optional_member(point.method, "counted_only") for point in points):
             raise InputError(
-                "method: failures by rupture are counted, not sampled by levels; use"
+                "method: failures by rupture are counted, not sampled by levels. Use"
                 " st.Equilibrium() or st.LocalCriterion(), or failure_probability(...,"
                 " algorithm='plain')"
             )
@@ -128,33 +128,33 @@ class Repetitions:
         self._descents: list[dict[int, Descent]] = [{} for _ in points]
 
     def misfit(self, table: Table) -> str:
-        """Return why a table cannot hold repetitions of these points; '' if it can."""
+        """Return why a table cannot hold repetitions of these points, or ''."""
         rows = table.rows
         if rows.dtype != ROW or table.failures or not rows.size:
             return "it holds no repetitions"
         members = [len(state.experiment.random.members) for state in self.states]
         if not within(rows[POINT], len(self.states)) or rows[NUMBER].min() < 0:
-            return "a point or a repetition is none of the study"
+            return "a point or a repetition is not in the study"
         inside = all(within(rows[name], rows["samples"]) for name in ("ancestor", "level"))
         if not inside or not within(rows["member"], np.array(members)[rows[POINT]]):
-            return "a level, a sample or a member is none of the repetition"
+            return "a level, a sample or a member is not in the repetition"
         return ""
 
     def add(self, table: Table) -> None:
-        """Take the repetitions of a table; those beyond the number are left out."""
+        """Take the repetitions of a table, but leave out numbers beyond the count."""
         for point, number, descent in repetitions_in(table.rows):
             if number < self.done.shape[1]:
                 self._descents[point][number] = descent
                 self.done[point, number] = True
 
     def tail(self, point: int) -> Tail | None:
-        """Return the tail of a point from all of its repetitions; None without any."""
+        """Return the tail of a point from all of its repetitions, if there are any."""
         descents = [descent for _, descent in sorted(self._descents[point].items())]
         spent = sum(descent.evaluations for descent in descents)
         return Tail(descents, spent=spent) if descents else None
 
     def curves(self, attributes: Mapping[str, Any]) -> list[xr.Dataset]:
-        """Return the curve of each point of the sweep, NaN without a repetition."""
+        """Return the curve of each point of the sweep, NaN for a point without repetitions."""
         wanted = chances(self.smallest)
         tails = [self.tail(point) for point in range(len(self.states))]
         curves = [
@@ -193,7 +193,7 @@ def complete_curves(
     progress: Show,
     pilot: bool,
 ) -> None:
-    """Compute what is not stored; `elsewhere`, (points, repetitions), another job computes."""
+    """Compute the missing repetitions, except those `elsewhere`, (points, repetitions)."""
     store.resume(rows)
     missing, states, cores = ~(rows.done | elsewhere), rows.states, workers or usable_cores()
     with merge_warnings():

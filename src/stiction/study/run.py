@@ -1,4 +1,4 @@
-"""Runs on disk: parts of a study for several jobs, and reading of stored samples."""
+"""Runs on disk: parts of a study for several jobs, and stored samples."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FEWEST_BLOCKS = 8
-"""Blocks that a part has if there are enough, so that parts take about as long."""
+"""Blocks in a part, if there are enough, so that parts take about the same time."""
 
 
 def _part(value: Any) -> tuple[int, int]:
@@ -44,7 +44,7 @@ AnyPart: TypeAlias = Annotated[Any, BeforeValidator(_part)]
 
 
 def samples_of_part(part: tuple[int, int], points: int, samples: int) -> NDArray[np.bool_]:
-    """Return which samples a part has, (points, samples): blocks in turn."""
+    """Return the mask of the samples in a part, (points, samples): blocks in turn."""
     (number, of), total = part, points * samples
     block = min(SAMPLES_PER_BLOCK, max(1, total // (FEWEST_BLOCKS * of)))
     mine: NDArray[np.bool_] = np.arange(total) // block % of == number - 1
@@ -73,14 +73,14 @@ class Status(Result):
 
 
 class StoredRun:
-    """A run on disk, for reading; see `stiction.open_run`.
+    """A run on disk, for reading: see `stiction.open_run`.
 
     Attributes
     ----------
     path : Path
     study : Study
-    settings : dict
-        Of failure curves, their smallest probability and event; None of samples.
+    settings : dict, optional
+        Smallest probability and event of failure curves. A run of samples has no settings.
     """
 
     def __init__(self, store: Store, study: Any, settings: dict[str, Any] | None) -> None:
@@ -93,7 +93,7 @@ class StoredRun:
 
     @property
     def counted(self) -> str:
-        """What is stored."""
+        """Stored items: 'samples' or 'repetitions'."""
         return "repetitions" if self.settings else "samples"
 
     @property
@@ -102,7 +102,7 @@ class StoredRun:
         return " and ".join({point.method.label: None for point in self.study.experiments})
 
     def status(self) -> Status:
-        """Return the state of the run; all chunks are compared with their checksums.
+        """Return the state of the run, after comparing all chunks with their checksums.
 
         Raises
         ------
@@ -127,7 +127,7 @@ class StoredRun:
         Parameters
         ----------
         only : sequence of str, optional
-            Names of the variables to read; all by default.
+            Names of the variables to read. The default is all.
 
         Warns
         -----
@@ -148,7 +148,7 @@ class StoredRun:
         return result
 
     def curves(self) -> list[xr.Dataset]:
-        """Return the failure curve of each point of the sweep, NaN without a repetition."""
+        """Return the failure curve of each point, NaN for a point without repetitions."""
         curves: list[xr.Dataset] = self._read(None).curves(self.study.attributes)
         return curves
 
@@ -170,12 +170,12 @@ class StoredRun:
         ----------
         path : path
         partial : bool
-            Whether to write what is there of a run that is not complete.
+            Whether to write the stored part of an incomplete run.
 
         Raises
         ------
         InputError
-            If the suffix is neither.
+            If the suffix is another.
         StoreError
             If the file cannot be written.
         RunError
@@ -184,8 +184,7 @@ class StoredRun:
         rows, place = self._read(None), check("path", path, FilePath)
         if not (partial or rows.done.all()):
             raise RunError(
-                f"{self.path}: {int(rows.done.sum())} of {rows.done.size} {self.counted} are there;"
-                " run the study again to compute the others, or write what is there with"
-                " partial=True"
+                f"{self.path}: {int(rows.done.sum())} of {rows.done.size} {self.counted} are there."
+                " Run the study again to compute the others, or pass partial=True"
             )
         export(self._checked(rows), place)

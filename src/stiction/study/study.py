@@ -1,4 +1,4 @@
-"""A study: problem, strength, method and ensemble in one object, or one TOML file."""
+"""A study: problem, strength, method and ensemble in a single object or TOML file."""
 
 from __future__ import annotations
 
@@ -61,9 +61,9 @@ T = TypeVar("T")
 CURVES = "failure_curve"
 """Key of the settings of failure curves beside the study of a run."""
 MAX_TOML_BYTES, MAX_TOML_WORDS, MAX_DOTS = 2**21, 2**18, 64
-"""Bytes of a study file, bytes of it that are not lists of numbers, and dots of a line of these."""
+"""Bytes of a study file, bytes beside lists of numbers, and dots in a line of those bytes."""
 SHOWN_KEYS = 10
-"""Keys of a file that is no study."""
+"""Keys in a message about a file that is no study."""
 _NUMBERS = re.compile(rb"(?:[^=#]{1,200}=)?([\s\d.,eE+_\[\]-]*)")
 """A line that holds numbers, or a key and numbers."""
 
@@ -74,7 +74,7 @@ AnyMethod: Any = Annotated[
     ),
     "Method",
 ]
-"""Any registered method; in a study file ``type`` selects it."""
+"""Any registered method. In a study file ``type`` selects it."""
 _One: Any = Annotated[
     RandomInterface,
     BeforeValidator(
@@ -86,19 +86,19 @@ AnyRandom: Any = Annotated[
     Discriminator(lambda given: "several" if isinstance(given, list | tuple) else "one"),
     "RandomInterface | list",
 ]
-"""A random interface, or several that are equally likely; a field alone becomes one."""
+"""A random interface, or several equally likely interfaces. A field becomes an interface."""
 
 
 @model(kw_only=True)
 class Question:
-    """A demand, whose failure probability is asked for, or a probability, for a design.
+    """A question: the failure probability of a demand, or the design for a probability.
 
     Parameters
     ----------
     stress, force, friction_coefficient : float, optional
-        The demand, Pa, N or 1, as of `stiction.failure_probability`.
+        The demand, Pa, N or 1, as in `stiction.failure_probability`.
     probability : float, optional
-        Instead: that of sliding below the design, as of `stiction.design_stress`.
+        Probability of sliding below the design, as in `stiction.design_stress`.
     target_cv : float
         Coefficient of variation to reach.
     """
@@ -115,13 +115,13 @@ class Question:
         asked = [name for name in given if name != "target_cv"]
         if len(asked) != 1:
             raise InputError(
-                "give one of stress (Pa), force (N), friction_coefficient and probability, got"
-                f" {' and '.join(asked) or 'none'}"
+                "give either stress (Pa), force (N), friction_coefficient or probability, got"
+                f" {' and '.join(asked) or 'nothing'}"
             )
         return self
 
     def answer(self, experiment: Experiment, workers: int | None = None) -> Answer:
-        """Answer it for one point of a study."""
+        """Answer the question for a point of a study."""
         options: dict[str, Any] = {
             name: value for name, value in vars(self).items() if value is not None
         }
@@ -150,31 +150,31 @@ PARTS = tuple(_Parts.__dataclass_fields__)
 class Study(_Parts):
     """Definition of a Monte Carlo study.
 
-    The same names serve Python and TOML; a study read from the attributes of a result runs
-    again to the same numbers.
+    The same names serve Python and TOML. A study from the attributes of a result runs again to the
+    same numbers.
 
     Parameters
     ----------
     problem : Problem
     random : RandomInterface, RandomField or list of them
-        The random properties; a field alone is the peak strength, Pa. Of a list, each is
-        equally likely.
+        The random properties. A field is the peak strength, Pa. Members of a list are equally
+        likely.
     method : LocalCriterion, Equilibrium or Rupture
     ensemble : Ensemble
     sweep : list of dict
-        Axes that are crossed; each maps dotted keys of the study, which vary together, to
-        lists of values. Every point of the sweep has the same samples.
+        Axes that are crossed. Each axis maps dotted keys, which vary together, to lists of values.
+        Every point of the sweep has the same samples.
     uncertain : dict, optional
-        Distributions of parameters of ``random`` by dotted key, as of `RandomInterface.uncertain`,
-        and their ``count``, by default 30: that many interfaces, drawn with the seed, are equally
-        likely. `failure_curve` gives their mean and band; `run` samples over them.
+        Distributions of parameters of ``random`` by dotted key, as in `RandomInterface.uncertain`,
+        and their ``count``, by default 30. That many interfaces are drawn with the seed and are
+        equally likely. `failure_curve` gives their mean and band, and `run` samples over them.
     mixture : bool
-        Whether a list in ``random`` is complete, as of `stiction.failure_probability`.
+        Whether a list in ``random`` is complete, as in `stiction.failure_probability`.
     save : Save, optional
         Results that `stiction rupture` keeps, and the places of its stations.
     reliability : Question, optional
-        What `stiction reliability` answers: a ``force`` (N), ``stress`` (Pa) or
-        ``friction_coefficient`` to carry, or the ``probability`` of a design; and ``target_cv``.
+        Question to `stiction reliability`: a ``force`` (N), ``stress`` (Pa) or
+        ``friction_coefficient`` to carry, or the ``probability`` of a design, with ``target_cv``.
     title : str
         Title of the study, for readers.
 
@@ -182,7 +182,7 @@ class Study(_Parts):
     ------
     InputError
         If a key is missing, unknown or out of range, or a point of the sweep is not a valid
-        study; the message lists every problem.
+        study. The message lists every problem.
 
     Examples
     --------
@@ -215,15 +215,15 @@ class Study(_Parts):
         wide = [name for name in variables if {"x", "y"} & {*variables[name].dims}]
         if wide and len({point.problem.interface for point in points}) > 1:
             raise InputError(
-                f"sweep: {', '.join(wide)} cannot be kept along an interface that is swept; make a"
-                " study of each"
+                f"sweep: {', '.join(wide)} cannot be kept along an interface that is swept. Make a"
+                " separate study for each interface"
             )
         for point in distinct(points, "problem", "random"):
             self._check_tables(point)
         return self
 
     def _check_tables(self, point: Experiment) -> None:
-        """Refuse a demand, or a station, that a point has no place for."""
+        """Refuse a demand or a station that does not fit a point."""
         question = self.reliability
         if question is not None and question.force is not None:
             point.problem.stress_of("reliability.force", question.force)
@@ -238,7 +238,7 @@ class Study(_Parts):
 
     @property
     def points(self) -> list[Point]:
-        """The points of the sweep, in order; without a sweep, one point without values."""
+        """The points of the sweep in order. Without a sweep, there is a point without values."""
         keys = [key for axis in self.sweep for key in axis]
         steps = itertools.product(*(zip(*axis.values(), strict=True) for axis in self.sweep))
         return [
@@ -248,9 +248,9 @@ class Study(_Parts):
 
     @cached_property
     def experiments(self) -> list[Experiment]:
-        """The experiment at each point; objects that points share are built once.
+        """The experiment at each point, with a single copy of shared objects.
 
-        A mistake is reported once, with the first point where it is.
+        A mistake is reported once, with the first point that has it.
         """
         base = _Parts(**{name: getattr(self, name) for name in PARTS})
         made: dict[Any, Any] = {}
@@ -288,9 +288,9 @@ class Study(_Parts):
         return experiments
 
     def _mixture(self, random: Any) -> Any:
-        """Return a list of interfaces as all that there are."""
+        """Return a list of interfaces as a complete mixture."""
         if self.uncertain:
-            raise InputError("mixture: interfaces of [uncertain] are a sample; leave it out")
+            raise InputError("mixture: interfaces of [uncertain] are a sample. Leave it out")
         return as_random(random, mixture=True)
 
     def _likely(self, random: Any) -> Any:
@@ -302,7 +302,7 @@ class Study(_Parts):
             key for key in parameters if any(f"{key}.".startswith(f"{axis}.") for axis in axes)
         ]
         if swept:
-            raise InputError(f"uncertain: {swept[0]} is swept, too; take it out of one of them")
+            raise InputError(f"uncertain: {swept[0]} is swept too. Take it out of either table")
         if isinstance(random, list) or any(key.startswith("problem.") for key in parameters):
             return drawn_from(uncertain(random, parameters), count, self.ensemble.seed)
         return random.uncertain(parameters, count, self.ensemble.seed)
@@ -336,28 +336,29 @@ class Study(_Parts):
         part: AnyPart | None = None,
         pilot: Flag = True,
     ) -> xr.Dataset:
-        """Run the study, or the part of it that is missing.
+        """Run the study, or its missing part.
 
         Parameters
         ----------
         out : path, optional
             Folder in which results are stored as they are computed. The same call resumes an
-            interrupted run, computes failed samples again, and new ones if `samples` was raised.
+            interrupted run, computes failed samples again, and adds samples if `samples` was
+            raised.
         workers, executor, progress, pilot
             See `stiction.monte_carlo`.
         part : str, optional
-            Compute only one of several parts, such as "3/100", into the same folder as the
-            other parts: for independent jobs.
+            Part to compute in an independent job, such as "3/100". All parts go into the same
+            folder.
 
         Returns
         -------
         xarray.Dataset
-            Over the sweep's axes and 'sample'; NaN where a sample failed or is missing.
+            Over the axes of the sweep and 'sample', with NaN for failed and missing samples.
 
         Raises
         ------
         InputError, RunError
-            See `stiction.monte_carlo`; also if `out` holds another study, or a worker is lost.
+            See `stiction.monte_carlo`. Also if `out` holds another study, or a worker is lost.
         StoreError
             If `out` cannot be used.
         """
@@ -378,7 +379,7 @@ class Study(_Parts):
         )
 
     def _elsewhere(self, part: tuple[int, int] | None, samples: int) -> Any:
-        """Return which samples other jobs compute, (points, samples)."""
+        """Return the mask of the samples that other jobs compute, (points, samples)."""
         return part is not None and ~samples_of_part(part, len(self.experiments), samples)
 
     @checked
@@ -394,28 +395,29 @@ class Study(_Parts):
         progress: Progress = True,
         part: AnyPart | None = None,
     ) -> xr.Dataset:
-        """Estimate failure probabilities at every point, or the part that is missing.
+        """Estimate failure probabilities at every point, or at the missing points.
 
-        Repetition i, with 2,000 samples a level, depends on (seed, i) only.
-        The number of samples of the study is not used.
+        Repetition i, with 2,000 samples in each level, depends on (seed, i) only. The number of
+        samples in the study is not used.
 
         Parameters
         ----------
         out : path
-            Folder in which repetitions are stored as they are done. The same call resumes
-            an interrupted run, and computes more if `repetitions` was raised.
+            Folder in which repetitions are stored as they are computed. The same call resumes
+            an interrupted run, and adds repetitions if `repetitions` was raised.
         repetitions : int
-            Eight give a coefficient of variation of about 0.2 at 1e-9, 32 half of it.
+            Eight repetitions give a coefficient of variation of about 0.2 at 1e-9, and 32 give
+            half of that.
         smallest, event
             As in `stiction.failure_curve`.
         workers, executor, progress, part
-            As in `run`; parts and executors share repetitions.
+            As in `run`. Parts and executors share repetitions.
 
         Returns
         -------
         xarray.Dataset
-            As from `stiction.failure_curve`, from the repetitions that were stored and those
-            computed; over the sweep's axes too, with `lower_bound` (Pa). NaN where there is none.
+            As from `stiction.failure_curve`, from stored and computed repetitions, over the axes of
+            the sweep too, with `lower_bound` (Pa). A point without repetitions has NaN.
 
         Raises
         ------
@@ -463,7 +465,7 @@ class Study(_Parts):
 
     @classmethod
     def from_dict(cls, given: dict[str, Any], *, folder: str | Path | None = None) -> Study:
-        """Make a study of plain dictionaries; files of profiles are in `folder`."""
+        """Make a study from plain dictionaries, with files of profiles in `folder`."""
         return _read(cls, given, folder)
 
     @classmethod
@@ -494,13 +496,13 @@ class Setup:
 
 
 def read_setup(path: Path) -> Setup:
-    """Read one interface from a study file, which need not have the other tables."""
+    """Read an interface from a study file, which need not have the other tables."""
     keys, given = Setup.__dataclass_fields__, _read_toml(path)
     return _read(Setup, {key: given[key] for key in given if key in keys}, path.parent)
 
 
 def _check_toml(content: bytes) -> None:
-    """Refuse what Python's parser would take long for, such as keys of a thousand parts."""
+    """Refuse texts that Python's parser takes long for, such as keys with a thousand parts."""
     words = 0
     for line in content.split(b"\n"):
         match = _NUMBERS.fullmatch(line)
@@ -511,8 +513,8 @@ def _check_toml(content: bytes) -> None:
             raise InputError(f"has a line with more than {MAX_DOTS} dots beside its numbers")
     if words > MAX_TOML_WORDS or len(content) > MAX_TOML_BYTES:
         raise InputError(
-            f"has more than {MAX_TOML_BYTES} bytes, or {MAX_TOML_WORDS} beside lists of numbers;"
-            " name profiles by files beside the study, such as strength.npy"
+            f"has more than {MAX_TOML_BYTES} bytes, or {MAX_TOML_WORDS} beside lists of numbers."
+            " Name profiles by files beside the study, such as strength.npy"
         )
 
 
@@ -524,7 +526,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
         return tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise InputError(
-            f"{path}: is not text in UTF-8 (byte {error.start}); save it as UTF-8"
+            f"{path}: is not text in UTF-8 (byte {error.start}). Save it as UTF-8"
         ) from None
     except (RecursionError, ValueError) as error:  # a ValueError for integers of many digits
         raise InputError(
@@ -544,22 +546,22 @@ def _read(
     folder: str | Path | None,
     named: list[Path] | None = None,
 ) -> T:
-    """Validate a study in plain form, or its `Setup`; its files are in `folder`.
+    """Validate a study, or a `Setup`, in plain form, with its files in `folder`.
 
-    Files that it names are added to `named`.
+    Paths of files in the study are added to `named`.
     """
     check("study", given, dict)
     context = {}
     if given and not {*keys_of(cls)} & {*given}:
         some = ", ".join(map(describe, [*given][:SHOWN_KEYS]))
         raise InputError(
-            f"study: has none of the tables {', '.join(PARTS)}, but {some};"
-            " `stiction example` prints a study to start from"
+            f"study: must have the tables {', '.join(PARTS)}, got {some}. `stiction example` prints"
+            " a study to start from"
         )
     saved = given.get("save")
     if folder is not None and isinstance(saved, dict) and "to" in saved:
         raise InputError(
-            "save.to: is no option of a study file; give --out to stiction rupture"
+            "save.to: is no option of a study file. Give --out to stiction rupture"
         )
     if folder is not None:
         place = check("folder", folder, FilePath)
@@ -600,7 +602,7 @@ def open_run(path: Any) -> StoredRun:
     """
     place = check("path", path, FilePath)
     if place.is_file():
-        raise InputError(f"path: {place} is a file; give the folder of the run")
+        raise InputError(f"path: {place} is a file. Give the folder of the run")
     plain = read_study(place)
     store, settings = Store(place, plain), plain.pop(CURVES, None)
     try:
@@ -613,7 +615,7 @@ def open_run(path: Any) -> StoredRun:
         study = Study.from_dict(plain)
     except InputError as error:
         raise StoreError(
-            f"{place}: its study cannot be read by this installation: {'; '.join(error.problems)};"
-            " install the version, or the package with the class, that wrote it"
+            f"{place}: its study cannot be read by this installation: {'; '.join(error.problems)}."
+            " Install the version, or the package with the class, that wrote it"
         ) from None
     return StoredRun(store, study, settings)

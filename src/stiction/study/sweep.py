@@ -1,4 +1,4 @@
-"""Sweeps: keys of a study take several values; axes are crossed, keys of one zipped."""
+"""Sweeps over values of keys: axes are crossed, and the keys of an axis vary together."""
 
 import dataclasses
 import math
@@ -27,11 +27,11 @@ _FIXED = ("ensemble", "ensemble.samples", "ensemble.first", "ensemble.keep")
 _TABLES = ("problem", "random", "method", "ensemble")
 
 Axis: TypeAlias = dict[str, list[Any]]
-"""Keys that vary together, each with one value for each step."""
+"""Keys that vary together, each with a value for each step."""
 
 
 class Point(NamedTuple):
-    """One combination of a sweep: its number and the value of every swept key."""
+    """A combination in a sweep: its number and the value of every swept key."""
 
     number: int
     values: dict[str, Any]
@@ -59,8 +59,8 @@ def _axis(given: Any) -> Axis:
     if len({len(values) for values in axis.values()}) > 1:
         named = ", ".join(f"{key} has {len(values)}" for key, values in axis.items())
         raise InputError(
-            f"keys of one table vary together and need as many values each ({named}); to cross"
-            " them, give each a [[sweep]] of its own"
+            f"keys of a table vary together and need equally many values ({named}). To cross them,"
+            " give each key its own [[sweep]]"
         )
     return axis
 
@@ -78,7 +78,7 @@ def _flat(given: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def read_axes(given: Any) -> list[Axis]:
-    """Return the axes of a sweep from what was written."""
+    """Return the axes of a sweep from the tables of a study."""
     if not isinstance(given, list | tuple):
         raise InputError(f"must be a list of tables, each a [[sweep]], got {describe(given)}")
     axes: list[Axis] = []
@@ -144,7 +144,7 @@ def _read_uncertain(given: Any) -> dict[str, Any] | None:
         except ValueError as error:
             raise InputError(f"{key}: {error}") from None
     if len(uncertain) == 1:
-        raise InputError("names no parameter; give its dotted key and a distribution")
+        raise InputError("names no parameter. Give its dotted key and a distribution")
     return uncertain
 
 
@@ -196,7 +196,7 @@ def grid_axes(
 
 
 def _labels(values: Sequence[Any]) -> NDArray[Any]:
-    """Return numbers as they are, of anything else its name, numbered if it repeats."""
+    """Return numbers as given and names of other values, with a number if names repeat."""
     if all(isinstance(value, numbers.Real) and not isinstance(value, bool) for value in values):
         return np.array(values)
     texts = [value if isinstance(value, str) else _text(value) for value in values]

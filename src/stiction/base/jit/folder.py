@@ -17,7 +17,7 @@ CHOSEN = os.environ.get("NUMBA_CACHE_DIR", "")
 """Folder that the user chose, or ''."""
 if os.path.lexists(".numba_config.yaml"):
     warn_user(
-        ".numba_config.yaml: numba reads this file in the current folder; stiction does not take"
+        ".numba_config.yaml: numba reads this file in the current folder. stiction does not take"
         " the folder of its compiled kernels from it",
         UserWarning,
     )

@@ -1,8 +1,8 @@
 """Strength of any friction law at a slip, inside compiled kernels.
 
 A law hands kernels its numbers as a NamedTuple of its own type. The line that its strength follows
-is resolved by that type when a kernel is compiled, so a law costs nothing that it does not use, and
-another law changes no kernel.
+is resolved by that type when a kernel is compiled. A new law therefore changes no kernel, and its
+cost in a kernel is the cost of its own formula.
 """
 
 from collections.abc import Callable
@@ -21,7 +21,7 @@ from stiction.problem.friction.parameters import Linear
 
 
 def _line(law: Any, *numbers: float) -> tuple[float, float]:
-    """Stand for `line_at` of a law; the function is chosen by the type of its parameters."""
+    """Stand for `line_at` of a law, which is chosen by the type of its parameters."""
     raise NotImplementedError
 
 
@@ -66,8 +66,8 @@ def line_at(
 ) -> tuple[float, float]:
     """Return the straight line that the strength follows at ``slip + ahead``.
 
-    What the line has at `slip` (Pa), and how fast it falls (Pa/m). Of a piecewise linear law it is
-    the piece itself.
+    The line is given by its value at `slip` (Pa) and its rate of fall (Pa/m). For a piecewise
+    linear law it is the piece itself.
 
     Parameters
     ----------
@@ -81,13 +81,13 @@ def line_at(
 
 @jit
 def strength_at(law: Any, peak: float, residual: float, rate: float, slip: float) -> float:
-    """Return the strength tau_f, Pa, at a slip; for the parameters see `line_at`."""
+    """Return the strength tau_f, Pa, at a slip, with the parameters of `line_at`."""
     return _line(law, peak, residual, rate, slip, 0.0)[0]
 
 
 @jit_allocating
 def strengths(law: Any, peak: Array, residual: Array, rate: Array, slip: Array) -> Array:
-    """Return the strength tau_f at every node, Pa; all arrays (nodes,), see `line_at`."""
+    """Return the strength tau_f at every node, Pa, from (nodes,) arrays as in `line_at`."""
     result = np.empty(slip.size)
     for i in range(slip.size):
         result[i] = strength_at(law, peak[i], residual[i], rate[i], slip[i])

@@ -1,6 +1,6 @@
 """Friction laws: strength that falls with slip from tau_p to tau_r.
 
-To add one, derive from `FrictionLaw`; `register` makes it known to study files.
+To add a law, derive from `FrictionLaw`. `register` makes it known to study files.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from stiction.base.model import (
 from stiction.problem.friction.parameters import Exponential, Linear, Parameters, Polygon
 
 SCALES = ("weakening_rate", "critical_slip", "fracture_energy")
-"""Any one of them sets how fast a law weakens."""
+"""Each of them alone sets how fast a law weakens."""
 NEARLY_RESIDUAL = 0.01
-"""Share of tau_p - tau_r that is left where a law that never ends counts as residual."""
+"""Remaining share of tau_p - tau_r at which a law that never ends counts as residual."""
 SLIPS = 4097
-"""Number of slips up to `FrictionLaw.reach` at which a law of one's own is examined."""
+"""Number of slips up to `FrictionLaw.reach` at which a law of the user is examined."""
 LAWS = Kinds("laws")
 """The laws of study files by their `type`."""
 _VALID = {
@@ -46,8 +46,8 @@ _VALID = {
 class FrictionLaw(ABC):
     """Strength tau_f(d) = tau_r + (tau_p - tau_r) f(d/d_c), f falling from 1 to 0.
 
-    A law is the function f, with which its `parameters` come, its integral and its inverse. The
-    arguments are those of `LinearWeakening`, with W = -f'(0) (tau_p - tau_r)/d_c and
+    A law consists of the function f in its `parameters`, its integral and its inverse. It takes
+    the arguments of `LinearWeakening`, with W = -f'(0) (tau_p - tau_r)/d_c and
     Gamma = (tau_p - tau_r) d_c times the integral of f.
     """
 
@@ -82,7 +82,7 @@ class FrictionLaw(ABC):
     @property
     @abstractmethod
     def parameters(self) -> Parameters:
-        """What kernels take of the law: a NamedTuple of a type of its own, with f."""
+        """The part of the law for kernels: its own type of NamedTuple, with f."""
 
     @abstractmethod
     def area(self, u: Any) -> Array:
@@ -90,15 +90,15 @@ class FrictionLaw(ABC):
 
     @abstractmethod
     def slip_at(self, fraction: float) -> float:
-        """Return a u at which f has fallen to a fraction in [0, 1]; infinite if it never does.
+        """Return a u at which f has fallen to a fraction in [0, 1].
 
-        ``slip_at(0.0)`` is `math.inf` for a law with a tail.
+        For a law with a tail, ``slip_at(0.0)`` is `math.inf`.
         """
 
     def fraction(self, u: Any) -> Array:
         """Return f(u) at slips u in units of d_c, any shape."""
         f = self.parameters.f
-        return np.vectorize(lambda one: f(one)[0], otypes=[float])(u)
+        return np.vectorize(lambda slip: f(slip)[0], otypes=[float])(u)
 
     @property
     def initial_slope(self) -> float:
@@ -107,7 +107,7 @@ class FrictionLaw(ABC):
 
     @property
     def steepest_slope(self) -> float:
-        """The largest -f'(u); that at zero slip unless another is larger by 0.1 %."""
+        """The largest -f'(u), which counts as -f'(0) unless it is larger by 0.1 %."""
         first = self.initial_slope
         if isinstance(self.parameters, Linear | Exponential):
             return first
@@ -116,7 +116,7 @@ class FrictionLaw(ABC):
 
     @property
     def steepening(self) -> float:
-        """The steepest slope over the first, at least 1: it decides what is unstable."""
+        """The steepest slope over the first, at least 1. It decides about stability."""
         return self.steepest_slope / self.initial_slope
 
     @property
@@ -126,18 +126,18 @@ class FrictionLaw(ABC):
 
     @property
     def linear(self) -> bool:
-        """Whether strength falls along one straight line, to the residual strength."""
+        """Whether strength falls along a straight line to the residual strength."""
         return isinstance(self.parameters, Linear)
 
     @property
     def reach(self) -> float:
-        """u from which strength counts as residual: 1 % is left of a law that never ends."""
+        """u from which strength counts as residual. For a law that never ends, f is 1 % there."""
         end = self.slip_at(0.0)
         return end if np.isfinite(end) else self.slip_at(NEARLY_RESIDUAL)
 
     @property
     def scale(self) -> tuple[str, Any] | None:
-        """Which of W, d_c and Gamma was given, and its value; None if it comes with profiles."""
+        """Name and value of the given scale (W, d_c or Gamma), if it is not in the profiles."""
         return next(
             ((s, getattr(self, s)) for s in SCALES if getattr(self, s) is not None), None
         )
@@ -151,7 +151,7 @@ class FrictionLaw(ABC):
     def rate(self, drop: Array, scale: str, value: Any) -> Array:
         """Return the weakening rate W at zero slip, Pa/m.
 
-        `drop` is tau_p - tau_r, Pa; `value` that of one of `SCALES`, in Pa/m, m or J/m².
+        `drop` is tau_p - tau_r, Pa, and `value` the value of a scale, in Pa/m, m or J/m².
         """
         value = np.asarray(value, dtype=np.float64)
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
@@ -168,8 +168,8 @@ class FrictionLaw(ABC):
     def dissipated(self, slip: Array, drop: Array, rate: Array) -> Array:
         """Return the energy dissipated above the residual strength up to a slip, J/m².
 
-        `slip` (m) is of shape (..., nodes), `drop` = tau_p - tau_r (Pa) and `rate` = W (Pa/m) of
-        shape (nodes,).
+        `slip` (m) has the shape (..., nodes). `drop` = tau_p - tau_r (Pa) and `rate` = W (Pa/m)
+        have the shape (nodes,).
         """
         if self.linear:
             weakened = np.minimum(slip, drop / rate)
@@ -187,10 +187,9 @@ class LinearWeakening(FrictionLaw):
     Parameters
     ----------
     weakening_rate, critical_slip, fracture_energy : float or (nodes,) array, optional
-        One of W (Pa/m), d_c (m) and Gamma (J/m²), positive. With d_c,
-        W = (tau_p - tau_r)/d_c varies with the strength; with Gamma,
-        W = (tau_p - tau_r)²/(2 Gamma) does. Leave all three out if one of them is a profile
-        or random (`RandomInterface`).
+        W (Pa/m), d_c (m) or Gamma (J/m²), positive. With d_c, W = (tau_p - tau_r)/d_c varies
+        with the strength. With Gamma, W = (tau_p - tau_r)²/(2 Gamma) does. Leave all three out if
+        the scale is a profile or random (`RandomInterface`).
     residual_strength, residual_ratio : float or (nodes,) array, optional
         tau_r (Pa) or tau_r/tau_p in [0, 1).
 
@@ -223,8 +222,8 @@ class LinearWeakening(FrictionLaw):
 class ExponentialWeakening(FrictionLaw):
     """Strength that decays with slip: tau_r + (tau_p - tau_r) exp(-d/d_c).
 
-    The parameters are those of `LinearWeakening`; W is the rate at zero slip, d_c the slip at which
-    1/e of tau_p - tau_r is left, and Gamma = (tau_p - tau_r) d_c.
+    The law has the parameters of `LinearWeakening`. W is the rate at zero slip, d_c the slip at
+    which 1/e of tau_p - tau_r remains, and Gamma = (tau_p - tau_r) d_c.
 
     Examples
     --------
@@ -262,12 +261,12 @@ class PiecewiseWeakening(FrictionLaw):
     Parameters
     ----------
     slip : sequence of float
-        Corners u = d/d_c, rising from above 0 to 1; the corner at zero slip is implied.
+        Corners u = d/d_c, rising from above 0 to 1. The corner at zero slip is implied.
     strength : sequence of float
         (tau_f - tau_r)/(tau_p - tau_r) at these corners, falling from below 1 to 0.
     weakening_rate, critical_slip, fracture_energy, residual_strength, residual_ratio : optional
-        As for `LinearWeakening`; W is that of the first piece, and the residual strength is
-        reached at d_c.
+        As for `LinearWeakening`. W is the rate of the first piece, and the strength is residual
+        from d_c on.
 
     Examples
     --------
@@ -288,19 +287,19 @@ class PiecewiseWeakening(FrictionLaw):
         slip, strength = self.corners
         if slip.size != strength.size or slip.size < 2:
             given = f"{slip.size - 1} and {strength.size - 1}"
-            raise InputError(f"slip and strength: give one number for each corner, got {given}")
+            raise InputError(f"slip and strength: give a number for each corner, got {given}")
         if np.any(np.diff(slip) <= 0.0) or slip[-1] != 1.0:
             raise InputError(f"slip: must rise from above 0 to exactly 1, got {self.slip}")
         if np.any(np.diff(strength) >= 0.0) or strength[-1] != 0.0:
             raise InputError(
                 "strength: must fall at every corner, from below 1 to exactly 0, got"
-                f" {self.strength}; give a plateau a small fall, such as 0.5, 0.4999"
+                f" {self.strength}. Give a plateau a small fall, such as 0.5, 0.4999"
             )
         return self
 
     @property
     def corners(self) -> tuple[Array, Array]:
-        """u and f at all corners, including the one at zero slip."""
+        """u and f at all corners, including the corner at zero slip."""
         return np.array((0.0, *self.slip)), np.array((1.0, *self.strength))
 
     @property
@@ -334,7 +333,7 @@ class PiecewiseWeakening(FrictionLaw):
 
     @property
     def parameters(self) -> Polygon | Linear:
-        """Parameters for the kernels; a single piece gives the linear law, to the bit."""
+        """Parameters for the kernels. A single piece gives the linear law, to the bit."""
         if len(self.slip) == 1:
             return Linear()
         return Polygon(*self.corners, float(self._pieces[0][0]))
@@ -381,19 +380,17 @@ class PiecewiseWeakening(FrictionLaw):
 
 @lru_cache(maxsize=64)
 def _examined(law: FrictionLaw) -> tuple[Array, Array, Array]:
-    """Slips u up to the reach of a law, and f and -f' there, compiled."""
-    from stiction.problem.friction.kernels import (
-        compiled,  # numba is imported where it is needed
-    )
+    """Return slips u up to the reach of a law, and f and -f' there, compiled."""
+    from stiction.problem.friction.kernels import compiled  # imports numba
 
     parameters = law.parameters
     f, u = compiled(type(parameters)), np.linspace(0.0, law.reach, SLIPS)
-    values, slopes = np.array([f(parameters, one) for one in u]).T
+    values, slopes = np.array([f(parameters, slip) for slip in u]).T
     return u, values, slopes
 
 
 def contradictions(law: FrictionLaw) -> list[str]:
-    """Return what is wrong with a law of one's own: it rises, say, or contradicts its f."""
+    """Return the mistakes in a law of the user, which may rise or contradict its f."""
     if type(law).__module__.startswith("stiction."):
         return []
     name, parameters = type(law).__name__, law.parameters
@@ -404,7 +401,7 @@ def contradictions(law: FrictionLaw) -> list[str]:
             f"{name}: slip_at(0) fails ({type(error).__name__}: {error}); return the slip at which"
             " strength is residual, math.inf if it never is"
         ]
-    if not all(hasattr(parameters, one) for one in ("_fields", "f", "initial_slope")):
+    if not all(hasattr(parameters, name) for name in ("_fields", "f", "initial_slope")):
         return [
             f"{name}: its parameters must be a NamedTuple with a field initial_slope, -f'(0), and"
             " a method f(self, u)"
@@ -457,4 +454,4 @@ if TYPE_CHECKING:
     Friction: TypeAlias = FrictionLaw
 else:
     Friction = Annotated[Any, OneOf(LAWS, _law, default="linear"), "FrictionLaw"]
-"""Any friction law; in a study file ``type`` selects it (default: linear)."""
+"""Any friction law. In a study file ``type`` selects it (default: linear)."""

@@ -7,18 +7,18 @@ from stiction.base.arrays import Array
 
 
 class Parameters(Protocol):
-    """What kernels take of a law: a NamedTuple with these members, of a type of its own."""
+    """The part of a law for kernels: its own type of NamedTuple with these members."""
 
     @property
     def initial_slope(self) -> float:
-        """-f'(0), positive; a field."""
+        """-f'(0), positive. It is a field."""
 
     def f(self, u: float) -> tuple[float, float]:
-        """Return f(u) and -f'(u) at a slip u >= 0 in units of d_c; numba compiles it."""
+        """Return f(u) and -f'(u) at a slip u >= 0 in units of d_c. Numba compiles it."""
 
 
 class Linear(NamedTuple):
-    """The linear law needs no numbers but those of the sample."""
+    """Parameters of the linear law, which needs the numbers of the sample only."""
 
     initial_slope: float = 1.0
 
@@ -27,7 +27,7 @@ class Linear(NamedTuple):
 
 
 class Exponential(NamedTuple):
-    """The exponential law needs no numbers but those of the sample."""
+    """Parameters of the exponential law, which needs the numbers of the sample only."""
 
     initial_slope: float = 1.0
 

@@ -1,8 +1,13 @@
 """Values put on the nodes of a line or a plane, and their gaps.
 
-The nodes are x_i = i L/n in each direction, periodically: points may come in any order and begin
-anywhere. Those of a specimen are x_i = (i + 1/2) L/n, and nothing continues beyond its ends. What
-is missing is refused, stays NaN, or is interpolated on request.
+The nodes are x_i = i L/n in each direction. The interface is periodic, so points may come in any
+order and begin anywhere. On a specimen, the nodes are x_i = (i + 1/2) L/n, and the profile stops at
+its ends. The steps are:
+
+1. Find by how much of a spacing all points lie beside nodes. A warning states such an offset.
+   Points that do not lie on nodes are refused, or interpolated on request.
+2. Give each node the value of its point. Two different values at a node are refused.
+3. Refuse missing values, leave NaN, or fill gaps by linear interpolation on request.
 """
 
 from __future__ import annotations
@@ -23,23 +28,23 @@ Gaps = Literal["refuse", "fill", "skip"]
 Mask = NDArray[np.bool_]
 
 TOLERANCE = 0.02
-"""Of the spacing of nodes: what rounding in a file may move a point."""
+"""Share of the spacing by which rounding in a file may move a point."""
 WIDE = 4.0
-"""Times the median distance of points: what is wider is no interval but a gap."""
+"""Multiple of the median distance of points above which an interval is a gap."""
 IN_GAP, MEASURED = "in_gap", "measured"
-"""Variable of a result; coordinate of results and profiles with gaps, False where none was."""
+"""Variable of a result, and coordinate of results and profiles with gaps, False in a gap."""
 OF_A_PLANE = (
     "; a map has columns or coordinates x and y, or is an .npy of shape (nx, ny), and needs an"
     " interface of two lengths and two numbers of nodes"
 )
-"""What to do with two dimensions where a line was expected."""
+"""Advice for two dimensions where a line was expected."""
 
 
 def points_of(array: Any) -> tuple[Array, dict[str, Array], Any]:
-    """Return values (..., points), their places (m) by direction, and where they were measured.
+    """Return values (..., points), their places (m) by direction, and a mask of measured points.
 
-    The mask is True if nothing was filled in. Values without coordinates keep their shape,
-    and the dictionary is empty.
+    The mask is True if all were measured. Values without coordinates keep their shape, and have
+    an empty dictionary of places.
     """
     dims = [dim for dim in ("x", "y") if dim in array.coords]
     if len(dims) == 2 and "row" not in array.dims:
@@ -54,10 +59,9 @@ def points_of(array: Any) -> tuple[Array, dict[str, Array], Any]:
 def place(
     array: Any, interface: Interface, interpolate: bool = False, gaps: Gaps = "refuse"
 ) -> tuple[Array, Any]:
-    """Put values on the nodes of an interface, (..., *shape), with a mask of what was measured.
+    """Put values on the nodes of an interface, (..., *shape), with a mask of measured nodes.
 
-    The mask is False where there was no value, be it filled in or left out; it is True if
-    nothing is missing.
+    The mask is False at filled and missing values. It is True if all values are there.
     """
     values, places, measured = points_of(array)
     if not places:
@@ -66,7 +70,7 @@ def place(
             hint = turned(shape, interface.shape)
             if not interface.is_plane:
                 hint = (
-                    "; give one value per node, or name the column of x (x=...), with"
+                    ". Give a value for each node, or name the column of x (x=...), with"
                     " interpolate=True if points do not lie on the nodes"
                 )
             raise InputError(f"must have shape {interface.shape}, got shape {shape}{hint}")
@@ -86,7 +90,7 @@ def place(
         if finer == 1 and not 0 <= flat.min() <= flat.max() < interface.size:
             raise InputError(
                 f"x reaches from {at.min():g} to {at.max():g} m, beyond the nodes of a specimen"
-                f" of {interface.measure:g} m; crop the record, place it with offset= or 'centre',"
+                f" of {interface.measure:g} m. Crop the record, place it with offset= or 'centre',"
                 " or pass interpolate=True"
             )
     else:
@@ -118,9 +122,9 @@ def turned(given: tuple[int, ...], shape: tuple[int, ...]) -> str:
 
 
 def _offset(dim: str, x: Array, interface: Interface, interpolate: bool) -> float | None:
-    """Return by how many spacings, in (-0.5, 0.5], all points lie beside nodes.
+    """Return the offset of all points from nodes, in spacings, in (-0.5, 0.5] (step 1).
 
-    It is None if points are to be interpolated, as those of a line that is coarser than the nodes.
+    It is None if points must be interpolated, for example on a line that is coarser than the nodes.
     """
     axis = interface.dims.index(dim)
     spacing, length = interface.spacings[axis], interface.lengths[axis]
@@ -145,8 +149,8 @@ def _offset(dim: str, x: Array, interface: Interface, interpolate: bool) -> floa
         advice = "" if interface.is_plane else ", or interpolate linearly with interpolate=True"
         raise InputError(
             f"{dim} does not coincide with the {interface.shape[axis]} nodes {formula}, which"
-            f" are {spacing:.6g} m apart: {at.size} points from {x.min():.6g} to {x.max():.6g} m;"
-            f" check the unit of {dim}, give values at the nodes, interface.{dim}{advice}"
+            f" are {spacing:.6g} m apart: {at.size} points from {x.min():.6g} to {x.max():.6g} m."
+            f" Check the unit of {dim}, give values at the nodes, interface.{dim}{advice}"
         )
     offset = float(first + deviation.mean())
     if abs(offset) > TOLERANCE:
@@ -160,7 +164,7 @@ def _offset(dim: str, x: Array, interface: Interface, interpolate: bool) -> floa
 def _check_repeats(
     values: Array, places: dict[str, Array], twins: NDArray[np.int64], interface: Interface
 ) -> None:
-    """Refuse two points at one place, unless they have the same value a period apart."""
+    """Refuse two points at the same place, unless they have the same value a period apart."""
     rows = values.reshape(-1, twins.size)
     for i in np.flatnonzero(twins != np.arange(twins.size)):
         pair = [twins[i], i]
@@ -173,12 +177,12 @@ def _check_repeats(
             )
             raise InputError(
                 f"{where} are the same position on an interface of period {interface.length}"
-                f" m; keep one of the two values{'' if interface.is_plane else OF_A_PLANE}"
+                f" m. Keep either value{'' if interface.is_plane else OF_A_PLANE}"
             )
 
 
 def _interpolated(x: Array, values: Array, interface: Interface) -> Array:
-    """Linear between points, constant a little beyond those at free ends, NaN in gaps."""
+    """Return linear interpolations, constant a little beyond free ends, NaN in gaps (step 1)."""
     length, nodes = interface.measure, interface.x
     margin = TOLERANCE * interface.spacing
     if not interface.is_free:
@@ -214,7 +218,7 @@ def _interpolated(x: Array, values: Array, interface: Interface) -> Array:
 def close_gaps(
     values: Array, measured: Any, interface: Interface, gaps: Gaps
 ) -> tuple[Array, Any]:
-    """Return values (..., *shape) with NaN refused, left or filled, and what was measured."""
+    """Return values (..., *shape) with NaN refused, left or filled, and a mask (step 3)."""
     missing = np.isnan(values)
     if not missing.any():
         return values, measured
@@ -227,9 +231,9 @@ def close_gaps(
     )
     if gaps == "refuse":
         raise InputError(
-            f"{text}; give them, make interface.length that of the record, or pass gaps='fill' to"
-            " st.onset or st.read_profile, which interpolates. RandomField.given(profile) draws"
-            " equally likely values there instead"
+            f"{text}. Give them, make interface.length the length of the record, or pass"
+            " gaps='fill' to st.onset or st.read_profile, which interpolates."
+            " RandomField.given(profile) draws equally likely values there instead"
         )
     if gaps == "fill":
         if holes.all(axis=interface.axes).any():
@@ -239,14 +243,14 @@ def close_gaps(
         ]).reshape(values.shape)  # fmt: skip
         doubt = "; check interface.length and the unit of x" if missing.mean() > 0.5 else ""
         pieces = "triangles" if interface.is_plane else "straight lines"
-        warn_accuracy(f"{text}; filled with {pieces}{doubt}")
+        warn_accuracy(f"{text}. Filled with {pieces}{doubt}")
     return values, ~missing & measured
 
 
 def _filled(row: Array, hole: Mask, interface: Interface) -> Array:
     """Return values (*shape) whose holes are interpolated linearly.
 
-    Free ends take the nearest value. On a plane, triangles span the nodes around each hole; a
+    Free ends take the nearest value. On a plane, triangles span the nodes around each hole, and a
     period repeats on all sides.
     """
     if not hole.any():
@@ -271,9 +275,9 @@ def _filled(row: Array, hole: Mask, interface: Interface) -> Array:
 
 
 def with_gaps(problem: Any, result: xr.Dataset, measured: Any) -> xr.Dataset:
-    """Return a result with the gaps of its profiles, and a mark of patches that reach into one."""
+    """Return a result with the gaps of its profiles, and a mark of patches that reach into them."""
     interface, position = problem.interface, result["critical_position"]
-    if np.all(measured):  # nothing was filled
+    if np.all(measured):
         return result
     rate, places = problem.uniform_rate, position.values.reshape(-1, len(interface.dims))
     lengths = interface.spacings if rate is None else problem.nucleation_lengths(rate)
