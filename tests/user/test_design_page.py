@@ -1,5 +1,7 @@
 """The page of a design: its numbers, inputs, evidence and doubts, from Python and a command."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from joint import GIVEN, PROBLEM, RANDOM
@@ -84,3 +86,28 @@ def test_the_command_writes_the_page(tmp_path):
         standalone_mode=False,
     )
     assert "Joint A" in page.read_text(encoding="utf-8")
+
+
+def test_the_command_makes_constants_uncertain(tmp_path, capsys):
+    """As the table of a study does, to the digit."""
+    table = {KEY: {"low": 4e6, "high": 6e6}, "count": 40}
+    study = st.Study(
+        problem=PROBLEM, random=RANDOM, method=GIVEN["method"], ensemble=st.Ensemble(samples=1),
+        reliability={"probability": 1e-2, "target_cv": 0.3},
+    )  # fmt: skip
+    path = tmp_path / "study.toml"
+    study.to_toml(path)
+
+    def command(*lines):
+        options = [word for line in lines for word in ("--uncertain", line)]
+        app(["reliability", str(path), *options], standalone_mode=False)
+        return capsys.readouterr().out
+
+    printed = command(f"{KEY} = [4e6, 6e6]", "count = 40")
+    wanted = replace(study, uncertain=table)
+    assert printed.startswith(str(wanted.reliability.answer(wanted.experiments[0])))
+    refuses("--uncertain: must be a line of TOML", lambda: command(KEY))
+    refuses(
+        "uncertain: problem.load: unknown 'weight'",
+        lambda: command("problem.load.weight = [1, 2]"),
+    )

@@ -72,6 +72,11 @@ class Experiment:
                 except InputError as error:
                     mistakes |= dict.fromkeys(f"{name}: {text}" for text in error.problems)
         problems = list(mistakes)
+        for constants in getattr(random, "constants", ())[:1]:  # all have the same keys
+            try:
+                with_values(self.problem, constants, "problem")
+            except InputError as error:
+                problems += [f"uncertain: {text}" for text in error.problems]
         problems += refusals(self.problem, self.method)
         unknown = [name for name in self.keep if name not in random.names]
         problems += [unknown_name("keep", name, random.names) for name in unknown]
@@ -103,9 +108,9 @@ class Experiment:
     @property
     def variables(self) -> dict[str, Variable]:
         """Variables of `results`, by name."""
-        interface, names = self.problem.interface, self.random.names
+        interface, pressed = self.problem.interface, "normal_pressure" in self.random.varying
         kept = {name: along(interface, PROFILES[name]) for name in self.keep}
-        return variables_of(self.problem, self.method, "normal_pressure" in names) | kept
+        return variables_of(self.problem, self.method, pressed) | kept
 
     @property
     def sample_bytes(self) -> float:

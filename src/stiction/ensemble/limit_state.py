@@ -62,7 +62,7 @@ class LimitState:
     @property
     def _random_pressure(self) -> bool:
         """Whether stresses are divided by a pressure that differs between samples."""
-        return self.per_pressure and "normal_pressure" in self.experiment.random.names
+        return self.per_pressure and "normal_pressure" in self.experiment.random.varying
 
     def by(self, method: Any) -> Self:
         """Return the same limit state by another method."""
@@ -160,7 +160,7 @@ class LimitState:
         profile = np.broadcast_to(problem.load_profile, problem.interface.shape)
         least: Any = problem.load.initial_stress
         most: Any = least
-        if "initial_stress" in random.names:
+        if "initial_stress" in random.varying:
             least, most = support_in_stress(problem, random, "initial_stress", chance)
         # The mean of a random initial stress is random itself: take its lowest.
         initial = np.mean(np.broadcast_to(least, profile.shape))
@@ -206,7 +206,7 @@ def scales_with_strength(problem: Any, random: Any, method: Any) -> bool:
     zero = scaling == "stretch"  # neither residual strength nor initial stress scales
     return bool(
         scaling != "none"
-        and len(random.names) == 1
+        and random.varying <= {"strength", *({"normal_pressure"} - {*random.names})}
         and friction.weakening_rate is not None
         and np.ptp(initial) == 0.0
         and not (np.any(initial) and np.ptp(problem.load_profile))
@@ -219,7 +219,7 @@ def no_single_length(problem: Problem, random: Any) -> str | None:
     rate = problem.uniform_rate
     if not problem.friction.linear:
         return "strength does not fall linearly with slip"
-    if rate is None or set(SCALES) & set(random.names):
+    if rate is None or set(SCALES) & random.varying:
         return "the weakening rate is not uniform"
     try:
         if problem.specimen is None:

@@ -452,6 +452,6 @@ def bounds_of(
         return low * area, high * area
     if variable != "friction_coefficient":
         return low, high
-    if "normal_pressure" in experiment.random.names:
+    if "normal_pressure" in experiment.random.varying:
         return -np.inf, np.inf
     return low / experiment.pressure, high / experiment.pressure

@@ -568,6 +568,15 @@ class Problem:
         self._check_resolution(sample.steepest_rate)
         return sample, reduce(np.logical_and, measured)
 
+    def constants(self, strength: Any) -> dict[str, Any]:
+        """Return values by name of profiles that are not given, None where there are none."""
+        return {
+            "residual_strength": self.friction.residual(strength),
+            "initial_stress": self.load.initial_stress,
+            **dict([self.friction.scale] if self.friction.scale else []),
+            "normal_pressure": self.normal_pressure,
+        }
+
     def own_sample(self, profiles: Mapping[str, Array], accept: Collection[str] = ()) -> Sample:
         """Return a sample of arrays by name that the package made, (samples, *shape) in SI.
 
@@ -584,17 +593,16 @@ class Problem:
         if problems:
             raise InputError(problems)
         strength = profiles["strength"]
-        scale, value = self.friction.scale or (SCALES[0], 1.0)
+        scale = self.friction.scale[0] if self.friction.scale else SCALES[0]
         scale = next((name for name in SCALES if name in profiles), scale)
-        defaults = {
-            "residual_strength": self.friction.residual(strength),
-            "initial_stress": self.load.initial_stress,
-            scale: value,
-            "normal_pressure": np.nan if self.given_pressure is None else self.normal_pressure,
+        known = {"normal_pressure": np.nan, scale: 1.0} | {
+            name: value
+            for name, value in (self.constants(strength) | dict(profiles)).items()
+            if value is not None
         }
         residual, initial, value, pressure = (
-            np.broadcast_to(profiles.get(name, default), strength.shape)
-            for name, default in defaults.items()
+            np.broadcast_to(known[name], strength.shape)
+            for name in ("residual_strength", "initial_stress", scale, "normal_pressure")
         )
         return self._made(strength, residual, initial, scale, value, pressure, accept)
 

@@ -25,7 +25,13 @@ from stiction.base.representation import Result, Row, Summary
 from stiction.base.variables import unit_of_key
 from stiction.problem.interface import Interface
 from stiction.random.dotted_keys import distributions_of, full_key, with_values
-from stiction.random.fields import RandomField, RandomInterface, as_random_interface, layout
+from stiction.random.fields import (
+    FACTOR,
+    RandomField,
+    RandomInterface,
+    as_random_interface,
+    layout,
+)
 from stiction.random.synthesis import SAMPLES_PER_BLOCK, Stream
 
 MEMBER_STREAM = Stream(2000, SAMPLES_PER_BLOCK, np.arange(0), mean_mode=True)
@@ -117,6 +123,11 @@ class EquallyLikely:
         return self.members[0].names
 
     @cached_property
+    def varying(self) -> set[str]:
+        """Names of what differs from sample to sample: random, or with a factor."""
+        return set().union(*(member.varying for member in self.members))
+
+    @cached_property
     def kinds(self) -> NDArray[np.int64]:
         """Number of each member's fields, the same for equal fields, (members,)."""
         known: dict[Any, int] = {}
@@ -204,6 +215,8 @@ class EquallyLikely:
     def from_draws(self, interface: Interface, draws: Array) -> dict[str, Array]:
         """Map draws (samples, dimension) to profiles by name, (samples, *shape) each."""
         profiles = {name: np.empty((len(draws), *interface.shape)) for name in self.names}
+        for name in self.varying - {*self.names}:  # of members without such a factor it is 1
+            profiles[FACTOR + name] = np.ones((len(draws), *interface.shape))
         selected, columns = self.member(draws), _columns(self, interface).of
         for number in np.unique(selected).tolist():
             rows = np.flatnonzero(selected == number)

@@ -44,6 +44,8 @@ from stiction.random.synthesis import SAMPLES_PER_BLOCK, Stream, block_of
 NAMES = tuple(PROFILES)
 MAY_BE_COEFFICIENTS = ("strength", "residual_strength", "initial_stress")
 FIRST_FACTOR_STREAM = 1000  # number of the stream of draws of the first property's factor
+FACTORS = (*NAMES, "pressing_force")  # what may have a factor, in the order of their streams
+FACTOR = "between."  # begins the name of a factor among profiles, if its property is not random
 MIN_PIVOT = 1e-12  # round-off of eigenvalues of a correlation matrix
 # Limits of warnings
 MAX_UNRESOLVED = 0.01  # share of the variance that the grid does not resolve
@@ -312,7 +314,9 @@ class RandomInterface:
         ``correlation.strength.residual_strength = 0.8``. Other pairs are independent.
     between : mapping, optional
         Marginals of positive factors with mean 1 that are constant along a specimen and differ
-        from specimen to specimen: ``{"strength": st.Lognormal(mean=1.0, cv=0.1)}``.
+        from specimen to specimen: ``{"strength": st.Lognormal(mean=1.0, cv=0.1)}``. A property that
+        is not random here may have one, too, such as ``"critical_slip"``, and so may
+        ``"pressing_force"``: the problem then gives its mean.
 
     Notes
     -----
@@ -373,12 +377,15 @@ class RandomInterface:
             "correlation": [*correlated, *chain(*correlated.values())],
             "between": between,
         }
+        valid = {"correlation": self.names, "between": FACTORS}
         problems += [
-            unknown_name(table, name, self.names)
+            unknown_name(table, name, valid[table])
             for table, given in tables.items()
             for name in given
-            if name not in self.names
+            if name not in valid[table]
         ]
+        if {"normal_pressure", "pressing_force"} <= {*between}:
+            problems.append("between: give one of normal_pressure and pressing_force, got both")
         for name, marginal in between.items():
             if getattr(self.properties.get(name), "conditions", None) is not None:
                 problems.append(
@@ -404,6 +411,12 @@ class RandomInterface:
     def properties(self) -> dict[str, RandomField]:
         """Random properties by name, in the order of `stiction.base.variables.PROFILES`."""
         return {name: getattr(self, name) for name in NAMES if getattr(self, name) is not None}
+
+    @property
+    def varying(self) -> set[str]:
+        """Names of what differs from sample to sample: random, or with a factor."""
+        pressed = {"pressing_force": "normal_pressure"}
+        return {*self.names, *(pressed.get(name, name) for name in self.between or ())}
 
     @property
     def members(self) -> tuple[RandomInterface, ...]:
@@ -476,7 +489,10 @@ class RandomInterface:
 
     @checked
     def from_draws(self, interface: Interface, draws: Numbers) -> dict[str, Array]:
-        """Map draws (samples, dimension) to profiles by name, (samples, *shape) each."""
+        """Map draws (samples, dimension) to profiles by name, (samples, *shape) each.
+
+        Factors of properties that are not random begin with `FACTOR` and a property.
+        """
         streams = layout(self, interface)
         dimension = streams[-1].columns.stop
         if draws.ndim != 2 or draws.shape[1] != dimension:
@@ -501,8 +517,13 @@ class RandomInterface:
         # A factor between specimens is a single number for each sample.
         factors = zip((self.between or {}).items(), independent[len(profiles) :], strict=True)
         for (name, marginal), u in factors:
-            factor = from_normal(marginal, u)
-            profiles[name] *= factor.reshape(-1, *(1 for _ in interface.shape))
+            factor = from_normal(marginal, u).reshape(-1, *(1 for _ in interface.shape))
+            if name in profiles:
+                profiles[name] *= factor
+            else:
+                name = "normal_pressure" if name == "pressing_force" else name
+                whole = np.broadcast_to(factor, (len(draws), *interface.shape))
+                profiles[FACTOR + name] = whole
         return profiles
 
     def profiles(
@@ -589,7 +610,7 @@ def layout(random: RandomInterface, interface: Interface) -> list[Stream]:
         start = columns.stop
     no_modes = np.arange(0)
     for column, name in enumerate(random.between or (), start):
-        number = FIRST_FACTOR_STREAM + NAMES.index(name)
+        number = FIRST_FACTOR_STREAM + FACTORS.index(name)
         columns = slice(column, column + 1)
         streams.append(Stream(number, SAMPLES_PER_BLOCK, no_modes, True, columns, no_modes))
     return streams

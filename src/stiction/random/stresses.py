@@ -10,7 +10,7 @@ from scipy.special import ndtr, ndtri
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.problem.problem import Problem
-from stiction.random.fields import RandomInterface
+from stiction.random.fields import FACTOR, RandomInterface
 
 # Shares of the strength at or below the residual strength: the largest without a warning, and the
 # largest that is accepted.
@@ -25,8 +25,16 @@ def coefficients_of(random: RandomInterface) -> list[str]:
 
 
 def check_pressure(problem: Problem, random: RandomInterface) -> None:
-    """Raise an `InputError` if coefficients are given without a normal pressure."""
-    names = coefficients_of(random)
+    """Raise an `InputError` if coefficients have no pressure, or a factor has no property."""
+    names, constants = coefficients_of(random), problem.constants(np.ones(()))
+    forces = {"pressing_force": problem.load.pressing_force}
+    for name in random.between or {}:
+        value = (constants | forces).get(name)
+        if name not in random.names and (value is None or not np.any(value)):
+            raise InputError(
+                f"between.{name}: is a factor on the {name} of the problem, which has none; give"
+                " it there, make it random, or leave the factor out"
+            )
     if names and problem.given_pressure is None and "normal_pressure" not in random.names:
         raise InputError(
             f"{names[0]}: is given as friction coefficients, which need a normal pressure"
@@ -39,12 +47,22 @@ def profiles_in_stress(
 ) -> dict[str, Array]:
     """Return sampled profiles with coefficients multiplied by the pressure at each node.
 
-    A sampled pressure is multiplied by the shape of the pressure between glued blocks.
+    A sampled pressure is multiplied by the shape of the pressure between glued blocks. Constants of
+    the problem are multiplied by their factors between specimens.
     """
-    stresses, pressure = dict(profiles), problem.normal_pressure
+    stresses = {name: rows for name, rows in profiles.items() if not name.startswith(FACTOR)}
+    factors = {name: rows for name, rows in profiles.items() if name.startswith(FACTOR)}
+    pressure = problem.normal_pressure
     if "normal_pressure" in stresses:
         pressure = stresses["normal_pressure"] = stresses["normal_pressure"] * problem.pressing
-    return stresses | {name: stresses[name] * pressure for name in coefficients_of(random)}
+    elif FACTOR + "normal_pressure" in factors:
+        pressure = factors[FACTOR + "normal_pressure"] * pressure
+    stresses |= {name: stresses[name] * pressure for name in coefficients_of(random)}
+    constants = problem.constants(stresses["strength"]) if factors else {}
+    for key, factor in factors.items():
+        name = key.removeprefix(FACTOR)
+        stresses[name] = factor * constants[name]
+    return stresses
 
 
 def support_in_stress(
@@ -55,22 +73,24 @@ def support_in_stress(
     With a `chance`, each of its random parts exceeds its bounds with this probability on either
     side.
     """
-    field, between = random.properties[name], random.between or {}
+    field, between = random.properties.get(name), random.between or {}
 
     def extremes(marginal: Any) -> Any:
         law = marginal.distribution
         return (law.ppf(chance), law.isf(chance)) if chance else law.support()
 
-    low, high = extremes(field.marginal)
+    if field is None:
+        value = problem.constants(0.0)[name]
+        low, high = np.min(value), np.max(value)
+    else:
+        low, high = extremes(field.marginal)
+    pressed = ("normal_pressure", "pressing_force") if name == "normal_pressure" else (name,)
     # Rounding may put the lower end of a factor just below zero.
-    factors = [np.maximum(extremes(between[name]), 0.0)] if name in between else []
-    if name == "normal_pressure":
+    factors = [np.maximum(extremes(between[key]), 0.0) for key in pressed if key in between]
+    if field is not None and name == "normal_pressure":
         factors.append((np.min(problem.pressing), np.max(problem.pressing)))
-    if field.of is not None and "normal_pressure" in random.names:
+    if field is not None and field.of is not None:
         factors.append(support_in_stress(problem, random, "normal_pressure", chance))
-    elif field.of is not None:
-        pressure = problem.normal_pressure
-        factors.append((np.min(pressure), np.max(pressure)))
     for factor in factors:  # factors are positive, and 0 times infinity counts as 0
         ends = [a * b if a and b else 0.0 for a in (low, high) for b in factor]
         low, high = min(ends), max(ends)
@@ -89,6 +109,9 @@ def _pressures(problem: Problem, random: RandomInterface) -> Array:
             random.properties["normal_pressure"].marginal, PRESSURE_QUANTILES
         )
         pressure = np.multiply.outer(levels, problem.pressing)
+    for key in {"normal_pressure", "pressing_force"} & {*(random.between or {})}:
+        factors = _equally_likely((random.between or {})[key], PRESSURE_QUANTILES)
+        pressure = np.multiply.outer(factors, pressure)
     flat = np.sort(np.ravel(pressure))
     return flat[
         np.linspace(0, flat.size - 1, min(flat.size, PRESSURE_QUANTILES)).round().astype(int)

@@ -135,7 +135,7 @@ def _expands(state: LimitState) -> bool:
     experiment = state.experiment
     problem, random = experiment.problem, experiment.random
     return random.factor_column(problem.interface) is not None and scales_with_strength(
-        problem, random.members[0], experiment.method
+        problem, random, experiment.method
     )
 
 
