@@ -28,7 +28,8 @@ class InputError(ValueError):
     Parameters
     ----------
     problems : str or iterable of str
-        A text for each mistake, with the key or argument, the value given and the valid values.
+        A text for each mistake, with the key or argument, the value given and the valid
+        values.
 
     Attributes
     ----------
@@ -140,7 +141,8 @@ _collected: ContextVar[list[Warned] | None] = ContextVar("collected", default=No
 def collect_warnings() -> Iterator[list[Warned]]:
     """Collect the warnings of this package in this thread, and in those that run in its context.
 
-    `warnings.catch_warnings` changes the whole process: two threads would take each other's.
+    `warnings.catch_warnings` changes the whole process: two threads would take each
+    other's.
     """
     warned: list[Warned] = []
     token = _collected.set(warned)
@@ -165,8 +167,8 @@ def merge_warnings() -> Iterator[list[Warned]]:
 def merged(caught: Iterable[Warned]) -> list[Warned]:
     """Return warnings without repetition.
 
-    Texts that differ only in numbers become a single text with ranges. Warnings about samples
-    become a single warning that counts all samples.
+    Texts that differ only in numbers become a single text with ranges. Warnings about
+    samples become a single warning that counts all samples.
     """
     groups: dict[tuple[str, type[Warning], bool], list[Warned]] = {}
     for warning in caught:
@@ -211,7 +213,8 @@ def warn_of_samples(text: str, which: Any, sizes: Any = ()) -> None:
     Parameters
     ----------
     text : str
-        With ``{samples}`` for '3 of 40 samples (1, 4, 7)' and ``{worst}`` for the largest size.
+        With ``{samples}`` for '3 of 40 samples (1, 4, 7)' and ``{worst}`` for the largest
+        size.
     which : array of bool
         Whether the warning concerns each sample.
     sizes : array, optional

@@ -1,7 +1,8 @@
 """Files that are whole or absent, archives of arrays, and the folders of the cache.
 
-Files may come from strangers. Every reader of the package takes its bytes from `read_regular` or
-from `content_of`, and looks at the size of its result before it takes memory.
+Files may come from strangers. Every reader of the package takes its bytes from
+`read_regular` or from `content_of`, and looks at the size of its result before it takes
+memory.
 """
 
 import atexit
@@ -44,12 +45,15 @@ def read_regular(
 ) -> bytes:
     """Return the content of a regular file.
 
-    An `InputError` refuses a file of another kind, or a file that is too large. Other errors of the
-    system (an OSError) pass. The steps are:
+    An `InputError` refuses a file of another kind, or a file that is too large. Other
+    errors of the system (an OSError) pass. The steps are:
 
-    1. Look at the kind of the file before it is opened, because opening a device may act on it.
-    2. Open the file without waiting, and look again, because another file may have taken its place.
-    3. Read as many bytes as the file had then. Files that the system makes up, as in /proc, have 0.
+    1. Look at the kind of the file before it is opened, because opening a device may act
+       on it.
+    2. Open the file without waiting, and look again, because another file may have taken
+       its place.
+    3. Read as many bytes as the file had then. Files that the system makes up, as in
+       /proc, have 0.
     """
     extra = getattr(os, "O_NONBLOCK", 0)
     if not follow_links:
@@ -202,9 +206,9 @@ def _warn_of_no_cache(folder: Path, reason: str) -> None:
 def private_folder(folder: Path) -> Path:
     """Return a folder in which only this user can have put anything, and make it if needed.
 
-    Compiled kernels are pickles, so whoever can replace a kernel can run code as the user who loads
-    it. If the folder is not private, a warning says why, and a temporary folder of this process
-    takes its place. The steps are:
+    Compiled kernels are pickles, so whoever can replace a kernel can run code as the user
+    who loads it. If the folder is not private, a warning says why, and a temporary folder
+    of this process takes its place. The steps are:
 
     1. Resolve links, because their owners could let them lead elsewhere.
     2. Make all missing folders with mode 0700, for any umask.

@@ -1,6 +1,7 @@
 """Frozen, validated parameter objects, and public functions that check their arguments.
 
-The same definition serves Python, TOML and JSON. An `InputError` lists all mistakes at once.
+The same definition serves Python, TOML and JSON. An `InputError` lists all mistakes at
+once.
 """
 
 import dataclasses
@@ -257,8 +258,9 @@ def mistakes(
 ) -> list[tuple[str, str]]:
     """Return the mistakes that pydantic found in a model or call, each with its path.
 
-    `valid` are the names of the keys or arguments. Mistakes inside another model were explained
-    there. Pydantic adds the members of a union to the path of a `call`, and they are left out.
+    `valid` are the names of the keys or arguments. Mistakes inside another model were
+    explained there. Pydantic adds the members of a union to the path of a `call`, and
+    they are left out.
     """
     texts: dict[tuple[str, str, str], list[str]] = {}  # a union has an item for each member
     shown = [name for name in valid if name != "self"]
@@ -328,8 +330,9 @@ def model(*, kw_only: bool = ...) -> Callable[[type[T]], type[T]]: ...
 def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     """Class decorator: a frozen pydantic dataclass whose mistakes come as `InputError`.
 
-    Objects compare by value (arrays too) and hash by value. Consistency checks go into a method
-    decorated with ``pydantic.model_validator(mode="after")`` that raises `InputError`.
+    Objects compare by value (arrays too) and hash by value. Consistency checks go into a
+    method decorated with ``pydantic.model_validator(mode="after")`` that raises
+    `InputError`.
     """
     if cls is None:
         return functools.partial(model, kw_only=kw_only)
@@ -380,8 +383,8 @@ def to_plain(value: Any) -> Any:
 def checked(function: Function) -> Function:
     """Decorator of a public function: check its arguments by their annotations.
 
-    A class in an annotation takes its own instances only, not the tables of a study file. An
-    `InputError` lists all mistakes.
+    A class in an annotation takes its own instances only, not the tables of a study file.
+    An `InputError` lists all mistakes.
     """
     written = function.__annotations__
     function.__annotations__ = {

@@ -1,7 +1,7 @@
 """Progress of long work, by the same mechanism everywhere.
 
-After a second, a terminal shows a bar (rich), a notebook shows an output that is updated, and a
-pipe gets a line now and then. The working code reports its progress with `advance`.
+After a second, a terminal shows a bar (rich), a notebook shows an output that is updated,
+and a pipe gets a line now and then. The working code reports its progress with `advance`.
 """
 
 from __future__ import annotations

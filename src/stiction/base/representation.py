@@ -1,7 +1,7 @@
 """How objects show themselves, compare, and become JSON.
 
-A model shows its fields. A result shows the number that was asked for, its interval, its unit and
-what it rests on (`Summary`), as text and as an HTML table.
+A model shows its fields. A result shows the number that was asked for, its interval, its
+unit and what it rests on (`Summary`), as text and as an HTML table.
 """
 
 from __future__ import annotations

@@ -43,8 +43,8 @@ def write_design_page(
     problem : Problem
         The problem of the design. Its constants are the inputs.
     evidence : sequence
-        Results behind the design, which are printed: a fit, a posterior, an agreement. Their doubts
-        and notes are listed as doubts.
+        Results behind the design, which are printed: a fit, a posterior, an agreement.
+        Their doubts and notes are listed as doubts.
     sources : mapping, optional
         The source of each input by its dotted key, such as ``{"load.pressing_force":
         "drawing 12"}``. Inputs without a source are called assumed.

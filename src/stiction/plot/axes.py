@@ -27,7 +27,8 @@ def with_unit(name: str, unit: str) -> str:
 def new_figure(width: float, height: float) -> Figure:
     """Return a figure that notebooks and galleries show, with sizes in inches.
 
-    It is made outside `paper_style`, because a backend that is loaded here sets parameters too.
+    It is made outside `paper_style`, because a backend that is loaded here sets
+    parameters too.
     """
     import matplotlib.pyplot as plt
 

@@ -45,11 +45,11 @@ def fit(field_fit: FieldFit) -> NDArray[Any]:
     Returns
     -------
     (4,) array of matplotlib.axes.Axes
-        (a) Values and the fitted marginal, (b) quantiles of the data against quantiles of the
-        fit, (c) correlation, with the effect of the window, and (d) spectrum, each for all records
-        together. The bands show records that were simulated from the fitted field. They contain
-        90 % of the fits to such records in (a) and (b), and 90 % of the sets of such records in (c)
-        and (d).
+        (a) Values and the fitted marginal, (b) quantiles of the data against quantiles of
+        the fit, (c) correlation, with the effect of the window, and (d) spectrum, each
+        for all records together. The bands show records that were simulated from the
+        fitted field. They contain 90 % of the fits to such records in (a) and (b), and 90
+        % of the sets of such records in (c) and (d).
     """
     estimate, rng = field_fit._estimate, np.random.default_rng(0)
     windows = estimate.setting.windows
@@ -110,7 +110,8 @@ def _powers(observed: list[Observed]) -> list[Array]:
 def _pooled_correlation(lag: Array, observed: list[Observed], powers: list[Array]) -> Array:
     """Return the correlation in the windows at lags (m), weighted by the number of values.
 
-    A record counts at lags up to half of its length, because its own period repeats them beyond.
+    A record counts at lags up to half of its length, because its own period repeats them
+    beyond.
     """
     total, variance = np.zeros(lag.size), np.zeros(lag.size)
     for (window, records, *_), power in zip(observed, powers, strict=True):
@@ -211,8 +212,8 @@ def agreement(result: Agreement, *, ax: Axes | None = None) -> Axes:
     Returns
     -------
     matplotlib.axes.Axes
-        If the prediction is right, all steps of 90 % of campaigns with so many tests lie in the
-        shaded band. Each length of specimens has its own colour.
+        If the prediction is right, all steps of 90 % of campaigns with so many tests lie
+        in the shaded band. Each length of specimens has its own colour.
 
     Examples
     --------

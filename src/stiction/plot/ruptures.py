@@ -51,10 +51,10 @@ def rupture(run: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None 
     Returns
     -------
     matplotlib.axes.Axes
-        If a patch became unstable, a dot marks the onset, at time zero. On a line, time begins
-        shortly before the onset and ends shortly after the last slip, and points that slip seven
-        decades slower than the fastest point are white. On a plane, the front is drawn at equal
-        intervals of time on a map of the strength.
+        If a patch became unstable, a dot marks the onset, at time zero. On a line, time
+        begins shortly before the onset and ends shortly after the last slip, and points
+        that slip seven decades slower than the fastest point are white. On a plane, the
+        front is drawn at equal intervals of time on a map of the strength.
 
     Raises
     ------
@@ -90,8 +90,8 @@ def film(
     path : path
         Ends in .gif.
     frames : int
-        Maximum number of frames, evenly spaced over the frames of the run, which lie closer in
-        time as the interface accelerates.
+        Maximum number of frames, evenly spaced over the frames of the run, which lie
+        closer in time as the interface accelerates.
     progress : bool or callable
         As in `stiction.monte_carlo`.
 

@@ -138,28 +138,30 @@ class Interface:
     Parameters
     ----------
     length : float or (float, float)
-        Period, m. A number gives a line, and two numbers give a plane: along x, the direction of
-        load and slip, and along y.
+        Period, m. A number gives a line, and two numbers give a plane: along x, the
+        direction of load and slip, and along y.
     nodes : int or (int, int)
-        Number of nodes in each direction, even and at least 8, at most 2^24 in all. Powers of two
-        are fastest.
+        Number of nodes in each direction, even and at least 8, at most 2^24 in all.
+        Powers of two are fastest.
     width : float, optional
-        Width of a line, m, which turns its stresses into forces, N. A plane has its area, and a
-        specimen its thickness.
+        Width of a line, m, which turns its stresses into forces, N. A plane has its area,
+        and a specimen its thickness.
     ends : {"periodic", "free"}
-        Set by a `Problem`: "free" if it has a `specimen`. The nodes are then the centres of cells,
-        x_i = (i + 1/2) length/nodes, and the interface stops at its ends.
+        Set by a `Problem`: "free" if it has a `specimen`. The nodes are then the centres
+        of cells, x_i = (i + 1/2) length/nodes, and the interface stops at its ends.
     extent : (float, float), ((float, float), (float, float)), Ellipse or mask, optional
-        Part of the interface that can break, by default all of it. Beyond, both solids are a single
-        piece, which never slips. A line takes its two ends (m, or text such as "0.5 km"), a plane
-        two pairs (along x and y) or an `Ellipse`. Both take a mask: a boolean array of shape
-        (*shape), in a study file the path of a ``.npy``. Nodes at the ends can break.
+        Part of the interface that can break, by default all of it. Beyond, both solids
+        are a single piece, which never slips. A line takes its two ends (m, or text such
+        as "0.5 km"), a plane two pairs (along x and y) or an `Ellipse`. Both take a mask:
+        a boolean array of shape (*shape), in a study file the path of a ``.npy``. Nodes
+        at the ends can break.
 
     Notes
     -----
-    With an extent, mean stresses, friction coefficients, forces and mean strengths belong to the
-    nodes that can break. Periodic images of the extent interact. If the extent is small compared
-    with the period, results depend on the period through the square of their ratio only.
+    With an extent, mean stresses, friction coefficients, forces and mean strengths belong
+    to the nodes that can break. Periodic images of the extent interact. If the extent is
+    small compared with the period, results depend on the period through the square of
+    their ratio only.
 
     Examples
     --------
@@ -378,8 +380,8 @@ class Interface:
     def wave_vectors(self) -> tuple[Array, ...]:
         """Components of the wave vectors of `transform`, rad/m.
 
-        They broadcast to the shape of a transformed profile: (n//2 + 1,) on a line, (nx, 1) and
-        (1, ny//2 + 1) on a plane.
+        They broadcast to the shape of a transformed profile: (n//2 + 1,) on a line, (nx,
+        1) and (1, ny//2 + 1) on a plane.
         """
         *first, last = (2.0 * np.pi / length for length in self.lengths)
         along = last * np.arange(self.shape[-1] // 2 + 1)
@@ -398,7 +400,8 @@ class Interface:
     def in_plane_share(self) -> Array:
         """Share of mode II, (kx/k)², at each wave vector of a plane. The rest is mode III.
 
-        The constant mode counts as mode II. On a line, where the problem sets the mode, it is 1.
+        The constant mode counts as mode II. On a line, where the problem sets the mode,
+        it is 1.
         """
         k = self.wavenumbers
         k.flat[0] = 1.0
@@ -409,7 +412,8 @@ class Interface:
     def transform(self, profiles: Array) -> Array:
         """Return the real Fourier transform of profiles (..., *shape), unscaled.
 
-        Each profile is transformed by itself, so that the result does not depend on the batch.
+        Each profile is transformed by itself, so that the result does not depend on the
+        batch.
         """
         return np.fft.rfft2(profiles) if self.is_plane else np.fft.rfft(profiles)
 

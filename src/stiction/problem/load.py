@@ -27,8 +27,9 @@ NotNegative = Annotated[Real, Field(ge=0.0)]
 class LoadShape(ABC):
     """A load profile by a formula. Its mean is scaled to 1, so that tau_0 is the mean stress.
 
-    To add a shape, derive a class. Decorate it with `stiction.extensions.model`, which checks its
-    parameters, and with `stiction.extensions.register`, after which study files accept its `type`.
+    To add a shape, derive a class. Decorate it with `stiction.extensions.model`, which
+    checks its parameters, and with `stiction.extensions.register`, after which study
+    files accept its `type`.
     """
 
     family: ClassVar[str] = "loads"
@@ -130,8 +131,9 @@ class Load:
     normal_pressure : float or (nodes,) array, optional
         Pa, positive on average. Every onset then has a `friction_coefficient`.
     pressing_force : float, optional
-        Force instead of `normal_pressure`, N, positive. Divided by the area of the interface,
-        which must be known, it is the pressure: uniform, or the mean between glued plates.
+        Force instead of `normal_pressure`, N, positive. Divided by the area of the
+        interface, which must be known, it is the pressure: uniform, or the mean between
+        glued plates.
 
     Examples
     --------

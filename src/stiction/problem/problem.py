@@ -92,9 +92,9 @@ class Problem:
     mode : {"II", "III"}
         In-plane or anti-plane shear. A plane is in-plane along x and anti-plane along y.
     specimen : Blocks, optional
-        Finite blocks instead of half-spaces. Their drive makes the load profile, the interface ends
-        with them (`interface.ends` is "free"), and tau_0 is the drive: the mean stress that the
-        drive would cause without slip.
+        Finite blocks instead of half-spaces. Their drive makes the load profile, the
+        interface ends with them (`interface.ends` is "free"), and tau_0 is the drive: the
+        mean stress that the drive would cause without slip.
 
     Raises
     ------
@@ -267,8 +267,8 @@ class Problem:
     ) -> None:
         """Doubt mean peak and residual strengths (Pa) that do not fit the rest of the problem.
 
-        An `InputError` refuses strengths that cannot fit, and scales of slip by name that are not
-        resolved at these strengths. The default `pressure` is the problem's own.
+        An `InputError` refuses strengths that cannot fit, and scales of slip by name that
+        are not resolved at these strengths. The default `pressure` is the problem's own.
         """
         friction, modulus = self.friction, self.solid.shear_modulus
         pressure = self.given_pressure if pressure is None else pressure
@@ -392,8 +392,8 @@ class Problem:
     def nucleation_length(self) -> float:
         """h_n = 2 lambda_0 G*/W, m (Uenishi and Rice, 2003), for a uniform weakening rate.
 
-        If the law steepens, W is the steepest rate. An `InputError` says that the rate varies along
-        the interface or follows from other parameters.
+        If the law steepens, W is the steepest rate. An `InputError` says that the rate
+        varies along the interface or follows from other parameters.
         """
         if self.uniform_rate is None:
             raise InputError(
@@ -405,7 +405,8 @@ class Problem:
     def nucleation_lengths(self, rate: float) -> tuple[float, ...]:
         """Return h_n of a uniform weakening rate (Pa/m) in each direction, m.
 
-        On a plane, the length along x belongs to mode II, and the length along y to mode III.
+        On a plane, the length along x belongs to mode II, and the length along y to mode
+        III.
         """
         if not rate > 0.0:
             raise InputError(f"rate: must be a positive number, got {describe(rate)}")
@@ -484,28 +485,28 @@ class Problem:
         Parameters
         ----------
         profiles : array, mapping of arrays, xarray.Dataset or Sample
-            Peak strength tau_p (Pa), of shape (samples, *shape) or (*shape), or profiles by
-            name: 'strength' and any others in `PROFILES`, but only 'weakening_rate',
-            'critical_slip' or 'fracture_energy'. Give each profile here or in the problem, not in
-            both. All but the strength may also be (samples, 1) or a number. Such a
-            'normal_pressure' is a mean, which glued blocks distribute. A 'friction_coefficient' in
-            place of the strength, or a DataArray that states the unit 1, is multiplied by the
-            pressure.
+            Peak strength tau_p (Pa), of shape (samples, *shape) or (*shape), or profiles
+            by name: 'strength' and any others in `PROFILES`, but only 'weakening_rate',
+            'critical_slip' or 'fracture_energy'. Give each profile here or in the
+            problem, not in both. All but the strength may also be (samples, 1) or a
+            number. Such a 'normal_pressure' is a mean, which glued blocks distribute. A
+            'friction_coefficient' in place of the strength, or a DataArray that states
+            the unit 1, is multiplied by the pressure.
         accept : collection of {"overstress"}
             Extreme profiles that the method accepts: initial stress above the strength.
 
         Raises
         ------
         InputError
-            If a name, shape or value is invalid, a strength is not above the initial stress, no
-            strength is above the residual strength, or a `Sample` was made by another problem.
-            The message lists every problem.
+            If a name, shape or value is invalid, a strength is not above the initial
+            stress, no strength is above the residual strength, or a `Sample` was made by
+            another problem. The message lists every problem.
 
         Notes
         -----
-        A node whose strength is not above its residual strength does not weaken: its strength is
-        constant. An `AccuracyWarning` gives the share of such nodes, and the share of nodes at
-        which the initial stress is below minus the strength.
+        A node whose strength is not above its residual strength does not weaken: its
+        strength is constant. An `AccuracyWarning` gives the share of such nodes, and the
+        share of nodes at which the initial stress is below minus the strength.
         """
         return self.placed_sample(profiles, accept)[0]
 
@@ -580,8 +581,8 @@ class Problem:
     def own_sample(self, profiles: Mapping[str, Array], accept: Collection[str] = ()) -> Sample:
         """Return a sample of arrays by name that the package made, (samples, *shape) in SI.
 
-        Only values are checked here, because some samples may not fit the problem. The caller
-        checks the resolution, and nodes that do not weaken, for all samples.
+        Only values are checked here, because some samples may not fit the problem. The
+        caller checks the resolution, and nodes that do not weaken, for all samples.
         """
         problems: list[str] = []
         for name, rows in profiles.items():
@@ -636,7 +637,8 @@ class Problem:
     def given_twice(self, names: Collection[str], owner: str) -> list[str]:
         """Return refusals of values that profiles, or random properties, would replace.
 
-        They also name values that are missing in both. The `owner` of the names begins each text.
+        They also name values that are missing in both. The `owner` of the names begins
+        each text.
         """
         twice = [
             f"problem.{key}: has no effect beside {owner}.{name}, which replaces it. Leave either"

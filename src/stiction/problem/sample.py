@@ -29,7 +29,8 @@ nodes that weaken."""
 def steepest_rate(strength: Array, residual: Array, rate: Array) -> float:
     """Return the largest weakening rate of nodes that may break, Pa/m, from (samples, *shape).
 
-    Barriers are left out, because with a uniform critical slip they weaken steeply but never slip.
+    Barriers are left out, because with a uniform critical slip they weaken steeply but
+    never slip.
     """
     drop = strength - residual
     if drop.max() <= BARRIER * drop.min() or rate.max() == rate.min():
@@ -62,16 +63,16 @@ class Sample(Result, _Profiles):
     Attributes
     ----------
     strength, residual_strength, weakening_rate, initial_stress : (samples, *shape) arrays
-        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa). Do not write to them. Strength is
-        infinite beyond the extent of the interface. Where it is at or below the residual
-        strength, both are equal and W has no effect.
+        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa). Do not write to them.
+        Strength is infinite beyond the extent of the interface. Where it is at or below
+        the residual strength, both are equal and W has no effect.
     load_profile : (*shape) array
         p, dimensionless, positive.
     normal_pressure : (samples, *shape) array
         In Pa, NaN if the problem has no pressure.
     problem : Problem, optional
-        The problem that made the sample, and the only problem that takes it. A sample made by hand
-        has no problem.
+        The problem that made the sample, and the only problem that takes it. A sample
+        made by hand has no problem.
     """
 
     def _summary(self) -> Summary:

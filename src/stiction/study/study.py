@@ -150,31 +150,33 @@ PARTS = tuple(_Parts.__dataclass_fields__)
 class Study(_Parts):
     """Definition of a Monte Carlo study.
 
-    The same names serve Python and TOML. A study from the attributes of a result runs again to the
-    same numbers.
+    The same names serve Python and TOML. A study from the attributes of a result runs
+    again to the same numbers.
 
     Parameters
     ----------
     problem : Problem
     random : RandomInterface, RandomField or list of them
-        The random properties. A field is the peak strength, Pa. Members of a list are equally
-        likely.
+        The random properties. A field is the peak strength, Pa. Members of a list are
+        equally likely.
     method : LocalCriterion, Equilibrium or Rupture
     ensemble : Ensemble
     sweep : list of dict
-        Axes that are crossed. Each axis maps dotted keys, which vary together, to lists of values.
-        Every point of the sweep has the same samples.
+        Axes that are crossed. Each axis maps dotted keys, which vary together, to lists
+        of values. Every point of the sweep has the same samples.
     uncertain : dict, optional
-        Distributions of parameters of ``random`` by dotted key, as in `RandomInterface.uncertain`,
-        and their ``count``, by default 30. That many interfaces are drawn with the seed and are
-        equally likely. `failure_curve` gives their mean and band, and `run` samples over them.
+        Distributions of parameters of ``random`` by dotted key, as in
+        `RandomInterface.uncertain`, and their ``count``, by default 30. That many
+        interfaces are drawn with the seed and are equally likely. `failure_curve` gives
+        their mean and band, and `run` samples over them.
     mixture : bool
         Whether a list in ``random`` is complete, as in `stiction.failure_probability`.
     save : Save, optional
         Results that `stiction rupture` keeps, and the places of its stations.
     reliability : Question, optional
         Question to `stiction reliability`: a ``force`` (N), ``stress`` (Pa) or
-        ``friction_coefficient`` to carry, or the ``probability`` of a design, with ``target_cv``.
+        ``friction_coefficient`` to carry, or the ``probability`` of a design, with
+        ``target_cv``.
     title : str
         Title of the study, for readers.
 
@@ -341,24 +343,26 @@ class Study(_Parts):
         Parameters
         ----------
         out : path, optional
-            Folder in which results are stored as they are computed. The same call resumes an
-            interrupted run, computes failed samples again, and adds samples if `samples` was
-            raised.
+            Folder in which results are stored as they are computed. The same call resumes
+            an interrupted run, computes failed samples again, and adds samples if
+            `samples` was raised.
         workers, executor, progress, pilot
             See `stiction.monte_carlo`.
         part : str, optional
-            Part to compute in an independent job, such as "3/100". All parts go into the same
-            folder.
+            Part to compute in an independent job, such as "3/100". All parts go into the
+            same folder.
 
         Returns
         -------
         xarray.Dataset
-            Over the axes of the sweep and 'sample', with NaN for failed and missing samples.
+            Over the axes of the sweep and 'sample', with NaN for failed and missing
+            samples.
 
         Raises
         ------
         InputError, RunError
-            See `stiction.monte_carlo`. Also if `out` holds another study, or a worker is lost.
+            See `stiction.monte_carlo`. Also if `out` holds another study, or a worker is
+            lost.
         StoreError
             If `out` cannot be used.
         """
@@ -397,17 +401,17 @@ class Study(_Parts):
     ) -> xr.Dataset:
         """Estimate failure probabilities at every point, or at the missing points.
 
-        Repetition i, with 2,000 samples in each level, depends on (seed, i) only. The number of
-        samples in the study is not used.
+        Repetition i, with 2,000 samples in each level, depends on (seed, i) only. The
+        number of samples in the study is not used.
 
         Parameters
         ----------
         out : path
-            Folder in which repetitions are stored as they are computed. The same call resumes
-            an interrupted run, and adds repetitions if `repetitions` was raised.
+            Folder in which repetitions are stored as they are computed. The same call
+            resumes an interrupted run, and adds repetitions if `repetitions` was raised.
         repetitions : int
-            Eight repetitions give a coefficient of variation of about 0.2 at 1e-9, and 32 give
-            half of that.
+            Eight repetitions give a coefficient of variation of about 0.2 at 1e-9, and 32
+            give half of that.
         smallest, event
             As in `stiction.failure_curve`.
         workers, executor, progress, part
@@ -416,8 +420,9 @@ class Study(_Parts):
         Returns
         -------
         xarray.Dataset
-            As from `stiction.failure_curve`, from stored and computed repetitions, over the axes of
-            the sweep too, with `lower_bound` (Pa). A point without repetitions has NaN.
+            As from `stiction.failure_curve`, from stored and computed repetitions, over
+            the axes of the sweep too, with `lower_bound` (Pa). A point without
+            repetitions has NaN.
 
         Raises
         ------
@@ -453,7 +458,8 @@ class Study(_Parts):
     def to_toml(self, path: str | Path) -> None:
         """Write the study as a TOML file.
 
-        It raises an `InputError` if a part exists in Python only or the file cannot be written.
+        It raises an `InputError` if a part exists in Python only or the file cannot be
+        written.
         """
         text = tomli_w.dumps(self.to_dict())
         with prefixed("path"):

@@ -170,8 +170,9 @@ def grid_axes(
 ) -> GridAxes:
     """Return the axes as dimensions of a result.
 
-    Their names are the last parts of their keys, or the whole keys if the last part is not clear
-    or a keyword of xarray. The axis of the key 'method' is called 'onset_method'.
+    Their names are the last parts of their keys, or the whole keys if the last part is
+    not clear or a keyword of xarray. The axis of the key 'method' is called
+    'onset_method'.
     """
     keys = [key for axis in axes for key in axis]
     last = {key: key.rpartition(".")[2] for key in keys}

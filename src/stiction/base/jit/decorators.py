@@ -82,8 +82,9 @@ def _state_of(classes: Iterable[Any]) -> str | None:
 class _Guard:
     """A cache that keeps what is compiled for a friction law from elsewhere by the law's state.
 
-    Such a law is part of the kernels that are compiled for it. numba would not notice that the law
-    was edited, and could not read its index where the law's module is missing.
+    Such a law is part of the kernels that are compiled for it. numba would not notice
+    that the law was edited, and could not read its index where the law's module is
+    missing.
     """
 
     def __init__(self, cache: Any, function: Callable[..., Any]) -> None:

@@ -1,7 +1,8 @@
 """The folder in which the compiled kernels of a module are kept.
 
-Kernels are code. The package or the environment choose their folder, never a file where somebody
-stands: numba also reads `.numba_config.yaml` in the current folder, which may come from a stranger.
+Kernels are code. The package or the environment choose their folder, never a file where
+somebody stands: numba also reads `.numba_config.yaml` in the current folder, which may
+come from a stranger.
 """
 
 import hashlib
@@ -28,8 +29,8 @@ _IMPORT = re.compile(rb"^\s*(?:from|import) (stiction[\w.]*)(?: import (\w+))?",
 def _kernel_sources() -> dict[str, bytes]:
     """Return the text of every file that may hold a part of a kernel, by module.
 
-    Files that refuse input hold no part of a kernel, unless they hold one themselves: an edited
-    message recompiles nothing.
+    Files that refuse input hold no part of a kernel, unless they hold one themselves: an
+    edited message recompiles nothing.
     """
     package = Path(__file__).parents[2]
     sources = {}
@@ -46,10 +47,10 @@ def _kernel_sources() -> dict[str, bytes]:
 def kernel_folder(module: str, compiler: str) -> Path:
     """Return the folder of the kernels of a module that a `compiler` (any name) compiled.
 
-    numba takes a compiled kernel for current as long as the kernel's own file is: it does not
-    notice that a function or a constant of another file has changed. So every state of the files
-    that a module imports, directly or not, has a folder of its own. Friction laws are resolved by
-    type inside kernels and belong to every state.
+    numba takes a compiled kernel for current as long as the kernel's own file is: it does
+    not notice that a function or a constant of another file has changed. So every state
+    of the files that a module imports, directly or not, has a folder of its own. Friction
+    laws are resolved by type inside kernels and belong to every state.
     """
     texts = _kernel_sources()
     waiting = [

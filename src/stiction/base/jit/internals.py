@@ -1,8 +1,8 @@
 """numba's private parts: kernels compiled in half the time, and kept by the text of their files.
 
-This file may be deleted. Without it, or where it cannot be imported, as with a numba newer than the
-newest that was tried, `decorators.py` compiles the kernels with plain `numba.njit`, to the same
-bits.
+This file may be deleted. Without it, or where it cannot be imported, as with a numba
+newer than the newest that was tried, `decorators.py` compiles the kernels with plain
+`numba.njit`, to the same bits.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ if numba.version_info.short > NEWEST:
 class _Locator(_CacheLocator):
     """The folder of a function's compiled forms.
 
-    What tells it from others is the text of its file, not where the file lies or when it was
-    written: another environment with the same package compiles nothing again.
+    What tells it from others is the text of its file, not where the file lies or when it
+    was written: another environment with the same package compiles nothing again.
     """
 
     def __init__(self, function: Any, file: str) -> None:

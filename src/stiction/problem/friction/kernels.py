@@ -1,8 +1,8 @@
 """Strength of any friction law at a slip, inside compiled kernels.
 
-A law hands kernels its numbers as a NamedTuple of its own type. The line that its strength follows
-is resolved by that type when a kernel is compiled. A new law therefore changes no kernel, and its
-cost in a kernel is the cost of its own formula.
+A law hands kernels its numbers as a NamedTuple of its own type. The line that its
+strength follows is resolved by that type when a kernel is compiled. A new law therefore
+changes no kernel, and its cost in a kernel is the cost of its own formula.
 """
 
 from collections.abc import Callable
@@ -66,8 +66,8 @@ def line_at(
 ) -> tuple[float, float]:
     """Return the straight line that the strength follows at ``slip + ahead``.
 
-    The line is given by its value at `slip` (Pa) and its rate of fall (Pa/m). For a piecewise
-    linear law it is the piece itself.
+    The line is given by its value at `slip` (Pa) and its rate of fall (Pa/m). For a
+    piecewise linear law it is the piece itself.
 
     Parameters
     ----------

@@ -46,8 +46,8 @@ _VALID = {
 class FrictionLaw(ABC):
     """Strength tau_f(d) = tau_r + (tau_p - tau_r) f(d/d_c), f falling from 1 to 0.
 
-    A law consists of the function f in its `parameters`, its integral and its inverse. It takes
-    the arguments of `LinearWeakening`, with W = -f'(0) (tau_p - tau_r)/d_c and
+    A law consists of the function f in its `parameters`, its integral and its inverse. It
+    takes the arguments of `LinearWeakening`, with W = -f'(0) (tau_p - tau_r)/d_c and
     Gamma = (tau_p - tau_r) d_c times the integral of f.
     """
 
@@ -168,8 +168,8 @@ class FrictionLaw(ABC):
     def dissipated(self, slip: Array, drop: Array, rate: Array) -> Array:
         """Return the energy dissipated above the residual strength up to a slip, J/m².
 
-        `slip` (m) has the shape (..., nodes). `drop` = tau_p - tau_r (Pa) and `rate` = W (Pa/m)
-        have the shape (nodes,).
+        `slip` (m) has the shape (..., nodes). `drop` = tau_p - tau_r (Pa) and `rate` = W
+        (Pa/m) have the shape (nodes,).
         """
         if self.linear:
             weakened = np.minimum(slip, drop / rate)
@@ -187,9 +187,9 @@ class LinearWeakening(FrictionLaw):
     Parameters
     ----------
     weakening_rate, critical_slip, fracture_energy : float or (nodes,) array, optional
-        W (Pa/m), d_c (m) or Gamma (J/m²), positive. With d_c, W = (tau_p - tau_r)/d_c varies
-        with the strength. With Gamma, W = (tau_p - tau_r)²/(2 Gamma) does. Leave all three out if
-        the scale is a profile or random (`RandomInterface`).
+        W (Pa/m), d_c (m) or Gamma (J/m²), positive. With d_c, W = (tau_p - tau_r)/d_c
+        varies with the strength. With Gamma, W = (tau_p - tau_r)²/(2 Gamma) does. Leave
+        all three out if the scale is a profile or random (`RandomInterface`).
     residual_strength, residual_ratio : float or (nodes,) array, optional
         tau_r (Pa) or tau_r/tau_p in [0, 1).
 
@@ -222,8 +222,8 @@ class LinearWeakening(FrictionLaw):
 class ExponentialWeakening(FrictionLaw):
     """Strength that decays with slip: tau_r + (tau_p - tau_r) exp(-d/d_c).
 
-    The law has the parameters of `LinearWeakening`. W is the rate at zero slip, d_c the slip at
-    which 1/e of tau_p - tau_r remains, and Gamma = (tau_p - tau_r) d_c.
+    The law has the parameters of `LinearWeakening`. W is the rate at zero slip, d_c the
+    slip at which 1/e of tau_p - tau_r remains, and Gamma = (tau_p - tau_r) d_c.
 
     Examples
     --------
@@ -265,8 +265,8 @@ class PiecewiseWeakening(FrictionLaw):
     strength : sequence of float
         (tau_f - tau_r)/(tau_p - tau_r) at these corners, falling from below 1 to 0.
     weakening_rate, critical_slip, fracture_energy, residual_strength, residual_ratio : optional
-        As for `LinearWeakening`. W is the rate of the first piece, and the strength is residual
-        from d_c on.
+        As for `LinearWeakening`. W is the rate of the first piece, and the strength is
+        residual from d_c on.
 
     Examples
     --------
@@ -343,8 +343,8 @@ class PiecewiseWeakening(FrictionLaw):
     def from_law(cls, law: FrictionLaw, pieces: Pieces) -> PiecewiseWeakening:
         """Approximate another law by a number of linear `pieces`, at least 2.
 
-        Corners lie on the law at equal steps of strength. If the law never reaches its residual
-        strength, the last piece dissipates as much as the rest of the law.
+        Corners lie on the law at equal steps of strength. If the law never reaches its
+        residual strength, the last piece dissipates as much as the rest of the law.
 
         Examples
         --------

@@ -1,12 +1,14 @@
 """A profile from anything that has labels: the right variable, its coordinates, its values in SI.
 
-A source is a file, an xarray object, a table of pandas, a surface, a quantity with a unit or an
-array. It may hold many variables, under names and in units that nobody agreed on. A wrong choice
-would be a wrong number, so every choice is either clear or refused. `labelled` takes these steps:
+A source is a file, an xarray object, a table of pandas, a surface, a quantity with a unit
+or an array. It may hold many variables, under names and in units that nobody agreed on. A
+wrong choice would be a wrong number, so every choice is either clear or refused.
+`labelled` takes these steps:
 
 1. Make the source a DataArray or a Dataset.
 2. Take a table without headings for a map if its comments, `rows` or `spacing` say so.
-3. Choose the variable and its coordinates: by the argument, else by the name, else by the unit.
+3. Choose the variable and its coordinates: by the argument, else by the name, else by the
+   unit.
 4. Name the dimensions 'x' and 'y', or 'row' for a list of points, after the sample.
 5. Convert values and coordinates to SI, and check them.
 """
@@ -115,7 +117,8 @@ def simplified(value: Any, quantity: str) -> Any:
 def with_stated_unit(value: Any, units: Iterable[str]) -> tuple[Any, str | None]:
     """Return numbers without labels, and the unit that they state, if they do.
 
-    The unit belongs to a quantity, is the attribute `units`, or stands in the name of a Series.
+    The unit belongs to a quantity, is the attribute `units`, or stands in the name of a
+    Series.
     """
     stated = ""
     if is_labelled(value) and not hasattr(value, "data_vars"):
@@ -195,8 +198,8 @@ def labelled(
 ) -> Any:
     """Return a quantity of `source` in SI along the directions `dims`, or along its own.
 
-    A dimension of another name comes first. If each sample has a single value, it is the only
-    dimension.
+    A dimension of another name comes first. If each sample has a single value, it is the
+    only dimension.
     """
     # 1. Make the source a DataArray or a Dataset.
     is_file = isinstance(source, str | Path)
@@ -395,8 +398,8 @@ def column_of(
 ) -> Any:
     """Return the wanted column in a table of tests, or the column that begins with a certain word.
 
-    If no name begins with such a word, return the only column in a unit of `units`, if there is a
-    single column.
+    If no name begins with such a word, return the only column in a unit of `units`, if
+    there is a single column.
     """
     names = list(table.data_vars)
     if wanted is not None:

@@ -1,11 +1,11 @@
 """Values put on the nodes of a line or a plane, and their gaps.
 
-The nodes are x_i = i L/n in each direction. The interface is periodic, so points may come in any
-order and begin anywhere. On a specimen, the nodes are x_i = (i + 1/2) L/n, and the profile stops at
-its ends. The steps are:
+The nodes are x_i = i L/n in each direction. The interface is periodic, so points may come
+in any order and begin anywhere. On a specimen, the nodes are x_i = (i + 1/2) L/n, and the
+profile stops at its ends. The steps are:
 
-1. Find by how much of a spacing all points lie beside nodes. A warning states such an offset.
-   Points that do not lie on nodes are refused, or interpolated on request.
+1. Find by how much of a spacing all points lie beside nodes. A warning states such an
+   offset. Points that do not lie on nodes are refused, or interpolated on request.
 2. Give each node the value of its point. Two different values at a node are refused.
 3. Refuse missing values, leave NaN, or fill gaps by linear interpolation on request.
 """
@@ -43,8 +43,8 @@ OF_A_PLANE = (
 def points_of(array: Any) -> tuple[Array, dict[str, Array], Any]:
     """Return values (..., points), their places (m) by direction, and a mask of measured points.
 
-    The mask is True if all were measured. Values without coordinates keep their shape, and have
-    an empty dictionary of places.
+    The mask is True if all were measured. Values without coordinates keep their shape,
+    and have an empty dictionary of places.
     """
     dims = [dim for dim in ("x", "y") if dim in array.coords]
     if len(dims) == 2 and "row" not in array.dims:
@@ -124,7 +124,8 @@ def turned(given: tuple[int, ...], shape: tuple[int, ...]) -> str:
 def _offset(dim: str, x: Array, interface: Interface, interpolate: bool) -> float | None:
     """Return the offset of all points from nodes, in spacings, in (-0.5, 0.5] (step 1).
 
-    It is None if points must be interpolated, for example on a line that is coarser than the nodes.
+    It is None if points must be interpolated, for example on a line that is coarser than
+    the nodes.
     """
     axis = interface.dims.index(dim)
     spacing, length = interface.spacings[axis], interface.lengths[axis]
@@ -250,8 +251,8 @@ def close_gaps(
 def _filled(row: Array, hole: Mask, interface: Interface) -> Array:
     """Return values (*shape) whose holes are interpolated linearly.
 
-    Free ends take the nearest value. On a plane, triangles span the nodes around each hole, and a
-    period repeats on all sides.
+    Free ends take the nearest value. On a plane, triangles span the nodes around each
+    hole, and a period repeats on all sides.
     """
     if not hole.any():
         return row

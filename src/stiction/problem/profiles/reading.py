@@ -1,7 +1,8 @@
 """Measured profiles: read in SI, and put on the nodes of an interface.
 
-A profile enters in three ways: through `read_profile`, as an argument of a call or an object
-(`at_nodes`), or by its name in a study file (`profile_in_file`). All three take these steps:
+A profile enters in three ways: through `read_profile`, as an argument of a call or an
+object (`at_nodes`), or by its name in a study file (`profile_in_file`). All three take
+these steps:
 
 1. Find the quantity in the source, in SI (`labels.py`).
 2. Turn heights or grey values into strengths, if the caller gives a map.
@@ -80,28 +81,30 @@ def read_profile(
     Parameters
     ----------
     source : path, array, or table with labels
-        Labels of xarray and pandas and units of pint and astropy count. An ``.npy`` file has the
-        shape (nodes,) or (nx, ny). A ``.csv``, ``.txt``, ``.dat``, ``.tsv`` or ``.xlsx`` file has
-        columns, with or without a line of names such as ``x (mm), strength (MPa)``. A ``.nc``
-        file has variables with `units`, and x as a coordinate. A map over 'x' and 'y' is a table
-        with both as columns, a matrix without headings, a grey image (``.png``, ``.tif``), or a
-        binary file or object that SurfaceTopography reads.
+        Labels of xarray and pandas and units of pint and astropy count. An ``.npy`` file
+        has the shape (nodes,) or (nx, ny). A ``.csv``, ``.txt``, ``.dat``, ``.tsv`` or
+        ``.xlsx`` file has columns, with or without a line of names such as ``x (mm),
+        strength (MPa)``. A ``.nc`` file has variables with `units`, and x as a
+        coordinate. A map over 'x' and 'y' is a table with both as columns, a matrix
+        without headings, a grey image (``.png``, ``.tif``), or a binary file or object
+        that SurfaceTopography reads.
     x, value : str or int, optional
-        Name, heading or number (from 0) of the column, coordinate or variable. By default a name
-        such as ``x`` or ``position``, and ``strength`` or ``tau_p``, decides, else a single
-        column in a unit of length or of `quantity`. Of two columns without headings, the first is
-        x.
+        Name, heading or number (from 0) of the column, coordinate or variable. By default
+        a name such as ``x`` or ``position``, and ``strength`` or ``tau_p``, decides, else
+        a single column in a unit of length or of `quantity`. Of two columns without
+        headings, the first is x.
     unit, x_unit : str, optional
         Units of the values and of positions if the source states none; SI by default.
     quantity : str
-        'strength', 'residual_strength', 'initial_stress', 'normal_pressure' (Pa), 'critical_slip',
-        'height' (m), 'weakening_rate' (Pa/m), 'load_profile' or 'friction_coefficient' (1).
+        'strength', 'residual_strength', 'initial_stress', 'normal_pressure' (Pa),
+        'critical_slip', 'height' (m), 'weakening_rate' (Pa/m), 'load_profile' or
+        'friction_coefficient' (1).
     strength : callable, optional
-        Map from heights (m, an array), or from the grey values of an image, to strengths (Pa):
-        ``strength=lambda h: 1e6 + 5e11 * h``. Heights are then read.
+        Map from heights (m, an array), or from the grey values of an image, to strengths
+        (Pa): ``strength=lambda h: 1e6 + 5e11 * h``. Heights are then read.
     missing : float, str or sequence of them, optional
-        Numbers and words that stand for a missing value, such as ``-9999`` or ``"Bad"``. Empty
-        cells, ``nan``, ``n/a``, ``-``, ``***`` and ``#N/A`` always do.
+        Numbers and words that stand for a missing value, such as ``-9999`` or ``"Bad"``.
+        Empty cells, ``nan``, ``n/a``, ``-``, ``***`` and ``#N/A`` always do.
     decimal : {".", ","}, optional
         Decimal mark of a text, if the file does not tell it from a mark of thousands.
     skip : int
@@ -118,15 +121,15 @@ def read_profile(
     interface : Interface, optional
         Map the profile to the nodes x_i = i L/n, modulo L, from points in any order.
     offset : float, (float, float) or "centre"
-        Offset that is added to the coordinates, m. With "centre", the centre of the record moves
-        to the centre of the interface.
+        Offset that is added to the coordinates, m. With "centre", the centre of the
+        record moves to the centre of the interface.
     interpolate : bool
         Interpolate linearly if the points of a line do not coincide with the nodes.
     gaps : {"refuse", "fill", "skip"}
         Refuse missing values (NaN, empty cells, missing points), fill them with straight
         lines (on planes with triangles), or leave NaN, for `stiction.fit_field` and
-        `RandomField.given`, which draws equally likely values. Without an interface, missing
-        values always stay.
+        `RandomField.given`, which draws equally likely values. Without an interface,
+        missing values always stay.
 
     Returns
     -------
@@ -255,8 +258,8 @@ def at_nodes(
 ) -> tuple[Any, Any]:
     """Return the values of a quantity at the nodes, and a mask of the measured nodes.
 
-    `name` may be a dotted key. Numbers, and arrays of another shape, pass as given, because the
-    caller checks them. The mask is True if all values are there.
+    `name` may be a dotted key. Numbers, and arrays of another shape, pass as given,
+    because the caller checks them. The mask is True if all values are there.
     """
     quantity = quantity_of(name)
     with prefixed(name):

@@ -1,19 +1,20 @@
 """Tables of numbers, as instruments, spreadsheets and colleagues write them.
 
-A table is text or a sheet of a workbook. Its dialect is unknown: what separates columns, which mark
-is decimal, where headings end, where units stand. A wrong guess could change a value by a factor of
-a thousand, so the reader refuses a table wherever two readings of it differ. The steps are:
+A table is text or a sheet of a workbook. Its dialect is unknown: what separates columns,
+which mark is decimal, where headings end, where units stand. A wrong guess could change a
+value by a factor of a thousand, so the reader refuses a table wherever two readings of it
+differ. The steps are:
 
 1. Split lines into cells. The last lines that contain numbers show the separator.
-2. Find the first line of numbers. Lines above it are headings, units or remarks. Empty lines
-   separate records.
-3. Find the decimal mark, which is the same in the whole file. If points or commas may also mark
-   thousands, refuse the file unless the caller states `decimal`.
+2. Find the first line of numbers. Lines above it are headings, units or remarks. Empty
+   lines separate records.
+3. Find the decimal mark, which is the same in the whole file. If points or commas may
+   also mark thousands, refuse the file unless the caller states `decimal`.
 4. Turn cells into numbers. Empty cells and words for a missing value become NaN.
 5. Split headings into names and units.
 
-A text above `LARGE` bytes takes the same steps for its first lines. pandas then reads the other
-lines if all of them are alike. Otherwise the steps above read the whole file.
+A text above `LARGE` bytes takes the same steps for its first lines. pandas then reads the
+other lines if all of them are alike. Otherwise the steps above read the whole file.
 """
 
 from __future__ import annotations
@@ -136,10 +137,11 @@ def read_table(path: Path, options: Options = Options()) -> xr.Dataset:  # noqa:
     comments. The last line above the numbers names the columns, or gives their units below
     a line of names. If there is no such line, the last comment may name the columns.
 
-    Columns become variables along 'row', with NaN in empty cells. A column without a name is
-    called by its number, from 0. The attributes are `lines` (number of the line of each row),
-    `blocks` (number of its record), `comments`, and `headed` (whether columns have names).
-    The attribute `text` of a column without any number describes its content.
+    Columns become variables along 'row', with NaN in empty cells. A column without a name
+    is called by its number, from 0. The attributes are `lines` (number of the line of
+    each row), `blocks` (number of its record), `comments`, and `headed` (whether columns
+    have names). The attribute `text` of a column without any number describes its
+    content.
     """
     content = content_of(path)
     if path.suffix.lower() == EXCEL:
