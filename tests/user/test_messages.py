@@ -79,7 +79,7 @@ def test_a_doubt_of_a_unit_comes_instead_of_advice_that_follows_from_it():
         solid = st.Solid(shear_modulus=modulus, poisson_ratio=0.33, density=1170.0)
         with pytest.raises(st.InputError) as caught:
             st.Problem(solid, interface, law)
-        assert words in str(caught.value)
+        assert words in str(caught.value).lower()
         assert ("nodes >=" in str(caught.value)) == (modulus == 1e8)
 
 
@@ -95,10 +95,10 @@ def test_names_are_found_in_any_case_and_among_all_valid_keys():
         refuses(f"did you mean {meant}", lambda plain=plain: st.Study.from_dict(plain))
 
 
-def test_an_infinite_strength_names_the_method_that_takes_it():
+def test_an_infinite_strength_names_the_extent():
     strength = [float("inf")] + 255 * [1e6]
     refuses(
-        "strength: must be finite ... st.Rupture()",
+        "strength: must be finite ... interface.extent",
         lambda: st.onset(make_problem(), strength, method=EXACT),
     )
 

@@ -33,7 +33,7 @@ DECADES = 7.0
 """Drawn decades of slip rate below the largest."""
 BEFORE = 0.11
 """Drawn time before the onset, in units of L/c_s."""
-KEEP = "; keep them with simulate_rupture(save=st.Save(['slip_rate', 'shear_stress']))"
+KEEP = ". Keep them with simulate_rupture(save=st.Save(['slip_rate', 'shear_stress']))"
 
 
 def rupture(run: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None = None) -> Axes:

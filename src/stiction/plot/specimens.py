@@ -229,7 +229,7 @@ def block(run: xr.Dataset, *, problem: Problem | None = None) -> NDArray[Any]:
         All panels share a scale of colours, and 1 % of the values lie beyond its ends.
         Time counts from the first arrival of the front.
     """
-    need(run, "block_velocity", hint="; it is kept of specimens")
+    need(run, "block_velocity", hint=". It is kept for specimens")
     interface = problem_of(run, problem).interface
     scale, unit = unit_for("m", interface.lengths)
     velocity = run["block_velocity"].values
@@ -267,7 +267,7 @@ def curve_of(result: xr.Dataset) -> tuple[Array, Array, str, str]:
 
     If the thickness is unknown, the force is the mean stress (Pa).
     """
-    need(result, "travel", "event_start", hint="; give the path of a specimen")
+    need(result, "travel", "event_start", hint=". Give the path of a specimen")
     name = "force" if "force" in result else "mean_stress"
     event = "event_force" if name == "force" else "event_stress"
     high, drop = result[event].values, result[f"{event}_drop"].values

@@ -168,7 +168,7 @@ def check_values(name: str, array: Array, interface: Interface) -> None:
         entry = tuple(np.argwhere(~(np.abs(array) <= LARGEST))[0].tolist())
         given = f"{array[entry]:g} (at most {LARGEST:g})"
         if name == "strength" and array[entry] == np.inf:
-            given += "; give interface.extent, beyond which nothing breaks, instead"
+            given += ". Give interface.extent, beyond which nothing breaks, instead"
         raise InputError(f"must be finite. Entry {entry} is {given}")
     given = f"{least:g} {QUANTITIES[name].units}"
     if name in SCALES and least <= 0.0:

@@ -34,7 +34,7 @@ WIDE = 4.0
 IN_GAP, MEASURED = "in_gap", "measured"
 """Variable of a result, and coordinate of results and profiles with gaps, False in a gap."""
 OF_A_PLANE = (
-    "; a map has columns or coordinates x and y, or is an .npy of shape (nx, ny), and needs an"
+    ". A map has columns or coordinates x and y, or is an .npy of shape (nx, ny), and needs an"
     " interface of two lengths and two numbers of nodes"
 )
 """Advice for two dimensions where a line was expected."""
@@ -117,7 +117,7 @@ def place(
 def turned(given: tuple[int, ...], shape: tuple[int, ...]) -> str:
     """Return the hint for a message on the shape of a plane if its axes are swapped."""
     if len(shape) == 2 and given == shape[::-1]:
-        return "; x and y are swapped: the first axis of a profile is x"
+        return ". x and y are swapped: the first axis of a profile is x"
     return ""
 
 
@@ -242,9 +242,9 @@ def close_gaps(
         values = np.stack([
             _filled(row, hole, interface) for row, hole in zip(rows, holes, strict=True)
         ]).reshape(values.shape)  # fmt: skip
-        doubt = "; check interface.length and the unit of x" if missing.mean() > 0.5 else ""
+        doubt = ". Check interface.length and the unit of x" if missing.mean() > 0.5 else ""
         pieces = "triangles" if interface.is_plane else "straight lines"
-        warn_accuracy(f"{text}. Filled with {pieces}{doubt}")
+        warn_accuracy(f"{text}. They are filled with {pieces}{doubt}")
     return values, ~missing & measured
 
 
