@@ -599,20 +599,21 @@ def reliability(
     a page that prints on A4, with its characteristic value, partial factor, inputs,
     doubts and sensitivities. `--out` computes the whole curve, decade by decade.
 
-    Problem, strength, method, seed and sweep come from the study file, whose number of samples is
-    not used. The stress is the mean shear stress on the interface. Failure means that the whole
-    interface slides below that stress. With a table [uncertain], the probability is the mean over
-    equally likely interfaces, and a band contains 90 % of them. `--uncertain` adds a line to this
-    table, such as an assumed constant and its range. Rerunning the command resumes an interrupted
-    run and adds repetitions if `--repetitions` was raised. `stiction export` writes the curve as a
-    table, and `stiction report` writes a page with its figure.
+    Problem, strength, method, seed and sweep come from the study file, whose number of
+    samples is not used. The stress is the mean shear stress on the interface. Failure
+    means that the whole interface slides below that stress. With a table [uncertain], the
+    probability is the mean over equally likely interfaces, and a band contains 90 % of
+    them. `--uncertain` adds a line to this table, such as an assumed constant and its
+    range. Rerunning the command resumes an interrupted run and adds repetitions if
+    `--repetitions` was raised. `stiction export` writes the curve as a table, and
+    `stiction report` writes a page with its figure.
 
     \b
     Examples:
-      stiction reliability study.toml --force 40e3
-      stiction reliability study.toml --probability 1e-3
-      stiction reliability study.toml --uncertain "problem.friction.residual_ratio = [0.6, 0.8]"
-      stiction reliability study.toml --out curve --smallest 1e-6
+      stiction reliability study.toml --force 40e3 stiction reliability study.toml
+      --probability 1e-3 stiction reliability study.toml --uncertain
+      "problem.friction.residual_ratio = [0.6, 0.8]" stiction reliability study.toml --out
+      curve --smallest 1e-6
     """
     from stiction.study.export import table_of
     from stiction.study.study import Study, open_run
