@@ -102,7 +102,7 @@ def block_response(
     """Return the response of two blocks to slip and to their drive.
 
     Length L and height H are in m, and the modulus is G (Pa). kappa is Kolosov's constant, 3 - 4 nu
-    in plane strain and (3 - nu)/(1 + nu) in plane stress, or None for mode III. A platen (no
+    in plane strain and (3 - nu)/(1 + nu) in plane stress, or `None` for mode III. A platen (no
     `pushes`) is glued to the top and moves along the interface. The top of a pushed block lies on
     rollers, or is free in mode III.
     """

@@ -1,7 +1,7 @@
 """Two blocks behind the machine that drives them: stiffness, shear profile, travel and windows.
 
-The block with its drive and the machine are springs in series. Let F be the force per unit depth, U
-the travel of the drive, X the travel of the machine's far end and k the stiffness of the machine:
+The block with its drive and the machine are springs in series. With the force F per unit depth, the
+drive's travel U, the travel X at the machine's far end, and the machine's stiffness k,
 
     F = k (X - U),    U = F/C + (dx/2L) <q, d>.
 

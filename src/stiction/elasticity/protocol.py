@@ -30,7 +30,7 @@ SMALLEST_EIGENVALUE = 0.5788869418506
 class HalfSpaces(NamedTuple):
     """Half-spaces, by their periods (m) and moduli (Pa) along each direction.
 
-    The modulus of a line is G* of its mode, and the moduli of a plane are G* and G.
+    A line has the modulus G* of its mode, and a plane the moduli G* and G.
     """
 
     lengths: tuple[float, ...]
@@ -113,7 +113,7 @@ class Elasticity(Protocol):
 
     @property
     def half_spaces(self) -> HalfSpaces | None:
-        """The half-spaces, which give the symbol of K; None for blocks, which have no symbol."""
+        """The half-spaces, which give the symbol of K; `None` for blocks, which have no symbol."""
 
     @property
     def relief(self) -> float:

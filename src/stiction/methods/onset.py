@@ -41,9 +41,9 @@ MAX_DIFFERENCE = 0.01
 
 
 def exact_counterpart(problem: Problem, method: Method) -> Method | None:
-    """Return the method that a method approximates, or None if it has no such method.
+    """Return the method that a method approximates, or `None` if it has no such method.
 
-    None also stands for an exact method that cannot take the problem.
+    `None` also stands for an exact method that cannot take the problem.
     """
     name = optional_member(method, "exact_method")
     exact: Method | None = METHODS[name]() if name else None
@@ -61,7 +61,7 @@ def relative_differences(stress: Array, exact: Array) -> Array:
 
 
 def doubt(method: Method, differences: Mapping[str, tuple[float, float]]) -> str | None:
-    """Return a warning if the mean or scatter of a difference is above 1 %, otherwise None.
+    """Return a warning if the mean or scatter of a difference is above 1 %, otherwise `None`.
 
     `differences` maps a kind of samples to the mean and scatter of their relative differences.
     """

@@ -153,16 +153,16 @@ class EquallyLikely:
 
     @cached_property
     def factor_laws(self) -> tuple[list[Any], NDArray[np.int64]]:
-        """Laws of the factor of the strength, and the number of the law of each member."""
+        """Distributions of the strength's factor, and the number of each member's distribution."""
         known: dict[Any, int] = {}
         laws = [(member.between or {}).get("strength") for member in self.members]
         numbers = [known.setdefault(law, len(known)) for law in laws]
         return list(known), np.array(numbers)
 
     def factor_column(self, interface: Interface) -> int | None:
-        """Return the number of the draw of the strength's factor, or None.
+        """Return the number of the draw of the strength's factor, or `None`.
 
-        It is None if any member has no factor.
+        It is `None` if any member has no factor.
         """
         if None in self.factor_laws[0]:
             return None
@@ -272,7 +272,7 @@ def drawn_from(source: Source, count: int, seed: int) -> EquallyLikely:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Uncertain(Result):
-    """Source with distributions of parameters of the random properties and of the problem."""
+    """Source whose parameters, and constants of the problem, have distributions."""
 
     given: Any  # a random interface, several, or a source
     laws: Mapping[str, Any]  # by full key

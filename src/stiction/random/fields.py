@@ -321,8 +321,8 @@ class RandomInterface:
     Notes
     -----
     Correlated translation fields follow Grigoriu (1995). The Cholesky factor of the correlation
-    matrix combines the draws of a property with the draws of the properties before it in the list
-    above. If spectra differ, the fields at a point are a little less correlated than the modes.
+    matrix combines a property's own draws with the draws of earlier properties in the list above.
+    If spectra differ, the fields at a point are a little less correlated than the modes.
 
     Examples
     --------
@@ -432,11 +432,11 @@ class RandomInterface:
 
     @property
     def factor_laws(self) -> tuple[list[Any], NDArray[np.int64]]:
-        """Laws of the factor of the strength, and the number of the law of each member."""
+        """Distributions of the strength's factor, and the number of each member's distribution."""
         return [(self.between or {}).get("strength")], np.zeros(1, np.int64)
 
     def factor_column(self, interface: Interface) -> int | None:
-        """Return the number of the draw of the strength's factor, or None without a factor."""
+        """Return the number of the draw of the strength's factor, or `None` without a factor."""
         if "strength" not in (self.between or {}):
             return None
         streams = layout(self, interface)[len(self.names) :]
@@ -477,8 +477,8 @@ class RandomInterface:
     ) -> Array:
         """Draw the independent standard normal numbers of samples `first`, `first` + 1, ....
 
-        Draw j of a property of sample i depends on (seed, property, i, j) only. The result is
-        (samples, dimension): the draws of each property in the order of `names`, then the draws of
+        Draw j for a property in sample i depends on (seed, property, i, j) only. The result is
+        (samples, dimension): the draws for each property in the order of `names`, then for
         `between`.
         """
         streams = layout(self, interface)
@@ -593,7 +593,7 @@ class RandomInterface:
 
 @lru_cache(maxsize=8192)
 def layout(random: RandomInterface, interface: Interface) -> list[Stream]:
-    """Return the streams of draws of each property, and of each factor between specimens."""
+    """Return the stream for each property, and for each factor between specimens."""
     fields = list(random.properties.values())
     streams, start, block = [], 0, block_of(len(interface.shape))
     for name, field, row in zip(random.names, fields, random.linked, strict=True):

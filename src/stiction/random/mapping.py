@@ -24,8 +24,7 @@ Algorithm of the mapping (`from_normal`): our own
 3. Interpolate (`interpolate`). Values of z outside the table, or on a marked piece, go to a second
    table of [-8, 8]. Values that it does not serve go to scipy.
 
-The result is accurate to 1e-9 of the value, or of a millionth of the standard deviation if that is
-larger.
+The relative error is at most 1e-9, or the absolute error 1e-15 standard deviations.
 
 Algorithm of the correlation (`hermite_coefficients`)
 -----------------------------------------------------

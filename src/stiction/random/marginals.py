@@ -80,7 +80,7 @@ class Beta(Marginal):
 class _ByMoments(Marginal):
     """Families above a lower bound, given by mean and coefficient of variation.
 
-    `scipy_family` is the family of scipy with the arguments shape, `low` and scale, or None. Its
+    `scipy_family` is the family of scipy with the arguments shape, `low` and scale, or `None`. Its
     marginals share the tables of `mapping`.
     """
 

@@ -190,7 +190,7 @@ class ScaledSpectrum(SpectralDensity):
         return self.correlation_length * lag_of_correlation(unit, math.exp(-1.0))
 
     def with_efolding_length(self, length: float) -> Any:
-        """Return the spectrum of the same shape with an e-folding length of z of `length` (m)."""
+        """Return the spectrum with the same shape whose e-folding length (of z) is `length`, m."""
         xi = self.correlation_length * length / self.efolding_length
         return dataclasses.replace(self, correlation_length=xi)
 

@@ -44,7 +44,7 @@ def block_of(dimensions: int) -> int:
 
 
 class Stream(NamedTuple):
-    """Draws of a property, or of a factor between specimens, among all draws of a sample."""
+    """Draws for a property or a factor between specimens, among all draws in a sample."""
 
     number: int  # number of the stream; never changes
     block: int  # samples that share a generator

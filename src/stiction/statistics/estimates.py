@@ -93,7 +93,7 @@ def quantiles(values: Any, probability: Numbers) -> Quantiles:
     Parameters
     ----------
     values : (samples,) array
-        Values of any quantity, for example the critical stress of a Monte Carlo ensemble, Pa.
+        Values, for example critical stresses by `monte_carlo`, Pa.
     probability : float or (m,) array
         Probabilities of the quantiles, between 0 and 1, exclusive.
 

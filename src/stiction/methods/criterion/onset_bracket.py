@@ -1,4 +1,4 @@
-"""A quick test of a predicted onset of a line, without the kernels of equilibrium.
+"""A quick test whether a predicted onset is right, for lines, without the equilibrium kernels.
 
 Problem
 -------
@@ -98,7 +98,7 @@ def _least_difference(
 def slides(
     column: Array, peak: Array, residual: Array, rate: Array, load: Array
 ) -> bool | None:
-    """Return whether a line slides under a load, having no equilibrium; None if undecided.
+    """Return whether a line slides under a load, having no equilibrium; `None` if undecided.
 
     Parameters
     ----------

@@ -3,7 +3,7 @@
 Problem
 -------
 K is the stiffness and W the uniform weakening rate (Pa/m). A window is a set of nodes on which the
-lowest eigenvalue of K is at most W, and y > 0 the eigenvector, of unit sum. With all other nodes
+lowest eigenvalue of K is at most W, and y > 0 the eigenvector, with unit sum. With all other nodes
 held, slip on it is unstable from the load <s, y>/<p, y> on, where s is the strength less initial
 stress (Pa) and p the load profile. If K has no positive entry off its diagonal, y is a multiplier
 of the whole interface, so that this load bounds the onset from above as long as no node reaches its
@@ -126,7 +126,7 @@ def ellipse_window(
     rate: float,
     aspect: float,
 ) -> Window | None:
-    """Return the smallest unstable ellipse of an aspect, or None if it meets its images.
+    """Return the smallest unstable ellipse of an aspect, or `None` if it meets its images.
 
     See steps 1 to 3 at the top of this file.
     """
@@ -169,7 +169,7 @@ class Ellipse(NamedTuple):
 def _smallest_unstable(
     column: Array, distance: Array, rate: float, stable_square: float, max_square: float
 ) -> Ellipse | None:
-    """Step 2: find the smallest unstable ellipse up to `max_square` (m²), or None, by bisection.
+    """Step 2: find the smallest unstable ellipse up to `max_square` (m²), or `None`, by bisection.
 
     The column is the stress (Pa) at each node of the box by unit slip at node (0, 0). Ellipses up
     to `stable_square` are known to be stable.

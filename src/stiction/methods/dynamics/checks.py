@@ -50,7 +50,7 @@ def warn_of_slip(run: Run, state: RuptureState) -> None:
 
 
 def at_first_slip(run: Run) -> RuptureState | None:
-    """Return the state of rest at the first slip, or None if the load never causes slip.
+    """Return the state of rest at the first slip, or `None` if the load never causes slip.
 
     Loading too fast for the grid gives an `InputError` or a warning.
     """

@@ -182,7 +182,7 @@ class Run:
         return bool(remaining <= 1e-6 * self.medium.step)
 
     def ending(self, state: RuptureState, reason: int) -> str | None:
-        """Return the reason why a run ends here, in a word, or None if it goes on."""
+        """Return the reason why a run ends here, in a word, or `None` if it goes on."""
         if reason == Reason.ALL_SLID and self.setting.thresholds.held:
             return "rest"
         if reason in _ENDINGS:
@@ -201,7 +201,7 @@ class Run:
     def run_to_end(self, state: RuptureState, max_steps: int) -> tuple[str | None, int]:
         """Go on to the end of the run, or to `max_steps` in all. Return (ending, `Reason`).
 
-        The ending is None if the run has not ended. The reason is then NOT_FINITE or DONE.
+        The ending is `None` if the run has not ended. The reason is then NOT_FINITE or DONE.
         """
         ending, reason = None, int(Reason.DONE)
         while ending is None and reason != Reason.NOT_FINITE and state.steps < max_steps:

@@ -43,9 +43,9 @@ entry for each wave vector with different waves: on a line k > 0, on a plane kx 
 because (kx, ky) and (-kx, ky) have the same |k| and share of mode II. On a plane an entry therefore
 has multiplicity 2. Entries are padded to whole blocks. Tables are packed as [block][pair][row][64],
 Fourier arrays as [block][copy][real, imaginary][64] and memory variables as
-[block][copy][pair][4][64]. The four rows are the real and imaginary part of the memory of the real
-signal, then of the imaginary signal. The constant row length lets the compiler vectorise without
-run-time checks of overlap.
+[block][copy][pair][4][64]. The four rows are the memory that belongs to the real signal (real and
+imaginary part), then to the imaginary signal. The constant row length lets the compiler vectorise
+without run-time checks for overlap.
 """
 
 from typing import Any
@@ -83,7 +83,7 @@ def phi(z: Spectrum) -> Spectrum:
 
 
 def offsets(half: tuple[int, ...]) -> tuple[Ints, Ints, int]:
-    """Return entry and offset of each mode of a transform, and the multiplicity of entries."""
+    """Return entry and offset for each mode, and the multiplicity of entries."""
     if len(half) == 1:
         entry = np.maximum(np.arange(half[0]) - 1, 0)  # the mean has no memory
         copy, multiplicity = np.zeros_like(entry), 1

@@ -2,8 +2,8 @@
 
 Problem
 -------
-Discretise the elasticity of a block for waves (`waves`), on rows of nodes above the nodes of the
-interface. The static response must agree with the closed form of `elasticity.blocks`.
+Discretise the elasticity of a block for waves (`waves`), on rows of nodes above the interface. The
+static response must agree with the closed form of `elasticity.blocks`.
 
 Grid
 ----
@@ -231,7 +231,7 @@ def _limit(
 
 
 def layer_matrix(mesh: Mesh, layer: int, nodes: int) -> sp.csr_matrix:
-    """Return the stiffness of a row of elements, for u and v of the lower, then the upper nodes."""
+    """Return the stiffness of an element row, for u and v at the lower, then the upper nodes."""
     left, right = np.eye(nodes, nodes - 1), np.eye(nodes, nodes - 1, -1)
     columns = [sp.csr_matrix(left), sp.csr_matrix(right)]
     stiffness = sp.csr_matrix((4 * nodes, 4 * nodes))

@@ -136,17 +136,17 @@ class Rupture:
     the sliding event.
 
     **Instabilities between half-spaces.** An instability is slip that the load does not drive. It
-    begins at a maximum of the mean shear stress after which waves lower the stress by 1e-4 of the
-    stress scale, apart from any fall of the load. If the stress is above the strength at the start,
-    it begins there. `first_instability` is the mean stress at the beginning of the first
+    begins when the mean shear stress has a maximum, after which waves lower it by 1e-4 of the
+    stress scale. A fall by the load does not count. If the stress is above the strength at the
+    start, it begins there. `first_instability` is the mean stress at the beginning of the first
     instability. The highest instability has `onset_time`, `critical_position` and `applied_load`
     (the load factor at that time). If the interface slides, it also has `critical_stress` and
     `critical_load`, the load factor that carries this stress statically. The two load factors
     differ by the stress that waves radiate. Events that did not happen have the value NaN, with a
     warning. An overstressed start has no `critical_load`.
 
-    **Arrested events.** `arrested_events` counts instabilities in which Z V of a node exceeds 7.5 %
-    of the median of tau_p - tau_r before the mean stress is as high again or all is calm.
+    **Arrested events.** `arrested_events` counts instabilities in which Z V at a node exceeds 7.5 %
+    of the median tau_p - tau_r before the mean stress is as high again or all is calm.
     `Equilibrium` also counts smaller jumps.
 
     **Stress scale.** At each node, it is the smaller of tau_p - tau_r and three times the drop

@@ -45,7 +45,7 @@ _MAX_TRIALS = 5
 
 
 def static_program(problem: Problem) -> DenseProgram | None:
-    """Return the search for equilibria of a problem, or None on planes and for curved laws."""
+    """Return the search for equilibria of a problem, or `None` on planes and for curved laws."""
     if problem.interface.is_plane or refused(problem.friction):
         return None
     return DenseProgram(problem)
@@ -54,7 +54,7 @@ def static_program(problem: Problem) -> DenseProgram | None:
 def slow_start(
     program: DenseProgram, run: Run, rows: Sample, number: int, rate: float
 ) -> RuptureState | None:
-    """Return the state closest to the onset with a small error, or None if there is no such state.
+    """Return the state closest to the onset with a small error, or `None` without such a state.
 
     `number` is the row of the sample, `rate` the loading rate (Pa/s).
     """
@@ -93,7 +93,7 @@ def _state_at(
     distance: float,
     rate: float,
 ) -> RuptureState | None:
-    """Steps 2 to 5: return the state at a distance (Pa) below the onset; None if it is unknown.
+    """Steps 2 to 5: return the state at a distance (Pa) below the onset; `None` if it is unknown.
 
     It is unknown if a node is beyond the first piece of its law, where the linear programme does
     not hold, or if a front has arrived, since the time of arrival is not known.

@@ -199,7 +199,7 @@ class RuptureProgram(DenseProgram):
 
 
 class RuptureSolver(OnsetSolver):
-    """Solver of the samples of a specimen with inertia; thread-safe."""
+    """Solver for samples of a specimen with inertia; thread-safe."""
 
     program: RuptureProgram
 

@@ -224,12 +224,12 @@ class RuptureState(NamedTuple):
 
     @property
     def steps(self) -> int:
-        """Number of steps of both kinds so far."""
+        """Number of steps so far, explicit and implicit."""
         return int(self.now["explicit_steps"] + self.now["implicit_steps"])
 
 
 class ExplicitTables(NamedTuple):
-    """Tables of an explicit step h, with work arrays."""
+    """Tables for explicit steps h, with work arrays."""
 
     step: float  # h, s
     table: Array  # [block][pair][4][64]: E = exp(s |k| c_s h) and w E B, B = h phi(s |k| c_s h)
@@ -242,7 +242,7 @@ class ExplicitTables(NamedTuple):
 
 
 class ImplicitTables(NamedTuple):
-    """Tables of an implicit step of some size, with the work arrays of a run."""
+    """Tables for implicit steps of a given size, with the work arrays of a run."""
 
     valid_for: Array  # size (s) and ratio of the step of the tables; NaN before the first
     table: Array  # from here to `ramp_response`, see `memory.tabulate`

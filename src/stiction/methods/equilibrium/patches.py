@@ -34,7 +34,7 @@ class Patch(NamedTuple):
 
 
 def count_patches(slip: Array) -> int:
-    """Return the number of runs of slipping nodes on a circle of nodes."""
+    """Return how many runs of slipping nodes there are on a circle."""
     above = slip > 0.0
     starts = int(np.count_nonzero(above[1:] > above[:-1])) + int(above[0] > above[-1])
     return max(starts, int(above[0]))
@@ -120,7 +120,7 @@ def span(occupied: Mask, peak: int) -> tuple[int, int]:
 
 
 def patch_of(mask: Mask, weight: Array, spacings: tuple[float, ...]) -> Patch:
-    """Return the centre (centroid of the weight), extents and area of a patch of a plane."""
+    """Return the patch on a plane that a mask marks, centred at the centroid of the weight."""
     peak = np.unravel_index(int(np.argmax(np.where(mask, weight, -np.inf))), mask.shape)
     centre, extents = [], []
     for axis in (0, 1):

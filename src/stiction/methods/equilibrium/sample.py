@@ -201,7 +201,7 @@ class Program(Protocol):
     def at(
         self, sample: StaticSample, state: EquilibriumState, load: float
     ) -> EquilibriumState | None:
-        """Return the equilibrium at a load above a state, or None if it is not found."""
+        """Return the equilibrium at a load above a state, or `None` if it is not found."""
 
     def gradient(self, sample: StaticSample, state: EquilibriumState) -> Array:
         """Return the derivative of the stress of an instability by the strengths there, (n,).

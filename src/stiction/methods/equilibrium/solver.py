@@ -111,7 +111,7 @@ def warn_of_signs(problem: Problem) -> None:
 
 
 class OnsetSolver:
-    """Solver of the samples of a problem, with the options of `Equilibrium`; thread-safe."""
+    """Solver for samples by `Equilibrium` with its options; thread-safe."""
 
     def __init__(self, problem: Problem, options: Any, program: Program) -> None:
         self.problem, self.options, self.program = problem, options, program

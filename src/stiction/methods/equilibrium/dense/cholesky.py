@@ -270,8 +270,8 @@ class SlipState(NamedTuple):
 def append(workspace: Workspace, n_slipping: int, count: int) -> int:
     """Step 1: append queue[:count] to S and L, until done or a pivot fails.
 
-    Returns the number of rows of L. If it is below n_slipping + count, the pivot of the next node
-    of S failed; its row, without the pivot, follows the last row of L.
+    Returns the number of rows in L. If it is below n_slipping + count, the pivot for the next node
+    in S failed. The row of this node, without the pivot, then follows the last row in L.
     """
     factor, slipping, queue = workspace.factor, workspace.slipping, workspace.queue
     stiffness, diagonal = workspace.stiffness, workspace.diagonal

@@ -106,7 +106,7 @@ class DenseProgram:
         cap: float = np.inf,
         state: EquilibriumState | None = None,
     ) -> EquilibriumState | None:
-        """Return the critical load of a sample (below `cap`) with its proofs, or None if it stalls.
+        """Return the critical load (at most `cap`) with its proofs, or `None` if the search stalls.
 
         Only the first piece of the friction law counts: `excess` and `rate`. `state` is a known
         equilibrium at a lower load.
@@ -135,7 +135,7 @@ class DenseProgram:
     def _by_transforms(
         self, sample: StaticSample, state: EquilibriumState | None
     ) -> EquilibriumState | None:
-        """Solve a programme in which many nodes slip, or return None if its bounds stay apart."""
+        """Solve a programme in which many nodes slip, or return `None` if its bounds stay apart."""
         half_spaces = self.elastic.half_spaces
         if half_spaces is None:
             return None
@@ -193,7 +193,7 @@ class DenseProgram:
     def _next_by_programme(
         self, sample: StaticSample, state: EquilibriumState, from_rest: bool
     ) -> EquilibriumState | None:
-        """Return the next instability by a linear programme, or None if a corner comes first."""
+        """Return the next instability by a linear programme, or `None` if a corner comes first."""
         present = sample if from_rest else present_sample(sample, state.slip)
         solution = self.solve(present, state=None if from_rest else state)
         if solution is None or not (from_rest or solution.load >= state.load):

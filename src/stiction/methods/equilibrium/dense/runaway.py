@@ -18,8 +18,8 @@ length (`unstoppable_length`).
    does, the interface slides.
 2. Nodes beside the run that are overloaded join it, as far as the stress there is known.
 3. Elastic step: with the strengths of the moment, solve K_RR x = (load p - K d - s(d))_R on the run
-   R, cut the right side at zero, and add x to the slip. The blocks of K on runs of one length are
-   alike, so that one Cholesky factor serves all runs of all samples.
+   R, cut the right side at zero, and add x to the slip. Blocks of K on runs with the same length
+   are equal, so that a single Cholesky factor serves all runs and samples.
 4. The interface slides if nodes at their residual strength form a run of the unstoppable length,
    or if the mean strength of the interface cannot carry the load.
 5. The test gives up (UNDECIDED) if slip hardly grows any more, after `MAX_RUN_STEPS` steps, or if

@@ -18,8 +18,8 @@ positive definite.
 
 On a line K has no positive entry off its diagonal, and a node that slips never stops. On a specimen
 it may have some (`may_stop`), so that slip at one node can unload another. Slip never goes back: a
-node that is unloaded rests. The rates of the nodes at their strength then satisfy the conditions of
-a minimum of v'Av/2 - p'v over v >= 0:
+node that is unloaded rests. The rates at the nodes that reach their strength then minimise
+v'Av/2 - p'v over v >= 0:
 
     v >= 0,  A v - p >= 0,  v'(A v - p) = 0.                                                  (3)
 

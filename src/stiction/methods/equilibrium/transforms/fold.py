@@ -53,7 +53,7 @@ class Turn(NamedTuple):
 
 
 def _solution(operator: Operator, inside: Mask, right: Array) -> Array | None:
-    """Solve A x = right on the nodes inside; None if A is not positive definite there."""
+    """Solve A x = right on the nodes inside; `None` if A is not positive definite there."""
     x, residual = np.zeros(right.size), np.where(inside, right, 0.0)
     tolerance = SOLUTION_RTOL * float(np.abs(residual).max())
     status, _ = solve_inside(operator, inside, x, residual, tolerance)
@@ -63,7 +63,7 @@ def _solution(operator: Operator, inside: Mask, right: Array) -> Array | None:
 def _equilibrium_near(
     operator: Operator, sample: StaticSample, load: float, slip: Array
 ) -> Array | None:
-    """Step 1: improve a rough slip at a load; None if there is no equilibrium near it."""
+    """Step 1: improve a rough slip at a load; `None` if there is no equilibrium near it."""
     tolerance = residual_tolerance(sample, load, TURN_SLIP_RTOL)
     for _ in range(MAX_PIECE_REVISIONS):
         present = present_pieces(sample, slip)
@@ -81,7 +81,7 @@ def follow_to_turn(
 ) -> Turn | None:
     """Follow a stable path from a rough slip at a load to its turn, or to the target load.
 
-    Returns None if the path is not stable at the first load, or after too many events.
+    Returns `None` if the path is not stable at the first load, or after too many events.
     """
     # 1.
     start = _equilibrium_near(operator, sample, load, slip)

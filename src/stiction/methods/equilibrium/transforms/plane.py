@@ -285,7 +285,7 @@ class PlaneProgram:
         passed: list[tuple[float, Array]],
         load_beyond: float,
     ) -> Turn | None:
-        """Step 6: follow the end of the path event by event; None if it is not found.
+        """Step 6: follow the end of the path event by event; `None` if it is not found.
 
         A rough slip may be beyond the turn. Then start from the step before it, and so on.
         """

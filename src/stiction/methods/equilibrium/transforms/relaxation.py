@@ -139,7 +139,7 @@ def stable_equilibrium(
     accuracy: float,
     guess: Array,
 ) -> Array | None:
-    """Return the slip at a load to which a stable path certainly leads, otherwise None.
+    """Return the slip at a load to which a stable path certainly leads, otherwise `None`.
 
     The path begins at an equilibrium with less slip at a lower load; the guess is a slip at its
     end. The accuracy is the largest residual stress as a share of the mean strength or load.

@@ -85,7 +85,7 @@ class Held(NamedTuple):
 
 
 def _hold(bracket: Bracket, phi: Array, guess: Held, accuracy: float) -> Held | None:
-    """Step 1: return the equilibrium with a patch phi held; None if another patch is unstable.
+    """Step 1: return the equilibrium with a patch phi held; `None` if another patch is unstable.
 
     The guess gives the amplitude at which the spring has no force; the accuracy is the largest
     residual stress as a share of the mean strength.
@@ -124,7 +124,7 @@ def _hold(bracket: Bracket, phi: Array, guess: Held, accuracy: float) -> Held | 
 
 
 def _other_patch(bracket: Bracket) -> Array | None:
-    """Step 2: return the unstable patch beside the held patch (unit norm); None without any."""
+    """Step 2: return the unstable patch beside the held patch (unit norm); `None` without any."""
     vector = np.where(bracket.inside, np.abs(bracket.operator.direction), 0.0)
     if not vector.any():
         return None
