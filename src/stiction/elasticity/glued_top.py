@@ -85,6 +85,7 @@ class GluedTop:
         distance = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
         apart = np.abs(np.subtract.outer(self.x, self.x))
         from_right = np.abs(np.subtract.outer(self.to_right, self.to_right))
+        # Near the right corner only distances from the right end keep their relative precision.
         apart = np.where(np.add.outer(self.x, self.x) < harmonics.length, apart, from_right)
         np.fill_diagonal(apart, self.stretch)
         sums = harmonics.sums(apart)
@@ -101,6 +102,7 @@ class GluedTop:
         modes = np.arange(1, count // 2 + 1)
         logarithm = np.fft.irfft(np.append(0.0, 0.5 * period / modes), count)
         matrix = self.step * kernel + weight * logarithm[distance]
+        # Single reflections at both ends, and then between the ends.
         for end in (self.x, self.to_right):
             across = np.add.outer(end, end)
             sums = harmonics.sums(across)

@@ -151,6 +151,7 @@ def widths_between(nodes: int, lowest: float, highest: float) -> tuple[int, ...]
     widest = min(nodes - 1, MAX_WIDTH)
     widths: Sequence[int] = range(1, widest + 1)
     if lowest < highest:
+        # A ladder is the same for all samples, so that its eigenvectors are computed once.
         ladder = [1]
         while ladder[-1] < min(nodes // 2, MAX_WIDTH):
             ladder.append(max(ladder[-1] + 1, int(ladder[-1] * WIDTH_RATIO)))

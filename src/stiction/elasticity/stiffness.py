@@ -118,6 +118,7 @@ def apply_circular(
             if (node & 1) != parity or values[t] == 0.0:
                 continue
             # 2. Target q lies at the odd distance 2 (q - (node >> 1)) + 1 - 2 parity.
+            # Names instead of arrays let the compiler keep the four nodes in registers.
             p0, p1, p2, p3 = half - (node >> 1) - parity, p0, p1, p2
             z0, z1, z2, z3 = values[t], z0, z1, z2
             n_waiting += 1

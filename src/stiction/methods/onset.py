@@ -152,6 +152,7 @@ def onset(
             part = sample.part(slice(start, start + size))
             with collect_warnings() as caught:
                 parts.append(solver(part))
+            # Samples are numbered in a batch: shift their numbers to those in all profiles.
             warned += (text.after(start) for text in caught)
             meter.advance(part.samples)
     values = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
@@ -173,7 +174,7 @@ def _compare(problem: Problem, method: Method, sample: Sample, stress: Array) ->
     first, stress = sample.part(slice(0, count)), stress[:count]
     if not count or not optional_member(method, "may_differ")(problem, first, stress):
         return
-    with collect_warnings():
+    with collect_warnings():  # and drop warnings of the comparison
         true = prepared(problem, exact)(first)["critical_stress"]
     differences = relative_differences(stress, true)
     kind = f"the first {count} of {sample.samples} samples"

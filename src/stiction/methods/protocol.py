@@ -168,6 +168,7 @@ def _check_values(
     sizes = dict(zip(("x", "y"), sample.shape, strict=False))
     sizes |= {"sample": sample.samples, DIRECTION: 2}
     for key, variable in variables.items():
+        # Dimensions of the method's own, such as 'event', may have any size.
         shape = tuple(sizes.get(dim) for dim in variable.dims)
         if values[key].shape != shape and None not in shape:
             raise InputError(

@@ -44,6 +44,7 @@ def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
     unknown = [name for name in {**changes, **inside} if not table and name not in names]
     if unknown:
         raise InputError([unknown_name(path or "sweep", name, names) for name in unknown])
+    # Values below a key replace the object there, from the inside outwards.
     for name, below in inside.items():
         inner = owner.get(name) if table else getattr(owner, names[name])
         changes[name] = with_values({} if inner is None else inner, below, begin + name)
@@ -53,6 +54,7 @@ def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
         fields = {names[key]: value for key, value in changes.items()}
         return dataclasses.replace(owner, **fields)
     except InputError as error:
+        # The path replaces the name of the class, which a user of keys does not know.
         kind = f"{type(owner).__name__}."
         texts = (text.removeprefix(kind) for text in error.problems)
         raise InputError([begin + text for text in texts]) from None

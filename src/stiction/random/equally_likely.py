@@ -173,6 +173,7 @@ class EquallyLikely:
         """Make rows of draws samples of given members."""
         count = len(self.members)
         place = np.argsort(self.order) if self.order else np.arange(count)
+        # The middle of a member's interval, so that round-off cannot select its neighbour.
         draws[rows, 0] = ndtri((place[members] + 0.5) / count)
 
     def uncertain(self, parameters: Mapping[str, Any]) -> "Uncertain":
@@ -207,6 +208,7 @@ class EquallyLikely:
         draws = np.full((samples, self.dimension(interface)), np.nan)
         draws[:, :1] = MEMBER_STREAM.draw(seed, first, samples)
         columns = _columns(self, interface)
+        # Members that cover all columns draw them. Shared columns get the same numbers twice.
         for number in columns.covering:
             of_member = columns.of[number]
             draws[:, of_member] = self.members[number].draws(interface, samples, seed, first)
@@ -369,6 +371,7 @@ def uncertain(random: Any, parameters: Mapping[str, Any]) -> Uncertain:
 def hypercube(laws: Mapping[str, Any], count: int, seed: int) -> list[dict[str, float]]:
     """Return a Latin hypercube: a value of each distribution in every interval of 1/count."""
     rng = np.random.default_rng([seed, 6])
+    # Permute the intervals of each distribution, and take a random place in each interval.
     cells = rng.permuted(np.tile(np.arange(count), (len(laws), 1)), axis=1)
     shares = (cells + rng.random(cells.shape)) / count
     rows = [law.ppf(share) for law, share in zip(laws.values(), shares, strict=True)]

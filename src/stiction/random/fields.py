@@ -255,7 +255,7 @@ class RandomField:
         def excess(rho: float) -> float:
             return float(correlation_of_mapped(np.array(rho), coefficients)) - math.exp(-1.0)
 
-        # The correlation of the mapped field is monotone in that of z.
+        # The correlation of the mapped field rises with the correlation of z: find the value of z.
         return lag_of_correlation(self.spectrum, brentq(excess, 0.0, 1.0, xtol=1e-16))
 
 
@@ -602,6 +602,7 @@ def layout(random: RandomInterface, interface: Interface) -> list[Stream]:
         ranks = reduce(np.union1d, [linked.modes(interface).ranks for linked in group])
         mean_mode = any(linked.mean_mode for linked in group)
         columns = slice(start, start + 2 * ranks.size + int(mean_mode))
+        # Columns of the group's draws that belong to modes of this field.
         places = np.searchsorted(ranks, field.modes(interface).ranks)
         pairs = int(mean_mode) + 2 * places[:, None] + np.arange(2)
         numbers: Any = np.concatenate((np.arange(int(field.mean_mode)), pairs.ravel()))

@@ -169,6 +169,7 @@ class Weibull(_ByMoments):
             return float(math.expm1(spread)) - ratio**2
 
         # The ratio falls from 10 to 0.001 as the shape rises from 0.2 to 1300.
+        # The search is in the logarithm, as the shape ranges over four decades.
         shape = math.exp(brentq(excess, math.log(0.15), math.log(2e3), xtol=1e-14))
         return shape, math.exp(gammaln(1.0 + 1.0 / shape))
 
@@ -228,6 +229,7 @@ class TruncatedNormal(_ByMoments):
         # The widest distributions: exponential, and with two bounds uniform.
         excess = self.mean - self.low
         room = min(excess**2, excess * max(high - self.mean, 0.0) / 2.0)
+        # Start from the normal distribution without truncation.
         solution = root(moments, [0.0, 0.0], tol=1e-12) if deviation**2 < room else None
         if solution is None or not np.abs(moments(solution.x)).max() < 1e-8:
             raise InputError(

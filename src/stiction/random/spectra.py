@@ -134,7 +134,7 @@ def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
     while above > 0.0:
         before, lag = lag, lag + max(above / slope, step)
         above = excess(lag)
-        step *= 1.005  # for spectra whose power sits far below their truncation
+        step *= 1.005  # longer steps for spectra with little power near their truncation
     ratio: float = brentq(
         lambda ratio: excess(ratio * lag), before / lag, 1.0, xtol=1e-15, rtol=1e-14
     )

@@ -134,6 +134,7 @@ def share_below_residual(problem: Problem, random: RandomInterface) -> float:
     residual = np.asarray(problem.friction.residual_strength)
     if "residual_strength" in fields:
         residual = _equally_likely(fields["residual_strength"].marginal, RESIDUAL_QUANTILES)
+    # A pressure on both strengths cancels.
     one_sided = ("strength" in pressed) != ("residual_strength" in pressed)
     for name, power in (("residual_strength", 1.0), ("strength", -1.0)):
         if name in between:

@@ -100,6 +100,7 @@ def nucleation_statistics(problem: Problem, strength: RandomField) -> Nucleation
 def strength_spectrum(problem: Problem, strength: RandomField) -> Array:
     """Return the share of Var[tau_p] at each wave of `Interface.transform`; the sum is 1."""
     interface = problem.interface
+    # The spectrum is the transform of the correlation. A mode stands for its conjugate, too.
     power = interface.transform(strength.correlation(interface)).real / interface.size
     power[..., 1 : interface.shape[-1] // 2] *= 2.0
     return np.maximum(power, 0.0)

@@ -137,6 +137,7 @@ def griffith_length(
         SHORT_LENGTHS, np.arange(1, problem.interface.size)
     )
     above = runs(lengths, tau)
+    # A crack can be arrested only after it has begun to run.
     if arrest:
         above = ~above & np.maximum.accumulate(above, axis=1)
     crosses, first = above.any(axis=1), above.argmax(axis=1)
@@ -173,6 +174,7 @@ def _intensity_factors(problem: Problem, drops: Array, lengths: Array, centre: f
     cosine = np.cos((np.arange(points) + 0.5) * np.pi / points)
     factors = []
     for part in np.array_split(lengths, 1 + lengths.size * points // POINTS_AT_ONCE):
+        # 1. The substitution of (1) turns the crack into -1 < cos t < 1.
         U = np.tan(0.5 * np.pi * part / period)
         u = U[:, None] * cosine
         place = (centre + np.arctan(u) * period / np.pi) / interface.spacing

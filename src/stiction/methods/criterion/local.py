@@ -89,6 +89,7 @@ class LocalCriterion:
 
     def seconds_per_sample(self, problem: Problem) -> float:
         """Return the approximate time of a sample on a core, s."""
+        # Measured. The time on planes is mostly transforms over several ellipses.
         fixed, per_node = (5e-4, 8e-8) if problem.interface.is_plane else (3e-5, 3e-8)
         return fixed + per_node * problem.interface.size
 
@@ -153,7 +154,9 @@ class LocalCriterion:
             load, patch = np.empty(len(excess)), np.empty((len(excess), 4))
             place = np.empty((len(excess), 2) if interface.is_plane else len(excess))
             for rate, rows in _rates(sample):
+                # 1.
                 windows = windows_of(problem, rate)
+                # 2.
                 load[rows], place[rows], chosen = least_average(
                     interface, windows, excess[rows], profile
                 )
@@ -182,6 +185,7 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
     load, start, width, relief = np.zeros((4, sample.samples))
     allowed, blocks = np.empty(problem.interface.size), problem.blocks
     for rate, rows in _rates(sample):
+        # 1.
         windows = blocks.windows(rate, rate)
         if not windows.starts.size:
             raise InputError(
@@ -189,6 +193,7 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
                 " criterion does not hold. Use st.Equilibrium()"
             )
         for i in rows:
+            # 2.
             load[i], c, start[i] = weakest_window(
                 excess[i],
                 sample.load_profile,
@@ -198,7 +203,7 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
                 allowed,
             )
             width[i] = windows.widths[c]
-            if blocks.relief > 0.0:
+            if blocks.relief > 0.0:  # 3.
                 run = slice(int(start[i]), int(start[i] + width[i]))
                 drive = load[i] * sample.load_profile - excess[i]
                 relief[i] = _relief_of_patch(blocks, rate, run, drive)
@@ -221,6 +226,7 @@ def _relief_of_patch(blocks: Driven, rate: float, run: slice, drive: Array) -> f
     """
     matrix = np.zeros((run.stop - run.start + 1,) * 2)
     matrix[:-1, :-1] = blocks.stiffness[run, run] - rate * np.eye(len(matrix) - 1)
+    # The last row and column are the added equation and its unknown force, scaled like the others.
     matrix[[0, -2], -1] = matrix[-1, [0, -2]] = rate
     slip = np.zeros(len(drive))
     slip[run] = np.linalg.solve(matrix, np.append(drive[run], 0.0))[:-1]

@@ -339,6 +339,7 @@ def fading_memory(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
         for j in range(TWO_ROWS):
             tables.packed[block * TWO_ROWS + j] = sums[0, j]
             tables.second_packed[block * TWO_ROWS + j] = sums[1, j]
+    # The tables do not hold the shares of the modes on a plane: weight the two sums here.
     for q in range(1, tables.memory_sum.size):
         o, share = grid.offset[q], grid.mode_two[grid.entry[q]]
         share_three = 1.0 - share

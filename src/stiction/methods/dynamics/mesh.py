@@ -98,6 +98,7 @@ def _mesh(
     depth = specimen.thickness or 1.0
     heights = row_heights(specimen.height, dx)
     elements, strips = _elements(np.diff(heights), dx, solid, mode == "III")
+    # A row carries half of the elements above and below it.
     tributary = np.gradient(heights)
     tributary[[0, -1]] = 0.5 * np.diff(heights)[[0, -1]]
     push = np.zeros((heights.size, 2))
@@ -148,6 +149,7 @@ def row_heights(height: float, spacing: float) -> Array:
         ROW_RATIO ** np.arange(int(2.0 * height / spacing) + 2), MAX_ROW_HEIGHT
     )
     count = max(int(np.searchsorted(np.cumsum(steps), height * (1.0 - 1e-9))) + 1, 2)
+    # Stretch the rows to end at the top, except the first, which fits the interface.
     steps = steps[:count]
     steps[1:] *= (height - spacing) / steps[1:].sum()
     return np.concatenate([[0.0], np.cumsum(steps)])
@@ -210,6 +212,7 @@ def _covered(heights: Array, middle: float, width: float) -> Array:
     edges = np.concatenate([heights[:1], 0.5 * (heights[1:] + heights[:-1]), heights[-1:]])
     low, high = middle - 0.5 * width, middle + 0.5 * width
     share = np.maximum(np.minimum(edges[1:], high) - np.maximum(edges[:-1], low), 0.0)
+    # The row above the interface takes the share of the interface.
     share[1] += share[0]
     share[0] = 0.0
     return share / share.sum()
@@ -220,12 +223,14 @@ def _limit(
 ) -> float:
     """Return the largest stable step of mesh, viscosity and correction together, s."""
     thin = min(mesh.spacing, float(np.diff(mesh.heights).min()))
+    # Bound of the squared frequency of an element, then of the correction on the interface.
     squares = max(4.0 * speed**2, 8.0 / 3.0 * (speed**2 + shear_speed**2)) / thin**2
     stiffest = float(
         scipy.linalg.eigvalsh(correction, subset_by_index=[len(correction) - 1] * 2)[0]
     )
     squares += 2.0 * max(stiffest, 0.0) * mesh.spacing / mesh.mass[0]
     frequency = np.sqrt(squares)
+    # Stability limit of the leapfrog with stiffness-proportional damping.
     damped = 0.5 * viscous * frequency
     return float(2.0 / frequency * (np.sqrt(1.0 + damped**2) - damped))
 
@@ -279,6 +284,7 @@ def _condensed(mesh: Mesh, folds: list[Array]) -> tuple[Array, Array, float]:
     compliance = 0.0
 
     def eliminated(inner: Array, between: Any, force: Array) -> tuple[Array, Array, float]:
+        # The Schur complement, by the inverse of a Cholesky factor (LAPACK's dpotri).
         factor = scipy.linalg.cholesky(inner, overwrite_a=True, check_finite=False)
         inverse = scipy.linalg.lapack.dpotri(factor, overwrite_c=True)[0]
         inverse = np.triu(inverse) + np.triu(inverse, 1).T

@@ -349,6 +349,7 @@ def _least_load(medium: Medium, nodes: Nodes, steepest: float) -> float:
     # Half the nucleation length of a line. On a plane, half the lengths along x and y multiplied.
     half = float(np.prod(medium.problem.half_spaces.nucleation_lengths(2.0 * steepest)))
     weakens = np.isfinite(nodes.strength) & (nodes.critical > 0.0)
+    # Nodes that never weaken cannot start a rupture.
     loads = ((nodes.strength - nodes.initial) / nodes.profile)[weakens]
     weakest = round(min(max(half / interface.cell, 1.0), loads.size))
     return float(np.partition(loads, weakest - 1)[:weakest].mean())

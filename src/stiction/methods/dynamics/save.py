@@ -264,6 +264,7 @@ class Recorder:
         the step at which `max_steps` ended it.
         """
         folder, steps = self.save.to, sum(rows["step_time"].size for rows in self._steps)
+        # A file for every frame would be slow, and a single file would have to fit in memory.
         full = len(self._frames) >= FRAMES_PER_FILE or steps >= _MAX_STEPS_PER_FILE
         if folder is None or not (full or ((at_once or last) and self._frames)):
             return
@@ -356,6 +357,7 @@ def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset
             data_vars="minimal", coords="minimal", compat="override", join="override",
         )  # fmt: skip
 
+    # Frames and steps have different lengths in each file: join them separately.
     framed = joined("time", "step").merge(joined("step", "time"))
     framed.attrs = parts[-1].attrs
     if (folder / _SUMMARY).exists():

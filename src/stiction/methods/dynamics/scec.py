@@ -84,6 +84,7 @@ def write_scec(
         record = run.sel(station=name)
         place = {dim: float(record[f"station_{dim}"]) for dim in dims}
         j, k, *_ = [place[dim] - middle[dim] for dim in dims] + [0.0]
+        # The record begins after the first step. The first frame is the state before it.
         start = run.isel(time=0).sel(place, method="nearest")
         time = np.append(start.time, record.step_time)
         shown = [
@@ -107,6 +108,7 @@ def write_scec(
             paths[-1], np.column_stack(columns), "%21.13e" + 7 * " %15.7e", header=header,
             comments="",
         )  # fmt: skip
+    # Unbroken nodes need a number in the format.
     times = np.nan_to_num(run.arrival_time.values, nan=UNBROKEN_TIME).ravel()
     places = [grid.ravel() for grid in np.meshgrid(*away, indexing="ij")]
     paths.append(target / "cplot.txt")

@@ -145,6 +145,7 @@ def _record_to_end(
     """Take steps and keep frames until the run ends. Return the reason."""
     interval = recorder.save.every
     while state.steps < max_steps:
+        # An implicit step is much longer than an explicit step.
         count = interval if state.explicit else max(1, interval // 10)
         if state.steps + count >= max_steps:
             recorder.flush(state, at_once=True)

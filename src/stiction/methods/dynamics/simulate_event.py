@@ -88,6 +88,7 @@ def simulate_event(
         before = states[-1 if number is None else number]
         trial = program.event(sample, before)  # 2.
         trial.run(method.max_steps)
+        # A sliding event goes on until the last waves have crossed the block.
         steps = trial.steps + (trial.mesh.window // 2 if trial.slides else 0)
         record = EventRecord(problem, rows, program.event(sample, before), save, trial)  # 3.
         record.add()
@@ -146,6 +147,7 @@ class EventRecord:
                 "drive_travel": 2.0 * waves.now[TRAVEL],
             }
         )
+        # Pictures at given shares of the slip show the event better than at equal times.
         while self._due and self._due[0] <= waves.slip.mean():
             self._due.pop(0)
             self.blocks.append((waves.now[NOW], waves.u_rate.copy()))
@@ -156,6 +158,7 @@ class EventRecord:
         mesh, waves = self.event.mesh, self.event.waves
         rates = np.hstack([waves.u_rate, waves.v_rate]).astype(float)
         lag = mesh.viscous_time + 0.5 * mesh.step
+        # w holds displacement and viscous time times rate, at the end of the step.
         w = np.hstack([waves.u, waves.v]).astype(float) - lag * rates
         strain = 0.0
         for row, matrix in enumerate(self._layers):

@@ -117,6 +117,7 @@ class DynamicEvent:
 
     def run(self, max_steps: int) -> None:
         """Step 2: take steps until all is at rest or all nodes have slipped."""
+        # Slip at the last checks, which together span a window.
         slips = deque([self.waves.slip.copy()], maxlen=CHECKS_PER_WINDOW + 1)
         while self.take_steps(-(-self.mesh.window // CHECKS_PER_WINDOW)):
             slips.append(self.waves.slip.copy())
@@ -145,6 +146,7 @@ def begin(
     growth = INITIAL_GROWTH * sample.critical[fastest] / max(float(z[fastest]), 1e-300)
     slip = before.slip + growth * z
     start = load * sample.profile - stiffness @ slip
+    # The initial growth is not the arrival of a front: put the threshold just above it.
     front = arrival * sample.critical
     front = np.where(before.slip < front, np.maximum(front, slip * (1.0 + 1e-12)), np.inf)
     return DynamicEvent(sample, mesh, before, start, at_rest(mesh, slip), front)
@@ -165,7 +167,7 @@ class RuptureProgram(DenseProgram):
 
     def __init__(self, problem: Problem, method: Any) -> None:
         super().__init__(problem)
-        self.may_stop = True
+        self.may_stop = True  # waves leave nodes at rest below their strength
         self.mesh, self.max_steps = make_mesh(problem, method.courant), method.max_steps
         law = problem.friction
         self.arrival = min(law.slip_at(1.0 - method.arrival), law.reach) / law.reach

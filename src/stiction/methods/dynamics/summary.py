@@ -166,6 +166,7 @@ def rupture_speed(arrival: Floats, spacing: float, window: float) -> Floats:
     over `window` (m). It is NaN unless the arrival is strictly monotone over the window, so that
     the birth of patches and the meeting of fronts do not count.
     """
+    # A window over more than the line would compare a front with itself.
     half = max(1, round(0.5 * window / spacing))
     if 2 * half >= arrival.size:
         return np.full(arrival.shape, np.nan)

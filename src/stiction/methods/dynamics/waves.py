@@ -134,6 +134,7 @@ def _slide(
     slip, rates, u, now = waves.slip, waves.u_rate[0], waves.u[0], waves.now
     never = 0
     for i in range(slip.shape[0]):
+        # In double precision, since slip adds up many small increments.
         before = np.float64(rates[i])
         strength = strength_at(sample, slip, i)
         free = keep * before + gain * (force[i] + dx * (start[i] - waves.corrected[i]))
@@ -143,15 +144,17 @@ def _slide(
         else:
             after = 0.0
             waves.stress[i] = free / (gain * dx)
-        added = 2.0 * step * after
+        added = 2.0 * step * after  # both blocks move
         if slip[i] < front[i] <= slip[i] + added:
             waves.arrival[i] = now[TIME] + step * (front[i] - slip[i]) / added
         slip[i] += added
         waves.slip_rate[i] = 2.0 * after
+        # The work of friction, with the mean of the rates before and after the step.
         now[FRICTION] += 0.5 * dx * step * waves.stress[i] * (before + after)
         u[i] += np.float32(step * after + mesh.viscous_time * (after - before))
         rates[i] = np.float32(after)
         never += slip[i] == 0.0
+    # Update the stress of the correction by the added slip only: most nodes rest most of the time.
     for j in range(slip.shape[0]):
         added = step * waves.slip_rate[j]
         if added > 0.0:
@@ -169,10 +172,11 @@ def _move_platen(mesh: Mesh, waves: Waves, force: Any) -> None:
     for i in range(force.shape[0]):
         total += force[i]
     before = now[SPEED]
-    if mesh.stiffness == np.inf:
+    if mesh.stiffness == np.inf:  # the drive holds the top, and balances its force
         now[FORCE] = -total
         return
     mass = force.shape[0] * mesh.mass[top]
+    # The spring acts at the mean travel of the step, which keeps stiff machines stable.
     inert = (mass + mesh.drive_mass) / step + 0.5 * mesh.stiffness * step
     lost = 0.5 * mesh.attenuation * mass
     total -= mesh.stiffness * now[TRAVEL]
@@ -200,7 +204,7 @@ def _move_pusher(mesh: Mesh, waves: Waves, gains: Array) -> None:
             mobility += mesh.push[j, side] ** 2 * gains[j]
             speed += mesh.push[j, side] * waves.u_rate[j, i]
     before = now[SPEED]
-    if mesh.stiffness == np.inf:
+    if mesh.stiffness == np.inf:  # the force that stops the pushed nodes
         force = -speed / mobility
     else:
         a = 0.5 * mesh.stiffness * step + mesh.drive_mass / step
@@ -238,6 +242,7 @@ def wave_steps(
     u, v, u_rate, v_rate = waves.u, waves.v, waves.u_rate, waves.v_rate
     for taken in range(steps):
         never = n
+        # Forces on row j and motion of row j - 1 alternate, so that two rows of forces suffice.
         for j in range(rows + 1):
             if j < rows:  # stencils are zero beyond the interface and the top
                 low, up, stencil = max(j - 1, 0), min(j + 1, last), mesh.stencils[j]

@@ -83,6 +83,7 @@ def _measures(
     """Return the variables of an event; `initial` and `profile` are means over the interface."""
     interface = problem.interface
     added = (after.slip - before.slip).reshape(interface.shape)
+    # Slip elsewhere also grows a little in an event. The patch is around the largest added slip.
     inside, patch = largest_patch(np.maximum(added, 0.0), interface, MIN_ADDED_SLIP)
     stress_before = before.load - relief_of(problem, before.slip)
     stress_after = after.load - relief_of(problem, after.slip)

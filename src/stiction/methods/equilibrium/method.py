@@ -124,6 +124,7 @@ class Equilibrium:
         if problem.specimen is not None:  # more events, and jumps are followed to their end
             drive = problem.specimen.drive
             more *= 60.0 if drive.type == "platen" and not drive.stiffness else 300.0
+        # The numbers and the exponent are measured.
         return 2e-4 + 5e-4 * more * (interface.size / 1024) ** 1.5
 
     def supports(self, problem: Problem) -> list[str]:

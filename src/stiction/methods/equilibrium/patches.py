@@ -66,6 +66,7 @@ def main_patch(field: Array) -> tuple[int, int, float]:
     if length == n:
         # The run has no ends: cut the circle opposite the peak.
         start = (peak + n // 2 + 1) % n
+    # The centroid is taken along the run, so that it is defined across the ends of the circle.
     weight = 0.0
     moment = 0.0
     for q in range(length):
@@ -94,6 +95,7 @@ def labelled_patches(mask: Mask) -> tuple[NDArray[np.int64], int]:
     pieces, count = label(mask)
     if count == 0:
         return pieces.astype(np.int64), 0
+    # scipy's labels stop at the borders. Join the patches that meet across them.
     first = np.concatenate((pieces[0, :], pieces[:, 0]))
     last = np.concatenate((pieces[-1, :], pieces[:, -1]))
     meet = (first > 0) & (last > 0)
@@ -114,6 +116,7 @@ def span(occupied: Mask, peak: int) -> tuple[int, int]:
     places = np.flatnonzero(occupied)
     if places.size == n:
         return peak - n // 2, n
+    # The shortest arc is the circle without the widest gap.
     gaps = np.diff(np.append(places, places[0] + n))
     widest = int(np.argmax(gaps))
     return int(places[(widest + 1) % places.size]), n - int(gaps[widest]) + 1

@@ -219,6 +219,7 @@ def _write_direction(
     It is 1 if the direction leads to the solution of the linear problem, otherwise infinite.
     """
     slip, may_stop = state.slip, state.may_stop
+    # Leave out nodes that would move back, and solve again, until no such node is left.
     direction, solution = true_pieces.direction, true_pieces.solution
     while True:
         n_factored = factor_slipping(true_pieces)

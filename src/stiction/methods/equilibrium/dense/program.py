@@ -112,6 +112,7 @@ class DenseProgram:
         equilibrium at a lower load.
         """
         bound, multiplier = self.bound(sample)
+        # Dense factors cost the cube of the slipping nodes, transforms little more than all nodes.
         if cap == np.inf and self.nodes > MAX_WEAK_NODES:
             weak_nodes = np.count_nonzero(sample.excess < bound * sample.profile)
             if weak_nodes > MAX_WEAK_NODES:

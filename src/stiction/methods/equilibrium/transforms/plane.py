@@ -153,6 +153,7 @@ def plane_onset(
     while slip is None:
         shape = grids[-1][0].shape
         stiffest, steepest = float(half_spaces.symbol(shape).max()), float(grids[-1][2].max())
+        # A coarse grid takes every other node, so that an odd number of nodes cannot be halved.
         odd = any(nodes % 2 for nodes in shape)
         resolved = 0.5 * stiffest >= MIN_STIFFNESS_RATIO * steepest
         if odd or min(shape) < 2 * MIN_COARSE_NODES or not resolved:
@@ -275,6 +276,7 @@ class PlaneProgram:
             work = step * inner(sample.profile, growth)
             if work > 0.0:  # A times the growth is about the step of the load
                 operator = operator._replace(soft_mode=growth / np.sqrt(work))
+            # The last few states are enough to restart before a turn that was passed unseen.
             load, slip, step = load_beyond, end, STEP_FACTOR * step
             passed = [*passed[-3:], (load, slip)]
 
