@@ -71,7 +71,7 @@ class Method(Protocol):
         """Return how long a sample takes on a core, s, to a factor of three."""
 
     def supports(self, problem: Problem) -> list[str]:
-        """Return the reasons why it cannot take a problem, or an empty list."""
+        """Return the reasons why the method cannot take a problem, or an empty list."""
 
     def prepare(self, problem: Problem) -> Solver:
         """Return a solver of samples. Compute here whatever all samples share."""
@@ -144,7 +144,9 @@ def prepared(problem: Problem, method: Method) -> Solver:
     variables = method.variables(problem)
     lacking = [name for name in ONSET_VARIABLES if name not in variables]
     if lacking:
-        raise InputError(f"method: the variables of {method.label} lack {', '.join(lacking)}")
+        raise InputError(
+            f"method: the variables of {method.label} must include {', '.join(lacking)}"
+        )
 
     def solve(sample: Sample) -> Values:
         values = {name: np.asarray(value) for name, value in solver(sample).items()}

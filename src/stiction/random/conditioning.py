@@ -179,8 +179,8 @@ class Conditions:
         names, places = interface.dims, self.places
         if len(places) != len(names):
             raise InputError(
-                f"given.profile: has {len(places)} coordinates, the interface {len(names)}:"
-                f" {', '.join(names)}"
+                f"given.profile: must have the {len(names)} coordinates {', '.join(names)} of the"
+                f" interface, got {len(places)}"
             )
         problems = [
             f"given.profile: {name} reaches from {row.min():g} to {row.max():g} m, the interface is"

@@ -118,7 +118,7 @@ def distribution_of(key: str, value: Any) -> Any:
     raise InputError(
         f"{key}: must be a frozen continuous scipy.stats distribution such as"
         " scipy.stats.uniform(1e-3, 9e-3), a range (low, high) with low < high, or"
-        " {'low': ..., 'high': ..., 'spacing': 'linear' or, of a positive range, 'log'}, or a"
+        " {'low': ..., 'high': ..., 'spacing': 'linear' or, for a positive range, 'log'}, or a"
         " table of a marginal such as {'type': 'lognormal', 'mean': ..., 'cv': ...}, got"
         f" {describe(value)}"
     )

@@ -104,12 +104,12 @@ class RandomField:
 
     @property
     def mean(self) -> float:
-        """Mean of the field, in its own unit (Pa for strength)."""
+        """Mean of the field in the unit of the field (Pa for strength)."""
         return float(self.marginal.distribution.mean())
 
     @property
     def standard_deviation(self) -> float:
-        """Standard deviation of the field, in its own unit."""
+        """Standard deviation of the field in the unit of the field."""
         return float(self.marginal.distribution.std())
 
     @checked

@@ -84,7 +84,7 @@ class Modes:
         return fields
 
     def _from_first_node(self, draws: Array) -> Array:
-        """Return the draws of the same waves with the origin at the first node.
+        """Return the draws for the same waves with their origin at the first node.
 
         The first node of a specimen lies half a spacing from its end.
         """

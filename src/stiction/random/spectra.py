@@ -217,7 +217,7 @@ class _PowerOfWavenumber(ScaledSpectrum):
 @register
 @model
 class PowerLawSpectrum(_PowerOfWavenumber):
-    """g(k) ~ (k^2 + lambda^2)^-exponent, lambda = 2 pi/correlation_length.
+    """Power-law spectrum g(k) ~ (k^2 + lambda^2)^-exponent, lambda = 2 pi/correlation_length.
 
     Parameters
     ----------

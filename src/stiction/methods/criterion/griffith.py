@@ -168,7 +168,7 @@ def _stress_drops(problem: Problem) -> Array:
 
 
 def _intensity_factors(problem: Problem, drops: Array, lengths: Array, centre: float) -> Array:
-    """Step 1: return K at both tips of cracks of these lengths, Pa m^(1/2), (drops, m, 2)."""
+    """Step 1: return K at both tips of cracks with given lengths, Pa m^(1/2), (drops, m, 2)."""
     interface, period = problem.interface, problem.interface.measure
     points = max(MIN_POINTS, interface.size)
     cosine = np.cos((np.arange(points) + 0.5) * np.pi / points)

@@ -94,10 +94,10 @@ class LocalCriterion:
         return fixed + per_node * problem.interface.size
 
     def supports(self, problem: Problem) -> list[str]:
-        """Return the reasons why it cannot solve a problem, or an empty list."""
+        """Return the reasons why the method cannot solve a problem, or an empty list."""
         friction, reasons = problem.friction, []
         if problem.interface.breakable is not None:
-            reasons.append("interface.extent: is taken by st.Rupture() between half-spaces")
+            reasons.append("interface.extent: leave it out, or use st.Rupture() (half-spaces)")
         if friction.steepening > 1.0:
             reasons.append(
                 f"friction: this law falls up to {friction.steepening:.3g} times as steeply later"
@@ -319,8 +319,8 @@ def excess_of(sample: Sample) -> Array:
     """Return tau_p - tau_i, Pa, or raise an `InputError` if the strength is not finite."""
     if not np.isfinite(sample.strength).all():
         raise InputError(
-            "strength: must be finite everywhere for the local criterion, which averages it. Give a"
-            " large finite strength to nodes that cannot break, or use st.Rupture()"
+            "strength: must be finite everywhere for the local criterion, which averages it. End"
+            " the interface at nodes that cannot break (interface.extent), and use st.Rupture()"
         )
     return np.ascontiguousarray(sample.strength - sample.initial_stress)
 

@@ -1,4 +1,4 @@
-"""A quick test whether a predicted onset is right, for lines, without the equilibrium kernels.
+"""Quick test whether a predicted onset of a line is right, without the equilibrium kernels.
 
 Problem
 -------

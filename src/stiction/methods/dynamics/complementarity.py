@@ -46,7 +46,7 @@ _JOINING = 10.0  # stress above the strength with which a node joins, in units o
 
 @jit_inside
 def _solve(transform: Transform, tables: ImplicitTables, accuracy: float) -> Any:
-    """Step 2: improve u in place to a residual of `accuracy` (Pa). Return whether it is reached."""
+    """Step 2: improve u in place to a residual of `accuracy` (Pa). Return whether that succeeds."""
     u, slipping, driving = tables.increment, tables.slipping, tables.driving
     falling, product, work = tables.falling, tables.product, tables.work
     r, p, z = tables.cg_residual, tables.cg_direction, tables.cg_preconditioned

@@ -120,7 +120,7 @@ def _correct(
 
 @jit_inside
 def _calm(now: Any, thresholds: Thresholds, step: float, impedance: float, rise: float) -> Any:
-    """Step 4: count calm steps. Return whether there were enough of them in a row.
+    """Step 4: count calm steps in a row. Return whether they suffice for implicit steps.
 
     Waves make slip rates come and go. Creep is slow, or as fast as it was when the row began.
     """

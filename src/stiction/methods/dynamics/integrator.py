@@ -182,7 +182,7 @@ class Run:
         return bool(remaining <= 1e-6 * self.medium.step)
 
     def ending(self, state: RuptureState, reason: int) -> str | None:
-        """Return the reason why a run ends here, in a word, or `None` if it goes on."""
+        """Return the reason why a run ends in its present state, or `None` if it goes on."""
         if reason == Reason.ALL_SLID and self.setting.thresholds.held:
             return "rest"
         if reason in _ENDINGS:

@@ -1,4 +1,4 @@
-"""The memory of past slip rates: memory variables of each mode, and how steps advance them.
+"""The memory of past slip rates: memory variables of each mode, and their time steps.
 
 Problem
 -------

@@ -290,9 +290,9 @@ class Rupture:
             checks.check_finite(run, state, reason)
             if ended is None:
                 raise InputError(
-                    f"max_steps: {self.max_steps} steps led to tau_0 = {state.now['load']:.6g} Pa,"
-                    f" and {state.now['weakened_nodes']} nodes to their residual strength, but not"
-                    f" to stop={self.stop!r}. Raise max_steps or the loading rate"
+                    f"max_steps: {self.max_steps} steps did not reach stop={self.stop!r}, only"
+                    f" tau_0 = {state.now['load']:.6g} Pa with {state.now['weakened_nodes']} nodes"
+                    " at their residual strength. Raise max_steps or the loading rate"
                 )
         checks.warn_of_slip(run, state)
         values = summary(run, state)

@@ -49,9 +49,8 @@ def simulate_rupture(
     ----------
     problem : Problem
     profiles : array, mapping of arrays, xarray.Dataset or Sample
-        Peak strength (Pa) of a single sample, infinite at nodes that never break, or several
-        profiles by name, as in `onset`. If the initial stress is above the strength, slip begins
-        at once.
+        Peak strength (Pa) of a single sample, or several profiles by name, as in `onset`. If the
+        initial stress is above the strength, slip begins at once.
     method : Rupture
         Load, numerical options and end of the run. The run begins at the first slip,
         regardless of `start`, and keeps its results if `max_steps` ends it.

@@ -67,7 +67,7 @@ def refusals(method: Any, problem: Problem) -> list[str]:
         if name not in OPTIONS and value != getattr(usual, name)
     ]
     if problem.interface.breakable is not None:
-        reasons.append("interface.extent: is taken by st.Rupture() between half-spaces")
+        reasons.append("interface.extent: leave it out on specimens, which have ends")
     return reasons + refused(problem.friction)
 
 

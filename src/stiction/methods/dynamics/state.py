@@ -60,7 +60,7 @@ Reason = IntEnum(
 
 
 class Phase(IntEnum):
-    """Kind of the next steps, which decides the form of `RuptureState.memory`."""
+    """Kind of the next step, explicit or implicit. It decides the form of `RuptureState.memory`."""
 
     IMPLICIT = 0  # psi, the memory variables themselves
     EXPLICIT = 1  # psi/B, divided by their response B to a unit slip rate

@@ -128,10 +128,10 @@ class Equilibrium:
         return 2e-4 + 5e-4 * more * (interface.size / 1024) ** 1.5
 
     def supports(self, problem: Problem) -> list[str]:
-        """Return the reasons why it cannot solve a problem, or an empty list."""
+        """Return the reasons why the method cannot solve a problem, or an empty list."""
         reasons = refused(problem.friction)
         if problem.interface.breakable is not None:
-            reasons.append("interface.extent: is taken by st.Rupture() between half-spaces")
+            reasons.append("interface.extent: leave it out, or use st.Rupture() (half-spaces)")
         if not problem.interface.is_plane and self.gap != type(self)().gap:
             reasons.append("gap: leave it out on lines, which are solved to round-off")
         return reasons

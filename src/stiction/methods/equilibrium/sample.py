@@ -1,4 +1,4 @@
-"""Samples, states and the program's protocol, as the solvers of equilibrium take them.
+"""Samples, equilibrium states, and the protocol of the search for equilibria.
 
 Strength falls with slip along straight pieces. A law of M pieces has M corners, and piece M is the
 residual strength. Between corners everything is linear, so solvers step from corner to corner. The
@@ -37,7 +37,7 @@ class Pieces(NamedTuple):
 
     @property
     def steepens(self) -> bool:
-        """Whether a piece falls more steeply than the one before it."""
+        """Whether a piece falls more steeply than the piece before it."""
         return bool(np.any(np.diff(self.slopes) > 0.0))
 
 
@@ -204,7 +204,7 @@ class Program(Protocol):
         """Return the equilibrium at a load above a state, or `None` if it is not found."""
 
     def gradient(self, sample: StaticSample, state: EquilibriumState) -> Array:
-        """Return the derivative of the stress of an instability by the strengths there, (n,).
+        """Return the derivative of an instability's stress by the strengths, (n,).
 
         The stress is the mean stress divided by the mean of the load profile. The strengths are the
         present pieces of the law, continued to zero slip.
@@ -230,7 +230,7 @@ def exceeds(sample: StaticSample, slip: Array, piece: NDArray[np.int64] | None =
 
 @jit_inside
 def piece_at(pieces: Pieces, critical: float, slip: float) -> int:
-    """Return the piece on which a node with this d_c is after a slip."""
+    """Return the piece on which a node with a given d_c is after a slip."""
     piece = 0
     while piece < pieces.ends.shape[0] and slip >= pieces.at_corner * (
         pieces.ends[piece] * critical

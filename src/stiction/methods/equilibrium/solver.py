@@ -50,7 +50,7 @@ STRENGTH_STEP = 1e-7
 
 
 class SamplePath(NamedTuple):
-    """Course of one sample until it slides.
+    """Course of a sample until it slides.
 
     `first` is the first instability and `last` the last equilibrium. `known` is false if a jump or
     a path was not followed to its end; the load of `last` is then a lower bound. `peak` is the
@@ -96,7 +96,7 @@ def make_program(problem: Problem, gap: float = 1e-6) -> Program:
     if reasons := refused(problem.friction):
         raise InputError(reasons)
     if problem.interface.breakable is not None:
-        raise InputError("interface.extent: is taken by st.Rupture() between half-spaces")
+        raise InputError("interface.extent: leave it out, or use st.Rupture() (half-spaces)")
     return PlaneProgram(problem, gap) if problem.interface.is_plane else DenseProgram(problem)
 
 

@@ -162,7 +162,7 @@ def _remove_reversed(workspace: Workspace, n_slipping: int, load: float) -> int:
 def _cut(
     state: SlipState, n_factored: int, bound: float, multiplier: Array
 ) -> tuple[float, float]:
-    """Step 3: the load of the cut, and the lower of it and the bound, with its multiplier."""
+    """Step 3: return the load of the cut, and the new bound. Write the bound's multiplier."""
     sample, _, _, workspace, _ = state
     y = workspace.direction
     singular_direction(workspace, n_factored, y)

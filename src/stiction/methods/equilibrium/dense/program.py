@@ -296,7 +296,7 @@ class DenseProgram:
 
 
 def present_sample(sample: StaticSample, slip: Array) -> StaticSample:
-    """Return the sample whose only pieces are those on which the nodes are after a slip."""
+    """Return the sample in which each node keeps the piece on which it is after a slip."""
     present = present_pieces(sample, slip)
     return sample._replace(excess=present.strength, rate=present.rate)
 

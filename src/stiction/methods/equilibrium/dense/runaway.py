@@ -1,4 +1,4 @@
-"""A quick test whether an unstable patch of a line certainly slides along all of the interface.
+"""Quick test whether an unstable patch of a line certainly grows until the interface slides.
 
 Problem
 -------

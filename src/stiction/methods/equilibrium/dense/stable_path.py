@@ -100,7 +100,7 @@ class PathStatus(IntEnum):
 
 
 class PathEnd(NamedTuple):
-    """Where a path ended."""
+    """End of a path."""
 
     load: float  # Pa
     peak: float  # largest mean stress on the way, divided by the mean of the load profile, Pa
@@ -321,7 +321,7 @@ def _keep_factored(state: SlipState, n_factored: int, v_nodes: Array) -> None:
 
 @jit_inside
 def _some_rest(state: SlipState) -> bool:
-    """Whether a node rests that slipped before."""
+    """Return whether any node rests that slipped before."""
     for i in range(state.slip.shape[0]):
         if state.slip[i] > 0.0 and not state.workspace.is_slipping[i]:
             return True
@@ -382,7 +382,7 @@ def _start(
 
 @jit_inside
 def all_slip(state: SlipState) -> bool:
-    """Whether every node slips or has slipped."""
+    """Return whether every node slips or has slipped."""
     for i in range(state.slip.shape[0]):
         if not (state.workspace.is_slipping[i] or state.slip[i] > 0.0):
             return False

@@ -72,9 +72,10 @@ def _lifting_field(operator: Operator) -> tuple[Array, Array]:
 class Bracket:
     """Programme of a sample on a grid, with the best bounds of its solution so far.
 
-    They are rigorous bounds of the onset load (Pa), `lower` and `upper`, with the slip (m) and the
-    multiplier, <p, y> = 1, that prove them: at first no node slips, or all slide at once. All of
-    K(k), W (Pa/m), strength less initial stress (Pa) and load profile are given as fields (*shape).
+    `lower` and `upper` are rigorous bounds of the onset load (Pa). The slip (m) proves the lower
+    bound, and the multiplier, with <p, y> = 1, the upper. The first proofs are that no node slips,
+    and that all nodes slide at once. K(k), W (Pa/m), strength less initial stress (Pa) and load
+    profile are fields (*shape).
     """
 
     def __init__(
@@ -112,7 +113,7 @@ class Bracket:
         return self.magnitude * float(self.profile.mean())
 
     def raise_slip(self, slip: Array) -> None:
-        """Take a slip, cut at zero, if it proves a higher lower bound: it overloads no node."""
+        """Take a slip, cut at zero, if it proves a higher lower bound."""
         trial = np.maximum(slip, 0.0)
         product(self.operator, trial, self.residual)
         load = float(((self.residual + self.excess) / self.profile).min())

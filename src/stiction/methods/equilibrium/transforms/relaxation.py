@@ -174,7 +174,7 @@ def stable_equilibrium(
 
 
 class Bound(NamedTuple):
-    """A step of (b) 2."""
+    """Result of a step with bounds, (b) 2."""
 
     status: int
     slip: Array
@@ -190,7 +190,7 @@ def _bound(
     omitted: float,
     tolerance: float,
 ) -> Bound:
-    """(b) 2: slip if nodes omit a share of their weakening, and stop weakening at their corner.
+    """(b) 2: return the slip if nodes omit a share of their weakening and stop at their corner.
 
     The assumed strength is the larger of two lines, and Newton's method finds on which of them each
     node is. The drive is lowered by the residual allowed, so that a rough slip is a bound, too.

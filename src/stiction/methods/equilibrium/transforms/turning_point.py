@@ -1,4 +1,4 @@
-"""The turning point of the load, where the stable and the unstable equilibria of a patch meet.
+"""The turning point of the load, at which stable and unstable equilibria of a patch meet.
 
 Problem
 -------
@@ -142,7 +142,7 @@ def _other_patch(bracket: Bracket) -> Array | None:
 
 
 def _load_at(state: Held, amplitude: float, curvature: float = 0.0) -> float:
-    """Step 5: load (Pa) at which the spring has no force at an amplitude, from a state near it."""
+    """Step 5: return the load (Pa) without a spring force at an amplitude, from a state near it."""
     step = amplitude - state.amplitude
     force = state.force + (state.slope_of_force + 0.5 * curvature * step) * step
     return state.load - force / state.force_by_load
