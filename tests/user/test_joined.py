@@ -132,7 +132,7 @@ def test_profiles_and_peaks_are_joined():
     assert told.mean("strength.mean") == pytest.approx(1.2e6, rel=3e-3)
     assert {*told.families} == {"weibull"}
     refuses(
-        "another unit?",
+        "State the unit",
         lambda: st.infer(PROBLEM, fit, 1e-6 * peaks, **LOCAL),
     )
 

@@ -98,20 +98,17 @@ def test_members_in_proportion_share_uncertain_values():
     """As 128 specimens are made of each solved one only where strengths are in proportion."""
 
     class Source:
-        def grouped(self, count, seed):
-            fields = np.random.default_rng(seed).integers(3, size=count)
+        def interfaces(self, count, seed=0):
+            cvs = np.array([0.12, 0.15, 0.2])[
+                np.random.default_rng(seed).integers(3, size=count)
+            ]
+            marginals = [st.Gamma(mean=0.2 + 1e-5 * n, cv=cv) for n, cv in enumerate(cvs)]
             return [
                 dataclasses.replace(
-                    RANDOM,
-                    strength=dataclasses.replace(
-                        RANDOM.strength, marginal=st.Gamma(mean=0.2 + 1e-5 * number, cv=cv)
-                    ),
+                    RANDOM, strength=dataclasses.replace(RANDOM.strength, marginal=marginal)
                 )
-                for number, cv in enumerate(np.array([0.12, 0.15, 0.2])[fields])
-            ], fields.tolist()
-
-        def interfaces(self, count, seed=0):
-            return self.grouped(count, seed)[0]
+                for marginal in marginals
+            ]
 
     laws = {"strength.spectrum.correlation_length": (3e-3, 5e-3), PRESSURE: (4e6, 6e6)}
     random = drawn_from(st.uncertain(Source(), laws), 200, 0)

@@ -212,17 +212,13 @@ class FieldFit(Result):
         >>> min(means) < fit.field.mean < max(means)
         True
         """
-        return self.grouped(count, seed)[0]
-
-    def grouped(self, count: int, seed: int) -> tuple[list[RandomInterface], list[int]]:
-        """Return equally likely interfaces and the number of the field within each."""
         chosen = self._chosen(count, seed)
-        place = {own: number for number, own in enumerate(self._every)}
-        numbers = [place[field] for field in chosen]
         if not self._families:
-            return [RandomInterface(strength=field) for field in chosen], numbers
-        rng = np.random.default_rng([seed, 6])
-        return self._posterior.grouped(self._posterior.draws(count, rng, numbers))
+            return [RandomInterface(strength=field) for field in chosen]
+        place = {own: number for number, own in enumerate(self._every)}
+        rng, numbers = np.random.default_rng([seed, 6]), [place[field] for field in chosen]
+        drawn = self._posterior.draws(count, rng, numbers)
+        return [self._posterior.interface(row) for row in drawn]
 
     def _chosen(self, count: int, seed: int) -> list[RandomField]:
         """Return likely fields from all families in proportion to their weights (step 6)."""

@@ -103,11 +103,8 @@ class SpecimenPosterior(Posterior):
         seed : int
             Not negative.
         """
-        return self.grouped(count, seed)[0]
-
-    def grouped(self, count: int, seed: int) -> tuple[list[RandomInterface], list[int]]:
-        """Return equally likely interfaces and the number of the field within each."""
-        return self.grid.grouped(self.grid.draws(count, np.random.default_rng([seed, 4])))
+        drawn = self.grid.draws(count, np.random.default_rng([seed, 4]))
+        return [self.grid.interface(row) for row in drawn]
 
     @property
     def prior(self) -> Any:

@@ -243,10 +243,6 @@ class Grid:
         mean = profiles.reference * math.exp(drawn[3])
         return of_mean(profiles.fields[field], mean, factor)
 
-    def grouped(self, drawn: Array) -> tuple[list[RandomInterface], list[int]]:
-        """Return the interfaces of draws (draws, 4) and the numbers of their fields."""
-        return [self.interface(row) for row in drawn], drawn[:, 0].astype(np.int64).tolist()
-
     def described(self, drawn: Array) -> dict[str, Array]:
         """Return draws (draws, 4) as parameters by name."""
         field, scale = drawn[:, 0].astype(np.int64), np.exp(drawn[:, 3])

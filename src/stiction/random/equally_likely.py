@@ -1,6 +1,6 @@
 """Equally likely random interfaces as a mixture: a first draw selects the member of a sample."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import (
@@ -42,8 +42,10 @@ MAX_DRAWS_OF_STREAM = 1 << 40
 VARIANTS = 40
 """Number of values of each uncertain constant of the problem."""
 SHARED_VALUES = 8
-"""Number of members of a field that share the value of an uncertain parameter, so that their
-strengths are in proportion."""
+"""Number of members in proportion that share the value of an uncertain parameter, and so remain in
+proportion."""
+FORM_SHARES = np.array([0.05, 0.5, 0.95])
+"""Shares whose quantiles over the mean tell marginals apart."""
 FIRST_MEMBERS, MAX_MEMBERS = 1_000, 8_000
 """Number of members drawn from a source at first, and at most."""
 
@@ -92,7 +94,6 @@ class EquallyLikely:
     order: tuple[int, ...] = ()  # of the members along the first draw; empty keeps their order
     source: Source | None = None  # from which the members were drawn
     complete: bool = False  # whether the members are all possible interfaces, not a sample
-    fields: tuple[int, ...] = ()  # number of each member's field; equal if in proportion
     constants: tuple[Mapping[str, float], ...] = ()  # of the problem, taken in turn by members
 
     def __post_init__(self) -> None:
@@ -141,10 +142,10 @@ class EquallyLikely:
     def groups(self) -> NDArray[np.int64]:
         """Number of each member's group; the strengths of a group are in proportion."""
         known: dict[Any, int] = {}
-        strengths = [member.strength for member in self.members]
-        fields = np.array(self.fields or [known.setdefault(s, len(known)) for s in strengths])
+        forms = [form_of(member.strength) for member in self.members]
+        numbers = np.array([known.setdefault(form, len(known)) for form in forms])
         variants = max(len(self.constants), 1)
-        return fields * variants + np.arange(fields.size) % variants
+        return numbers * variants + np.arange(numbers.size) % variants
 
     @cached_property
     def means(self) -> Array:
@@ -262,14 +263,20 @@ def _named(kinds: Mapping[str, Any]) -> str:
     return " and ".join(f"{name} ({of})" if of else name for name, of in kinds.items())
 
 
+def form_of(field: RandomField) -> Any:
+    """Return what fields share whose values are in proportion."""
+    if field.conditions is not None:
+        return field
+    relative = field.marginal.distribution.ppf(FORM_SHARES) / field.mean
+    shape = tuple(f"{value:.10g}" for value in relative)
+    return shape, field.spectrum, field.mean_mode, field.anisotropy, field.of
+
+
 def drawn_from(source: Source, count: int, seed: int) -> EquallyLikely:
-    """Return a mixture of `count` interfaces from a source, grouped by field if it is known."""
-    grouped = getattr(source, "grouped", None)
-    members, fields = grouped(count, seed) if grouped else (source.interfaces(count, seed), ())
+    """Return a mixture of `count` interfaces from a source."""
     constants = source.constants(seed) if isinstance(source, Uncertain) else ()
-    return EquallyLikely(
-        tuple(members), source=source, fields=tuple(fields), constants=tuple(constants)
-    )
+    members = tuple(source.interfaces(count, seed))
+    return EquallyLikely(members, source=source, constants=tuple(constants))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -286,42 +293,30 @@ class Uncertain(Result):
         ]
         return Summary("Uncertain parameters, means", rows, "90 % interval")
 
-    def grouped(self, count: int, seed: int) -> tuple[list[RandomInterface], Sequence[int]]:
-        """Return equally likely interfaces, and the numbers of their fields if they are known."""
+    def interfaces(self, count: int, seed: int = 0) -> list[RandomInterface]:
+        """Return `count` equally likely interfaces, without the constants of the problem."""
         source = self.given if isinstance(self.given, Source) else None
         if isinstance(self.given, EquallyLikely):
             source = self.given.source
         likely = drawn_from(source, count, seed) if source else as_random(self.given)
         keys = [key for key in self.laws if not key.startswith("problem.")]
         ranks = np.arange(count)
-        if len(keys) < len(
-            self.laws
-        ):  # members take constants in turn, and a field shares them
+        # Constants are taken in turn; members in proportion share them, and values of parameters.
+        if len(keys) < len(self.laws):
             turns = np.array_split(ranks, VARIANTS)
             ranks = np.array([turns[n % VARIANTS][n // VARIANTS] for n in range(count)])
-        fields = np.resize(likely.groups, count)
-        numbers = np.argsort(fields, kind="stable")[ranks]
-        fields = fields[numbers]
+        numbers = np.argsort(np.resize(likely.groups, count), kind="stable")[ranks]
         members = [likely.members[number % len(likely.members)] for number in numbers]
         if not keys:
-            return members, fields.tolist()
-        keeps_form = not any(
-            key.startswith("random.strength.marginal") and not key.endswith(".cv")
-            for key in keys
-        )
+            return members
         several = 1 < np.unique(likely.groups).size < len(likely.members)
-        shared = SHARED_VALUES if keeps_form and several else 1
+        shared = SHARED_VALUES if several else 1
         rows = hypercube({key: self.laws[key] for key in keys}, -(-count // shared), seed)
-        row = ranks // shared if shared > 1 else np.arange(count)
-        pairs = zip(members, (rows[number] for number in row), strict=True)
+        row = ranks // shared if several else np.arange(count)
         return [
-            with_values(member, {k.removeprefix("random."): v for k, v in values.items()})
-            for member, values in pairs
-        ], (fields * len(rows) + row).tolist() if shared > 1 else ()
-
-    def interfaces(self, count: int, seed: int = 0) -> list[RandomInterface]:
-        """Return `count` equally likely interfaces, without the constants of the problem."""
-        return self.grouped(count, seed)[0]
+            with_values(member, {k.removeprefix("random."): v for k, v in rows[number].items()})
+            for member, number in zip(members, row, strict=True)
+        ]
 
     def constants(self, seed: int) -> list[dict[str, float]]:
         """Return values of the constants of the problem, by keys without ``problem.``."""
