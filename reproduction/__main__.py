@@ -5,7 +5,6 @@ second call computes only the missing studies.
 """
 
 import argparse
-import dataclasses
 import importlib
 import os
 import re
@@ -30,10 +29,6 @@ def main(arguments: list[str] | None = None) -> None:
     from reproduction.studies import jobs
 
     size = runner.QUICK if options.quick else runner.USUAL
-    if options.samples:
-        names = ("readings", "trend", "what_if", "dynamic")  # lowered too, but not raised
-        lowered = {name: min(options.samples, getattr(size, name)) for name in names}
-        size = dataclasses.replace(size, samples=options.samples, **lowered)
     out = Path(options.out)
     run = runner.Runner(out, size, options.seed, options.workers)
     wanted = list(jobs(options.full or options.figure is not None))
@@ -72,16 +67,12 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--full", action="store_true",
                         help="also what goes beyond the paper")  # fmt: skip
     parser.add_argument("--figure", type=int, metavar="N", help="draw this figure only")
-    parser.add_argument("--samples", type=int, metavar="N",
-                        help="of each correlation length, 100 or more")  # fmt: skip
     parser.add_argument("--parameters", type=Path, metavar="FILE",
                         help="tables of a study file, in place of the paper's")  # fmt: skip
     parser.add_argument("--out", default="stiction-paper", metavar="FOLDER")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=_cores(), help="threads")
     options = parser.parse_args(arguments)
-    if options.samples is not None and options.samples < 100:
-        parser.error(f"--samples: must be 100 or more, got {options.samples}")
     if options.figure is not None and str(options.figure) not in FIGURES:
         parser.error(f"--figure: must be 1 to {len(FIGURES)}, got {options.figure}")
     if options.parameters:

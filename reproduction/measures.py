@@ -14,7 +14,7 @@ import stiction as st
 from reproduction import PARAMETERS, TEXTS, setting
 from reproduction import numbers_with_errors as estimates
 from reproduction.modulus import odds, reading  # noqa: F401
-from reproduction.numbers_with_errors import Number, lower_spread, mean, quantile, share
+from reproduction.numbers_with_errors import Number, lower_spread, mean, share
 from reproduction.runner import Data, LeftOut
 from reproduction.setting import FIRST, HIGH, LAST, LOW, MEAN, RATIOS, SIMULATED, H
 from reproduction.studies import NORMAL, infinite_variance_ratio
@@ -264,13 +264,6 @@ def griffith(d: Data, name: str) -> Number:
     return Number(float(np.median(medians)), error)
 
 
-def griffith_quantiles(d: Data) -> Rows:
-    """Return quantiles of the length of single events over Griffith's."""
-    quotient = _over_griffith(d, "event_length")
-    known = quotient[np.isfinite(quotient)]
-    return [(f"{p:.0%}", quantile(known, p)) for p in (0.05, 0.5, 0.95)]
-
-
 # What if
 
 
@@ -307,13 +300,6 @@ def exponents(d: Data, index: int) -> Rows:
         for i, (label, row) in enumerate(zip(labels, stress, strict=True))
         if i % 4 != 2
     ]
-
-
-def pressure_slope(d: Data) -> Number:
-    """Return the logarithmic slope of the length of the critical patch against pressure."""
-    rows = points(d, "normal_load", mean, 1.0, [0, 2], "critical_patch_length")
-    ratio = rows[1][1] / rows[0][1]
-    return Number(math.log(ratio.value), ratio.error / ratio.value) * (1.0 / math.log(4.0))
 
 
 # Words of the texts

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.special import ndtr
 from scipy.stats import binom
 
-from reproduction.numbers_with_errors import Number, mean, share
+from reproduction.numbers_with_errors import Number
 from reproduction.runner import Data
 from reproduction.setting import SIMULATED
 from reproduction.studies import READINGS
@@ -73,8 +73,6 @@ EVIDENCE = (
 )
 """What is printed, where, and its probability, given means of resampled samples. Two means are
 taken to differ if they are visibly apart, in standard errors of a mean of 20."""
-
-
 COUNTS = slice(3)
 """The part of the evidence that consists of counts."""
 
@@ -84,13 +82,8 @@ class Reading:
     """What a reading gives for each printed result."""
 
     key: str
-    text: str
-    length: float
-    excess: tuple[Number, ...]
-    misplaced: tuple[Number, ...]
-    patches: Number
-    eight: Number
     chances: tuple[np.ndarray, ...]
+    eight: Number
 
     def chance(self, index: int) -> Number:
         """Return the probability of a printed result."""
@@ -113,25 +106,15 @@ def compare(data: Data, visible: float = 1.0) -> list[Reading]:
     drawn = np.random.default_rng(0).integers(count, size=(RESAMPLED, count))
     drawn = np.vstack([np.arange(count), drawn])
     readings = []
-    for key, text in READINGS.items():
+    for key in READINGS:
         values_of = functools.partial(at, data, key)
 
         @functools.cache
         def resampled(name, ratio, function=np.asarray, values_of=values_of):
             return np.mean(function(values_of(name, ratio))[drawn], axis=1)
 
-        readings.append(
-            Reading(
-                key=key,
-                text=text,
-                length=float(data["readings"]["length"].sel(reading=key)),
-                excess=tuple(mean(values_of("excess", ratio)) * 100.0 for ratio in SIMULATED),
-                misplaced=tuple(share(values_of("misplaced", ratio)) for ratio in SIMULATED),
-                patches=mean(values_of("patches", SIMULATED[0])),
-                eight=_bootstrapped(_eight(resampled)),
-                chances=tuple(function(resampled, visible) for _, _, function in EVIDENCE),
-            )
-        )
+        chances = tuple(function(resampled, visible) for _, _, function in EVIDENCE)
+        readings.append(Reading(key, chances, _bootstrapped(_eight(resampled))))
     return readings
 
 

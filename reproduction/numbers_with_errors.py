@@ -68,6 +68,8 @@ def short(number: Number) -> str:
     places = 2 - math.floor(math.log10(size))  # three digits at most
     if error > 0.0:
         places = min(places, math.floor(-math.log10(0.5 * error)))
+    if abs(value) > error:  # one digit at least
+        places = max(places, -math.floor(math.log10(size)))
     value = round(value, places) + 0.0
     return f"{value:,.{max(places, 0)}f}".replace("-", MINUS)
 

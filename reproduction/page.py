@@ -39,21 +39,29 @@ def physics(text: str) -> Markup:
     return Markup(plain.replace(" +- ", " ± "))
 
 
-def verdict(data: Data, name: str) -> str:
-    """Return the verdict on a statement as the verb of a sentence."""
+OUTCOMES = {
+    Verdict.HOLDS: "Confirmed",
+    Verdict.CORRECTED: "Confirmed with a correction",
+    Verdict.FAILS: "Not confirmed",
+    Verdict.OPEN: "Undecided",
+    Verdict.TEXT: "Undecided from the text",
+}
+
+
+def outcome(data: Data, name: str) -> str:
+    """Return the verdict on a statement as the beginning of a sentence."""
     (claim,) = (claim for rows in GROUPS.values() for claim in rows if claim.name == name)
     if (finding := judge(claim, data)) is None:
         raise LeftOut(name)
-    value = finding.verdict.value
-    return f"is {value}" if finding.verdict in (Verdict.OPEN, Verdict.TEXT) else value
+    return OUTCOMES[finding.verdict]
 
 
 def write(path: Path, data: Data, groups, images, runner, warned, *, done: bool) -> None:
     """Write the page: groups of findings by title, images by figure number, texts of warnings."""
     environment = jinja2.Environment(autoescape=True, trim_blocks=True)
-    environment.filters |= {"physics": physics, "number": rounded}
     JINJA.filters |= {"number": rounded, "short": short}
-    known = NAMES | {"d": data, "own": PARAMETERS, "verdict": functools.partial(verdict, data)}
+    environment.filters |= JINJA.filters | {"physics": physics}
+    known = NAMES | {"d": data, "own": PARAMETERS, "outcome": functools.partial(outcome, data)}
 
     def filled(text: str) -> str:
         """Return a text with its numbers, or nothing if one of its studies is left out."""

@@ -1,6 +1,7 @@
 """Rules that turn numbers with errors into a verdict; three standard errors decide."""
 
 import contextlib
+import functools
 import math
 from collections.abc import Callable, Iterable, Sequence
 from contextvars import ContextVar
@@ -83,6 +84,8 @@ def within(low: float, high: float, why: str = "", *, share: bool = False) -> Ru
         text = f"below {high:g}"
     elif high == math.inf:
         text = f"above {low:g}"
+    if why.startswith("%"):
+        text, why = f"{text} %", why.removeprefix("%").removeprefix(": ")
     return Rule(text + (f" ({why})" if why else ""), judge)
 
 
@@ -114,19 +117,11 @@ def _monotonic(sign: float, word: str) -> Rule:
             return Verdict.FAILS if most < 0.0 or wrong else Verdict.OPEN
         return Verdict.CORRECTED if wrong else Verdict.OPEN if doubtful else Verdict.HOLDS
 
-    return Rule(f"{word} from the first to the last, and the other way between no two", judge)
+    return Rule(f"{word} from the first to the last, and no two go the other way", judge)
 
 
-def falling() -> Rule:
-    """The numbers fall."""
-    return _monotonic(-1.0, "falls")
-
-
-def rising() -> Rule:
-    """The numbers rise."""
-    return _monotonic(1.0, "rises")
-
-
+falling = functools.partial(_monotonic, -1.0, "falls")
+rising = functools.partial(_monotonic, 1.0, "rises")
 _WORST = (Verdict.FAILS, Verdict.OPEN, Verdict.CORRECTED, Verdict.HOLDS)
 
 

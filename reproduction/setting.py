@@ -74,6 +74,10 @@ def _check(study: st.Study) -> None:
             nodes = 2 * int(np.ceil(0.5 * problem.interface.size * MIN_NODES / span))
             mistakes.append(f"problem.interface.nodes: the nucleation length spans {span:.1f} nodes"
                             f" of at least {MIN_NODES}; give {nodes} or more")  # fmt: skip
+        mean = study.random.properties["strength"].marginal.distribution.mean()
+        if not 1e-7 < mean / problem.effective_modulus < 0.1:
+            mistakes.append(f"random.strength.marginal: a mean of {mean:g} Pa beside a modulus of"
+                            f" {problem.effective_modulus:g} Pa; check the units")  # fmt: skip
         if np.size(problem.friction.residual_strength or 0.0) > 1:
             mistakes.append("problem.friction.residual_strength: give one number, no profile")
     if mistakes:

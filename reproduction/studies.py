@@ -28,29 +28,22 @@ READINGS = {
 }
 
 
-def local(run: Runner) -> xr.Dataset:
-    """Onsets by the local criterion."""
-    return run.sweep("local", PROBLEM, strength, LOCAL, run.size.samples)
+SWEEPS = {
+    "local": ("Onsets by the local criterion", PROBLEM, LOCAL, "samples", RATIOS),
+    "exact": ("Onsets by exact equilibrium, with interaction", PROBLEM, EXACT, "samples", RATIOS),
+    "ruptures": ("Ruptures until all slides", PROBLEM, RUPTURE, "ruptures", SIMULATED),
+    "printed": ("Onsets by the printed modulus", STRAIN, LOCAL, "readings", SIMULATED),
+    "dynamic": ("Monte Carlo study by ruptures", PROBLEM, RUPTURE, "dynamic", RATIOS),
+    "vanishing": ("Onsets at vanishing correlation length, by the local criterion",
+                  setting.grid(PROBLEM, nodes=4.0), LOCAL, "trend", (1 / 64, 1 / 32)),
+}  # fmt: skip
+"""Progress line, problem, method, number of samples and xi_0/h_n of Monte Carlo studies."""
 
 
-def exact(run: Runner) -> xr.Dataset:
-    """Onsets by exact equilibrium, with every interaction between patches."""
-    return run.sweep("exact", PROBLEM, strength, EXACT, run.size.samples)
-
-
-def printed(run: Runner) -> xr.Dataset:
-    """Onsets by the local criterion with the printed modulus."""
-    return run.sweep("printed", STRAIN, strength, LOCAL, run.size.readings, SIMULATED)
-
-
-def ruptures(run: Runner) -> xr.Dataset:
-    """Ruptures of the first samples, until the whole interface slides."""
-    return run.sweep("ruptures", PROBLEM, strength, RUPTURE, run.size.ruptures, SIMULATED)
-
-
-def dynamic(run: Runner) -> xr.Dataset:
-    """Monte Carlo study by ruptures."""
-    return run.sweep("dynamic", PROBLEM, strength, RUPTURE, run.size.dynamic)
+def sweep(run: Runner, name: str) -> xr.Dataset:
+    """Run one of these studies."""
+    _, problem, method, count, ratios = SWEEPS[name]
+    return run.sweep(name, problem, strength, method, getattr(run.size, count), ratios)
 
 
 @kept(samples=lambda size: size.samples)
@@ -134,7 +127,7 @@ def readings(run: Runner) -> xr.Dataset:
     def first(dataset: xr.Dataset) -> xr.Dataset:
         return dataset.sel(correlation_ratio=list(SIMULATED)).isel(sample=slice(count))
 
-    consistent = first(exact(run)), first(local(run))
+    consistent = first(sweep(run, "exact")), first(sweep(run, "local"))
     strain = run.sweep("strain-exact", STRAIN, in_printed, EXACT, count, SIMULATED)
     strain_local = run.sweep("strain-local", STRAIN, in_printed, LOCAL, count, SIMULATED)
     mixed = run.sweep("mixed-exact", PROBLEM, in_printed, EXACT, count, SIMULATED)
@@ -145,7 +138,7 @@ def readings(run: Runner) -> xr.Dataset:
         "a": (*consistent, consistent[1], strength, PROBLEM),
         "b": (strain, strain_local, strain_local, in_printed, STRAIN),
         "c": (mixed, strain_local, mixed_own, in_printed, STRAIN),
-        "c'": (consistent[0], printed(run), consistent[1], strength, STRAIN),
+        "c'": (consistent[0], sweep(run, "printed"), consistent[1], strength, STRAIN),
     }
     parts = []
     for simulated, predicted, by_one_modulus, field_of, problem in cases.values():
@@ -216,12 +209,6 @@ def trend(run: Runner) -> xr.Dataset:
     return result[["critical_stress"]].assign_coords(ratio=list(TREND))
 
 
-def vanishing(run: Runner) -> xr.Dataset:
-    """Onsets at vanishing correlation length, by the local criterion on a finer grid."""
-    fine = setting.grid(PROBLEM, nodes=4.0)
-    return run.sweep("vanishing", fine, strength, LOCAL, run.size.trend, (1 / 64, 1 / 32))
-
-
 @kept(samples=lambda size: size.trend // 2)
 def window(run: Runner, samples: int) -> xr.Dataset:
     """Onsets as the nucleation length vanishes, with L/xi_0 held fixed."""
@@ -242,7 +229,7 @@ def window(run: Runner, samples: int) -> xr.Dataset:
 
 @kept()
 def modes(run: Runner) -> xr.Dataset:
-    """Onsets with rounded weights, with more modes of the strength, and with fewer."""
+    """Onsets with rounded weights, and with more modes of the strength."""
     parts = []
     for ratio in RATIOS:
         field, interface = strength(ratio), PROBLEM.interface
@@ -250,21 +237,16 @@ def modes(run: Runner) -> xr.Dataset:
         more = dataclasses.replace(field, spectrum=spectrum)
         tau_p = field.sample(interface, samples=200, seed=run.seed)
         usual = st.theory.nucleation_stress(PROBLEM, tau_p).min(axis=1)
-        cut = np.fft.rfft(tau_p, axis=1)
         t = (np.arange(64) + 0.5) * np.pi / 64  # Eq. 9 at s = cos t, by Gauss's rule
         weight = 0.751 * (0.925 - 0.308 * np.cos(t) ** 2) * np.sin(t) ** 2 * np.pi / 64
         average = weight @ np.cos(0.5 * H * np.outer(np.cos(t), interface.wavenumbers))
-        rounded = np.fft.irfft(cut * average, interface.size, axis=1).min(axis=1)
-        cut[:, interface.wavenumbers > 10.0 * np.pi / (ratio * H)] = 0.0
-        changed = {
-            "untruncated": more.sample(interface, samples=200, seed=run.seed),
-            "cut": np.fft.irfft(cut, interface.size, axis=1),
-        }
-        changes = {
-            name: st.theory.nucleation_stress(PROBLEM, rows).min(axis=1) / usual - 1.0
-            for name, rows in changed.items()
-        } | {"rounded": rounded / usual - 1.0}
-        parts.append(xr.Dataset({name: ("sample", row) for name, row in changes.items()}))
+        averages = np.fft.irfft(np.fft.rfft(tau_p, axis=1) * average, interface.size, axis=1)
+        more_modes = more.sample(interface, samples=200, seed=run.seed)
+        untruncated = st.theory.nucleation_stress(PROBLEM, more_modes).min(axis=1)
+        changes = {"untruncated": untruncated, "rounded": averages.min(axis=1)}
+        parts.append(
+            xr.Dataset({k: ("sample", row / usual - 1.0) for k, row in changes.items()})
+        )
     return along("correlation_ratio", RATIOS, parts)
 
 
@@ -360,7 +342,7 @@ def mechanism(run: Runner) -> xr.Dataset:
 @kept(samples=lambda size: size.samples, most=lambda size: 10)
 def arrest(run: Runner, samples: int, most: int) -> xr.Dataset:
     """Arrested samples again, with inertia."""
-    events = exact(run)["arrested_events"]
+    events = sweep(run, "exact")["arrested_events"]
     interface = PROBLEM.interface
     chosen = [
         (ratio, int(number))
@@ -454,38 +436,37 @@ ARRESTS = ("wide_strength", "random_load", "random_residual")
 WHAT_IFS = (*ARRESTS, "normal_load", "length", "exponent", "skewness")
 
 
-def what_if(run: Runner, name: str, *, inertia: bool = False) -> xr.Dataset:
-    """A study file of `what_if/`, its swept points stacked along 'point'; by ruptures if asked."""
+def what_if(run: Runner, name: str, suffix: str) -> xr.Dataset:
+    """A study file of `what_if/`, its points stacked along 'point'; with a suffix by ruptures."""
     study = st.Study.from_toml(setting.WHAT_IF / f"{name}.toml")
     most = run.size.trend if study.method == LOCAL else run.size.what_if
-    if inertia:
+    if suffix:
         study, most = dataclasses.replace(study, method=RUPTURE), run.size.arrests
     ensemble = st.Ensemble(samples=min(most, study.ensemble.samples), seed=run.seed)
     changed = dataclasses.replace(study, ensemble=ensemble)
-    result = run.study(f"{name}-inertia" if inertia else name, changed)
+    result = run.study(name + suffix, changed)
     swept = [dim for dim in result["critical_stress"].dims if dim != "sample"]
     numbered = result.drop_vars([name for name in result.coords if name != "sample"])
     return numbered.stack(point=swept, create_index=False).transpose("point", ...)
 
 
-PAPER = (local, moments, exact, ruptures, theory, representative)
+PAPER = ("local", moments, "exact", "ruptures", theory, representative)
 """What the paper does, in the order in which it is computed."""
-MODULUS = (printed, readings)
+MODULUS = ("printed", readings)
 """Which modulus the paper used: asked with the paper's parameters only."""
-BEYOND = (trend, vanishing, window, modes, growth, mechanism, arrest, driving, dynamic)
+BEYOND = (trend, "vanishing", window, modes, growth, mechanism, arrest, driving, "dynamic")
 """What `--full` adds."""
 
 
 def jobs(full: bool):
     """Yield the name, the progress line and the function of every study."""
-    studies = PAPER if PARAMETERS else PAPER + MODULUS
-    studies += BEYOND if full else ()
-    for study in studies:
-        yield study.__name__, study.__doc__.partition(".")[0], study
+    for study in (*PAPER, *(() if PARAMETERS else MODULUS), *(BEYOND if full else ())):
+        if isinstance(study, str):
+            yield study, SWEEPS[study][0], functools.partial(sweep, name=study)
+        else:
+            yield study.__name__, study.__doc__.partition(".")[0], study
     # The what-ifs state parameters of their own.
     for name in WHAT_IFS if full and not PARAMETERS else ():
-        text = f"What if: {name.replace('_', ' ')}"
-        yield name, text, functools.partial(what_if, name=name)
-        if name in ARRESTS:
-            ruptures = functools.partial(what_if, name=name, inertia=True)
-            yield f"{name}-inertia", f"{text}, with inertia", ruptures
+        for suffix in ("", "-inertia") if name in ARRESTS else ("",):
+            text = f"What if: {name.replace('_', ' ')}{suffix.replace('-', ', with ')}"
+            yield name + suffix, text, functools.partial(what_if, name=name, suffix=suffix)

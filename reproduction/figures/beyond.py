@@ -8,13 +8,7 @@ import numpy as np
 from reproduction import setting
 from reproduction.figures import common
 from reproduction.figures.common import COLOURS, DARK, GREY, OVER_MEAN, RED, XI
-from reproduction.measures import (
-    arrest_shares,
-    arrested,
-    largest_energy,
-    trend,
-    with_inertia,
-)
+from reproduction.measures import arrest_shares, arrested, largest_energy, trend, with_inertia
 from reproduction.numbers_with_errors import deviation, lower_spread, mean
 from reproduction.runner import Data
 from reproduction.setting import MEAN, PROBLEM, RATIOS, H, L
@@ -57,9 +51,10 @@ def figure_9(d: Data):
     for axes in (top, bottom):
         axes.axvspan(RATIOS[0], RATIOS[-1], color="#eeeeee", lw=0, zorder=0)
     top.set(xscale="log", ylabel=rf"mean of $\tau_\mathrm{{cr}}{OVER_MEAN}")
-    top.text((RATIOS[0] * RATIOS[-1]) ** 0.5, 0.03, "Figures 5 and 6", ha="center", color=GREY,
+    top.text((RATIOS[0] * RATIOS[-1]) ** 0.5, 0.95, "Figures 5 and 6", ha="center", color=GREY,
              transform=top.get_xaxis_transform())  # fmt: skip
     bottom.set(yscale="log", xlabel=XI, ylabel="spread (kPa)")
+    common.plain_ticks(bottom.yaxis, (5, 10, 20, 50, 100))
     common.plain_ticks(bottom.xaxis, (1 / 64, 1 / 16, 0.25, 1, 4, 16),
                        ["1/64", "1/16", "1/4", "1", "4", "16"])  # fmt: skip
     bottom.legend(loc="upper left")
@@ -87,6 +82,7 @@ def figure_10(d: Data):
     lowering.loglog(study["distance"], study["lowering"] * 100, "-o", color=COLOURS[0], ms=4)
     lowering.set(xlabel=r"distance of two dips over $h_\mathrm{n}$", ylabel="onset lowered (%)")
     common.plain_ticks(lowering.xaxis, (1.25, 2, 3, 5, 8))
+    common.plain_ticks(lowering.yaxis, (0.03, 0.1, 0.3, 1))
     common.letters(number, single, lowering)
     return figure
 

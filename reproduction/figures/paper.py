@@ -94,8 +94,8 @@ def figure_2(d: Data):
     left.set(xlabel="$z$", ylabel="cumulative probability", ylim=(0, 1.02), xlim=(-3.5, 3.5))
     right.set(xlabel=TAU_P, ylim=(0, 1.02), xlim=(s[0] / MEAN, s[-1] / MEAN))
     right.tick_params(labelleft=False)
-    left.legend(loc="upper left")
-    right.legend(loc="center right")
+    for panel in (left, right):
+        panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     spectrum = setting.FIELD.spectrum
     unit = 2.0 * np.pi / spectrum.correlation_length  # lambda
     cutoff = spectrum.cutoff() / unit
@@ -329,7 +329,7 @@ def figure_6(d: Data):
     inset.plot(places, best, "x", color=RED, ms=7)
     common.ratio_axis(inset)
     inset.set(xlabel="", ylabel="mean", xlim=(_PLACES[1] - 0.4, _PLACES[-2] + 0.4))
-    bottom.legend([drawn], [f"{d.size.ruptures} ruptures each"], loc="lower left")
+    bottom.legend([drawn], [f"{d.size.ruptures} ruptures each"], loc=(0.02, 0.12))
     common.letters(top, bottom)
     return figure
 
