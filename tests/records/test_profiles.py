@@ -21,7 +21,7 @@ from setups import EXACT, LOCAL, without
 
 import stiction as st
 from stiction.base.units import parse
-from stiction.study.export import export
+from stiction.study.run import export
 
 calls = Calls()
 BACK = "values written out above, tests/oracle/test_crooked.py and tests/user/test_profiles.py"

@@ -21,7 +21,7 @@ from stiction.base import files
 from stiction.base.errors import StoreError
 from stiction.cli.commands import app
 from stiction.ensemble.store import Store
-from stiction.study import export
+from stiction.study import run as runs_on_disk
 
 STUDY = small_study(
     title="a small sweep",
@@ -143,9 +143,9 @@ def test_a_disk_without_room_for_a_result_is_left_as_it_was(tmp_path, monkeypatc
     result = local_onset(LINE, LINE_STRENGTH)
     Usage = namedtuple("Usage", "free")
     room = {"free": result.nbytes + 2**16}
-    monkeypatch.setattr(export.shutil, "disk_usage", lambda _: Usage(**room))
+    monkeypatch.setattr(runs_on_disk.shutil, "disk_usage", lambda _: Usage(**room))
     words = "cannot be written: No space left on device"
-    refuses(words, lambda: export.write_result(result, tmp_path / "out.nc"), StoreError)
+    refuses(words, lambda: runs_on_disk.write_result(result, tmp_path / "out.nc"), StoreError)
     assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
     room["free"] *= 2
-    export.write_result(result, tmp_path / "out.nc")
+    runs_on_disk.write_result(result, tmp_path / "out.nc")

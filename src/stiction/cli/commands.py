@@ -434,7 +434,7 @@ def onset(
     from stiction.methods.onset import onset as find
     from stiction.methods.protocol import METHODS
     from stiction.problem.profiles.reading import read_profile
-    from stiction.study.export import table_of
+    from stiction.study.run import table_of
     from stiction.study.study import read_setup
 
     setup = read_setup(study)
@@ -517,7 +517,7 @@ def rupture(
     from stiction.methods.dynamics.method import Rupture
     from stiction.methods.dynamics.simulate import simulate_rupture
     from stiction.problem.profiles.reading import read_profile
-    from stiction.study.export import write_result
+    from stiction.study.run import write_result
     from stiction.study.study import Study, read_setup
 
     out.mkdir(parents=True, exist_ok=True)
@@ -615,7 +615,7 @@ def reliability(
       "problem.friction.residual_ratio = [0.6, 0.8]" stiction reliability study.toml --out
       curve --smallest 1e-6
     """
-    from stiction.study.export import table_of
+    from stiction.study.run import table_of
     from stiction.study.study import Study, open_run
 
     loaded = Study.from_toml(study)

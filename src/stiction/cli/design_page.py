@@ -1,8 +1,9 @@
 """A design as a self-contained HTML page to file, which prints on A4."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import date
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -106,56 +107,50 @@ def write_design_page(
     return path
 
 
-def _numbers(design: Answer) -> list[list[Any]]:
-    unit, area = ("Pa", 1.0) if math.isnan(design.area) else ("N", design.area)
-    low, high = (in_words(unit, area * end) for end in design.interval)
-    rows: list[list[Any]] = [
-        [
-            "design " + ("stress" if unit == "Pa" else "force"),
-            in_words(unit, area * design.stress),
-        ],
-        ["95 % interval of the computation", f"{low} to {high}"],
-        ["target probability of failure", f"{design.probability:g}"],
-        ["reliability index β", f"{design.reliability_index:.3g}"],
+def _demand(design: Answer) -> tuple[str, Callable[[float], str]]:
+    """Return 'force' or 'stress', and a function from a stress, Pa, to this demand in words."""
+    if math.isnan(design.area):
+        return "stress", partial(in_words, "Pa")
+    return "force", lambda stress: in_words("N", design.area * stress)
+
+
+def _numbers(design: Answer) -> list[list[str]]:
+    """Return the rows of the first table, without optional quantities that are unknown."""
+
+    name, shown = _demand(design)
+    low, high = map(shown, design.interval)
+    rows = {
+        f"design {name}": shown(design.stress),
+        "95 % interval of the computation": f"{low} to {high}",
+        "target probability of failure": f"{design.probability:g}",
+        "reliability index β": f"{design.reliability_index:.3g}",
+        f"characteristic value (5 %, confidence {100.0 * design.confidence:g} %)": shown(
+            design.characteristic_stress
+        ),
+        "partial factor (characteristic over design value)": f"{design.partial_factor:.3g}",
+        "mean shear stress": in_words("Pa", design.stress),
+        "friction coefficient": f"{design.friction_coefficient:.4g}",
+        "algorithm": f"{design.algorithm}, {design.evaluations} evaluations",
+    }
+    optional = ("characteristic", "partial", "friction")
+    return [
+        [title, text]
+        for title, text in rows.items()
+        if not (title.startswith(optional) and text.startswith("nan"))
     ]
-    if math.isfinite(design.characteristic_stress):
-        value = in_words(unit, area * design.characteristic_stress)
-        share = f"{100.0 * design.confidence:g}"
-        rows += [
-            [f"characteristic value (5 %, confidence {share} %)", value],
-            [
-                "partial factor (characteristic over design value)",
-                f"{design.partial_factor:.3g}",
-            ],
-        ]
-    rows += [["mean shear stress", in_words("Pa", design.stress)]]
-    if math.isfinite(design.friction_coefficient):
-        rows += [["friction coefficient", f"{design.friction_coefficient:.4g}"]]
-    return [*rows, ["algorithm", f"{design.algorithm}, {design.evaluations} evaluations"]]
 
 
 def _moves(design: Answer) -> tuple[list[str], list[list[str]]]:
-    effects = design.sensitivities
-    unit, name = ("Pa", "stress") if math.isnan(design.area) else ("N", "force")
-    ends = effects[f"{name}_at_low"].values, effects[f"{name}_at_high"].values
-    rows = [
-        [str(source), str(low), str(high), in_words(unit, at_low), in_words(unit, at_high)]
-        for source, low, high, at_low, at_high in zip(
-            effects.source.values, effects.low.values, effects.high.values, *ends, strict=True
-        )
-    ]
-    area = 1.0 if unit == "Pa" else design.area
-    rows += [
-        [
-            key.replace("stress by", "family of the factor:"),
-            "",
-            "",
-            in_words(unit, area * value),
-            "",
-        ]
-        for key, value in effects.attrs.items()
-        if key.startswith("stress by")
-    ]
+    """Return the heads and rows of the table of sensitivities."""
+    (name, shown), effects = _demand(design), design.sensitivities
+    at_low, at_high = effects["stress_at_low"].values, effects["stress_at_high"].values
+    columns = [map(str, effects[key].values) for key in ("source", "low", "high")]
+    columns += [map(shown, at_low), map(shown, at_high)]
+    rows = [list(row) for row in zip(*columns, strict=True)]
+    for key, value in effects.attrs.items():
+        if key.startswith("stress by"):
+            family = key.replace("stress by", "family of the factor:")
+            rows.append([family, "", "", shown(value), ""])
     return ["source", "from", "to", f"{name} at the first", f"{name} at the second"], rows
 
 

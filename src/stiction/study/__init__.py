@@ -1,7 +1,6 @@
 """A study: everything that defines a Monte Carlo computation, from Python or TOML.
 
 Read `study`, the object of problem, strength, method and ensemble, then `sweep`, whose
-axes turn a study into points. `run` reads runs on disk and cuts them into parts.
-`failure` stores repetitions of failure curves and turns them into curves. `export` writes
-results.
+axes turn a study into points. `run` reads runs on disk, cuts them into parts and exports
+results. `failure` stores repetitions of failure curves and turns them into curves.
 """

@@ -1,9 +1,13 @@
-"""Runs on disk: parts of a study for several jobs, and stored samples."""
+"""Runs on disk: parts of a study for several jobs, stored samples, and files for other programs."""
 
 from __future__ import annotations
 
+import errno
+import os
 import re
+import shutil
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
@@ -12,19 +16,23 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
-from stiction.base.errors import RunError
+from stiction.base.errors import InputError, RunError, warn_accuracy
+from stiction.base.files import cannot, write_whole
 from stiction.base.model import FilePath, check
 from stiction.base.representation import Result, brief
+from stiction.base.variables import DIRECTION
 from stiction.ensemble.batches import Failure
 from stiction.ensemble.dataset import Gathered
 from stiction.ensemble.store import Store
 from stiction.random.synthesis import SAMPLES_PER_BLOCK
-from stiction.study.export import export
 from stiction.study.failure import Repetitions
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
 
+OVERHEAD = 2**16
+"""Bytes of a NetCDF file beside its arrays."""
 FEWEST_BLOCKS = 8
 """Blocks in a part, if there are enough, so that parts take about the same time."""
 
@@ -188,3 +196,68 @@ class StoredRun:
                 " Run the study again to compute the others, or pass partial=True"
             )
         export(self._checked(rows), place)
+
+
+# -- files for other programs --------------------------------------------------------------------
+
+
+def export(result: xr.Dataset, path: Path) -> None:
+    """Write a result as NetCDF (.nc) or as a table (.csv), whole or not at all."""
+    if path.suffix == ".nc":
+        write_result(result, path)
+    elif path.suffix == ".csv":
+        frame = table_of(result)
+        # Numbers are written as the shortest text that reads back to the same bits.
+        write_whole(path, lambda aside: frame.to_csv(aside, index=False, na_rep="nan"))
+    else:
+        raise InputError(f"{path}: the suffix must be .nc or .csv, got {path.suffix!r}")
+
+
+def write_result(result: xr.Dataset, path: Path) -> None:
+    """Write a result as a NetCDF file with checksums, whole or not at all."""
+    with suppress(OSError):
+        free = shutil.disk_usage(path.parent).free
+        # NetCDF does not report a full disk, and keeps its unfinished file open.
+        if free < 1.05 * result.nbytes + OVERHEAD:
+            raise cannot("written", path, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
+    encoding = {
+        str(name): {"fletcher32": True}
+        for name, variable in result.variables.items()
+        if variable.ndim and variable.size and variable.dtype.kind in "fiub"
+    }
+    write_whole(
+        path, lambda aside: result.to_netcdf(aside, engine="netcdf4", encoding=encoding)
+    )
+
+
+def table_of(result: xr.Dataset) -> pd.DataFrame:
+    """Return a table with a column for each variable and a row for each sample and point.
+
+    Columns are named ``name (unit)``: swept keys, the sample number, results. The curves of
+    equally likely interfaces are left out, but their band stays.
+    """
+    result = result.drop_dims("member", errors="ignore")
+    wide = sorted(
+        str(name)
+        for name, values in result.data_vars.items()
+        if "sample" in values.dims
+        and {*values.dims[values.dims.index("sample") + 1 :]} - {DIRECTION}
+    )
+    if wide:
+        warn_accuracy(
+            f"{', '.join(wide)}: has several numbers for each sample and does not fit into a table."
+            " Export a .nc file to keep it"
+        )
+    narrow = result.drop_vars(wide)
+    for name, values in narrow.data_vars.items():
+        if DIRECTION in values.dims:  # a column for each component
+            parts = {
+                f"{name}_{c.item()}": values.sel({DIRECTION: c}) for c in values[DIRECTION]
+            }
+            narrow = narrow.drop_vars([name]).assign(parts)
+    rows = list(dict.fromkeys(dim for v in narrow.data_vars.values() for dim in v.dims))
+    narrow = narrow.drop_dims({*narrow.dims} - {*rows})
+    names = dict.fromkeys([*narrow.coords, *rows, *narrow.data_vars])
+    units = {name: narrow[name].attrs.get("units", "1") for name in names}
+    frame = narrow.to_dataframe(dim_order=rows).reset_index()[list(names)]
+    return frame.rename(columns={name: f"{name} ({unit})" for name, unit in units.items()})

@@ -4,10 +4,11 @@ The nodes are x_i = i L/n in each direction. The interface is periodic, so point
 in any order and begin anywhere. On a specimen, the nodes are x_i = (i + 1/2) L/n, and the
 profile stops at its ends. The steps are:
 
-1. Find by how much of a spacing all points lie beside nodes. A warning states such an
-   offset. Points that do not lie on nodes are refused, or interpolated on request.
-2. Give each node the value of its point. Two different values at a node are refused.
-3. Refuse missing values, leave NaN, or fill gaps by linear interpolation on request.
+1. Find by how much of a spacing all points lie beside nodes, and warn of such an offset.
+   Refuse points that do not lie on nodes, unless the caller wants to interpolate.
+2. Number the node of each point. Refuse two different values at a node.
+3. Give each node the value of its point, or interpolate between points.
+4. Refuse missing values, leave NaN, or fill gaps by linear interpolation on request.
 """
 
 from __future__ import annotations
@@ -77,8 +78,9 @@ def place(
         return close_gaps(values, measured, interface, gaps)
     if values.size == 0:
         raise InputError("has no values")
+    # 1. Find the offset from the nodes.
     offsets = [_offset(dim, places[dim], interface, interpolate) for dim in interface.dims]
-    # Between the nodes, places differ if they are a millionth of the spacing apart.
+    # 2. Number nodes. Between them, places differ if they are a millionth of a spacing apart.
     finer = 10**6 if None in offsets else 1
     shape = tuple(finer * n for n in interface.shape)
     steps = [
@@ -98,6 +100,7 @@ def place(
     node, first, twins = np.unique(flat, return_index=True, return_inverse=True)
     _check_repeats(values, places, first[twins], interface)
 
+    # 3. Put values on the nodes.
     def put(rows: Array) -> Array:
         if finer > 1:
             return _interpolated(places["x"][first], rows[..., first], interface)
@@ -110,6 +113,7 @@ def place(
             f"{node.size} points are interpolated linearly to {interface.size} nodes, which are"
             f" {interface.spacing:.3g} m apart"
         )
+    # 4. Close gaps.
     whole = np.all(measured) or put(measured * 1.0) > 0.999
     return close_gaps(put(values), whole, interface, gaps)
 
@@ -183,7 +187,7 @@ def _check_repeats(
 
 
 def _interpolated(x: Array, values: Array, interface: Interface) -> Array:
-    """Return linear interpolations, constant a little beyond free ends, NaN in gaps (step 1)."""
+    """Return linear interpolations, constant a little beyond free ends, NaN in gaps (step 3)."""
     length, nodes = interface.measure, interface.x
     margin = TOLERANCE * interface.spacing
     if not interface.is_free:
@@ -219,7 +223,8 @@ def _interpolated(x: Array, values: Array, interface: Interface) -> Array:
 def close_gaps(
     values: Array, measured: Any, interface: Interface, gaps: Gaps
 ) -> tuple[Array, Any]:
-    """Return values (..., *shape) with NaN refused, left or filled, and a mask (step 3)."""
+    """Return values (..., *shape) with NaN refused, left or filled, and a mask (step 4)."""
+
     missing = np.isnan(values)
     if not missing.any():
         return values, measured

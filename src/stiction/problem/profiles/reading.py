@@ -1,8 +1,8 @@
 """Measured profiles: read in SI, and put on the nodes of an interface.
 
 A profile enters in three ways: through `read_profile`, as an argument of a call or an
-object (`at_nodes`), or by its name in a study file (`profile_in_file`). All three take
-these steps:
+object (`at_nodes`), or by its name in a study file (`profile_in_file`). `read_profile`, to
+which study files lead, takes these steps, and `at_nodes` takes steps 1 and 4:
 
 1. Find the quantity in the source, in SI (`labels.py`).
 2. Turn heights or grey values into strengths, if the caller gives a map.
@@ -179,18 +179,22 @@ def read_profile(
     options = Options(skip, sheet, missing, decimal, record)
     dims = None if interface is None else interface.dims
     with prefixed(str(source) if isinstance(source, str | Path) else "source"):
+        # 1. Find the quantity.
         array = labelled(
             source, "height" if strength else quantity, dims, x=x, value=value, unit=unit,
             x_unit=x_unit, options=options, rows=rows, spacing=spacing,
         )  # fmt: skip
+        # 2. Map heights or grey values.
         if strength is not None:
             array = array.copy(data=_mapped(strength, array.values))
+        # 3. Move the coordinates.
         if offset != 0.0:
             array = _moved(array, offset, interface)
         single = [dim for dim in {*array.dims} - {"x", "y", "row"} if array.sizes[dim] == 1]
         array = array.squeeze(single)
         if not {*array.dims} <= {"x", "y", "row"}:
             raise InputError(f"must hold a single profile, got shape {array.shape}")
+        # 4. Place or sort the values.
         if interface is None:
             array = _in_order(array)
         else:
