@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+from functools import reduce
 from typing import Any
 
 
@@ -36,3 +38,15 @@ def small_study(
 def lengths(*values: float) -> list[dict[str, Any]]:
     """A sweep of the strength's correlation length, m."""
     return [{"random.strength.spectrum.correlation_length": list(values)}]
+
+
+def altered(plain: dict[str, Any], **values: Any) -> dict[str, Any]:
+    """A copy of a study with other values by key, dots written as __, without those of None."""
+    study = copy.deepcopy(plain)
+    for path, value in values.items():
+        *above, last = path.split("__")
+        table = reduce(lambda inner, name: inner.setdefault(name, {}), above, study)
+        table[last] = value
+        if value is None:
+            del table[last]
+    return study

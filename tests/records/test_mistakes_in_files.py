@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from recording import Calls, compared, inside, table_of
 from setups import LOCAL, make_problem
-from small_study import lengths, small_study
+from small_study import altered, lengths, small_study
 
 import stiction as st
 from stiction.base.model import model
@@ -84,13 +84,7 @@ def of_map(values, heading="x (mm); y (mm); strength (MPa)", name="m.csv"):
 
 def studied(**changes):
     """The small study with other values, by keys whose dots are written as __."""
-    study = small_study(64)
-    for path, value in changes.items():
-        *above, last = path.split("__")
-        table = study
-        for name in above:
-            table = table.setdefault(name, {})
-        table[last] = value
+    study = altered(small_study(64), **changes)
     with inside():
         rows = [f"{1e3 * x};{1e-3 * (1e5 + 1e6 * x)}" for x in X[:64]]
         Path("tau_r.csv").write_text("\n".join(["x (mm);tau_r (kPa)", *rows]))

@@ -5,14 +5,13 @@ from __future__ import annotations
 import inspect
 import os
 import re
-import tomllib
 
 import pytest
 import tomli_w
 from checks import python
 from refusals import refuses
 from setups import EXACT, beta_strength, make_problem
-from small_study import small_study
+from small_study import altered, small_study
 
 import stiction as st
 from stiction.base import files
@@ -30,37 +29,30 @@ def inside(monkeypatch, tmp_path):
     return tmp_path
 
 
-def altered(**values):
-    """The small study with other values by dotted key, as text."""
-    plain = small_study(256)
-    for key, value in values.items():
-        table = plain
-        *steps, last = key.split("__")
-        for step in steps:
-            table = table.setdefault(step, {})
-        table[last] = value
-    return tomli_w.dumps(plain)
+def text(**values):
+    """The small study with other values."""
+    return tomli_w.dumps(altered(small_study(256), **values))
 
 
 MARGINAL = "random__strength__marginal"
 STUDIES = {  # what is wrong, and the exit code of a run
-    "MPa": (altered(**{f"{MARGINAL}__low": 0.66, f"{MARGINAL}__high": 1.66}), 2),
-    "kPa": (altered(**{f"{MARGINAL}__low": 660.0, f"{MARGINAL}__high": 1660.0}), 0),
-    "uniform": (altered(random__strength__spectrum__correlation_length=0.5), 2),
-    "below the residual": (altered(problem__friction__residual_strength=1.2e6), 2),
-    "coarse": (altered(random__strength__spectrum__correlation_length=4e-4), 0),
-    "a law without scale": (altered(problem__friction={}), 2),
-    "a force without an area": (altered(reliability={"force": 40e3}), 2),
-    "a coefficient without a pressure": (altered(reliability={"friction_coefficient": 0.4}), 2),
-    "a station off the interface": (altered(save={"stations": {"far": 3.0}}), 2),
+    "MPa": (text(**{f"{MARGINAL}__low": 0.66, f"{MARGINAL}__high": 1.66}), 2),
+    "kPa": (text(**{f"{MARGINAL}__low": 660.0, f"{MARGINAL}__high": 1660.0}), 0),
+    "uniform": (text(random__strength__spectrum__correlation_length=0.5), 2),
+    "below the residual": (text(problem__friction__residual_strength=1.2e6), 2),
+    "coarse": (text(random__strength__spectrum__correlation_length=4e-4), 0),
+    "a law without scale": (text(problem__friction={}), 2),
+    "a force without an area": (text(reliability={"force": 40e3}), 2),
+    "a coefficient without a pressure": (text(reliability={"friction_coefficient": 0.4}), 2),
+    "a station off the interface": (text(save={"stations": {"far": 3.0}}), 2),
 }
 
 
 @pytest.mark.filterwarnings("always")
 @pytest.mark.parametrize("name", STUDIES)
 def test_check_says_what_a_run_says_before_its_first_sample(name, inside, runs):
-    text, code = STUDIES[name]
-    (inside / "study.toml").write_text(text)
+    content, code = STUDIES[name]
+    (inside / "study.toml").write_text(content)
 
     def said(line):
         marks = "error: ", "warning: "
@@ -91,7 +83,7 @@ def test_names_are_found_in_any_case_and_among_all_valid_keys():
         ("method__type", "LOCAL_CRITERION", "'local_criterion'"),
         ("problem__solid__Density", 1e3, "'density'"),
     ):
-        plain = tomllib.loads(altered(**{key: value}))
+        plain = altered(small_study(256), **{key: value})
         refuses(f"did you mean {meant}", lambda plain=plain: st.Study.from_dict(plain))
 
 
@@ -143,7 +135,7 @@ def test_the_example_is_a_study_that_runs_without_a_doubt(inside, runs):
 )
 def test_commands_need_neither_a_backend_nor_all_letters(line, encoding, inside):
     """In the shell of a notebook, and where the output is redirected on Windows."""
-    (inside / "study.toml").write_text(altered(title="τ"), encoding="utf-8")
+    (inside / "study.toml").write_text(text(title="τ"), encoding="utf-8")
     said = python(
         "-m", "stiction", *line.split(), cwd=inside, PYTHONIOENCODING=encoding,
         MPLBACKEND="no_such_backend",
@@ -183,19 +175,19 @@ def test_a_cache_that_cannot_be_used_is_said_once(inside):
 
 
 def test_files_that_are_no_study_get_one_line_that_says_what_to_do(inside, runs):
-    text = altered(title="Größe")
+    study = text(title="Größe")
     contents = {
-        "utf16.toml": (text.encode("utf-16"), "save it as UTF-8"),
-        "latin.toml": (text.encode("latin-1"), "save it as UTF-8"),
+        "utf16.toml": (study.encode("utf-16"), "save it as UTF-8"),
+        "latin.toml": (study.encode("latin-1"), "save it as UTF-8"),
         "json.toml": (b'{"problem": 1}', "`stiction example` prints a study"),
         "other.toml": (b"[tool.poetry]\n", "`stiction example` prints a study to start from"),
-        "case.toml": (text.replace("[ensemble]", "[Ensemble]").encode(), "mean 'ensemble'"),
+        "case.toml": (study.replace("[ensemble]", "[Ensemble]").encode(), "mean 'ensemble'"),
     }
     for name, (content, words) in contents.items():
         (inside / name).write_bytes(content)
         (line,) = runs(f"check {name}", words, code=2).splitlines()
         assert line.startswith("error: ")
-    (inside / "mark.toml").write_bytes(text.encode("utf-8-sig"))
+    (inside / "mark.toml").write_bytes(study.encode("utf-8-sig"))
     runs("check mark.toml", "valid")
     (line,) = runs("check Mark.toml", "mean 'mark.toml'", code=2).splitlines()
     for folder, code in (("none", 1), ("mark.toml", 2)):

@@ -1,6 +1,5 @@
 """A study, swept or not, is the same in Python, in TOML and in the attributes of its result."""
 
-import copy
 import dataclasses
 import json
 
@@ -9,7 +8,7 @@ import pytest
 import scipy.stats
 import xarray as xr
 from refusals import refuses
-from small_study import small_study
+from small_study import altered, small_study
 
 import stiction as st
 
@@ -19,22 +18,8 @@ LENGTH = "random.strength.spectrum.correlation_length"
 LOGNORMAL = {"type": "lognorm", "s": 0.2, "scale": 1e6}
 
 
-def changed(**values):
-    """A copy of the study with keys, dots written as __, replaced, or removed if None."""
-    study = copy.deepcopy(STUDY)
-    for path, value in values.items():
-        *folders, last = path.split("__")
-        table = study
-        for name in folders:
-            table = table[name]
-        table[last] = value
-        if value is None:
-            del table[last]
-    return study
-
-
 def loaded(folder=".", **values):
-    return st.Study.from_dict(changed(**values), folder=folder)
+    return st.Study.from_dict(altered(STUDY, **values), folder=folder)
 
 
 def swept(*axes, **values):

@@ -2,12 +2,13 @@
 
 import warnings
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 
 import numpy as np
 import pytest
 import tomli_w
 from setups import beta_strength
-from small_study import small_study
+from small_study import altered, small_study
 from specimens import crooked
 
 import stiction as st
@@ -86,16 +87,9 @@ def test_samples_are_counted_over_those_without_the_doubt_too():
     assert merging(some[2]) == ["off by 0.05 in 1 of 2 samples (5)"]
 
 
-def changed(**values):
-    """The small study with other values, by dotted key."""
-    plain = small_study(64, correlation_length=9e-3, ensemble={"samples": 6, "seed": 3})
-    for key, value in values.items():
-        table = plain
-        *steps, last = key.split("__")
-        for step in steps:
-            table = table.setdefault(step, {})
-        table[last] = value
-    return plain
+changed = partial(
+    altered, small_study(64, correlation_length=9e-3, ensemble={"samples": 6, "seed": 3})
+)
 
 
 DOUBTED = {

@@ -37,7 +37,7 @@ _PREFIXES = {
     "": 1.0, "T": 1e12, "G": 1e9, "M": 1e6, "k": 1e3, "c": 1e-2, "m": 1e-3, "u": 1e-6,
     "\N{MICRO SIGN}": 1e-6, "\N{GREEK SMALL LETTER MU}": 1e-6, "n": 1e-9,
 }  # fmt: skip
-_UNITS = {
+_KNOWN = {
     prefix + symbol: Unit(scale * unit.factor, unit.powers)
     for prefix, scale in _PREFIXES.items()
     for symbol, unit in _BASE.items()
@@ -87,8 +87,8 @@ def parse(text: str) -> Unit | None:
     divisor.
     """
     text = text.strip()
-    if text in _UNITS:
-        return _UNITS[text]
+    if text in _KNOWN:
+        return _KNOWN[text]
     plain = re.sub("[⁻⁰¹²³⁴]+", lambda m: "^" + m.group().translate(_SUPERSCRIPTS), text)
     plain = re.sub(r"\*(?!\*)|[·⋅]", " ", plain.replace("**", "^"))
     factor = 1.0
@@ -96,7 +96,7 @@ def parse(text: str) -> Unit | None:
     for place, part in enumerate(plain.split("/")):
         for number, word in enumerate(part.split() or ("",)):
             match = _POWER.match(word)
-            unit = _UNITS.get(_symbol(match[1])) if match else None
+            unit = _KNOWN.get(_symbol(match[1])) if match else None
             if match is None or unit is None:
                 return None
             power = int(match[2] or 1) * (-1 if place and number == 0 else 1)

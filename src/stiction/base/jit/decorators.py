@@ -108,7 +108,7 @@ class _Guard:
         return self._of_laws[state]
 
     def load_overload(self, signature: Any, target: Any) -> Any:
-        """Return the compiled form for types of arguments; None if none is kept."""
+        """Return the compiled form for types of arguments, if it is stored."""
         cache = self._cache_of(signature)
         compiled = cache.load_overload(signature, target) if cache else None
         if compiled is None:
@@ -141,7 +141,7 @@ def _compile(function: Kernel, options: str) -> Kernel:
 
 
 def _plain(function: Any) -> Any:
-    """Compile with what numba documents, and `_cache` if there is one."""
+    """Compile with the documented parts of numba, and with `_cache` if it exists."""
     with _one_at_a_time:
         kept = numba.config.CACHE_DIR
         numba.config.CACHE_DIR = str(kernel_folder(function.__module__, "plain"))
@@ -156,10 +156,10 @@ def _plain(function: Any) -> Any:
 
 
 def jit(function: Kernel) -> Kernel:
-    """Compile for one thread, without the interpreter lock.
+    """Compile for a single thread, without the interpreter lock.
 
-    No ``parallel=True`` (forking after an OpenMP region aborts) and no fast-math: the same
-    numbers must come out whatever the batch.
+    ``parallel=True`` is not used, because forking after an OpenMP region aborts. Fast-math
+    is not used either, because results must not depend on the batch.
     """
     return _compile(function, "OPTIONS")
 
@@ -170,5 +170,5 @@ def jit_allocating(function: Kernel) -> Kernel:
 
 
 def jit_inside(function: Kernel) -> Kernel:
-    """Compile what only other kernels call, in half the time: Python itself cannot call it."""
+    """Compile a function for other kernels only, in half the time. Python cannot call it."""
     return _compile(function, "INSIDE")

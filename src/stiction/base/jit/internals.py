@@ -65,9 +65,9 @@ class _Format(CompileResultCacheImpl):
 
 
 class Cache(FunctionCache):
-    """Compiled forms of a function on disk, with what drafts leave to those that call them.
+    """Compiled forms of a function on disk, with the parts that drafts leave to their callers.
 
-    Forms for a friction law from elsewhere have a folder for each state of that law.
+    Forms for a user's friction law have a folder for each state of that law.
     """
 
     _impl_class = _Format

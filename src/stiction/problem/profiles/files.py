@@ -34,7 +34,7 @@ INSTRUMENTS = (
     ".ibw", ".nid",
 )  # fmt: skip
 """Binary files of profilometers and microscopes, which SurfaceTopography reads."""
-HEIGHT, GREY = "height", "grey value"
+HEIGHT, GREY_VALUE = "height", "grey value"
 """Names of arrays that hold no strengths: surfaces and images."""
 
 
@@ -85,7 +85,7 @@ def _read_image(content: bytes) -> xr.DataArray:
         grey = np.asarray(image)
     if grey.ndim != 2 or grey.dtype.kind not in "fiu":
         raise InputError(f"must be a grey image, got shape {grey.shape} of {grey.dtype}")
-    return xr.DataArray(grey.T.astype(np.float64), dims=("x", "y"), name=GREY)
+    return xr.DataArray(grey.T.astype(np.float64), dims=("x", "y"), name=GREY_VALUE)
 
 
 def _read_instrument(content: bytes) -> xr.DataArray:

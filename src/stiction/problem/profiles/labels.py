@@ -34,7 +34,7 @@ from stiction.base.errors import (
 from stiction.base.model import as_numbers, describe, real_array
 from stiction.base.units import factor_to, is_in, magnitude, parse, plain
 from stiction.base.variables import QUANTITIES
-from stiction.problem.profiles.files import GREY, HEIGHT, heights_of, load
+from stiction.problem.profiles.files import GREY_VALUE, HEIGHT, heights_of, load
 from stiction.problem.profiles.placing import MEASURED, OF_A_PLANE
 from stiction.problem.profiles.tables import Options, name_and_unit, sizes_of, table_of_frame
 
@@ -207,11 +207,11 @@ def labelled(
     if not is_labelled(data):
         data = _of_array(data, source)
     name = getattr(data, "name", None)
-    if name in (HEIGHT, GREY) and quantity != "height":
+    if name in (HEIGHT, GREY_VALUE) and quantity != "height":
         raise InputError(
             f"holds {name}s. Pass strength= with a map to strengths (Pa), or read quantity='height'"
         )
-    if name == GREY:
+    if name == GREY_VALUE:
         unit = unit or "m"  # a map to strengths takes grey values as they are
     # 2. A table without headings may be a map.
     data = _as_map(data, dims, rows, spacing, value)

@@ -511,10 +511,10 @@ def _decimal_mark(
         if len(decimal) == 2:
             break
     if stated is not None:
-        if (other := _OTHER[stated]) in decimal:
+        if (thousands := _OTHER[stated]) in decimal:
             raise InputError(
-                f"{example[other]}, in which {other!r} does not mark thousands. Pass"
-                f" decimal={other!r}"
+                f"{example[thousands]}, in which {thousands!r} does not mark thousands. Pass"
+                f" decimal={thousands!r}"
             )
         return stated
     if len(example) == 2:
