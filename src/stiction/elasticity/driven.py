@@ -66,7 +66,7 @@ class Driven:
         return _windows_at(self, low)
 
     def travel(self, force: Any, slip: Array) -> Any:
-        """Return the sum of the travels of both drives (m) at a force per unit depth (N/m)."""
+        """Return the travel of both drives together (m) at a force per unit depth (N/m)."""
         moved = 2.0 * force / self.drive_stiffness + (slip * self.shear).mean(axis=-1)
         return moved
 
@@ -78,7 +78,7 @@ def _unstable(matrix: Array, rate: float, begin: int, end: int) -> bool:
 
 
 def shortest_runs(matrix: Array, rate: float) -> list[tuple[int, int]]:
-    """Return first node and end of the shortest unstable runs of K (n, n) at a rate, Pa/m.
+    """Return first node and end of the shortest runs on which K (n, n) is unstable at a rate, Pa/m.
 
     The lowest eigenvalue of a block of K rises if the block shrinks. Therefore a shortest run that
     begins later also ends later, and a single pass over the nodes finds all of them:

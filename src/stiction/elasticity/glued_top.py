@@ -121,7 +121,7 @@ class GluedTop:
         return traction
 
     def shear(self, x: Array) -> Array:
-        """Return the shear stress at places of the interface per unit of t at a point, 1/m."""
+        """Return the shear stress at places on the interface per unit of t at a point, 1/m."""
         harmonics, kappa = self.harmonics, self.kappa
         apart = np.abs(np.subtract.outer(x, self.x))
         sums = harmonics.sums_at_top(apart)

@@ -141,7 +141,7 @@ class Harmonics:
     def reflected(
         self, weights: Array, along_x: Polynomial, x: Array, along_s: Polynomial, s: Array
     ) -> Array:
-        """Return the sum over k of weights times 4 k³ P(d/dx) Q(d/ds) of the remainder, (x, s)."""
+        """Return the sum over k of weights times 4 k³ P(d/dx) Q(d/ds) remainder, (x, s)."""
         left = self.solutions(along_x, x) @ (weights[:, None, None] * self._remainder)
         total: Array = np.tensordot(left, self.solutions(along_s, s), ((0, 2), (0, 2)))
         return total

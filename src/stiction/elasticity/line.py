@@ -97,7 +97,7 @@ def line_of(half_spaces: HalfSpaces, nodes: int) -> Line:
 
 @functools.lru_cache(maxsize=512)
 def window_mode(nodes: int, width: int) -> tuple[float, Array]:
-    """Step 2: return the smallest eigenvalue of a block of K, and its eigenvector.
+    """Step 2: return the smallest eigenvalue and eigenvector of a block in K.
 
     The unit of K is (G*/2)(2 pi/L). The eigenvector is positive, with unit sum.
     """

@@ -185,7 +185,7 @@ def _cauchy_cholesky(s: Complex, b: Complex, stop: float) -> Complex:
 
 
 def balanced_truncation(s: Complex, w: Complex, pairs: int) -> Complex:
-    """Step 2: return the poles of a short model of sum w exp(s T) by balanced truncation."""
+    """Step 2: return the poles of a short model for sum w exp(s T) by balanced truncation."""
     b = np.sqrt(w)
     factor = _cauchy_cholesky(s, b, 1e-24)
     left, sigma, right = np.linalg.svd(factor.T @ factor)

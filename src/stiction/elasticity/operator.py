@@ -64,7 +64,7 @@ Mask = NDArray[np.bool_]
 
 
 class Transform(NamedTuple):
-    """Shapes and axes of the transform of an interface; read-only, shared by threads."""
+    """Shapes and axes of an interface's transform; read-only, shared by threads."""
 
     shape: tuple[int, int]  # of a profile; (1, nodes) on a line, so that a kernel serves both
     half: tuple[int, int]  # of its real transform
@@ -120,7 +120,7 @@ def convolve(
 
 
 class Operator(NamedTuple):
-    """K - W of an interface with the workspaces of its solvers, for one thread at a time."""
+    """K - W of an interface with workspaces for its solvers, for a single thread at a time."""
 
     transform: Transform
     symbol: Array  # (modes,): K(k), Pa/m
@@ -165,7 +165,7 @@ def product(operator: Operator, field: Array, out: Array) -> None:
 
 @jit
 def dot(first: Array, second: Array, count: int) -> float:
-    """Return the sum of products of the first `count` entries, in a single thread.
+    """Return the inner product of the first `count` entries, in a single thread.
 
     The sum by numpy depends on the number of its threads.
     """
@@ -196,7 +196,7 @@ def dot(first: Array, second: Array, count: int) -> float:
 
 @jit
 def inner(a: Array, b: Array) -> float:
-    """Return the sum of products of two fields over all nodes."""
+    """Return the inner product of two fields over all nodes."""
     return dot(a, b, a.size)
 
 

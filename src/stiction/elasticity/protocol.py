@@ -37,7 +37,7 @@ class HalfSpaces(NamedTuple):
     moduli: tuple[float, ...]
 
     def symbol(self, shape: tuple[int, ...]) -> Array:
-        """Return K(k), Pa/m, for the modes of ``numpy.fft.rfftn`` of an interface; read-only."""
+        """Return K(k), Pa/m, for the modes of an interface as in ``numpy.fft.rfftn``; read-only."""
         return _symbol(*self, shape)
 
     def nucleation_lengths(self, rate: float) -> tuple[float, ...]:
@@ -94,7 +94,7 @@ class CircularEntries(NamedTuple):
 
 
 class DenseEntries(NamedTuple):
-    """K of two blocks, row by row in a flat array, and the relief of their drive.
+    """K of two blocks, row by row in a flat array, and the relief of the drive.
 
     Slip d lowers the mean stress by relief <q, d>/n. `relief` is in Pa/m, and 0 under a dead load.
     """

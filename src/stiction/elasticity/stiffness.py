@@ -1,4 +1,4 @@
-"""Products with the stiffness K of a line or of two blocks, inside kernels.
+"""Products with the stiffness K of a line or two blocks, inside kernels.
 
 Problem
 -------
@@ -78,7 +78,7 @@ def apply_outside(
 def add_four(
     target: Array, strip: Array, places: tuple[int, int, int, int], values: tuple[float, ...]
 ) -> None:
-    """Add the contribution of four nodes to half of a product."""
+    """Add the contribution by four nodes to half of a product."""
     half = target.shape[0]
     p0, p1, p2, p3 = places
     z0, z1, z2, z3 = values

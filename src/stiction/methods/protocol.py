@@ -105,7 +105,7 @@ class OptionalMembers:
         return False, False
 
     def may_differ(self, problem: Problem, sample: Sample, stress: Array) -> bool:
-        """Return whether to compare the onsets of samples (Pa) with the onsets of `exact_method`.
+        """Return whether to compare onsets of samples (Pa) with onsets by `exact_method`.
 
         Return False if a quick test finds that they differ by less than 1 %.
         """
@@ -191,7 +191,7 @@ def seconds_per_sample(problem: Problem, method: Method) -> float:
 
 
 def batch_size(problem: Problem, method: Method) -> int:
-    """Return the number of samples in a batch: half a second of work, at most 512."""
+    """Return how many samples form a batch: half a second of work, at most 512."""
     return max(
         1, min(MAX_BATCH_SAMPLES, int(BATCH_SECONDS / seconds_per_sample(problem, method)))
     )

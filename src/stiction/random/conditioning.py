@@ -159,7 +159,7 @@ Points = Annotated[
 
 @model
 class Conditions:
-    """Measured values of a field and their error, in the unit of the field."""
+    """Measured values and their error, in the unit of the field."""
 
     profile: Points
     noise: Positive

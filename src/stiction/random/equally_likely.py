@@ -161,7 +161,7 @@ class EquallyLikely:
         return list(known), np.array(numbers)
 
     def factor_column(self, interface: Interface) -> int | None:
-        """Return the number of the draw of the strength's factor, or `None`.
+        """Return the column of the draw for the strength's factor, or `None`.
 
         It is `None` if any member has no factor.
         """
@@ -171,7 +171,7 @@ class EquallyLikely:
         return int(_columns(self, interface).of[0][column])
 
     def select(self, draws: Array, rows: NDArray[np.int64], members: NDArray[np.int64]) -> None:
-        """Make rows of draws samples of given members."""
+        """Change rows of draws so that they select given members."""
         count = len(self.members)
         place = np.argsort(self.order) if self.order else np.arange(count)
         # The middle of a member's interval, so that round-off cannot select its neighbour.
@@ -182,7 +182,7 @@ class EquallyLikely:
         return uncertain(self, parameters)
 
     def variant(self, draws: Array) -> NDArray[np.int64]:
-        """Return the number of the constants of each sample."""
+        """Return the number of the constants that each sample takes."""
         return self.member(draws) % max(len(self.constants), 1)
 
     def interfaces(self, count: int, seed: int = 0) -> list[RandomInterface]:
@@ -195,13 +195,13 @@ class EquallyLikely:
         return drawn_from(self.source, count, seed)
 
     def member(self, draws: Array) -> NDArray[np.int64]:
-        """Return the number of the member of each sample."""
+        """Return the member that each sample selects, by number."""
         count = len(self.members)
         place = np.minimum((ndtr(draws[:, 0]) * count).astype(np.int64), count - 1)
         return np.array(self.order, np.int64)[place] if self.order else place
 
     def dimension(self, interface: Interface) -> int:
-        """Return the number of standard normal draws of a sample."""
+        """Return how many standard normal draws a sample has."""
         return _columns(self, interface).dimension
 
     def draws(self, interface: Interface, samples: int, seed: int, first: int = 0) -> Array:
@@ -231,7 +231,7 @@ class EquallyLikely:
 
 
 class Columns(NamedTuple):
-    """Columns of each member's draws among the draws of a mixture."""
+    """Columns of each member's draws among all draws of a mixture."""
 
     of: list[NDArray[np.int64]]
     dimension: int
@@ -319,14 +319,14 @@ class Uncertain(Result):
         ]
 
     def constants(self, seed: int) -> list[dict[str, float]]:
-        """Return values of the constants of the problem, by keys without ``problem.``."""
+        """Return values for the constants of the problem, by keys without ``problem.``."""
         keys = [key for key in self.laws if key.startswith("problem.")]
         laws = {key.removeprefix("problem."): self.laws[key] for key in keys}
         return hypercube(laws, VARIANTS, seed + 1) if keys else []
 
 
 def uncertain(random: Any, parameters: Mapping[str, Any]) -> Uncertain:
-    """Give distributions to parameters of the random properties and constants of the problem.
+    """Give distributions to parameters of random properties and to constants of the problem.
 
     Parameters
     ----------
@@ -355,7 +355,7 @@ def uncertain(random: Any, parameters: Mapping[str, Any]) -> Uncertain:
     with prefixed("uncertain"):
         laws = {full_key(k): law for k, law in distributions_of(parameters).items()}
         if not laws:
-            raise InputError("must map keys to distributions, got none")
+            raise InputError("must map keys to distributions, got an empty mapping")
         if wrong := [k for k in laws if k.startswith("problem.interface.")]:
             raise InputError(f"{wrong[0]}: must be fixed, sweep over it instead")
     with prefixed("random"):
@@ -364,7 +364,7 @@ def uncertain(random: Any, parameters: Mapping[str, Any]) -> Uncertain:
 
 
 def hypercube(laws: Mapping[str, Any], count: int, seed: int) -> list[dict[str, float]]:
-    """Return a Latin hypercube: a value of each distribution in every interval of 1/count."""
+    """Return a Latin hypercube: for each distribution, a value in every interval of 1/count."""
     rng = np.random.default_rng([seed, 6])
     # Permute the intervals of each distribution, and take a random place in each interval.
     cells = rng.permuted(np.tile(np.arange(count), (len(laws), 1)), axis=1)

@@ -104,12 +104,12 @@ class RandomField:
 
     @property
     def mean(self) -> float:
-        """Mean of the field in the unit of the field (Pa for strength)."""
+        """Mean of the field, in its unit (Pa for strength)."""
         return float(self.marginal.distribution.mean())
 
     @property
     def standard_deviation(self) -> float:
-        """Standard deviation of the field in the unit of the field."""
+        """Standard deviation of the field, in its unit."""
         return float(self.marginal.distribution.std())
 
     @checked
@@ -424,7 +424,7 @@ class RandomInterface:
         return (self,)
 
     def member(self, draws: Array) -> NDArray[np.int64]:
-        """Return the number of the member of each sample: 0."""
+        """Return the member that each sample selects, always 0."""
         return np.zeros(len(draws), np.int64)
 
     groups = np.zeros(1, np.int64)
@@ -436,7 +436,7 @@ class RandomInterface:
         return [(self.between or {}).get("strength")], np.zeros(1, np.int64)
 
     def factor_column(self, interface: Interface) -> int | None:
-        """Return the number of the draw of the strength's factor, or `None` without a factor."""
+        """Return the column of the draw for the strength's factor, or `None` without a factor."""
         if "strength" not in (self.between or {}):
             return None
         streams = layout(self, interface)[len(self.names) :]
@@ -468,7 +468,7 @@ class RandomInterface:
         return np.linalg.matrix_power(self.matrix != 0.0, len(self.names))
 
     def dimension(self, interface: Interface) -> int:
-        """Return the number of standard normal draws of a sample."""
+        """Return how many standard normal draws a sample has."""
         return int(layout(self, interface)[-1].columns.stop)
 
     @checked
@@ -569,7 +569,7 @@ class RandomInterface:
         with prefixed("uncertain"):
             laws = distributions_of(parameters, "random.")
             if not laws:
-                raise InputError("must map keys to distributions, got none")
+                raise InputError("must map keys to distributions, got an empty mapping")
         rng, interfaces = np.random.default_rng([seed, 6]), []
         cells = rng.permuted(np.tile(np.arange(count), (len(laws), 1)), axis=1)
         shares = (cells + rng.random(cells.shape)) / count

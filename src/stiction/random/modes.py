@@ -47,7 +47,7 @@ class Modes:
 
     @property
     def dimension(self) -> int:
-        """Number of standard normal draws of a sample."""
+        """Number of standard normal draws for a sample."""
         return 2 * self.ranks.size + int(self.has_mean)
 
     @property

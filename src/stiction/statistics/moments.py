@@ -107,7 +107,7 @@ def strength_spectrum(problem: Problem, strength: RandomField) -> Array:
 
 
 def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, float]:
-    """Return the unit of the strength (Pa), load profile and initial stress of a uniform problem.
+    """Return unit of the strength (Pa), load profile and initial stress, if all are uniform.
 
     The unit of friction coefficients is the normal pressure. Raises an `InputError` if any of them
     varies along the interface.

@@ -81,7 +81,7 @@ def multiplier(z: Array) -> Array:
 
 
 def grid_weights(half_width: float) -> Array:
-    """Return weights w_0, w_1 = w_-1, ... of the nodes 0, 1, ... from the centre of a patch.
+    """Return weights w_0, w_1 = w_-1, ... for nodes 0, 1, ... from the centre of a patch.
 
     `half_width` is h_n/2 in nodes, and w_0 + 2 (w_1 + w_2 + ...) = 1. If weights are not negative,
     an average lies between the least and the greatest strength even if the strength jumps. Weights

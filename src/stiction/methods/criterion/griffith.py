@@ -158,8 +158,8 @@ def _stress_drops(problem: Problem) -> Array:
     problem.refuse_specimen("the theory of cracks between half-spaces", "use st.Equilibrium()")
     if problem.friction.residual_ratio is not None:
         raise InputError(
-            "problem.friction.residual_ratio: the stress drop needs the residual strength in Pa;"
-            " give friction.residual_strength (for random strength, the ratio times its mean)"
+            "problem.friction.residual_ratio: the stress drop needs the residual strength in Pa."
+            " Give friction.residual_strength (for random strength, the ratio times its mean)"
         )
     resting = problem.load.initial_stress - problem.friction.residual_strength
     drops = np.empty((2, problem.interface.size))

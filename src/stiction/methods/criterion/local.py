@@ -138,7 +138,7 @@ class LocalCriterion:
         return variables if problem.specimen is None else variables | OF_SPECIMENS
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, Array]]:
-        """Return the solver of samples of a problem.
+        """Return the solver for samples of a problem.
 
         It raises an `InputError` if the weakening rate varies along the interface or a critical
         patch does not fit on it.
@@ -274,7 +274,7 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     _warn_if_coarse(problem, sample)
     ((rate, _), *further_rates) = _rates(sample)
     if further_rates:
-        raise InputError("weakening_rate: differs between samples. Pass samples one by one")
+        raise InputError("weakening_rate: differs between samples. Pass each sample alone")
     excess, profile = excess_of(sample), sample.load_profile
     windows = windows_of(problem, rate)
     samples = averages(interface, windows, excess, profile)

@@ -116,7 +116,7 @@ class Run:
         return float(abs(values[i + 1] - values[i]) / (times[i + 1] - times[i]))
 
     def start(self, time: float, slip: Floats | None = None) -> RuptureState:
-        """Return the state of rest, or of an equilibrium with a slip, with an empty memory.
+        """Return the state at rest, or in equilibrium with a slip, with an empty memory.
 
         If any stress is above the strength by more than round-off, explicit steps come first.
         """
@@ -177,7 +177,7 @@ class Run:
         )
 
     def ended(self, state: RuptureState) -> bool:
-        """Return whether the end time is reached, up to the rounding of a sum of many steps."""
+        """Return whether the end time is reached, apart from round-off after many steps."""
         remaining = self.setting.thresholds.end_time - state.now["time"]
         return bool(remaining <= 1e-6 * self.medium.step)
 

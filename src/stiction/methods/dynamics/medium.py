@@ -147,7 +147,7 @@ def largest_step(
 
 
 def amplification(kappa: float, kernel: ExponentialSum, stiffness: float) -> Floats:
-    """Return the matrix of an explicit step of a frictionless mode, kappa = |k| c_s dt."""
+    """Return the matrix of an explicit step for a frictionless mode, kappa = |k| c_s dt."""
     pairs = kernel.poles.size
     z = kernel.poles * kappa
     decay, gain = np.exp(z), kappa * phi(z)

@@ -97,7 +97,7 @@ def offsets(half: tuple[int, ...]) -> tuple[Ints, Ints, int]:
 
 
 def blocks(entries: int) -> int:
-    """Return the number of blocks for a number of entries."""
+    """Return the number of blocks that hold all entries."""
     return -(-entries // ENTRIES)
 
 

@@ -254,7 +254,7 @@ class Rupture:
         return prepare_medium(problem, self.kernel_tolerance, self.courant)
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, NDArray[Any]]]:
-        """Return the solver of samples of a problem, with the memory kernel fitted once."""
+        """Return the solver for samples of a problem, with the memory kernel fitted once."""
         if problem.specimen is not None:
             return specimens.RuptureSolver(problem, self.events, self.program(problem))
         medium, rate = self.medium(problem), self.loading_rate

@@ -1,4 +1,4 @@
-"""Stored results of a rupture: frames, the record of every step, and a folder on disk.
+"""Stored results of a rupture: frames, a record of every step, and a folder on disk.
 
 A folder holds files of frames, a checkpoint from which the run resumes, and at the end a summary.
 """

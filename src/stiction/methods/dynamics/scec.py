@@ -18,7 +18,7 @@ COLUMN_NAMES = "t h-slip h-slip-rate h-shear-stress v-slip v-slip-rate v-shear-s
 def write_scec(
     run: Any, folder: Any, *, origin: Any, normal_stress: float, benchmark: str = "TPV3"
 ) -> list[Path]:
-    """Write the stations and rupture times of a run in the format of SCEC (Harris et al., 2009).
+    """Write stations and rupture times of a run in the SCEC format (Harris et al., 2009).
 
     The direction along strike is x, the direction of slip, and the direction down-dip is y. On
     lines y is 0. Slip has no vertical component.

@@ -99,7 +99,7 @@ def simulate_event(
 
 
 class EventRecord:
-    """Frames of an event so far, with pictures of the block.
+    """Frames of an event up to now, with pictures of the block.
 
     A trial of the event shows how much slips, so that the pictures are spread evenly over the slip.
     """

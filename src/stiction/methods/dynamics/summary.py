@@ -160,7 +160,7 @@ def front_speed(
 
 
 def rupture_speed(arrival: Floats, spacing: float, window: float) -> Floats:
-    """Return the apparent speed of the front at each node of a line, m/s, or NaN.
+    """Return the apparent speed of a front at each node on a line, m/s, or NaN.
 
     `arrival` (s) is periodic, and NaN at nodes that the front did not reach. The speed is a mean
     over `window` (m). It is NaN unless the arrival is strictly monotone over the window, so that

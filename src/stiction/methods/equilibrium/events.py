@@ -62,7 +62,7 @@ class ArrestedEvent(NamedTuple):
 def event_table(
     problem: Problem, rows: Sample, row: int, events: list[ArrestedEvent]
 ) -> dict[str, Array]:
-    """Return the variables of the arrested events of a sample, (events, ...) arrays."""
+    """Return the variables of a sample's arrested events, (events, ...) arrays."""
     initial, profile = rows.initial_stress[row].mean(), rows.load_profile.mean()
     measured = [_measures(problem, initial, profile, *event) for event in events]
     return {
@@ -120,13 +120,13 @@ def relief_of(problem: Problem, slip: Array) -> float:
 
 
 def travel_of(problem: Problem, load: float, slip: Array) -> float:
-    """Return the sum of the travels of a specimen's drives since the unloaded state, m."""
+    """Return the travel of a specimen's two drives together since the unloaded state, m."""
     force = (load - relief_of(problem, slip)) * problem.interface.measure
     return float(problem.blocks.travel(force, slip))
 
 
 def elongation_of(problem: Problem, stress: float) -> float:
-    """Return the elongation of the machine at a mean stress of the interface (Pa), m.
+    """Return the elongation of the machine (m) at a mean stress on the interface (Pa).
 
     It is NaN under a dead load, which has no far end.
     """

@@ -165,5 +165,5 @@ class Equilibrium:
         return variables
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, NDArray[Any]]]:
-        """Return the solver of samples of a problem."""
+        """Return the solver for samples of a problem."""
         return OnsetSolver(problem, self, make_program(problem, self.gap))

@@ -83,7 +83,7 @@ def with_ends(field: Array, interface: Any) -> Array:
 
 
 def line_patch(field: Array, interface: Any) -> Patch:
-    """Return the patch of a line that holds the largest entry of a field."""
+    """Return the patch on a line that holds the largest entry in a field."""
     spacing = interface.spacing
     _, length, centre = main_patch(with_ends(field, interface))
     centre += interface.first
@@ -91,7 +91,7 @@ def line_patch(field: Array, interface: Any) -> Patch:
 
 
 def labelled_patches(mask: Mask) -> tuple[NDArray[np.int64], int]:
-    """Return the label of each node's patch (from 1, at rest 0), and the number of patches."""
+    """Return each node's patch by number (from 1, at rest 0), and how many patches there are."""
     pieces, count = label(mask)
     if count == 0:
         return pieces.astype(np.int64), 0

@@ -51,7 +51,7 @@ def _check_loads(loads: Any) -> Array:
     rises = given.ndim == 1 and given.size and np.all(np.diff(given, prepend=-1e-300) > 0.0)
     if not (rises and np.isfinite(given[-1])):
         raise InputError(
-            f"loads: must be finite and rise, none negative, got {describe(given.tolist())}"
+            f"loads: must be finite, not negative, and rise, got {describe(given.tolist())}"
         )
     return given
 

@@ -241,7 +241,7 @@ def piece_at(pieces: Pieces, critical: float, slip: float) -> int:
 
 @jit_inside
 def start_of(sample: StaticSample, i: int, piece: int) -> float:
-    """Return the value of a piece of node i at zero slip, less the initial stress, Pa.
+    """Return the strength of node i on a piece continued to zero slip, less initial stress, Pa.
 
     The first piece gives tau_p, the last tau_r.
     """

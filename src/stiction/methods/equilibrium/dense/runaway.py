@@ -63,7 +63,7 @@ UNSTOPPABLE_MARGIN = 1.5
 
 
 def block_factor(column: Array, width: int) -> Array:
-    """Return the Cholesky factor of the leading block of K, for runs of up to `width` nodes.
+    """Return the Cholesky factor of the leading block in K, for runs up to `width` nodes.
 
     The block is a Toeplitz matrix: its factor follows column by column from two vectors, in
     `width`^2 operations (the algorithm of Schur; T. Kailath and A. Sayed, Fast Reliable Algorithms
