@@ -143,6 +143,7 @@ def onset(
     if refused := refusals(problem, method):
         raise InputError(refused)
     attributes = study_attributes(problem=problem, method=method)
+    # Profiles pass the checks for users' data here, and nowhere else.
     sample, measured = problem.placed_sample(profiles, optional_member(method, "accepts"), gaps)
     problem.doubt(sample)
     solver, parts, size = prepared(problem, method), [], batch_size(problem, method)

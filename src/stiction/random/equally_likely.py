@@ -1,4 +1,12 @@
-"""Equally likely random interfaces as a mixture: a first draw selects the member of a sample."""
+"""Equally likely random interfaces as a mixture: a first draw selects the member of a sample.
+
+A mixture behaves as a single random interface, so that one search for failures covers all members.
+
+1. Collect the draws of all members. Members share a draw for the same property and mode
+   (`_columns`).
+2. A first draw, mapped to a uniform number, selects the member (`EquallyLikely.member`).
+3. The member maps its share of the other draws to profiles (`EquallyLikely.from_draws`).
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -301,7 +309,8 @@ class Uncertain(Result):
         likely = drawn_from(source, count, seed) if source else as_random(self.given)
         keys = [key for key in self.laws if not key.startswith("problem.")]
         ranks = np.arange(count)
-        # Constants are taken in turn; members in proportion share them, and values of parameters.
+        # Member n takes the constants n % VARIANTS. Members with the same constants get
+        # neighbouring ranks and thereby, in the order of groups, strengths in proportion.
         if len(keys) < len(self.laws):
             turns = np.array_split(ranks, VARIANTS)
             ranks = np.array([turns[n % VARIANTS][n // VARIANTS] for n in range(count)])
@@ -309,6 +318,7 @@ class Uncertain(Result):
         members = [likely.members[number % len(likely.members)] for number in numbers]
         if not keys:
             return members
+        # Neighbours in a group also share values of parameters.
         several = 1 < np.unique(likely.groups).size < len(likely.members)
         shared = SHARED_VALUES if several else 1
         rows = hypercube({key: self.laws[key] for key in keys}, -(-count // shared), seed)

@@ -1,4 +1,18 @@
-"""Random fields, and the random interface that holds all random properties."""
+"""Random fields, and the random interface that holds all random properties.
+
+Problem: map independent standard normal draws to profiles of correlated properties, each a
+translation field (M. Grigoriu, Applied Non-Gaussian Processes, 1995). `layout` says which draws
+belong to which property and mode.
+
+Algorithm (`RandomInterface.from_draws`)
+----------------------------------------
+1. Condition the draws on measured values, group by group of correlated properties
+   (`conditioning`).
+2. Combine a property's own draws with the draws of earlier properties by the Cholesky factor of
+   the correlation matrix (`lower_factor`).
+3. Synthesise the Gaussian field z from its modes (`modes`), and map it to the marginal (`mapping`).
+4. Multiply by the factors between specimens, which are a draw each.
+"""
 
 from __future__ import annotations
 
@@ -501,8 +515,7 @@ class RandomInterface:
             )
         if not np.isfinite(draws).all():
             raise InputError("draws: must be finite")
-        # First condition draws on measured values. Then combine the draws of each property with the
-        # draws of the properties before it.
+        # 1.
         for columns, conditioning in _conditioned(self, interface):
             draws = draws.copy()
             draws[:, columns] = conditioning.draws(draws[:, columns])
@@ -510,11 +523,13 @@ class RandomInterface:
         independent = [draws[:, stream.columns] for stream in streams]
         rows = zip(self.properties.items(), streams, lower_factor(self.matrix), strict=False)
         for (name, field), stream, row in rows:
+            # 2.
             mixed = reduce(np.add, (row[j] * independent[j] for j in np.flatnonzero(row)))
             of_property = np.ascontiguousarray(mixed[:, stream.of_property])
+            # 3.
             z = field.modes(interface).gaussian(of_property)
             profiles[name] = from_normal(field.marginal, z)
-        # A factor between specimens is a single number for each sample.
+        # 4. A factor is a single number for each sample.
         factors = zip((self.between or {}).items(), independent[len(profiles) :], strict=True)
         for (name, marginal), u in factors:
             factor = from_normal(marginal, u).reshape(-1, *(1 for _ in interface.shape))

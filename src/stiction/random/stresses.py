@@ -1,4 +1,14 @@
-"""Random properties of a problem as stresses, also for friction coefficients under a pressure."""
+"""Random properties of a problem as stresses, also for friction coefficients under a pressure.
+
+`share_below_residual` estimates the share of the strength that does not exceed the residual
+strength, by our own algorithm:
+
+1. Replace the residual strength by equally likely values.
+2. Multiply or divide them by equally likely values of each factor on only one of the two strengths:
+   factors between specimens, and the pressure on coefficients.
+3. Average the distribution function of the strength over these values. If the two strengths are
+   correlated, take the distribution of the strength given the residual strength.
+"""
 
 import math
 from collections.abc import Mapping
@@ -32,7 +42,7 @@ def check_pressure(problem: Problem, random: RandomInterface) -> None:
         value = (constants | forces).get(name)
         if name not in random.names and (value is None or not np.any(value)):
             raise InputError(
-                f"between.{name}: multiplies the {name} of the problem, which is not given. Give"
+                f"between.{name}: is a factor on the {name} of the problem, which is not given. Give"
                 " it there, make it random, or leave the factor out"
             )
     if names and problem.given_pressure is None and "normal_pressure" not in random.names:
@@ -131,10 +141,11 @@ def share_below_residual(problem: Problem, random: RandomInterface) -> float:
     """
     fields, between = random.properties, random.between or {}
     pressed = coefficients_of(random)
+    # 1.
     residual = np.asarray(problem.friction.residual_strength)
     if "residual_strength" in fields:
         residual = _equally_likely(fields["residual_strength"].marginal, RESIDUAL_QUANTILES)
-    # A pressure on both strengths cancels.
+    # 2. A pressure on both strengths cancels.
     one_sided = ("strength" in pressed) != ("residual_strength" in pressed)
     for name, power in (("residual_strength", 1.0), ("strength", -1.0)):
         if name in between:
@@ -143,6 +154,7 @@ def share_below_residual(problem: Problem, random: RandomInterface) -> float:
             )
         if one_sided and name in pressed:
             residual = np.outer(residual, _pressures(problem, random) ** power)
+    # 3.
     below = fields["strength"].marginal.distribution.cdf(residual)
     rho = (random.correlation or {}).get("strength", {}).get("residual_strength", 0.0)
     if rho:  # given a residual strength, the strength's z is normal with mean rho z
