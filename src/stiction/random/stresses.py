@@ -42,8 +42,8 @@ def check_pressure(problem: Problem, random: RandomInterface) -> None:
         value = (constants | forces).get(name)
         if name not in random.names and (value is None or not np.any(value)):
             raise InputError(
-                f"between.{name}: is a factor on the {name} of the problem, which is not given. Give"
-                " it there, make it random, or leave the factor out"
+                f"between.{name}: is a factor on the {name} of the problem, which is not given."
+                " Give it there, make it random, or leave the factor out"
             )
     if names and problem.given_pressure is None and "normal_pressure" not in random.names:
         raise InputError(
