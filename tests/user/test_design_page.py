@@ -1,6 +1,7 @@
 """The page of a design: its numbers, inputs, evidence and doubts, from Python and a command."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -111,3 +112,40 @@ def test_the_command_makes_constants_uncertain(tmp_path, capsys):
         "uncertain: problem.load: unknown 'weight'",
         lambda: command("problem.load.weight = [1, 2]"),
     )
+
+
+def test_a_posterior_and_peaks_are_stored_with_a_study(tmp_path, capsys, monkeypatch):
+    """The file beside the study holds the same interfaces, and a file of peaks is compared."""
+    monkeypatch.setattr("stiction.study.study.FIRST_MEMBERS", 20)
+    source = st.uncertain(RANDOM, {"strength.marginal.mean": (0.19, 0.21)})
+    refuses("give them as uncertain=", lambda: make(random=source))
+    plain = SimpleNamespace(interfaces=source.interfaces)
+
+    study = make(random=plain, peaks=np.array([0.7, 0.72, 0.9]) * 1e6)
+    study.to_toml(tmp_path / "study.toml")
+    text = (tmp_path / "study.toml").read_text()
+    assert 'random = "study.random.json"' in text
+    again = st.Study.from_toml(tmp_path / "study.toml")
+    assert again.random == source.interfaces(20)
+    np.testing.assert_array_equal(again.peaks.values[0], study.peaks.values[0])
+    assert st.Study.from_dict(again.to_dict()).random == again.random
+    # The same with a file of peaks, in other units, which lie far above the prediction.
+    (tmp_path / "slip.csv").write_text("force [N]\n" + "\n".join(map(str, range(600, 640))))
+    named = 'peaks = "slip.csv"\n' + text.partition("[peaks]")[0]
+    (tmp_path / "named.toml").write_text(named)
+    page = tmp_path / "page.html"
+    options = ["reliability", str(tmp_path / "named.toml"), "--page", str(page)]
+    app(options, standalone_mode=False)
+    assert "40 peaks against the prediction" in capsys.readouterr().out
+    assert "the peaks contradict the prediction, p = 0.001" in page.read_text("utf-8")
+    (tmp_path / "study.random.json").write_text("[{")
+    refuses(
+        "random: ... is not valid JSON", lambda: st.Study.from_toml(tmp_path / "study.toml")
+    )
+
+
+def make(**tables):
+    return st.Study(
+        problem=PROBLEM, method=GIVEN["method"], ensemble=st.Ensemble(samples=1),
+        reliability={"probability": 1e-1, "target_cv": 0.3}, **tables,
+    )  # fmt: skip

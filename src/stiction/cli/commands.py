@@ -53,6 +53,8 @@ Scheduler = Annotated[
 Part = Annotated[
     str | None, Option(metavar="K/N", help="Compute the K-th of N parts, into one folder RUN.")
 ]
+COMPARED_SAMPLES = 1_000
+"""Samples with which measured peaks are compared."""
 LOADING_RATE = 2e7
 """Loading rate of a rupture, Pa/s, if the study has another method."""
 
@@ -674,6 +676,8 @@ def _answer(
     study: Any, asked: dict[str, float], workers: int | None, page: Path | None = None
 ) -> None:
     """Print the answer to the question of the command or of the study, at each point."""
+    from stiction.ensemble.monte_carlo import monte_carlo
+    from stiction.inference.agreement import agreement
     from stiction.study.study import Question
 
     question = study.reliability
@@ -693,13 +697,23 @@ def _answer(
         where = f"{point}: " if point.values else ""
         answer = question.answer(experiment, workers)
         echo(f"{where}{answer}")
+        evidence = []
+        if study.peaks is not None:
+            predicted = monte_carlo(
+                experiment.problem, experiment.random, method=experiment.method,
+                samples=COMPARED_SAMPLES, seed=experiment.seed, workers=workers,
+            )  # fmt: skip
+            evidence.append(agreement(predicted, study.peaks))
+            echo(f"{where}{evidence[0]}")
         if page is not None:
             from stiction.cli.design_page import write_design_page
 
             number = f"_{point.number}" if point.values else ""
             path = page.with_stem(page.stem + number)
             title = study.title or "Design of a joint"
-            write_design_page(answer, path, problem=experiment.problem, title=title)
+            write_design_page(
+                answer, path, problem=experiment.problem, evidence=evidence, title=title
+            )
             echo(f"page: {path}")
 
 

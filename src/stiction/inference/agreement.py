@@ -50,6 +50,8 @@ RANGE_MARGIN = 0.25
 OUTLYING_SHARE = 1e-3
 """Share of the predicted peaks on either side that is left out of this range, because their
 distribution may have heavy tails."""
+DOUBTFUL_P_VALUE = 0.05
+"""P-value below which measured and predicted peaks contradict each other."""
 BAND_LEVEL = 0.9
 PRECURSORS = {"number": "number", "size": "largest", "first_load": "load of the first"}
 """Compared properties of precursors, with their names in printed text."""
@@ -93,6 +95,16 @@ class Agreement(Result):
     predicted: tuple[Predicted, ...]
     band: float
     precursors: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Doubts: that the peaks contradict the prediction."""
+        p = min(self.p_values.values())
+        text = (
+            f"the peaks contradict the prediction, p = {p:.2g} of their agreement. Check units,"
+            " method and surfaces"
+        )
+        return (text,) if p < DOUBTFUL_P_VALUE else ()
 
     def _summary(self) -> Summary:
         rows = [Row(f"p-value, {name}", p) for name, p in self.p_values.items()]

@@ -18,7 +18,7 @@ from stiction.base.model import Count, Number, checked
 from stiction.base.representation import Summary
 from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.limit_state import scales_with_strength
-from stiction.inference.agreement import Agreement, agreement
+from stiction.inference.agreement import DOUBTFUL_P_VALUE, Agreement, agreement
 from stiction.inference.density import tabulate
 from stiction.inference.fit import FieldFit
 from stiction.inference.likelihood import (
@@ -55,8 +55,6 @@ LIKELY_FIELDS = 60
 ONSETS = {"local_criterion": 200}
 FEW_ONSETS = 100
 """Simulated onsets of each field by other methods."""
-DOUBT = 0.05
-"""P-value of agreement below which a warning says that peaks and profiles contradict."""
 LOG_STRENGTH_MARGIN = 0.3
 """Distance in the logarithm of the strength by which simulated means exceed the range of peaks."""
 
@@ -254,7 +252,7 @@ def _information(grid: Grid, before: Grid, proper: bool) -> dict[str, float]:
 def _notes(profiles: Profiles, tests: int, comparison: Agreement | None) -> list[str]:
     """Return the reasons to doubt the posterior."""
     notes = []
-    if comparison is not None and (p := min(comparison.p_values.values())) < DOUBT:
+    if comparison is not None and (p := min(comparison.p_values.values())) < DOUBTFUL_P_VALUE:
         notes.append(
             f"the peaks contradict the profiles, p = {p:.2g} of their agreement. Tests, profiles or"
             " model miss something, and a force by both does, too. Check units, method and"

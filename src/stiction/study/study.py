@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import pydantic
 import tomli_w
-from pydantic import BeforeValidator, Discriminator, Tag, model_validator
+from pydantic import BeforeValidator, Discriminator, PlainSerializer, Tag, model_validator
 
 from stiction.base.errors import InputError, StoreError, prefixed
-from stiction.base.files import content_of
+from stiction.base.files import content_of, write_whole
 from stiction.base.kinds import OneOf
 from stiction.base.model import (
     Count,
@@ -41,12 +41,20 @@ from stiction.ensemble.experiment import Ensemble, Experiment
 from stiction.ensemble.limit_state import StressName
 from stiction.ensemble.monte_carlo import gather
 from stiction.ensemble.store import Store, read_study
+from stiction.inference.peaks import Peaks, make_peaks, read_peaks
 from stiction.methods.dynamics.save import Save
 from stiction.methods.protocol import METHODS, as_method
 from stiction.problem.problem import Problem
 from stiction.problem.profiles.reading import ProfileFile, profile_in_file
 from stiction.random.dotted_keys import with_values
-from stiction.random.equally_likely import as_random, drawn_from, uncertain
+from stiction.random.equally_likely import (
+    FIRST_MEMBERS,
+    Source,
+    as_random,
+    drawn_from,
+    uncertain,
+)
+from stiction.random.equally_likely import Uncertain as Likely
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 from stiction.reliability.answer import Answer, Probability, TargetCv
 from stiction.reliability.failure import design_stress, failure_probability
@@ -62,6 +70,8 @@ CURVES = "failure_curve"
 """Key of the settings of failure curves beside the study of a run."""
 MAX_TOML_BYTES, MAX_TOML_WORDS, MAX_DOTS = 2**21, 2**18, 64
 """Bytes of a study file, bytes beside lists of numbers, and dots in a line of those bytes."""
+MOST_WRITTEN = 8
+"""Random interfaces that a study file holds itself; more of them are in a file beside it."""
 SHOWN_KEYS = 10
 """Keys in a message about a file that is no study."""
 _NUMBERS = re.compile(rb"(?:[^=#]{1,200}=)?([\s\d.,eE+_\[\]-]*)")
@@ -81,12 +91,42 @@ _One: Any = Annotated[
         lambda given: as_random_interface(given) if isinstance(given, RandomField) else given
     ),
 ]
+
+
+def _interfaces(given: Any) -> Any:
+    """Return interfaces of a fit or a posterior, and anything else as it is."""
+    if isinstance(given, Likely):
+        raise InputError(
+            "random: has uncertain parameters; give them as uncertain= of the study"
+        )
+    return given.interfaces(FIRST_MEMBERS) if isinstance(given, Source) else given
+
+
 AnyRandom: Any = Annotated[
     Annotated[_One, Tag("one")] | Annotated[list[_One], Tag("several")],
     Discriminator(lambda given: "several" if isinstance(given, list | tuple) else "one"),
+    BeforeValidator(_interfaces),
     "RandomInterface | list",
 ]
 """A random interface, or several equally likely interfaces. A field becomes an interface."""
+
+
+def _peaks_of(given: Any) -> Any:
+    """Return peaks, which a study in plain form holds as a table {unit, values, lengths}."""
+    if not isinstance(given, Mapping) or "values" not in given:
+        return make_peaks(given)
+    values = given["values"]
+    lengths = given.get("lengths", [None] * len(values))
+    return make_peaks(dict(zip(lengths, values, strict=True)), given.get("unit", "Pa"))
+
+
+def _plain_peaks(peaks: Peaks) -> dict[str, Any]:
+    plain = {"unit": peaks.unit, "values": [values.tolist() for values in peaks.values]}
+    return plain if None in peaks.lengths else plain | {"lengths": list(peaks.lengths)}
+
+
+AnyPeaks: Any = Annotated[Any, BeforeValidator(_peaks_of), PlainSerializer(_plain_peaks)]
+"""Measured peaks; in a study file the name of a file beside it, as `read_peaks` reads."""
 
 
 @model(kw_only=True)
@@ -156,7 +196,7 @@ class Study(_Parts):
     Parameters
     ----------
     problem : Problem
-    random : RandomInterface, RandomField or list of them
+    random : RandomInterface, RandomField, list of them, FieldFit or Posterior
         The random properties. A field is the peak strength, Pa. Members of a list are
         equally likely.
     method : LocalCriterion, Equilibrium or Rupture
@@ -177,6 +217,9 @@ class Study(_Parts):
         Question to `stiction reliability`: a ``force`` (N), ``stress`` (Pa) or
         ``friction_coefficient`` to carry, or the ``probability`` of a design, with
         ``target_cv``.
+    peaks : Peaks or as of `stiction.infer`, optional
+        Peaks of tests from which ``random`` was not inferred: `stiction reliability` compares them
+        with its prediction. In a study file the name of a file that `read_peaks` reads.
     title : str
         Title of the study, for readers.
 
@@ -208,6 +251,7 @@ class Study(_Parts):
     mixture: Flag = False
     save: Save | None = None
     reliability: Question | None = None
+    peaks: AnyPeaks | None = None
     title: Text = ""
 
     @model_validator(mode="after")
@@ -456,16 +500,23 @@ class Study(_Parts):
         return {name: value for name, value in plain if value or name not in left_out}
 
     def to_toml(self, path: str | Path) -> None:
-        """Write the study as a TOML file.
+        """Write the study as a TOML file, and many interfaces as a JSON file beside it.
 
         It raises an `InputError` if a part exists in Python only or the file cannot be
         written.
         """
-        text = tomli_w.dumps(self.to_dict())
+        plain, place = self.to_dict(), check("path", path, FilePath)
+        beside = place.with_suffix(".random.json")
+        interfaces = plain["random"]
+        if many := isinstance(interfaces, list) and len(interfaces) > MOST_WRITTEN:
+            plain["random"] = beside.name
+        text = tomli_w.dumps(plain)
         with prefixed("path"):
             _check_toml(text.encode())
         try:
-            check("path", path, FilePath).write_text(text, encoding="utf-8")
+            if many:
+                write_whole(beside, json.dumps(interfaces).encode())
+            place.write_text(text, encoding="utf-8")
         except OSError as error:
             raise InputError(f"path: {path} cannot be written: {error.strerror}") from None
 
@@ -579,10 +630,28 @@ def _read(
             return file
 
         context["read"] = read
+        given = dict(given)
+        for key, reader in (("random", _stored_interfaces), ("peaks", read_peaks)):
+            if isinstance(given.get(key), str):
+                file = place / given[key]
+                with prefixed(key):
+                    given[key] = reader(file)
+                if named is not None:
+                    named.append(file)
     try:
         return pydantic.TypeAdapter(cls).validate_python(given, context=context)
     except pydantic.ValidationError as error:
         raise InputError(dict.fromkeys(explain(error))) from None
+
+
+def _stored_interfaces(path: Path) -> list[Any]:
+    """Return the interfaces of a file that `Study.to_toml` wrote."""
+    with prefixed(str(path)):
+        try:
+            interfaces = json.loads(content_of(path))
+        except (RecursionError, ValueError) as error:
+            raise InputError(f"is not valid JSON: {error}") from None
+        return list(check("interfaces", interfaces, list))
 
 
 def open_run(path: Any) -> StoredRun:
