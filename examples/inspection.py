@@ -14,20 +14,22 @@ SHARES = {"a tenth": 0.1, "a third": 1 / 3, "all": 1.0}
 STRESS, NOISE = 0.68e6, 20e3  # Pa
 
 
-def probabilities(specimens: int = 40, samples: int = 1000):
+def probabilities(
+    specimens: int = 40, samples: int = 1000
+) -> tuple[float, dict[str, np.ndarray]]:
     """Return P of an unknown specimen, and of each one given a scan of each share."""
     problem = st.paper.problem(nodes=512)
     strength = st.paper.strength(problem, correlation_ratio=1.0)
     x, rng = problem.interface.x, np.random.default_rng(0)
 
-    def failing(field, samples=samples, seed=0):
+    def failing(field: st.RandomField, samples: int = samples, seed: int = 0) -> float:
         found = st.monte_carlo(
             problem, field, method=st.LocalCriterion(), samples=samples, seed=seed, pilot=False,
             progress=False,
         )  # fmt: skip
         return float((found.critical_stress < STRESS).mean())
 
-    found = {name: [] for name in SHARES}
+    found: dict[str, list[float]] = {name: [] for name in SHARES}
     profiles = strength.sample(problem.interface, samples=specimens, seed=1)
     for number, specimen in enumerate(profiles):
         measured = specimen + NOISE * rng.standard_normal(x.size)

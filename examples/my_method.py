@@ -10,7 +10,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 import stiction as st
-from stiction.extensions import onset_variables
+from stiction.extensions import Sample, Solver, Variable, onset_variables
 
 
 @dataclass(frozen=True)
@@ -21,19 +21,19 @@ class WeakestWindow:
     type = "weakest_window"
     label = "weakest window"
 
-    def variables(self, problem):
+    def variables(self, problem: st.Problem) -> dict[str, Variable]:
         return onset_variables(problem.interface)
 
-    def seconds_per_sample(self, problem):
+    def seconds_per_sample(self, problem: st.Problem) -> float:
         return 1e-8 * problem.interface.size
 
-    def supports(self, problem):
+    def supports(self, problem: st.Problem) -> list[str]:
         return ["it does not take planes"] if problem.interface.is_plane else []
 
-    def prepare(self, problem):
+    def prepare(self, problem: st.Problem) -> Solver:
         width = max(1, round(self.length / problem.interface.spacing))
 
-        def solve(sample):
+        def solve(sample: Sample) -> dict[str, np.ndarray]:
             excess = (sample.strength - sample.initial_stress) / sample.load_profile
             average = uniform_filter1d(excess, width, axis=1, mode="wrap")
             stress = sample.mean_stress(average.min(axis=1))

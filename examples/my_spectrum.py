@@ -14,7 +14,7 @@ marginal = st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6)  # Pa
 groove = 2.0 * np.pi / 2e-3  # rad/m
 
 
-def machined(k):
+def machined(k: np.ndarray) -> np.ndarray:
     """A flat part and a peak, of a tenth of its wavenumber in width."""
     return np.exp(-(((k - groove) / (0.1 * groove)) ** 2)) + 0.3 * np.exp(-((k / groove) ** 2))
 

@@ -28,12 +28,12 @@ peaks = simulator(samples=25, seed=7, load_cell_error=error)((h_n, 0.66e6))
 simulate = simulator(samples=1000, seed=0)
 
 
-def transform(u):
+def transform(u: np.ndarray) -> np.ndarray:
     """From the unit square to the parameters."""
     return np.array([0.5 * h_n * 4.0 ** u[0], 0.5e6 + 0.3e6 * u[1]])
 
 
-def log_likelihood(theta):
+def log_likelihood(theta: np.ndarray) -> float:
     """A kernel density of simulated peaks with the load cell's error."""
     onsets = simulate(theta)
     density = scipy.stats.gaussian_kde(onsets, "silverman")

@@ -20,7 +20,9 @@ RATIOS = (0.25, 0.5, 1.0, 2.0)
 PIXELS = 1400
 
 
-def main(folder: str | Path = "docs/images", samples: int = 10_000, nodes: int = 1024):
+def main(
+    folder: str | Path = "docs/images", samples: int = 10_000, nodes: int = 1024
+) -> list[float]:
     """Draw both; the median critical stress at the ends of the range, MPa."""
     folder = Path(folder)
     problem = st.paper.problem(nodes=nodes)
@@ -61,7 +63,7 @@ def monte_carlo(
         beside = [figure.add_subplot(grid[row, 1], sharey=above) for row in (0, 1)]
         onset = figure.add_subplot(grid[:, 2])
         for i, ratio in enumerate(RATIOS):
-            style = {"color": color(i), "linewidth": 1.0}
+            style: dict[str, Any] = {"color": color(i), "linewidth": 1.0}
             tau_p = profiles[ratio] * 1e-6
             tau_n = st.theory.nucleation_stress(problem, profiles[ratio]) * 1e-6
             above.plot(x, tau_p[0], **style)
@@ -112,5 +114,5 @@ def rupture(run: xr.Dataset, problem: st.Problem) -> Figure:
 
 
 if __name__ == "__main__":
-    short, long = main(*sys.argv[1:2])
+    short, long = main(sys.argv[1] if len(sys.argv) > 1 else "docs/images")
     print(f"median critical stress: {short:.4f} MPa at xi_0/h_n = 0.25, {long:.4f} MPa at 2")

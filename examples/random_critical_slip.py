@@ -14,20 +14,28 @@ strength = st.paper.strength(paper, correlation_ratio=1.0)
 critical_slip, energy = 2e-6, 1.0  # m, J/m2
 
 
-def varying(mean):
+def varying(mean: float) -> st.RandomField:
     """A log-normal field of this mean, with a coefficient of variation of about 0.2."""
     return st.RandomField(scipy.stats.lognorm(0.2, scale=mean), strength.spectrum)
 
 
 cases = {
-    "d_c uniform": ({"critical_slip": critical_slip}, {}),
-    "d_c random": ({}, {"critical_slip": varying(critical_slip)}),
-    "Gamma random": ({}, {"fracture_energy": varying(energy)}),
+    "d_c uniform": (
+        st.LinearWeakening(critical_slip=critical_slip),
+        st.RandomInterface(strength=strength),
+    ),
+    "d_c random": (
+        st.LinearWeakening(),
+        st.RandomInterface(strength=strength, critical_slip=varying(critical_slip)),
+    ),
+    "Gamma random": (
+        st.LinearWeakening(),
+        st.RandomInterface(strength=strength, fracture_energy=varying(energy)),
+    ),
 }
 onsets = {}
-for name, (law, more) in cases.items():
-    problem = st.Problem(paper.solid, paper.interface, st.LinearWeakening(**law))
-    random = st.RandomInterface(strength=strength, **more)
+for name, (law, random) in cases.items():
+    problem = st.Problem(paper.solid, paper.interface, law)
     onsets[name] = st.monte_carlo(problem, random, method=st.Equilibrium(), samples=60, seed=0)
     mean = float(onsets[name].critical_stress.mean())
     patch = float(onsets[name].critical_patch_length.median())

@@ -7,10 +7,11 @@ them may move.
 from stiction.base.kinds import register
 from stiction.base.model import Positive, Real, model
 from stiction.base.variables import Variable
-from stiction.methods.protocol import Method
+from stiction.methods.protocol import Method, Solver
 from stiction.problem.friction import FrictionLaw
 from stiction.problem.load import LoadShape, distance
 from stiction.problem.results import onset_variables
+from stiction.problem.sample import Sample
 from stiction.random.marginals import Marginal
 from stiction.random.spectra import ScaledSpectrum, SpectralDensity
 
@@ -21,7 +22,9 @@ __all__ = [
     "Method",
     "Positive",
     "Real",
+    "Sample",
     "ScaledSpectrum",
+    "Solver",
     "SpectralDensity",
     "Variable",
     "distance",

@@ -7,7 +7,7 @@ import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
-from stiction.base.model import Names, Numbers, at_least, check, checked, describe
+from stiction.base.model import Count, Names, Number, Numbers, check, checked, describe
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import limit_state
 from stiction.inference.likelihood import Simulation, simulate
@@ -28,8 +28,8 @@ def simulator(
     parameters: Names,
     *,
     method: MethodObject,
-    samples: at_least(1),  # type: ignore[valid-type]
-    seed: at_least(0) = 0,  # type: ignore[valid-type]
+    samples: Count,
+    seed: Number = 0,
     load_cell_error: NotNegative = 0.0,
 ) -> Callable[..., Array]:
     """Return a function that simulates the peaks of repeated tests, for dynesty or sbi.
@@ -83,7 +83,7 @@ def simulator(
 
     def simulated(theta: Any, *, first: int = 0) -> Array:
         """Return the peaks of samples first, first + 1, ... at theta, (samples,), Pa."""
-        first = check("first", first, at_least(0))
+        first = check("first", first, Number)
         values = check("theta", theta, Numbers)
         if values.shape != (len(parameters),) or not np.isfinite(values).all():
             raise InputError(

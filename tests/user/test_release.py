@@ -92,23 +92,44 @@ CALLS = [
     ("solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, {}=1170.0)", "density", "densty"),
     ("interface = st.Interface(length={}, nodes=1024)", "0.1", '"0.1"'),
     ("law = st.LinearWeakening({}=5e11)", "weakening_rate", "weakening_rat"),
+    ("steep = st.LinearWeakening(weakening_rate={})", "np.full(1024, 5e11)", '"fast"'),
     ("beta = st.Beta(alpha=1.5, beta=3.0, {}low=0.66e6)", "high=1.66e6, ", ""),
     ("problem = st.Problem({}, law)", "solid, interface", "interface, solid"),
+    ("st.Problem(solid, interface, {})", "law", '"linear"'),
+    ("st.Problem(solid, interface, law, {})", "st.Load()", "1e6"),
+    ("st.Load(profile={})", "st.GradientLoad(amplitude=0.1)", "st.GradientLoad"),
+    ("st.Load(initial_stress={})", "[1e5] * 1024", '"1e5"'),
     ("method = st.{}()", "Equilibrium", "Equilibrum"),
-    ("field = {}", "st.RandomField(beta, st.PowerLawSpectrum(1e-3))", "3"),
-    ("st.monte_carlo(problem, field, method=st.LocalCriterion(), samples={})", "9", "{}"),
+    ("field = st.RandomField({})", "beta, st.PowerLawSpectrum(1e-3)", "beta, 1e-3"),
+    ("st.RandomField({})", "beta, st.PowerLawSpectrum(1e-3)", "st.PowerLawSpectrum(1e-3), beta"),
+    ("st.RandomField({}, st.PowerLawSpectrum(1e-3))", "beta", "st.Beta"),
+    ("st.RandomField(beta, {})", "st.PowerLawSpectrum(1e-3)", "st.PowerLawSpectrum"),
+    (
+        "st.RandomInterface(strength=field, correlation={})",
+        '{("strength", "initial_stress"): 0.1}', '{"strength": 0.1}',
+    ),
+    ("st.monte_carlo(problem, {}, method=method, samples=9)", "[field, field]", "3"),
+    ("st.monte_carlo(problem, field, method=method, samples={})", "9", '"10"'),
+    ("st.monte_carlo(problem, field, method={}, samples=9)", "method", '"equilibrium"'),
+    ("st.monte_carlo(problem, field, method={}, samples=9)", "method", "st.Equilibrium"),
+    ("st.monte_carlo(problem, field, method=method, samples=9, keep={})", '"strength"', "1"),
+    ("st.Save({})", '["slip"], stations={"a": 0.05}', "3"),
     ("run = st.Rupture(loading_rate={})", "2e7", '"fast"'),
-]
+    ("st.plot.field(interface, [0.0]).figure.{}", "set_size_inches(3, 2)", "set_size(3, 2)"),
+]  # fmt: skip
 """Lines, what belongs in them, and a mistake in its place."""
 
 
-def test_a_type_checker_finds_every_mistake(tmp_path):
+def test_a_type_checker_finds_every_mistake_and_accepts_what_is_right(tmp_path):
     pytest.importorskip("basedpyright")
+    head = "import numpy as np\nimport stiction as st\n"
     for name, which in (("right.py", 1), ("wrong.py", 2)):
         lines = [call[0].format(call[which]) for call in CALLS]
-        (tmp_path / name).write_text("\n".join(["import stiction as st", *lines]))
+        (tmp_path / name).write_text(head + "\n".join(lines))
+    config = tmp_path / "pyrightconfig.json"
+    config.write_text('{"include": ["right.py"], "typeCheckingMode": "strict"}')
     options = ["-m", "basedpyright", "--level", "error", "--outputjson"]
-    found = json.loads(python(*options, tmp_path, code=1))["generalDiagnostics"]
-    errors = {(Path(d["file"]).name, d["range"]["start"]["line"]) for d in found}
-    lines = {i + 1 for i, call in enumerate(CALLS) if call[0] != "field = {}"}
-    assert errors == {("wrong.py", line) for line in lines}
+    right = json.loads(python(*options, "-p", config))["generalDiagnostics"]
+    assert [one["message"] for one in right] == []
+    found = json.loads(python(*options, tmp_path / "wrong.py", code=1))["generalDiagnostics"]
+    assert {one["range"]["start"]["line"] - 2 for one in found} >= {*range(len(CALLS))}

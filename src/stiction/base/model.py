@@ -15,7 +15,17 @@ import types
 import typing
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias, TypeVar, dataclass_transform
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Generic,
+    Literal,
+    Protocol,
+    TypeAlias,
+    TypeVar,
+    dataclass_transform,
+)
 
 import numpy as np
 import pydantic
@@ -183,34 +193,58 @@ def _path(value: Any) -> Path:
     return Path(text)
 
 
-@functools.cache
-def at_least(least: int) -> Any:
-    """Return the annotation of a whole number, such as 1e4, that is not below `least`."""
-    return Annotated[int, Field(ge=least), BeforeValidator(as_count)]
-
-
-Count: TypeAlias = at_least(1)  # type: ignore[valid-type]  # a call makes it
-Number: TypeAlias = at_least(0)  # type: ignore[valid-type]
+Number: TypeAlias = Annotated[int, Field(ge=0), BeforeValidator(as_count)]
+"""A whole number, such as 1e4, that is not negative."""
+Count: TypeAlias = Annotated[Number, Field(ge=1)]
 Real: TypeAlias = Annotated[float, BeforeValidator(_real), Field(allow_inf_nan=False)]
 Positive: TypeAlias = Annotated[Real, Field(gt=0)]
 Numbers: TypeAlias = Annotated[Any, BeforeValidator(as_numbers), "array"]
 """Real numbers of any shape, as a float64 array."""
-Profile: TypeAlias = Annotated[
-    Any,
-    BeforeValidator(_profile),
-    PlainSerializer(_plain),
-    "float | array",
+Held = TypeVar("Held", covariant=True)
+Given = TypeVar("Given", contravariant=True)
+
+
+class Converted(Generic[Held, Given]):
+    """Annotation of a field of a model that holds another type than it is given.
+
+    Type checkers read it as a descriptor. At runtime only the type that is held, with its
+    validators, is left.
+    """
+
+    if TYPE_CHECKING:
+
+        def __get__(self, owner: Any, kind: Any = None) -> Held: ...
+        def __set__(self, owner: Any, value: Given) -> None: ...
+    else:
+
+        def __class_getitem__(cls, types: tuple[Any, Any]) -> Any:
+            return types[0]
+
+
+class Labelled(Protocol):
+    """An array of any library, with or without labels and a unit."""
+
+    @property
+    def shape(self) -> Any: ...
+
+
+AnyNumbers: TypeAlias = float | Labelled | Sequence[float] | Sequence[Sequence[float]]
+PlacedProfile: TypeAlias = Annotated[
+    Any, BeforeValidator(_profile), PlainSerializer(_plain), "float | array"
 ]
-OptionalProfile: Any = Profile | None
+Profile: TypeAlias = Converted[PlacedProfile, AnyNumbers]
+OptionalProfile: TypeAlias = Converted[PlacedProfile | None, AnyNumbers | None]
 """A number, a read-only array of shape (nodes,), or None for 'not given'."""
+Names: TypeAlias = Annotated[Sequence[str], BeforeValidator(_names), "tuple"]
+"""A name or several, as a tuple."""
+HeldPath: TypeAlias = Annotated[Path, BeforeValidator(_path)]
+FilePath: TypeAlias = Annotated[str | Path, BeforeValidator(_path), "Path"]
+"""A path, which is a `Path` where the function or model begins."""
 Flag: TypeAlias = Annotated[bool, BeforeValidator(_flag)]
 Progress: TypeAlias = Annotated[Show, BeforeValidator(_show), "bool | Callable"]
 """True, False, or a function of (done, total)."""
 Text: TypeAlias = Annotated[str, Field(strict=True, min_length=0)]
 """Text in valid UTF-8. Pydantic looks at it only if its length is limited."""
-Names: TypeAlias = Annotated[tuple[str, ...], BeforeValidator(_names)]
-"""A name or several, as a tuple."""
-FilePath: TypeAlias = Annotated[Path, BeforeValidator(_path)]
 Mode: TypeAlias = Literal["II", "III"]
 
 

@@ -447,7 +447,7 @@ def onset(
         strength, interface=problem.interface, unit=unit, x_unit=x_unit, interpolate=interpolate,
         gaps=gaps, value=_column(value), x=_column(x), quantity=quantity, decimal=decimal,
         missing=None if missing is None else [_number(text) for text in missing], skip=skip,
-        sheet=_column(sheet), record=record, offset=_number(offset),
+        sheet=_column(sheet) or 0, record=record, offset=_number(offset),
     )  # fmt: skip
     with collect_warnings():  # each method refuses, and warns, for itself
         problem.sample(profile, accept=("overstress",))
@@ -462,7 +462,9 @@ def onset(
         try:
             given = of_study is not None and of_study.type == name
             result = find(
-                problem, profile, method=of_study if given else METHODS[name](**options)
+                problem,
+                profile,
+                method=of_study if of_study and given else METHODS[name](**options),
             )
             table = table_of(result[[key for key in printed if key in result]])
             rows[name] = {key: v[0] for key, v in table.items() if key.startswith(printed)}

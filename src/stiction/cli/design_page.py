@@ -79,7 +79,7 @@ def write_design_page(
     """
     if not design.of_stress:
         raise InputError("design: must come from st.design_stress, got a failure probability")
-    page = Page(title)
+    place, page = Path(path), Page(title)
     page.text(f"{date.today().isoformat()}; stiction, {versions()}.")
     page.table("Design", ["quantity", "value"], _numbers(design))
     page.text(
@@ -101,10 +101,10 @@ def write_design_page(
         doubts += [*getattr(item, "doubts", ()), *getattr(item, "notes", ())]
     page.table("Doubts", ["doubt"], [[text] for text in doubts or ["none"]])
     try:
-        write_whole(path, page.html().encode())
+        write_whole(place, page.html().encode())
     except OSError as error:
         raise InputError(f"path: {path} cannot be written: {error.strerror}") from None
-    return path
+    return place
 
 
 def _demand(design: Answer) -> tuple[str, Callable[[float], str]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import chain, pairwise
@@ -54,7 +54,7 @@ class Experiment:
     problem: Problem
     random: Any  # a RandomInterface or EquallyLikely, or what becomes one
     method: Any
-    keep: tuple[str, ...] = ()  # names of random fields that `results` holds
+    keep: Sequence[str] = ()  # names of random fields that `results` holds
     seed: int = 0
 
     def __post_init__(self) -> None:

@@ -245,7 +245,7 @@ def monte_carlo(
     (('sample',), 'Pa')
     """
     ensemble = Ensemble(samples=samples, seed=seed, first=first, keep=keep)
-    experiment = Experiment(problem, random, method, keep, seed)
+    experiment = Experiment(problem, random, method, ensemble.keep, seed)
     about = study_attributes(
         problem=problem, random=experiment.given, method=experiment.method, ensemble=ensemble
     )

@@ -29,14 +29,15 @@ Steps for a posterior. The peaks of one campaign share the unknown parameters.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from pydantic import Field
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
-from stiction.base.model import Number, at_least, checked
+from stiction.base.model import Count, Number, checked
 from stiction.base.representation import Result, Row, Summary
 from stiction.inference.curves import Curves, summary_of
 from stiction.inference.peaks import Peaks, factor_of, make_peaks
@@ -127,7 +128,7 @@ def agreement(
     *,
     unit: str = "Pa",
     load_cell_error: NotNegative = 0.0,
-    replicates: at_least(100) = 999,  # type: ignore[valid-type]
+    replicates: Annotated[Count, Field(ge=100)] = 999,
     seed: Number = 0,
 ) -> Agreement:
     """Test whether measured peaks agree with a prediction.

@@ -20,14 +20,15 @@ Steps, for each design and each simulated campaign:
 """
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import xarray as xr
+from pydantic import Field
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, unknown_name
-from stiction.base.model import Count, Names, Progress, at_least, check, checked, is_whole
+from stiction.base.model import Count, Names, Number, Progress, check, checked, is_whole
 from stiction.base.progress import Meter
 from stiction.base.variables import Variable
 from stiction.inference.grid import grid_of
@@ -62,9 +63,9 @@ def design_of_tests(
     method: MethodObject,
     load_cell_error: NotNegative = 0.0,
     unit: str = "Pa",
-    repetitions: at_least(10) = 60,  # type: ignore[valid-type]
-    samples: at_least(100) | None = None,  # type: ignore[valid-type]
-    seed: at_least(0) = 0,  # type: ignore[valid-type]
+    repetitions: Annotated[Count, Field(ge=10)] = 60,
+    samples: Annotated[Count, Field(ge=100)] | None = None,
+    seed: Number = 0,
     workers: Count | None = None,
     progress: Progress = True,
 ) -> xr.Dataset:

@@ -35,7 +35,7 @@ from scipy.stats import t as student
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed, unknown_name, warn_accuracy
-from stiction.base.model import Count, Flag, Number, Positive, Progress, at_least, checked
+from stiction.base.model import Count, Flag, Number, Positive, Progress, checked
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.variables import QUANTITIES, unit_of_key
 from stiction.inference.between import chance_of_scatter
@@ -273,7 +273,7 @@ class FieldFit(Result):
 
     def _summary(self) -> Summary:
         marginal = getattr(self.field.marginal, "type", "marginal").replace("_", " ")
-        spectrum = self.field.spectrum.type.replace("_", " ")
+        spectrum = getattr(self.field.spectrum, "type", "").replace("_", " ")
         title = (
             f"{marginal} marginal, {spectrum} spectrum from {self.lengths_held:.3g} correlation"
             " lengths"
@@ -309,7 +309,7 @@ def fit_field(
     between: Factors = False,
     prior: Any = None,
     quantity: str = "strength",
-    bootstrap: at_least(MIN_REPETITIONS) = 200,  # type: ignore[valid-type]
+    bootstrap: Annotated[Count, Field(ge=MIN_REPETITIONS)] = 200,
     confidence: Share = 0.9,
     seed: Number = 0,
     workers: Count | None = None,

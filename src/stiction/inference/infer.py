@@ -19,13 +19,14 @@ import itertools
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
-from stiction.base.model import Count, Progress, at_least, checked
+from stiction.base.model import Count, Number, Progress, checked
 from stiction.base.progress import Meter, Show
 from stiction.ensemble.limit_state import no_single_length
 from stiction.ensemble.pilot import compare, pilot_doubt
@@ -92,8 +93,8 @@ def infer(
     method: MethodObject,
     load_cell_error: NotNegative = 0.0,
     unit: str = "Pa",
-    samples: at_least(100) | None = None,  # type: ignore[valid-type]
-    seed: at_least(0) = 0,  # type: ignore[valid-type]
+    samples: Annotated[Count, Field(ge=100)] | None = None,
+    seed: Number = 0,
     workers: Count | None = None,
     progress: Progress = True,
 ) -> Posterior:

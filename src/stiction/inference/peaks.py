@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -208,7 +209,7 @@ def read_peaks(
     if isinstance(source, Curves):
         return make_peaks(source)
     with prefixed(str(source)):
-        return _of_table(read_table(source, options), unit, options)
+        return _of_table(read_table(Path(source), options), unit, options)
 
 
 def _refuse_curve(table: Any, read: set[str]) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Protocol, T
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, SkipValidation
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
@@ -134,7 +134,9 @@ def as_method(value: Any) -> Any:
     return value
 
 
-MethodObject: TypeAlias = Annotated[Any, BeforeValidator(as_method), "Method"]
+MethodObject: TypeAlias = Annotated[
+    Method, SkipValidation, BeforeValidator(as_method), "Method"
+]
 """Annotation of an argument that is a method; see `stiction.base.model.checked`."""
 
 

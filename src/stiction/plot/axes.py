@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import pydantic
@@ -17,6 +17,15 @@ from stiction.base.units import unit_for
 from stiction.base.variables import DIRECTION, FRICTION_COEFFICIENT
 from stiction.plot.style import COLUMN, keep_contrast, paper_style
 from stiction.problem.problem import Problem
+
+if TYPE_CHECKING:
+
+    class FigureAxes(Axes):
+        """Axes on a figure, which can be saved, and not on a part of one."""
+
+        figure: Figure  # type: ignore[assignment,unused-ignore]
+else:
+    FigureAxes: TypeAlias = Axes
 
 
 def with_unit(name: str, unit: str) -> str:
@@ -40,7 +49,7 @@ def new_figure(width: float, height: float) -> Figure:
 @contextmanager
 def on_axes(
     ax: Axes | None, width: float = 1.35 * COLUMN, height: float = 2.8
-) -> Iterator[Axes]:
+) -> Iterator[Any]:
     """Yield the caller's axes as they are, or new axes in the style of a printed page."""
     if ax is not None:
         if not isinstance(ax, Axes):

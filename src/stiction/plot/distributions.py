@@ -14,6 +14,7 @@ from stiction.base.units import in_words, unit_for
 from stiction.base.variables import DIRECTION
 from stiction.inference.peaks import make_peaks
 from stiction.plot.axes import (
+    FigureAxes,
     add_friction_scale,
     add_scale,
     named,
@@ -39,7 +40,7 @@ TINY = 1e-300
 
 def monte_carlo(
     result: Any, *, quantity: str | None = None, measured: Any = None, ax: Axes | None = None
-) -> Axes:
+) -> FigureAxes:
     """Draw the density of the onset in an ensemble or several, or along a sweep.
 
     Parameters
@@ -139,7 +140,7 @@ def quantiles(
     quantity: str | None = None,
     along: str | None = None,
     ax: Axes | None = None,
-) -> Axes:
+) -> FigureAxes:
     """Draw the median onset with its error, and the quartiles, along a sweep.
 
     Parameters
@@ -277,7 +278,7 @@ def failure_curve(
     stress: Real | None = None,
     force: Positive | None = None,
     ax: Axes | None = None,
-) -> Axes:
+) -> FigureAxes:
     """Draw P(onset < s) over decades, with its interval.
 
     Parameters
@@ -351,7 +352,7 @@ def failure_curve(
     return axes
 
 
-def sensitivities(design: Answer, *, ax: Axes | None = None) -> Axes:
+def sensitivities(design: Answer, *, ax: Axes | None = None) -> FigureAxes:
     """Draw the sensitivities of a design, with the widest at the top.
 
     Parameters

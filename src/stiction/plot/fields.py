@@ -15,6 +15,7 @@ from stiction.base.units import unit_for
 from stiction.base.variables import PROFILES, QUANTITIES
 from stiction.methods.criterion.local import nucleation_stress
 from stiction.plot.axes import (
+    FigureAxes,
     add_friction_scale,
     named,
     need,
@@ -39,7 +40,7 @@ def field(
     *,
     quantity: str | None = None,
     ax: Axes | None = None,
-) -> Axes:
+) -> FigureAxes:
     """Draw a profile or a partly measured field, as lines along x or as a map of a plane.
 
     Parameters
@@ -162,7 +163,7 @@ def onset(
     problem: Problem | None = None,
     sample: int = 0,
     ax: Axes | None = None,
-) -> Axes:
+) -> FigureAxes:
     """Draw a strength profile and the position of its onset, by a method or several.
 
     Parameters

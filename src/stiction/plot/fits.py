@@ -12,7 +12,7 @@ from stiction.base.variables import QUANTITIES
 from stiction.inference.agreement import Agreement
 from stiction.inference.fit import FieldFit
 from stiction.inference.whittle import Observed, observe
-from stiction.plot.axes import new_figure, on_axes, with_unit
+from stiction.plot.axes import FigureAxes, new_figure, on_axes, with_unit
 from stiction.plot.style import (
     ACCENT,
     INK,
@@ -199,7 +199,7 @@ def _band(axes: Axes, at: Any, rows: Any) -> None:
     axes.fill_between(at, low, high, color=color(1), alpha=0.25, linewidth=0.0)
 
 
-def agreement(result: Agreement, *, ax: Axes | None = None) -> Axes:
+def agreement(result: Agreement, *, ax: Axes | None = None) -> FigureAxes:
     """Draw measured peaks as steps on the predicted distribution.
 
     Parameters

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from stiction.base.errors import InputError
-from stiction.base.model import FilePath, at_least, check
+from stiction.base.model import Count, FilePath, check
 from stiction.base.progress import Meter, Show
 from stiction.base.units import unit_for
-from stiction.plot.axes import need, on_axes, problem_of, with_unit
+from stiction.plot.axes import FigureAxes, need, on_axes, problem_of, with_unit
 from stiction.plot.fields import draw_map, map_height, name_line
 from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, paper_style
 from stiction.problem.problem import Problem
@@ -36,7 +36,9 @@ BEFORE = 0.11
 KEEP = ". Keep them with simulate_rupture(save=st.Save(['slip_rate', 'shear_stress']))"
 
 
-def rupture(run: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None = None) -> Axes:
+def rupture(
+    run: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None = None
+) -> FigureAxes:
     """Draw slip rate in space and time, or the advance of the front on a plane.
 
     Parameters
@@ -105,7 +107,7 @@ def film(
         If a variable was not kept, or the path does not end in .gif.
     """
     need(run, "slip_rate", "shear_stress", "peak_strength", hint=KEEP)
-    check("frames", frames, at_least(1))
+    check("frames", frames, Count)
     target = check("path", path, FilePath)
     if target.suffix != ".gif":
         raise InputError(f"path: must end in .gif, got {target.name!r}")

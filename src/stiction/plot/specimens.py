@@ -13,7 +13,7 @@ from stiction.base.errors import InputError
 from stiction.base.model import check
 from stiction.base.units import unit_for
 from stiction.inference.curves import Curves
-from stiction.plot.axes import need, new_figure, on_axes, problem_of, with_unit
+from stiction.plot.axes import FigureAxes, need, new_figure, on_axes, problem_of, with_unit
 from stiction.plot.fields import rows_of
 from stiction.plot.style import ACCENT, COLUMN, INK, PAGE, PALE, QUIET, paper_style, series
 from stiction.problem.problem import Problem
@@ -123,7 +123,7 @@ def force_travel(
     *,
     measured: Curves | None = None,
     ax: Axes | None = None,
-) -> Axes:
+) -> FigureAxes:
     """Draw the curve of a machine: force against the travel of the drives, with its drops.
 
     Parameters

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property, partial
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, PlainSerializer, ValidationInfo, model_val
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
-from stiction.base.model import Positive, as_count, as_number, in_si, model, to_plain
+from stiction.base.model import Converted, Positive, as_count, as_number, in_si, model, to_plain
 from stiction.base.units import factor_to
 
 Mask = NDArray[np.bool_]
@@ -131,6 +131,12 @@ Extent = Annotated[
 ]
 
 
+Lengths: TypeAlias = Converted[
+    Annotated[float | tuple[float, float], _lengths], float | Sequence[float]
+]
+Counts: TypeAlias = Converted[Annotated[int | tuple[int, int], _counts], int | Sequence[int]]
+
+
 @model
 class Interface:
     """Interface with equally spaced nodes: a periodic line or plane, or a line in a specimen.
@@ -175,8 +181,8 @@ class Interface:
     251
     """
 
-    length: Annotated[float | tuple[float, float], _lengths]
-    nodes: Annotated[int | tuple[int, int], _counts]
+    length: Lengths
+    nodes: Counts
     width: Positive | None = None
     ends: Literal["periodic", "free"] = "periodic"
     extent: Extent = None

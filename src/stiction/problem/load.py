@@ -12,7 +12,10 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.kinds import Kinds, OneOf, register
 from stiction.base.model import (
+    AnyNumbers,
+    Converted,
     OptionalProfile,
+    PlacedProfile,
     Positive,
     Profile,
     Real,
@@ -141,9 +144,11 @@ class Load:
     >>> load = st.Load(profile=st.EdgeLoad(excess=2.0, decay=0.01), normal_pressure=5e6)
     """
 
-    profile: Annotated[Profile, OneOf(LOADS, _shape, untyped=True)] = 1.0
-    initial_stress: Profile = 0.0
-    normal_pressure: OptionalProfile = None
+    profile: Converted[
+        Annotated[PlacedProfile, OneOf(LOADS, _shape, untyped=True)], AnyNumbers | LoadShape
+    ] = 1.0  # type: ignore[assignment]  # converted
+    initial_stress: Profile = 0.0  # type: ignore[assignment]
+    normal_pressure: OptionalProfile = None  # type: ignore[assignment]
     pressing_force: Positive | None = None
 
     @model_validator(mode="after")

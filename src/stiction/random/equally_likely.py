@@ -83,7 +83,7 @@ def _known(given: Any) -> Any:
 
 if TYPE_CHECKING:
     AnyRandom: TypeAlias = (
-        RandomInterface | RandomField | Source | list[RandomInterface] | list[RandomField]
+        RandomInterface | RandomField | Source | Sequence[RandomInterface | RandomField]
     )
 else:
     AnyRandom = Annotated[Any, BeforeValidator(_known), "RandomInterface | RandomField | list"]

@@ -21,7 +21,7 @@ import math
 from collections.abc import Mapping
 from functools import cached_property, lru_cache, reduce
 from itertools import chain
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,7 @@ from scipy.special import ndtri
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed, unknown_name, warn_accuracy
 from stiction.base.model import (
+    Converted,
     Count,
     Flag,
     Number,
@@ -50,7 +51,7 @@ from stiction.problem.interface import Interface
 from stiction.random.conditioning import Conditioning, Conditions, Measured, conditioned
 from stiction.random.dotted_keys import distributions_of, full_key, with_values
 from stiction.random.mapping import correlation_of_mapped, from_normal, hermite_coefficients
-from stiction.random.marginals import AnyMarginal
+from stiction.random.marginals import AnyMarginal, AnyMarginals
 from stiction.random.modes import Modes, make_modes
 from stiction.random.spectra import Share, Spectrum, lag_of_correlation
 from stiction.random.synthesis import SAMPLES_PER_BLOCK, Stream, block_of
@@ -292,7 +293,10 @@ def _pairs(value: Any) -> Any:
 
 
 Coefficient = Annotated[Real, Field(ge=-1.0, le=1.0)]
-Correlation = Annotated[dict[str, dict[str, Coefficient]], BeforeValidator(_pairs)]
+Correlation: TypeAlias = Converted[
+    Annotated[dict[str, dict[str, Coefficient]], BeforeValidator(_pairs)] | None,
+    Mapping[tuple[str, str], float] | Mapping[str, Mapping[str, float]] | None,
+]
 
 
 def lower_factor(matrix: Array) -> Array:
@@ -360,8 +364,8 @@ class RandomInterface:
     critical_slip: RandomField | None = None
     fracture_energy: RandomField | None = None
     normal_pressure: RandomField | None = None
-    correlation: Correlation | None = None
-    between: dict[str, AnyMarginal] | None = None
+    correlation: Correlation = None  # type: ignore[assignment]  # converted
+    between: AnyMarginals = None  # type: ignore[assignment]
 
     @field_validator(*NAMES, mode="before")
     @classmethod

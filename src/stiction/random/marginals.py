@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, Protocol, Self, TypeAlias
 
 import numpy as np
 import scipy.stats
@@ -20,7 +20,7 @@ from scipy.special import gammaln
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, UnitWarning, unknown_name, warn_user
 from stiction.base.kinds import Kinds, OneOf, from_table, register
-from stiction.base.model import Positive, Real, check, model
+from stiction.base.model import Converted, Positive, Real, check, model
 
 Bound: TypeAlias = Annotated[Real, Field(gt=-1e18, lt=1e18)]
 
@@ -344,5 +344,15 @@ def _of_scipy(name: str, given: Mapping[str, Any], first: tuple[Any, ...] = ()) 
     return ScipyMarginal(name, tuple(values.items()))
 
 
-AnyMarginal: TypeAlias = Annotated[Any, OneOf(MARGINALS, marginal_of), "Marginal"]
+class FrozenDistribution(Protocol):
+    """A frozen distribution of `scipy.stats`."""
+
+    def ppf(self, q: Any) -> Any: ...
+
+
+MarginalObject: TypeAlias = Annotated[Any, OneOf(MARGINALS, marginal_of), "Marginal"]
+AnyMarginal: TypeAlias = Converted[MarginalObject, Marginal | FrozenDistribution]
+AnyMarginals: TypeAlias = Converted[
+    dict[str, MarginalObject] | None, Mapping[str, Marginal | FrozenDistribution] | None
+]
 """A `Beta`, `Lognormal`, ..., or any frozen continuous `scipy.stats` distribution."""

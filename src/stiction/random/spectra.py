@@ -370,5 +370,5 @@ def spectrum_of(value: Any) -> SpectralDensity:
     )
 
 
-Spectrum: TypeAlias = Annotated[Any, OneOf(SPECTRA, spectrum_of), "Spectrum"]
+Spectrum: TypeAlias = Annotated[SpectralDensity, OneOf(SPECTRA, spectrum_of), "Spectrum"]
 """Annotation of an argument that is a spectrum."""

@@ -16,7 +16,7 @@ from scipy.special import ndtri
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, collect_warnings, warn_accuracy
-from stiction.base.model import Real, at_least
+from stiction.base.model import Count, Real
 from stiction.base.progress import Meter
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.units import in_words
@@ -32,7 +32,7 @@ from stiction.reliability.tail import Tail, two_levels_refused
 TargetCv: TypeAlias = Annotated[Real, Field(ge=1e-6, le=1)]
 """A smaller one would take more than 1e12 failures; a larger is no answer."""
 Probability: TypeAlias = Annotated[Real, Field(ge=1e-30, lt=1)]
-Budget: TypeAlias = at_least(100)  # type: ignore[valid-type]  # a call makes it
+Budget: TypeAlias = Annotated[Count, Field(ge=100)]
 
 COUNTING_SECONDS, FEWEST_EVALUATIONS, MOST_EVALUATIONS = 100.0, 1_000, 2_000_000
 """Computing time of counting by a slow method, fewest and most evaluations, by default."""

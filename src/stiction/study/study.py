@@ -412,7 +412,7 @@ class Study(_Parts):
         """
         if part is not None and out is None:
             raise InputError("part: needs out=, the folder in which the parts are stored")
-        store = None if out is None else Store.open(out, self.to_dict())
+        store = None if out is None else Store.open(Path(out), self.to_dict())
         return gather(
             self.experiments,
             self.ensemble,
@@ -478,7 +478,7 @@ class Study(_Parts):
         study = replace(self, ensemble=replace(self.ensemble, samples=repetitions))
         complete_curves(
             rows,
-            Store.open(out, study.to_dict() | {CURVES: settings}),
+            Store.open(Path(out), study.to_dict() | {CURVES: settings}),
             elsewhere=self._elsewhere(part, repetitions),
             workers=workers,
             executor=executor,

@@ -82,7 +82,7 @@ class LocalCriterion:
     """
 
     type: Literal["local_criterion"] = "local_criterion"
-    label: ClassVar[str] = "local criterion"
+    label = "local criterion"
     exact_method: ClassVar[str] = "equilibrium"
     scaling: ClassVar[str] = "affine"
     samples_at_point: ClassVar[int] = 2000

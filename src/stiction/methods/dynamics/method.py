@@ -186,7 +186,7 @@ class Rupture:
     type: Literal["rupture"] = "rupture"
     # Profiles that `Problem.sample` refuses for other methods.
     accepts: ClassVar[tuple[str, ...]] = ("overstress",)
-    label: ClassVar[str] = "rupture"
+    label = "rupture"
     counted_only: ClassVar[bool] = True
 
     @pydantic.model_validator(mode="after")

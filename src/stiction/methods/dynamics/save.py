@@ -6,9 +6,9 @@ A folder holds files of frames, a checkpoint from which the run resumes, and at 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import numpy as np
 import pydantic
@@ -24,7 +24,18 @@ from stiction.base.files import (
     write_arrays,
     write_whole,
 )
-from stiction.base.model import Count, FilePath, Names, Real, Text, checked, model
+from stiction.base.model import (
+    AnyNumbers,
+    Converted,
+    Count,
+    FilePath,
+    HeldPath,
+    Names,
+    Real,
+    Text,
+    checked,
+    model,
+)
 from stiction.base.netcdf import read_netcdf
 from stiction.base.variables import Variable
 from stiction.methods.dynamics.integrator import Run
@@ -99,6 +110,9 @@ Place = Annotated[
     tuple[Real, ...], BeforeValidator(lambda place: np.atleast_1d(place).tolist())
 ]
 
+Stations: TypeAlias = Converted[dict[Text, Place], Mapping[str, AnyNumbers]]
+Folder: TypeAlias = Converted[HeldPath | None, FilePath | None]
+
 
 @model
 class Save:
@@ -130,8 +144,8 @@ class Save:
 
     fields: Names = ("slip", "slip_rate", "shear_stress")
     every: Annotated[Count, pydantic.Field(le=10**6)] = 10
-    stations: dict[Text, Place] = pydantic.Field(default_factory=dict)
-    to: FilePath | None = None
+    stations: Stations = pydantic.Field(default_factory=dict)  # type: ignore[arg-type]
+    to: Folder = None  # type: ignore[assignment]  # converted
 
     @pydantic.model_validator(mode="after")
     def _known(self) -> Save:
@@ -345,8 +359,8 @@ def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset
     """
     import xarray as xr
 
-    parts = []
-    for path in sorted(folder.glob(_FRAME_FILES)):
+    parts, place = [], Path(folder)
+    for path in sorted(place.glob(_FRAME_FILES)):
         parts.append(_read(path, [] if fields is None else FIELDS.keys() - {*fields}))
     if not parts:
         raise InputError(f"folder: {str(folder)!r} holds no frames of a rupture")
@@ -360,8 +374,8 @@ def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset
     # Frames and steps have different lengths in each file: join them separately.
     framed = joined("time", "step").merge(joined("step", "time"))
     framed.attrs = parts[-1].attrs
-    if (folder / _SUMMARY).exists():
-        whole = _read(folder / _SUMMARY)
+    if (place / _SUMMARY).exists():
+        whole = _read(place / _SUMMARY)
         framed = framed.merge(whole, compat="override")
         framed.attrs = whole.attrs
     return framed

@@ -112,7 +112,7 @@ class Equilibrium:
     first_stage: ClassVar[str] = "local_criterion"
     scaling: ClassVar[str] = "stretch"
     samples_at_point: ClassVar[int] = 500
-    label: ClassVar[str] = "equilibrium"
+    label = "equilibrium"
 
     def seconds_per_sample(self, problem: Problem) -> float:
         """Return the approximate time of a sample on a core, s."""

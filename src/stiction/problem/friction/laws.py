@@ -11,16 +11,16 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
-from pydantic import BeforeValidator, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.kinds import Kinds, OneOf, register
 from stiction.base.model import (
+    Count,
     OptionalProfile,
     Profile,
     Real,
-    at_least,
     checked,
     is_unplaced,
     model,
@@ -52,11 +52,11 @@ class FrictionLaw(ABC):
     """
 
     family: ClassVar[str] = "laws"
-    weakening_rate: OptionalProfile = None
-    critical_slip: OptionalProfile = None
-    residual_strength: Profile = 0.0
-    fracture_energy: OptionalProfile = None
-    residual_ratio: OptionalProfile = None
+    weakening_rate: OptionalProfile = None  # type: ignore[assignment]  # converted
+    critical_slip: OptionalProfile = None  # type: ignore[assignment]
+    residual_strength: Profile = 0.0  # type: ignore[assignment]
+    fracture_energy: OptionalProfile = None  # type: ignore[assignment]
+    residual_ratio: OptionalProfile = None  # type: ignore[assignment]
 
     @model_validator(mode="after")
     def _one_scale(self) -> Any:
@@ -250,7 +250,7 @@ def _listed(value: Any) -> Any:
 
 
 Corners: TypeAlias = Annotated[tuple[Real, ...], BeforeValidator(_listed)]
-Pieces: TypeAlias = at_least(2)  # type: ignore[valid-type]  # a call makes it
+Pieces: TypeAlias = Annotated[Count, Field(ge=2)]
 
 
 @register
