@@ -8,7 +8,7 @@ A mixture behaves as a single random interface, so that one search for failures 
 3. The member maps its share of the other draws to profiles (`EquallyLikely.from_draws`).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import (
