@@ -153,7 +153,7 @@ def test_what_no_file_can_name_is_refused_before_anything_is_computed(tmp_path):
     class Another(Unregistered):
         pass
 
-    refuses("Another: the type 'unregistered' is that of", lambda: register(Another))
+    refuses("Another: the type 'unregistered' belongs to", lambda: register(Another))
     refuses("needs a field such as type", lambda: register(LoadShape))
     for least in (-0.01, 0.0):  # zero is not positive
         Another.values = lambda self, interface, least=least: interface.x + least
