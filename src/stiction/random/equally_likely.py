@@ -63,7 +63,7 @@ class Source(Protocol):
     """Source of any number of equally likely interfaces: a fit, a posterior, parameters."""
 
     def interfaces(self, count: int, seed: int = 0) -> list[RandomInterface]:
-        """Return a number of equally likely interfaces."""
+        """Return `count` equally likely interfaces."""
 
 
 def _known(given: Any) -> Any:

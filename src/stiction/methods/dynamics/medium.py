@@ -97,9 +97,8 @@ def prepare_medium(problem: Problem, tolerance: float, courant: float) -> Medium
 def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:
     """Return stiffness and memory on the modes of the interface.
 
-    On a plane the share of mode II in a wave vector is a = (kx/k)², the share of mode III b = 1 - a
-    (P. Geubelle and J. Rice, 1995). K and the memory (G k/2)[a C_II + b C_III] * V have these
-    shares.
+    On a plane a wave vector has the share a = (kx/k)² of mode II and b = 1 - a of mode III
+    (P. Geubelle and J. Rice, 1995), in K and in the memory (G k/2)[a C_II + b C_III] * V.
     """
     solid, interface = problem.solid, problem.interface
     k, share = interface.wavenumbers, interface.in_plane_share

@@ -181,7 +181,7 @@ class EventRecord:
         }
 
     def dataset(self, method: Any, stopped: str) -> xr.Dataset:
-        """Return the frames and pictures as a dataset."""
+        """Return the frames of the event and the pictures of the block as a dataset."""
         problem, interface = self.problem, self.problem.interface
         arrival = self.event.waves.arrival
         reached = bool(np.isfinite(arrival).any())

@@ -192,9 +192,9 @@ def _move_platen(mesh: Mesh, waves: Waves, force: Any) -> None:
 
 @jit_inside
 def _move_pusher(mesh: Mesh, waves: Waves, gains: Array) -> None:
-    """Step 4: let the pusher act on the block, behind its spring, or hold it.
+    """Step 4: move the pusher behind its spring, or hold it, and apply its force to the block.
 
-    The force F of the pusher changes its speed from v to v + g F, with the mobility g of the pushed
+    The force F changes the speed of the pusher from v to v + g F, with the mobility g of the pushed
     nodes.
     """
     now, step, last = waves.now, mesh.step, waves.u.shape[1] - 1

@@ -253,10 +253,11 @@ def _write_direction(
 def _step_with_true_pieces(
     state: SlipState, load: float, true_pieces: Workspace, n_slipping: int, tolerance: float
 ) -> Outcome:
-    """Step 2. `true_pieces` is the workspace with the factor of A = K - diag(W).
+    """Step 2: move slip with the true pieces, and return the outcome.
 
-    Returns ARRESTED if the step ends at the solution of the linear problem, SLIDING if nothing
-    bounds it, else UNDECIDED.
+    `true_pieces` is the workspace with the factor of A = K - diag(W). The outcome is ARRESTED if
+    the step ends at the solution of the linear problem, SLIDING if the step is unbounded, otherwise
+    UNDECIDED.
     """
     sample, slip, Kd, workspace, may_stop = state
     overload = workspace.rhs
