@@ -13,7 +13,7 @@ from scipy.special import ndtr
 import stiction as st
 from reproduction import PARAMETERS, TEXTS, setting
 from reproduction import numbers_with_errors as estimates
-from reproduction.modulus import odds, reading  # noqa: F401
+from reproduction.modulus import at, odds, reading  # noqa: F401
 from reproduction.numbers_with_errors import Number, lower_spread, mean, share
 from reproduction.runner import Data, LeftOut
 from reproduction.setting import FIRST, HIGH, LAST, LOW, MEAN, RATIOS, SIMULATED, H
@@ -79,6 +79,13 @@ def from_normal(d: Data, ratio: float) -> Number:
         NORMAL
     )
     return max(gaps, key=lambda gap: gap.value) / float(np.abs(strength_gaps).max())
+
+
+def if_skewed_low(number):
+    """Return a number, which is left out if the strength is not skewed to low values."""
+    if POINT_SKEWNESS < 0.1:
+        raise LeftOut("skewness")
+    return number
 
 
 def ties(d: Data, ratio: float, gap: float) -> Number:

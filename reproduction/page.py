@@ -17,7 +17,7 @@ from markupsafe import Markup, escape
 from reproduction import PARAMETERS, TEXTS, modulus
 from reproduction.claims import GROUPS, JINJA, NAMES, judge
 from reproduction.numbers_with_errors import rounded, short
-from reproduction.rules import Verdict
+from reproduction.rules import Verdict, below
 from reproduction.runner import Data, LeftOut
 
 _NAME = re.compile(r"\b(xi|tau|h|d|x|v|G|c|L)_(\w+(?:,\w+)?)")
@@ -61,7 +61,13 @@ def write(path: Path, data: Data, groups, images, runner, warned, *, done: bool)
     environment = jinja2.Environment(autoescape=True, trim_blocks=True)
     JINJA.filters |= {"number": rounded, "short": short}
     environment.filters |= JINJA.filters | {"physics": physics}
-    known = NAMES | {"d": data, "own": PARAMETERS, "outcome": functools.partial(outcome, data)}
+    known = NAMES | {
+        "d": data,
+        "own": PARAMETERS,
+        "OUTCOMES": OUTCOMES,
+        "below": below,
+        "outcome": functools.partial(outcome, data),
+    }
 
     def filled(text: str) -> str:
         """Return a text with its numbers, or nothing if one of its studies is left out."""

@@ -54,7 +54,7 @@ def figure_9(d: Data):
     top.text((RATIOS[0] * RATIOS[-1]) ** 0.5, 0.95, "Figures 5 and 6", ha="center", color=GREY,
              transform=top.get_xaxis_transform())  # fmt: skip
     bottom.set(yscale="log", xlabel=XI, ylabel="spread (kPa)")
-    common.plain_ticks(bottom.yaxis, (5, 10, 20, 50, 100))
+    common.log_ticks(bottom.yaxis)
     common.plain_ticks(bottom.xaxis, (1 / 64, 1 / 16, 0.25, 1, 4, 16),
                        ["1/64", "1/16", "1/4", "1", "4", "16"])  # fmt: skip
     bottom.legend(loc="upper left")
@@ -82,14 +82,14 @@ def figure_10(d: Data):
     lowering.loglog(study["distance"], study["lowering"] * 100, "-o", color=COLOURS[0], ms=4)
     lowering.set(xlabel=r"distance of two dips over $h_\mathrm{n}$", ylabel="onset lowered (%)")
     common.plain_ticks(lowering.xaxis, (1.25, 2, 3, 5, 8))
-    common.plain_ticks(lowering.yaxis, (0.03, 0.1, 0.3, 1))
+    common.log_ticks(lowering.yaxis)
     common.letters(number, single, lowering)
     return figure
 
 
 def figure_11(d: Data):
     """Draw the energy balance of a growing rupture, and the share of arrested ones."""
-    figure = common.new(5.6)
+    figure = common.new(6.0)
     top, bottom = figure.subplots(2, 1, height_ratios=(1.2, 1.0))
     drops = {
         ratio: d.stress(ratio, "exact").mean() - setting.residual(MEAN) for ratio in RATIOS
@@ -97,7 +97,9 @@ def figure_11(d: Data):
     unit = math.pi * 0.5 * H / (2 * setting.G_STAR) / largest_energy()
     length = np.linspace(0, 1.5 / (unit * max(drops.values()) ** 2), 100)
     for ratio, drop in drops.items():
-        top.plot(length, unit * length * drop**2, **common.line(ratio), label=f"{ratio:g}")
+        top.plot(
+            length, unit * length * drop**2, **common.line(ratio), label=f"{XI} = {ratio:g}"
+        )
     top.axhline(1, color=RED, lw=1)
     top.text(
         0.02 * length[-1], 1.03, r"largest fracture energy $\Gamma_\mathrm{max}$", color=RED
@@ -114,7 +116,7 @@ def figure_11(d: Data):
         top.plot(place, y + 0 * place, marker, color=DARK, ms=5, mfc="none", label=text)
     top.set(xlabel=r"length of the rupture over $h_\mathrm{n}$", xlim=(0, length[-1]),
             ylim=(0, 1.6), ylabel=r"$G/\Gamma_\mathrm{max}$")  # fmt: skip
-    top.legend(loc="lower right", title=XI)
+    top.legend(loc="lower center", bbox_to_anchor=(0.5, 1.09), ncols=3)
     for function, shift, colour, marker, text in (
         (arrested, 0.0, COLOURS[0], "o", "without inertia"),
         (with_inertia, 0.1, RED, "D", "with inertia (drawn beside)"),

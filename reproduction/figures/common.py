@@ -2,6 +2,7 @@
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator
 
 from reproduction.setting import HIGH, LOW, MAX_RATIOS, MEAN, RATIOS
 
@@ -74,6 +75,13 @@ def plain_ticks(axis, places, labels=None) -> None:
     """Put ticks at these places only, with plain labels."""
     axis.set_ticks(places, labels or [f"{place:g}" for place in places])
     axis.set_ticks([], minor=True)
+
+
+def log_ticks(axis) -> None:
+    """Put plain labels at 1, 2 and 5 of each decade."""
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_locator(NullLocator())
 
 
 def ratio_axis(axes) -> None:
