@@ -1,4 +1,17 @@
-"""Samples computed in batches, by threads or any executor: the same numbers from each."""
+"""Samples computed in batches by threads or any executor, with the same numbers from each.
+
+Problem. Solve spans of samples on workers that come and go, in bounded memory, so that results do
+not depend on the workers.
+
+Steps:
+
+1. While a worker is free, cut a piece off the first waiting span: about half a second of work at
+   the pace of the latest piece (`piece_size`).
+2. Submit the piece. An executor that runs it at once returns a finished future. Hand its table over
+   before the next piece begins.
+3. Wait for the first futures, at most a second, because workers come and go.
+4. Yield each table, and take its pace.
+"""
 
 import os
 import time
@@ -31,13 +44,13 @@ from stiction.random.synthesis import SAMPLES_PER_BLOCK, block_of
 
 POINT: str = "_point"
 NUMBER: str = "_sample"
-"""Names of the columns that hold the numbers of the point and of the sample."""
+"""Names of the columns with the numbers of the point and of the sample."""
 PIECE_SECONDS = 0.5
 """Duration of a piece of work."""
 MAX_PIECE_BYTES = 16 * 2**20
 """Largest size of the values of a piece of work."""
 WORKER_COUNT_SECONDS = 1.0
-"""Seconds between counts of the workers; on Windows nothing interrupts a longer wait."""
+"""Seconds between counts of the workers. A longer wait cannot be interrupted on Windows."""
 
 
 class Span(NamedTuple):
@@ -51,15 +64,15 @@ class Span(NamedTuple):
 class Failure(NamedTuple):
     """A sample that could not be solved."""
 
-    point: int  # of a sweep; 0 without one
+    point: int  # of a sweep, or 0
     sample: int
     seed: int
-    error: str  # the message of the solver
-    input: bool = False  # an `InputError`: the sample does not fit the method or the grid
+    error: str  # message of the solver
+    input: bool = False  # whether the sample does not fit the method or the grid (`InputError`)
 
     @property
     def name(self) -> str:
-        """What failed, such as 'sample 3 of point 2 (seed 5)'."""
+        """Name of the sample, such as 'sample 3 of point 2 (seed 5)'."""
         where = f" of point {self.point}" if self.point else ""
         return f"sample {self.sample}{where} (seed {self.seed})"
 
@@ -70,14 +83,14 @@ class Failure(NamedTuple):
 class Table(NamedTuple):
     """Samples of any points of a sweep, and the failures among them.
 
-    A sample that was solved is a row of `POINT`, `NUMBER` and the variables of the method.
+    A solved sample is a row of `POINT`, `NUMBER` and the variables of the method.
     """
 
     rows: NDArray[Any]
     failures: tuple[Failure, ...]
     seconds: float  # of one core
-    versions: str  # of the packages that computed them
-    warned: tuple[Warned, ...] = ()  # which a store does not keep
+    versions: str  # of the packages that computed the samples
+    warned: tuple[Warned, ...] = ()  # not stored
 
 
 def _rows(point: int, first: int, values: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
@@ -99,7 +112,7 @@ def usable_cores() -> int:
 
 
 def in_threads(function: Callable[[Any], Any], jobs: Sequence[Any], workers: int) -> list[Any]:
-    """Return results for all jobs; warnings come once, at the caller's line."""
+    """Return results for all jobs. Warnings are issued once, at the line of the caller."""
     with merge_warnings() as caught, ThreadPoolExecutor(workers) as pool:
         contexts = [copy_context() for _ in jobs]
         results = list(pool.map(Context.run, contexts, repeat(function), jobs))
@@ -114,7 +127,7 @@ def versions() -> str:
 
 
 def solve_span(experiment: Experiment, span: Span) -> Table:
-    """Solve a span of samples; a sample that fails does not stop the others."""
+    """Solve a span of samples. A sample that fails does not stop the others."""
     begin = time.perf_counter()
     parts: list[NDArray[Any]] = []
     failures: list[Failure] = []
@@ -123,7 +136,7 @@ def solve_span(experiment: Experiment, span: Span) -> Table:
     while waiting:
         first, count = waiting.popleft()
         try:
-            # The number of BLAS threads changes last bits.
+            # The number of BLAS threads changes the last bits.
             with one_blas_thread(), collect_warnings() as caught:
                 parts.append(_rows(span.point, first, experiment.results(first, count)))
         except Exception as error:
@@ -143,24 +156,22 @@ def solve_span(experiment: Experiment, span: Span) -> Table:
 def piece_size(
     experiment: Experiment, span: Span, pace: float | None, left: int, workers: int
 ) -> int:
-    """Return how many samples go into the next piece of work, at a pace in s a sample."""
+    """Return the number of samples of the next piece, at a pace in s per sample."""
     block = block_of(len(experiment.problem.interface.shape))
-    size = (
-        int(PIECE_SECONDS / max(pace, 1e-9))
-        if pace
-        else min(experiment.batch, SAMPLES_PER_BLOCK)
-    )
-    # A fair share of what is left, but at least a block, which is drawn as a whole.
+    size = min(experiment.batch, SAMPLES_PER_BLOCK)
+    if pace:
+        size = int(PIECE_SECONDS / max(pace, 1e-9))
+    # A fair share of the remaining samples, but at least a block, which is drawn as a whole.
     size = min(size, max(-(-left // (2 * workers)), block))
     size = max(1, min(size, int(MAX_PIECE_BYTES / experiment.sample_bytes), span.samples))
     end = span.first + size
-    if size > block and size < span.samples:  # draws come in blocks: do not cut one in two
+    if size > block and size < span.samples:  # do not cut a block of draws in two
         end -= end % block
     return end - span.first
 
 
 def _workers_of(executor: Executor, workers: int) -> int:
-    """Return the present number of workers of an executor: those of Dask come and go."""
+    """Return the present number of workers of an executor. Workers of Dask come and go."""
     client = getattr(executor, "_client", None)
     if client is not None:
         return max(1, sum(client.nthreads().values()))
@@ -168,10 +179,10 @@ def _workers_of(executor: Executor, workers: int) -> int:
 
 
 class SerialExecutor(Executor):
-    """Runs what is submitted at once, in the thread that submits it."""
+    """An executor that runs each call at once, in the same thread."""
 
     def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Return the result, as a future that is done."""
+        """Return the result as a finished future."""
         future: Future[Any] = Future()
         future.set_result(fn(*args, **kwargs))
         return future
@@ -185,22 +196,15 @@ def solve_spans(
     executor: Executor | None = None,
     workers: int = 1,
 ) -> Generator[tuple[Span, Table], None, None]:
-    """Solve spans of items, and yield pieces of them with their tables as they are done.
+    """Solve spans of items, and yield pieces of them with their tables (steps 1 to 4).
 
-    At most two pieces of work a worker are under way, so that memory stays bounded. Closing
-    the generator cancels what has not begun. A worker that is lost, or has other versions,
-    is a `WorkerError`. Only experiments can have spans of more than one item. Steps:
-
-    1. While a worker is free, cut a piece off the first waiting span, about half a second of work
-       at the pace of the latest piece (`piece_size`).
-    2. Submit it. An executor that runs it at once returns a future that is done: hand its table
-       over before the next piece begins.
-    3. Wait for the first futures, at most a second, as workers come and go.
-    4. Yield each table, and take its pace.
+    At most two pieces per worker are under way, so that memory stays bounded. Closing the generator
+    cancels the pieces that have not begun. A worker that is lost or has other versions raises a
+    `WorkerError`. Only experiments can have spans of more than one item.
     """
     waiting = deque(spans)
     left = sum(span.samples for span in spans)
-    pace: float | None = None  # of the latest piece, in s a sample
+    pace: float | None = None  # of the latest piece, in s per sample
     running: dict[Future[Table], Span] = {}
     with ExitStack() as stack:
         stack.enter_context(one_blas_thread())
@@ -240,6 +244,7 @@ def solve_spans(
 
 
 def _result(future: Future[Table], span: Span) -> Table:
+    """Return the table of a finished piece."""
     try:
         table = future.result()
     except InputError:
@@ -252,14 +257,14 @@ def _result(future: Future[Table], span: Span) -> Table:
         ) from error
     if table.versions != versions():
         raise WorkerError(
-            f"a worker has {table.versions}, the run has {versions()}; install the same versions"
+            f"a worker has {table.versions}, the run has {versions()}. Install the same versions"
             " there, or end that worker"
         )
     return table
 
 
 def spans_of(missing: NDArray[np.bool_], first: int) -> list[Span]:
-    """Return the stretches of samples that are missing, (points, samples)."""
+    """Return the spans of missing samples, (points, samples)."""
     spans = []
     for point, row in enumerate(missing):
         edges = np.flatnonzero(np.diff(row, prepend=False, append=False)).reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""Tables of samples, in any order, gathered to one dataset over sweep, sample and x."""
+"""Tables of samples in any order, gathered into one dataset over sweep, sample and x."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 Coordinates: TypeAlias = dict[str, tuple[NDArray[Any], Variable]]
 """Values and variables of coordinates by name."""
 GridAxes: TypeAlias = Mapping[str, Coordinates]
-"""Coordinates of each dimension of a sweep, that of its name first."""
+"""Coordinates of each dimension of a sweep, first the one with the name of the dimension."""
 
 
 def distinct(points: Sequence[Experiment], *parts: str) -> list[Experiment]:
-    """Return one of the experiments for each combination of these parts."""
+    """Return one experiment for each combination of these parts."""
     first: dict[Any, Experiment] = {}
     for point in points:
         first.setdefault(tuple(id(getattr(point, part)) for part in parts), point)
@@ -44,30 +44,27 @@ def over_axes(
 ) -> tuple[dict[str, NDArray[Any]], dict[str, Variable], Coordinates]:
     """Return values of all points, (points, ...), over the axes of a sweep instead."""
     dims, shape = tuple(axes), tuple(len(axes[dim][dim][0]) for dim in axes)
-    return (
-        {name: array.reshape(shape + array.shape[1:]) for name, array in values.items()},
-        {
-            name: replace(variable, dims=dims + variable.dims)
-            for name, variable in variables.items()
-        },
-        {
-            name: variable
-            for coordinates in axes.values()
-            for name, variable in coordinates.items()
-        },
-    )
+    arrays = {name: array.reshape(shape + array.shape[1:]) for name, array in values.items()}
+    swept = {
+        name: replace(variable, dims=dims + variable.dims)
+        for name, variable in variables.items()
+    }
+    coordinates: Coordinates = {}
+    for of_dimension in axes.values():
+        coordinates |= of_dimension
+    return arrays, swept, coordinates
 
 
 def within(numbers: NDArray[Any], ends: Any) -> bool:
-    """Whether whole numbers lie from 0 to below their ends."""
+    """Return whether whole numbers lie from 0 to below their ends."""
     return bool(np.all((numbers >= 0) & (numbers < ends)))
 
 
 class Gathered:
     """The results of all samples of one or several experiments, in memory.
 
-    `only` names the variables that are gathered. `done`, of shape (points, samples),
-    marks the samples that are there.
+    `only` names the variables to gather. `done`, (points, samples), marks the samples that are
+    there.
     """
 
     def __init__(
@@ -82,23 +79,22 @@ class Gathered:
         self.points, self.first, self._only = points, ensemble.first, only
         self.done = np.zeros((len(points), ensemble.samples), dtype=np.bool_)
         self._failures: dict[tuple[int, int], Failure] = {}
-        self._arrays: dict[str, NDArray[Any]] = {}  # floats, NaN where nothing is
+        self._arrays: dict[str, NDArray[Any]] = {}  # floats, NaN without a value
         self._types: dict[str, np.dtype[Any]] = {}
 
     def misfit(self, table: Table) -> str:
-        """Return why a table cannot hold samples of these points; '' if it can."""
-        failed = np.array([failure[:2] for failure in table.failures], dtype=object).reshape(
-            -1, 2
-        )
+        """Return why a table cannot contain samples of these points, or '' if it can."""
+        pairs = [failure[:2] for failure in table.failures]
+        failed = np.array(pairs, dtype=object).reshape(-1, 2)
         for points, samples in ((table.rows[POINT], table.rows[NUMBER]), failed.T):
             if not within(points, len(self.points)) or np.any(samples < self.first):
-                return "a point or a sample is none of the study"
+                return "a point or a sample is not in the study"
         variables, interface = variables_in(self.points), self.points[0].problem.interface
         sizes = dict(zip(interface.dims, interface.shape, strict=True))
         sizes[DIRECTION] = len(interface.dims)
         for name in {*(table.rows.dtype.names or ())} - {POINT, NUMBER}:
             if name not in variables:
-                return f"{describe(name)} is no variable of the study"
+                return f"{describe(name)} is not a variable of the study"
             dims, shape = variables[name].dims[1:], table.rows.dtype[name].shape
             known = [sizes.get(dim, size) for dim, size in zip(dims, shape, strict=False)]
             if len(shape) != len(dims) or [*shape] != known:
@@ -106,7 +102,7 @@ class Gathered:
         return ""
 
     def add(self, table: Table) -> None:
-        """Put the rows of a table in their places; those of other samples are left out."""
+        """Put the rows of a table in their places, and leave out other samples."""
         for failure in table.failures:
             if failure.sample - self.first < self.done.shape[1]:
                 self._failures[failure.point, failure.sample - self.first] = failure
@@ -124,7 +120,7 @@ class Gathered:
 
     @property
     def failed(self) -> list[Failure]:
-        """Samples that failed and are not there, in the order of points and samples."""
+        """Failed samples that are missing, in the order of points and samples."""
         return [self._failures[at] for at in sorted(self._failures) if not self.done[at]]
 
     def dataset(
@@ -132,7 +128,7 @@ class Gathered:
     ) -> xr.Dataset:
         """Return a dataset over the axes of a sweep, the samples and the nodes.
 
-        What is missing is NaN; attributes 'failed_samples' and 'cut_short' give the cause.
+        Missing values are NaN. The attributes 'failed_samples' and 'cut_short' give the cause.
         """
         variables, values = variables_in(self.points), {}
         for name in variables:

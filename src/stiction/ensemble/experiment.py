@@ -1,4 +1,4 @@
-"""An experiment: a problem, what is random in it, and the method that finds its onset."""
+"""An experiment: a problem, its random properties, and the method that computes its onset."""
 
 from __future__ import annotations
 
@@ -40,21 +40,21 @@ from stiction.random.stresses import (
 )
 
 MOST_NUMBERS = 1 << 20
-"""Nodes, and draws, of samples of planes solved at once: 8 MiB for each profile."""
+"""Most nodes or draws of the samples of a plane that are solved at once: 8 MiB per profile."""
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """A problem, what is random in it, and a method, checked together once.
+    """A problem, its random properties and a method, checked together once.
 
-    Sample i follows from the experiment and i alone, whatever the batches. An `InputError`
-    lists everything that does not fit.
+    Sample i follows from the experiment and i alone, in any batch. An `InputError` lists all
+    mistakes.
     """
 
     problem: Problem
-    random: Any  # a RandomInterface or EquallyLikely, or what becomes one
+    random: Any  # a RandomInterface or EquallyLikely, or an object that becomes one
     method: Any
-    keep: Sequence[str] = ()  # names of random fields that `results` holds
+    keep: Sequence[str] = ()  # names of random fields that `results` contains
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -89,14 +89,14 @@ class Experiment:
         return dataclasses.replace(self, method=method)
 
     def with_seed(self, seed: int) -> Experiment:
-        """Return the same experiment with another seed; nothing is checked again."""
+        """Return the same experiment with another seed, without new checks."""
         copied = copy.copy(self)
         object.__setattr__(copied, "seed", seed)
         return copied
 
     @property
     def given(self) -> Any:
-        """What is random: one interface, or a list of equally likely ones."""
+        """The random interface, or the list of equally likely ones."""
         members = self.random.members
         return list(members) if len(members) > 1 else members[0]
 
@@ -107,7 +107,7 @@ class Experiment:
 
     @property
     def variables(self) -> dict[str, Variable]:
-        """Variables of `results`, by name."""
+        """Variables of `results` by name."""
         interface, pressed = self.problem.interface, "normal_pressure" in self.random.varying
         kept = {name: along(interface, PROFILES[name]) for name in self.keep}
         return variables_of(self.problem, self.method, pressed) | kept
@@ -120,27 +120,25 @@ class Experiment:
 
     @property
     def seconds(self) -> float:
-        """About how long the method takes for a sample on one core, s."""
+        """Approximate time of a sample on one core, s."""
         return seconds_per_sample(self.problem, self.method)
 
     @property
     def pressure(self) -> float:
-        """Mean normal pressure, Pa; NaN if there is none."""
+        """Mean normal pressure, Pa, or NaN without a pressure."""
+        members = self.random.members
         if "normal_pressure" in self.random.names:
-            pressures = [
-                member.properties["normal_pressure"].mean for member in self.random.members
-            ]
-            return float(np.mean(pressures))
+            return float(np.mean([one.properties["normal_pressure"].mean for one in members]))
         given = self.problem.given_pressure
         return float("nan") if given is None else float(np.mean(given))
 
     @property
     def mean_strength(self) -> float:
         """Mean strength, Pa."""
-        strengths = [
-            mean_in_stress(self.problem, member, "strength") for member in self.random.members
-        ]
-        return float(np.mean(strengths))
+        members = self.random.members
+        return float(
+            np.mean([mean_in_stress(self.problem, one, "strength") for one in members])
+        )
 
     def check_fields(self) -> None:
         """Warn of fields that do not suit the grid, the interface, or their units."""
@@ -150,7 +148,7 @@ class Experiment:
                 if not field.modes(self.problem.interface).ranks.size:
                     warn_user(
                         f"{name}: its correlation length is so long for this interface that each"
-                        " sample is uniform; check its unit, and give scatter between specimens"
+                        " sample is uniform. Check its unit, and give scatter between specimens"
                         " as between= of st.RandomInterface",
                         UnitWarning,
                     )
@@ -177,9 +175,9 @@ class Experiment:
         return dict(self.prepare()(self.sample(profiles)))
 
     def sample(self, profiles: Mapping[str, Array]) -> Sample:
-        """Return profiles by name as a sample, which an `InputError` refuses if it does not fit.
+        """Return profiles by name as a sample, or raise an `InputError` if it does not fit.
 
-        `check_fields` has looked at the resolution and at nodes that do not weaken.
+        `check_fields` has checked the resolution and nodes that do not weaken.
         """
         return self.problem.own_sample(profiles, optional_member(self.method, "accepts"))
 
@@ -200,17 +198,14 @@ class Experiment:
             parts.append((profiles, experiment.onset(profiles)))
             order.append(rows)
         places = np.argsort(np.concatenate(order))
-        combined = [
-            {
-                name: np.concatenate([one[k][name] for one in parts])[places]
-                for name in parts[0][k]
-            }
-            for k in (0, 1)
-        ]
-        return combined[0], combined[1]
+        profiles, values = (
+            {name: np.concatenate([g[name] for g in groups])[places] for name in groups[0]}
+            for groups in zip(*parts, strict=True)
+        )
+        return profiles, values
 
     def prepare(self) -> Solver:
-        """Return the prepared solver of the method, which is kept for the next call."""
+        """Return the prepared solver of the method. The next call uses it again."""
         return _solver(self.problem, self.method)
 
     def results(self, first: int, count: int) -> Values:
@@ -220,15 +215,15 @@ class Experiment:
 
     @property
     def batch(self) -> int:
-        """Number of samples to solve at once: by the method, on planes by memory."""
+        """Number of samples to solve at once, by the method, and on planes by memory."""
         interface, size = self.problem.interface, batch_size(self.problem, self.method)
-        if not interface.is_plane:  # a part of a block of draws costs as much as all
+        if not interface.is_plane:  # a part of a block of draws costs as much as the block
             return size
         # A rough field has hundreds of draws for each node.
         return min(size, max(1, MOST_NUMBERS // max(interface.size, self.dimension)))
 
     def batches(self, first: int, count: int, size: int = 0) -> Iterator[tuple[int, int]]:
-        """Cut samples from `first` on into (first, count), at multiples of a size."""
+        """Cut samples from `first` on into (first, count) at multiples of a size."""
         size, end = size or self.batch, first + count
         edges = chain((first,), range(first - first % size + size, end, size), (end,))
         return ((start, stop - start) for start, stop in pairwise(edges))
@@ -250,7 +245,7 @@ class Ensemble:
     first : int
         Number of the first sample.
     keep : str or tuple of str
-        Random fields, such as ``"strength"``, whose profiles are kept. Options of the method add
+        Random fields whose profiles are kept, such as ``"strength"``. Options of the method keep
         others, such as ``slip=True`` of `Equilibrium`.
 
     Examples

@@ -1,4 +1,5 @@
-"""The limit state: the stress at which an interface slides, of standard normal draws."""
+"""The limit state: the stress at which an interface slides as a function of standard normal
+draws."""
 
 import math
 from dataclasses import dataclass, replace
@@ -25,34 +26,35 @@ from stiction.random.fields import RandomInterface
 from stiction.random.stresses import support_in_stress
 
 StressName = Literal["critical_stress", "first_instability"]
-"""Which of the stresses of a method counts as failure."""
+"""Stress of a method that counts as failure."""
 
 MAX_RANKED, RANKINGS, LOW_QUANTILE_SIGMAS = 32, 4_000, 3.0
-"""Samples of each of equally likely interfaces, at most, and of all, about, that order them by the
-mean less so many standard deviations."""
+"""Most samples of each interface, and about the number of all samples, by which interfaces are
+ordered, and the standard deviations below the mean that are compared."""
 MAX_FACTORS = 8
-"""Random factors of the strength at a node, at most, that share what is negligible."""
+"""Most random factors of the strength at a node, which share a negligible probability."""
 MIN_THREAD_SECONDS = 2e-3
 """Seconds of work that justify a thread."""
 
 
 @dataclass(frozen=True, eq=False)
 class LimitState:
-    """Stress at onset as a function of draws; see `stiction.external.limit_state`.
+    """Stress at onset as a function of draws, see `stiction.external.limit_state`.
 
-    Stresses may be taken per normal pressure: where that is random, each is multiplied by
-    the mean pressure over that of its sample, so that one number stands for a coefficient.
+    Stresses may be taken per normal pressure. If the pressure is random, each stress is multiplied
+    by the mean pressure over the pressure of its sample, so that one number stands for a friction
+    coefficient.
     """
 
     experiment: Experiment
-    event: StressName = "critical_stress"  # which of the method's stresses
+    event: StressName = "critical_stress"
     per_pressure: bool = False
-    workers: int = 1  # threads; the numbers do not depend on this
+    workers: int = 1  # threads, on which results do not depend
     meter: Meter = SILENT  # counts the samples
 
     def __repr__(self) -> str:
-        what = f"{self.event} by {self.experiment.method.label}"
-        return f"LimitState({what}, of {self.dimension} draws)"
+        text = f"{self.event} by {self.experiment.method.label}"
+        return f"LimitState({text}, of {self.dimension} draws)"
 
     @property
     def dimension(self) -> int:
@@ -73,7 +75,7 @@ class LimitState:
         return self.experiment.with_seed(seed).draws(first, samples)
 
     def member(self, draws: Array) -> NDArray[np.int64]:
-        """Return which of equally likely interfaces each sample is of, (samples,)."""
+        """Return the number of the equally likely interface of each sample, (samples,)."""
         members: NDArray[np.int64] = self.experiment.random.member(draws)
         return members
 
@@ -84,12 +86,12 @@ class LimitState:
     def __call__(self, draws: Array) -> Array:
         """Return the stress at onset, Pa, of draws (samples, dimension) or (dimension,).
 
-        Infinite where the event does not happen: such a sample survives any stress.
+        It is infinite if the event does not happen, because such a sample survives any stress.
         """
         given, experiment = check("draws", draws, Numbers), self.experiment
         if given.ndim not in (1, 2) or given.shape[-1] != self.dimension:
             raise InputError(
-                f"draws: must have shape (samples, {self.dimension}), got {describe(given)}"
+                f"draws: must have shape (samples, {self.dimension}). Got {describe(given)}"
             )
         if not np.isfinite(given).all():
             raise InputError("draws: must be finite")
@@ -103,8 +105,8 @@ class LimitState:
             stress = np.concatenate(in_threads(self._stress, parts, self.workers))
         if np.any(stress == -np.inf):
             raise InputError(
-                f"method: {experiment.method.label} returned an onset at minus infinity; it must"
-                " return a stress, Pa, or NaN where the event does not happen"
+                f"method: {experiment.method.label} returned an onset at minus infinity. It must"
+                " return a stress, Pa, or NaN if the event does not happen"
             )
         stress = np.where(np.isnan(stress), np.inf, stress)
         stress = np.maximum(stress, self.bounds[0])  # rounding may be slightly below
@@ -126,35 +128,40 @@ class LimitState:
 
     @property
     def is_sample(self) -> bool:
-        """Whether these interfaces are a sample of those that may be true."""
+        """Whether these interfaces are a sample of all interfaces that may be true."""
         return self.several and not self.experiment.random.complete
 
     @property
     def may_survive(self) -> bool:
-        """Whether slip before the event lowers the stress: it need not happen at all."""
+        """Whether slip before the event lowers the stress, so that the event need not happen."""
         return self.experiment.problem.has_machine and self.event == "first_instability"
 
     @cached_property
     def bounds(self) -> tuple[float, float]:
-        """Stresses below and above which no sample slides, Pa; infinite where unknown."""
+        """Stresses below and above which no sample slides, Pa. Infinite if unknown."""
         return self.likely_bounds(0.0)
 
     def likely_bounds(self, negligible: float) -> tuple[float, float]:
-        """Return the same for all samples but a share that is negligible."""
+        """Return bounds for all samples but a negligible share."""
         lows, highs = zip(*self.bounds_of_members(negligible), strict=True)
         return min(lows), max(highs)
 
     def bounds_of_members(self, negligible: float = 0.0) -> list[tuple[float, float]]:
-        """Return the same for each of equally likely interfaces."""
+        """Return bounds for each of the equally likely interfaces."""
         members = self.experiment.random.members
         if getattr(self.experiment.random, "constants", ()):  # they move the bounds
             return [(-math.inf, math.inf)] * len(members)
         return [self._bounds_of(member, negligible) for member in members]
 
     def _bounds_of(self, random: RandomInterface, negligible: float) -> tuple[float, float]:
+        """Return bounds for one interface.
+
+        With p the load profile, tau_p the strength and tau_0 the initial stress, the first node
+        fails at the load min((tau_p - tau_0)/p). The lower bound is its mean stress.
+        """
         problem = self.experiment.problem
         if any(field.conditions is not None for field in random.properties.values()):
-            negligible = 0.0  # what was measured may be rarer
+            negligible = 0.0  # measured values may be rarer
         chance = negligible / (MAX_FACTORS * problem.interface.size)
         low, high = support_in_stress(problem, random, "strength", chance)
         profile = np.broadcast_to(problem.load_profile, problem.interface.shape)
@@ -162,7 +169,7 @@ class LimitState:
         most: Any = least
         if "initial_stress" in random.varying:
             least, most = support_in_stress(problem, random, "initial_stress", chance)
-        # The mean of a random initial stress is random itself: take its lowest.
+        # The mean of a random initial stress is random itself. Take its lowest value.
         initial = np.mean(np.broadcast_to(least, profile.shape))
         low = float(initial + np.min((low - most) / profile) * np.mean(profile))
         if self._random_pressure:
@@ -176,10 +183,11 @@ class LimitState:
 
 
 def weakest_first(state: LimitState) -> LimitState:
-    """Return the same limit state with equally likely interfaces in order, weakest first.
+    """Return the same limit state with equally likely interfaces in order, the weakest first.
 
-    Neighbours are then alike, and a chain that goes down moves from one to the next. Their
-    order is that of a low quantile of the same few samples of each, by the first stage if apt.
+    Neighbours are then alike, and a chain that goes down moves from one to the next. The order
+    follows a low quantile of the same few samples of each interface, by the first stage if it
+    applies.
     """
     experiment, random = state.experiment, state.experiment.random
     count = len(random.members)
@@ -200,7 +208,7 @@ def weakest_first(state: LimitState) -> LimitState:
 
 
 def scales_with_strength(problem: Any, random: Any, method: Any) -> bool:
-    """Return whether the onset is in proportion to the strength, see `inference.scaling`."""
+    """Return whether the onset is proportional to the strength, see `inference.scaling`."""
     friction, initial = problem.friction, np.asarray(problem.load.initial_stress)
     scaling = optional_member(method, "scaling")
     zero = scaling == "stretch"  # neither residual strength nor initial stress scales
@@ -215,7 +223,7 @@ def scales_with_strength(problem: Any, random: Any, method: Any) -> bool:
 
 
 def no_single_length(problem: Problem, random: Any) -> str | None:
-    """Return the reason why the local criterion does not hold, or None if it does."""
+    """Return the reason why the local criterion does not hold, or None."""
     rate = problem.uniform_rate
     if not problem.friction.linear:
         return "strength does not fall linearly with slip"
@@ -242,7 +250,7 @@ def limit_state(
 ) -> LimitState:
     """Return the stress at onset as a function of standard normal draws.
 
-    It serves external reliability codes. Failure below a stress s is ``limit_state(draws) < s``.
+    External reliability codes can call it. Failure below a stress s is ``limit_state(draws) < s``.
 
     Parameters
     ----------
@@ -256,12 +264,12 @@ def limit_state(
     LimitState
         A callable that maps independent standard normal draws, of shape (samples,
         `dimension`), to stresses, Pa, of shape (samples,). `draws(seed, first, samples)`
-        returns the draws of `monte_carlo`, `profiles(draws)` their profiles.
+        returns the draws of `monte_carlo`, and `profiles(draws)` their profiles.
 
     Raises
     ------
     InputError
-        If any argument is invalid; the message lists every problem.
+        If any argument is invalid. The message lists every problem.
 
     Examples
     --------

@@ -41,28 +41,28 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MAX_SHOWN_FAILURES = 3
-"""Number of failures that are reported one by one."""
+"""Number of failures that a warning lists."""
 LONG_RUN_SECONDS = 3600.0
-"""Estimated seconds from which a run says so before it begins."""
+"""Estimated seconds above which a run says so before it begins."""
 MAX_FAILED_FROM_START = 16
-"""Failed items, with none solved, after which the whole run is given up."""
+"""Failed items after which a run without any solved item is given up."""
 
 
 def check_fields(points: Sequence[Experiment]) -> None:
-    """Warn of fields that do not suit the grid, the interface or their units, once each."""
+    """Warn once of each field that does not suit the grid, the interface or its unit."""
     with merge_warnings():
         for point in distinct(points, "random", "problem"):
             point.check_fields()
 
 
 def check_run(points: Sequence[Experiment]) -> None:
-    """Refuse, or warn of, what a run refuses or doubts before its first sample."""
+    """Check a run before its first sample: fields, and the preparation of the method."""
     check_fields(points)
-    points[0].prepare()  # here, not in a thread: it warns at the caller's line
+    points[0].prepare()  # in this thread, so that it warns at the line of the caller
 
 
 def _warn_if_long(points: Sequence[Experiment], missing: NDArray[Any], workers: int) -> None:
-    """Say how long an ensemble takes that takes hours, before it begins."""
+    """Warn of an ensemble that takes hours before it begins."""
     counts = missing.sum(axis=1)
     seconds = sum(p.seconds * n for p, n in zip(points, counts, strict=True)) / workers
     if seconds > LONG_RUN_SECONDS:
@@ -84,14 +84,14 @@ def complete(
     executor: Executor | None,
     workers: int,
 ) -> None:
-    """Compute spans of items; each table goes to memory and to the store as it is done.
+    """Compute spans of items, and hand each table to memory and to the store when it is done.
 
-    `items` takes tables (`add`), and knows what is `done`, (points, items). `solve` returns
-    the table of a span of a point. One warning stands for those of all tables.
+    `items` takes tables (`add`), and marks what is `done`, (points, items). `solve` returns
+    the table of a span of a point. Equal warnings of several tables are issued once.
     """
     lost, total = 0, sum(span.samples for span in spans)
     with ExitStack() as stack:
-        if store:  # also on Ctrl-C, and when workers are lost: what is done is kept
+        if store:  # keep finished samples also after Ctrl-C, or if workers are lost
             stack.callback(store.save)
         warned = stack.enter_context(merge_warnings())
         stack.enter_context(meter)
@@ -124,8 +124,8 @@ def gather(
 ) -> xr.Dataset:
     """Compute an ensemble at every point of a sweep, or the part of it that is not stored.
 
-    Samples go to the `store` as they are done; `elsewhere`, (points, samples), are those that
-    another job computes. For the rest see `monte_carlo`.
+    Samples go to the `store` when they are done. `elsewhere`, (points, samples), marks samples that
+    another job computes. See `monte_carlo` for the other arguments.
     """
     rows, cores = Gathered(points, ensemble), workers or usable_cores()
     if store:
@@ -137,20 +137,13 @@ def gather(
             _warn_if_long(points, missing, cores)
     label = " and ".join({point.method.label: None for point in distinct(points, "method")})
     complete(
-        rows,
-        points,
-        spans_of(missing, ensemble.first),
-        solve_span,
-        Meter(label, int(missing.sum()), progress),
-        store=store,
-        executor=executor,
-        workers=cores,
-    )
+        rows, points, spans_of(missing, ensemble.first), solve_span,
+        Meter(label, int(missing.sum()), progress), store=store, executor=executor, workers=cores,
+    )  # fmt: skip
     comparison = store.pilot if store else None
     if comparison is None and pilot:
-        comparison = compare(
-            points, ensemble.first, ensemble.samples, progress is True, workers
-        )
+        show = progress is True
+        comparison = compare(points, ensemble.first, ensemble.samples, show, workers)
         where = " at the worst point of the sweep" if len(points) > 1 else ""
         if text := pilot_doubt(points[0], comparison, where):
             warn_accuracy(text)
@@ -158,15 +151,12 @@ def gather(
             store.note_pilot(comparison)
     result = rows.dataset({**attributes, **(comparison or {})}, axes)
     if failed := rows.failed:
-        some = "; ".join(str(failure) for failure in failed[:MAX_SHOWN_FAILURES])
-        more = (
-            f"; and {len(failed) - MAX_SHOWN_FAILURES} more"
-            if len(failed) > MAX_SHOWN_FAILURES
-            else ""
-        )
+        some = " | ".join(str(failure) for failure in failed[:MAX_SHOWN_FAILURES])
+        if (hidden := len(failed) - MAX_SHOWN_FAILURES) > 0:
+            some += f" | and {hidden} more"
         warn_accuracy(
             f"{len(failed)} of {rows.done.size} samples could not be solved and are NaN (the"
-            f" attribute 'failed_samples' lists them): {some}{more}"
+            f" attribute 'failed_samples' lists them): {some}"
         )
     return result
 
@@ -188,45 +178,45 @@ def monte_carlo(
 ) -> xr.Dataset:
     """Compute the onset of many random interfaces.
 
-    Sample i depends on (seed, i) only: not on the number of samples, the workers or the executor.
+    Sample i depends on (seed, i) only, not on the number of samples, the workers or the executor.
 
     Parameters
     ----------
     problem : Problem
     random : RandomInterface, RandomField or list of them
-        The random properties; a field alone is the peak strength, Pa. Of a list, each is
+        The random properties. A field alone is the peak strength, Pa. The members of a list are
         equally likely, and every sample has one of them.
     method : LocalCriterion, Equilibrium or Rupture
     samples, seed, first, keep
-        As in `Ensemble`. For profiles of a few samples, repeat these: another call with the
-        same seed and fewer samples gives the same ones.
+        As in `Ensemble`. To see the profiles of a few samples, repeat them: a call with the same
+        seed and fewer samples gives the same samples.
     workers : int, optional
-        Threads; all cores by default. The compiled kernels release the interpreter lock.
+        Threads, by default all cores. The compiled kernels release the interpreter lock.
     executor : concurrent.futures.Executor, optional
         Any object with `submit` instead of threads, such as a process pool or a Dask executor.
     progress : bool or callable
-        True shows progress on standard error after a second; a callable gets (done, total).
+        True shows progress on standard error after a second. A callable gets (done, total).
     pilot : bool
-        With the local criterion, check the first samples (32 on a line, 8 on a plane), and the
-        weakest of the first thousand. Where a quick test leaves a doubt, they are also solved by
-        `Equilibrium`, and the difference is reported; the ensemble stays the same.
+        Whether to check an approximate method with the first samples (32 on a line, 8 on a plane)
+        and the weakest of the first thousand. If a quick test leaves a doubt, they are also solved
+        by `Equilibrium`, and the difference is reported. The ensemble stays the same.
 
     Returns
     -------
     xarray.Dataset
-        Over 'sample', as from `onset`. The attributes hold the version, the study as JSON and the
-        seed: enough to run it again. Samples that could not be solved are NaN, and listed in the
-        attribute 'failed_samples' (point, sample, seed, message, whether the sample itself does
-        not fit). With a comparison, 'pilot_bias' and 'pilot_scatter' are the mean and the standard
-        deviation of the difference in `critical_stress`, relative to the mean by `Equilibrium`;
-        'pilot_weakest_bias' and 'pilot_weakest_scatter' are those of the weakest samples.
+        Results of `onset` over 'sample'. The attributes contain the version, the study as JSON and
+        the seed, so that it can be run again. Samples that could not be solved are NaN. The
+        attribute 'failed_samples' lists them (point, sample, seed, message, whether the sample
+        itself does not fit). If the pilot compared, 'pilot_bias' and 'pilot_scatter' are mean and
+        standard deviation of the difference in `critical_stress`, relative to the mean by
+        `Equilibrium`, and 'pilot_weakest_bias' and 'pilot_weakest_scatter' of the weakest samples.
 
     Raises
     ------
     InputError
         If any argument is invalid (the message lists every problem), or no sample is valid.
     RunError
-        If the solver fails on all samples; the message names one with its seed.
+        If the solver fails on all samples. The message names a sample with its seed.
 
     Warns
     -----
@@ -250,11 +240,6 @@ def monte_carlo(
         problem=problem, random=experiment.given, method=experiment.method, ensemble=ensemble
     )
     return gather(
-        [experiment],
-        ensemble,
-        about | {"seed": seed},
-        workers=workers,
-        executor=executor,
-        progress=progress,
-        pilot=pilot,
-    )
+        [experiment], ensemble, about | {"seed": seed}, workers=workers, executor=executor,
+        progress=progress, pilot=pilot,
+    )  # fmt: skip

@@ -1,4 +1,15 @@
-"""A pilot: some samples of an approximate method solved by its exact counterpart too."""
+"""A pilot: some samples of an approximate method solved by its exact counterpart, too.
+
+Problem. How far are onsets by an approximate method, such as the local criterion, from the exact
+onsets of the same samples?
+
+Steps, at up to `MAX_PILOT_POINTS` points of a sweep:
+
+1. Take the first samples, and the weakest among the first `MAX_RANKED_SAMPLES`.
+2. Ask the method by a quick test whether they may differ from the exact onset. If not, stop.
+3. Solve them exactly. The difference, over the mean of the exact onset, has a mean (bias) and a
+   standard deviation (scatter). Take the largest ones of all points.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -14,13 +25,13 @@ from stiction.methods.onset import doubt, exact_counterpart, relative_difference
 from stiction.methods.protocol import optional_member
 
 SAMPLES_ON_LINE, SAMPLES_ON_PLANE = 32, 8
-"""Numbers of first samples of a pilot, and of the weakest ones."""
+"""Number of first samples, and of weakest samples."""
 MAX_RANKED_SAMPLES, RANKING_SECONDS = 1000, 1.0
-"""First samples among which the weakest are, and seconds on one core for these."""
+"""First samples among which the weakest are found, and seconds on one core for them."""
 BATCH_SAMPLES = 64
 """Samples that the inexpensive method solves at once."""
 MAX_PILOT_POINTS = 8
-"""Number of points of a sweep that have a pilot."""
+"""Most points of a sweep that have a pilot."""
 
 
 def compare(
@@ -30,19 +41,16 @@ def compare(
     show: bool = False,
     workers: int | None = None,
 ) -> dict[str, Any]:
-    """Solve samples of at most eight points by their method and by its exact counterpart.
+    """Return bias and scatter of an approximate method for the first and the weakest samples.
 
-    Return mean and scatter of the difference over the mean of the exact onset, of the
-    points with the largest, for the first samples and for the weakest among more of them;
-    nothing if there is no exact counterpart, or no doubt at any point.
+    The result is empty if there is no exact counterpart, or no doubt at any point.
     """
     chosen = np.unique(np.linspace(0, len(points) - 1, MAX_PILOT_POINTS).round().astype(int))
     parts: dict[str, list[Array]] = {}
+    cores = workers or usable_cores()
     with Meter("comparing with the exact onset", len(chosen), show, unit="points") as meter:
         for number in chosen.tolist():
-            for name, relative in _differences(
-                points[number], first, most, workers or usable_cores()
-            ).items():
+            for name, relative in _differences(points[number], first, most, cores).items():
                 if relative.size > 1:
                     parts.setdefault(name, []).append(relative)
             meter.advance()
@@ -59,7 +67,7 @@ def _differences(
 ) -> dict[str, Array]:
     """Return the differences to the exact onset over its mean, by kind of samples.
 
-    They are empty without an exact counterpart, and where a quick test leaves no doubt.
+    The result is empty without an exact counterpart, or if the quick test leaves no doubt.
     """
     problem, method = experiment.problem, experiment.method
     exact = exact_counterpart(problem, method)
@@ -67,23 +75,22 @@ def _differences(
         return {}
     size = SAMPLES_ON_PLANE if problem.interface.is_plane else SAMPLES_ON_LINE
     with collect_warnings():  # the ensemble itself warns
-        looked_at = max(
-            size, min(MAX_RANKED_SAMPLES, int(RANKING_SECONDS / experiment.seconds))
-        )
-        draws = experiment.draws(first, min(looked_at, most))
+        # 1.
+        ranked = min(MAX_RANKED_SAMPLES, int(RANKING_SECONDS / experiment.seconds))
+        draws = experiment.draws(first, min(max(size, ranked), most))
         stress = _onsets(experiment, draws, BATCH_SAMPLES, workers)
         chosen = {"pilot": np.arange(min(size, most))}
         if most > size:
             chosen["pilot_weakest"] = np.argsort(stress)[:size]
         chosen = {name: rows[np.isfinite(stress[rows])] for name, rows in chosen.items()}
-        if not any(
-            optional_member(method, "may_differ")(
-                problem, experiment.sample(experiment.profiles(draws[rows])), stress[rows]
-            )
-            for rows in chosen.values()
-            if rows.size
-        ):
+        # 2.
+        may_differ = optional_member(method, "may_differ")
+        groups = [rows for rows in chosen.values() if rows.size]
+        samples = [experiment.sample(experiment.profiles(draws[rows])) for rows in groups]
+        pairs = zip(samples, groups, strict=True)
+        if not any(may_differ(problem, sample, stress[rows]) for sample, rows in pairs):
             return {}
+        # 3.
         some = np.unique(np.concatenate(list(chosen.values())))
         true = np.full(stress.size, np.nan)
         true[some] = _onsets(experiment.by(exact), draws[some], 1, workers)
@@ -93,7 +100,7 @@ def _differences(
 
 
 def _onsets(experiment: Experiment, draws: Array, batch: int, workers: int) -> Array:
-    """Return the stress at onset of each row of draws, NaN where it cannot be solved."""
+    """Return the stress at onset of each row of draws, NaN if it cannot be solved."""
 
     def solve(rows: Array) -> Array:
         try:

@@ -1,13 +1,16 @@
 """The store: a folder of self-describing chunks.
 
-``study.json`` identifies the study, and ``chunks/`` holds the samples. A chunk is a table
-of samples with a mark of their study; its name is a digest of its content. Chunks are
-written whole or not at all, they never change, and nothing lists them: any number of
-processes may write to a folder, a run may be killed at any moment, and damage is found.
-Digests find damage, not forgery: who can write to a folder can write numbers with a new digest.
+Problem. Many processes write samples to a folder, and any of them may be killed at any moment. No
+sample may be lost once it is written, and damage must be found.
 
-A folder may come from a stranger. Links, pipes, devices and folders in place of its files are an
-`InputError`; content that does not fit the study is damage, whatever its digest says.
+Solution. ``study.json`` identifies the study, and ``chunks/`` holds the samples. A chunk is a table
+of samples with a mark of its study, and its name is a digest of its content. Chunks are written
+whole or not at all, they never change, and no file lists them.
+
+Limits. A digest finds damage, but not forgery, because whoever can write to a folder can write
+other numbers with a new digest. A folder may come from a stranger. Links, pipes, devices and
+folders in place of its files are an `InputError`. Content that does not fit the study counts as
+damage, whatever its digest says.
 """
 
 from __future__ import annotations
@@ -45,31 +48,31 @@ FORMAT = 5
 STUDY, PILOT_FILE, CHUNKS = "study.json", "pilot.json", "chunks"
 NAME = re.compile(r"[0-9a-f]{32}\.npz")
 SAVE_SECONDS = 10.0
-"""A chunk holds the samples of this time."""
+"""Seconds of computing whose samples make a chunk."""
 SAVE_BYTES = 32 * 2**20
 MAX_JSON_BYTES = 64 * 2**20
-"""Of the description of a study or of a pilot."""
+"""Largest size of the description of a study or of a pilot."""
 
 
 class Damaged(StoreError):
-    """A stored file is missing or damaged; the message gives the defect."""
+    """A stored file is missing or damaged. The message says how."""
 
 
 class Rows(Protocol):
-    """Samples in memory, which a store fills."""
+    """Samples in memory that a store fills."""
 
     def misfit(self, table: Table) -> str:
-        """Return why a table cannot belong to this study; '' if it can."""
+        """Return why a table cannot belong to this study, or '' if it can."""
 
     def add(self, table: Table) -> None:
         """Take a table that fits."""
 
 
 class Store:
-    """The folder of a run: samples of a study, given in plain form.
+    """The folder of a run with the samples of a study, which is given in plain form.
 
-    Once it was read, `damage` has the defects of damaged chunks, by name; `seconds` (of one core,
-    for each) and `versions` are those of the others.
+    After reading, `damage` has the defects of damaged chunks by name. `seconds` (of one core) and
+    `versions` are those of the intact chunks.
     """
 
     def __init__(self, path: Path, study: Mapping[str, Any]) -> None:
@@ -83,13 +86,13 @@ class Store:
 
     @classmethod
     def open(cls, path: Path, study: dict[str, Any]) -> Store:
-        """Open a folder for writing: a new one, or one that holds the same study."""
+        """Open a folder for writing. It is new, or holds the same study."""
         try:
             path.mkdir(parents=True, exist_ok=True)
             names = {name for name in os.listdir(path) if not name.endswith(PART)}
             if names and not names & {STUDY, CHUNKS}:
                 some = ", ".join(sorted(names)[:3])
-                raise StoreError(f"{path}: holds other files ({some}); choose a new folder")
+                raise StoreError(f"{path}: has other files ({some}). Choose a new folder")
             with suppress(FileExistsError):
                 (path / CHUNKS).mkdir()
             _check_folder(path / CHUNKS)
@@ -101,19 +104,18 @@ class Store:
             _refuse_another(path, study, before)
         except Damaged:
             if list(store._tables()) or STUDY in names:
-                store.warn(f"{STUDY} is damaged or missing; it is rebuilt from the given study")
+                store.warn(f"{STUDY} is damaged or missing. It is rebuilt from the given study")
         if before != study:
-            if (
-                before and before["ensemble"]["samples"] < MAX_RANKED_SAMPLES
-            ):  # a pilot of fewer samples
+            # A pilot of fewer samples is no longer valid.
+            if before and before["ensemble"]["samples"] < MAX_RANKED_SAMPLES:
                 (path / PILOT_FILE).unlink(missing_ok=True)
             _write_json(path / STUDY, study)
         return store
 
     def read_into(self, rows: Rows) -> None:
-        """Hand over the undamaged chunks; the defects of the others are in `damage`.
+        """Hand over the intact chunks, and put the defects of the others into `damage`.
 
-        A file that exists and cannot be read may be whole: it raises a `StoreError`.
+        A file that exists but cannot be read may be intact. It raises a `StoreError`.
         """
         self.damage, self.seconds, self.versions = {}, [], {}
         for name, table in self._tables():
@@ -125,7 +127,7 @@ class Store:
             self.versions[table.versions] = None
 
     def _tables(self) -> Iterator[tuple[str, Table]]:
-        """Yield the chunks that are whole, with their names."""
+        """Yield the intact chunks with their names."""
         folder = self.path / CHUNKS
         try:
             _check_folder(folder)
@@ -135,7 +137,7 @@ class Store:
         for name in names:
             try:
                 data = _read(folder / name, MAX_FILE_BYTES)
-            except Damaged:  # it was damaged, and another process has deleted it
+            except Damaged:  # another process has deleted a damaged chunk
                 continue
             if name != f"{digest(data)}.npz":
                 self.damage[name] = "fails its checksum"
@@ -143,22 +145,22 @@ class Store:
             try:
                 mark, table = _table_in(data)
             except (*UNREADABLE, TypeError, RecursionError, MemoryError):
-                self.damage[name] = "is no chunk, though its checksum is right"
+                self.damage[name] = "is not a chunk, though its checksum is right"
                 continue
             if mark != self._mark:
                 raise StoreError(f"{folder / name}: belongs to another study")
             yield name, table
 
     def resume(self, rows: Rows) -> None:
-        """Hand over what is stored; warn of other versions, and delete what is damaged."""
+        """Hand over the stored samples, warn of other versions, and delete damaged chunks."""
         self.read_into(rows)
         for name, text in self.damage.items():
-            self.warn(f"{CHUNKS}/{name}: {text}; its samples are computed again")
+            self.warn(f"{CHUNKS}/{name}: {text}. Its samples are computed again")
             (self.path / CHUNKS / name).unlink(missing_ok=True)
         for version in sorted({*self.versions} - {versions()}):
             self.warn(
-                f"was begun with {version}, not {versions()}: samples of the two may differ"
-                " in their last digits"
+                f"was begun with {version}, not {versions()}. Their samples may differ in the last"
+                " digits"
             )
 
     def warn(self, text: str) -> None:
@@ -167,7 +169,7 @@ class Store:
 
     @property
     def pilot(self) -> dict[str, Any] | None:
-        """Result of the pilot; None if there was none."""
+        """Result of the pilot, or None."""
         with suppress(Damaged):
             return read_json(self.path / PILOT_FILE)
         return None
@@ -177,14 +179,14 @@ class Store:
         _write_json(self.path / PILOT_FILE, attributes)
 
     def add(self, table: Table) -> None:
-        """Take a table, and store all that were taken if it is time or they are large."""
+        """Take a table, and store all taken tables if they are large or it is time."""
         self._taken.append(table)
         size = sum(table.rows.nbytes for table in self._taken)
         if time.monotonic() - self._saved >= SAVE_SECONDS or size >= SAVE_BYTES:
             self.save()
 
     def save(self) -> None:
-        """Store the tables that were taken, one chunk for each set of variables."""
+        """Store the taken tables as a chunk for each set of variables."""
         _check_folder(self.path / CHUNKS)
         groups: dict[Any, list[Table]] = {}
         for table in self._taken:
@@ -201,18 +203,18 @@ class Store:
 
 
 def digest(data: bytes) -> str:
-    """Return the first half of the SHA-256, in hexadecimal."""
+    """Return the first half of the SHA-256 in hexadecimal."""
     return hashlib.sha256(data).hexdigest()[:32]
 
 
 def _check_folder(folder: Path) -> None:
-    """Refuse a link in place of the folder of chunks: files would be written where it leads."""
+    """Refuse a link in place of the folder of chunks, because files would go to its target."""
     if not stat.S_ISDIR(os.lstat(folder).st_mode):
-        raise InputError(f"{folder}: is not a folder; remove it, or choose another run")
+        raise InputError(f"{folder}: is not a folder. Remove it, or choose another run")
 
 
 def _table_in(data: bytes) -> tuple[str, Table]:
-    """Return the mark and the table of a chunk, or raise one of several errors if it is none."""
+    """Return the mark and the table of a chunk. Other content raises one of several errors."""
     arrays = arrays_in(data)
     mark, made_by, seconds, failed = json.loads(arrays["about"].tobytes())
     failures = tuple(Failure(*one) for one in failed)
@@ -228,34 +230,34 @@ def _table_in(data: bytes) -> tuple[str, Table]:
         and all(field[0].base.kind in "fiub" for field in fields.values())
     )  # fmt: skip
     if not valid:
-        raise ValueError("it holds other values than a chunk")
+        raise ValueError("other values than in a chunk")
     return mark, Table(rows, failures, seconds, made_by)
 
 
 def _read(file: Path, max_bytes: int) -> bytes:
-    """Return the content of a file; one that is there but cannot be read may be whole."""
+    """Return the content of a file. A file that exists but cannot be read may be intact."""
     try:
         return read_regular(file, max_bytes=max_bytes, follow_links=False)
     except InputError as error:
-        raise InputError(f"{file}: {error}; remove it, or choose another run") from None
+        raise InputError(f"{file}: {error}. Remove it, or choose another run") from None
     except FileNotFoundError:
-        what = "there is no run here; give the folder of `stiction run --out`"
+        advice = "there is no run here. Give the folder of `stiction run --out`"
         if file.name == STUDY and (file.parent / CHUNKS).is_dir():
-            what = f"{STUDY} is missing; run the study again into the folder to restore it"
-        raise Damaged(f"{file.parent}: {what}") from None
+            advice = f"{STUDY} is missing. Run the study again into the folder to restore it"
+        raise Damaged(f"{file.parent}: {advice}") from None
     except OSError as error:
         raise cannot("read", file, error) from error
 
 
 def _write_json(file: Path, content: Mapping[str, Any]) -> None:
-    """Write JSON with the format and a digest, whole or not at all."""
+    """Write JSON with its format and a digest, whole or not at all."""
     body = {"format": FORMAT, "content": content}
     sealed = body | {"digest": digest(json.dumps(body, sort_keys=True).encode())}
     write_whole(file, json.dumps(sealed, indent=1).encode())
 
 
 def read_json(file: Path) -> dict[str, Any]:
-    """Return what `_write_json` wrote, or raise a `StoreError`."""
+    """Return the content that `_write_json` wrote, or raise a `StoreError`."""
     try:
         body = json.loads(_read(file, MAX_JSON_BYTES))
         if body.pop("digest") != digest(json.dumps(body, sort_keys=True).encode()):
@@ -266,12 +268,12 @@ def read_json(file: Path) -> dict[str, Any]:
         raise
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise Damaged(
-            f"{file}: is damaged, or of another program; run the study again into the folder to"
+            f"{file}: is damaged or of another program. Run the study again into the folder to"
             " repair it"
         ) from None
     raise StoreError(
-        f"{file}: is of format {describe(body['format'])}; this version reads {FORMAT}:"
-        " install the version of stiction that wrote it"
+        f"{file}: is of format {describe(body['format'])}, but this version reads {FORMAT}."
+        " Install the version of stiction that wrote it"
     )
 
 
@@ -281,35 +283,34 @@ def read_study(folder: Path) -> dict[str, Any]:
     ensemble = study.get("ensemble")
     if not isinstance(ensemble, dict) or not isinstance(ensemble.get("samples"), int):
         raise Damaged(
-            f"{folder / STUDY}: is damaged: it is another file of a run;"
-            " run the study again to repair it"
+            f"{folder / STUDY}: is damaged: it is another file of a run. Run the study again to"
+            " repair it"
         )
     return study
 
 
 def _identity(study: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what makes two studies the same run: all but title and number of samples."""
+    """Return all of a study but its title and number of samples. It identifies a run."""
     ensemble = {key: value for key, value in study["ensemble"].items() if key != "samples"}
     rest = {key: value for key, value in study.items() if key != "title"}
     return rest | {"ensemble": ensemble}
 
 
 def _refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any]) -> None:
-    """Refuse a study that differs from the stored one, but for more samples."""
+    """Refuse a study that differs from the stored one in more than additional samples."""
     now, before = here["ensemble"]["samples"], there["ensemble"]["samples"]
     differences = _differences(_identity(here), _identity(there))
     if now < before:
-        differences += [
-            f"ensemble.samples: {now} here, {before} there: a run can grow, not shrink"
-        ]
+        differences.append(f"ensemble.samples: {now} here, {before} there: a run can only grow")
     if differences:
         raise InputError(
-            f"{path}: holds another study; choose another place, or make the study the same:\n"
+            f"{path}: holds another study. Choose another folder, or make the study the same:\n"
             + "\n".join(f"  {text}" for text in differences[:20])
         )
 
 
 def _differences(here: Any, there: Any, path: str = "") -> list[str]:
+    """Return each difference of two studies with its key and both values."""
     if isinstance(here, list) and isinstance(there, list):
         here, there = dict(enumerate(here)), dict(enumerate(there))
     if isinstance(here, Mapping) and isinstance(there, Mapping):
