@@ -1,4 +1,4 @@
-"""Answers on failure probability, and the checks that all of them share."""
+"""Answers on failure probability, and the checks that they share."""
 
 from __future__ import annotations
 
@@ -30,23 +30,23 @@ from stiction.random.equally_likely import MAX_MEMBERS
 from stiction.reliability.tail import Tail, two_levels_refused
 
 TargetCv: TypeAlias = Annotated[Real, Field(ge=1e-6, le=1)]
-"""A smaller one would take more than 1e12 failures; a larger is no answer."""
+"""A smaller one would take more than 1e12 failures. A larger one is not an estimate."""
 Probability: TypeAlias = Annotated[Real, Field(ge=1e-30, lt=1)]
 Budget: TypeAlias = Annotated[Count, Field(ge=100)]
 
 COUNTING_SECONDS, FEWEST_EVALUATIONS, MOST_EVALUATIONS = 100.0, 1_000, 2_000_000
-"""Computing time of counting by a slow method, fewest and most evaluations, by default."""
+"""Computing time of counting by a slow method, and fewest and most evaluations by default."""
 CHAIN_EVALUATIONS, PATIENCE_SECONDS = 20_000, 900.0
-"""Evaluations of subset simulation for about P = 1e-4 with a cv of 0.1, and seconds on one core
-that evaluations take at most if `max_evaluations` does not allow more."""
+"""Evaluations of subset simulation for about P = 1e-4 with a cv of 0.1, and longest time of
+evaluations on one core, s, unless `max_evaluations` allows more."""
 LIST_SHARE, SAMPLING_SHARE = 0.6, 0.8
-"""Parts of the target for the errors by the list of interfaces and by sampling, in squares."""
+"""Parts of the target for the errors by the list of interfaces and by sampling. Squares add up."""
 REQUEST_MARGIN, CARRIED_SHARE = 1.2, 0.9
-"""Margin on the number of members wanted; share of the mean whose carriers are counted."""
+"""Margin on the wanted number of members, and share of the mean that a warning reports."""
 EXACT_CHECKS = (8, 64)
-"""Fewest and most samples that are solved exactly to check those of an approximate method."""
+"""Fewest and most samples of an approximate method that are solved exactly as a check."""
 CHECK_SECONDS = 10.0
-"""Seconds of one core for these."""
+"""Seconds of one core for this check."""
 ESTIMATED = ("stress", "probability", "cv", "members_cv", "members")
 
 
@@ -70,7 +70,7 @@ class Estimate:
 
     @cached_property
     def members_cv(self) -> float:
-        """Part of `cv` by the list of interfaces, 0 of a single interface and of a mixture."""
+        """Part of `cv` by the list of interfaces, 0 for a single interface and for a mixture."""
         if not self.state.is_sample:
             return 0.0
         return self.tail.members_cv(self.stress, self.state.experiment.random.kinds)
@@ -82,7 +82,7 @@ class Estimate:
 
     @cached_property
     def members(self) -> Array:
-        """Probability of each of equally likely interfaces; none of a single one."""
+        """Probability of each of the equally likely interfaces. Empty for a single one."""
         if not self.state.several:
             return np.zeros(0)
         lows, highs = np.array(self.state.bounds_of_members()).T
@@ -97,58 +97,57 @@ class Answer(Result):
     Attributes
     ----------
     stress, probability : float
-        Pa, and the probability of an onset below it; one is given, the other estimated.
+        Stress, Pa, and probability of an onset below it. One is given, and the other estimated.
     interval : tuple of float
-        95 % confidence interval of the one that is estimated.
+        95 % confidence interval of the estimated one.
     cv : float
         Coefficient of variation of the probability: estimated standard error over the
-        estimate; infinite without a failure, zero if exact.
+        estimate. Infinite without a failure, and zero if exact.
     members_cv : float
-        Part of `cv` that is due to a list of equally likely interfaces being a sample of those
-        that may be true; the rest, with which it adds in squares, is that of sampling. 0 of a
-        mixture.
+        Part of `cv` because a list of equally likely interfaces is a sample of the interfaces that
+        may be true. The squares of this part and of the sampling error add up. 0 for a mixture.
     evaluations, first_stage_evaluations : int
         Samples solved by the method, and by its less expensive first stage only.
     lower_bound, stress_above_bound : float
-        Pa; no sample slides below `lower_bound`, which is minus infinity where none is known.
+        No sample slides below `lower_bound`, Pa. It is minus infinity if it is unknown.
     algorithm, reason : str
-        'plain', 'subset', 'two_level' or 'exact' (nothing had to be sampled), and why.
+        'plain', 'subset', 'two_level' or 'exact' (without samples), and the reason for it.
     members : (members,) array
-        Of a list of equally likely interfaces: the probability of each; NaN where fewer
-        than three samples of an interface slide below the stress. `probability` is the mean
-        over all, the predictive probability: the one to decide with.
+        For a list of equally likely interfaces, the probability of each. NaN if fewer than three
+        samples of an interface slide below the stress. `probability` is their mean, the predictive
+        probability, on which a decision should rest.
     survived : float
-        Share of plain samples in which the event does not happen, at any stress: behind a stiff
-        machine nothing need become unstable, and a load that holds need not break anything.
+        Share of plain samples in which the event does not happen at any stress. Behind a stiff
+        machine an interface may stay stable, and it may carry any load.
     warnings : tuple of str
-        Reasons not to trust the answer; empty if there are none.
+        Reasons not to trust the answer. Empty if there are none.
     normal_pressure, friction_coefficient : float
-        Mean pressure, Pa, and `stress` over it; NaN without a normal pressure.
+        Mean pressure, Pa, and `stress` over it. NaN without a normal pressure.
     area, force : float
-        Area of the interface, m², and `stress` times it, N; NaN if it is unknown: give
-        ``Blocks(thickness=...)``, or ``Interface(width=...)`` of a line.
+        Area of the interface, m², and `stress` times the area, N. NaN if the area is unknown: give
+        ``Blocks(thickness=...)``, or ``Interface(width=...)`` for a line.
     failing_profiles : xarray.Dataset
-        From `failure_probability`: some samples of the failure set over ('sample', 'x'),
-        drawn with its distribution: `strength` (and what else is random),
-        `critical_stress`, `critical_position`, ...
+        Given by `failure_probability`: some samples of the failure set over ('sample', 'x'), with
+        its distribution: `strength` and other random properties, `critical_stress`,
+        `critical_position`, ...
     sensitivities : xarray.Dataset
-        Of `design_stress`: what moves the design, over 'source', the widest first: the setting
-        at either end (`low`, `high`) and `force_at_low`, `force_at_high`, N, and the same of the
-        stress, Pa. Attributes ``stress by ...`` are of each family of the factor between
-        specimens. ``sensitivities.to_dataframe().to_csv(path)`` writes a file, and
-        `stiction.plot.sensitivities` draws it.
+        Given by `design_stress`: effects on the design over 'source', the largest first. `low` and
+        `high` are the settings at both ends, with `force_at_low` and `force_at_high`, N, and
+        `stress_at_low` and `stress_at_high`, Pa. Attributes ``stress by ...`` belong to the
+        families of the factor between specimens. ``sensitivities.to_dataframe().to_csv(path)``
+        writes a file, and `stiction.plot.sensitivities` draws it.
     characteristic_stress, confidence : float
-        Of `design_stress`, where specimens were counted: the stress below which 5 % of the
-        specimens slide, with this confidence (EN 1990: 75 %), Pa; NaN otherwise. It is a quantile
-        over equally likely interfaces.
+        Given by `design_stress` if specimens were counted: stress below which 5 % of the specimens
+        slide, with this confidence (EN 1990: 75 %), Pa. It is a quantile over equally likely
+        interfaces. NaN otherwise.
     partial_factor, reliability_index : float
-        `characteristic_stress` over `stress`, and the quantile of the normal distribution for the
-        probability, with its sign changed.
+        `characteristic_stress` over `stress`, and minus the quantile of the normal distribution at
+        the probability.
     of_stress : bool
         Whether the stress is estimated, as by `design_stress`, or the probability.
     quantity : str
-        What the text of the answer begins with: 'stress', 'force' or 'friction_coefficient', as was
-        asked; of `design_stress` the force where the area is known.
+        First quantity of the printed answer: 'stress', 'force' or 'friction_coefficient', as
+        requested. For `design_stress` it is the force if the area is known.
     """
 
     stress: float
@@ -175,7 +174,7 @@ class Answer(Result):
 
     @classmethod
     def of(cls, estimate: Estimate, doubts: Sequence[str] = (), **more: Any) -> Self:
-        """Return the answer from an estimate and what is given; issue doubts as warnings."""
+        """Return the answer from an estimate and given values, and issue doubts as warnings."""
         for text in doubts:
             warn_accuracy(text)
         state, tail = estimate.state, estimate.tail
@@ -196,12 +195,12 @@ class Answer(Result):
 
     @property
     def friction_coefficient(self) -> float:
-        """`stress` over the mean normal pressure; NaN without one."""
+        """`stress` over the mean normal pressure, or NaN without a pressure."""
         return self.stress / self.normal_pressure
 
     @property
     def force(self) -> float:
-        """`stress` times the area of the interface, N; NaN where that is unknown."""
+        """`stress` times the area of the interface, N, or NaN if the area is unknown."""
         return self.stress * self.area
 
     @property
@@ -211,18 +210,18 @@ class Answer(Result):
 
     @property
     def reliability_index(self) -> float:
-        """Index beta, for which the normal distribution has the probability below -beta."""
+        """Index beta: the standard normal distribution has this probability below -beta."""
         return -float(ndtri(self.probability))
 
     @property
     def band(self) -> tuple[float, float]:
-        """90 % band of the probability over equally likely interfaces; NaN of a single one.
+        """90 % band of the probability over equally likely interfaces, NaN for a single one.
 
-        5 % of them have at most the one, 95 % at most the other. More tests make it
-        narrower. It is too wide by the sampling error of each interface, which a smaller
-        `target_cv` lowers. An end is NaN if `members` is so at its rank, above the interfaces of
-        probability 0, as of lists of thousands: take one of tens. The error of the mean is
-        `interval`.
+        5 % of them have at most the first number, and 95 % at most the second. More tests make the
+        band narrower. It is too wide by the sampling error of each interface, which a smaller
+        `target_cv` reduces. An end is NaN if `members` is NaN at its rank above the interfaces of
+        probability 0, as for lists of thousands. Take a list of tens then. `interval` has the error
+        of the mean.
         """
         return band_of(self.members)
 
@@ -300,7 +299,7 @@ class Answer(Result):
         return "\n".join([result, *self._moved()])
 
     def _moved(self) -> list[str]:
-        """Return what moves a design, as lines."""
+        """Return the effects on a design as lines."""
         effects = self.sensitivities
         if not effects.sizes.get("source"):
             return []
@@ -330,7 +329,7 @@ class Answer(Result):
 
 
 def band_of(members: Array) -> tuple[float, float]:
-    """Return the 90 % band over equally likely interfaces; NaN where its rank is not known."""
+    """Return the 90 % band over equally likely interfaces, NaN if the value at its rank is."""
     if not members.size:
         return math.nan, math.nan
     # Unknown probabilities are small, but above those that are exactly zero.
@@ -353,7 +352,7 @@ def prepare(
     algorithm: str = "subset",
     per_pressure: bool = False,
 ) -> tuple[LimitState, int]:
-    """Return the limit state and the evaluations allowed; refuse what takes too long."""
+    """Return the limit state and the allowed evaluations, or refuse a method that is too slow."""
     state = LimitState(experiment, event, per_pressure, workers or usable_cores(), meter)
     problems = []
     if per_pressure and not experiment.pressure > 0.0:
@@ -375,27 +374,30 @@ def prepare(
 
 
 def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
-    """Return why chains of samples take too long by this method; None if allowed."""
-    seconds, kind = CHAIN_EVALUATIONS * experiment.seconds, experiment.method.type
-    fast = seconds <= PATIENCE_SECONDS and not optional_member(
-        experiment.method, "counted_only"
-    )
+    """Return why chains of samples take too long by this method, or None."""
+    seconds, method = CHAIN_EVALUATIONS * experiment.seconds, experiment.method
+    fast = seconds <= PATIENCE_SECONDS and not optional_member(method, "counted_only")
     if fast or (max_evaluations or 0) >= CHAIN_EVALUATIONS:
         return None
     return (
-        f"{CHAIN_EVALUATIONS:,} evaluations of subset simulation by {kind!r} would take about"
-        f" {seconds / 3600.0:.1g} h on one core; allow them with max_evaluations, or use plain"
-        " Monte Carlo (algorithm='plain' of failure_probability, or st.monte_carlo)"
+        f"{CHAIN_EVALUATIONS:,} evaluations of subset simulation by {method.type!r} would take"
+        f" about {seconds / 3600.0:.1g} h on one core. Allow them with max_evaluations, or count:"
+        " algorithm='plain' of failure_probability, or st.monte_carlo"
     )
 
 
 def bounded(lowest: float) -> bool:
-    """Return whether a least possible stress is a bound: zero and infinity are not."""
+    """Return whether a least stress is a bound, neither zero nor infinite."""
     return bool(np.isfinite(lowest) and lowest > 0.0)
 
 
+def sampling_target(state: LimitState, target_cv: float) -> float:
+    """Return the part of the target for the sampling error."""
+    return target_cv * (SAMPLING_SHARE if state.is_sample else 1.0)
+
+
 def wanted_members(random: Any, cv: float, target_cv: float) -> int:
-    """Return how many members to draw from a source instead, 0 for no more."""
+    """Return the number of members to draw from a source, 0 if there are enough."""
     least = cv / (LIST_SHARE * target_cv)
     count = len(random.members)
     if getattr(random, "source", None) is None or least <= 1.0 or count >= MAX_MEMBERS:
@@ -405,26 +407,20 @@ def wanted_members(random: Any, cv: float, target_cv: float) -> int:
 
 def few_members(random: Any, estimate: Answer | Estimate, target_cv: float) -> list[str]:
     """Return a warning if the list makes the estimate less precise than `target_cv`."""
-    by_list = estimate.members_cv
+    by_list, source = estimate.members_cv, random.source
     if not (estimate.cv > target_cv and by_list > LIST_SHARE * target_cv):
         return []
     members = np.nan_to_num(estimate.members)
     shares = np.cumsum(np.sort(np.bincount(random.kinds, members))[::-1])
     count = 1 + int(np.searchsorted(shares, CARRIED_SHARE * shares[-1]))
-    advice = (
-        "give what it was drawn from, a fit or a posterior, in its place: more are then drawn; or"
-        " a longer list (count of [uncertain])"
-    )
-    if random.source is not None:
-        advice = (
-            "no more differ, or no more are drawn: take more repetitions of a fit (bootstrap=), or"
-            " give infer a longer list"
-        )
+    advice = "Give the fit or posterior itself, from which more are drawn, or a longer list"
+    if source is not None:
+        advice = "Take more repetitions of the fit (bootstrap=), or give infer a longer list"
     return [
         f"the list of interfaces is a sample, and {count} of its {shares.size} different ones carry"
-        f" {CARRIED_SHARE:.0%} of the mean: by this alone the coefficient of variation is"
-        f" {by_list:.2g} (target {target_cv:g}); {advice}; more profiles or tests make them"
-        " more alike"
+        f" {CARRIED_SHARE:.0%} of the mean. By this alone the coefficient of variation is"
+        f" {by_list:.2g} (target {target_cv:g}). {advice}. More profiles or tests make them more"
+        " alike"
     ]
 
 
@@ -434,14 +430,14 @@ def imprecise(cv: float, target_cv: float, evaluations: int) -> list[str]:
     if math.isfinite(cv):
         advice += f" to about {REQUEST_MARGIN * evaluations * (cv / target_cv) ** 2:.1g}"
     text = (
-        f"the coefficient of variation by sampling is {cv:.3g}, not {target_cv:.3g}: {evaluations}"
-        f" evaluations do not suffice; {advice}, or target_cv"
+        f"the coefficient of variation by sampling is {cv:.3g} after {evaluations} evaluations, but"
+        f" {target_cv:.3g} was wanted. To reach it, {advice}, or accept a larger target_cv"
     )
     return [text] if cv > target_cv else []
 
 
 def different(values: Array, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """Return up to `count` positions with different values, in random order."""
+    """Return up to `count` positions of different values in random order."""
     _, first = np.unique(values, return_index=True)  # chains repeat states
     chosen: NDArray[np.int64] = rng.permutation(first)[:count]
     return chosen
@@ -450,10 +446,10 @@ def different(values: Array, count: int, rng: np.random.Generator) -> NDArray[np
 def exact_doubts(
     state: LimitState, near: tuple[Array, Array], stress: float, probability: float
 ) -> list[str]:
-    """Solve some samples of an approximate method exactly; warn if more or fewer fail.
+    """Solve some samples of an approximate method exactly, and warn if more or fewer fail.
 
-    `near` holds draws and stresses on both sides of the stress, the lowest there are. In a tail a
-    difference that is negligible in stress may multiply a probability, so failures are counted.
+    `near` has draws and stresses of the lowest samples on both sides of the stress. A small
+    difference of stress may multiply the probability in a tail, so failures are counted.
     """
     experiment, (draws, values) = state.experiment, near
     exact = exact_counterpart(experiment.problem, experiment.method)
@@ -466,15 +462,14 @@ def exact_doubts(
     with collect_warnings():
         fails_exactly = state.by(exact)(draws[chosen]) < stress
     fails = values[chosen] < stress
-    failed, failed_exactly, differing = (
-        int(np.sum(which)) for which in (fails, fails_exactly, fails != fails_exactly)
-    )
+    failed, failed_exactly = int(fails.sum()), int(fails_exactly.sum())
+    differing = int(np.sum(fails != fails_exactly))
     if abs(failed_exactly - failed) <= 2.0 * math.sqrt(max(differing, 1)):
         return []
     there = min(probability * max(failed_exactly, 1) / max(failed, 1), 1.0)
     return [
         f"of {chosen.size} samples in the tail {failed} fail by the {experiment.method.label} and"
-        f" {failed_exactly} by {exact.label}: by {exact.label} the probability of failure is"
-        f" {'about' if failed_exactly else 'below'} {there:.2g} instead of {probability:.2g}; use"
+        f" {failed_exactly} by {exact.label}. By {exact.label} the probability of failure is"
+        f" {'about' if failed_exactly else 'below'} {there:.2g} instead of {probability:.2g}. Use"
         " method=st.Equilibrium()"
     ]

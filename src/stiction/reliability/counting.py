@@ -1,4 +1,20 @@
-"""Plain Monte Carlo: count the failures among the samples of the ensemble."""
+"""Plain Monte Carlo: count the failures among the samples of the ensemble.
+
+Problem. Estimate P(T < s) from independent samples of the onset T, so that the coefficient of
+variation is at most a target.
+
+Sources. Inverse binomial sampling: Haldane (1945), Biometrika 33, 222. With limits on the number of
+samples: Girshick, Mosteller and Savage (1946), Annals of Mathematical Statistics 17, 13. Intervals:
+Clopper and Pearson (1934), Biometrika 26, 404.
+
+Steps:
+
+1. Fix the number r of failures from the target: the error falls like 1/sqrt(r - 1). A rule that
+   stopped at a precise estimate would favour early failures.
+2. Draw samples until there are r failures, within the limits on samples.
+3. If the last failure ended the count, the unbiased estimate is (r - 1)/(n - 1) for n samples up to
+   this failure. Otherwise it is the share of failures.
+"""
 
 import math
 from typing import NamedTuple
@@ -12,11 +28,11 @@ from stiction.reliability.subset import Descent, Population
 from stiction.reliability.uncertainty import binomial_interval
 
 COUNT_BATCH = 1024
-"""Most samples that are drawn and solved before failures are counted again."""
+"""Most samples that are solved before failures are counted again."""
 
 
 class Counted(NamedTuple):
-    """Failures among samples; one that ended the count is not part of the estimate."""
+    """Failures among samples. If the last failure ended the count, it does not enter."""
 
     failures: int
     samples: int
@@ -24,25 +40,22 @@ class Counted(NamedTuple):
 
     @property
     def probability(self) -> float:
-        """Unbiased estimate: the share of failures, of all samples but the last failure.
-
-        Haldane (1945); with limits on the samples, Girshick, Mosteller and Savage (1946).
-        """
+        """Unbiased estimate of the probability (step 3)."""
         last = int(self.until_failure)
         return (self.failures - last) / (self.samples - last)
 
     @property
     def cv(self) -> float:
-        """Standard error over the estimate."""
+        """Standard error of the estimate over the estimate."""
         last = int(self.until_failure)
         if self.failures <= last:
             return math.inf
-        # If no sample held, count as if one more had: no count is certain.
+        # If all samples failed, count one more that holds, because no count is certain.
         held = max(1.0 - self.probability, 1.0 / (self.samples + 1.0))
         return math.sqrt(held / (self.failures - last))
 
     def interval(self) -> tuple[float, float]:
-        """Return Clopper and Pearson's interval, the negative binomial one until a failure."""
+        """Return the interval of Clopper and Pearson, or the negative binomial one (step 2)."""
         low, high = binomial_interval(self.failures, self.samples)
         if self.until_failure:
             high = binomial_interval(self.failures - 1, self.samples - 1)[1]
@@ -59,16 +72,17 @@ def count_failures(
     max_evaluations: int,
     start: int = 0,
 ) -> tuple[Counted, Descent]:
-    """Count until there are enough failures, at least `least` samples from `start` on.
+    """Count until there are enough failures, and at least `least` samples from `start` on.
 
-    The number of failures is fixed beforehand: stopping at a precise estimate would favour
-    early failures. Samples beyond the last of them do not count, but are returned too.
+    Samples beyond the last counted failure are returned, too.
     """
+    # 1.
     wanted = 2 + math.ceil(1.0 / (target_cv * target_cv))  # the error falls like 1/sqrt(r - 1)
     least = min(least, max_evaluations)
     parts: list[Array] = []
     members: list[NDArray[np.int64]] = []
     done = failures = 0
+    # 2.
     while done < least or (failures < wanted and done < max_evaluations):
         size = least - done
         if size <= 0:
@@ -85,7 +99,5 @@ def count_failures(
         last = int(np.flatnonzero(values < stress)[wanted - 1])
         if last >= least:
             count = Counted(wanted, last + 1, until_failure=True)
-    level = Population(
-        math.inf, 0.0, values, np.arange(done), np.concatenate(members), np.empty((0, 0))
-    )
+    level = Population(math.inf, 0.0, values, np.arange(done), np.concatenate(members))
     return count, Descent(done, [level], stress, done, complete=True)

@@ -5,8 +5,8 @@ a factor b between specimens and a field f within. A handful of parameters (m an
 differs between equally likely interfaces of one field, and T is m b R(f) if the onset is in
 proportion to the strength. The solver is needed for R only.
 
-Source. Conditional Monte Carlo (Hammersley, 1956; Asmussen and Glynn, Stochastic Simulation,
-2007, section V.4), by stratified sampling in place of the integral over b.
+Source. Conditional Monte Carlo (Hammersley, 1956, Mathematical Proceedings of the Cambridge
+Philosophical Society 52, 73; Asmussen and Glynn, Stochastic Simulation, 2007, section V.4).
 
 Steps:
 
@@ -14,12 +14,12 @@ Steps:
 2. Divide each onset by the factor and the mean of its own sample.
 3. Multiply it by the means of other interfaces of the same field, evenly spread over these, and by
    factors at stratified shares of their laws: `FACTORS` specimens in all.
-4. Specimens of one solved sample are one family, from whose shares among the failures the error
-   follows (`uncertainty.ancestral_variance`), as in subset simulation.
+4. Specimens of one solved sample are one family. The error follows from the shares of families
+   among the failures (`uncertainty.ancestral_variance`), as in subset simulation.
 5. Solve more samples until the error is small enough.
 
-Where the onset is not in proportion to the strength there is one specimen for each sample, and
-this is plain counting.
+Departures. Stratified sampling replaces the integral over b. If the onset is not in proportion to
+the strength, each sample has one specimen, and this is plain counting.
 """
 
 import math
@@ -41,15 +41,15 @@ FACTORS = 128
 CHARACTERISTIC = 0.05
 """Share of the specimens below the characteristic value."""
 FIRST_SAMPLES, MOST_STEP_SAMPLES = 500, 8_000
-"""Samples that are solved at first, and most that are solved in one step."""
+"""Samples that are solved at first, and most samples in a later step."""
 COUNT_MARGIN = 1.1
-"""Factor on the number of samples, as the error so far is itself an estimate."""
+"""Factor on the number of samples, because the error so far is itself an estimate."""
 SUBSET_EVALUATIONS = 50.0
-"""Evaluations of subset simulation for a coefficient of variation of 1, over log10(P)^2: fitted to
-the table of docs/reliability.md."""
+"""Evaluations of subset simulation for a coefficient of variation of 1, over log10(P)^2. It was
+fitted to the table of docs/reliability.md."""
 LONG_LIST, LIST_COST = 100, 5.0
-"""Interfaces from which on a list is long, and the cost of an evaluation along chains over a long
-list, in evaluations that count."""
+"""Number of interfaces above which a list is long, and cost of an evaluation in chains over a long
+list, over the cost of an evaluation in counting."""
 
 
 class Counts(NamedTuple):
@@ -58,27 +58,21 @@ class Counts(NamedTuple):
     state: LimitState
     values: Array  # (samples, specimens), Pa
     members: NDArray[np.int64]
-    shares: Array  # NaN where the sample has its own factor
+    shares: Array  # NaN if the sample keeps its own factor
 
     @property
     def tail(self) -> Tail:
-        """The lower tail, of which each solved sample is one ancestor."""
+        """The lower tail. Each solved sample is one ancestor."""
         samples, specimens = self.values.shape
         ancestors = np.repeat(np.arange(samples), specimens)
-        level = Population(
-            math.inf,
-            0.0,
-            self.values.ravel(),
-            ancestors,
-            self.members.ravel(),
-            np.empty((0, 0)),
-        )
+        values, members = self.values.ravel(), self.members.ravel()
+        level = Population(math.inf, 0.0, values, ancestors, members)
         descent = Descent(samples, [level], -math.inf, samples, complete=True)
         reason = f"counting takes fewer evaluations: {specimens} specimens of each sample"
         return Tail([descent], "plain", reason, samples)
 
     def draws(self, picks: NDArray[np.int64]) -> Array:
-        """Return the draws of some specimens, by their numbers."""
+        """Return the draws of some specimens by their numbers."""
         state, specimens = self.state, self.values.shape[1]
         random, seed = state.experiment.random, state.experiment.seed
         rows = [state.draws(seed, int(pick) // specimens, 1) for pick in picks]
@@ -92,7 +86,7 @@ class Counts(NamedTuple):
         return draws
 
     def characteristic(self, confidence: float) -> float:
-        """Return the 5 % quantile that this share of the interfaces exceeds, Pa.
+        """Return the 5 % quantile that a share `confidence` of the interfaces exceeds, Pa.
 
         Onsets of an interface are those of a mean and a factor of 1 in its group, times its mean
         and factors at equal shares of its law.
@@ -117,7 +111,7 @@ class Counts(NamedTuple):
         return float(np.quantile(quantiles, 1.0 - confidence))
 
     def lowest(self, stress: float, count: int) -> tuple[Array, Array]:
-        """Return draws and onsets of some of the lowest specimens, half of them below a stress."""
+        """Return draws and onsets of the lowest specimens, half of them below a stress."""
         values = self.values.ravel()
         below = int(np.sum(values < stress))
         order = np.argpartition(values, min(2 * below, values.size - 1))[: 2 * below]
@@ -149,12 +143,12 @@ def solve(state: LimitState, first: int, samples: int) -> Counts:
     if not _expands(state):
         return Counts(state, onsets[:, None], members[:, None], np.full((samples, 1), np.nan))
     laws, law = random.factor_laws
-    # 2. onsets of a factor of 1 and a mean of 1
+    # 2.
     ratios = onsets / random.means[members]
     for number in np.unique(law[members]):
         rows = np.flatnonzero(law[members] == number)
         ratios[rows] /= from_normal(laws[number], draws[rows, column])
-    # 3. other interfaces of the same field, and their factors
+    # 3.
     rng = generator(experiment.seed, 5, first)
     steps = (np.arange(FACTORS) + rng.random((samples, FACTORS))) / FACTORS
     chosen = np.empty((samples, FACTORS), np.int64)
@@ -173,7 +167,7 @@ def solve(state: LimitState, first: int, samples: int) -> Counts:
 
 
 def count_tail(state: LimitState, goal: Goal, budget: int) -> tuple[Counts, Tail] | None:
-    """Count until the goal is reached (steps 4 and 5); None if subset simulation costs less."""
+    """Count until the goal is reached (steps 4 and 5), or return None if chains cost less."""
     long_list = len(state.experiment.random.members) > LONG_LIST
     if state.may_survive or not (long_list or _expands(state)):
         return None
@@ -182,7 +176,7 @@ def count_tail(state: LimitState, goal: Goal, budget: int) -> tuple[Counts, Tail
         tail, samples = counts.tail, len(counts.values)
         stress = tail.quantile(goal.probability) if goal.probability else goal.stress
         chance, cv = goal.probability or tail.probability(stress), tail.cv(stress)
-        if counts.values.shape[1] == 1 and goal.probability:  # of counting itself
+        if counts.values.shape[1] == 1 and goal.probability:  # the error of plain counting
             cv = max(cv, math.sqrt((1.0 - chance) / (chance * samples)))
         state.meter.note = f"c.o.v. {cv:.2g} (target {goal.cv:g})"
         if cv <= goal.cv or samples >= budget:

@@ -1,4 +1,21 @@
-"""Failure probability, design stress and the curve of both: by counting, or by the tail."""
+"""Failure probability, design stress and the curve of both, by counting or by the tail.
+
+Problem. The onset T of a random interface has the distribution P(T < s). Estimate it at a stress s,
+or the stress of a probability, with a given coefficient of variation.
+
+Sources. Each algorithm has its own file: `counting`, `factors`, `subset`, `two_level`, `tail`.
+
+Steps:
+
+1. Answer at once if the stress lies outside the bounds of the onset.
+2. Count with many specimens for each solved field, if this costs less (`factors`).
+3. Otherwise solve a pilot of plain samples. Count if failures are frequent, or if the method is too
+   slow for chains (`counting`). Sample the tail if they are rare (`tail`).
+4. If interfaces are drawn from a fit or a posterior, draw more of them until the error by their
+   number is small enough, and repeat steps 1 to 3.
+5. Solve some samples near the stress exactly, if the method is approximate, and warn if more or
+   fewer of them fail (`answer.exact_doubts`).
+"""
 
 import math
 from collections.abc import Callable, Mapping
@@ -22,7 +39,6 @@ from stiction.problem.results import along, study_attributes, to_dataset
 from stiction.random.equally_likely import AnyRandom, as_random
 from stiction.random.spectra import Share
 from stiction.reliability.answer import (
-    SAMPLING_SHARE,
     Answer,
     Budget,
     Estimate,
@@ -34,6 +50,7 @@ from stiction.reliability.answer import (
     few_members,
     imprecise,
     prepare,
+    sampling_target,
     too_slow,
     wanted_members,
 )
@@ -46,27 +63,27 @@ from stiction.reliability.uncertainty import binomial_interval, generator, logno
 F = TypeVar("F", Answer, Estimate)
 
 PILOT_SAMPLES = 1_000
-"""Number of plain samples by which the algorithm is chosen."""
+"""Number of plain samples that decide about the algorithm."""
 FREQUENT = 0.01
 """Probability above which counting needs no more evaluations than subset simulation."""
 FRESH = 1.5
-"""Least ratio of different members for which a longer list is computed."""
+"""Least ratio of different members that makes a longer list worthwhile."""
 CURVE_CV = 0.3
 """Coefficient of variation at the end of a curve by default."""
 COMMONEST, PER_DECADE = 0.5, 3
-"""Probability at which a curve begins, and its points for each decade."""
+"""Probability at the beginning of a curve, and points per decade."""
 NEGLIGIBLE_PROBABILITY = 1e-15
 """Probability of failing, or of holding, below which no sample is drawn."""
 DOUBTFUL = 0.02
 """Share of the mean strength below which a stress is probably in another unit."""
 THOUSAND = 1e3
-"""Factor off the mean strength that means another unit: kN for N, MPa for Pa."""
+"""Ratio to the mean strength that means another unit, such as kN for N or MPa for Pa."""
 SHOWN_PROFILES = 20
-"""Failing profiles kept."""
+"""Number of failing profiles in an answer."""
 CHECKED_FAILURES = 32
-"""Number of failures among the samples that are also solved by equilibrium."""
+"""Number of failures among the samples that equilibrium solves, too."""
 COVERED = 0.8
-"""Share of the failures that the first stage must reach to avoid a warning."""
+"""Share of the failures below which the first stage leads to a warning."""
 
 CURVE: dict[str, Variable] = {
     name: Variable(unit, text, ("point",))
@@ -115,36 +132,36 @@ def failure_probability(
     problem, seed, workers, progress
         As in `monte_carlo`. The total number of samples is an estimate.
     random : RandomInterface, RandomField, list of them, FieldFit or Posterior
-        Of a list, each is equally likely. From a fit or a posterior, or any object with a method
-        ``interfaces(count, seed)``, as many are drawn as the target needs, from 1,000 up to 8,000.
-        The answer is then the mean over them, the predictive probability, and has its `band`.
+        The members of a list are equally likely. From a fit, a posterior, or any object with a
+        method ``interfaces(count, seed)``, as many interfaces are drawn as the target needs, from
+        1,000 up to 8,000. The answer is then their mean, the predictive probability, and has a
+        `band`.
     stress : float, optional
         Mean shear stress to carry, Pa. Failure is an onset strictly below it.
     method : LocalCriterion, Equilibrium or Rupture
-        `Rupture`, and any method too slow for subset simulation, is used with plain Monte
-        Carlo unless `max_evaluations` is 20,000 or more.
+        `Rupture` and other methods that are too slow for subset simulation use plain Monte
+        Carlo, unless `max_evaluations` is 20,000 or more.
     friction_coefficient : float, optional
-        Instead of `stress`: ratio of mean shear stress to mean normal pressure that it must
-        carry. If the pressure is random, each sample's own pressure counts.
+        Instead of `stress`: ratio of mean shear stress to mean normal pressure to carry. If the
+        pressure is random, each sample's own pressure counts.
     force : float, optional
         Instead of `stress`: shear force to carry, N. The area of the interface must be known.
     algorithm : {"auto", "plain", "subset", "two_level"}
-        Plain Monte Carlo, subset simulation, or subset simulation by the local criterion
-        with equilibrium as the last level; see the page 'Failure probability' of the
-        documentation. `reason` in the result says why 'auto' took one.
+        Plain Monte Carlo, subset simulation, or subset simulation by the local criterion with
+        equilibrium as the last level. See the page 'Failure probability' of the documentation.
+        `reason` in the result explains the choice of 'auto'.
     target_cv : float
-        Coefficient of variation to reach, that by the list of interfaces included.
+        Coefficient of variation to reach, including the part by the list of interfaces.
     max_evaluations : int, optional
-        Largest number of samples to solve: by default as many as take a quarter of an hour
-        on one core, at most 2,000,000; 1,000 by rupture.
+        Largest number of samples to solve. By default a quarter of an hour on one core, at most
+        2,000,000 samples, and 1,000 for ruptures.
     event : {"critical_stress", "first_instability"}
         Whether the interface as a whole has to slide, or the first patch to become
         unstable, arrested or not. By the local criterion they are the same.
     mixture : bool
-        Whether a list of interfaces is complete, such as three batches of which each is
-        equally common. The interval then holds the sampling error only. By default the list
-        counts as a sample of the interfaces that may be true, and a short one makes the
-        interval wide.
+        Whether a list of interfaces is complete, such as three equally common batches. The
+        interval then contains the sampling error only. By default the list is a sample of the
+        interfaces that may be true, and a short list makes the interval wide.
 
     Returns
     -------
@@ -154,16 +171,16 @@ def failure_probability(
     Raises
     ------
     InputError
-        If any argument is invalid; the message lists every problem.
+        If any argument is invalid. The message lists every problem.
 
     Warns
     -----
     AccuracyWarning
-        If the estimate is unreliable; `warnings` in the result holds the same texts. By the
-        local criterion, some samples near the stress are also solved by equilibrium.
+        If the estimate is unreliable. `warnings` in the result has the same texts. If the method
+        is the local criterion, equilibrium solves some samples near the stress, too.
     UnitWarning
-        If the stress is below a fiftieth or above fifty times of the mean strength; a
-        thousand times is an `InputError`.
+        If the stress is below a fiftieth or above fifty times the mean strength. A factor of a
+        thousand is an `InputError`.
 
     Examples
     --------
@@ -176,11 +193,11 @@ def failure_probability(
     True
     """
     given = {"stress": stress, "force": force, "friction_coefficient": friction_coefficient}
-    asked = [name for name, one in given.items() if one is not None]
+    asked = [name for name, value in given.items() if value is not None]
     if len(asked) != 1:
         raise InputError(
-            "stress: give one of stress (Pa), force (N) and friction_coefficient, got"
-            f" {' and '.join(asked) or 'none'}"
+            "stress: give exactly one of stress (Pa), force (N) and friction_coefficient. Got"
+            f" {' and '.join(asked) or 'no value'}"
         )
     [name] = asked
     if force is not None:
@@ -191,13 +208,11 @@ def failure_probability(
             experiment, event, workers, meter, max_evaluations,
             algorithm=algorithm, per_pressure=stress is None,
         )  # fmt: skip
-        wanted = (
-            (friction_coefficient or 0.0) * experiment.pressure if stress is None else stress
-        )
+        wanted = stress
+        if wanted is None:
+            wanted = (friction_coefficient or 0.0) * experiment.pressure
         _check_unit(state, name, given[name] or 0.0, wanted)
-        answer = _probability(
-            state, float(wanted), algorithm, target_cv, budget, max_evaluations
-        )
+        answer = _probability(state, wanted, algorithm, target_cv, budget, max_evaluations)
         return replace(answer, quantity=name)
 
     experiment = Experiment(problem, as_random(random, seed, mixture), method, seed=seed)
@@ -226,14 +241,14 @@ def _of_enough_members(
     warned: list[Warned],
     solve: Callable[[Experiment, Meter], F],
 ) -> tuple[Experiment, F]:
-    """Return what is solved, with as many members as the error by the list needs."""
+    """Return a solution with as many members as the error by the list needs (step 4)."""
     while True:
         solution, known = solve(experiment, meter), experiment.random
         if not (count := wanted_members(known, solution.members_cv, target_cv)):
             return experiment, solution
         meter.note = f"{count:,} interfaces, c.o.v. by the list {solution.members_cv:.2g}"
         larger = known.larger(count, experiment.seed)
-        # A longer list by a posterior of a list holds some more that are rare.
+        # The list of a posterior over a list has few more different members.
         if larger.kinds.max() + 1 < FRESH * (known.kinds.max() + 1):
             return experiment, solution
         experiment = replace(experiment, random=larger)
@@ -241,7 +256,7 @@ def _of_enough_members(
 
 
 def _check_unit(state: LimitState, name: str, given: float, stress: float) -> None:
-    """Doubt a demand far off the mean strength; refuse it a thousand times off."""
+    """Warn of a demand far from the mean strength, and refuse it a thousand times away."""
     ratio = stress / state.experiment.mean_strength
     unit = f" {CURVE[name].units}".removesuffix(" 1")
     possible = 1.0 / THOUSAND, THOUSAND
@@ -249,7 +264,7 @@ def _check_unit(state: LimitState, name: str, given: float, stress: float) -> No
     if ratio > 0.0:
         text = (
             f"{name}: {given:g}{unit} is {ratio:.2g} times the mean strength,"
-            f" {in_words(CURVE[name].units, given / ratio)}; check the units (stress in Pa, force"
+            f" {in_words(CURVE[name].units, given / ratio)}. Check the units (stress in Pa, force"
             " in N, friction_coefficient without unit)"
         )
         doubt_units([Doubt(text, ratio, (least, 1.0 / DOUBTFUL), possible)])
@@ -259,16 +274,20 @@ def _probability(
     state: LimitState, stress: float, algorithm: str, target_cv: float, budget: int,
     allowed: int | None,
 ) -> Answer:  # fmt: skip
+    """Return the answer by the chosen algorithm (steps 1 to 3)."""
+    # 1.
     likely = state.likely_bounds(NEGLIGIBLE_PROBABILITY)
     if not likely[0] < stress < likely[1]:
         return _certain(state, stress, likely)
     reason, pilot, least = "as requested", None, min(PILOT_SAMPLES, max(budget // 5, 50))
+    goal = Goal(sampling_target(state, target_cv), stress)
     if algorithm == "auto" and (slow := too_slow(state.experiment, allowed)):
         algorithm, reason = "plain", slow
     elif algorithm == "auto":
-        aim = Goal(target_cv * (SAMPLING_SHARE if state.is_sample else 1.0), stress)
-        if counted := count_tail(state, aim, budget):
-            return _by_tail(Estimate(state, counted[1], stress), aim.cv, counted[0])
+        # 2.
+        if counted := count_tail(state, goal, budget):
+            return _by_tail(Estimate(state, counted[1], stress), goal.cv, counted[0])
+        # 3.
         state = weakest_first(state)
         draws = state.draws(state.experiment.seed, 0, least)
         pilot = draws, state(draws)
@@ -277,21 +296,19 @@ def _probability(
         algorithm = "auto" if rare else "plain"
         reason = f"{failures} failure{'s' * (failures != 1)} of {least} plain samples: "
         reason += "rare" if rare else "frequent enough to count"
-    target_cv *= SAMPLING_SHARE if state.is_sample else 1.0
     if algorithm == "plain":
         begun = 0 if pilot is None else least
-        return _by_counting(state, stress, target_cv, budget, least, begun, reason)
+        return _by_counting(state, goal, budget, least, begun, reason)
     if algorithm != "auto":
         state = weakest_first(state)
     tail = sample_tail(
-        state, Goal(target_cv, stress), algorithm=algorithm, budget=budget, reason=reason,
-        pilot=pilot,
-    )  # fmt: skip
-    return _by_tail(Estimate(state, tail, stress), target_cv)
+        state, goal, algorithm=algorithm, budget=budget, reason=reason, pilot=pilot
+    )
+    return _by_tail(Estimate(state, tail, stress), goal.cv)
 
 
 def _certain(state: LimitState, stress: float, likely: tuple[float, float]) -> Answer:
-    """Return the answer where no sample is needed."""
+    """Return the answer without samples (step 1)."""
     certain = not state.bounds[0] < stress < state.bounds[1]
     low, high = state.bounds if certain else likely
     doubt = 0.0 if certain else NEGLIGIBLE_PROBABILITY
@@ -301,7 +318,7 @@ def _certain(state: LimitState, stress: float, likely: tuple[float, float]) -> A
         reason = f"no interface carries more than {high:.7g} Pa"
     reason += "" if certain else f", but for a probability below {doubt:g}"
     members = len(state.experiment.random.members)
-    if state.is_sample:  # another list might hold others
+    if state.is_sample:  # another list might have other bounds
         doubt = max(doubt, binomial_interval(0, members)[1])
     return Answer.of(
         Estimate(state, Tail((), "exact", reason), stress),
@@ -314,38 +331,32 @@ def _certain(state: LimitState, stress: float, likely: tuple[float, float]) -> A
 
 
 def _by_counting(
-    state: LimitState,
-    stress: float,
-    target_cv: float,
-    budget: int,
-    least: int,
-    start: int,
-    reason: str,
+    state: LimitState, goal: Goal, budget: int, least: int, start: int, reason: str
 ) -> Answer:
     """Return the answer by plain Monte Carlo from sample `start` on.
 
-    Samples of a pilot do not enter: counting is chosen where they hold many failures.
+    Samples of a pilot do not enter, because counting is chosen if they have many failures.
     """
-    seed = state.experiment.seed
+    seed, stress = state.experiment.seed, goal.stress
 
     def drawn(numbers: Any) -> Array:
         rows = [state.draws(seed, start + int(one), 1) for one in numbers]
         return np.concatenate([np.empty((0, state.dimension)), *rows])
 
     count, counted = count_failures(
-        state, seed, stress, target_cv=target_cv, least=least,
-        max_evaluations=budget - start, start=start,
+        state, seed, stress, target_cv=goal.cv, least=least, max_evaluations=budget - start,
+        start=start,
     )  # fmt: skip
     stresses = counted.populations[0].values
     failed = np.flatnonzero(stresses < stress)
-    # The weakest samples: failures and others in their true shares.
+    # The weakest samples, with failures and others in their true shares.
     some = failed[:CHECKED_FAILURES]
     near = np.argsort(stresses[: some.max(initial=-1) + 1], kind="stable")[: 2 * some.size]
     estimate = Estimate(state, Tail([counted], "plain", reason, start + stresses.size), stress)
     cv, interval = math.hypot(count.cv, estimate.members_cv), count.interval()
     if estimate.members_cv:
         interval = lognormal_interval(count.probability, cv)
-    doubts = imprecise(count.cv, target_cv, estimate.tail.spent)
+    doubts = imprecise(count.cv, goal.cv, estimate.tail.spent)
     doubts += exact_doubts(state, (drawn(near), stresses[near]), stress, count.probability)
     return Answer.of(
         estimate, doubts, probability=count.probability, cv=cv, interval=interval,
@@ -354,6 +365,7 @@ def _by_counting(
 
 
 def _by_tail(estimate: Estimate, target_cv: float, counts: Counts | None = None) -> Answer:
+    """Return the answer from a tail, or from counts of specimens."""
     state, tail, stress = estimate.state, estimate.tail, estimate.stress
     probability, last = estimate.probability, tail.repetitions[-1]
     interval = lognormal_interval(probability, estimate.cv)
@@ -361,25 +373,24 @@ def _by_tail(estimate: Estimate, target_cv: float, counts: Counts | None = None)
     if tail.algorithm == "two_level" and probability == 0.0:
         interval = 0.0, math.exp(last.populations[-1].log_probability)
         doubts = [
-            f"{tail.short_of('a failure')}; the interval ends at the last level of the first stage"
+            f"{tail.short_of('a failure')}. The interval ends at the last level of the first stage"
         ]
     elif tail.algorithm == "two_level":
         covered = min(one.last for one in tail.repetitions)
         if covered < COVERED:
             doubts.append(
-                f"the local criterion misses {1.0 - covered:.0%} of the failures: the estimate may"
-                " be low; compare with algorithm='subset'"
+                f"the local criterion misses {1.0 - covered:.0%} of the failures, so that the"
+                " estimate may be too low. Compare with algorithm='subset'"
             )
     elif counts:
-        doubts += exact_doubts(
-            state, counts.lowest(stress, 2 * CHECKED_FAILURES), stress, probability
-        )
+        near = counts.lowest(stress, 2 * CHECKED_FAILURES)
+        doubts += exact_doubts(state, near, stress, probability)
     elif tail.complete:
         doubts += exact_doubts(state, last.around(stress), stress, probability)
     else:
         there = tail.probability(tail.reached), tail.cv(tail.reached)
         interval = 0.0, lognormal_interval(*there)[1]
-        doubts = [f"{tail.short_of(f'{stress:.7g} Pa')}; the interval ends there"]
+        doubts = [f"{tail.short_of(f'{stress:.7g} Pa')}. The interval ends there"]
     if counts:
         draws = counts.failing(stress, SHOWN_PROFILES)
     else:
@@ -390,6 +401,7 @@ def _by_tail(estimate: Estimate, target_cv: float, counts: Counts | None = None)
 
 
 def _profiles(state: LimitState, draws: Array) -> xr.Dataset:
+    """Return the profiles of draws with their onsets, labelled."""
     if not draws.shape[0]:
         return xr.Dataset()
     problem, method = state.experiment.problem, state.experiment.method
@@ -420,7 +432,7 @@ def design_stress(
 ) -> Answer:
     """Estimate the stress below which the interface slides with a given probability.
 
-    This is a quantile of the onset stress, from one set of repetitions of subset simulation.
+    It is a quantile of the onset stress, from one set of repetitions of subset simulation.
 
     Parameters
     ----------
@@ -430,27 +442,27 @@ def design_stress(
         `Rupture`, or a method that would take more than a quarter of an hour on one core,
         is refused unless `max_evaluations` is 20,000 or more.
     target_cv : float
-        Coefficient of variation to reach, of the failure probability at the stress.
+        Coefficient of variation to reach for the failure probability at the stress.
     confidence : float
-        Of the `characteristic_stress`.
+        Confidence of the `characteristic_stress`.
     sensitivities : bool or mapping, optional
-        Whether to compute what moves the design: by default if `random` is a fit, a posterior
-        or `uncertain`. A mapping of dotted keys of the problem to ranges, such as
-        ``{"problem.friction.residual_ratio": (0.6, 0.8)}``, replaces the usual 10 % on either
-        side.
+        Whether to compute the effects of families and constants on the design. By default they are
+        computed if `random` is a fit, a posterior or `uncertain`. A mapping from dotted keys of the
+        problem to ranges, such as ``{"problem.friction.residual_ratio": (0.6, 0.8)}``, replaces the
+        usual 10 % on either side.
     problem, random, seed, max_evaluations, event, mixture, workers, progress
         As in `failure_probability`.
 
     Returns
     -------
     Answer
-        With `stress` and its 95 % `interval`, Pa, which holds the error of the computation, and
+        With `stress`, its 95 % `interval` by the error of the computation (Pa), and
         `sensitivities`.
 
     Raises
     ------
     InputError
-        If any argument is invalid; the message lists every problem.
+        If any argument is invalid. The message lists every problem.
 
     Warns
     -----
@@ -486,8 +498,9 @@ def design_stress(
 def _quantile(
     state: LimitState, probability: float, target_cv: float, budget: int, confidence: float
 ) -> Answer:
+    """Return the design stress by counting or by the tail."""
     lowest = state.bounds[0]
-    target_cv *= SAMPLING_SHARE if state.is_sample else 1.0
+    target_cv = sampling_target(state, target_cv)
     goal = Goal(target_cv, probability=probability)
     counted = count_tail(state, goal, budget)
     if counted:
@@ -510,15 +523,15 @@ def _quantile(
     if math.isinf(estimate.stress):
         doubts.append(
             f"the event happens in {1.0 - tail.survived:.3g} of all samples, less than"
-            f" P = {probability:g}: no stress has that probability"
+            f" P = {probability:g}. No stress has that probability"
         )
     bound = Estimate(state, tail, math.nextafter(lowest, math.inf))
     if bound.probability >= probability:
         estimate, asked["stress"] = bound, lowest
         doubts.append(
             f"{bound.probability:.2g} of all samples slide at the bound of {lowest:.7g} Pa,"
-            " within the accuracy of the method: the stress at P ="
-            f" {probability:g} is the bound itself"
+            f" within the accuracy of the method. The stress at P = {probability:g} is the bound"
+            " itself"
         )
     doubts += imprecise(estimate.sampling_cv, target_cv, tail.spent)
     if tail.algorithm != "two_level":
@@ -557,26 +570,27 @@ def failure_curve(
     smallest : float
         Smallest probability of the curve.
     target_cv : float
-        Coefficient of variation to reach at the smallest probability; it is lower
-        elsewhere. Repetitions are added until it is reached: the same, of the same numbers,
-        as those of `Study.failure_curve`.
+        Coefficient of variation to reach at the smallest probability. It is lower elsewhere.
+        Repetitions are added until it is reached. They equal the repetitions of
+        `Study.failure_curve` with the same numbers.
     problem, random, method, seed, max_evaluations, event, mixture, workers, progress
         As in `design_stress`.
 
     Returns
     -------
     xarray.Dataset
-        Over 'point': `stress`, `stress_above_bound` (Pa), `probability` with `probability_low`,
-        `probability_high` and `cv`, `stress_low`, `stress_high` (Pa), and with a normal pressure
-        `friction_coefficient`, the stress over its mean, and with an area `force` (N).
-        `stress_above_bound` means little where the attribute `lower_bound` is zero or less. Of a
-        list, `probability` is the mean over its interfaces; `members`, over 'point' and 'member',
-        has the curve of each, and 5 and 95 % of them have at most `band_low` and `band_high`.
+        Over 'point': `stress` and `stress_above_bound` (Pa), `probability` with
+        `probability_low`, `probability_high` and `cv`, and `stress_low` and `stress_high` (Pa).
+        With a normal pressure also `friction_coefficient`, the stress over its mean, and with an
+        area `force` (N). `stress_above_bound` has no meaning if the attribute `lower_bound` is zero
+        or less. For a list of interfaces, `probability` is their mean. `members`, over 'point' and
+        'member', has the curve of each interface, and 5 and 95 % of the interfaces have at most
+        `band_low` and `band_high`.
 
     Raises
     ------
     InputError
-        If any argument is invalid; the message lists every problem.
+        If any argument is invalid. The message lists every problem.
 
     Warns
     -----
@@ -598,7 +612,7 @@ def failure_curve(
         def solve(experiment: Experiment, meter: Meter) -> Estimate:
             state, budget = prepare(experiment, event, workers, meter, max_evaluations)
             state = weakest_first(state)
-            aim = target_cv * (SAMPLING_SHARE if state.is_sample else 1.0)
+            aim = sampling_target(state, target_cv)
             tail = sample_curve(state, Goal(aim, probability=smallest), budget)
             reached = tail.quantile(smallest) if tail.complete else tail.reached
             return Estimate(state, tail, reached)
@@ -615,7 +629,7 @@ def failure_curve(
 def curve_doubts(end: Estimate, smallest: float, target_cv: float = CURVE_CV) -> list[str]:
     """Return the reasons not to trust the end of a curve."""
     if not end.tail.complete:
-        return [f"{end.tail.short_of(f'P = {smallest:g}')}; the curve ends there"]
+        return [f"{end.tail.short_of(f'P = {smallest:g}')}. The curve ends there"]
     doubts = few_members(end.state.experiment.random, end, target_cv)
     near = end.tail.repetitions[-1].around(end.stress)
     return doubts + exact_doubts(end.state, near, end.stress, smallest)
@@ -647,7 +661,9 @@ def curve_of(
         )
     table: dict[str, Any] = dict(zip(CURVE, np.array(rows).T, strict=False))
     table["members"] = np.array(members)
-    survive = np.isinf(table["stress"])  # so many that no stress has this probability
+    survive = np.isinf(
+        table["stress"]
+    )  # so many samples survive that no stress has this chance
     for values in table.values():
         values[survive] = np.nan
     known = {

@@ -10,9 +10,9 @@ walk whose acceptance does not fall with the dimension.
 Steps. A level is the set of z with g(z) below its ceiling.
 
 1. Draw N samples and evaluate them: the first level, whose ceiling is infinite.
-2. The next ceiling is the lowest value that does not go on, if a tenth of N goes on. Where
-   this is below the requested threshold, the threshold takes its place. Where it is at the floor
-   of g, the number just above the floor does.
+2. The next ceiling is the lowest value that does not go on, if a tenth of N goes on. If this is
+   below the requested threshold, take the threshold. If it is at the floor of g, take the number
+   just above the floor.
 3. The probability of the next level is that of the last one times the share of its samples
    strictly below the ceiling.
 4. Stop if the threshold, the floor or the requested probability is reached. Stop without having
@@ -28,7 +28,7 @@ Steps. A level is the set of z with g(z) below its ceiling.
 
 Departures. Only samples strictly below the ceiling go on: then the product of the shares is
 unbiased although the levels are chosen from the samples (Brehier, Gazeau, Goudenege, Lelievre
-and Rousset, 2016). Where the lowest values are all equal, the next higher value is the ceiling.
+and Rousset, 2016). If the lowest values are all equal, the next higher value is the ceiling.
 All chains move together, and the step size follows their acceptance at every step.
 """
 
@@ -65,13 +65,13 @@ class Population(NamedTuple):
     log_probability: float  # of the level
     values: Array  # (samples,)
     ancestors: NDArray[np.int64]  # the sample of the first level that each descends from
-    members: NDArray[np.int64]  # (samples,); which of equally likely interfaces each is of
-    draws: Array  # (samples, dimension); empty for early levels
+    members: NDArray[np.int64]  # (samples,), number of the interface of each
+    draws: Array = np.empty((0, 0))  # (samples, dimension); empty for early levels
     acceptance: float = 1.0  # share of Metropolis steps
     step: float = FIRST_STEP  # b at the end
 
     def light(self) -> Self:
-        """Return the same population without draws, which take nearly all of the memory."""
+        """Return the population without draws, which take nearly all of the memory."""
         return self._replace(draws=np.empty((0, self.draws.shape[1])))
 
 
@@ -87,9 +87,9 @@ class Below(NamedTuple):
 class Descent(NamedTuple):
     """A finished repetition: populations from all samples down to the rarest.
 
-    It is complete if it reached the threshold or the requested probability. By two levels
-    it has one population: the samples to which the guide leads, with their exact values;
-    `last` and `walked` are of walks among failures (see `two_level`).
+    It is complete if it reached the threshold or the requested probability. By two levels it has
+    one population, the samples to which the guide leads with their exact values. `last` and
+    `walked` belong to walks among failures (see `two_level`).
     """
 
     samples: int  # N, of the first level and, within a few, of each other
@@ -104,7 +104,7 @@ class Descent(NamedTuple):
 
     @property
     def extent(self) -> tuple[float, float]:
-        """Lowest and highest finite value; without any, plus and minus infinity."""
+        """Lowest and highest finite value. Plus and minus infinity if there is no such value."""
         lowest, plain = self.populations[-1].values, self.populations[0].values
         low = float(lowest.min(initial=math.inf))
         return low, float(plain.max(where=plain < math.inf, initial=-math.inf))
@@ -123,7 +123,7 @@ class Descent(NamedTuple):
         return [one for one in self.populations if one.ceiling >= value]
 
     def probability(self, value: float) -> float:
-        """Return the estimate of P(function < value) (step 6); zero without a sample below."""
+        """Return the estimate of P(function < value) (step 6). Zero without a sample below."""
         rarest = self._holders(value)[-1]
         return math.exp(rarest.log_probability) * _share(rarest.values < value) / self.last
 
@@ -150,8 +150,8 @@ class Descent(NamedTuple):
     def around(self, value: float) -> tuple[Array, Array]:
         """Return draws and values on both sides of a value, in their true shares.
 
-        They are the lowest of a population, twice as many as lie below the value. With more
-        than half of it below, almost none of the other side would be shown.
+        They are the lowest of a population, twice as many as lie below the value. Take a less rare
+        population if more than half of it lies below.
         """
         holders = self._holders(value)
         while True:
@@ -213,9 +213,9 @@ def descend(
 ) -> Descent:
     """Walk down to a threshold or a probability, whichever comes first.
 
-    `function` takes draws (k, dimension) to values (k,); low values are rare, and none is
-    below `floor`. Each level has `samples`; none is begun that would exceed
-    `max_evaluations`. `label` returns which of equally likely interfaces each sample is of.
+    `function` takes draws (k, dimension) to values (k,), of which low ones are rare and at least
+    `floor`. Each level has `samples`. It begins only if it does not exceed `max_evaluations`.
+    `label` returns the number of the equally likely interface of each sample.
     """
     count = max(2, round(samples * LEVEL_PROBABILITY))
     samples = count * max(2, round(samples / count))

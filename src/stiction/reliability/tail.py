@@ -7,21 +7,20 @@ Source. Independent repetitions of subset simulation (`subset`) or of two levels
 
 Steps:
 
-1. Choose the algorithm if it is 'auto' and two levels are possible: solve a pilot of plain
-   samples by the method and by its less expensive first stage, the guide. Take two
-   levels if the guide's weakest tenth holds at least `LEAST_SHARE_PICKED` of the weakest
-   fiftieth of the samples.
-2. Make a repetition of moderate size, which depends on the seed and its number only.
-3. Pool repetitions: p = sum of w_r p_r, with shares w_r by their numbers of samples,
+1. If the algorithm is 'auto' and two levels are possible, solve a pilot of plain samples by the
+   method and by its less expensive first stage, the guide. Take two levels if the weakest tenth by
+   the guide contains at least `LEAST_SHARE_PICKED` of the weakest fiftieth of the samples.
+2. Make a repetition of moderate size. It depends on the seed and its number only.
+3. Pool repetitions: p = sum of w_r p_r, with shares w_r in proportion to their numbers of samples,
    which do not depend on the outcome. The squared coefficient of variation is the sum of
    (w_r p_r)^2 v_r over p^2, with the relative variances v_r.
-4. If it is above the target, make the next repetition, of the size that would reach the target
-   within the limits of size and evaluations (2), and pool again (3).
-5. If a share below `POOR` of the samples of a guide that 'auto' chose are failures, sample
+4. If it is above the target, make the next repetition (2) and pool again (3). Its size would reach
+   the target, within the limits of size and evaluations.
+5. If fewer than a share `POOR` of the samples of a guide that 'auto' chose are failures, sample
    again by subset simulation.
-6. The stress of a probability follows from p(s) by bisection. The ends of its interval are
-   the stresses of the ends of the interval of p. Where no sample is so low, the lower end is
-   the least possible stress.
+6. The stress of a probability follows from p(s) by bisection. The ends of its interval are the
+   stresses of the ends of the interval of p. The lower end is the least possible stress if no
+   sample is so low.
 """
 
 import math
@@ -39,26 +38,26 @@ from stiction.reliability.two_level import bridge
 from stiction.reliability.uncertainty import generator, log_width
 
 UNLIMITED_EVALUATIONS = 10**18
-"""Evaluations that no repetition needs."""
+"""More evaluations than any repetition needs."""
 SIZE_MARGIN = 1.1
-"""Factor on the sample size, as the variance so far is itself an estimate."""
+"""Factor on the sample size, because the variance so far is itself an estimate."""
 SUBSET, BRIDGE, OF_CURVES = (1, 1_000, 5_000), (3, 200, 1_000), (4, 2_000, 2_000)
-"""First key of the generators; samples per level, or exact samples of two levels, of the first
-and of the largest repetition. Those of curves are stored: all are of one size."""
+"""First key of the generators, and samples per level, or exact samples of two levels, of the first
+and of the largest repetition. Repetitions of curves are stored and have one size."""
 DEEPER = 0.3
-"""Repetitions go on to this share of a probability, for the lower end of the interval."""
+"""Share of a probability to which repetitions go on for the lower end of the interval."""
 GUIDE_PILOT_SAMPLES = 500
-"""Number of plain samples by which a less expensive method is judged as a guide."""
+"""Number of plain samples that decide about a guide."""
 LEAST_SHARE_PICKED = 0.9
-"""Share of the weakest of them that a guide must pick to lead to the rarest."""
+"""Share of the weakest of them that a guide must pick."""
 RESOLVED = 3
-"""Samples of one of equally likely interfaces that tell its probability from others."""
+"""Fewest samples that determine the probability of one of the equally likely interfaces."""
 POOR = 0.02
-"""Least share of failures among the samples of a guide; below it the method is no guide."""
+"""Least share of failures among the samples of a guide."""
 
 
 class Goal(NamedTuple):
-    """What a tail is sampled for: the probability of a stress, or the stress of a probability."""
+    """Goal of sampling a tail: the probability of a stress, or the stress of a probability."""
 
     cv: float  # coefficient of variation to reach
     stress: float = -math.inf
@@ -71,7 +70,7 @@ class Tail(NamedTuple):
     repetitions: Sequence[Descent]
     algorithm: str = "subset"  # or 'two_level'
     reason: str = ""
-    spent: int = 0  # evaluations of the method, those to choose the algorithm included
+    spent: int = 0  # evaluations of the method, including those for the choice of the algorithm
 
     @property
     def complete(self) -> bool:
@@ -91,7 +90,7 @@ class Tail(NamedTuple):
         if self.algorithm == "subset":
             chance = self.probability(self.reached)
             text += f": they come down to {self.reached:.7g} Pa (P = {chance:.2g})"
-        return f"{text}; raise max_evaluations"
+        return f"{text}. Raise max_evaluations"
 
     @property
     def extent(self) -> tuple[float, float]:
@@ -106,12 +105,12 @@ class Tail(NamedTuple):
 
     @property
     def _shares(self) -> Array:
-        """Share of each repetition, by its size: that does not depend on its outcome."""
+        """Share of each repetition by its size, which does not depend on its outcome."""
         sizes = np.array([one.samples for one in self.repetitions])
         return sizes / sizes.sum()
 
     def _parts(self, stress: float) -> Array:
-        """Each repetition's part in the probability."""
+        """Part of each repetition in the probability."""
         return self._shares * [one.probability(stress) for one in self.repetitions]
 
     def probability(self, stress: float) -> float:
@@ -119,7 +118,7 @@ class Tail(NamedTuple):
         return float(sum(self._parts(stress)))
 
     def cv(self, stress: float) -> float:
-        """Return its coefficient of variation; infinite where no sample is so low."""
+        """Return the coefficient of variation. It is infinite if no sample is so low."""
         parts = self._parts(stress)
         if not parts.any():
             return math.inf
@@ -128,11 +127,12 @@ class Tail(NamedTuple):
         return float(math.sqrt(sum(variances)) / sum(parts))
 
     def of_members(self, stress: float, count: int) -> Array:
-        """Return the probability of each of equally likely interfaces, (members,).
+        """Return the probability of each of the equally likely interfaces, (members,).
 
-        NaN where fewer than `RESOLVED` samples of one are so low. Of plain samples it is a
-        share of those of that interface, whose number is chance too, and most of the error
-        near P = 1; all repetitions share it, since a single one may have few or none.
+        It is NaN if fewer than `RESOLVED` samples of an interface are so low. For plain samples it
+        is the share among the samples of that interface, because their number is random and makes
+        most of the error near P = 1. Repetitions are added up, since one may have few samples of an
+        interface.
         """
         chances, seen, low, plain = np.zeros((4, count))
         weight = 0.0
@@ -150,13 +150,13 @@ class Tail(NamedTuple):
         return np.where(seen >= RESOLVED, np.minimum(chances, 1.0), np.nan)
 
     def members_cv(self, stress: float, kinds: Array) -> float:
-        """Return the coefficient of variation by the list of interfaces being a sample.
+        """Return the coefficient of variation because the list of interfaces is a sample.
 
-        Its square is the sum of (p - w)^2 over entries with a share w of the list and a
-        share p of the failures, as of importance sampling. The sum of p^2 is the chance
-        that two failures are of one entry: of two samples of different ancestors, which are
-        independent, so that the few samples of each entry do not make it too large. Members
-        with the same number in `kinds` are one entry.
+        Its square is the sum of (p - w)^2 over entries with a share w of the list and a share p of
+        the failures, as in importance sampling. The sum of p^2 is the chance that two failures
+        belong to one entry. It is taken from pairs of different ancestors, which are independent,
+        so that few samples per entry do not make it too large. Members with the same number in
+        `kinds` are one entry.
         """
         entries = np.bincount(kinds)
         total, pairs, alike = np.zeros(entries.size), 0.0, 0.0
@@ -172,14 +172,14 @@ class Tail(NamedTuple):
         held = entries / kinds.size
         expected = float(held @ held)
         spread = alike / pairs - 2.0 * float(held @ total / total.sum()) + expected
-        # A spread seen in so many entries is that of one entry less.
+        # The entries determine their own mean, which takes one degree of freedom.
         excess = spread / max(1.0 - expected, 1e-300)
         return math.sqrt(max(excess, 0.0))
 
     def quantile(self, probability: float) -> float:
         """Return the stress below which the onset lies with this probability (step 6).
 
-        Infinite where the event is not so frequent.
+        It is infinite if the event is not so frequent.
         """
         if probability > 1.0 - self.survived:
             return math.inf
@@ -195,7 +195,7 @@ class Tail(NamedTuple):
     def stress_interval(
         self, probability: float, cv: float, lowest: float
     ) -> tuple[float, float]:
-        """Return stresses whose estimated probabilities bracket the requested one."""
+        """Return the stresses at the ends of the interval of the probability (step 6)."""
         least, highest = self.extent
         if not math.isfinite(cv):
             return lowest, highest
@@ -207,7 +207,7 @@ class Tail(NamedTuple):
 
 
 def _squares(*labels: Array) -> float:
-    """Return the sum of the squared numbers of samples that share their labels."""
+    """Return the sum of the squared numbers of samples with equal labels."""
     _, sizes = np.unique(np.stack(labels), axis=1, return_counts=True)
     return float(np.sum(sizes.astype(np.float64) ** 2))
 
@@ -224,9 +224,9 @@ def repeat_until_precise(
 ) -> list[Any]:
     """Return repetitions whose pooled coefficient of variation is at most the target.
 
-    All of them are complete, or it is a single incomplete one. `make` takes (samples,
-    number, evaluations left), and `judge` returns the coefficient of variation, or zero to
-    stop. Many repetitions of moderate size, `first` to `largest`, bound the memory.
+    Either all of them are complete, or there is a single incomplete one. `make` takes (samples,
+    number, evaluations left). `judge` returns the coefficient of variation, or zero to stop. Many
+    repetitions of moderate size, `first` to `largest`, bound the memory.
     """
     done: list[Any] = []
     spent, size = 0, first
@@ -235,35 +235,34 @@ def repeat_until_precise(
         spent += latest.evaluations
         if not latest.complete:
             return done or [latest]
-        # 3. pooled
+        # 3.
         done = [*(earlier.light() for earlier in done), latest]
         cv = judge(done)
         if cv <= target_cv:
             break
-        # 4. the next size
+        # 4.
         meter.note = f"repetition {len(done)}, c.o.v. {cv:.2g} (target {target_cv:g})"
-        total = sum(each.samples for each in done)
+        total = wanted = sum(each.samples for each in done)
         price = sum(each.evaluations for each in done) / total
-        wanted = (
-            SIZE_MARGIN * total * (cv / target_cv) ** 2 - total if math.isfinite(cv) else total
-        )
+        if math.isfinite(cv):
+            wanted = SIZE_MARGIN * total * (cv / target_cv) ** 2 - total
         affordable = (max_evaluations - spent) / price
         size = int(min(max(wanted, first), largest, affordable))
     return done
 
 
 def two_levels_refused(state: LimitState) -> str | None:
-    """Return why two levels are not possible, or None if they are."""
+    """Return why two levels are not possible, or None."""
     experiment = state.experiment
     if state.may_survive:
         return "behind a machine, the first instability need not happen"
     if optional_member(experiment.method, "first_stage") is None:
-        return f"{experiment.method.type!r} names no less expensive method as its first stage"
+        return f"{experiment.method.type!r} has no less expensive first stage"
     return no_single_length(experiment.problem, experiment.random)
 
 
 def share_picked(guide: Array, exact: Array) -> float:
-    """Return the share of the weakest fiftieth of samples in the guide's weakest tenth."""
+    """Return the share of the weakest fiftieth of samples in the weakest tenth by the guide."""
     weakest = np.argsort(exact)[: max(5, exact.size // 50)]
     seen = np.argsort(guide)[: max(10, exact.size // 10)]
     return float(np.isin(weakest, seen).mean())
@@ -280,11 +279,10 @@ def sample_tail(
 ) -> Tail:
     """Sample the lower tail down to a goal.
 
-    Algorithm 'auto' takes two levels where a less expensive method, the guide, picks the
-    same weakest ones among plain samples, and the first repetition finds failures by it.
-    `budget` includes the pilot: (draws, stresses) of plain samples that are there already.
+    `algorithm` 'auto' takes two levels if the guide passes steps 1 and 5. `budget` includes the
+    pilot, (draws, stresses) of plain samples that are there already.
     """
-    # 1. the algorithm
+    # 1.
     guide, auto, seed = None, algorithm == "auto", state.experiment.seed
     if algorithm == "two_level" or (auto and two_levels_refused(state) is None):
         guide = state.by(METHODS[state.experiment.method.first_stage]())
@@ -297,10 +295,10 @@ def sample_tail(
         share = share_picked(guide(pilot[0]), pilot[1])
         reason += f"; of {spent} plain samples the {label} picks {share:.0%} of the weakest"
         guide = guide if share >= LEAST_SHARE_PICKED else None
-    # 2 to 4
+    # 2. to 4.
     repetitions = _repetitions(state, goal, budget - spent, guide, POOR if auto else 0.0)
     spent += sum(one.evaluations for one in repetitions)
-    # 5. a poor guide
+    # 5.
     if auto and guide and _share_failing(repetitions[0]) < POOR:
         share = _share_failing(repetitions[0])
         reason += f"; {share:.1%} of the failures by the {label} hold: a poor guide"
@@ -323,7 +321,7 @@ def _repetitions(
     poor: float = 0.0,
     kind: tuple[int, int, int] = SUBSET,
 ) -> list[Descent]:
-    """Return repetitions, by two levels with a guide; a single one of a poor guide."""
+    """Return repetitions, by two levels with a guide, or a single one of a poor guide."""
     key, first, largest = BRIDGE if guide else kind
 
     def judge(repetitions: Sequence[Descent]) -> float:
@@ -332,7 +330,7 @@ def _repetitions(
         tail = Tail(repetitions)
         return tail.cv(tail.quantile(goal.probability) if goal.probability else goal.stress)
 
-    # Fewer than usual where the budget would not even hold four levels.
+    # Take fewer samples if the budget would not allow four levels.
     return repeat_until_precise(
         lambda *size: repetition(state, goal, guide, key, *size), judge,
         target_cv=goal.cv, first=min(first, max(budget // 4, 20)), largest=largest,
@@ -349,7 +347,7 @@ def repetition(
     number: int,
     max_evaluations: int = UNLIMITED_EVALUATIONS,
 ) -> Descent:
-    """Return a repetition down to the goal, which depends on seed, key and number only."""
+    """Return a repetition down to the goal. It depends on seed, key and number only (step 2)."""
     options: dict[str, Any] = {
         "samples": samples,
         "max_evaluations": max_evaluations,
@@ -359,13 +357,13 @@ def repetition(
         "rng": generator(state.experiment.seed, key, number),
     }
     chance = goal.probability
-    with one_blas_thread():  # their number changes last bits
+    with one_blas_thread():  # the number of threads changes the last bits
         if guide is None:
             return descend(state, state.dimension, probability=DEEPER * chance, **options)
         return bridge(guide, state, state.dimension, probability=chance, **options)
 
 
 def _share_failing(descent: Descent) -> float:
-    """Return the share of failures among the samples of a guide, 1 without samples."""
+    """Return the share of failures among the samples of a guide, or 1 without samples."""
     values = descent.populations[-1].values
     return float(np.mean(values < descent.threshold)) if descent.complete else 1.0

@@ -1,4 +1,4 @@
-"""Two levels: an inexpensive limit state, the guide, goes down the tail; the exact one ends it.
+"""Two levels: an inexpensive limit state guides down the tail, and the exact one ends it.
 
 Problem. Estimate P(E < s) for an exact stress E that is expensive, with the help of the
 guide's stress L, which is not. By the definition of conditional probabilities, for any
@@ -6,8 +6,8 @@ ceiling b,
 
     P(E < s) = P(L < b) P(E < s | L < b) / P(L < b | E < s).
 
-Where L follows E closely the last factor is near one and the middle one is not small, so
-that a few hundred exact evaluations replace thousands.
+If L follows E closely, the last factor is near one and the middle factor is not small. Then a few
+hundred exact evaluations replace thousands.
 
 Source. Subset simulation with less expensive models on its first levels is due to Ullmann and
 Papaioannou (2015), Multilevel estimation of rare events. The choice of b and the walks that
@@ -18,7 +18,7 @@ Steps:
 1. Walk down by the guide alone (`subset.descend`), with `GUIDING` times as many samples per
    level. Its levels are candidates for L < b, each with its P(L < b).
 2. From the rarest level on, solve some of its samples exactly. The share with E < s is the
-   middle factor. Where a probability is requested, s is the quantile of these that meets it.
+   middle factor. If a probability is requested, s is the quantile of these that meets it.
 3. From failures among these, walk among the failures E < s (`subset.grow`), and forget the
    first `FORGOTTEN_STEPS` steps. The share of the later states with L < b is the last factor.
    `_covered` estimates its error, with one observation for each family of walkers.
@@ -40,10 +40,10 @@ from stiction.reliability.subset import Descent, Function, Label, Population, de
 GUIDING = 5
 """Samples of the guide per level for each exact sample of the middle factor."""
 LAST_FACTOR = 0.95
-"""Smallest last factor: below it the walk must first find failures that the guide misses."""
+"""Smallest last factor. Below it the walk must first find failures that the guide misses."""
 WALK_STEPS = 10
 FORGOTTEN_STEPS = 5
-"""Exact steps of each walk in the failure set, and the number of them that are discarded."""
+"""Exact steps of each walk in the failure set, and number of discarded steps."""
 LEVEL_RATIO = 2.5
 """Least ratio of the probability of the guide's level to the requested probability."""
 
@@ -55,7 +55,7 @@ def _covered(
     walkers = families.size
     covered = (guide(states) < ceiling).reshape(-1, walkers)
     last = max(float(covered.mean()), 1.0 / samples)
-    # Walkers of one ancestor are alike: each family is one observation.
+    # Walkers of one ancestor are alike, so each family is one observation.
     _, group = np.unique(families, return_inverse=True)
     sums = np.bincount(group, weights=covered.mean(axis=0) - last) / (walkers * last)
     # A family of share w pulls the mean: its square is (1 - 2 w + sum w^2) of that about the truth.
@@ -83,9 +83,9 @@ def bridge(
 ) -> Descent:
     """Sample the exact lower tail near a threshold, or near a probability if none is given.
 
-    `samples` are exact evaluations for the middle factor, as many again walk in the failure
-    set; `max_evaluations` limits both. Without a failure the estimate is zero: leaving it
-    out would favour repetitions that found one.
+    `samples` are exact evaluations for the middle factor. As many again walk in the failure set,
+    and `max_evaluations` limits both. Without a failure the estimate is zero, because leaving it
+    out would favour repetitions with a failure.
     """
     # 1. levels of the guide
     descent = descend(
@@ -145,5 +145,5 @@ def bridge(
     if best is not None:  # a last look, in vain, counts as well
         return best._replace(evaluations=spent, first_stage_evaluations=guided)
     none, chance = np.zeros(0, np.int64), lowest.log_probability
-    empty = Population(math.inf, chance, np.zeros(0), none, none, np.empty((0, 0)))
+    empty = Population(math.inf, chance, np.zeros(0), none, none)
     return Descent(samples, [empty], threshold, spent, False, guided)

@@ -1,4 +1,9 @@
-"""Errors of estimated probabilities: intervals, and the variance of correlated chains."""
+"""Errors of estimated probabilities: intervals, and the variance of correlated chains.
+
+Sources. Intervals of a count: Clopper and Pearson (1934), Biometrika 26, 404. Variance of chains by
+their genealogy: Chan and Lai (2013), Annals of Statistics 41, 2877; Lee and Whiteley (2018),
+Biometrika 105, 609.
+"""
 
 import math
 
@@ -11,10 +16,10 @@ CONFIDENCE = 0.95
 
 
 def log_width(cv: float) -> float:
-    """Half the width of the interval of the logarithm of an estimate.
+    """Return half the width of the interval of the logarithm of an estimate.
 
-    By Student's distribution, as the coefficient of variation is itself estimated, from
-    about 1/cv^2 independent families.
+    It follows Student's distribution, because the coefficient of variation is itself estimated,
+    from about 1/cv^2 independent families.
     """
     if cv == 0.0:
         return 0.0
@@ -23,7 +28,7 @@ def log_width(cv: float) -> float:
 
 
 def lognormal_interval(probability: float, cv: float) -> tuple[float, float]:
-    """Interval of an estimate whose logarithm is about normal, within [0, 1]."""
+    """Return the interval of an estimate whose logarithm is about normal, within [0, 1]."""
     if not math.isfinite(cv):
         return 0.0, 1.0
     width = log_width(cv)
@@ -32,7 +37,7 @@ def lognormal_interval(probability: float, cv: float) -> tuple[float, float]:
 
 
 def binomial_interval(failures: int, samples: int) -> tuple[float, float]:
-    """Interval of a probability from independent samples (Clopper and Pearson, 1934)."""
+    """Return the interval of a probability from independent samples (Clopper and Pearson)."""
     tail, held = 0.5 * (1.0 - CONFIDENCE), samples - failures
     low = betaincinv(failures, held + 1, tail) if failures else 0.0
     high = betaincinv(failures + 1, held, 1.0 - tail) if held else 1.0
@@ -40,14 +45,17 @@ def binomial_interval(failures: int, samples: int) -> tuple[float, float]:
 
 
 def ancestral_variance(ancestors: NDArray[np.int64], samples: int) -> float:
-    """Squared coefficient of variation of a subset estimate, from the ancestry of its failures.
+    """Return the squared coefficient of variation of a subset estimate by ancestors of failures.
 
-    The genealogy estimator of Chan and Lai (2013) and Lee and Whiteley (2018): families that
-    descend from different first samples, `samples` in all, evolve independently, so the spread
-    of their shares among the failures measures the error, the sum of (share - 1/N)^2 over the N
-    first samples. With k families of equal size that is 1/k, where the variance of a mean of k
-    calls for 1/(k - 1): hence a last division by one minus the sum. If all samples fail, it is as
-    if two more had not: that bounds the error as their binomial distribution does.
+    Families that descend from different first samples, N = `samples` in all, evolve independently.
+    Their shares w_i among the failures then measure the error, v = sum (w_i - 1/N)^2, in three
+    steps:
+
+    1. Sum the squared shares, and subtract 1/N.
+    2. If all samples fail, v is zero. Take (2/N)^2 at least, as if two more had not failed, which
+       bounds the error as their binomial distribution does.
+    3. With k families of equal size v is 1/k, but the variance of a mean of k values needs
+       1/(k - 1). Return v/(1 - v).
     """
     if ancestors.size == 0:
         return math.inf
@@ -60,7 +68,7 @@ def ancestral_variance(ancestors: NDArray[np.int64], samples: int) -> float:
 def generator(seed: int, *key: int) -> np.random.Generator:
     """Return an independent generator for each key under one seed.
 
-    The leading number of the spawn key keeps clear of the streams of random fields.
+    The first number of the spawn key keeps it apart from the streams of random fields.
     """
     sequence = np.random.SeedSequence(entropy=seed, spawn_key=(7_000_000, *key))
     return np.random.Generator(np.random.PCG64DXSM(sequence))
