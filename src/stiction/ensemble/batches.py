@@ -198,9 +198,10 @@ def solve_spans(
 ) -> Generator[tuple[Span, Table], None, None]:
     """Solve spans of items, and yield pieces of them with their tables (steps 1 to 4).
 
-    At most two pieces per worker are under way, so that memory stays bounded. Closing the generator
-    cancels the pieces that have not begun. A worker that is lost or has other versions raises a
-    `WorkerError`. Only experiments can have spans of more than one item.
+    At most two pieces per worker are under way, so that memory stays bounded. Closing the
+    generator cancels the pieces that have not begun. A worker that is lost or has other
+    versions raises a `WorkerError`. Only experiments can have spans of more than one
+    item.
     """
     waiting = deque(spans)
     left = sum(span.samples for span in spans)

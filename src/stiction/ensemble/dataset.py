@@ -63,8 +63,8 @@ def within(numbers: NDArray[Any], ends: Any) -> bool:
 class Gathered:
     """The results of all samples of one or several experiments, in memory.
 
-    `only` names the variables to gather. `done`, (points, samples), marks the samples that are
-    there.
+    `only` names the variables to gather. `done`, (points, samples), marks the samples
+    that are there.
     """
 
     def __init__(
@@ -128,7 +128,8 @@ class Gathered:
     ) -> xr.Dataset:
         """Return a dataset over the axes of a sweep, the samples and the nodes.
 
-        Missing values are NaN. The attributes 'failed_samples' and 'cut_short' give the cause.
+        Missing values are NaN. The attributes 'failed_samples' and 'cut_short' give the
+        cause.
         """
         variables, values = variables_in(self.points), {}
         for name in variables:

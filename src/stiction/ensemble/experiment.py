@@ -47,8 +47,8 @@ MOST_NUMBERS = 1 << 20
 class Experiment:
     """A problem, its random properties and a method, checked together once.
 
-    Sample i follows from the experiment and i alone, in any batch. An `InputError` lists all
-    mistakes.
+    Sample i follows from the experiment and i alone, in any batch. An `InputError` lists
+    all mistakes.
     """
 
     problem: Problem
@@ -245,8 +245,8 @@ class Ensemble:
     first : int
         Number of the first sample.
     keep : str or tuple of str
-        Random fields whose profiles are kept, such as ``"strength"``. Options of the method keep
-        others, such as ``slip=True`` of `Equilibrium`.
+        Random fields whose profiles are kept, such as ``"strength"``. Options of the
+        method keep others, such as ``slip=True`` of `Equilibrium`.
 
     Examples
     --------

@@ -29,8 +29,8 @@ StressName = Literal["critical_stress", "first_instability"]
 """Stress of a method that counts as failure."""
 
 MAX_RANKED, RANKINGS, LOW_QUANTILE_SIGMAS = 32, 4_000, 3.0
-"""Most samples of each interface, and about the number of all samples, by which interfaces are
-ordered, and the standard deviations below the mean that are compared."""
+"""Most samples of each interface, and about the number of all samples, by which
+interfaces are ordered, and the standard deviations below the mean that are compared."""
 MAX_FACTORS = 8
 """Most random factors of the strength at a node, which share a negligible probability."""
 MIN_THREAD_SECONDS = 2e-3
@@ -41,9 +41,9 @@ MIN_THREAD_SECONDS = 2e-3
 class LimitState:
     """Stress at onset as a function of draws, see `stiction.external.limit_state`.
 
-    Stresses may be taken per normal pressure. If the pressure is random, each stress is multiplied
-    by the mean pressure over the pressure of its sample, so that one number stands for a friction
-    coefficient.
+    Stresses may be taken per normal pressure. If the pressure is random, each stress is
+    multiplied by the mean pressure over the pressure of its sample, so that one number
+    stands for a friction coefficient.
     """
 
     experiment: Experiment
@@ -86,7 +86,8 @@ class LimitState:
     def __call__(self, draws: Array) -> Array:
         """Return the stress at onset, Pa, of draws (samples, dimension) or (dimension,).
 
-        It is infinite if the event does not happen, because such a sample survives any stress.
+        It is infinite if the event does not happen, because such a sample survives any
+        stress.
         """
         given, experiment = check("draws", draws, Numbers), self.experiment
         if given.ndim not in (1, 2) or given.shape[-1] != self.dimension:
@@ -156,8 +157,9 @@ class LimitState:
     def _bounds_of(self, random: RandomInterface, negligible: float) -> tuple[float, float]:
         """Return bounds for one interface.
 
-        With p the load profile, tau_p the strength and tau_0 the initial stress, the first node
-        fails at the load min((tau_p - tau_0)/p). The lower bound is its mean stress.
+        With p the load profile, tau_p the strength and tau_0 the initial stress, the
+        first node fails at the load min((tau_p - tau_0)/p). The lower bound is its mean
+        stress.
         """
         problem = self.experiment.problem
         if any(field.conditions is not None for field in random.properties.values()):
@@ -185,9 +187,9 @@ class LimitState:
 def weakest_first(state: LimitState) -> LimitState:
     """Return the same limit state with equally likely interfaces in order, the weakest first.
 
-    Neighbours are then alike, and a chain that goes down moves from one to the next. The order
-    follows a low quantile of the same few samples of each interface, by the first stage if it
-    applies.
+    Neighbours are then alike, and a chain that goes down moves from one to the next. The
+    order follows a low quantile of the same few samples of each interface, by the first
+    stage if it applies.
     """
     experiment, random = state.experiment, state.experiment.random
     count = len(random.members)
@@ -250,7 +252,8 @@ def limit_state(
 ) -> LimitState:
     """Return the stress at onset as a function of standard normal draws.
 
-    External reliability codes can call it. Failure below a stress s is ``limit_state(draws) < s``.
+    External reliability codes can call it. Failure below a stress s is
+    ``limit_state(draws) < s``.
 
     Parameters
     ----------

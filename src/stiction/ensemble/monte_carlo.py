@@ -124,8 +124,8 @@ def gather(
 ) -> xr.Dataset:
     """Compute an ensemble at every point of a sweep, or the part of it that is not stored.
 
-    Samples go to the `store` when they are done. `elsewhere`, (points, samples), marks samples that
-    another job computes. See `monte_carlo` for the other arguments.
+    Samples go to the `store` when they are done. `elsewhere`, (points, samples), marks
+    samples that another job computes. See `monte_carlo` for the other arguments.
     """
     rows, cores = Gathered(points, ensemble), workers or usable_cores()
     if store:
@@ -178,38 +178,42 @@ def monte_carlo(
 ) -> xr.Dataset:
     """Compute the onset of many random interfaces.
 
-    Sample i depends on (seed, i) only, not on the number of samples, the workers or the executor.
+    Sample i depends on (seed, i) only, not on the number of samples, the workers or the
+    executor.
 
     Parameters
     ----------
     problem : Problem
     random : RandomInterface, RandomField or list of them
-        The random properties. A field alone is the peak strength, Pa. The members of a list are
-        equally likely, and every sample has one of them.
+        The random properties. A field alone is the peak strength, Pa. The members of a
+        list are equally likely, and every sample has one of them.
     method : LocalCriterion, Equilibrium or Rupture
     samples, seed, first, keep
-        As in `Ensemble`. To see the profiles of a few samples, repeat them: a call with the same
-        seed and fewer samples gives the same samples.
+        As in `Ensemble`. To see the profiles of a few samples, repeat them: a call with
+        the same seed and fewer samples gives the same samples.
     workers : int, optional
         Threads, by default all cores. The compiled kernels release the interpreter lock.
     executor : concurrent.futures.Executor, optional
-        Any object with `submit` instead of threads, such as a process pool or a Dask executor.
+        Any object with `submit` instead of threads, such as a process pool or a Dask
+        executor.
     progress : bool or callable
         True shows progress on standard error after a second. A callable gets (done, total).
     pilot : bool
-        Whether to check an approximate method with the first samples (32 on a line, 8 on a plane)
-        and the weakest of the first thousand. If a quick test leaves a doubt, they are also solved
-        by `Equilibrium`, and the difference is reported. The ensemble stays the same.
+        Whether to check an approximate method with the first samples (32 on a line, 8 on
+        a plane) and the weakest of the first thousand. If a quick test leaves a doubt,
+        they are also solved by `Equilibrium`, and the difference is reported. The
+        ensemble stays the same.
 
     Returns
     -------
     xarray.Dataset
-        Results of `onset` over 'sample'. The attributes contain the version, the study as JSON and
-        the seed, so that it can be run again. Samples that could not be solved are NaN. The
-        attribute 'failed_samples' lists them (point, sample, seed, message, whether the sample
-        itself does not fit). If the pilot compared, 'pilot_bias' and 'pilot_scatter' are mean and
-        standard deviation of the difference in `critical_stress`, relative to the mean by
-        `Equilibrium`, and 'pilot_weakest_bias' and 'pilot_weakest_scatter' of the weakest samples.
+        Results of `onset` over 'sample'. The attributes contain the version, the study as
+        JSON and the seed, so that it can be run again. Samples that could not be solved
+        are NaN. The attribute 'failed_samples' lists them (point, sample, seed, message,
+        whether the sample itself does not fit). If the pilot compared, 'pilot_bias' and
+        'pilot_scatter' are mean and standard deviation of the difference in
+        `critical_stress`, relative to the mean by `Equilibrium`, and 'pilot_weakest_bias'
+        and 'pilot_weakest_scatter' of the weakest samples.
 
     Raises
     ------

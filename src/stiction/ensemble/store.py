@@ -71,8 +71,8 @@ class Rows(Protocol):
 class Store:
     """The folder of a run with the samples of a study, which is given in plain form.
 
-    After reading, `damage` has the defects of damaged chunks by name. `seconds` (of one core) and
-    `versions` are those of the intact chunks.
+    After reading, `damage` has the defects of damaged chunks by name. `seconds` (of one
+    core) and `versions` are those of the intact chunks.
     """
 
     def __init__(self, path: Path, study: Mapping[str, Any]) -> None:

@@ -74,19 +74,20 @@ class Agreement(Result):
     peaks : Peaks
         The measured peaks.
     cramer_von_mises, largest_deviation : float
-        Both distances. W^2 sums the squared differences between measured and predicted shares over
-        the tests. The largest difference is multiplied by the square root of the number of tests.
+        Both distances. W^2 sums the squared differences between measured and predicted
+        shares over the tests. The largest difference is multiplied by the square root of
+        the number of tests.
     p_values : dict of str to float
-        Probability of a distance at least as large if the prediction is right, by the names of the
-        two distances.
+        Probability of a distance at least as large if the prediction is right, by the
+        names of the two distances.
     predicted : tuple of (values, share)
         Predicted distribution function of each kind of specimen.
     band : float
         Largest deviation that 90 % of campaigns do not exceed.
     precursors : dict of str to (measured, predicted) arrays
-        Given if curves were compared, one value for each test: ``number`` of precursors, ``size``
-        (N or Pa) of the largest precursor or 0, and ``first_load``, the force at the first
-        precursor or else the peak. `p_values` has these names too.
+        Given if curves were compared, one value for each test: ``number`` of precursors,
+        ``size`` (N or Pa) of the largest precursor or 0, and ``first_load``, the force at
+        the first precursor or else the peak. `p_values` has these names too.
     """
 
     peaks: Peaks
@@ -133,18 +134,18 @@ def agreement(
 ) -> Agreement:
     """Test whether measured peaks agree with a prediction.
 
-    The test compares distributions, so the order of the tests does not count. If peaks drift,
-    remove the trend first, ``peaks - np.polyval(np.polyfit(time, peaks, 1), time) + peaks.mean()``,
-    and report that you did.
+    The test compares distributions, so the order of the tests does not count. If peaks
+    drift, remove the trend first, ``peaks - np.polyval(np.polyfit(time, peaks, 1), time)
+    + peaks.mean()``, and report that you did.
 
     Parameters
     ----------
     prediction : Dataset or Posterior
-        Result of `stiction.monte_carlo`, or of `stiction.infer`, whose uncertainty then counts.
-        Neither may have been fitted to these peaks.
+        Result of `stiction.monte_carlo`, or of `stiction.infer`, whose uncertainty then
+        counts. Neither may have been fitted to these peaks.
     peaks : array, mapping of arrays, Peaks or Curves
-        As in `stiction.infer`. Precursors are compared too if curves are given and the prediction
-        has events, such as the events of ``Equilibrium(events=20)``.
+        As in `stiction.infer`. Precursors are compared too if curves are given and the
+        prediction has events, such as the events of ``Equilibrium(events=20)``.
     unit : str
         Unit of the peaks and the load-cell error.
     load_cell_error : float
@@ -162,9 +163,10 @@ def agreement(
     Raises
     ------
     InputError
-        If the prediction lacks the measured quantity, is a sweep, or has one kind of specimen
-        although several were tested. If peaks differ from the prediction by a factor of fifty. If
-        the posterior was fitted to these peaks, because it then lies near them.
+        If the prediction lacks the measured quantity, is a sweep, or has one kind of
+        specimen although several were tested. If peaks differ from the prediction by a
+        factor of fifty. If the posterior was fitted to these peaks, because it then lies
+        near them.
 
     Warns
     -----
@@ -173,9 +175,9 @@ def agreement(
 
     Notes
     -----
-    A p-value of 0.3 means that three of ten campaigns with as many tests would lie as far from a
-    right prediction. It does not mean that the prediction is right. Few tests find only gross
-    errors.
+    A p-value of 0.3 means that three of ten campaigns with as many tests would lie as far
+    from a right prediction. It does not mean that the prediction is right. Few tests find
+    only gross errors.
 
     Examples
     --------
@@ -216,8 +218,9 @@ def agreement(
 def _precursors(prediction: xr.Dataset, curves: Curves) -> dict[str, tuple[Array, Array]]:
     """Return number, largest size and first load of precursors, measured and predicted.
 
-    Both follow from the force before and after each event, with the largest threshold of the tests.
-    A smaller drop does not count, because the load cell would not tell it from noise.
+    Both follow from the force before and after each event, with the largest threshold of
+    the tests. A smaller drop does not count, because the load cell would not tell it from
+    noise.
     """
     names = {"N": ("event_force", "critical_force"), "Pa": ("event_stress", "critical_stress")}
     event, peak = names.get(curves.unit, ("", ""))

@@ -80,8 +80,8 @@ def bootstrapped(
 ) -> tuple[list[Repetitions], list[Repetitions]]:
     """Fit records simulated from an estimate, and from fields `at_ends` (steps 1 and 5).
 
-    The second list holds the fits from `further` estimates, with their own numbers of repetitions.
-    Records to which the family cannot be fitted are left out.
+    The second list holds the fits from `further` estimates, with their own numbers of
+    repetitions. Records to which the family cannot be fitted are left out.
     """
 
     def repeat(truth: Estimate, count: int = count) -> Repetitions:
@@ -126,8 +126,9 @@ def at_ends(around: Repetitions, confidence: float) -> list[Estimate]:
 class Scale(NamedTuple):
     """Scale on which the error of a parameter is about normal: its logarithm, unless `linear`.
 
-    A bound of a marginal is given by the logarithm of its distance from the mean. Noise is given by
-    its variance, which may be negative, because all estimates at zero would have an error of zero.
+    A bound of a marginal is given by the logarithm of its distance from the mean. Noise
+    is given by its variance, which may be negative, because all estimates at zero would
+    have an error of zero.
     """
 
     name: str

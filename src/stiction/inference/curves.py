@@ -87,8 +87,8 @@ class Curve(Result):
     drops : Drops
         Precursors: drops before the peak. The error of each size is about twice the noise.
     plateau, plateau_deviation : float
-        Mean and standard deviation of the force after the drop at the peak. NaN if the record
-        ends there.
+        Mean and standard deviation of the force after the drop at the peak. NaN if the
+        record ends there.
     """
 
     name: str
@@ -181,14 +181,14 @@ def read_curve(
     Parameters
     ----------
     source : path, DataFrame or (travel, force)
-        A text file or workbook, a folder of such files, a pandas table, or two arrays. A table
-        needs a column with force, stress or friction coefficient and a column with travel or time.
-        A file may hold several tests, either numbered in a column ``test`` or separated by empty
-        lines.
+        A text file or workbook, a folder of such files, a pandas table, or two arrays. A
+        table needs a column with force, stress or friction coefficient and a column with
+        travel or time. A file may hold several tests, either numbered in a column
+        ``test`` or separated by empty lines.
     force, travel : str or int, optional
-        Column, given by its name, heading or number from 0. By default the force is the column
-        called force, load, friction, ... and the travel is the column called travel, displacement,
-        extension, position, ... or else time.
+        Column, given by its name, heading or number from 0. By default the force is the
+        column called force, load, friction, ... and the travel is the column called
+        travel, displacement, extension, position, ... or else time.
     unit, travel_unit : str, optional
         Units of force and travel if the source states no units.
     speed : float, optional

@@ -67,8 +67,8 @@ class Densities(NamedTuple):
 def grouped(ordered: Array) -> tuple[Array, Array]:
     """Return means and shares of groups of neighbouring sorted values (step 3).
 
-    Groups end at equal steps of a normal variable, so that every group of a nearly normal sample
-    is narrow beside the kernel. A value at an end is shared between both groups.
+    Groups end at equal steps of a normal variable, so that every group of a nearly normal
+    sample is narrow beside the kernel. A value at an end is shared between both groups.
     """
     size = ordered.size
     reach = float(ndtri(1.0 - 0.5 / size))
@@ -174,7 +174,8 @@ def log_likelihoods(
 ) -> None:
     """Write the logarithms of the densities of peaks at points to `out`, (points, peaks), 1/Pa.
 
-    `of_v` comes from `Densities.between`. `scales` has shift and stretch at points, (2, points).
+    `of_v` comes from `Densities.between`. `scales` has shift and stretch at points, (2,
+    points).
     """
     for i in range(index.shape[0]):
         bound, mean, spread = of_v[0, i], of_v[1, i], of_v[2, i]

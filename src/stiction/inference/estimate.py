@@ -241,8 +241,8 @@ def _estimate(rows: Sequence[Array], setting: FitSetting, start: Estimate | None
 def _left(windows: Sequence[RecordWindow], model: Model) -> float:
     """Return the share of its variance that a field is expected to show about mean and trend.
 
-    For N values with correlation R it is tr(M R)/N. The projection M takes the trend of each record
-    and the mean of all records from the values.
+    For N values with correlation R it is tr(M R)/N. The projection M takes the trend of
+    each record and the mean of all records from the values.
     """
     taken, mean, points = 0.0, 0.0, 0.0
     for window, count in Counter(windows).items():
@@ -267,11 +267,12 @@ def bands(group: Observed, expected: Array, per_octave: int = 3) -> Array:
 class Goodness(NamedTuple):
     """Quality of a family of marginals: its best member, and two measures of the fit.
 
-    `distance` is Kolmogorov's distance. `score` is the score of step 4 less the score of the best
-    family: 0 for the best family, negative for others. Differences below 2 do not distinguish
-    families. `weight` is the share of fields that `FieldFit.interfaces` draws from the family. It
-    is in proportion to the likelihood of its fields, whose logarithm is on average half a unit for
-    each parameter below the greatest one, because the fields scatter about the estimate.
+    `distance` is Kolmogorov's distance. `score` is the score of step 4 less the score of
+    the best family: 0 for the best family, negative for others. Differences below 2 do
+    not distinguish families. `weight` is the share of fields that `FieldFit.interfaces`
+    draws from the family. It is in proportion to the likelihood of its fields, whose
+    logarithm is on average half a unit for each parameter below the greatest one, because
+    the fields scatter about the estimate.
     """
 
     marginal: Any
@@ -301,7 +302,8 @@ def compare(
 ) -> tuple[list[Estimate], dict[str, Goodness], float]:
     """Return the estimates, best family first, their qualities, and the number of values (step 5).
 
-    Families that cannot be fitted are left out. An `InputError` says so if none can be fitted.
+    Families that cannot be fitted are left out. An `InputError` says so if none can be
+    fitted.
     """
     fitted: list[tuple[float, Estimate]] = []
     problems: list[str] = []

@@ -116,27 +116,31 @@ class FieldFit(Result):
     field : RandomField
         The fitted field for simulation, without measurement noise and with the mean mode.
     parameters : dict of str to float
-        Estimates in SI. ``efolding_length`` (m) is the lag at which the correlation of z falls to
-        1/e. ``mean`` and ``standard_deviation`` belong to the field. ``marginal.*``, ``spectrum.*``
-        and ``anisotropy`` have their names in study files. ``noise`` is the standard deviation of
-        the measurement noise, and ``between`` the coefficient of variation between specimens.
+        Estimates in SI. ``efolding_length`` (m) is the lag at which the correlation of z
+        falls to 1/e. ``mean`` and ``standard_deviation`` belong to the field.
+        ``marginal.*``, ``spectrum.*`` and ``anisotropy`` have their names in study files.
+        ``noise`` is the standard deviation of the measurement noise, and ``between`` the
+        coefficient of variation between specimens.
     interval : dict of str to (float, float)
-        Bootstrap interval of each parameter. The interval of the noise may begin at zero. Intervals
-        of the bounds of the marginal end outside of the values. Intervals of exponent and
-        anisotropy end at the searched ranges, 0.65 to 16 and 0.05 to 20. With `between`, the
-        intervals of ``mean`` and ``between`` come from the posterior by the levels of the records.
+        Bootstrap interval of each parameter. The interval of the noise may begin at zero.
+        Intervals of the bounds of the marginal end outside of the values. Intervals of
+        exponent and anisotropy end at the searched ranges, 0.65 to 16 and 0.05 to 20.
+        With `between`, the intervals of ``mean`` and ``between`` come from the posterior
+        by the levels of the records.
     confidence : float
         Confidence level of the intervals.
     repetitions : tuple of RandomField
-        Fits to records simulated from `field`, as another measurement might have given them.
+        Fits to records simulated from `field`, as another measurement might have given
+        them.
     families : dict of str to Goodness
         Quality of each requested family of marginals, the best family first.
     independent : float
         Number of independent values in the scores of families.
     p_values : dict of str to float
-        Probability that records of the fitted ``marginal`` and ``spectrum`` lie as far from their
-        fits as the data do. A small one means that the family does not fit. For several records
-        without `between`, ``level`` is the probability that their means scatter as much.
+        Probability that records of the fitted ``marginal`` and ``spectrum`` lie as far
+        from their fits as the data do. A small one means that the family does not fit.
+        For several records without `between`, ``level`` is the probability that their
+        means scatter as much.
     missing : (int, int)
         Number of points without a value, which are left out, and number of all points.
     doubts : tuple of str
@@ -183,16 +187,17 @@ class FieldFit(Result):
     def interfaces(self, count: Count, seed: Number = 0) -> list[RandomInterface]:
         """Return equally likely random interfaces, for the failure probability under all of them.
 
-        Each is the estimate less the error of a repetition, with the bias and scatter of the
-        intervals. Families of the marginal are drawn in proportion to their `weight`. With
-        `between`, each interface has a mean and a factor between specimens, drawn from their
-        posterior (`stiction.inference.specimens`). A longer list begins with a shorter one of the
-        same seed.
+        Each is the estimate less the error of a repetition, with the bias and scatter of
+        the intervals. Families of the marginal are drawn in proportion to their `weight`.
+        With `between`, each interface has a mean and a factor between specimens, drawn
+        from their posterior (`stiction.inference.specimens`). A longer list begins with a
+        shorter one of the same seed.
 
         Parameters
         ----------
         count : int
-            Number of interfaces. A family has at most as many different ones as repetitions.
+            Number of interfaces. A family has at most as many different ones as
+            repetitions.
         seed : int
             Not negative.
 
@@ -321,48 +326,51 @@ def fit_field(
     ----------
     profiles : DataArray, array, or list of them
         Lines over 'x' or maps over 'x' and 'y' (m) with equally spaced points, such as
-        `stiction.read_profile` returns. Missing values (NaN, missing points, filled values) are
-        left out. Plain arrays in SI have a value at each node of `interface`, and shape (nodes,) or
-        (samples, nodes), on a plane (nx, ny) or (samples, nx, ny). Several profiles are samples of
-        one field and may differ in length.
+        `stiction.read_profile` returns. Missing values (NaN, missing points, filled
+        values) are left out. Plain arrays in SI have a value at each node of `interface`,
+        and shape (nodes,) or (samples, nodes), on a plane (nx, ny) or (samples, nx, ny).
+        Several profiles are samples of one field and may differ in length.
     interface : Interface, optional
         Needed for arrays without coordinates. A warning is issued if it is too short, or
         its nodes too coarse, for the fitted field.
     marginal : str, dict or sequence of them
-        Family: 'beta', 'lognormal', 'weibull', 'gamma', 'normal' or any continuous distribution of
-        `scipy.stats`. The best of several is chosen, and `families` in the result compares them. A
-        table fixes parameters: ``{"type": "beta", "low": 0, "high": 2e6}``. By default both bounds
-        of 'beta' are estimated, and the lower bound of the others is 0.
+        Family: 'beta', 'lognormal', 'weibull', 'gamma', 'normal' or any continuous
+        distribution of `scipy.stats`. The best of several is chosen, and `families` in
+        the result compares them. A table fixes parameters: ``{"type": "beta", "low": 0,
+        "high": 2e6}``. By default both bounds of 'beta' are estimated, and the lower
+        bound of the others is 0.
     spectrum : str or dict
-        'power_law', 'squared_exponential' or 'exponential'. A table fixes parameters, such
-        as ``{"type": "power_law", "exponent": 4.0}``. If it has ``"truncation"`` or
-        ``"power_kept"``, the spectrum of the record ends there. Otherwise only the field has its
-        usual end.
+        'power_law', 'squared_exponential' or 'exponential'. A table fixes parameters,
+        such as ``{"type": "power_law", "exponent": 4.0}``. If it has ``"truncation"`` or
+        ``"power_kept"``, the spectrum of the record ends there. Otherwise only the field
+        has its usual end.
     detrend : int
-        Degree of the removed polynomial trend, 0 to 3. The mean is kept. The scatter that mean and
-        trend take from the values on average is added to the estimate, except for families of
-        `scipy.stats` with a fixed loc or scale.
+        Degree of the removed polynomial trend, 0 to 3. The mean is kept. The scatter that
+        mean and trend take from the values on average is added to the estimate, except
+        for families of `scipy.stats` with a fixed loc or scale.
     noise : bool or float
-        Whether to estimate white, normal measurement noise along with the field, or its standard
-        deviation (SI) if it is known.
+        Whether to estimate white, normal measurement noise along with the field, or its
+        standard deviation (SI) if it is known.
     anisotropy : bool or float
         Ratio of the correlation lengths of maps along y and x. False stands for 1, and True
         estimates it.
     between : bool, str or sequence of str
-        Whether records come from different specimens, each with its own factor of mean 1. The
-        coefficient of variation ``between`` of this factor is then estimated. Its family is one of
-        'lognormal', 'normal' (above zero) and 'weibull'. Several families, or True for all, are
-        averaged. A warning states that fewer than five specimens determine the scatter poorly.
+        Whether records come from different specimens, each with its own factor of mean 1.
+        The coefficient of variation ``between`` of this factor is then estimated. Its
+        family is one of 'lognormal', 'normal' (above zero) and 'weibull'. Several
+        families, or True for all, are averaged. A warning states that fewer than five
+        specimens determine the scatter poorly.
     prior : mapping, optional
         Priors of the mean, ``"strength.mean"``, and of the coefficient of variation,
-        ``"between.strength"``, as in `infer`. By default the first is flat in its logarithm, and
-        the second half-Cauchy of scale 0.1.
+        ``"between.strength"``, as in `infer`. By default the first is flat in its
+        logarithm, and the second half-Cauchy of scale 0.1.
     quantity : str
-        Measured quantity, for its unit: 'strength', 'normal_pressure', 'friction_coefficient', ...
-        A fitted field of friction coefficients has ``of="friction_coefficient"``.
+        Measured quantity, for its unit: 'strength', 'normal_pressure',
+        'friction_coefficient', ... A fitted field of friction coefficients has
+        ``of="friction_coefficient"``.
     bootstrap : int
-        Number of repetitions, at least 20, for the fitted field and for each of two fields with the
-        correlation lengths at the ends of a first interval.
+        Number of repetitions, at least 20, for the fitted field and for each of two
+        fields with the correlation lengths at the ends of a first interval.
     confidence : float
         Confidence level of the intervals.
     seed : int
@@ -387,26 +395,27 @@ def fit_field(
     Warns
     -----
     AccuracyWarning
-        If values are outliers or dropouts, profiles repeat others, or a family is left out because
-        it cannot be fitted to records simulated from it. Also for each of the `doubts`: records
-        hold fewer than ten correlation lengths, a p-value is below 1 % (of ``level`` if records of
-        different specimens lack `between`), the noise hides the cut-off of the spectrum, a
-        parameter lies at the end of the searched range, or fewer than five specimens shall
-        determine the scatter between them.
+        If values are outliers or dropouts, profiles repeat others, or a family is left
+        out because it cannot be fitted to records simulated from it. Also for each of the
+        `doubts`: records hold fewer than ten correlation lengths, a p-value is below 1 %
+        (of ``level`` if records of different specimens lack `between`), the noise hides
+        the cut-off of the spectrum, a parameter lies at the end of the searched range, or
+        fewer than five specimens shall determine the scatter between them.
 
     Notes
     -----
-    The marginal maximises the likelihood of values with noise. The spectrum maximises a Whittle
-    likelihood with the exact expectation for the window, which contains taper, gaps, detrending,
-    aliasing, and a given truncation of the spectrum (Sykulski et al., 2019; Guillaumin et al.,
-    2022). Correlations of values follow from correlations of the Gaussian field z by Hermite
-    expansion (Grigoriu, 1995).
+    The marginal maximises the likelihood of values with noise. The spectrum maximises a
+    Whittle likelihood with the exact expectation for the window, which contains taper,
+    gaps, detrending, aliasing, and a given truncation of the spectrum (Sykulski et al.,
+    2019; Guillaumin et al., 2022). Correlations of values follow from correlations of the
+    Gaussian field z by Hermite expansion (Grigoriu, 1995).
 
-    Families are compared by Akaike's criterion for a number of independent values. N values with
-    correlations rho_ij count as N^2/sum rho_ij^3.
+    Families are compared by Akaike's criterion for a number of independent values. N
+    values with correlations rho_ij count as N^2/sum rho_ij^3.
 
-    Intervals come from a studentised bootstrap (Davison and Hinkley, 1997, section 5.2), their
-    upper and lower ends from fields of longer and shorter correlation (Carpenter, 1999).
+    Intervals come from a studentised bootstrap (Davison and Hinkley, 1997, section 5.2),
+    their upper and lower ends from fields of longer and shorter correlation (Carpenter,
+    1999).
 
     Examples
     --------

@@ -69,8 +69,8 @@ def grid_of(
 ) -> PosteriorGrid | None:
     """Return the density with this logarithm at points (points, parameters) in a box, or None.
 
-    The result is None if the density is zero at all points. The midpoint rule converges faster than
-    any power of the step once a cell is narrower than the density.
+    The result is None if the density is zero at all points. The midpoint rule converges
+    faster than any power of the step once a cell is narrower than the density.
     """
     dimension = box.shape[1]
     along = int(min(MOST_ALONG, max(8, points ** (1.0 / dimension))))

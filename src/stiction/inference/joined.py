@@ -68,7 +68,8 @@ class SpecimenPosterior(Posterior):
     families : dict of str to float
         Posterior probability of each family of the factor between specimens.
     agreement : Agreement or None
-        Agreement of the peaks with the prediction by the profiles alone. None without profiles.
+        Agreement of the peaks with the prediction by the profiles alone. None without
+        profiles.
     """
 
     grid: Grid = field(repr=False, compare=False)

@@ -48,8 +48,8 @@ from stiction.random.synthesis import SAMPLES_PER_BLOCK
 
 NODES = {0: 1, 1: 25, 2: 11, 3: 7, 4: 5}
 COARSE = {0: 1, 1: 5, 2: 4, 3: 3, 4: 2}
-"""Nodes along each simulated parameter, by the number of these parameters. An expensive method that
-the local criterion guides is simulated at the coarse nodes only."""
+"""Nodes along each simulated parameter, by the number of these parameters. An expensive
+method that the local criterion guides is simulated at the coarse nodes only."""
 LOG = 3.0
 """Ratio of the ends of a prior from which on a parameter is interpolated in its logarithm."""
 MIN_CORRELATION = 0.8
@@ -151,7 +151,8 @@ def experiment_on(
 class Simulation(NamedTuple):
     """How onsets are simulated.
 
-    `done` holds the onsets of an interrupted call by experiment and samples. New ones are added.
+    `done` holds the onsets of an interrupted call by experiment and samples. New ones are
+    added.
     """
 
     method: Any
@@ -345,9 +346,10 @@ def make_likelihood(
 ) -> Likelihood:
     """Simulate the onsets that the likelihood needs (steps 1 to 5).
 
-    `lengths` holds the length of each kind of specimen, m, or None for the length of the problem.
-    `variable` names the peaks among the results, and `error` is the standard deviation of the load
-    cell. `box` is the part of the prior that matters, (2, parameters) as u, by default all of it.
+    `lengths` holds the length of each kind of specimen, m, or None for the length of the
+    problem. `variable` names the peaks among the results, and `error` is the standard
+    deviation of the load cell. `box` is the part of the prior that matters, (2,
+    parameters) as u, by default all of it.
     """
     box = prior.whole if box is None else box
     method, meter = simulation.method, simulation.meter
@@ -405,10 +407,11 @@ def moved(
 ) -> Array:
     """Return onsets by an expensive method from many onsets by the local criterion (step 4).
 
-    `many` are onsets by the local criterion, (points, many). At coarse nodes a `few` onsets by the
-    method are there, and `known` ones of the same samples by the local criterion, (nodes, few). The
-    difference of their quantiles, over the standard deviation, changes little between nodes. It is
-    interpolated between the nodes around each point, `index`, with their `weight`.
+    `many` are onsets by the local criterion, (points, many). At coarse nodes a `few`
+    onsets by the method are there, and `known` ones of the same samples by the local
+    criterion, (nodes, few). The difference of their quantiles, over the standard
+    deviation, changes little between nodes. It is interpolated between the nodes around
+    each point, `index`, with their `weight`.
     """
     mean, spread = known.mean(axis=1, keepdims=True), known.std(axis=1, keepdims=True)
     standardised = (np.sort(known) - mean) / spread

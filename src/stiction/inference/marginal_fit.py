@@ -86,8 +86,8 @@ KINDS: dict[str, tuple[Any, Callable[..., Array], Callable[..., Array]]] = {
         lambda u, a, b: (a - 1.0) * np.log(u) + (b - 1.0) * np.log1p(-u) - betaln(a, b),
     ),
 }
-"""Families that are fitted here: distribution of scipy, and distribution function and log density
-of (value - loc)/scale."""
+"""Families that are fitted here: distribution of scipy, and distribution function and log
+density of (value - loc)/scale."""
 SCIPYS = {"normal": "norm"}
 """Names of scipy for our names of families."""
 
@@ -178,7 +178,8 @@ class Family:
     def widened(self, marginal: Any, factor: float) -> Any:
         """Return the marginal with the same mean and `factor` times the standard deviation.
 
-        Fixed parameters stay. A distribution of scipy with a fixed loc or scale stays as it is.
+        Fixed parameters stay. A distribution of scipy with a fixed loc or scale stays as
+        it is.
         """
         free, mean = self.parameters(marginal), float(marginal.distribution.mean())
         moved: dict[str, Any] = {
@@ -308,7 +309,8 @@ def _beta(family: Family, values: Array, quiet: Array, noise: float, start: Any)
 def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], Array]]:
     """Return counts of values in bins, points for F, and a function from F there to the bins.
 
-    The convolution with the noise is a sum in steps of half a standard deviation or less (step 1).
+    The convolution with the noise is a sum in steps of half a standard deviation or less
+    (step 1).
     """
     counts, edges = np.histogram(values, bins=BINS)
     width = float(edges[1] - edges[0])
@@ -330,8 +332,8 @@ def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], 
 def mean_log_likelihood(marginal: Any, values: Array, noise: float) -> float:
     """Return the mean logarithm of the density of values that carry noise.
 
-    With noise it is the probability of a bin over its width. It stays finite if a value is all but
-    impossible in the family.
+    With noise it is the probability of a bin over its width. It stays finite if a value
+    is all but impossible in the family.
     """
     if noise**2 <= NEGLIGIBLE_NOISE * values.var():
         least = math.log(LEAST / float(np.ptp(values)))
@@ -357,8 +359,8 @@ def climb(
 ) -> Array:
     """Return the parameters of the greatest likelihood by steps of at most `longest` (step 3).
 
-    `value_of` returns the log likelihood, and a state from which `derivatives` returns score and
-    information. A gain below `settled` ends the search.
+    `value_of` returns the log likelihood, and a state from which `derivatives` returns
+    score and information. A gain below `settled` ends the search.
     """
     at = np.clip(at, limits[:, 0], limits[:, 1])
     value, state = value_of(at)

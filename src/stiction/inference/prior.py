@@ -24,9 +24,10 @@ TAIL_PROBABILITY = 1e-4
 class Prior:
     """Independent priors of some parameters of a problem and its random interface.
 
-    `distributions` are frozen distributions of `scipy.stats` by the keys of the user. A point is
-    given by `u` with a number in [0, 1] for each parameter, in which the prior is uniform. Arrays
-    have shape (points, parameters). These parameters replace the values in `problem` and `random`.
+    `distributions` are frozen distributions of `scipy.stats` by the keys of the user. A
+    point is given by `u` with a number in [0, 1] for each parameter, in which the prior
+    is uniform. Arrays have shape (points, parameters). These parameters replace the
+    values in `problem` and `random`.
     """
 
     problem: Problem

@@ -169,9 +169,9 @@ def _checked(record: Record, quantity: str) -> Record:
 def refuse_uncorrelated(windows: Sequence[RecordWindow], rows: Sequence[Array]) -> None:
     """Refuse records of white noise, whose correlation length lies below their spacing.
 
-    The sum of products v_i v_(i+j) over all lags j up to k, over the variance, has mean 0 for white
-    noise, and a variance equal to the number of products (Box and Pierce, 1970, who sum squares).
-    The test takes k = 1, 2, 4, ..., and pools records and directions.
+    The sum of products v_i v_(i+j) over all lags j up to k, over the variance, has mean 0
+    for white noise, and a variance equal to the number of products (Box and Pierce, 1970,
+    who sum squares). The test takes k = 1, 2, 4, ..., and pools records and directions.
     """
     lags = 2 ** np.arange(max(int(np.log2(max(windows[0].measured.shape) / 4)), 1))
     sums, counts = np.zeros(lags[-1]), np.zeros(lags[-1])

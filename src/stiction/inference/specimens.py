@@ -52,8 +52,8 @@ PRIOR_SCALE = 0.1
 LEAST_CV, MOST_CV = 2e-3, 0.9
 """Smallest and largest s."""
 SCATTER_CELLS, MEAN_CELLS, ONSET_MEANS = 40, 48, 5
-"""Values of s and of log m on the grid, and means at which onsets are simulated if T(c)/c depends
-on c."""
+"""Values of s and of log m on the grid, and means at which onsets are simulated if T(c)/c
+depends on c."""
 LOG_MEAN_MARGIN = 1.0
 """Distance by which the first range of log m exceeds the range of x."""
 LOWEST, PREDICTED = 3.0, 1_000
@@ -62,8 +62,8 @@ OUTER_MASS = 1e-6
 """Neglected mass on either side of log m."""
 MAX_MEAN_ZOOMS = 4
 FINE, MAX_X_POINTS = 4.0, 2_000
-"""Points of x for the least standard deviation of a number, and most points in all. Cells of x add
-a twelfth of their square to a variance, which is 0.5 % of the least variance."""
+"""Points of x for the least standard deviation of a number, and most points in all. Cells
+of x add a twelfth of their square to a variance, which is 0.5 % of the least variance."""
 LOWEST_FACTOR, TABULATED = 6.0, 2_401
 """Range of log b on either side of zero, and number of values in the table of its distribution."""
 TABULATED_DEVIATIONS = 6.0
@@ -304,7 +304,8 @@ def grid_of_profiles(profiles: Profiles, tables: "Tables | None" = None) -> tupl
 def _products(kernel: Array, tables: Array) -> Array:
     """Return the sum over numbers of log likelihoods, (fields, families, cells, means).
 
-    `tables` holds log likelihoods of the numbers at x, (fields, numbers, points) (steps 3 and 4).
+    `tables` holds log likelihoods of the numbers at x, (fields, numbers, points) (steps 3
+    and 4).
     """
     flat = kernel.reshape(-1, kernel.shape[-1]).T
     total = np.zeros((len(tables), flat.shape[1]))

@@ -108,9 +108,9 @@ def observe(rows: Sequence[Array], windows: Sequence[RecordWindow]) -> list[Obse
 class Model(NamedTuple):
     """Prediction of records from a spectrum, the Hermite shares of a marginal and noise.
 
-    `end_seen` says whether the truncation of the spectrum was given. Otherwise it is left out: it
-    lies at a multiple of 1/xi_0, and would determine the correlation length if it fell among the
-    wavenumbers of a record.
+    `end_seen` says whether the truncation of the spectrum was given. Otherwise it is left
+    out: it lies at a multiple of 1/xi_0, and would determine the correlation length if it
+    fell among the wavenumbers of a record.
     """
 
     spectrum: Any
@@ -308,7 +308,8 @@ class Whittle(NamedTuple):
     def noise_variance(self, at: Array) -> tuple[float, float]:
         """Return the variance of the noise, which may be negative, and its standard error.
 
-        The error assumes independent ordinates. It is too small, but in proportion to the true one.
+        The error assumes independent ordinates. It is too small, but in proportion to the
+        true one.
         """
         state = self.value(at)[1]
         model, (_, information) = state[0], self.score(at, state)

@@ -44,8 +44,8 @@ EXACT = {1: 16, 2: 2}
 ROOM = {1: 4, 2: 2}
 """Period of the grid on which a correlation is computed, in lengths of the record."""
 EDGE = 2.0
-"""Modes over which a spectrum fades out at its end. The likelihood would move in steps with the
-correlation length if the end were sharper."""
+"""Modes over which a spectrum fades out at its end. The likelihood would move in steps
+with the correlation length if the end were sharper."""
 LEFT_OUT = 1e-4
 """Share of the variance above the end of a spectrum without truncation."""
 FOLDS = 6
@@ -65,8 +65,8 @@ class Edge(NamedTuple):
 class RecordWindow:
     """Points of records of one geometry, `spacings` (m) apart: taper, gaps, and degree of trend.
 
-    Lags in each direction are 0, 1, ..., n - 1, -n, ..., -1. The shape of a real transform is
-    (*half).
+    Lags in each direction are 0, 1, ..., n - 1, -n, ..., -1. The shape of a real
+    transform is (*half).
     """
 
     def __init__(
@@ -150,9 +150,9 @@ class RecordWindow:
     def power(self, spectrum: Any, anisotropy: float = 1.0, *, end_seen: bool = True) -> Array:
         """Return the variance of z in each mode of a period of the grid. The sum is 1 (step 4).
 
-        Power above `FOLDS` sampling wavenumbers is spread evenly. The spectrum fades out at its
-        truncation. It has no truncation if `end_seen` is false, because the missing power of a
-        rough spectrum would be taken for noise.
+        Power above `FOLDS` sampling wavenumbers is spread evenly. The spectrum fades out
+        at its truncation. It has no truncation if `end_seen` is false, because the
+        missing power of a rough spectrum would be taken for noise.
         """
         dimensions = len(self.shape)
         stretch = (1.0, anisotropy)[:dimensions]

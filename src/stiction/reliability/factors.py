@@ -45,11 +45,11 @@ FIRST_SAMPLES, MOST_STEP_SAMPLES = 500, 8_000
 COUNT_MARGIN = 1.1
 """Factor on the number of samples, because the error so far is itself an estimate."""
 SUBSET_EVALUATIONS = 50.0
-"""Evaluations of subset simulation for a coefficient of variation of 1, over log10(P)^2. It was
-fitted to the table of docs/reliability.md."""
+"""Evaluations of subset simulation for a coefficient of variation of 1, over log10(P)^2.
+It was fitted to the table of docs/reliability.md."""
 LONG_LIST, LIST_COST = 100, 5.0
-"""Number of interfaces above which a list is long, and cost of an evaluation in chains over a long
-list, over the cost of an evaluation in counting."""
+"""Number of interfaces above which a list is long, and cost of an evaluation in chains
+over a long list, over the cost of an evaluation in counting."""
 
 
 class Counts(NamedTuple):
@@ -88,8 +88,8 @@ class Counts(NamedTuple):
     def characteristic(self, confidence: float) -> float:
         """Return the 5 % quantile that a share `confidence` of the interfaces exceeds, Pa.
 
-        Onsets of an interface are those of a mean and a factor of 1 in its group, times its mean
-        and factors at equal shares of its law.
+        Onsets of an interface are those of a mean and a factor of 1 in its group, times
+        its mean and factors at equal shares of its law.
         """
         random = self.state.experiment.random
         if not np.isfinite(self.shares).any():

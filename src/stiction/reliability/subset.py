@@ -87,9 +87,9 @@ class Below(NamedTuple):
 class Descent(NamedTuple):
     """A finished repetition: populations from all samples down to the rarest.
 
-    It is complete if it reached the threshold or the requested probability. By two levels it has
-    one population, the samples to which the guide leads with their exact values. `last` and
-    `walked` belong to walks among failures (see `two_level`).
+    It is complete if it reached the threshold or the requested probability. By two levels
+    it has one population, the samples to which the guide leads with their exact values.
+    `last` and `walked` belong to walks among failures (see `two_level`).
     """
 
     samples: int  # N, of the first level and, within a few, of each other
@@ -150,8 +150,8 @@ class Descent(NamedTuple):
     def around(self, value: float) -> tuple[Array, Array]:
         """Return draws and values on both sides of a value, in their true shares.
 
-        They are the lowest of a population, twice as many as lie below the value. Take a less rare
-        population if more than half of it lies below.
+        They are the lowest of a population, twice as many as lie below the value. Take a
+        less rare population if more than half of it lies below.
         """
         holders = self._holders(value)
         while True:
@@ -178,7 +178,8 @@ def grow(
 ) -> tuple[Array, Array, float, float]:
     """Return states and values of chains, the given ones first, acceptance and last step size.
 
-    All chains move together (step 5). The step size follows their acceptance, ever more slowly.
+    All chains move together (step 5). The step size follows their acceptance, ever more
+    slowly.
     """
     chains, dimension = draws.shape
     states, chain_values = np.empty((steps, chains, dimension)), np.empty((steps, chains))
@@ -213,9 +214,10 @@ def descend(
 ) -> Descent:
     """Walk down to a threshold or a probability, whichever comes first.
 
-    `function` takes draws (k, dimension) to values (k,), of which low ones are rare and at least
-    `floor`. Each level has `samples`. It begins only if it does not exceed `max_evaluations`.
-    `label` returns the number of the equally likely interface of each sample.
+    `function` takes draws (k, dimension) to values (k,), of which low ones are rare and
+    at least `floor`. Each level has `samples`. It begins only if it does not exceed
+    `max_evaluations`. `label` returns the number of the equally likely interface of each
+    sample.
     """
     count = max(2, round(samples * LEVEL_PROBABILITY))
     samples = count * max(2, round(samples / count))

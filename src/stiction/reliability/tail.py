@@ -42,8 +42,9 @@ UNLIMITED_EVALUATIONS = 10**18
 SIZE_MARGIN = 1.1
 """Factor on the sample size, because the variance so far is itself an estimate."""
 SUBSET, BRIDGE, OF_CURVES = (1, 1_000, 5_000), (3, 200, 1_000), (4, 2_000, 2_000)
-"""First key of the generators, and samples per level, or exact samples of two levels, of the first
-and of the largest repetition. Repetitions of curves are stored and have one size."""
+"""First key of the generators, and samples per level, or exact samples of two levels, of
+the first and of the largest repetition. Repetitions of curves are stored and have one
+size."""
 DEEPER = 0.3
 """Share of a probability to which repetitions go on for the lower end of the interval."""
 GUIDE_PILOT_SAMPLES = 500
@@ -129,10 +130,10 @@ class Tail(NamedTuple):
     def of_members(self, stress: float, count: int) -> Array:
         """Return the probability of each of the equally likely interfaces, (members,).
 
-        It is NaN if fewer than `RESOLVED` samples of an interface are so low. For plain samples it
-        is the share among the samples of that interface, because their number is random and makes
-        most of the error near P = 1. Repetitions are added up, since one may have few samples of an
-        interface.
+        It is NaN if fewer than `RESOLVED` samples of an interface are so low. For plain
+        samples it is the share among the samples of that interface, because their number
+        is random and makes most of the error near P = 1. Repetitions are added up, since
+        one may have few samples of an interface.
         """
         chances, seen, low, plain = np.zeros((4, count))
         weight = 0.0
@@ -152,11 +153,11 @@ class Tail(NamedTuple):
     def members_cv(self, stress: float, kinds: Array) -> float:
         """Return the coefficient of variation because the list of interfaces is a sample.
 
-        Its square is the sum of (p - w)^2 over entries with a share w of the list and a share p of
-        the failures, as in importance sampling. The sum of p^2 is the chance that two failures
-        belong to one entry. It is taken from pairs of different ancestors, which are independent,
-        so that few samples per entry do not make it too large. Members with the same number in
-        `kinds` are one entry.
+        Its square is the sum of (p - w)^2 over entries with a share w of the list and a
+        share p of the failures, as in importance sampling. The sum of p^2 is the chance
+        that two failures belong to one entry. It is taken from pairs of different
+        ancestors, which are independent, so that few samples per entry do not make it too
+        large. Members with the same number in `kinds` are one entry.
         """
         entries = np.bincount(kinds)
         total, pairs, alike = np.zeros(entries.size), 0.0, 0.0
@@ -224,9 +225,10 @@ def repeat_until_precise(
 ) -> list[Any]:
     """Return repetitions whose pooled coefficient of variation is at most the target.
 
-    Either all of them are complete, or there is a single incomplete one. `make` takes (samples,
-    number, evaluations left). `judge` returns the coefficient of variation, or zero to stop. Many
-    repetitions of moderate size, `first` to `largest`, bound the memory.
+    Either all of them are complete, or there is a single incomplete one. `make` takes
+    (samples, number, evaluations left). `judge` returns the coefficient of variation, or
+    zero to stop. Many repetitions of moderate size, `first` to `largest`, bound the
+    memory.
     """
     done: list[Any] = []
     spent, size = 0, first
@@ -279,8 +281,8 @@ def sample_tail(
 ) -> Tail:
     """Sample the lower tail down to a goal.
 
-    `algorithm` 'auto' takes two levels if the guide passes steps 1 and 5. `budget` includes the
-    pilot, (draws, stresses) of plain samples that are there already.
+    `algorithm` 'auto' takes two levels if the guide passes steps 1 and 5. `budget`
+    includes the pilot, (draws, stresses) of plain samples that are there already.
     """
     # 1.
     guide, auto, seed = None, algorithm == "auto", state.experiment.seed

@@ -83,9 +83,9 @@ def bridge(
 ) -> Descent:
     """Sample the exact lower tail near a threshold, or near a probability if none is given.
 
-    `samples` are exact evaluations for the middle factor. As many again walk in the failure set,
-    and `max_evaluations` limits both. Without a failure the estimate is zero, because leaving it
-    out would favour repetitions with a failure.
+    `samples` are exact evaluations for the middle factor. As many again walk in the
+    failure set, and `max_evaluations` limits both. Without a failure the estimate is
+    zero, because leaving it out would favour repetitions with a failure.
     """
     # 1. levels of the guide
     descent = descend(

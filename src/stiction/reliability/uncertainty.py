@@ -18,8 +18,8 @@ CONFIDENCE = 0.95
 def log_width(cv: float) -> float:
     """Return half the width of the interval of the logarithm of an estimate.
 
-    It follows Student's distribution, because the coefficient of variation is itself estimated,
-    from about 1/cv^2 independent families.
+    It follows Student's distribution, because the coefficient of variation is itself
+    estimated, from about 1/cv^2 independent families.
     """
     if cv == 0.0:
         return 0.0
@@ -47,13 +47,13 @@ def binomial_interval(failures: int, samples: int) -> tuple[float, float]:
 def ancestral_variance(ancestors: NDArray[np.int64], samples: int) -> float:
     """Return the squared coefficient of variation of a subset estimate by ancestors of failures.
 
-    Families that descend from different first samples, N = `samples` in all, evolve independently.
-    Their shares w_i among the failures then measure the error, v = sum (w_i - 1/N)^2, in three
-    steps:
+    Families that descend from different first samples, N = `samples` in all, evolve
+    independently. Their shares w_i among the failures then measure the error, v = sum
+    (w_i - 1/N)^2, in three steps:
 
     1. Sum the squared shares, and subtract 1/N.
-    2. If all samples fail, v is zero. Take (2/N)^2 at least, as if two more had not failed, which
-       bounds the error as their binomial distribution does.
+    2. If all samples fail, v is zero. Take (2/N)^2 at least, as if two more had not
+       failed, which bounds the error as their binomial distribution does.
     3. With k families of equal size v is 1/k, but the variance of a mean of k values needs
        1/(k - 1). Return v/(1 - v).
     """
